@@ -1,0 +1,53 @@
+"""Predict the motion of a manipulated cable as one bivariate spline over material coordinate and time."""
+
+from typing import TYPE_CHECKING, Any
+
+from dlocore.cable import PRESETS, Cable
+from dlocore.errors import Cancelled, DloError, SceneError
+from dlocore.paths import Move, Still, Waypoints
+from dlocore.prediction import Accuracy, EffectReport, GraspReaction, Iteration, Prediction
+from dlocore.scene import ControlPoints, Environment, Grasp, Load, Points, Quality, Scene, Straight, Table
+from dlocore.spline import SplineSurface
+
+if TYPE_CHECKING:
+    from dlocore.front import equilibrium, predict, warm_up
+
+__all__ = [
+    "PRESETS",
+    "Accuracy",
+    "Cable",
+    "Cancelled",
+    "ControlPoints",
+    "DloError",
+    "EffectReport",
+    "Environment",
+    "Grasp",
+    "GraspReaction",
+    "Iteration",
+    "Load",
+    "Move",
+    "Points",
+    "Prediction",
+    "Quality",
+    "Scene",
+    "SceneError",
+    "SplineSurface",
+    "Still",
+    "Straight",
+    "Table",
+    "Waypoints",
+    "equilibrium",
+    "predict",
+    "warm_up",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Import the solver on first use: its compiler takes longer to import than the rest of the package together."""
+    if name in ("predict", "equilibrium", "warm_up"):
+        import importlib
+
+        solver = importlib.import_module("dlocore.front")
+
+        return getattr(solver, name)
+    raise AttributeError(name)

@@ -1,0 +1,139 @@
+"""The cable: geometry, density and section stiffnesses, and presets of real cables."""
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dlocore.errors import SceneError, array, choice, number
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Cable:
+    """A cable of round section, nearly inextensible, with independent section stiffnesses.
+
+    Give each stiffness itself, or `youngs_modulus` and `shear_modulus` and the solid round section gives it
+    (EA = E pi D^2/4, EI = E pi D^4/64, GJ = G pi D^4/32; docs/model.md eq. 2). Real wires do not follow the isotropic
+    rule between EI and GJ, so they are independent. Where nothing is given, EA = 16 EI/D^2 (the solid section of the
+    same EI) and GJ = EI (measured wires lie at 0.8 to 1.6).
+
+    Args:
+        length: L [m], 0.01 to 1000.
+        diameter: D [m].
+        linear_density: mu [kg/m].
+        bending_stiffness: EI [N m^2].
+        axial_stiffness: EA [N].
+        torsional_stiffness: GJ [N m^2].
+        youngs_modulus: E [Pa].
+        shear_modulus: G [Pa].
+        bending_damping: internal damping on the rate of curvature [N m^2 s].
+        torsional_damping: internal damping on the rate of twist [N m^2 s]; not modelled yet, must be 0.
+        yield_strain: the paper's eps_M; not modelled yet, must be absent.
+        memory_rate: the paper's k_eps [1/s]; not modelled yet, must be absent.
+        rest_shape: the stress-free shape: "straight", "initial" (that of the start shape) or points (n, 2 or 3) [m].
+
+    Raises:
+        SceneError: a value is missing, not finite or not positive.
+    """
+
+    length: float
+    diameter: float
+    linear_density: float
+    bending_stiffness: float | None = None
+    axial_stiffness: float | None = None
+    torsional_stiffness: float | None = None
+    youngs_modulus: float | None = None
+    shear_modulus: float | None = None
+    bending_damping: float = 0.0
+    torsional_damping: float = 0.0
+    yield_strain: float | None = None
+    memory_rate: float | None = None
+    rest_shape: str | ArrayLike = "straight"
+
+    def __post_init__(self) -> None:
+        def put(name: str, value: Any) -> None:
+            object.__setattr__(self, name, value)
+
+        length = number("length", self.length, at_least=0.01, at_most=1000.0, unit="m")
+        diameter = number("diameter", self.diameter, above=0.0, at_most=length / 2, unit="m")
+        put("length", length)
+        put("diameter", diameter)
+        put("linear_density", number("linear_density", self.linear_density, above=0.0, at_most=1e4, unit="kg/m"))
+        optional = ("bending_stiffness", "axial_stiffness", "torsional_stiffness", "youngs_modulus", "shear_modulus")
+        for name in optional:
+            if getattr(self, name) is not None:
+                put(name, number(name, getattr(self, name), above=0.0, at_most=1e15))
+        if self.bending_stiffness is None:
+            if self.youngs_modulus is None:
+                raise SceneError("bending_stiffness", None, "EI [N m^2], or youngs_modulus [Pa]", "It is missing")
+            put("bending_stiffness", self.youngs_modulus * math.pi * diameter**4 / 64)
+        if self.axial_stiffness is None:
+            modulus = self.youngs_modulus
+            put(
+                "axial_stiffness",
+                16 * self.bending_stiffness / diameter**2 if modulus is None else modulus * math.pi * diameter**2 / 4,
+            )
+        if self.torsional_stiffness is None:
+            modulus = self.shear_modulus
+            put("torsional_stiffness", self.bending_stiffness if modulus is None else modulus * math.pi * diameter**4 / 32)
+        put("bending_damping", number("bending_damping", self.bending_damping, at_least=0.0, unit="N m^2 s"))
+        if number("torsional_damping", self.torsional_damping, at_least=0.0, unit="N m^2 s") > 0:
+            raise SceneError("torsional_damping", self.torsional_damping, "0", "Twist is not modelled yet")
+        for name in ("yield_strain", "memory_rate"):
+            if getattr(self, name) is not None:
+                raise SceneError(name, getattr(self, name), "absent", "Plasticity is not modelled yet")
+        if isinstance(self.rest_shape, str):
+            choice("rest_shape", self.rest_shape, ("straight", "initial"))
+        else:
+            columns = np.shape(self.rest_shape)[-1] if np.ndim(self.rest_shape) == 2 else 3
+            put("rest_shape", array("rest_shape", self.rest_shape, shape=(None, 2 if columns == 2 else 3), unit="m"))
+
+    @staticmethod
+    def preset(name: str, **overrides: Any) -> "Cable":
+        """Return the preset `name` with the given fields replaced.
+
+        Raises:
+            SceneError: no such preset or field.
+        """
+        if name not in PRESETS:
+            raise SceneError("preset", name, "one of " + ", ".join(PRESETS))
+        unknown = set(overrides) - {f.name for f in fields(Cable)}
+        if unknown:
+            raise SceneError(sorted(unknown)[0], overrides[sorted(unknown)[0]], "a field of Cable")
+        return Cable(**{**PRESETS[name].values, **overrides})
+
+
+@dataclass(frozen=True)
+class Preset:
+    """Measured values of a real cable and where they come from."""
+
+    values: dict[str, float]
+    source: str
+
+
+_WIRES = "measured wires of github.com/qj25/adapteddlo_muj (MIT), middle of the published range; length 1 m assumed"
+_ELECTRIC = "identified electric cables of github.com/sebtiburzio/floating_PAC_model, middle of the published range; length 1 m assumed"
+
+
+def _wire(density: float, diameter: float, EI: float, GJ: float | None) -> dict[str, float]:
+    values = {"length": 1.0, "linear_density": density, "diameter": diameter, "bending_stiffness": EI}
+    return values if GJ is None else values | {"torsional_stiffness": GJ}
+
+
+PRESETS: dict[str, Preset] = {
+    "paper": Preset(
+        _wire(0.05, 0.005, 1e-3, 1e-3) | {"axial_stiffness": 640.0},
+        "the planar case of the paper's Fig. 1 with the material chosen in docs/model.md (the paper gives none)",
+    ),
+    "white-wire": Preset(_wire(0.0174, 0.006, 8.8e-5, 6.9e-5), _WIRES),
+    "black-wire": Preset(_wire(0.0272, 0.006, 1.1e-3, 1.4e-3), _WIRES),
+    "red-wire": Preset(_wire(0.0215, 0.006, 7.9e-4, 1.3e-3), _WIRES),
+    "black-electric-cable": Preset(_wire(1.0, 0.020, 0.12, None), _ELECTRIC),
+    "orange-electric-cable": Preset(_wire(0.55, 0.015, 0.09, None), _ELECTRIC),
+    "tent-pole": Preset(
+        _wire(0.069, 0.007, 3.54, 2.36),
+        "simulator settings of github.com/burakaksoy (deformable pole); length 1 m assumed",
+    ),
+}

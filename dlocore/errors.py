@@ -1,0 +1,121 @@
+"""Errors of the predictor and the checks that raise them.
+
+Bad input is an exception that names the field, the value and what is allowed. Not converging is a result
+(`Prediction.status`), never an exception.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+class DloError(Exception):
+    """Anything this package raises on purpose."""
+
+
+class SceneError(DloError, ValueError):
+    """A scene that can't be solved as it was given.
+
+    Attributes:
+        field: path of the field, e.g. ``primitives[0].u``.
+        given: the value, shortened for reading.
+        allowed: what would be accepted, in words.
+        reason: what is wrong, in words.
+    """
+
+    def __init__(self, field: str, given: Any, allowed: str, reason: str = "") -> None:
+        self.field = field
+        self.given = _shorten(given)
+        self.allowed = allowed
+        self.reason = reason
+        super().__init__(str(self))
+
+    def __str__(self) -> str:
+        why = f" {self.reason}." if self.reason else ""
+        return f"{self.field}: got {self.given}.{why} Allowed: {self.allowed}."
+
+    def __reduce__(self) -> tuple[type["SceneError"], tuple[str, str, str, str]]:
+        return (type(self), (self.field, self.given, self.allowed, self.reason))
+
+
+class Cancelled(DloError):
+    """The caller asked a running solve to stop."""
+
+
+def _shorten(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    text = value if isinstance(value, str) else repr(value)
+    return text if len(text) <= 120 else text[:117] + "..."
+
+
+@contextmanager
+def within(prefix: str) -> Iterator[None]:
+    """Prefix the field of any SceneError raised inside, so that nested parts report their full path."""
+    try:
+        yield
+    except SceneError as error:
+        raise SceneError(f"{prefix}.{error.field}", error.given, error.allowed, error.reason) from None
+
+
+def number(
+    field: str,
+    value: Any,
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    at_most: float | None = None,
+    unit: str = "",
+) -> float:
+    """Return `value` as a float, or raise SceneError unless it is a finite number in the allowed range."""
+    bounds = [
+        f"above {above:g}" if above is not None else "",
+        f"at least {at_least:g}" if at_least is not None else "",
+        f"at most {at_most:g}" if at_most is not None else "",
+    ]
+    allowed = " ".join(["a finite number", *[b for b in bounds if b]]) + (f" [{unit}]" if unit else "")
+    if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.integer | np.floating):
+        raise SceneError(field, value, allowed)
+    try:
+        x = float(value)
+    except OverflowError:
+        raise SceneError(field, value, allowed) from None
+    inside = (
+        np.isfinite(x)
+        and (above is None or x > above)
+        and (at_least is None or x >= at_least)
+        and (at_most is None or x <= at_most)
+    )
+    if not inside:
+        raise SceneError(field, value, allowed)
+    return x
+
+
+def array(field: str, value: ArrayLike, *, shape: tuple[int | None, ...], unit: str = "") -> NDArray[np.float64]:
+    """Return `value` as a read-only float array of `shape` (None: any length), or raise SceneError."""
+    sizes = " x ".join("n" if n is None else str(n) for n in shape)
+    allowed = f"finite numbers, {sizes}" + (f" [{unit}]" if unit else "")
+    try:
+        raw = np.asarray(value)
+    except ValueError:
+        raise SceneError(field, value, allowed, "The rows differ in length") from None
+    if raw.dtype.kind not in "fiu":
+        raise SceneError(field, value, allowed)
+    x = np.array(raw, dtype=float)
+    if x.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, x.shape, strict=True)):
+        raise SceneError(field, f"shape {x.shape}", allowed)
+    if not np.isfinite(x).all():
+        where = [int(i) for i in np.argwhere(~np.isfinite(x))[0]]
+        raise SceneError(field + "".join(f"[{i}]" for i in where), float(x[tuple(where)]), allowed)
+    x.setflags(write=False)
+    return x
+
+
+def choice(field: str, value: Any, options: tuple[str, ...]) -> str:
+    """Return `value`, or raise SceneError unless it is one of `options`."""
+    if not isinstance(value, str) or value not in options:
+        raise SceneError(field, value, "one of " + ", ".join(options))
+    return value

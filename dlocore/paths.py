@@ -1,0 +1,175 @@
+"""Grasp paths: where a gripper goes, and how it turns, over time.
+
+A path's clock starts when its grasp does (`Grasp.grasp_time`, t = 0 by default). Before its first instant and after
+its last a path stands still.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation, Slerp
+
+from dlocore.errors import SceneError, array, choice, number
+
+Floats = NDArray[np.float64]
+Profile = Literal["minimum_jerk", "linear", "cubic"]
+
+# position law s(x) and its rate s'(x) on 0 <= x <= 1
+_PROFILES = {
+    "minimum_jerk": (lambda x: x**3 * (10 - 15 * x + 6 * x**2), lambda x: 30 * x**2 * (1 - x) ** 2),
+    "linear": (lambda x: x, np.ones_like),
+    "cubic": (lambda x: x**2 * (3 - 2 * x), lambda x: 6 * x * (1 - x)),
+}
+_DURATION = {"above": 1e-4, "at_most": 1e4, "unit": "s"}
+MAX_WAYPOINTS = 100_000
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Still:
+    """Stay where the cable was grasped."""
+
+    @property
+    def duration(self) -> float:
+        """Time until the path ends [s]."""
+        return 0.0
+
+    def at(self, t: Floats, start: Floats) -> Floats:
+        """Positions at times `t` (k,) [s] of a grasp that began at `start` (3,) [m]; (k, 3) [m]."""
+        return np.broadcast_to(start, (len(t), 3))
+
+    def velocity_at(self, t: float) -> Floats:
+        """Velocity at time `t` [s]; (3,) [m/s]."""
+        return np.zeros(3)
+
+    def rotation_at(self, t: Floats) -> Floats | None:
+        """Rotations since the grasp began at times `t`; (k, 3, 3), or None where it never turns."""
+        return None
+
+    def angular_velocity_at(self, t: float) -> Floats:
+        """Angular velocity at time `t` [s]; (3,) [rad/s]."""
+        return np.zeros(3)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Move:
+    """Move by `displacement` (3,) [m] and turn by the rotation vector `rotation` (3,) [rad] in `duration` [s].
+
+    `profile` is "minimum_jerk" (zero velocity and acceleration at both ends), "cubic" (zero velocity) or "linear"
+    (constant velocity: it starts and stops with a jump).
+    """
+
+    displacement: ArrayLike
+    duration: float
+    rotation: ArrayLike | None = None
+    profile: Profile = "minimum_jerk"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "displacement", array("displacement", self.displacement, shape=(3,), unit="m"))
+        object.__setattr__(self, "duration", number("duration", self.duration, **_DURATION))
+        if self.rotation is not None:
+            object.__setattr__(self, "rotation", array("rotation", self.rotation, shape=(3,), unit="rad"))
+        choice("profile", self.profile, tuple(_PROFILES))
+
+    def at(self, t: Floats, start: Floats) -> Floats:
+        """Positions at times `t` (k,) [s] of a grasp that began at `start` (3,) [m]; (k, 3) [m]."""
+        s = _PROFILES[self.profile][0](np.clip(t / self.duration, 0.0, 1.0))
+        return start + s[:, None] * cast(Floats, self.displacement)
+
+    def _rate(self, t: float) -> float:
+        x = t / self.duration
+        return float(_PROFILES[self.profile][1](np.float64(x))) / self.duration if 0.0 <= x < 1.0 else 0.0
+
+    def velocity_at(self, t: float) -> Floats:
+        """Velocity at time `t` [s]; (3,) [m/s]."""
+        return self._rate(t) * cast(Floats, self.displacement)
+
+    def rotation_at(self, t: Floats) -> Floats | None:
+        """Rotations since the grasp began at times `t`; (k, 3, 3), or None where it never turns."""
+        if self.rotation is None:
+            return None
+        s = _PROFILES[self.profile][0](np.clip(t / self.duration, 0.0, 1.0))
+        return Rotation.from_rotvec(s[:, None] * cast(Floats, self.rotation)).as_matrix()
+
+    def angular_velocity_at(self, t: float) -> Floats:
+        """Angular velocity at time `t` [s]; (3,) [rad/s]."""
+        return np.zeros(3) if self.rotation is None else self._rate(t) * cast(Floats, self.rotation)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Waypoints:
+    """Pass through `positions` (n, 3) [m] at `times` (n,) [s] along a C2 cubic spline that starts at rest.
+
+    `orientations` (n, 4), unit quaternions (w, x, y, z), turn the grasp by their rotation since the first. The first
+    position must be that of the cable at the grasped point, within `dlocore.shape.GRASP_TOLERANCE`; it is then the
+    cable that is brought to it.
+    """
+
+    times: ArrayLike
+    positions: ArrayLike
+    orientations: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        times = array("times", self.times, shape=(None,), unit="s")
+        if not 2 <= len(times) <= MAX_WAYPOINTS:
+            raise SceneError("times", f"{len(times)} times", f"2 to {MAX_WAYPOINTS} times")
+        if not (np.diff(times) > 1e-6).all():
+            k = int(np.argmin(np.diff(times)))
+            raise SceneError(f"times[{k + 1}]", times[k + 1], "times that rise by more than 1e-6 s")
+        if times[0] < 0.0:
+            raise SceneError("times[0]", times[0], "at least 0 [s]")
+        number("times[-1]", float(times[-1]), **_DURATION)
+        positions = array("positions", self.positions, shape=(None, 3), unit="m")
+        if len(positions) != len(times):
+            raise SceneError("positions", f"{len(positions)} positions", f"as many as times ({len(times)})")
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "positions", positions)
+        boundary = ((1, np.zeros(3)), (2, np.zeros(3)))
+        object.__setattr__(self, "_spline", CubicSpline(times, positions, bc_type=boundary))
+        if self.orientations is not None:
+            quaternions = array("orientations", self.orientations, shape=(None, 4))
+            if len(quaternions) != len(times):
+                raise SceneError("orientations", f"{len(quaternions)} rows", f"as many as times ({len(times)})")
+            norms = np.linalg.norm(quaternions, axis=1)
+            if not (np.abs(norms - 1.0) < 1e-3).all():
+                k = int(np.argmax(np.abs(norms - 1.0)))
+                raise SceneError(f"orientations[{k}]", quaternions[k], "unit quaternions (w, x, y, z)")
+            object.__setattr__(self, "orientations", quaternions)
+            turns = Rotation.from_quat(quaternions[:, [1, 2, 3, 0]])
+            object.__setattr__(self, "_slerp", Slerp(times, turns * turns[0].inv()))
+
+    @property
+    def duration(self) -> float:
+        """Time until the path ends [s]."""
+        return float(cast(Floats, self.times)[-1])
+
+    def _clip(self, t: Floats) -> Floats:
+        times = cast(Floats, self.times)
+        return np.clip(t, times[0], times[-1])
+
+    def at(self, t: Floats, start: Floats) -> Floats:
+        """Positions at times `t` (k,) [s]; (k, 3) [m]. `start` is not used: waypoints are absolute."""
+        return self._spline(self._clip(t))  # type: ignore[attr-defined]
+
+    def velocity_at(self, t: float) -> Floats:
+        """Velocity at time `t` [s]; (3,) [m/s]."""
+        times = cast(Floats, self.times)
+        return self._spline(t, 1) if times[0] <= t < times[-1] else np.zeros(3)  # type: ignore[attr-defined]
+
+    def rotation_at(self, t: Floats) -> Floats | None:
+        """Rotations since the grasp began at times `t`; (k, 3, 3), or None where it never turns."""
+        return None if self.orientations is None else self._slerp(self._clip(t)).as_matrix()  # type: ignore[attr-defined]
+
+    def angular_velocity_at(self, t: float) -> Floats:
+        """Angular velocity at time `t` [s]; (3,) [rad/s]."""
+        times = cast(Floats, self.times)
+        if self.orientations is None or not times[0] <= t < times[-1]:
+            return np.zeros(3)
+        step = min(1e-4, 0.5 * (times[-1] - t))
+        now, later = self._slerp([t, t + step])  # type: ignore[attr-defined]
+        return (later * now.inv()).as_rotvec() / step
+
+
+Path = Still | Move | Waypoints

@@ -1,0 +1,142 @@
+"""What a solve returns, and what it reports while it runs."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.scene import Scene
+from dlocore.spline import SplineSurface
+
+Floats = NDArray[np.float64]
+Status = Literal["converged", "max_iterations", "stalled", "time_limit"]
+
+
+@dataclass(frozen=True)
+class EffectReport:
+    """Whether an effect was simulated, why, and how large it was.
+
+    Attributes:
+        name: as in the scene's `effects`.
+        active: whether it was simulated.
+        reason: why, in words.
+        magnitude: its size on the predicted motion, in `unit`; None where that means nothing.
+        unit: of the magnitude, e.g. "N".
+    """
+
+    name: str
+    active: bool
+    reason: str
+    magnitude: float | None = None
+    unit: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Iteration:
+    """One iteration of a solve: of `spacetime` or `paper`, or one refinement level of `march`.
+
+    Attributes:
+        number: from 0.
+        update: norm of the change of the control points, the paper's eq. (25) [m]; for a refinement level the largest
+            change of the surface [m], infinite at the first.
+        residual: root of the weighted mean square of the equations' residual over the whole motion, as a displacement
+            [m] (docs/model.md eq. 16); for `paper` as a force [N]; for a level of `march` the largest Newton update [m].
+        energy: elastic + kinetic + gravitational energy at the end of the motion [J].
+        wall_time: since the solve began [s].
+        damping: Levenberg-Marquardt damping of the step, 0 for a plain one.
+        step_length: fraction of the full step that was taken.
+        n_u: control points along the cable at this iteration.
+        n_t: control points in time.
+        surface: the iterate itself.
+        note: what happened, in words, e.g. "Gauss-Newton tangent"; empty for a plain iteration.
+    """
+
+    number: int
+    update: float
+    residual: float
+    energy: float
+    wall_time: float
+    damping: float
+    step_length: float
+    n_u: int
+    n_t: int
+    surface: SplineSurface
+    note: str = ""
+
+
+OnIteration = Callable[[Iteration], None]
+
+
+@dataclass(frozen=True, eq=False)
+class GraspReaction:
+    """Force and moment that a gripper gives to the cable.
+
+    Attributes:
+        u: material coordinate of the grasp [m].
+        times: (k,) [s], those of the prediction's reactions.
+        reaction: (k, 3) [N]; zero while the gripper is open.
+        moment: (k, 3) [N m]; zero for a grasp that holds only the position.
+    """
+
+    u: float
+    times: Floats
+    reaction: Floats
+    moment: Floats
+
+
+@dataclass(frozen=True, kw_only=True)
+class Accuracy:
+    """What the answer is worth and what it cost.
+
+    Attributes:
+        method: the method that gave the answer.
+        error_estimate: estimated error of the position at the worst point of the surface [m]; None where nothing was
+            computed that tells.
+        wall_time: time of the whole solve [s].
+        n_u, n_t: size of the net of control points.
+        delta: threshold on the update [m].
+        steps: time steps of the march.
+        dimensions: 2 where the motion is planar, else 3.
+        phases: time by phase [s]: "setup", "march", "fit", "spacetime", "estimate", "report".
+    """
+
+    method: str
+    error_estimate: float | None
+    wall_time: float
+    n_u: int
+    n_t: int
+    delta: float
+    steps: int
+    dimensions: int
+    phases: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Prediction:
+    """A predicted motion.
+
+    Attributes:
+        scene: what was asked.
+        status: "converged", or why not; never a success word for a failure.
+        message: the status in words, and what to do about it.
+        surface: the bivariate spline q(u, t).
+        grasps: reaction of each grasp, in the scene's order.
+        effects: what was simulated and why.
+        iterations: how the solve went.
+        accuracy: method, estimated error, time.
+        start_energy: elastic energy stored in the start shape [J].
+        start_fit: root mean square distance of the start from the given points [m]; 0 where it was given exactly.
+    """
+
+    scene: Scene
+    status: Status
+    message: str
+    surface: SplineSurface
+    grasps: tuple[GraspReaction, ...]
+    effects: tuple[EffectReport, ...]
+    iterations: tuple[Iteration, ...]
+    accuracy: Accuracy
+    start_energy: float
+    start_fit: float

@@ -1,0 +1,82 @@
+"""The bivariate cubic B-spline q(u, t) = sum_ij b_i(u) b_j(t) q_ij of the paper's eq. (15)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import BSpline
+
+Floats = NDArray[np.float64]
+DEGREE = 3
+
+
+def uniform_knots(n: int, end: float) -> Floats:
+    """Return clamped uniform cubic knots for `n` control points on [0, end]; (n + 4,)."""
+    return np.concatenate([np.zeros(3), np.linspace(0.0, end, n - 2), np.full(3, end)])
+
+
+def design_matrix(knots: Floats, x: ArrayLike, derivative: int = 0) -> Floats:
+    """Return the basis functions, or a derivative of them, at the points `x`; (len(x), n) [1/unit^derivative]."""
+    n = len(knots) - DEGREE - 1
+    return BSpline(knots, np.eye(n), DEGREE)(np.asarray(x, dtype=float), derivative)
+
+
+@dataclass(frozen=True, eq=False)
+class SplineSurface:
+    """A predicted space-time surface.
+
+    Attributes:
+        control_points: q_ij, (n_t, n_u, 4) [m, m, m, rad].
+        knots_u: (n_u + 4,) [m].
+        knots_t: (n_t + 4,) [s].
+    """
+
+    control_points: Floats
+    knots_u: Floats
+    knots_t: Floats
+
+    @property
+    def length(self) -> float:
+        """Length of the cable [m]."""
+        return float(self.knots_u[-1])
+
+    @property
+    def horizon(self) -> float:
+        """Predicted time [s]."""
+        return float(self.knots_t[-1])
+
+    def __call__(self, u: ArrayLike, t: ArrayLike, du: int = 0, dt: int = 0) -> Floats:
+        """Return q, or its derivative of orders `du` and `dt`, on the grid of `t` and `u`.
+
+        Args:
+            u: material coordinates (k_u,) [m].
+            t: times (k_t,) [s].
+            du: order of the derivative in u, 0 to 3.
+            dt: order of the derivative in t, 0 to 3.
+
+        Returns:
+            (k_t, k_u, 4) [m, m, m, rad], per m^du s^dt.
+        """
+        along = design_matrix(self.knots_u, np.atleast_1d(u), du)
+        over = design_matrix(self.knots_t, np.atleast_1d(t), dt)
+        return np.einsum("tj,jic,ui->tuc", over, self.control_points, along, optimize=True)
+
+    def positions(self, u: ArrayLike, t: ArrayLike) -> Floats:
+        """Return r on the grid of `t` and `u`; (k_t, k_u, 3) [m]."""
+        return self(u, t)[..., :3]
+
+    def sample(self, samples_u: int = 101, samples_t: int = 33) -> tuple[Floats, Floats, Floats]:
+        """Return evenly spaced u (samples_u,) [m] and t (samples_t,) [s], and q there (samples_t, samples_u, 4)."""
+        u = np.linspace(0.0, self.length, samples_u)
+        t = np.linspace(0.0, self.horizon, samples_t)
+        return u, t, self(u, t)
+
+    def curvature(self, u: ArrayLike, t: ArrayLike) -> Floats:
+        """Return the curvature |r' x r''| / |r'|^3 on the grid; (k_t, k_u) [1/m]."""
+        first, second = self(u, t, du=1)[..., :3], self(u, t, du=2)[..., :3]
+        cross = np.linalg.norm(np.cross(first, second), axis=-1)
+        return cross / np.maximum(np.linalg.norm(first, axis=-1), 1e-300) ** 3
+
+    def axial_strain(self, u: ArrayLike, t: ArrayLike) -> Floats:
+        """Return |r'| - 1 on the grid; (k_t, k_u)."""
+        return np.linalg.norm(self(u, t, du=1)[..., :3], axis=-1) - 1.0
