@@ -77,7 +77,10 @@ class Cable:
             )
         if self.torsional_stiffness is None:
             modulus = self.shear_modulus
-            put("torsional_stiffness", self.bending_stiffness if modulus is None else modulus * math.pi * diameter**4 / 32)
+            put(
+                "torsional_stiffness",
+                self.bending_stiffness if modulus is None else modulus * math.pi * diameter**4 / 32,
+            )
         put("bending_damping", number("bending_damping", self.bending_damping, at_least=0.0, unit="N m^2 s"))
         if number("torsional_damping", self.torsional_damping, at_least=0.0, unit="N m^2 s") > 0:
             raise SceneError("torsional_damping", self.torsional_damping, "0", "Twist is not modelled yet")

@@ -163,7 +163,9 @@ class Grasp:
         if not isinstance(self.path, Still | Move | Waypoints):
             raise SceneError("path", self.path, "Still, Move or Waypoints")
         if self.hold == "point":
-            turns = getattr(self.path, "rotation", None) is not None or getattr(self.path, "orientations", None) is not None
+            turns = (
+                getattr(self.path, "rotation", None) is not None or getattr(self.path, "orientations", None) is not None
+            )
             if turns:
                 name = "path.rotation" if isinstance(self.path, Move) else "path.orientations"
                 raise SceneError(name, "a rotation", 'none with hold "point", or hold "tangent"')
@@ -285,7 +287,9 @@ class Quality:
             )
         given = [n for n in ("n_u", "target_error", "time_budget") if getattr(self, n) is not None]
         if len(given) > 1:
-            raise SceneError(given[1], getattr(self, given[1]), f"only one of n_u with n_t, target_error and time_budget")
+            raise SceneError(
+                given[1], getattr(self, given[1]), f"only one of n_u with n_t, target_error and time_budget"
+            )
         if self.method in ("spacetime", "paper") and self.n_u is None:
             raise SceneError("method", self.method, "n_u and n_t given with it")
 
@@ -369,5 +373,3 @@ class Scene:
 
 
 MIN_GRASP_DISTANCE = 1e-4  # of the length, between two grasps that hold at the same time
-
-

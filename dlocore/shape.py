@@ -82,24 +82,29 @@ def _given(shape: ControlPoints, length: float) -> StartCurve:
 
 def _fitted(shape: Points, length: float) -> StartCurve:
     points = cast(Floats, shape.points)
-    fit = fit_points(points, length)
-    _check_length("shape.points", fit.length, length)
-    scale = length / fit.length
-    middle = fit.curve(np.linspace(0, fit.length, 65)).mean(axis=0)
-    control = middle + scale * (fit.curve.c - middle)
-    curve = StartCurve(knots=fit.curve.t * scale, control_points=control)
+    middle = points.mean(axis=0)
+    fit = fit_points(points - middle, length)
+    _check_length("shape.points", fit.length_given, length)
+    scale = length / fit.curve.t[-1]
+    centre = fit.curve(np.linspace(0.0, fit.curve.t[-1], 65)).mean(axis=0)
+    knots = fit.curve.t * scale
+    curve = SplineCurve(knots=knots, control_points=middle + centre + scale * (fit.curve.c - centre))
     at = fit.at * scale
-    d = points - curve(at)
-    t = curve(at, 1)
-    off = np.linalg.norm(d - (d * t).sum(axis=1)[:, None] * t, axis=1)
+    off = _distance(curve, at, points)
     return StartCurve(
-        knots=curve.knots,
-        control_points=control,
+        knots=knots,
+        control_points=curve.control_points,
         velocity=_velocity(shape.velocity, at),
         fit_rms=float(np.sqrt((off**2).mean())),
         fit_max=float(off.max()),
-        length_given=fit.length,
+        length_given=fit.length_given,
     )
+
+
+def _distance(curve: SplineCurve, at: Floats, points: Floats) -> Floats:
+    """Return the distances (n,) [m] of points from a unit-speed curve, from parameters near their feet."""
+    foot = at + ((points - curve(at)) * curve(at, 1)).sum(axis=1)
+    return np.sqrt(((points - curve(np.clip(foot, 0.0, curve.knots[-1]))) ** 2).sum(axis=1))
 
 
 def _check_length(name: str, given: float, length: float) -> None:

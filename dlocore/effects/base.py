@@ -1,0 +1,36 @@
+"""The one contract that all effects meet.
+
+An effect is a frozen dataclass of parameters with a `site`, the place where its compiled law acts:
+
+========== ============================== ============================================================================
+site       the law is given               the law gives
+========== ============================== ============================================================================
+field      -                              constant coefficients of linear terms: density, drag, weight per unit length
+axial      strain e                       tension N and modulus dN/de
+curvature  kappa, its rate, its memory    moment M, stiffness dM/dkappa, viscosity dM/d(rate)
+body       position, velocity             force per unit length, minus its derivatives by position and by velocity
+========== ============================== ============================================================================
+
+Curvature is a vector: one signed component in the plane, three world components across the tangent in space; a law is
+written once for both. Laws at strain sites know nothing of splines or of geometry: `kernels/strain.py` turns stress
+into generalised forces. Memory is the paper's eps_0, the curvature of the stress-free shape at the point: state that
+belongs to the solve, not to the law. Laws add to their outputs, so that effects at one site superpose.
+`effects/laws.py` is the one list of them: adding an effect is adding a file and its line there.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+Site = Literal["field", "axial", "curvature", "body"]
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Base of the effects: a name, a site, and up to four parameters for the compiled law."""
+
+    name: ClassVar[str]
+    site: ClassVar[Site]
+
+    def parameters(self) -> tuple[float, ...]:
+        """Return the numbers that the compiled law reads, in its order."""
+        return ()

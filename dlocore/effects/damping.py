@@ -1,0 +1,49 @@
+"""Internal damping on the rate of curvature, so that a rigid swing costs nothing (docs/model.md eq. 9).
+
+Without a twist coordinate the spin of the sections about the tangent is free, and only the radial part of the rate
+costs: kappa_t . kappa/|kappa|. Near zero curvature that direction is undefined; there the whole rate costs, with a
+smooth passage at |kappa| of about `EPSILON`/L: the dissipation density is
+
+    eta/2 (eps^2 |kappa_t|^2 + (kappa . kappa_t)^2) / (|kappa|^2 + eps^2)  [W/m],
+
+in the plane, where kappa has one component, exactly eta/2 kappa_t^2.
+"""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from dlocore.effects.base import Effect, Site
+from dlocore.kernels.compile import law
+
+EPSILON = 0.1  # times 1/L: a cable bent to less than a tenth of a radian over its length
+
+
+@dataclass(frozen=True)
+class Damping(Effect):
+    """Bending damping eta [N m^2 s] and the length L [m] that scales the passage near zero curvature."""
+
+    name: ClassVar[str] = "damping"
+    site: ClassVar[Site] = "curvature"
+    bending_damping: float
+    length: float
+
+    def parameters(self) -> tuple[float, ...]:
+        """Return (eta, eps^2)."""
+        return (self.bending_damping, (EPSILON / self.length) ** 2)
+
+
+@law
+def damping_moment(p: Any, kappa: Any, rate: Any, moment: Any, viscosity: Any) -> None:
+    """Add M = V kappa_t with V = eta (eps^2 I + kappa kappa') / (|kappa|^2 + eps^2), which is positive definite."""
+    n = len(kappa)
+    square = p[1]
+    along = 0.0
+    for k in range(n):
+        square += kappa[k] * kappa[k]
+        along += kappa[k] * rate[k]
+    scale = p[0] / square
+    for k in range(n):
+        moment[k] += scale * (p[1] * rate[k] + kappa[k] * along)
+        viscosity[k, k] += scale * p[1]
+        for j in range(n):
+            viscosity[k, j] += scale * kappa[k] * kappa[j]

@@ -1,0 +1,259 @@
+"""Knots, cubic B-spline basis tables and Gauss points, compiled: they are rebuilt for every scene."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dlocore.kernels.compile import kernel
+
+GAUSS_1 = (np.array([0.0]), np.array([2.0]))
+GAUSS_2 = np.polynomial.legendre.leggauss(2)
+GAUSS_3 = np.polynomial.legendre.leggauss(3)
+GAUSS_4 = np.polynomial.legendre.leggauss(4)
+_SAMPLES = 256  # of the knot density in one segment
+
+
+@kernel
+def basis(knots: Any, span: int, x: float, order: int, out: Any) -> None:
+    """Write the four cubic basis functions of `span` at `x`, and their derivatives to `order` (0 to 3), to out[order+1, 4].
+
+    `span` is the index k with knots[k] <= x <= knots[k+1] (Cox-de Boor; Piegl and Tiller, The NURBS Book, A2.3).
+    """
+    ndu = np.empty((4, 4))
+    left = np.empty(4)
+    right = np.empty(4)
+    ndu[0, 0] = 1.0
+    for j in range(1, 4):
+        left[j] = x - knots[span + 1 - j]
+        right[j] = knots[span + j] - x
+        saved = 0.0
+        for r in range(j):
+            ndu[j, r] = right[r + 1] + left[j - r]
+            ratio = ndu[r, j - 1] / ndu[j, r]
+            ndu[r, j] = saved + right[r + 1] * ratio
+            saved = left[j - r] * ratio
+        ndu[j, j] = saved
+    for j in range(4):
+        out[0, j] = ndu[j, 3]
+    a = np.empty((2, 4))
+    for r in range(4):
+        s1, s2 = 0, 1
+        a[0, 0] = 1.0
+        factor = 3.0
+        for k in range(1, order + 1):
+            d = 0.0
+            rk, pk = r - k, 3 - k
+            if r >= k:
+                a[s2, 0] = a[s1, 0] / ndu[pk + 1, rk]
+                d = a[s2, 0] * ndu[rk, pk]
+            j1 = 1 if rk >= -1 else -rk
+            j2 = k - 1 if r - 1 <= pk else 3 - r
+            for j in range(j1, j2 + 1):
+                a[s2, j] = (a[s1, j] - a[s1, j - 1]) / ndu[pk + 1, rk + j]
+                d += a[s2, j] * ndu[rk + j, pk]
+            if r <= pk:
+                a[s2, k] = -a[s1, k - 1] / ndu[pk + 1, r]
+                d += a[s2, k] * ndu[r, pk]
+            out[k, r] = d * factor
+            factor *= pk
+            s1, s2 = s2, s1
+
+
+@kernel
+def find_span(knots: Any, x: float) -> int:
+    """Return k with knots[k] <= x < knots[k+1], or the last non-empty span at the end."""
+    k = len(knots) - 5
+    while k > 3 and (x < knots[k] or knots[k] == knots[k + 1]):
+        k -= 1
+    return k
+
+
+@kernel
+def basis_rows(knots: Any, x: Any, order: int) -> Any:
+    """Return first control points (len(x),) and tables (len(x), order + 1, 4) of the basis at the points `x`."""
+    first = np.empty(len(x), np.int64)
+    table = np.empty((len(x), order + 1, 4))
+    for p in range(len(x)):
+        span = find_span(knots, x[p])
+        first[p] = span - 3
+        basis(knots, span, x[p], order, table[p])
+    return first, table
+
+
+@kernel
+def graded_knots(n: int, length: float, features: Any, multiplicity: Any, power: Any, width: Any) -> Any:
+    """Return clamped knots for `n` control points on [0, length] with knots at, and graded towards, the features.
+
+    The density of knots is 1 + sum_f (w_f / (w_f + |u - u_f| / L))^p_f: features are grasps and loads. A feature inside
+    becomes a knot of its multiplicity. Spans are shared among the segments between features in proportion to the
+    integral of the density (each at least one), and spread within each by it.
+
+    Args:
+        n: number of control points, at least 4 + the multiplicities inside.
+        length: L [m].
+        features: sorted material coordinates (m,) [m].
+        multiplicity: of the knot at each feature (m,), 1 or 2; at the ends of the cable ignored.
+        power: grading exponent p_f (m,).
+        width: grading width w_f (m,), fraction of L.
+
+    Returns:
+        knots (n + 4,) [m]; empty where n is too small.
+    """
+    cuts = np.empty(len(features) + 2)
+    repeat = np.ones(len(features) + 2, np.int64)
+    cuts[0] = 0.0
+    m = 1
+    extra = 0
+    for f in range(len(features)):
+        if features[f] > 1e-9 * length and features[f] < (1.0 - 1e-9) * length:
+            cuts[m] = features[f]
+            repeat[m] = multiplicity[f]
+            extra += multiplicity[f] - 1
+            m += 1
+    cuts[m] = length
+    spans = n - 3 - extra
+    if spans < m:
+        return np.empty(0)
+    cumulative = np.empty((m, _SAMPLES + 1))
+    total = np.empty(m)
+    for s in range(m):
+        a, b = cuts[s], cuts[s + 1]
+        cumulative[s, 0] = 0.0
+        before = 0.0
+        for i in range(_SAMPLES + 1):
+            # sample points crowd towards both ends of the segment, where the density peaks
+            x = i / _SAMPLES
+            u = a + (b - a) * x * x * (3.0 - 2.0 * x)
+            here = 1.0
+            for f in range(len(features)):
+                here += ((width[f] + 1.0) / (width[f] + abs(u - features[f]) / length)) ** power[f]
+            if i > 0:
+                y = (i - 1) / _SAMPLES
+                step = u - (a + (b - a) * y * y * (3.0 - 2.0 * y))
+                cumulative[s, i] = cumulative[s, i - 1] + 0.5 * (here + before) * step
+            before = here
+        total[s] = cumulative[s, _SAMPLES]
+    share = np.ones(m, np.int64)
+    for _ in range(spans - m):
+        worst = 0
+        for s in range(1, m):
+            if total[s] / share[s] > total[worst] / share[worst]:
+                worst = s
+        share[worst] += 1
+    knots = np.empty(n + 4)
+    knots[:4] = 0.0
+    k = 4
+    for s in range(m):
+        a, b = cuts[s], cuts[s + 1]
+        i = 0
+        for j in range(1, share[s]):
+            target = total[s] * j / share[s]
+            while cumulative[s, i + 1] < target:
+                i += 1
+            x = (i + (target - cumulative[s, i]) / (cumulative[s, i + 1] - cumulative[s, i])) / _SAMPLES
+            knots[k] = a + (b - a) * x * x * (3.0 - 2.0 * x)
+            k += 1
+        if s < m - 1:
+            for _ in range(repeat[s + 1]):
+                knots[k] = b
+                k += 1
+    knots[k:] = length
+    return knots
+
+
+class Tables(NamedTuple):
+    """Basis functions at the quadrature points of a set of knots.
+
+    `*_first` (p,): index of the first of the four control points at each point; `*_b1` (p, 4): first derivatives of
+    their basis functions [1/m], `*_b2` second [1/m^2], `*_b0` values; `*_w` (p,): weights [m]. Axial points: one a span
+    and two in an end span whose end direction is free (selective reduced integration, docs/model.md). Curvature and
+    body points: three a span. `mass` (n, 4): integrals of b_i b_{i+d} du [m]; `weight` (n,): integrals of b_i du [m].
+    """
+
+    axial_first: Any
+    axial_b1: Any
+    axial_w: Any
+    curvature_u: Any
+    curvature_first: Any
+    curvature_b1: Any
+    curvature_b2: Any
+    curvature_w: Any
+    body_first: Any
+    body_b0: Any
+    body_w: Any
+    mass: Any
+    weight: Any
+
+
+@kernel
+def _points(knots: Any, rule: Any, weights: Any) -> Any:
+    spans = 0
+    for k in range(3, len(knots) - 4):
+        spans += knots[k + 1] > knots[k]
+    g = len(rule)
+    u = np.empty(spans * g)
+    w = np.empty(spans * g)
+    p = 0
+    for k in range(3, len(knots) - 4):
+        half = 0.5 * (knots[k + 1] - knots[k])
+        if half > 0.0:
+            for i in range(g):
+                u[p] = knots[k] + half * (1.0 + rule[i])
+                w[p] = half * weights[i]
+                p += 1
+    return u, w
+
+
+@kernel
+def _axial_points(knots: Any, free_start: bool, free_end: bool, rule: Any, weights: Any) -> Any:
+    spans = 0
+    for k in range(3, len(knots) - 4):
+        spans += knots[k + 1] > knots[k]
+    u = np.empty(spans + 2)
+    w = np.empty(spans + 2)
+    p = 0
+    s = 0
+    for k in range(3, len(knots) - 4):
+        half = 0.5 * (knots[k + 1] - knots[k])
+        if half > 0.0:
+            s += 1
+            if (s == 1 and free_start) or (s == spans and free_end):
+                for i in range(2):
+                    u[p] = knots[k] + half * (1.0 + rule[i])
+                    w[p] = half * weights[i]
+                    p += 1
+            else:
+                u[p] = knots[k] + half
+                w[p] = 2.0 * half
+                p += 1
+    return u[:p], w[:p]
+
+
+@kernel
+def build_tables(
+    knots: Any, free_start: bool, free_end: bool, rule2: Any, w2: Any, rule3: Any, w3: Any, rule4: Any, w4: Any
+) -> Any:
+    """Return `Tables` of the clamped cubic `knots`; `free_*`: the direction at that end of the cable is free."""
+    u, axial_w = _axial_points(knots, free_start, free_end, rule2, w2)
+    axial_first, table = basis_rows(knots, u, 1)
+    axial_b1 = np.ascontiguousarray(table[:, 1])
+    curvature_u, curvature_w = _points(knots, rule3, w3)
+    curvature_first, table = basis_rows(knots, curvature_u, 2)
+    b0 = np.ascontiguousarray(table[:, 0])
+    b1 = np.ascontiguousarray(table[:, 1])
+    b2 = np.ascontiguousarray(table[:, 2])
+    n = len(knots) - 4
+    mass = np.zeros((n, 4))
+    weight = np.zeros(n)
+    u4, weights4 = _points(knots, rule4, w4)
+    first4, table4 = basis_rows(knots, u4, 0)
+    for p in range(len(u4)):
+        f = first4[p]
+        for i in range(4):
+            weight[f + i] += weights4[p] * table4[p, 0, i]
+            for j in range(i, 4):
+                mass[f + i, j - i] += weights4[p] * table4[p, 0, i] * table4[p, 0, j]
+    return Tables(
+        axial_first, axial_b1, axial_w, curvature_u, curvature_first, b1, b2, curvature_w, curvature_first, b0, curvature_w,
+        mass, weight,
+    )  # fmt: skip

@@ -1,0 +1,34 @@
+"""The decorator of every compiled function, with an on-disk cache that follows the source of all of them."""
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+
+
+def _digest() -> str:
+    """Hash the source of everything that is compiled."""
+    here = Path(__file__).parent
+    sources = sorted([*here.glob("*.py"), *(here.parent / "effects").glob("*.py")])
+    return hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
+
+
+_SOURCE = _digest()
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile `function` without the GIL and without fastmath, which would hide NaN.
+
+    numba's cache of a function looks only at the age of that function's own file, so a change of a law that is inlined
+    into a kernel would go unnoticed. The stamp is therefore the hash of all compiled sources.
+    """
+    compiled = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    compiled._cache._cache_file._source_stamp = _SOURCE
+    return compiled
+
+
+def law(function: Callable[..., Any]) -> Any:
+    """Compile a pointwise law that is inlined into the kernels."""
+    return numba.njit(error_model="numpy", inline="never")(function)

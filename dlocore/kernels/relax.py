@@ -1,0 +1,97 @@
+"""Minimise the stored energy of a held cable: start shapes and static equilibria."""
+
+from typing import Any
+
+import numpy as np
+
+from dlocore.kernels.assembly import add_scalar_band, assemble, multiply_scalar_band, stored_energy
+from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_matrix, reduce_vector, solve
+from dlocore.kernels.compile import kernel
+
+_HALVINGS = 30
+
+
+@kernel
+def _merit(
+    axes: Any, q: Any, target: Any, strength: float, applied: Any, tables: Any, active: Any, p: Any, memory: Any, w: Any
+) -> float:
+    """Return the energy: stored + strength/2 (q - target)' B (q - target) - applied . q."""
+    w[:] = 0.0
+    away = q - target
+    multiply_scalar_band(tables.mass, away, strength, w)
+    total = stored_energy(axes, q, tables, active, p, memory)
+    for i in range(q.shape[0]):
+        for d in range(q.shape[1]):
+            total += 0.5 * away[i, d] * w[i, d] - applied[i, d] * q[i, d]
+    return total
+
+
+@kernel
+def relax(
+    axes: Any, q: Any, target: Any, strength: float, applied: Any, tables: Any, active: Any, p: Any, memory: Any, e: Any,
+    offset: Any, tolerance: float, limit: int,
+) -> Any:  # fmt: skip
+    """Minimise energy over q (n, nc) in place by Newton steps with a line search; return (update [m], iterations).
+
+    The energy is the stored one, minus the work of the applied forces, plus a spring of `strength` [N/m^2] a unit length
+    towards `target`. Where the tangent is not positive its positive semidefinite part is taken. The work of the
+    residual, not the energy, decides where energy differences drown in rounding.
+
+    Args:
+        e, offset: elimination and prescribed part of the held degrees of freedom.
+        tolerance: on the largest update [m].
+        limit: on the iterations.
+    """
+    nc = len(axes)
+    n = q.shape[0]
+    size = n * nc
+    free = size - len(e.held)
+    K = np.empty((size, 4 * nc))
+    A = np.empty((free, 4 * nc))
+    f = np.empty((n, nc))
+    still = np.zeros((n, nc))
+    w = np.empty((n, nc))
+    x = np.empty(free)
+    change = np.empty(size)
+    place_held(e, offset, q.ravel())
+    energy = _merit(axes, q, target, strength, applied, tables, active, p, memory, w)
+    update = np.inf
+    damping = 0.0
+    largest = 0.25 * np.sum(tables.weight)  # a step no longer than a quarter of the cable
+    for it in range(limit):
+        for attempt in range(40):
+            geometric = 1.0 if attempt == 0 else 0.0
+            assemble(axes, q, still, tables, active, p, memory, (1.0, 0.0, geometric), f, K)
+            add_scalar_band(nc, tables.mass, strength, K)
+            if attempt > 1:
+                damping = max(10.0 * damping, 1e-12 * np.max(K[:, 0]))
+            for i in range(size):
+                K[i, 0] += damping
+            reduce_matrix(e, K, A)
+            if factor(A) < 0:
+                break
+        damping *= 0.1
+        f -= applied
+        multiply_scalar_band(tables.mass, q - target, strength, f)
+        reduce_vector(e, f.ravel(), x)
+        solve(A, x)
+        expand_vector(e, x, change)
+        update = np.max(np.abs(change))
+        if not np.isfinite(update):
+            return np.inf, it
+        length = min(1.0, largest / update)
+        slope = 0.0
+        for i in range(size):
+            slope += change[i] * f.ravel()[i]
+        step = change.reshape((n, nc))
+        if update > tolerance:
+            for _ in range(_HALVINGS):
+                after = _merit(axes, q - length * step, target, strength, applied, tables, active, p, memory, w)
+                if after <= energy - 1e-4 * length * slope + 1e-14 * abs(energy):
+                    break
+                length *= 0.5
+        q -= length * step
+        energy = _merit(axes, q, target, strength, applied, tables, active, p, memory, w)
+        if update <= tolerance:
+            return update, it + 1
+    return update, limit

@@ -1,0 +1,101 @@
+"""A penalised cubic spline whose smoothness is chosen from the data, by banded linear algebra alone."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.linalg.lapack import dpbtrf, dpbtrs
+
+from dlocore.spline import DEGREE
+
+Floats = NDArray[np.float64]
+
+STRENGTHS = 10.0 ** np.arange(-6.0, 14.0)  # lambda, relative: from interpolation to a parabola on MAX_SPANS spans
+LEAST_NOISE = 1e-6  # of the size of the data: below it rounding, not the data, would choose the smoothness
+CURVATURE_PENALTY = 1e-8  # of the penalty, on r'': decides the shape where fewer than three points are distinct
+
+
+def smooth(x: Floats, y: Floats, weight: Floats, length: float, spans: int, most_noise: float) -> BSpline:
+    """Return the cubic spline that minimises sum w |r(x) - y|^2 + lambda int |r'''|^2 on uniform knots.
+
+    lambda has the largest restricted likelihood (REML), with the noise profiled out: least
+
+        (N - 3) log D + log det(A + lambda P) - (n - 3) log lambda,   D = sum w |y|^2 - b . c,   (A + lambda P) c = b.
+
+    Cross-validation was tried: from 8 to 60 points it took the noise for the shape in every third case, with lengths
+    up to 10 % too long.
+
+    Args:
+        x: parameters (N,), in any order, near [0, length] [m].
+        y: data (N, 3).
+        weight: number of points that each row stands for (N,).
+        length: end of the last span [m].
+        spans: number of knot spans.
+    """
+    n = spans + DEGREE
+    k, basis = _basis(x * spans / length, spans)
+    normal, right = normal_equations(k, basis, weight, y, n)
+    square = float((weight * (y**2).sum(axis=1)).sum())
+    penalty = _penalty(n)
+    strengths = STRENGTHS * (normal[0].mean() / penalty[0].mean())
+    score = np.array([_score(normal, penalty, right, square, len(x), most_noise, s) for s in strengths])
+    control = _solve(normal + _least(strengths, score) * penalty, right)[1]
+    return BSpline(length / spans * np.arange(-DEGREE, spans + DEGREE + 1), control, DEGREE)
+
+
+def _basis(x: Floats, spans: int) -> tuple[NDArray[np.intp], Floats]:
+    """Return the first index (N,) and the values (4, N) of the uniform cubic B-splines at `x` [spans]."""
+    k = np.clip(np.floor(x).astype(np.intp), 0, spans - 1)
+    f = x - k
+    g = 1 - f
+    return k, np.stack([g**3, 3 * f**3 - 6 * f**2 + 4, 3 * g**3 - 6 * g**2 + 4, f**3]) / 6
+
+
+def normal_equations(k: NDArray[np.intp], basis: Floats, weight: Floats, y: Floats, n: int) -> tuple[Floats, Floats]:
+    """Return the lower band (4, n) of B^T W B and B^T W y (n, 3) for rows of four values `basis` (4, N) from `k` on."""
+    normal, right = np.zeros((4, n)), np.zeros((n, 3))
+    for i in range(4):
+        weighted = weight * basis[i]
+        for d in range(3):
+            right[:, d] += np.bincount(k + i, weighted * y[:, d], n)
+        for j in range(i + 1):
+            normal[i - j] += np.bincount(k + j, weighted * basis[j], n)
+    return normal, right
+
+
+def _penalty(n: int) -> Floats:
+    """Return the lower band (4, n) of the sum of squared third differences, and a trace of the second ones."""
+    band = np.zeros((4, n))
+    for difference, size in (((-1.0, 3.0, -3.0, 1.0), 1.0), ((1.0, -2.0, 1.0), CURVATURE_PENALTY)):
+        rows = n - len(difference) + 1
+        for i, a in enumerate(difference):
+            for j, b in enumerate(difference[: i + 1]):
+                band[i - j, j : j + rows] += size * a * b
+    return band
+
+
+def _score(
+    normal: Floats, penalty: Floats, right: Floats, square: float, count: int, most_noise: float, strength: float
+) -> float:
+    """Return the restricted likelihood's -2 log, up to a constant, for one lambda."""
+    factor, c = _solve(normal + strength * penalty, right)
+    misfit = max(square - float((c * right).sum()), 0.0) + LEAST_NOISE**2 * square
+    free = normal.shape[1] - DEGREE
+    seen = 3 * max(count - 3, 1)
+    variance = min(misfit / seen, most_noise**2)
+    fit = seen * np.log(variance) + misfit / variance
+    return fit / 3 + 2 * np.log(factor[0]).sum() - free * np.log(strength)
+
+
+def _least(strengths: Floats, score: Floats) -> float:
+    """Return the lambda of least score, by a parabola in log lambda through the three best neighbours."""
+    i = int(np.clip(np.argmin(score), 1, len(score) - 2))
+    left, middle, right = score[i - 1 : i + 2]
+    bend = left - 2 * middle + right
+    shift = 0.5 * (left - right) / bend if bend > 0 else 0.0
+    return float(strengths[i] * (strengths[1] / strengths[0]) ** np.clip(shift, -1.0, 1.0))
+
+
+def _solve(band: Floats, right: Floats) -> tuple[Floats, Floats]:
+    """Return the banded Cholesky factor, its diagonal first, and the solution."""
+    factor, _ = dpbtrf(band, lower=1)
+    return factor, dpbtrs(factor, right, lower=1)[0]

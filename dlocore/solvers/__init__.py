@@ -1,0 +1,1 @@
+"""The solvers behind `predict`, all returning the same bivariate spline."""

@@ -1,0 +1,90 @@
+"""March on finer and finer grids until two of them agree."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.discretisation import make_grid, smallest_n_u
+from dlocore.kernels.basis import basis_rows
+from dlocore.problem import Problem
+from dlocore.solvers.march import March, fit, march, smallest_n_t, time_knots
+from dlocore.solvers.monitor import Monitor
+
+Floats = NDArray[np.float64]
+
+# (n_u, n_t, steps) of a motion of about two seconds of one metre
+LEVELS = (
+    (9, 13, 48),
+    (13, 19, 72),
+    (17, 25, 96),
+    (25, 37, 144),
+    (33, 49, 192),
+    (49, 73, 288),
+    (65, 97, 384),
+    (97, 145, 576),
+)
+ACCEPT = 0.75  # of the target: a refinement that moved the surface less is believed
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """A march on one grid and its spline.
+
+    Attributes:
+        motion: the march.
+        knots_t: (n_t + 4,) [s].
+        control: (n_t, n_u, nc) [m].
+        change: largest distance to the level before [m], infinite at the first.
+    """
+
+    motion: March
+    knots_t: Floats
+    control: Floats
+    change: float
+
+
+def stretched(problem: Problem, level: int) -> tuple[int, int, int]:
+    """Return (n_u, n_t, steps) of a level for the horizon and the features of a problem."""
+    n_u, n_t, steps = LEVELS[level]
+    natural = 2.0 * np.sqrt(problem.scene.cable.length)  # [s]: about the period of a cable that swings
+    factor = float(np.clip(problem.horizon / natural, 1.0, 64.0))
+    n_u = max(n_u, smallest_n_u(problem) + 2 * level)
+    n_t = max(round(n_t * factor), smallest_n_t(problem) + 4 * (level + 1))
+    return n_u, n_t, max(round(steps * factor), 3 * n_t)
+
+
+def run_level(problem: Problem, n_u: int, n_t: int, steps: int, monitor: Monitor) -> Level:
+    """March on one grid and fit the time spline."""
+    grid = make_grid(problem, n_u)
+    knots_t = time_knots(problem, n_t)
+    assert knots_t is not None, "the caller asks for enough control points"
+    monitor.phase("setup")
+    motion = march(problem, grid, steps, monitor)
+    monitor.phase("march")
+    control = fit(motion, knots_t)
+    monitor.phase("fit")
+    return Level(motion, knots_t, control, np.inf)
+
+
+def sample(level: Level, u: Floats, t: Floats) -> Floats:
+    """Return the surface of a level on a grid of u (k,) and t (m,); (m, k, nc) [m]."""
+    return _matrix(level.knots_t, t) @ np.einsum(
+        "ki,jid->jkd", _matrix(level.motion.grid.knots, u), level.control
+    ).reshape(len(level.control), -1)
+
+
+def _matrix(knots: Floats, x: Floats) -> Floats:
+    first, table = basis_rows(knots, x, 0)
+    out = np.zeros((len(x), len(knots) - 4))
+    np.put_along_axis(out, first[:, None] + np.arange(4), table[:, 0], axis=1)
+    return out
+
+
+def distance(a: Level, b: Level, problem: Problem) -> float:
+    """Return the largest distance between the surfaces of two levels [m]."""
+    u = np.linspace(0.0, problem.scene.cable.length, 33)
+    t = np.linspace(0.0, problem.horizon, 17)
+    nc = problem.plane.dimensions
+    away = (sample(a, u, t) - sample(b, u, t)).reshape(-1, nc)
+    return float(np.sqrt((away * away).sum(axis=1).max()))

@@ -1,0 +1,234 @@
+"""The compiled march: implicit steps of the spatial spline, fitted by the time spline."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.discretisation import Grid, Held, applied_forces, hold
+from dlocore.kernels.basis import graded_knots
+from dlocore.kernels.march import (
+    FAILED_STEP,
+    LAST_UPDATE,
+    NEWTON,
+    constrained_mass_solve,
+    fit_time,
+    initial_state,
+    march_steps,
+)
+from dlocore.paths import Move, Waypoints
+from dlocore.problem import Problem
+from dlocore.scene import Grasp
+from dlocore.solvers.monitor import Monitor, TimeIsUp
+
+Floats = NDArray[np.float64]
+
+RHO = 0.9  # spectral radius at infinite frequency: at equal steps 3 to 5 times more accurate than BDF2
+TOLERANCE = 1e-7  # of the length, on the largest Newton update of a step
+_CHUNK = 64  # steps between looks at the clock
+_MIN_MASS = 1e-9  # of the true one, where inertia is off: it keeps rigid motion determined
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """A time at which the motion is not smooth, and how much of it jumps.
+
+    Attributes:
+        time: [s].
+        multiplicity: of the time knot there: 1 smooth, 2 acceleration jumps, 3 velocity jumps.
+    """
+
+    time: float
+    multiplicity: int
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A stretch of the march between two events with the same grasps closed."""
+
+    first: int
+    last: int
+    step: float
+    held: Held
+
+
+@dataclass(frozen=True, eq=False)
+class March:
+    """A marched motion.
+
+    Attributes:
+        grid: space discretisation.
+        times: (steps + 1,) [s].
+        states: (steps + 1, n_u, nc) control points at those times.
+        velocity: (n_u, nc) [m/s] just after t = 0.
+        stretches: stretches between events.
+        forces: for each stretch, forces at the held degrees of freedom (steps + 1, held) [N].
+        reached: last step that found equilibrium.
+        stopped: why it ended there: "" (the end), "step" (no equilibrium) or "time" (deadline).
+        newton: Newton iterations.
+        update: largest accepted Newton update [m].
+    """
+
+    grid: Grid
+    times: Floats
+    states: Floats
+    velocity: Floats
+    stretches: tuple[Stretch, ...]
+    forces: tuple[Floats, ...]
+    reached: int
+    stopped: str
+    newton: int
+    update: float
+
+
+def events_of(problem: Problem) -> list[Event]:
+    """Return the events inside the horizon, by time."""
+    found: dict[float, int] = {}
+
+    def add(time: float, multiplicity: int) -> None:
+        if 0.0 < time < problem.horizon * (1 - 1e-9):
+            found[time] = max(found.get(time, 0), multiplicity)
+
+    for g in problem.scene.grasps:
+        add(g.start, 3)
+        if g.release_time is not None:
+            add(g.release_time, 2)
+        released = np.inf if g.release_time is None else g.release_time
+        end = g.start + g.path.duration
+        if g.path.duration and end < released:
+            add(end, _smoothness(g, g.path.duration))
+        if isinstance(g.path, Waypoints):
+            add(g.start + float(np.asarray(g.path.times)[0]), 2)
+    return [Event(t, found[t]) for t in sorted(found)]
+
+
+def _smoothness(grasp: Grasp, end: float) -> int:
+    if isinstance(grasp.path, Move):
+        return {"minimum_jerk": 1, "cubic": 2, "linear": 3}[grasp.path.profile]
+    return 3
+
+
+def time_knots(problem: Problem, n_t: int) -> Floats | None:
+    """Return the time knots (n_t + 4,) [s] with a knot at every event, or None where n_t is too small for them."""
+    events = events_of(problem)
+    times = np.array([e.time for e in events])
+    multiplicity = np.array([e.multiplicity for e in events], dtype=np.int64)
+    knots = graded_knots(n_t, problem.horizon, times, multiplicity, np.zeros(len(events)), np.ones(len(events)))
+    return knots if len(knots) else None
+
+
+def smallest_n_t(problem: Problem) -> int:
+    """Return the least number of control points in time that has a knot at every event."""
+    return max(5, 4 + sum(e.multiplicity for e in events_of(problem)))
+
+
+def closed_grasps(problem: Problem, begin: float, end: float) -> list[Grasp]:
+    """Return the grasps that hold all through the times `begin` to `end` [s]."""
+    middle = 0.5 * (begin + end)
+    return [
+        g for g in problem.scene.grasps if g.start <= middle and (g.release_time is None or g.release_time > middle)
+    ]
+
+
+def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: float = RHO) -> March:
+    """March the motion of a problem on `grid` in about `steps` equal steps, more where events lie close.
+
+    Raises:
+        Cancelled: the caller asked to stop.
+    """
+    plane = problem.plane
+    axes = tuple(range(plane.dimensions))
+    marks = [0.0, *[e.time for e in events_of(problem)], problem.horizon]
+    counts = [
+        max(8, steps // (2 * len(marks)), round(steps * (b - a) / problem.horizon))
+        for a, b in zip(marks[:-1], marks[1:], strict=True)
+    ]
+    if len(counts) == 1:
+        counts = [steps]
+    times = np.concatenate(
+        [[0.0], *[np.linspace(a, b, n + 1)[1:] for a, b, n in zip(marks[:-1], marks[1:], counts, strict=True)]]
+    )
+    active, parameters = problem.law_table()
+    density = problem.scene.cable.linear_density
+    if problem.inertia is None:
+        rho = 0.0
+    unit_mass = grid.tables.mass
+    mass = unit_mass * (density * _MIN_MASS if problem.inertia is None else problem.inertia.density())
+    drag = unit_mass * (0.0 if problem.drag is None else problem.drag.coefficient())
+    applied = applied_forces(problem, grid, times)
+    tolerance = TOLERANCE * problem.scene.cable.length
+    states = np.empty((len(times), grid.n_u, plane.dimensions))
+    states[0] = grid.start
+    v = grid.velocity.copy()
+    velocity = v
+    info = np.zeros(5)
+    info[FAILED_STEP] = -1
+    stretches: list[Stretch] = []
+    forces: list[Floats] = []
+    reached, stopped = 0, ""
+    first = 0
+    for begin, end, count in zip(marks[:-1], marks[1:], counts, strict=True):
+        last = first + count
+        h = (end - begin) / count
+        grasps = closed_grasps(problem, begin, end)
+        held = hold(problem, grid, grasps, times[first : last + 1], states[first])
+        e = held.elimination
+        near = hold(problem, grid, grasps, begin + 1e-3 * h * np.arange(3.0), states[first]).offsets
+        rate = (4 * near[1] - 3 * near[0] - near[2]) / (2e-3 * h)
+        v = constrained_mass_solve(plane.dimensions, unit_mass, e, rate, _times_mass(unit_mass, v))
+        if first == 0:
+            velocity = v.copy()
+        load = applied[min(first, len(applied) - 1)]
+        G = np.empty_like(v)
+        acceleration = (near[2] - 2 * near[1] + near[0]) / (1e-3 * h) ** 2
+        if problem.inertia is None:
+            v = np.zeros_like(v)
+        a = initial_state(
+            axes, states[first], v, mass, drag, grid.tables, active, parameters, grid.memory, load, e, acceleration, G
+        )
+        if problem.inertia is None:
+            a = np.zeros_like(v)
+        offsets = np.zeros((len(times), len(e.held)))
+        offsets[first : last + 1] = held.offsets
+        reactions = np.zeros((len(times), len(e.held)))
+        stretches.append(Stretch(first, last, h, held))
+        forces.append(reactions)
+        for k in range(first, last, _CHUNK):
+            try:
+                monitor.check()
+            except TimeIsUp:
+                stopped = "time"
+                break
+            until = min(k + _CHUNK, last)
+            march_steps(
+                axes, k, until, first, h, rho, tolerance, states, v, a, G, mass, drag, grid.tables, active, parameters,
+                grid.memory, applied, e, offsets, reactions, info,
+            )  # fmt: skip
+            reached = until
+            if info[FAILED_STEP] >= 0:
+                reached, stopped = int(info[FAILED_STEP]) - 1, "step"
+                break
+        if stopped:
+            break
+        reactions[first] = reactions[first + 1]
+        first = last
+    states[reached + 1 :] = states[reached]
+    return March(
+        grid, times, states, velocity, tuple(stretches), tuple(forces), reached, stopped, int(info[NEWTON]),
+        float(info[LAST_UPDATE]),
+    )  # fmt: skip
+
+
+def _times_mass(mass: Floats, v: Floats) -> Floats:
+    out = mass[:, 0, None] * v
+    for o in range(1, 4):
+        out[:-o] += mass[:-o, o, None] * v[o:]
+        out[o:] += mass[:-o, o, None] * v[:-o]
+    return out
+
+
+def fit(motion: March, knots_t: Floats) -> Floats:
+    """Return control points (n_t, n_u, nc) [m] of the time spline fitted to a marched motion."""
+    steps, n_u, nc = motion.states.shape
+    flat = fit_time(knots_t, motion.times, motion.states.reshape(steps, n_u * nc), motion.velocity.reshape(-1))
+    return flat.reshape(len(knots_t) - 4, n_u, nc)

@@ -1,0 +1,56 @@
+"""Deadline, cancellation and progress of one solve, checked between its iterations."""
+
+import time
+from collections.abc import Callable
+
+from dlocore.errors import Cancelled
+from dlocore.prediction import Iteration, OnIteration
+
+
+class TimeIsUp(Exception):
+    """The deadline of a solve has passed; the solver answers with what it has."""
+
+
+class Monitor:
+    """Clock and messages of one solve."""
+
+    def __init__(
+        self,
+        on_iteration: OnIteration | None = None,
+        deadline: float | None = None,
+        cancelled: Callable[[], bool] | None = None,
+    ) -> None:
+        self.began = time.perf_counter()
+        self.iterations: list[Iteration] = []
+        self.phases: dict[str, float] = {}
+        self._mark = self.began
+        self._on_iteration = on_iteration
+        self._end = None if deadline is None else self.began + deadline
+        self._cancelled = cancelled
+
+    def elapsed(self) -> float:
+        """Time since the solve began [s]."""
+        return time.perf_counter() - self.began
+
+    def remaining(self) -> float:
+        """Time to the deadline [s]."""
+        return float("inf") if self._end is None else self._end - time.perf_counter()
+
+    def check(self) -> None:
+        """Raise Cancelled where the caller asked to stop, TimeIsUp where the deadline has passed."""
+        if self._cancelled is not None and self._cancelled():
+            raise Cancelled("the solve was cancelled")
+        if self._end is not None and time.perf_counter() > self._end:
+            raise TimeIsUp
+
+    def phase(self, name: str) -> None:
+        """Book the time since the last call under `name`."""
+        now = time.perf_counter()
+        self.phases[name] = self.phases.get(name, 0.0) + now - self._mark
+        self._mark = now
+
+    def report(self, iteration: Iteration) -> None:
+        """Record an iteration and pass it on."""
+        self.iterations.append(iteration)
+        if self._on_iteration is not None:
+            self._on_iteration(iteration)
