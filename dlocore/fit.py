@@ -1,24 +1,31 @@
 """Fit a unit-speed curve to ordered, noisy points: a penalised cubic B-spline in true arclength."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline, CubicHermiteSpline, make_interp_spline
 
+from dlocore.errors import SceneError
 from dlocore.smoothing import smooth
 from dlocore.spline import DEGREE
 
 Floats = NDArray[np.float64]
 
+MAX_LENGTH_MISMATCH = 0.10  # of the cable's length: beyond it the shape is another cable's, or a part of this one's
 MAX_GROUPS = 2000  # points are averaged down to about this many: then a group is a small part of a knot span
 MAX_SPANS = 160  # knot spans: three for each radius of a cable that turns eight full loops
 SPARSE = 40  # points: chords between so few are long against the noise, so their order and spacing are not in doubt
-REFITS = 4  # of the parameter: measured, a fifth moves the curve by less than 2 % of the noise
+REFITS = 4  # of the parameter: measured, a fifth moves the curve by less than a twentieth of the noise
+NOISE = 0.002  # [m], or of a length above 1 m: what few points deviate from a smooth curve beyond it is shape
 END_NOISE = 3.0  # an end point lies within three deviations of the noise, so the cable's end does
-SPEED_ERROR = 3e-4  # between samples it may be a few times larger, and 1e-3 is the strain of a taut cable
-NOISE = 0.002
 MARGIN = 0.05  # of the length: how far feet of noisy points may lie beyond the ends
+SPEED_ERROR = 3e-4  # at quarter points; between them it is at most twice that, below the 1e-3 strain of a taut cable
+MIN_UNIT_SPANS, MAX_UNIT_SPANS = (
+    64,
+    1024,
+)  # a curve that bends within less than this is no cable: a kink between two points
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,31 +49,33 @@ def fit_points(points: Floats, length: float) -> PointFit:
     1. Average points closer than their noise, whose chords would add up to a length that isn't there.
     2. Minimise sum |r(s_i) - p_i|^2 + lambda int |r'''|^2 ds (`smooth`), s_i the arclength of point i.
     3. Project the points on the curve, measure its true arclength there, and fit again.
-    4. Where the first and last points leave the ends in doubt, by their noise, let the cable's length decide.
+    4. As far as noise leaves in doubt where the first and the last point lie on the curve, the cable's length decides.
 
     Args:
         points: in order (n, 3) [m], about their middle.
-        length: of the cable [m]; it sets the scale of the averaging and decides about the ends.
+        length: of the cable [m].
+
+    Raises:
+        SceneError: the curve differs in length from the cable by more than MAX_LENGTH_MISMATCH.
     """
     share = _share(points)
     p, progress, weight = _averaged(points, share)
-    s = _chord_length(p, progress, length)
-    most_noise = NOISE * max(length, 1.0)
-    if len(p) > SPARSE:
-        most_noise = max(most_noise, 1.5 * _noise(p))
+    noise = _noise(p) if len(p) > SPARSE else 0.0
+    s = _chord_length(p, progress, length, noise)
     spans = int(np.clip(len(p), 8, MAX_SPANS))
+    most_noise = max(NOISE * max(length, 1.0), 1.5 * noise)
     for _ in range(REFITS):
-        first, last = _ends(s, p)
-        x = s - first
-        span = last - first
+        first, last = _ends(s, noise)
+        x, span = s - first, last - first
         spline = smooth(x, p, weight, span, spans, most_noise)
         if len(p) > SPARSE:
             x = np.clip(_foot(spline, x, p), -MARGIN * span, (1 + MARGIN) * span)
         grid, along = _arclength(spline, -MARGIN * span, (1 + MARGIN) * span, 4 * spans)
         s = np.interp(x, grid, along)
-    first, last = _ends(s, p)
-    noise = float(np.sqrt(((p - spline(x)) ** 2).sum(axis=1).mean()))
-    doubt = 2 * END_NOISE * noise
+    first, last = _ends(s, noise)
+    check_length("shape.points", "points along the whole cable", last - first, length)
+    misfit = float(np.sqrt(((p - spline(x)) ** 2).sum(axis=1).mean()))
+    doubt = 2 * END_NOISE * misfit
     extra = float(np.clip(length - (last - first), -doubt, doubt))
     start, end = first - extra / 2, last + extra / 2
     return PointFit(
@@ -74,6 +83,13 @@ def fit_points(points: Floats, length: float) -> PointFit:
         length_given=last - first,
         at=np.clip(np.interp(share, progress, s) - start, 0.0, end - start),
     )
+
+
+def check_length(name: str, allowed: str, given: float, length: float) -> None:
+    """Raise SceneError on the field `name` unless a curve of length `given` [m] fits a cable of `length` [m]."""
+    if not abs(given - length) <= MAX_LENGTH_MISMATCH * length:
+        reason = f"The cable is {length:.4g} m long; the two may differ by {MAX_LENGTH_MISMATCH:.0%}"
+        raise SceneError(name, f"a curve {given:.4g} m long", f"{allowed}, or another cable.length", reason)
 
 
 def _share(p: Floats) -> Floats:
@@ -111,11 +127,11 @@ def _noise(p: Floats) -> float:
     return float(np.sqrt(np.median(square) / 1.39))  # the median of chi^2 with two degrees of freedom is 1.39
 
 
-def _chord_length(p: Floats, progress: Floats, length: float) -> Floats:
+def _chord_length(p: Floats, progress: Floats, length: float, noise: float) -> Floats:
     """Return a first arclength of the points (n,) [m]: chords between averages of those closer than their noise."""
     if len(p) <= SPARSE:
         return _cumulated(p)
-    distance = float(np.clip(6 * _noise(p), 0.01 * length, length / SPARSE))
+    distance = float(np.clip(6 * noise, 0.01 * length, length / SPARSE))
     forward = _chords_of_averages(p, progress, distance)
     backward = _chords_of_averages(p[::-1], 1 - progress[::-1], distance)[::-1]
     return 0.5 * (forward - forward[0] + backward[0] - backward)
@@ -150,17 +166,15 @@ def _foot(spline: BSpline, x: Floats, p: Floats) -> Floats:
     return x + ((p - spline(x)) * tangent).sum(axis=1) / (tangent**2).sum(axis=1)
 
 
-def _ends(s: Floats, p: Floats) -> tuple[float, float]:
+def _ends(s: Floats, noise: float) -> tuple[float, float]:
     """Return the arclength of the first and the last point, free of their noise [m].
 
-    The feet of many noisy points overshoot the ends; a line through the first ones tells where the first one is.
+    One foot is as uncertain as its point, so where points are dense, a line through the first ones tells where the
+    first one is; no more of them than lie within four deviations of it, since their spacing is uncertain too.
     """
-    if len(s) <= SPARSE:
-        return float(s[0]), float(s[-1])
-    reach = 4 * _noise(p)
 
     def end(v: Floats) -> float:
-        k = int(np.clip((np.abs(v - v[0]) < reach).sum(), 1, len(v) // 8))
+        k = int(np.clip((np.abs(v - v[0]) < 4 * noise).sum(), 1, len(v) // 8))
         one, two = v[:k].mean(), v[k : 2 * k].mean()
         return float(one - (two - one) * (k - 1) / (2 * k))
 
@@ -177,17 +191,20 @@ def _arclength(spline: BSpline, start: float, end: float, steps: int) -> tuple[F
 
 
 def _unit_speed(spline: BSpline, grid: Floats, along: Floats, start: float, end: float) -> BSpline:
-    """Return the piece of a curve between two arclengths [m] as a spline in arclength with | |r'| - 1 | <= SPEED_ERROR."""
+    """Return the piece of a curve between two arclengths [m] as a spline in arclength.
+
+    Its knots are halved until | |r'| - 1 | <= SPEED_ERROR.
+    """
     x_of = CubicHermiteSpline(along, grid, 1 / np.sqrt((spline(grid, 1) ** 2).sum(axis=1)))
-    spans = 64
+    spans = MIN_UNIT_SPANS
     while True:
         s = np.linspace(start, end, spans + 1)
         x = x_of(s)
-        tangent = spline(x[[0, -1]], 1)
-        tangent /= np.sqrt((tangent**2).sum(axis=1))[:, None]
-        curve = make_interp_spline(s - start, spline(x), k=DEGREE, bc_type=([(1, tangent[0])], [(1, tangent[1])]))
+        first, last = (t / np.linalg.norm(t) for t in spline(x[[0, -1]], 1))
+        ends: Any = ([(1, first)], [(1, last)])
+        curve = make_interp_spline(s - start, spline(x), k=DEGREE, bc_type=ends)
         between = (s[:-1, None] + (end - start) / spans * np.array([0.25, 0.5, 0.75])).ravel() - start
         speed = np.sqrt((curve(between, 1) ** 2).sum(axis=1))
-        if np.abs(speed - 1).max() <= SPEED_ERROR or spans >= 1024:
+        if np.abs(speed - 1).max() <= SPEED_ERROR or spans >= MAX_UNIT_SPANS:
             return curve
         spans *= 2
