@@ -1,0 +1,91 @@
+"""A run as stored: request, response document, and the nets of control points; and the surface as .npz."""
+
+import io
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore import Iteration, Prediction, SplineSurface
+
+Floats = NDArray[np.float64]
+_SCALARS = ("update", "residual", "energy", "wall_time", "damping", "step_length")
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A prediction with what was asked, as far as it is stored.
+
+    Attributes:
+        request: the request.
+        document: the response.
+        surface: the predicted surface.
+        iterations: the iterates.
+    """
+
+    request: dict[str, Any]
+    document: dict[str, Any]
+    surface: SplineSurface
+    iterations: tuple[Iteration, ...]
+
+
+def pack(prediction: Prediction) -> bytes:
+    """Return the nets of a prediction, of its answer and its iterations, as .npz."""
+    arrays: dict[str, Any] = {}
+    surfaces = [prediction.surface, *(iteration.surface for iteration in prediction.iterations)]
+    for k, surface in enumerate(surfaces):
+        arrays[f"control_points_{k}"] = surface.control_points
+        arrays[f"knots_u_{k}"] = surface.knots_u
+        arrays[f"knots_t_{k}"] = surface.knots_t
+    for name in _SCALARS:
+        arrays[name] = np.array([getattr(iteration, name) for iteration in prediction.iterations], dtype=float)
+    return _npz(arrays)
+
+
+def unpack(request: dict[str, Any], document: dict[str, Any], nets: bytes) -> Run:
+    """Return the run that was stored as these parts."""
+    with np.load(io.BytesIO(nets), allow_pickle=False) as arrays:
+        surfaces = [
+            SplineSurface(arrays[f"control_points_{k}"], arrays[f"knots_u_{k}"], arrays[f"knots_t_{k}"])
+            for k in range(len(document["iterations"]) + 1)
+        ]
+        scalars = {name: arrays[name] for name in _SCALARS}
+    iterations = tuple(
+        Iteration(
+            number=shown["number"],
+            **{name: float(values[k]) for name, values in scalars.items()},
+            n_u=shown["n_u"],
+            n_t=shown["n_t"],
+            surface=surfaces[k + 1],
+            note=shown["note"],
+        )
+        for k, shown in enumerate(document["iterations"])
+    )
+    return Run(request, document, surfaces[0], iterations)
+
+
+def surface_npz(document: dict[str, Any]) -> bytes:
+    """Return the surface, the spline and the reactions of a response document as .npz.
+
+    Arrays: `u` (k_u,), `t` (k_t,), `positions` (k_t, k_u, 3), `twist` (k_t, k_u), `control_points` (n_t, n_u, 4),
+    `knots_u`, `knots_t`, `degree`, `grasp_u` (g,), `reaction` and `moment` (g, k_t, 3); SI units.
+    """
+    surface, grasps = document["surface"], document["grasps"]
+    times = len(surface["t"])
+    return _npz(
+        {
+            **{name: np.asarray(surface[name], dtype=float) for name in ("u", "t", "positions", "twist")},
+            **{name: np.asarray(document[name], dtype=float) for name in ("control_points", "knots_u", "knots_t")},
+            "degree": np.array(document["degree"]),
+            "grasp_u": np.array([grasp["u"] for grasp in grasps], dtype=float),
+            "reaction": np.array([grasp["reaction"] for grasp in grasps], dtype=float).reshape(-1, times, 3),
+            "moment": np.array([grasp["moment"] for grasp in grasps], dtype=float).reshape(-1, times, 3),
+        }
+    )
+
+
+def _npz(arrays: dict[str, Any]) -> bytes:
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    return buffer.getvalue()

@@ -1,0 +1,170 @@
+"""What the commands of ``dlo`` do."""
+
+import json as stdlib_json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import orjson
+from pydantic import ValidationError
+
+from app.fields import BadField, bad_fields
+from app.schemas import PredictionRequest, from_prediction, to_scene
+from app.settings import Settings
+from dlocore import Iteration, Prediction, SceneError
+
+BAD_INPUT, NOT_CONVERGED = 2, 3
+
+
+class CommandError(Exception):
+    """A command that can't go on; the message is for the person who ran it."""
+
+    def __init__(self, message: str, exit_code: int = BAD_INPUT) -> None:
+        super().__init__(message)
+        self.exit_code = exit_code
+
+
+def serve(host: str | None, port: int | None) -> int:
+    """Run the service until it is stopped."""
+    import uvicorn
+
+    from app.main import create_app
+
+    given = {name: value for name, value in (("host", host), ("port", port)) if value is not None}
+    settings = _settings(**given)
+    # one process: the 3D scene and the queue of solves live in it; viser compresses nothing, so neither do we
+    config = uvicorn.Config(
+        create_app(settings), host=settings.host, port=settings.port, log_level="info", ws_per_message_deflate=False
+    )
+    socket = config.bind_socket()
+    where = f"[{settings.host}]" if ":" in settings.host else settings.host
+    address = f"http://{where}:{socket.getsockname()[1]}"
+    print(f"page      {address}/\n3D scene  {address}/scene/\nAPI docs  {address}/docs", flush=True)
+    print(f"runs      {settings.data_dir / 'runs'}", flush=True)
+    uvicorn.Server(config).run(sockets=[socket])
+    return 0
+
+
+def predict(scene: str, *, npz: str | None, json: str | None, rrd: str | None) -> int:
+    """Predict one scene, write what is asked for, and say how it went on stderr."""
+    raw = _read(scene)
+    request = _request(raw)
+    prediction = _solve(request)
+    document = from_prediction(prediction, "", request.output.samples_u, request.output.samples_t)
+    del document["links"], document["id"]
+    if npz is not None:
+        from app.archive import surface_npz
+
+        _write(npz, surface_npz(document))
+    if json is not None:
+        _write(json, orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY))
+    if rrd is not None:
+        _record(rrd, request_json=stdlib_json.loads(raw), document=document, prediction=prediction)
+    print(summary(prediction), file=sys.stderr)
+    return 0 if prediction.status == "converged" else NOT_CONVERGED
+
+
+def warmup() -> int:
+    """Compile the solver."""
+    from dlocore import warm_up
+
+    began = time.perf_counter()
+    warm_up()
+    print(f"solver compiled in {time.perf_counter() - began:.1f} s", file=sys.stderr)
+    return 0
+
+
+def summary(prediction: Prediction) -> str:
+    """Return status, method, error, time and active effects in a few lines."""
+    accuracy = prediction.accuracy
+    error = "unknown" if accuracy.error_estimate is None else f"{1e3 * accuracy.error_estimate:.3g} mm"
+    active = ", ".join(effect.name for effect in prediction.effects if effect.active)
+    return "\n".join(
+        [
+            f"{prediction.status}: {prediction.message}",
+            f"method   {accuracy.method}, {accuracy.n_u} x {accuracy.n_t} control points, {accuracy.dimensions}D",
+            f"error    {error} (estimated, worst point)",
+            f"time     {1e3 * accuracy.wall_time:.3g} ms",
+            f"effects  {active}",
+        ]
+    )
+
+
+def _settings(**given: Any) -> Settings:
+    try:
+        return Settings(**given)
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = "_".join(str(part) for part in first["loc"])
+        raise CommandError(f"setting {name} (DLO_{name.upper()}): {first['msg']}") from None
+
+
+def _read(scene: str) -> bytes:
+    if scene == "-":
+        return sys.stdin.buffer.read()
+    try:
+        return Path(scene).read_bytes()
+    except OSError as error:
+        raise CommandError(f"can't read {scene}: {error.strerror}") from None
+
+
+def _request(raw: bytes) -> PredictionRequest:
+    try:
+        body = stdlib_json.loads(raw)  # takes NaN too, which the schema then refuses by name
+    except (ValueError, RecursionError) as error:
+        raise CommandError(f"the scene is not JSON: {error}") from None
+    try:
+        return PredictionRequest.model_validate(body)
+    except ValidationError as error:
+        raise CommandError(_words(bad_fields(error.errors(), body))) from None
+
+
+def _words(fields: list[BadField]) -> str:
+    lines = [f"{field.field}: got {field.given}. {field.message}" for field in fields]
+    return "\n     ".join(lines)
+
+
+def _solve(request: PredictionRequest) -> Prediction:
+    from tqdm import tqdm
+
+    from app.runs import RunStore
+    from dlocore import predict as solve
+
+    def stored(id: str) -> Any:
+        return RunStore(_settings()).surface(id)
+
+    with tqdm(desc="solving", unit=" iterations", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
+
+        def show(iteration: Iteration) -> None:
+            bar.set_postfix(update=f"{iteration.update:.2g} m", residual=f"{iteration.residual:.2g}")
+            bar.update()
+
+        try:
+            return solve(to_scene(request, stored), on_iteration=show)
+        except SceneError as error:
+            raise CommandError(_words([BadField.from_scene_error(error)])) from None
+
+
+def _record(rrd: str, *, request_json: dict[str, Any], document: dict[str, Any], prediction: Prediction) -> None:
+    from app.archive import Run
+    from app.recording import layout, write_recording
+
+    path = Path(rrd)
+    run = Run(request_json, {**document, "id": path.stem}, prediction.surface, prediction.iterations)
+    try:
+        write_recording(run, path)
+    except (OSError, RuntimeError) as error:
+        raise CommandError(f"can't write {rrd}: {error}", exit_code=1) from None
+    _write(str(path.with_suffix(".rbl")), layout())
+
+
+def _write(path: str, content: bytes) -> None:
+    if path == "-":
+        sys.stdout.buffer.write(content)
+        sys.stdout.buffer.flush()
+        return
+    try:
+        Path(path).write_bytes(content)
+    except OSError as error:
+        raise CommandError(f"can't write {path}: {error.strerror}", exit_code=1) from None

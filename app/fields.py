@@ -1,0 +1,196 @@
+"""What is wrong with which field of a request: pydantic's findings in the words of the contract."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from app.schemas.request import PredictionRequest
+from dlocore import SceneError
+
+MAX_REPORTED = 50
+_WHOLE = "body"
+
+
+@dataclass(frozen=True)
+class BadField:
+    """One wrong field.
+
+    Attributes:
+        field: its path, e.g. ``primitives[0].u``; ``body`` for the request as a whole.
+        given: what was given, shortened for reading.
+        allowed: what would be accepted, in words.
+        message: what is wrong, in words.
+    """
+
+    field: str
+    given: str
+    allowed: str
+    message: str
+
+    @staticmethod
+    def from_scene_error(error: SceneError) -> "BadField":
+        """Return the field that the solver refused."""
+        reason = f"{error.reason}. " if error.reason else ""
+        return BadField(error.field, error.given, error.allowed, f"{reason}Allowed: {error.allowed}.")
+
+
+def bad_fields(errors: Sequence[Any], body: Any) -> list[BadField]:
+    """Return pydantic's `errors` about the request `body`, at most 50 of them."""
+    return [_bad_field(error, body) for error in errors[:MAX_REPORTED]]
+
+
+def _bad_field(error: Any, body: Any) -> BadField:
+    loc = list(error["loc"])
+    where = loc[0] if loc and loc[0] in ("path", "query", "header") else _WHOLE
+    kind, context = error["type"], error.get("ctx", {})
+    if kind == "json_invalid":
+        at = loc[1] if len(loc) > 1 else 0
+        given = str(body or "")[max(0, at - 30) : at + 30]
+        return BadField(_WHOLE, given, "JSON (RFC 8259) in UTF-8", f"The body is not JSON: {context['error']}.")
+    loc = loc[1:] if loc and loc[0] in ("body", "path", "query", "header") else loc
+    tagged, steps = _steps(loc, body) if where == _WHOLE else (loc, loc)
+    if kind == "union_tag_not_found":
+        steps = [*steps, "kind"]
+    given = "nothing" if kind in ("missing", "union_tag_not_found") else _shown(error["input"], kind)
+    if kind == "union_tag_invalid":
+        steps, given = [*steps, "kind"], _shown(error["input"].get("kind"), kind)
+    allowed = _allowed(kind, context, tagged)
+    what = {
+        "missing": "It is missing. ",
+        "union_tag_not_found": "It is missing. ",
+        "extra_forbidden": "There is no such field. ",
+    }
+    return BadField(_text(steps), given, allowed, f"{what.get(kind, '')}Allowed: {allowed}.")
+
+
+def _steps(loc: list[Any], body: Any) -> tuple[list[Any], list[Any]]:
+    """Return the path of an error with the names of union branches, and without them.
+
+    A branch by form begins with "~"; a branch by `kind` is that of the object it was found in.
+    """
+    steps: list[Any] = []
+    value, fresh = body, True
+    for item in loc:
+        if isinstance(item, str) and item.startswith("~"):
+            continue
+        if fresh and isinstance(value, dict) and value.get("kind") == item:
+            fresh = False
+            continue
+        steps.append(item)
+        inside = isinstance(value, dict) or (isinstance(value, list) and isinstance(item, int) and item < len(value))
+        value = value.get(item) if isinstance(value, dict) else value[item] if inside else None
+        fresh = True
+    return loc, steps
+
+
+def _text(steps: list[Any]) -> str:
+    text = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in steps).lstrip(".")
+    return text or _WHOLE
+
+
+def _shown(value: Any, kind: str) -> str:
+    if kind in ("too_short", "too_long") and isinstance(value, list):
+        return f"{len(value)} items"
+    text = value if isinstance(value, str) else repr(value)
+    return text if len(text) <= 120 else text[:117] + "..."
+
+
+_TYPES = {
+    "float_type": "a finite number",
+    "float_parsing": "a finite number",
+    "finite_number": "a finite number",
+    "int_type": "an integer",
+    "int_from_float": "an integer",
+    "int_parsing": "an integer",
+    "bool_type": "true or false",
+    "string_type": "a text",
+    "list_type": "a list",
+    "dict_type": "an object",
+    "model_type": "an object",
+    "model_attributes_type": "an object",
+}
+
+
+def _allowed(kind: str, context: dict[str, Any], loc: list[Any]) -> str:
+    schema = _schema_at(loc)
+    if kind == "extra_forbidden":
+        return "one of " + ", ".join(_schema_at(loc[:-1]).get("properties", {}))
+    if kind == "union_tag_invalid":
+        return "one of " + context["expected_tags"].replace("'", "")
+    if kind == "union_tag_not_found":
+        return "the kind of object, one of " + ", ".join(schema.get("discriminator", {}).get("mapping", {}))
+    if kind == "literal_error":
+        return "one of " + context["expected"].replace("'", "").replace(" or ", ", ")
+    if kind in ("too_short", "too_long"):
+        return _bounds(context, "min_length", "max_length", "{} items")
+    text = _TYPES.get(kind, "")
+    if kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
+        text = _range(schema) or _bounds(context, "ge", "le", "{}")
+    description = schema.get("description", "").split("\n")[0].rstrip(".")
+    return f"{text} ({description})" if text and description else text or description or "a field of the contract"
+
+
+def _bounds(context: dict[str, Any], least: str, most: str, form: str) -> str:
+    low, high = context.get(least), context.get(most)
+    if low is not None and low == high:
+        return form.format(low)
+    return form.format(f"at least {low}" if low is not None else f"at most {high}")
+
+
+def _range(schema: dict[str, Any]) -> str:
+    for option in [schema, *schema.get("anyOf", [])]:
+        words = [
+            f"{word} {option[key]:g}"
+            for key, word in (
+                ("exclusiveMinimum", "above"),
+                ("minimum", "at least"),
+                ("exclusiveMaximum", "below"),
+                ("maximum", "at most"),
+            )
+            if key in option
+        ]
+        if words:
+            number = "an integer" if option.get("type") == "integer" else "a finite number"
+            return " ".join([number, *words])
+    return ""
+
+
+@cache
+def _schema() -> dict[str, Any]:
+    return PredictionRequest.model_json_schema()
+
+
+def _schema_at(loc: list[Any]) -> dict[str, Any]:
+    """Return the JSON schema of the field at `loc`, with union branches as pydantic names them; {} where unknown."""
+    node = _schema()
+    for item in loc:
+        if isinstance(item, str) and item.startswith("~"):
+            continue
+        node = _child(_resolved(node), item)
+        if not node:
+            return {}
+    description = node.get("description")
+    resolved = _resolved(node)
+    return {**resolved, "description": description} if description else resolved
+
+
+def _resolved(node: dict[str, Any]) -> dict[str, Any]:
+    while "$ref" in node:
+        node = _schema()["$defs"][node["$ref"].rsplit("/", 1)[1]]
+    return node
+
+
+def _child(node: dict[str, Any], item: Any) -> dict[str, Any]:
+    mapping = node.get("discriminator", {}).get("mapping", {})
+    if item in mapping:
+        return {"$ref": mapping[item]}
+    if isinstance(item, str) and item in node.get("properties", {}):
+        return node["properties"][item]
+    if isinstance(item, int) and "items" in node:
+        return node["items"]
+    for option in [*node.get("anyOf", []), *node.get("oneOf", [])]:
+        found = _child(_resolved(option), item)
+        if found:
+            return found
+    return {}

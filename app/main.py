@@ -1,0 +1,68 @@
+"""The application: ``uvicorn app.main:app``, or ``dlo serve``."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from importlib.metadata import PackageNotFoundError, version
+
+import anyio
+from fastapi import FastAPI
+from fastapi.middleware.cors import CORSMiddleware
+from fastapi_offline import FastAPIOffline
+
+from app import openapi, problems, viewer
+from app.middleware import BodyLimit, PageHeaders
+from app.routes import cables, health, pages, predictions, rerun
+from app.service import Service
+from app.settings import Settings
+
+_ABOUT = """Predict how a cable moves when grippers move it: post a scene, get the whole motion as one bivariate spline.
+
+SI units: metres, seconds, radians, newtons, kilograms; world frame right-handed, z up. Failures are
+`application/problem+json` (RFC 9457) and name the field that is wrong."""
+
+
+def create_app(settings: Settings | None = None) -> FastAPI:
+    """Return the application, wired up.
+
+    Args:
+        settings: the settings; those of the environment where absent.
+    """
+    settings = settings or Settings()
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        service = Service.of(settings)
+        app.state.service = service
+        async with anyio.create_task_group() as tasks, viewer.running(app, settings, service.runs):
+            tasks.start_soon(service.warm_up)
+            yield
+            service.worker.close()
+            tasks.cancel_scope.cancel()
+
+    app = FastAPIOffline(title="dlo", version=_version(), description=_ABOUT, lifespan=lifespan, redoc_url=None)
+    problems.install(app)
+    openapi.install(app)
+    app.add_middleware(BodyLimit, limit=settings.max_body_bytes)
+    app.add_middleware(PageHeaders)
+    if settings.allowed_origins:
+        app.add_middleware(
+            CORSMiddleware,
+            allow_origins=settings.allowed_origins,
+            allow_methods=["GET", "POST", "DELETE"],
+            allow_headers=["Content-Type"],
+        )
+    for routes in (predictions, cables, health, rerun):
+        app.include_router(routes.router)
+    viewer.add_routes(app)
+    pages.add_pages(app)
+    return app
+
+
+def _version() -> str:
+    try:
+        return version("dlo")
+    except PackageNotFoundError:  # run from a checkout
+        return "0"
+
+
+app = create_app()

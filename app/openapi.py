@@ -1,0 +1,44 @@
+"""The OpenAPI document: FastAPI's, with the schemas of the answers that are serialised without a model."""
+
+from typing import Any
+
+from fastapi import FastAPI
+from pydantic import BaseModel
+
+from app.schemas.response import PredictionResponse, ProblemDocument, problem_document
+
+_REFERENCE = "#/components/schemas/{model}"
+
+
+def install(app: FastAPI) -> None:
+    """Let ``app.openapi`` describe problems and predictions as they are sent."""
+    described = app.openapi
+
+    def openapi() -> dict[str, Any]:
+        if app.openapi_schema is None:
+            document = described()
+            schemas = document.setdefault("components", {}).setdefault("schemas", {})
+            for model in (PredictionResponse, ProblemDocument):
+                schemas.update(_schemas(model))
+            for path in document["paths"].values():
+                for operation in path.values():
+                    _describe_bad_request(operation["responses"])
+            for name in ("HTTPValidationError", "ValidationError"):
+                schemas.pop(name, None)
+            app.openapi_schema = document
+        return app.openapi_schema
+
+    app.openapi = openapi  # type: ignore[method-assign]
+
+
+def _schemas(model: type[BaseModel]) -> dict[str, Any]:
+    schema = model.model_json_schema(ref_template=_REFERENCE, mode="serialization")
+    parts = schema.pop("$defs", {})
+    return {**parts, model.__name__: schema}
+
+
+def _describe_bad_request(responses: dict[str, Any]) -> None:
+    """Replace FastAPI's own description of a bad request, which it adds wherever something is validated."""
+    content = responses.get("422", {}).get("content", {})
+    if "application/json" in content:
+        responses["422"] = problem_document("The request is wrong: `errors` names each field.")

@@ -1,0 +1,102 @@
+"""Failures as ``application/problem+json`` (RFC 9457), for every way a request can fail."""
+
+import logging
+from collections.abc import Mapping
+from http import HTTPStatus
+from typing import Any
+
+import orjson
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import Response
+from starlette.exceptions import HTTPException
+
+from app.fields import BadField, bad_fields
+from dlocore import SceneError
+
+MEDIA_TYPE = "application/problem+json"
+_log = logging.getLogger("dlo")
+
+_DETAILS = {
+    404: "There is nothing at this address.",
+    405: "This address exists, but not for this method.",
+    415: "Send the body as application/json.",
+}
+
+
+class ProblemError(Exception):
+    """A failure to be answered as a problem document.
+
+    Args:
+        status: HTTP status.
+        kind: short name, the end of the problem's type URN.
+        detail: what went wrong and what to do, in words.
+        headers: response headers.
+        extra: further members of the document.
+    """
+
+    def __init__(
+        self, status: int, kind: str, detail: str, *, headers: Mapping[str, str] | None = None, **extra: Any
+    ) -> None:
+        super().__init__(detail)
+        self.status = status
+        self.kind = kind
+        self.detail = detail
+        self.headers = dict(headers or {})
+        self.extra = extra
+
+
+def problem_response(problem: ProblemError) -> Response:
+    """Return the problem as an HTTP response."""
+    document = {
+        "type": f"urn:dlo:problem:{problem.kind}",
+        "title": HTTPStatus(problem.status).phrase,
+        "status": problem.status,
+        "detail": problem.detail,
+        **problem.extra,
+    }
+    return Response(orjson.dumps(document), problem.status, problem.headers, MEDIA_TYPE)
+
+
+def bad_scene(fields: list[BadField]) -> ProblemError:
+    """Return the problem of a request whose `fields` are wrong."""
+    first = f"{fields[0].field}: {fields[0].message}"
+    more = f" (and {len(fields) - 1} more)" if len(fields) > 1 else ""
+    return ProblemError(422, "bad-request", first + more, errors=[vars(field) for field in fields])
+
+
+async def _on_problem(request: Request, error: Exception) -> Response:
+    assert isinstance(error, ProblemError)
+    return problem_response(error)
+
+
+async def _on_scene_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, SceneError)
+    return problem_response(bad_scene([BadField.from_scene_error(error)]))
+
+
+async def _on_validation_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, RequestValidationError)
+    return problem_response(bad_scene(bad_fields(error.errors(), error.body)))
+
+
+async def _on_http_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    kind = HTTPStatus(error.status_code).phrase.lower().replace(" ", "-")
+    detail = _DETAILS.get(error.status_code, str(error.detail))
+    return problem_response(ProblemError(error.status_code, kind, detail, headers=error.headers))
+
+
+async def _on_crash(request: Request, error: Exception) -> Response:
+    _log.error("%s %s failed", request.method, request.url.path, exc_info=error)
+    detail = "The service failed; this is a defect. Its log says where."
+    return problem_response(ProblemError(500, "internal-error", detail))
+
+
+def install(app: FastAPI) -> None:
+    """Make every failure of `app` a problem document."""
+    app.add_exception_handler(ProblemError, _on_problem)
+    app.add_exception_handler(SceneError, _on_scene_error)
+    app.add_exception_handler(RequestValidationError, _on_validation_error)
+    app.add_exception_handler(HTTPException, _on_http_error)
+    app.add_exception_handler(Exception, _on_crash)

@@ -1,0 +1,1 @@
+"""The HTTP routes: thin, each a few lines around the service."""

@@ -1,0 +1,72 @@
+"""JSON request bodies: the right content type, and numbers that are not numbers found by name."""
+
+import asyncio
+import json
+from collections.abc import AsyncIterator, Callable, Coroutine
+from contextlib import asynccontextmanager
+from threading import Event
+from typing import Any
+
+import orjson
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
+
+from app.problems import ProblemError
+
+
+class JsonRequest(Request):
+    """A request whose body is strict JSON."""
+
+    async def json(self) -> Any:
+        """Return the body as data; NaN and infinities stay in it, for the schema to refuse by name."""
+        body = await self.body()
+        try:
+            return orjson.loads(body)
+        except orjson.JSONDecodeError as error:
+            try:
+                return json.loads(body)
+            except (ValueError, RecursionError):
+                raise error from None
+
+
+class JsonRoute(APIRoute):
+    """A route that takes JSON only."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """Return the handler with the checks around it."""
+        handle = super().get_route_handler()
+        takes_body = self.body_field is not None
+
+        async def checked(request: Request) -> Response:
+            if takes_body:
+                check_content_type(request)
+            return await handle(JsonRequest(request.scope, request.receive))
+
+        return checked
+
+
+def check_content_type(request: Request) -> None:
+    """Raise a 415 problem unless the body is declared as JSON."""
+    given = request.headers.get("content-type", "")
+    media = given.split(";")[0].strip().lower()
+    if media != "application/json" and not (media.startswith("application/") and media.endswith("+json")):
+        raise ProblemError(
+            415, "unsupported-media-type", f"Send the body as application/json, not as {given or 'nothing'!r}."
+        )
+
+
+@asynccontextmanager
+async def cancelled_when_gone(request: Request) -> AsyncIterator[Event]:
+    """Give an event that is set when the client closes the connection; the body must have been read."""
+    gone = Event()
+
+    async def watch() -> None:
+        while (await request.receive())["type"] != "http.disconnect":
+            pass
+        gone.set()
+
+    watcher = asyncio.create_task(watch())
+    try:
+        yield gone
+    finally:
+        watcher.cancel()

@@ -1,0 +1,36 @@
+"""``/health`` and ``/ready``, for whoever watches over the service."""
+
+from typing import Literal
+
+from fastapi import APIRouter
+from pydantic import BaseModel
+
+from app.schemas import problem_document
+from app.service import TheService
+
+router = APIRouter(tags=["service"])
+
+
+class Health(BaseModel):
+    """The process answers."""
+
+    status: Literal["ok"] = "ok"
+
+
+class Ready(BaseModel):
+    """The solver is compiled."""
+
+    status: Literal["ready"] = "ready"
+
+
+@router.get("/health", summary="Is the process alive?")
+async def health() -> Health:
+    """Answer as long as the process does."""
+    return Health()
+
+
+@router.get("/ready", summary="Can it solve?", responses={503: problem_document("The solver is still being compiled.")})
+async def ready(service: TheService) -> Ready:
+    """Answer once the solver is compiled."""
+    service.check_ready()
+    return Ready()

@@ -1,0 +1,224 @@
+"""Stored runs: one directory each, written whole or not at all, capped in number and bytes."""
+
+import os
+import re
+import secrets
+import shutil
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import orjson
+
+from app.archive import Run, pack, unpack
+from app.recording import write_recording
+from app.schemas.response import from_prediction
+from app.settings import Settings
+from dlocore import Prediction, SplineSurface
+
+_ID = re.compile(r"[0-9a-f]{28}")
+REQUEST, DOCUMENT, NETS, SUMMARY, RECORDING = "scene.json", "prediction.json", "nets.npz", "summary.json", "run.rrd"
+_ABANDONED_AFTER = 3600.0  # s; an unfinished directory that old belongs to no running process
+
+
+def new_id() -> str:
+    """Return an id that sorts by time (12 hex digits of milliseconds) and can't be guessed (64 random bits)."""
+    return f"{time.time_ns() // 1_000_000:012x}{secrets.token_hex(8)}"
+
+
+@dataclass
+class _Entry:
+    summary: dict[str, Any]
+    size: int
+
+
+class RunStore:
+    """The stored runs of a data directory; safe to call from any thread.
+
+    A run is written to a temporary directory, synced and renamed, so that a crash leaves a whole run or none. The
+    oldest runs go first when there are more than `max_runs` of them, or more than `max_run_bytes` bytes.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self._root = settings.data_dir / "runs"
+        self._max_runs = settings.max_runs
+        self._max_bytes = settings.max_run_bytes
+        self._lock = threading.Lock()
+        self._recording = threading.Lock()
+        self._entries: dict[str, _Entry] = {}
+        self._root.mkdir(parents=True, exist_ok=True)
+        for path in sorted(self._root.iterdir()):
+            if _ID.fullmatch(path.name) and (path / SUMMARY).is_file():
+                self._entries[path.name] = _Entry(orjson.loads((path / SUMMARY).read_bytes()), _size(path))
+            elif path.name.startswith(".") and time.time() - path.stat().st_mtime > _ABANDONED_AFTER:
+                shutil.rmtree(path, ignore_errors=True)
+        with self._lock:
+            removed = self._evict()
+        _delete(removed)
+
+    def save(
+        self, scene_json: dict[str, Any] | bytes, prediction: Prediction, *, samples_u: int = 101, samples_t: int = 33
+    ) -> str:
+        """Store a prediction and return its id.
+
+        Args:
+            scene_json: the request, as data or as the bytes that were sent.
+            prediction: what the solver returned.
+            samples_u: samples along the cable in the stored document.
+            samples_t: samples in time.
+        """
+        id = new_id()
+        request = scene_json if isinstance(scene_json, bytes) else orjson.dumps(scene_json)
+        document = from_prediction(prediction, id, samples_u, samples_t)
+        summary = {
+            "id": id,
+            "created": document["created"],
+            "status": prediction.status,
+            "method": prediction.accuracy.method,
+            "error_estimate": document["accuracy"]["error_estimate"],
+            "wall_time": prediction.accuracy.wall_time,
+            "links": document["links"],
+        }
+        files = {
+            REQUEST: request,
+            DOCUMENT: orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY),
+            NETS: pack(prediction),
+            SUMMARY: orjson.dumps(summary),
+        }
+        self._write(id, files)
+        with self._lock:
+            self._entries[id] = _Entry(summary, sum(map(len, files.values())))
+            removed = self._evict()
+        _delete(removed)
+        return id
+
+    def _write(self, id: str, files: dict[str, bytes]) -> None:
+        temporary = self._root / f".new-{id}"
+        temporary.mkdir()
+        try:
+            for name, content in files.items():
+                with (temporary / name).open("wb") as file:
+                    file.write(content)
+                    file.flush()
+                    os.fsync(file.fileno())
+            _sync(temporary)
+            temporary.rename(self._root / id)
+            _sync(self._root)
+        except BaseException:
+            shutil.rmtree(temporary, ignore_errors=True)
+            raise
+
+    def _evict(self) -> list[Path]:
+        """Forget the oldest runs beyond the caps and return their directories, out of the way of new readers."""
+        removed = []
+        ids = sorted(self._entries)
+        total = sum(entry.size for entry in self._entries.values())
+        while len(ids) > 1 and (len(ids) > self._max_runs or total > self._max_bytes):
+            oldest = ids.pop(0)
+            total -= self._entries[oldest].size
+            removed.append(self._forget(oldest))
+        return removed
+
+    def _forget(self, id: str) -> Path:
+        del self._entries[id]
+        doomed = self._root / f".old-{id}"
+        (self._root / id).rename(doomed)
+        return doomed
+
+    def delete(self, id: str) -> bool:
+        """Remove a run; return whether it was there."""
+        with self._lock:
+            if id not in self._entries:
+                return False
+            doomed = self._forget(id)
+        _delete([doomed])
+        return True
+
+    def __contains__(self, id: str) -> bool:
+        return id in self._entries
+
+    def page(self, limit: int, offset: int) -> tuple[list[dict[str, Any]], int]:
+        """Return the summaries of at most `limit` runs after `offset` newer ones, and how many there are in all."""
+        with self._lock:
+            ids = sorted(self._entries, reverse=True)
+            return [self._entries[id].summary for id in ids[offset : offset + limit]], len(ids)
+
+    def request(self, id: str) -> bytes | None:
+        """Return the request as it was sent, or None where there is no such run."""
+        return self._read(id, REQUEST)
+
+    def document(self, id: str) -> bytes | None:
+        """Return the response as JSON, or None where there is no such run."""
+        return self._read(id, DOCUMENT)
+
+    def _read(self, id: str, name: str) -> bytes | None:
+        if id not in self._entries:
+            return None
+        try:
+            return (self._root / id / name).read_bytes()
+        except FileNotFoundError:  # removed since
+            return None
+
+    def load(self, id: str) -> Run | None:
+        """Return a run with its surface and iterates, or None where there is no such run."""
+        parts = [self._read(id, name) for name in (REQUEST, DOCUMENT, NETS)]
+        if any(part is None for part in parts):
+            return None
+        request, document, nets = (part or b"" for part in parts)
+        return unpack(orjson.loads(request), orjson.loads(document), nets)
+
+    def surface(self, id: str) -> SplineSurface | None:
+        """Return the surface of a run, or None where there is no such run."""
+        run = self.load(id)
+        return None if run is None else run.surface
+
+    def recording(self, id: str) -> bytes | None:
+        """Return the recording (.rrd) of a run, written when first asked for; None where there is no such run."""
+        content = self._read(id, RECORDING)
+        if content is not None or id not in self:
+            return content
+        with self._recording:  # one at a time: the readers of one run need it once
+            content = self._read(id, RECORDING) or self._record(id)
+        return content
+
+    def _record(self, id: str) -> bytes | None:
+        run = self.load(id)
+        if run is None:
+            return None
+        temporary = self._root / f".rrd-{id}-{secrets.token_hex(4)}"
+        try:
+            write_recording(run, temporary)
+            content = temporary.read_bytes()
+            return content if self._keep(id, temporary, len(content)) else None
+        finally:
+            temporary.unlink(missing_ok=True)
+
+    def _keep(self, id: str, recording: Path, size: int) -> bool:
+        with self._lock:
+            entry = self._entries.get(id)
+            if entry is None:
+                return False
+            recording.replace(self._root / id / RECORDING)
+            entry.size += size
+            removed = self._evict()
+        _delete(removed)
+        return True
+
+
+def _sync(directory: Path) -> None:
+    handle = os.open(directory, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _size(directory: Path) -> int:
+    return sum(file.stat().st_size for file in directory.iterdir())
+
+
+def _delete(directories: list[Path]) -> None:
+    for directory in directories:
+        shutil.rmtree(directory, ignore_errors=True)

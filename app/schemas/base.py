@@ -1,0 +1,30 @@
+"""Numbers, vectors and the base model of the contract."""
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
+
+# strict, since a bool or a numeral in quotes would pass as a number otherwise
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Count = Annotated[int, Field(strict=True)]
+Flag = Annotated[bool, Field(strict=True)]
+Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Point = Annotated[list[Number], Field(min_length=2, max_length=3)]
+
+
+class Model(BaseModel):
+    """A part of the request: unknown fields are refused, defaults are those of the contract."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, protected_namespaces=())
+
+
+def _form(value: Any) -> str:
+    if isinstance(value, str):
+        return "~text"
+    return "~object" if isinstance(value, dict | BaseModel) else "~list"
+
+
+# For a field that may be a text, a list or an object: only the errors of the given form are reported. The mark "~"
+# tells the branch names from field names in the path of an error.
+BY_FORM = Discriminator(_form)
+TEXT, LIST, OBJECT = Tag("~text"), Tag("~list"), Tag("~object")

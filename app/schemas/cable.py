@@ -1,0 +1,60 @@
+"""The cable of a request."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from app.schemas.base import BY_FORM, LIST, TEXT, Model, Number, Point
+from dlocore import PRESETS
+
+RestPoints = Annotated[list[Point], Field(min_length=4, max_length=100_000)]
+RestShape = Annotated[
+    Annotated[Literal["straight", "initial"], TEXT] | Annotated[RestPoints, LIST],
+    BY_FORM,
+]
+
+
+def _positive(what: str, unit: str, example: float, most: float = 1e15) -> Any:
+    return Field(default=None, gt=0.0, le=most, description=f"{what} [{unit}].", examples=[example])
+
+
+class CableModel(Model):
+    """A cable of round section. `length`, `diameter` and `linear_density` are required unless `preset` gives them.
+
+    Give the stiffnesses themselves, or the moduli and the solid round section gives them: EA = E pi D^2/4,
+    EI = E pi D^4/64, GJ = G pi D^4/32.
+    """
+
+    preset: str | None = Field(
+        default=None,
+        description="Name of a preset (`GET /v1/cables`); fields given beside it override its values.",
+        examples=list(PRESETS)[:2],
+    )
+    length: Number | None = Field(default=None, ge=0.01, le=1000.0, description="Length L [m].", examples=[1.0])
+    diameter: Number | None = _positive("Diameter D, at most half the length", "m", 0.005, 500.0)
+    linear_density: Number | None = _positive("Mass per length", "kg/m", 0.05, 1e4)
+    bending_stiffness: Number | None = _positive("EI", "N m^2", 1e-3)
+    axial_stiffness: Number | None = _positive("EA", "N", 640.0)
+    torsional_stiffness: Number | None = _positive("GJ", "N m^2", 1e-3)
+    youngs_modulus: Number | None = _positive("E, gives EA and EI where they are absent", "Pa", 2e7)
+    shear_modulus: Number | None = _positive("G, gives GJ where it is absent", "Pa", 7e6)
+    bending_damping: Number = Field(
+        default=0.0, ge=0.0, description="Internal damping on the rate of curvature [N m^2 s].", examples=[1e-4]
+    )
+    torsional_damping: Number = Field(
+        default=0.0, ge=0.0, description="Internal damping on the rate of twist [N m^2 s].", examples=[0.0]
+    )
+    yield_strain: Number | None = Field(
+        default=None, gt=0.0, description="Strain at which the cable yields, eps_M; absent: elastic.", examples=[0.01]
+    )
+    memory_rate: Number | None = Field(
+        default=None, gt=0.0, description="Rate of the plastic memory, k_eps [1/s]; absent: elastic.", examples=[50.0]
+    )
+    rest_shape: RestShape = Field(
+        default="straight",
+        description=(
+            "The stress-free shape: `straight`, `initial` (that of the start shape) or points in order along the cable,"
+            " 2D or 3D [m]."
+        ),
+        examples=["straight"],
+    )

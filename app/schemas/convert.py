@@ -1,0 +1,190 @@
+"""From a valid request to the solver's scene."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.schemas.cable import CableModel
+from app.schemas.primitives import ForceOverTime, LoadModel, MovePath, PrimitiveModel, StillPath, WaypointsPath
+from app.schemas.request import PredictionRequest
+from app.schemas.shape import (
+    ControlVelocities,
+    PointsShape,
+    PointVelocities,
+    PredictionShape,
+    StraightShape,
+)
+from app.schemas.surroundings import EnvironmentModel, QualityModel
+from dlocore import (
+    Cable,
+    ControlPoints,
+    Environment,
+    Grasp,
+    Load,
+    Move,
+    Points,
+    Quality,
+    Scene,
+    SceneError,
+    SplineSurface,
+    Still,
+    Straight,
+    Table,
+    Waypoints,
+)
+from dlocore.errors import within
+from dlocore.paths import Path
+from dlocore.scene import Shape
+from dlocore.spline import design_matrix
+
+# Finds the surface of a stored prediction by its id; None where there is no such prediction.
+StoredSurface = Callable[[str], SplineSurface | None]
+
+
+def to_scene(request: PredictionRequest, stored: StoredSurface) -> Scene:
+    """Return the scene that `request` describes.
+
+    Args:
+        request: the valid request.
+        stored: finds the surface that a shape of kind "prediction" continues from.
+
+    Raises:
+        SceneError: the scene is impossible or asks for what is not modelled; its field is the path in the request.
+    """
+    with within("cable"):
+        cable = _cable(request.cable)
+    effects = request.effects if isinstance(request.effects, str) else request.effects.model_dump()
+    return Scene(
+        cable=cable,
+        shape=_shape(request, cable, stored),
+        grasps=tuple(_grasp(i, primitive) for i, primitive in enumerate(request.primitives)),
+        loads=tuple(_load(i, load) for i, load in enumerate(request.loads)),
+        environment=_environment(request.environment),
+        horizon=request.horizon,
+        effects={} if isinstance(effects, str) else effects,
+        quality=_quality(request.quality),
+    )
+
+
+def _cable(model: CableModel) -> Cable:
+    values = model.model_dump(exclude={"preset"}, exclude_none=True, exclude_unset=True)
+    if model.preset is not None:
+        return Cable.preset(model.preset, **values)
+    for name in ("length", "diameter", "linear_density"):
+        if name not in values:
+            raise SceneError(name, None, f"{CableModel.model_fields[name].description} Or a preset", "It is missing")
+    return Cable(**values)
+
+
+def _shape(request: PredictionRequest, cable: Cable, stored: StoredSurface) -> Shape:
+    model = request.shape
+    if isinstance(model, PredictionShape):
+        return _continued(model, cable, stored)
+    with within("shape"):
+        if isinstance(model, StraightShape):
+            velocity = _velocity(model.velocity, "points")
+            return Straight(start=model.start, direction=model.direction, settle=model.settle, velocity=velocity)
+        if isinstance(model, PointsShape):
+            return Points(points=model.points, settle=model.settle, velocity=_velocity(model.velocity, "points"))
+        return ControlPoints(
+            control_points=model.control_points,
+            knots=model.knots,
+            settle=model.settle,
+            velocity=_velocity(model.velocity, "control_points"),
+        )
+
+
+def _velocity(value: Any, kind: str) -> Any:
+    """Return the velocity as one vector or rows, given for a shape whose velocities are of `kind`."""
+    if not isinstance(value, PointVelocities | ControlVelocities):
+        return value
+    if value.kind != kind:
+        raise SceneError("velocity.kind", value.kind, f'"{kind}" with this shape')
+    if isinstance(value, PointVelocities):
+        return value.points
+    for i, row in enumerate(value.control_points):
+        if len(row) == 4 and row[3] != 0.0:
+            raise SceneError(f"velocity.control_points[{i}][3]", row[3], "0", "Twist is not modelled yet")
+    return [row[:3] for row in value.control_points]
+
+
+def _continued(model: PredictionShape, cable: Cable, stored: StoredSurface) -> ControlPoints:
+    surface = stored(model.id)
+    if surface is None:
+        raise SceneError("shape.id", model.id, "the id of a stored prediction", "There is no such prediction")
+    if not abs(surface.length - cable.length) <= 1e-9 * cable.length:
+        reason = "A continued cable keeps its length"
+        raise SceneError("cable.length", cable.length, f"{surface.length:g} [m], as in that prediction", reason)
+    t = surface.horizon if model.t is None else model.t
+    if not t <= surface.horizon:
+        raise SceneError("shape.t", t, f"0 to the end of that prediction, {surface.horizon:g} [s]")
+    with within("shape"):
+        return ControlPoints(
+            control_points=_at(surface, t, 0),
+            knots=surface.knots_u,
+            settle=model.settle,
+            velocity=_at(surface, t, 1)[:, :3],
+        )
+
+
+def _at(surface: SplineSurface, t: float, derivative: int) -> NDArray[np.float64]:
+    """Return the control points along the cable of the surface, or of its derivative, at time `t`; (n_u, 4)."""
+    row = design_matrix(surface.knots_t, [t], derivative)[0]
+    return np.einsum("j,jic->ic", row, surface.control_points)
+
+
+def _grasp(i: int, model: PrimitiveModel) -> Grasp:
+    with within(f"primitives[{i}]"):
+        with within("path"):
+            path = _path(model.path)
+        return Grasp(
+            u=model.u, path=path, hold=model.hold, grasp_time=model.grasp_time, release_time=model.release_time
+        )
+
+
+def _path(model: StillPath | MovePath | WaypointsPath) -> Path:
+    if isinstance(model, StillPath):
+        return Still()
+    if isinstance(model, MovePath):
+        return Move(
+            displacement=model.displacement, duration=model.duration, rotation=model.rotation, profile=model.profile
+        )
+    return Waypoints(times=model.times, positions=model.positions, orientations=model.orientations)
+
+
+def _load(i: int, model: LoadModel) -> Load:
+    prefix = f"loads[{i}]"
+    if not isinstance(model.force, ForceOverTime):
+        with within(prefix):
+            return Load(u=model.u, force=model.force)
+    times, values = model.force.times, model.force.values
+    if len(times) != len(values):
+        raise SceneError(f"{prefix}.force.values", f"{len(values)} forces", f"as many as times ({len(times)})")
+    if not (np.diff(times) > 0).all():
+        raise SceneError(f"{prefix}.force.times", times, "rising times [s]")
+    with within(prefix):
+        return Load(u=model.u, force=values, times=times)
+
+
+def _environment(model: EnvironmentModel) -> Environment:
+    table = None
+    if model.table is not None:
+        with within("environment.table"):
+            table = Table(height=model.table.height, friction=model.table.friction)
+    with within("environment"):
+        return Environment(
+            gravity=model.gravity,
+            drag=model.drag,
+            drag_quadratic=model.drag_quadratic,
+            table=table,
+            obstacles=tuple(model.obstacles),
+        )
+
+
+def _quality(model: str | QualityModel) -> Quality:
+    if isinstance(model, str):
+        return Quality()
+    with within("quality"):
+        return Quality(**model.model_dump())

@@ -1,0 +1,88 @@
+"""Grasps with their paths, and loads."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from app.schemas.base import BY_FORM, LIST, OBJECT, Model, Number, Vector
+
+Quaternion = Annotated[list[Number], Field(min_length=4, max_length=4)]
+Coordinate = Annotated[
+    Number,
+    Field(ge=0.0, le=1000.0, description="Material coordinate [m], 0 to the cable's length.", examples=[0.25]),
+]
+Instant = Annotated[Number, Field(ge=0.0, le=1e4)]
+
+
+class StillPath(Model):
+    """Stay where the cable was grasped."""
+
+    kind: Literal["still"]
+
+
+class MovePath(Model):
+    """Move by a displacement, and turn, in a given time."""
+
+    kind: Literal["move"]
+    displacement: Vector = Field(description="Displacement [m].", examples=[[0, 0.5, 0]])
+    rotation: Vector | None = Field(
+        default=None, description="Final rotation vector [rad]; holds other than `point` only.", examples=[[0, 0, 0.8]]
+    )
+    duration: Number = Field(gt=1e-4, le=1e4, description="Duration [s].", examples=[1.6])
+    profile: Literal["minimum_jerk", "linear", "cubic"] = Field(
+        default="minimum_jerk", description="Position law in time.", examples=["minimum_jerk"]
+    )
+
+
+class WaypointsPath(Model):
+    """Pass through positions at given times, along a C2 spline that starts at rest."""
+
+    kind: Literal["waypoints"]
+    times: list[Instant] = Field(
+        min_length=2, max_length=100_000, description="Rising times since the grasp [s].", examples=[[0, 0.5, 1]]
+    )
+    positions: list[Vector] = Field(
+        min_length=2,
+        description="One position for each time [m]; the first is where the cable is grasped.",
+        examples=[[[0.25, 0, 0], [0.25, 0.1, 0], [0.25, 0.3, 0]]],
+    )
+    orientations: list[Quaternion] | None = Field(
+        default=None, description="One unit quaternion (w, x, y, z) for each time.", examples=[[[1, 0, 0, 0]] * 3]
+    )
+
+
+PathModel = Annotated[StillPath | MovePath | WaypointsPath, Field(discriminator="kind")]
+
+
+class PrimitiveModel(Model):
+    """A gripper that holds the cable and moves it."""
+
+    u: Coordinate
+    hold: Literal["point", "tangent", "clamp"] = Field(
+        default="point",
+        description="`point` holds the position, `tangent` the direction too, `clamp` the twist as well.",
+        examples=["point"],
+    )
+    path: PathModel = Field(description="Where the gripper goes; its clock starts at `grasp_time`.")
+    grasp_time: Instant | None = Field(
+        default=None, description="When the gripper closes [s]; absent: it holds from the start.", examples=[0.0]
+    )
+    release_time: Instant | None = Field(default=None, description="When it opens [s]; absent: never.", examples=[2.0])
+
+
+class ForceOverTime(Model):
+    """A force given at times, linear between them and constant outside."""
+
+    times: list[Number] = Field(min_length=1, description="Rising times [s].", examples=[[0, 1]])
+    values: list[Vector] = Field(
+        min_length=1, description="One force for each time [N].", examples=[[[0, 0, 0], [0, 1, 0]]]
+    )
+
+
+class LoadModel(Model):
+    """A known force, where the motion is not known."""
+
+    u: Coordinate
+    force: Annotated[Annotated[Vector, LIST] | Annotated[ForceOverTime, OBJECT], BY_FORM] = Field(
+        description="Force [N], constant or over time.", examples=[[0, 0, 0.1]]
+    )

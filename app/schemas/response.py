@@ -1,0 +1,219 @@
+"""The response of the predictions, as data to serialise and as a schema to read."""
+
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, Field
+
+from dlocore import Prediction
+from dlocore.prediction import Iteration, Status
+from dlocore.spline import DEGREE
+
+Floats = NDArray[np.float64]
+
+
+class SurfaceModel(BaseModel):
+    """The predicted space-time surface, sampled evenly."""
+
+    u: list[float] = Field(description="Material coordinates [m].")
+    t: list[float] = Field(description="Times [s].")
+    positions: list[list[list[float]]] = Field(description="Positions [t][u][3] [m].")
+    twist: list[list[float]] = Field(description="Twist angles [t][u] [rad].")
+
+
+class GraspModel(BaseModel):
+    """What a gripper must give to the cable."""
+
+    u: float = Field(description="Material coordinate [m].")
+    reaction: list[list[float]] = Field(description="Force at the times of the surface [t][3] [N].")
+    moment: list[list[float]] = Field(description="Moment at the times of the surface [t][3] [N m].")
+
+
+class EffectModel(BaseModel):
+    """Whether an effect was simulated, and why."""
+
+    name: str = Field(description="As in the request.", examples=["gravity"])
+    active: bool = Field(description="Whether it was simulated.")
+    reason: str = Field(description="Why, in words.")
+    magnitude: float | None = Field(description="Its size on the predicted motion; null where that means nothing.")
+    unit: str = Field(description="Unit of the magnitude.", examples=["N"])
+
+
+class IterationModel(BaseModel):
+    """One iteration of the solve, or one refinement level of a march. Null where a value is not finite."""
+
+    number: int = Field(description="From 0.")
+    update: float | None = Field(description="Norm of the change of the control points, the paper's eq. (25) [m].")
+    residual: float | None = Field(description="Root mean square residual over the motion [m]; method `paper`: [N].")
+    energy: float | None = Field(description="Energy at the end of the motion [J].")
+    wall_time: float = Field(description="Since the solve began [s].")
+    damping: float | None = Field(description="Levenberg-Marquardt damping of the step.")
+    step_length: float | None = Field(description="Fraction of the full step taken.")
+    n_u: int = Field(description="Control points along the cable.")
+    n_t: int = Field(description="Control points in time.")
+    note: str = Field(description="What happened, in words.")
+
+
+class AccuracyModel(BaseModel):
+    """What the answer is worth and what it cost."""
+
+    method: str = Field(description="Method that gave the answer.", examples=["spacetime"])
+    error_estimate: float | None = Field(description="Error of position at the worst point [m]; null where unknown.")
+    wall_time: float = Field(description="Time of the solve [s].")
+    n_u: int = Field(description="Control points along the cable.")
+    n_t: int = Field(description="Control points in time.")
+    delta: float = Field(description="Threshold on the update [m].")
+    steps: int = Field(description="Time steps of the march.")
+    dimensions: int = Field(description="2 where the motion is planar, else 3.")
+    phases: dict[str, float] = Field(description="Time by phase [s].")
+
+
+class StartModel(BaseModel):
+    """The start shape as the solver took it."""
+
+    elastic_energy: float = Field(description="Elastic energy stored in the start shape [J].")
+    fit_error: float = Field(description="Root mean square distance from the given points [m].")
+
+
+class LinksModel(BaseModel):
+    """Addresses on this service."""
+
+    self: str = Field(description="This document.")
+    recording: str = Field(description="The iterations and the motion, for rerun (.rrd).")
+    surface: str = Field(description="The surface for NumPy (.npz).")
+    scene: str = Field(description="The request, to be sent again.")
+    viewer: str = Field(description="The recording in the browser.")
+
+
+class PredictionResponse(BaseModel):
+    """A predicted motion."""
+
+    id: str = Field(description="Id of the stored run.")
+    created: str = Field(description="When it was made, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000000Z"])
+    status: Status = Field(description="`converged`, or why not.")
+    message: str = Field(description="The status in words, and what to do about it.")
+    surface: SurfaceModel
+    control_points: list[list[list[float]]] = Field(
+        description="Control points of the bivariate spline [n_t][n_u][4] [m, m, m, rad]."
+    )
+    knots_u: list[float] = Field(description="Knots along the cable [m].")
+    knots_t: list[float] = Field(description="Knots in time [s].")
+    degree: int = Field(description="Degree of the spline.", examples=[3])
+    grasps: list[GraspModel]
+    effects: list[EffectModel]
+    iterations: list[IterationModel]
+    accuracy: AccuracyModel
+    start: StartModel
+    links: LinksModel
+
+
+class RunSummary(BaseModel):
+    """A stored run in a list."""
+
+    id: str = Field(description="Its id.")
+    created: str = Field(description="When it was made, ISO 8601 in UTC.")
+    status: Status = Field(description="`converged`, or why not.")
+    method: str = Field(description="Method that gave the answer.")
+    error_estimate: float | None = Field(description="Error of position at the worst point [m].")
+    wall_time: float = Field(description="Time of the solve [s].")
+    links: LinksModel
+
+
+class PredictionList(BaseModel):
+    """Stored runs, newest first."""
+
+    predictions: list[RunSummary]
+    total: int = Field(description="How many are stored.")
+    limit: int = Field(description="At most so many are listed.")
+    offset: int = Field(description="So many newer ones were passed over.")
+    next: str | None = Field(description="Address of the next page, or null.")
+
+
+class BadFieldModel(BaseModel):
+    """One wrong field."""
+
+    field: str = Field(examples=["primitives[0].u"])
+    given: str = Field(examples=["2.0"])
+    allowed: str = Field(examples=["0 to the cable's length, 1 [m]"])
+    message: str
+
+
+class ProblemDocument(BaseModel):
+    """What went wrong (RFC 9457)."""
+
+    type: str = Field(examples=["urn:dlo:problem:bad-request"])
+    title: str = Field(examples=["Unprocessable Content"])
+    status: int = Field(examples=[422])
+    detail: str = Field(description="What went wrong and what to do, in words.")
+    errors: list[BadFieldModel] | None = Field(default=None, description="The wrong fields, with status 422.")
+    prediction: str | None = Field(default=None, description="Address of the best iterate, with status 504.")
+
+
+def problem_document(description: str) -> dict[str, Any]:
+    """Return the OpenAPI entry of a response that is a problem document."""
+    reference = {"$ref": "#/components/schemas/ProblemDocument"}
+    return {"description": description, "content": {"application/problem+json": {"schema": reference}}}
+
+
+def links(id: str) -> dict[str, str]:
+    """Return the addresses of the run `id`, relative to the service."""
+    base = f"/v1/predictions/{id}"
+    return {
+        "self": base,
+        "recording": f"{base}/recording.rrd",
+        "surface": f"{base}/surface.npz",
+        "scene": f"{base}/scene.json",
+        "viewer": f"{base}/viewer",
+    }
+
+
+def from_prediction(prediction: Prediction, id: str, samples_u: int = 101, samples_t: int = 33) -> dict[str, Any]:
+    """Return the response document of `prediction`, with NumPy arrays in it.
+
+    Args:
+        prediction: what the solver returned.
+        id: id of the stored run.
+        samples_u: samples along the cable.
+        samples_t: samples in time.
+    """
+    u, t, q = prediction.surface.sample(samples_u, samples_t)
+    accuracy = vars(prediction.accuracy)
+    return {
+        "id": id,
+        "created": datetime.now(UTC).isoformat(timespec="microseconds").replace("+00:00", "Z"),
+        "status": prediction.status,
+        "message": prediction.message,
+        "surface": {"u": u, "t": t, "positions": np.ascontiguousarray(q[..., :3]), "twist": q[..., 3].copy()},
+        "control_points": np.ascontiguousarray(prediction.surface.control_points, dtype=float),
+        "knots_u": prediction.surface.knots_u,
+        "knots_t": prediction.surface.knots_t,
+        "degree": DEGREE,
+        "grasps": [
+            {"u": grasp.u, "reaction": _at(t, grasp.times, grasp.reaction), "moment": _at(t, grasp.times, grasp.moment)}
+            for grasp in prediction.grasps
+        ],
+        "effects": [{**vars(effect), "magnitude": _finite(effect.magnitude)} for effect in prediction.effects],
+        "iterations": [iteration_document(iteration) for iteration in prediction.iterations],
+        "accuracy": {**accuracy, "error_estimate": _finite(prediction.accuracy.error_estimate)},
+        "start": {"elastic_energy": prediction.start_energy, "fit_error": prediction.start_fit},
+        "links": links(id),
+    }
+
+
+def iteration_document(iteration: Iteration) -> dict[str, Any]:
+    """Return an iteration without its surface, with None where a value is not finite."""
+    document = {name: value for name, value in vars(iteration).items() if name != "surface"}
+    for name in ("update", "residual", "energy", "damping", "step_length"):
+        document[name] = _finite(document[name])
+    return document
+
+
+def _finite(value: float | None) -> float | None:
+    return float(value) if value is not None and np.isfinite(value) else None
+
+
+def _at(t: Floats, times: Floats, values: Floats) -> Floats:
+    """Return `values` (k, 3) at `times` (k,), interpolated at `t`; (len(t), 3)."""
+    return np.column_stack([np.interp(t, times, values[:, d]) for d in range(3)])

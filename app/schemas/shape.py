@@ -1,0 +1,112 @@
+"""The start shape of a request."""
+
+from typing import Annotated, Literal
+
+from pydantic import Discriminator, Field, Tag
+
+from app.schemas.base import Flag, Model, Number, Point, Vector
+
+ControlPoint = Annotated[list[Number], Field(min_length=3, max_length=4)]
+Settle = Annotated[
+    Flag,
+    Field(description="Relax to static equilibrium under the primitives' first poses before t = 0.", examples=[False]),
+]
+
+
+class PointVelocities(Model):
+    """Velocities at points: at the points of the shape, or evenly spaced along a straight one."""
+
+    kind: Literal["points"]
+    points: list[Vector] = Field(min_length=4, description="Velocities [m/s].", examples=[[[0, 0.1, 0]] * 4])
+
+
+class ControlVelocities(Model):
+    """Control points of the velocity, one for each control point of the shape."""
+
+    kind: Literal["control_points"]
+    control_points: list[ControlPoint] = Field(
+        min_length=4, description="[m/s, m/s, m/s], and the twist rate [rad/s].", examples=[[[0, 0.1, 0]] * 4]
+    )
+
+
+def _velocity_form(value: object) -> str:
+    if isinstance(value, dict | Model):
+        return "~object"
+    return "~rows" if isinstance(value, list) and value and isinstance(value[0], list) else "~one"
+
+
+Velocity = Annotated[
+    Annotated[Vector, Tag("~one")]
+    | Annotated[Annotated[list[Vector], Field(min_length=4)], Tag("~rows")]
+    | Annotated[
+        Annotated[PointVelocities | ControlVelocities, Field(discriminator="kind")],
+        Tag("~object"),
+    ],
+    Discriminator(_velocity_form),
+    Field(
+        description=(
+            "Initial velocity [m/s]: one vector for the whole cable, one for each point (each control point) of the "
+            "shape, or an object of the shape's form. Absent: at rest."
+        ),
+        examples=[[0.0, 0.1, 0.0]],
+    ),
+]
+
+
+class StraightShape(Model):
+    """A straight cable."""
+
+    kind: Literal["straight"]
+    start: Vector = Field(default=[0.0, 0.0, 0.0], description="Where u = 0 lies [m].", examples=[[0, 0, 0]])
+    direction: Vector = Field(
+        default=[1.0, 0.0, 0.0], description="Direction from there; any length but zero.", examples=[[1, 0, 0]]
+    )
+    settle: Settle = False
+    velocity: Velocity | None = None
+
+
+class PointsShape(Model):
+    """Points in order along the whole cable, as a vision system gives them: noisy, unevenly spaced, 2D or 3D."""
+
+    kind: Literal["points"]
+    points: list[Point] = Field(
+        min_length=4,
+        max_length=100_000,
+        description="Points [m], all 2D (z = 0) or all 3D.",
+        examples=[[[0.02, 0.01], [0.24, 0.05], [0.47, -0.03], [0.74, 0.13]]],
+    )
+    settle: Settle = False
+    velocity: Velocity | None = None
+
+
+class ControlPointsShape(Model):
+    """A clamped cubic spline by its control points."""
+
+    kind: Literal["control_points"]
+    control_points: list[ControlPoint] = Field(
+        min_length=4,
+        max_length=2000,
+        description="Control points [m, m, m] or [m, m, m, rad].",
+        examples=[[[0, 0, 0], [0.3, 0, 0], [0.7, 0, 0], [1, 0, 0]]],
+    )
+    knots: list[Number] | None = Field(
+        default=None,
+        description="Knots [m], four more than control points, from 0 to the cable's length; absent: uniform.",
+        examples=[[0, 0, 0, 0, 1, 1, 1, 1]],
+    )
+    settle: Settle = False
+    velocity: Velocity | None = None
+
+
+class PredictionShape(Model):
+    """Continue from a stored prediction, with its shape and velocity."""
+
+    kind: Literal["prediction"]
+    id: str = Field(description="Id of a stored prediction.", examples=["0193b1f5a2c07f3e9d1c5b6a7e8f"])
+    t: Number | None = Field(
+        default=None, ge=0.0, description="Time in that prediction [s]; absent: its end.", examples=[1.6]
+    )
+    settle: Settle = False
+
+
+ShapeModel = Annotated[StraightShape | PointsShape | ControlPointsShape | PredictionShape, Field(discriminator="kind")]

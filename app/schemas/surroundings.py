@@ -1,0 +1,129 @@
+"""The environment, the effects and the asked quality of a request."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from app.schemas.base import BY_FORM, OBJECT, TEXT, Count, Model, Number, Vector
+
+Switch = Literal["auto", "on", "off"]
+Length = Annotated[Number, Field(gt=0.0, le=1e4)]
+
+
+class TableModel(Model):
+    """A horizontal table."""
+
+    height: Number = Field(
+        default=0.0,
+        ge=-1e4,
+        le=1e4,
+        description="Height of the centreline of a cable lying on it [m]: the surface plus half the diameter.",
+        examples=[0.0],
+    )
+    friction: Number = Field(default=0.0, ge=0.0, le=10.0, description="Coefficient of friction.", examples=[0.0])
+
+
+class Cylinder(Model):
+    """A solid cylinder."""
+
+    kind: Literal["cylinder"]
+    center: Vector = Field(description="Centre [m].", examples=[[0.55, 0.2, 0]])
+    axis: Vector = Field(description="Direction of its axis.", examples=[[0, 0, 1]])
+    radius: Length = Field(description="Radius [m].", examples=[0.02])
+    height: Length = Field(description="Length along the axis [m].", examples=[0.1])
+
+
+class Box(Model):
+    """A solid box."""
+
+    kind: Literal["box"]
+    center: Vector = Field(description="Centre [m].", examples=[[0.5, 0.2, 0.05]])
+    size: Annotated[list[Length], Field(min_length=3, max_length=3)] = Field(
+        description="Edge lengths [m].", examples=[[0.1, 0.1, 0.1]]
+    )
+    orientation: Annotated[list[Number], Field(min_length=4, max_length=4)] | None = Field(
+        default=None, description="Unit quaternion (w, x, y, z); absent: axis-aligned.", examples=[[1, 0, 0, 0]]
+    )
+
+
+class Sphere(Model):
+    """A solid sphere."""
+
+    kind: Literal["sphere"]
+    center: Vector = Field(description="Centre [m].", examples=[[0.5, 0.2, 0.05]])
+    radius: Length = Field(description="Radius [m].", examples=[0.05])
+
+
+class Capsule(Model):
+    """A solid capsule: all points within `radius` of a segment."""
+
+    kind: Literal["capsule"]
+    start: Vector = Field(description="One end of the segment [m].", examples=[[0.5, 0, 0]])
+    end: Vector = Field(description="Its other end [m].", examples=[[0.5, 0.2, 0]])
+    radius: Length = Field(description="Radius [m].", examples=[0.02])
+
+
+ObstacleModel = Annotated[Cylinder | Box | Sphere | Capsule, Field(discriminator="kind")]
+
+
+class EnvironmentModel(Model):
+    """What surrounds the cable. World frame right-handed, z up."""
+
+    gravity: Vector = Field(default=[0.0, 0.0, -9.81], description="Gravity [m/s^2].", examples=[[0, 0, -9.81]])
+    drag: Number = Field(
+        default=0.0, ge=0.0, le=1e6, description="Linear drag per unit length [N s/m^2].", examples=[0.05]
+    )
+    drag_quadratic: Number = Field(
+        default=0.0, ge=0.0, le=1e6, description="Quadratic drag per unit length [N s^2/m^3].", examples=[0.0]
+    )
+    table: TableModel | None = Field(default=None, description="A table, or null.")
+    obstacles: list[ObstacleModel] = Field(
+        default=[], max_length=1000, description="Solid obstacles by their true surfaces; the cable adds its radius."
+    )
+
+
+class EffectsModel(Model):
+    """Which effects to simulate; `auto` asks the scene."""
+
+    inertia: Switch = "auto"
+    drag: Switch = "auto"
+    damping: Switch = "auto"
+    gravity: Switch = "auto"
+    stretch: Switch = "auto"
+    bend: Switch = "auto"
+    twist: Switch = "auto"
+    plasticity: Switch = "auto"
+    table: Switch = "auto"
+    friction: Switch = "auto"
+    obstacles: Switch = "auto"
+    self_contact: Switch = "auto"
+
+
+class QualityModel(Model):
+    """A grid (`n_u` with `n_t`), or a target error, or a time budget; and how to solve."""
+
+    n_u: Count | None = Field(default=None, ge=5, le=129, description="Control points along the cable.", examples=[9])
+    n_t: Count | None = Field(default=None, ge=5, le=513, description="Control points in time.", examples=[13])
+    delta: Number = Field(
+        default=1e-5, ge=1e-10, le=1e-2, description="Threshold on the control-point update [m].", examples=[1e-5]
+    )
+    target_error: Number | None = Field(
+        default=None, ge=1e-6, le=10.0, description="Error at the worst point of the surface [m].", examples=[0.002]
+    )
+    time_budget: Number | None = Field(
+        default=None, ge=1e-4, le=3600.0, description="Time the solve may take [s].", examples=[0.02]
+    )
+    method: Literal["auto", "march", "spacetime", "paper", "reference"] = Field(
+        default="auto", description="How to solve; the answer names the method used.", examples=["auto"]
+    )
+
+
+Effects = Annotated[Annotated[Literal["auto"], TEXT] | Annotated[EffectsModel, OBJECT], BY_FORM]
+Quality = Annotated[Annotated[Literal["auto"], TEXT] | Annotated[QualityModel, OBJECT], BY_FORM]
+
+
+class OutputModel(Model):
+    """How finely the answer is sampled, evenly."""
+
+    samples_u: Count = Field(default=101, ge=2, le=2001, description="Samples along the cable.", examples=[101])
+    samples_t: Count = Field(default=33, ge=2, le=2001, description="Samples in time.", examples=[33])

@@ -1,0 +1,42 @@
+"""Settings of the service, from environment variables that begin with ``DLO_``."""
+
+import os
+from pathlib import Path
+
+from pydantic import Field, field_validator
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+
+def default_data_dir() -> Path:
+    """Return the user's data directory for this program: ``$XDG_DATA_HOME/dlo``, else ``~/.local/share/dlo``."""
+    base = os.environ.get("XDG_DATA_HOME", "")
+    return (Path(base) if Path(base).is_absolute() else Path.home() / ".local" / "share") / "dlo"
+
+
+def usable_cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class Settings(BaseSettings):
+    """Where the service listens and stores, and its limits. ``DLO_PORT=9000`` sets `port`, and so on."""
+
+    model_config = SettingsConfigDict(env_prefix="DLO_", frozen=True, extra="ignore")
+
+    host: str = Field(default="127.0.0.1", description="Address to listen on; loopback unless you say otherwise.")
+    port: int = Field(default=8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one.")
+    data_dir: Path = Field(default_factory=default_data_dir, description="Directory of the stored runs.")
+    max_body_bytes: int = Field(default=10_000_000, ge=1_000, description="Largest request body [bytes].")
+    workers: int = Field(default_factory=usable_cores, ge=1, le=1024, description="Solves that run at once.")
+    queue_size: int = Field(default=64, ge=0, le=100_000, description="Solves that may wait for a worker.")
+    time_limit: float = Field(default=60.0, gt=0.0, le=86_400.0, description="Longest solve [s].")
+    allowed_origins: tuple[str, ...] = Field(
+        default=(), description='Other origins whose pages may call the API, as JSON: ["https://lab.example"].'
+    )
+    max_runs: int = Field(default=1000, ge=1, description="Stored runs kept; the oldest go first.")
+    max_run_bytes: int = Field(default=2_000_000_000, ge=1_000_000, description="Bytes of stored runs kept.")
+
+    @field_validator("data_dir")
+    @classmethod
+    def _absolute(cls, value: Path) -> Path:
+        return value.expanduser().absolute()
