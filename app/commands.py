@@ -29,10 +29,11 @@ def serve(host: str | None, port: int | None) -> int:
     """Run the service until it is stopped."""
     import uvicorn
 
-    from app.main import create_app
-
     given = {name: value for name, value in (("host", host), ("port", port)) if value is not None}
     settings = _settings(**given)
+    _settings()  # what the environment says must be right even where an option overrides it
+    from app.main import create_app
+
     # one process: the 3D scene and the queue of solves live in it; viser compresses nothing, so neither do we
     config = uvicorn.Config(
         create_app(settings), host=settings.host, port=settings.port, log_level="info", ws_per_message_deflate=False
@@ -121,7 +122,7 @@ def _request(raw: bytes) -> PredictionRequest:
 
 
 def _words(fields: list[BadField]) -> str:
-    lines = [f"{field.field}: got {field.given}. {field.message}" for field in fields]
+    lines = [f"{field.field}: {field.message}" for field in fields]
     return "\n     ".join(lines)
 
 
@@ -130,6 +131,7 @@ def _solve(request: PredictionRequest) -> Prediction:
 
     from app.runs import RunStore
     from dlocore import predict as solve
+    from dlocore import warm_up
 
     def stored(id: str) -> Any:
         return RunStore(_settings()).surface(id)
@@ -141,7 +143,9 @@ def _solve(request: PredictionRequest) -> Prediction:
             bar.update()
 
         try:
-            return solve(to_scene(request, stored), on_iteration=show)
+            scene = to_scene(request, stored)
+            warm_up()  # so that the reported time is that of the solve
+            return solve(scene, on_iteration=show)
         except SceneError as error:
             raise CommandError(_words([BadField.from_scene_error(error)])) from None
 

@@ -32,12 +32,19 @@ class BadField:
     def from_scene_error(error: SceneError) -> "BadField":
         """Return the field that the solver refused."""
         reason = f"{error.reason}. " if error.reason else ""
-        return BadField(error.field, error.given, error.allowed, f"{reason}Allowed: {error.allowed}.")
+        return BadField(error.field, error.given, error.allowed, f"{reason}Got {error.given}. Allowed: {error.allowed}.")
 
 
 def bad_fields(errors: Sequence[Any], body: Any) -> list[BadField]:
     """Return pydantic's `errors` about the request `body`, at most 50 of them."""
     return [_bad_field(error, body) for error in errors[:MAX_REPORTED]]
+
+
+_WHAT = {
+    "missing": "It is missing. ",
+    "union_tag_not_found": "It is missing. ",
+    "extra_forbidden": "There is no such field. ",
+}
 
 
 def _bad_field(error: Any, body: Any) -> BadField:
@@ -56,12 +63,7 @@ def _bad_field(error: Any, body: Any) -> BadField:
     if kind == "union_tag_invalid":
         steps, given = [*steps, "kind"], _shown(error["input"].get("kind"), kind)
     allowed = _allowed(kind, context, tagged)
-    what = {
-        "missing": "It is missing. ",
-        "union_tag_not_found": "It is missing. ",
-        "extra_forbidden": "There is no such field. ",
-    }
-    return BadField(_text(steps), given, allowed, f"{what.get(kind, '')}Allowed: {allowed}.")
+    return BadField(_text(steps), given, allowed, f"{_WHAT.get(kind, '')}Got {given}. Allowed: {allowed}.")
 
 
 def _steps(loc: list[Any], body: Any) -> tuple[list[Any], list[Any]]:
@@ -115,7 +117,7 @@ _TYPES = {
 def _allowed(kind: str, context: dict[str, Any], loc: list[Any]) -> str:
     schema = _schema_at(loc)
     if kind == "extra_forbidden":
-        return "one of " + ", ".join(_schema_at(loc[:-1]).get("properties", {}))
+        return "one of " + ", ".join(_names(_schema_at(loc[:-1])))
     if kind == "union_tag_invalid":
         return "one of " + context["expected_tags"].replace("'", "")
     if kind == "union_tag_not_found":
@@ -173,6 +175,12 @@ def _schema_at(loc: list[Any]) -> dict[str, Any]:
     description = node.get("description")
     resolved = _resolved(node)
     return {**resolved, "description": description} if description else resolved
+
+
+def _names(node: dict[str, Any]) -> list[str]:
+    """Return the field names of an object, or of the one object among the forms that a field may have."""
+    options = [node, *map(_resolved, node.get("anyOf", []))]
+    return next((list(option["properties"]) for option in options if "properties" in option), [])
 
 
 def _resolved(node: dict[str, Any]) -> dict[str, Any]:
