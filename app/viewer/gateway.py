@@ -1,0 +1,151 @@
+"""The scene under the service's own port: its one page, and its websocket passed on to the viser server.
+
+viser listens on the loopback address only. The gateway is the single way in, so it is the place where foreign origins
+are refused: viser itself checks none.
+"""
+
+import asyncio
+import contextlib
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import viser
+from fastapi import FastAPI, Request, Response, WebSocket
+from starlette.websockets import WebSocketDisconnect
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed, InvalidHandshake
+from websockets.typing import Subprotocol
+
+CLIENT_PAGE = Path(viser.__file__).parent / "client" / "build" / "index.html"
+CONTENT_SECURITY_POLICY = "; ".join(
+    [
+        "default-src 'self'",
+        # the client builds the bindings of its WebAssembly modules by eval, whether they are used or not
+        "script-src 'self' 'unsafe-inline' 'unsafe-eval' blob:",
+        "worker-src 'self' blob:",
+        "style-src 'self' 'unsafe-inline'",
+        "img-src 'self' data: blob:",
+        "font-src 'self' data:",
+        "connect-src 'self' data: blob:",
+        "object-src 'none'",
+        "base-uri 'none'",
+        "frame-ancestors 'self'",
+    ]
+)
+PAGE_HEADERS = {
+    "Content-Security-Policy": CONTENT_SECURITY_POLICY,
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cache-Control": "no-cache",
+}
+POLICY_VIOLATION = 1008
+TRY_AGAIN_LATER = 1013
+GOING_AWAY = 1001
+
+
+KEY_HEADER = "X-Scene-Key"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Upstream:
+    """The viser server behind the gateway.
+
+    Attributes:
+        port: where it listens on the loopback address.
+        key: proves to it that a connection came through the gateway.
+        allowed_origins: origins let in besides that of the page's own host.
+    """
+
+    port: int
+    key: str
+    allowed_origins: frozenset[str]
+
+
+def origin_is_allowed(origin: str | None, host: str, allowed: Collection[str]) -> bool:
+    """Say whether a websocket from `origin` may open a scene.
+
+    Programs send no origin and are let in, as for every other route. Browsers always send one: it must be that of the
+    page's own host, or one of `allowed`.
+    """
+    if origin is None:
+        return True
+    return origin in allowed or (bool(host) and urlsplit(origin).netloc == host)
+
+
+def add_gateway(app: FastAPI) -> None:
+    """Add `GET /scene/` and the websocket `/scene`; without a viser server they say so."""
+    page = CLIENT_PAGE.read_bytes()
+
+    @app.get("/scene/", include_in_schema=False)
+    async def scene_page(request: Request) -> Response:
+        if _upstream(request.app) is None:
+            return Response("The scene is not running.", status_code=503, media_type="text/plain")
+        return Response(page, media_type="text/html; charset=utf-8", headers=PAGE_HEADERS)
+
+    @app.websocket("/scene")
+    async def scene_socket(socket: WebSocket) -> None:
+        upstream = _upstream(socket.app)
+        if upstream is None:
+            await socket.close(TRY_AGAIN_LATER)
+            return
+        if not origin_is_allowed(
+            socket.headers.get("origin"), socket.headers.get("host", ""), upstream.allowed_origins
+        ):
+            await socket.close(POLICY_VIOLATION)
+            return
+        await _pass_on(socket, upstream)
+
+
+def _upstream(app: FastAPI) -> Upstream | None:
+    return getattr(app.state, "viewer_upstream", None)
+
+
+async def _pass_on(socket: WebSocket, upstream: Upstream) -> None:
+    """Connect `socket` with the viser server until either side closes."""
+    protocols = [Subprotocol(name) for name in socket.scope.get("subprotocols", [])]
+    try:
+        inner = await connect(
+            f"ws://127.0.0.1:{upstream.port}",
+            subprotocols=protocols or None,
+            additional_headers={KEY_HEADER: upstream.key},
+            compression=None,
+            max_size=None,
+            proxy=None,
+        )
+    except (OSError, InvalidHandshake):
+        await socket.close(TRY_AGAIN_LATER)
+        return
+    try:
+        await socket.accept(subprotocol=inner.subprotocol)
+        directions = {asyncio.create_task(_inwards(socket, inner)), asyncio.create_task(_outwards(inner, socket))}
+        try:
+            await asyncio.wait(directions, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in directions:
+                task.cancel()
+            await asyncio.gather(*directions, return_exceptions=True)
+    finally:
+        await inner.close()
+        with contextlib.suppress(RuntimeError, WebSocketDisconnect):
+            await socket.close(GOING_AWAY)
+
+
+async def _inwards(socket: WebSocket, inner: ClientConnection) -> None:
+    with contextlib.suppress(ConnectionClosed, WebSocketDisconnect):
+        while True:
+            message = await socket.receive()
+            if message["type"] == "websocket.disconnect":
+                return
+            data = message.get("bytes")
+            await inner.send(message["text"] if data is None else data)
+
+
+async def _outwards(inner: ClientConnection, socket: WebSocket) -> None:
+    with contextlib.suppress(ConnectionClosed, WebSocketDisconnect, RuntimeError):
+        async for message in inner:
+            if isinstance(message, bytes):
+                await socket.send_bytes(message)
+            else:
+                await socket.send_text(message)

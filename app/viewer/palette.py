@@ -1,0 +1,106 @@
+"""Colours: one ramp that reads on light and on dark ground, and the quantities it shows."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore import SplineSurface
+
+Floats = NDArray[np.float64]
+Colours = NDArray[np.uint8]
+
+BRAND = (46, 107, 214)
+STEEL = (128, 138, 154)
+WARNING = (222, 72, 50)
+REACTION = (213, 94, 0)
+_RAMP = np.array(
+    [(46, 107, 214), (108, 92, 224), (178, 80, 200), (228, 92, 142), (247, 133, 86), (248, 184, 72)], dtype=float
+)
+
+
+def ramp(values: Floats) -> Colours:
+    """Return the colours of `values` (n,), 0 to 1, from blue to amber; (n, 3)."""
+    x = np.clip(np.nan_to_num(values), 0.0, 1.0) * (len(_RAMP) - 1)
+    channels = [np.interp(x, np.arange(len(_RAMP)), _RAMP[:, channel]) for channel in range(3)]
+    return np.rint(np.stack(channels, axis=-1)).astype(np.uint8)
+
+
+def linear(colours: Colours) -> Colours:
+    """Return sRGB colours as linear light, as the client takes those of instances and vertices."""
+    share = colours / 255.0
+    light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    return np.rint(255.0 * light).astype(np.uint8)
+
+
+def colour(value: float) -> tuple[int, int, int]:
+    """Return the colour of one value, 0 to 1."""
+    r, g, b = ramp(np.array([value]))[0]
+    return int(r), int(g), int(b)
+
+
+def css_ramp() -> str:
+    """Return the ramp as a CSS gradient."""
+    stops = ", ".join(f"rgb({int(r)} {int(g)} {int(b)})" for r, g, b in _RAMP)
+    return f"linear-gradient(90deg, {stops})"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What the cable's colour shows.
+
+    Attributes:
+        name: as on the panel.
+        unit: of the values.
+        values: surface, u (k_u,) [m], t (k_t,) [s] -> (k_t, k_u).
+        signed: whether the scale is symmetric about zero.
+        scale: factor from the values to the unit.
+    """
+
+    name: str
+    unit: str
+    values: Callable[[SplineSurface, Floats, Floats], Floats]
+    signed: bool = False
+    scale: float = 1.0
+
+
+def _time(_surface: SplineSurface, u: Floats, t: Floats) -> Floats:
+    return np.repeat(t[:, None], len(u), axis=1)
+
+
+def _speed(surface: SplineSurface, u: Floats, t: Floats) -> Floats:
+    return np.linalg.norm(surface(u, t, dt=1)[..., :3], axis=-1)
+
+
+QUANTITIES = {
+    quantity.name: quantity
+    for quantity in (
+        Quantity("time", "s", _time),
+        Quantity("curvature", "1/m", SplineSurface.curvature),
+        Quantity("speed", "m/s", _speed),
+        Quantity("axial strain", "µm/m", SplineSurface.axial_strain, signed=True, scale=1e6),
+    )
+}
+
+
+@dataclass(frozen=True)
+class ColourScale:
+    """A quantity with the range that its colours span, in its own values (before `scale`)."""
+
+    quantity: Quantity
+    low: float
+    high: float
+
+    @staticmethod
+    def of(quantity: Quantity, surface: SplineSurface) -> "ColourScale":
+        """Span the whole prediction: from zero, or symmetric about it, to the largest value."""
+        u = np.linspace(0.0, surface.length, 61)
+        t = np.linspace(0.0, surface.horizon, 25)
+        largest = max(float(np.abs(quantity.values(surface, u, t)).max()), 1e-12)
+        return ColourScale(quantity, -largest if quantity.signed else 0.0, largest)
+
+    def colours(self, surface: SplineSurface, u: Floats, t: Floats) -> Colours:
+        """Return the colours of instances or vertices at `u` (k_u,) and `t` (k_t,); (k_t, k_u, 3), linear."""
+        values = self.quantity.values(surface, u, t)
+        return linear(ramp((values - self.low) / (self.high - self.low)))
