@@ -14,6 +14,7 @@ from dlocore.spline import DEGREE
 Floats = NDArray[np.float64]
 
 MAX_LENGTH_MISMATCH = 0.10  # of the cable's length: beyond it the shape is another cable's, or a part of this one's
+SAME = 1e-6  # of the length: points closer than this are one point given twice
 MAX_GROUPS = 2000  # points are averaged down to about this many: then a group is a small part of a knot span
 MAX_SPANS = 160  # knot spans: three for each radius of a cable that turns eight full loops
 SPARSE = 40  # points: chords between so few are long against the noise, so their order and spacing are not in doubt
@@ -56,10 +57,14 @@ def fit_points(points: Floats, length: float) -> PointFit:
         length: of the cable [m].
 
     Raises:
-        SceneError: the curve differs in length from the cable by more than MAX_LENGTH_MISMATCH.
+        SceneError: the curve differs in length from the cable by more than MAX_LENGTH_MISMATCH, or fewer than three
+            points are distinct.
     """
-    share = _share(points)
-    p, progress, weight = _averaged(points, share)
+    distinct, which = _distinct(points, SAME * length)
+    if len(distinct) < 3:
+        raise SceneError("shape.points", f"{len(distinct)} distinct points", "at least 3 distinct points")
+    share = _share(distinct)
+    p, progress, weight = _averaged(distinct, share)
     noise = _noise(p) if len(p) > SPARSE else 0.0
     s = _chord_length(p, progress, length, noise)
     spans = int(np.clip(len(p), 8, MAX_SPANS))
@@ -81,7 +86,7 @@ def fit_points(points: Floats, length: float) -> PointFit:
     return PointFit(
         curve=_unit_speed(spline, grid, along, start, end),
         length_given=last - first,
-        at=np.clip(np.interp(share, progress, s) - start, 0.0, end - start),
+        at=np.clip(np.interp(share, progress, s) - start, 0.0, end - start)[which],
     )
 
 
@@ -90,6 +95,15 @@ def check_length(name: str, allowed: str, given: float, length: float) -> None:
     if not abs(given - length) <= MAX_LENGTH_MISMATCH * length:
         reason = f"The cable is {length:.4g} m long; the two may differ by {MAX_LENGTH_MISMATCH:.0%}"
         raise SceneError(name, f"a curve {given:.4g} m long", f"{allowed}, or another cable.length", reason)
+
+
+def _distinct(p: Floats, distance: float) -> tuple[Floats, NDArray[np.intp]]:
+    """Return the points without repetitions of their predecessors (m, 3), and for each point which of them it is.
+
+    A repeated point is no second measurement: counted as one it would pass for a point without noise.
+    """
+    new = np.concatenate([[True], (np.diff(p, axis=0) ** 2).sum(axis=1) > distance**2])
+    return p[new], np.cumsum(new) - 1
 
 
 def _share(p: Floats) -> Floats:
@@ -174,7 +188,7 @@ def _ends(s: Floats, noise: float) -> tuple[float, float]:
     """
 
     def end(v: Floats) -> float:
-        k = int(np.clip((np.abs(v - v[0]) < 4 * noise).sum(), 1, len(v) // 8))
+        k = int(np.clip((np.abs(v - v[0]) < 4 * noise).sum(), 1, max(len(v) // 8, 1)))
         one, two = v[:k].mean(), v[k : 2 * k].mean()
         return float(one - (two - one) * (k - 1) / (2 * k))
 

@@ -9,10 +9,10 @@ from dlocore.spline import DEGREE
 
 Floats = NDArray[np.float64]
 
-STRENGTHS = 10.0 ** np.arange(-6.0, 14.0)  # lambda, relative: from interpolation to a parabola on MAX_SPANS spans
+WEAKEST = 1e-6  # lambda, relative to the data: interpolation
+STRONGEST = 1e-2  # relative to the data and the sixth power of the spans: a parabola to 1 %, and well above rounding
 LEAST_NOISE = 1e-6  # of the size of the data: below it rounding, not the data, would choose the smoothness
 TINY = 1e-300  # so that data that are all zero have a logarithm
-CURVATURE_PENALTY = 1e-8  # of the penalty, on r'': decides the shape where fewer than three points are distinct
 
 
 def smooth(x: Floats, y: Floats, weight: Floats, length: float, spans: int, most_noise: float) -> BSpline:
@@ -39,7 +39,8 @@ def smooth(x: Floats, y: Floats, weight: Floats, length: float, spans: int, most
     normal, right = normal_equations(k, basis, weight, y, n)
     square = float((weight * (y**2).sum(axis=1)).sum())
     penalty = _penalty(n)
-    strengths = STRENGTHS * (normal[0].mean() / penalty[0].mean())
+    decades = np.arange(np.log10(WEAKEST), np.log10(STRONGEST * spans**6) + 1)
+    strengths = 10.0**decades * (normal[0].mean() / penalty[0].mean())
     score = np.array([_score(normal, penalty, right, square, len(x), most_noise, s) for s in strengths])
     control = _solve(normal + _least(strengths, score) * penalty, right)[1]
     return BSpline(length / spans * np.arange(-DEGREE, spans + DEGREE + 1), control, DEGREE)
@@ -66,13 +67,12 @@ def normal_equations(k: NDArray[np.intp], basis: Floats, weight: Floats, y: Floa
 
 
 def _penalty(n: int) -> Floats:
-    """Return the lower band (4, n) of the sum of squared third differences, and a trace of the second ones."""
+    """Return the lower band (4, n) of the sum of squared third differences, int |r'''|^2 but for a factor."""
     band = np.zeros((4, n))
-    for difference, size in (((-1.0, 3.0, -3.0, 1.0), 1.0), ((1.0, -2.0, 1.0), CURVATURE_PENALTY)):
-        rows = n - len(difference) + 1
-        for i, a in enumerate(difference):
-            for j, b in enumerate(difference[: i + 1]):
-                band[i - j, j : j + rows] += size * a * b
+    difference = (-1.0, 3.0, -3.0, 1.0)
+    for i, a in enumerate(difference):
+        for j, b in enumerate(difference[: i + 1]):
+            band[i - j, j : j + n - 3] += a * b
     return band
 
 
