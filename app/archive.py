@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dlocore import Iteration, Prediction, SplineSurface
 
 Floats = NDArray[np.float64]
-_SCALARS = ("update", "residual", "energy", "wall_time", "damping", "step_length")
+_SCALARS = ("update", "residual", "energy", "wall_time", "step_length")
 
 
 @dataclass(frozen=True, eq=False)

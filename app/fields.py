@@ -141,7 +141,7 @@ def _bounds(context: dict[str, Any], least: str, most: str, form: str) -> str:
 
 
 def _range(schema: dict[str, Any]) -> str:
-    for option in [schema, *schema.get("anyOf", [])]:
+    for option in [schema, *_options(schema)]:
         words = [
             f"{word} {option[key]:g}"
             for key, word in (
@@ -179,8 +179,12 @@ def _schema_at(loc: list[Any]) -> dict[str, Any]:
 
 def _names(node: dict[str, Any]) -> list[str]:
     """Return the field names of an object, or of the one object among the forms that a field may have."""
-    options = [node, *map(_resolved, node.get("anyOf", []))]
+    options = [node, *map(_resolved, _options(node))]
     return next((list(option["properties"]) for option in options if "properties" in option), [])
+
+
+def _options(node: dict[str, Any]) -> list[dict[str, Any]]:
+    return [*node.get("anyOf", []), *node.get("oneOf", [])]
 
 
 def _resolved(node: dict[str, Any]) -> dict[str, Any]:
@@ -197,7 +201,7 @@ def _child(node: dict[str, Any], item: Any) -> dict[str, Any]:
         return node["properties"][item]
     if isinstance(item, int) and "items" in node:
         return node["items"]
-    for option in [*node.get("anyOf", []), *node.get("oneOf", [])]:
+    for option in _options(node):
         found = _child(_resolved(option), item)
         if found:
             return found

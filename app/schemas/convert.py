@@ -70,6 +70,8 @@ def to_scene(request: PredictionRequest, stored: StoredSurface) -> Scene:
 
 def _cable(model: CableModel) -> Cable:
     values = model.model_dump(exclude={"preset"}, exclude_none=True, exclude_unset=True)
+    if isinstance(model.rest_shape, list):
+        _check_columns("rest_shape", model.rest_shape)
     if model.preset is not None:
         return Cable.preset(model.preset, **values)
     for name in ("length", "diameter", "linear_density"):
@@ -87,13 +89,22 @@ def _shape(request: PredictionRequest, cable: Cable, stored: StoredSurface) -> S
             velocity = _velocity(model.velocity, "points")
             return Straight(start=model.start, direction=model.direction, settle=model.settle, velocity=velocity)
         if isinstance(model, PointsShape):
+            _check_columns("points", model.points)
             return Points(points=model.points, settle=model.settle, velocity=_velocity(model.velocity, "points"))
+        _check_columns("control_points", model.control_points)
         return ControlPoints(
             control_points=model.control_points,
             knots=model.knots,
             settle=model.settle,
             velocity=_velocity(model.velocity, "control_points"),
         )
+
+
+def _check_columns(name: str, rows: list[list[float]]) -> None:
+    columns = len(rows[0])
+    for i, row in enumerate(rows):
+        if len(row) != columns:
+            raise SceneError(f"{name}[{i}]", row, f"{columns} numbers, as in the first one")
 
 
 def _velocity(value: Any, kind: str) -> Any:
