@@ -141,7 +141,10 @@ def _memory(problem: Problem, grid: Grid) -> Floats:
 
 def consistent_start(problem: Problem, grid: Grid) -> Floats:
     """Return start control points (n_u, nc) of unit speed that pass exactly through the held points of the curve."""
-    held = hold(problem, grid, [g for g in problem.scene.grasps if g.start == 0.0], np.zeros(1))
+    grasps = [g for g in problem.scene.grasps if g.start == 0.0]
+    starts: Starts = {}
+    close_grasps(problem, grid, grasps, starts, None)
+    held = hold(problem, grid, grasps, np.zeros(1), starts)
     active, parameters = problem.law_table()
     active[:] = 0
     active[0] = 1
@@ -172,60 +175,55 @@ class Held:
     rows: tuple[tuple[int, int], ...]
     inverse: Floats
 
-    def forces(self, reactions: Floats, nc: int) -> Floats:
-        """Return the constraint forces (k, rows, nc) of the residual at the held degrees of freedom (k, held)."""
+    def multipliers(self, reactions: Floats, nc: int) -> Floats:
+        """Return the multipliers (k, rows, nc) of the constraint rows for forces (k, held) at the held ones [N]."""
         return np.einsum("rs,krd->ksd", self.inverse, reactions.reshape(len(reactions), -1, nc))
 
 
-def hold(problem: Problem, grid: Grid, grasps: list[Grasp], t: Floats, q: Floats | None = None) -> Held:
-    """Eliminate what `grasps` hold at the times t (k,) [s]; paths that begin now begin at the control points q.
-
-    The rows b(u_g) q = p(t), and b'(u_g) q = d(t) where the direction is held (unit stretch there), are solved for one
-    pivot control point each: those with the largest basis function (docs/model.md eq. 12).
-    """
-    nc = problem.plane.dimensions
-    starts = grasp_starts(problem, grid, grasps, q)
-    size = 1 + sum(g.hold == "tangent" for g in grasps) + len(grasps) - 1 if grasps else 0
-    A = np.zeros((size, grid.n_u))
-    target = np.empty((len(t), size, nc))
-    rows: list[tuple[int, int]] = []
-    pivots: list[int] = []
-    for i, g in enumerate(grasps):
-        position, direction = starts[i]
-        first, b = grid.rows(g.u)
-        r = len(rows)
-        A[r, first : first + 4] = b
-        target[:, r] = problem.position(g, t, position)
-        rows.append((i, 0))
-        order = [first + int(k) for k in np.argsort(-np.abs(b), kind="stable")]
-        pivots.append(next(k for k in order if k not in pivots))
-        if g.hold == "tangent":
-            first, b = grid.rows(g.u, 1)
-            A[r + 1, first : first + 4] = b
-            target[:, r + 1] = problem.direction(g, t, direction)
-            rows.append((i, 1))
-            order = [first + int(k) for k in np.argsort(-np.abs(b), kind="stable")]
-            pivots.append(next(k for k in order if k not in pivots))
-    inverse = np.linalg.inv(A[:, pivots]) if pivots else np.zeros((0, 0))
-    follow = -inverse @ A
-    follow[:, pivots] = 0.0
-    offsets = np.einsum("rs,ksd->krd", inverse, target)
-    return Held(
-        tuple(grasps), _elimination(grid.n_u, nc, pivots, follow), offsets.reshape(len(t), -1), tuple(rows), inverse
-    )
+Starts = dict[Grasp, tuple[Floats, Floats]]  # position and unit tangent (nc,) where the path of a grasp begins
 
 
-def grasp_starts(problem: Problem, grid: Grid, grasps: list[Grasp], q: Floats | None) -> list[tuple[Floats, Floats]]:
-    """Return position and unit tangent (nc,) where the path of each grasp begins: on the start curve, or on q."""
-    starts = []
+def close_grasps(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, q: Floats | None) -> None:
+    """Note where the paths of newly closed `grasps` begin: on the start curve at t = 0, else on the control points q."""
     for g in grasps:
+        if g in starts:
+            continue
         if q is None or g.start == 0.0:
             position = problem.plane.points(problem.start(g.u)[0])
             tangent = problem.plane.vectors(problem.start(g.u, 1)[0])
         else:
             position, tangent = grid.at(q, g.u), grid.at(q, g.u, 1)
-        starts.append((position, tangent / np.linalg.norm(tangent)))
-    return starts
+        starts[g] = (position, tangent / np.linalg.norm(tangent))
+
+
+def hold(problem: Problem, grid: Grid, grasps: list[Grasp], t: Floats, starts: Starts) -> Held:
+    """Eliminate what `grasps` hold at the times t (k,) [s].
+
+    The rows b(u_g) q = p(t), and b'(u_g) q = d(t) where the direction is held (unit stretch there), are solved for one
+    pivot control point each: those with the largest basis function (docs/model.md eq. 12).
+    """
+    nc = problem.plane.dimensions
+    size = sum(2 if g.hold == "tangent" else 1 for g in grasps)
+    A = np.zeros((size, grid.n_u))
+    target = np.empty((len(t), size, nc))
+    rows: list[tuple[int, int]] = []
+    pivots: list[int] = []
+    for i, g in enumerate(grasps):
+        position, direction = starts[g]
+        for derivative in range(2 if g.hold == "tangent" else 1):
+            first, b = grid.rows(g.u, derivative)
+            r = len(rows)
+            A[r, first : first + 4] = b
+            path = problem.position if derivative == 0 else problem.direction
+            target[:, r] = path(g, t, position if derivative == 0 else direction)
+            rows.append((i, derivative))
+            order = first + np.argsort(-np.abs(b), kind="stable")
+            pivots.append(next(int(k) for k in order if k not in pivots))
+    inverse = np.linalg.inv(A[:, pivots])
+    follow = -inverse @ A
+    follow[:, pivots] = 0.0
+    offsets = np.einsum("rs,ksd->krd", inverse, target).reshape(len(t), -1)
+    return Held(tuple(grasps), _elimination(grid.n_u, nc, pivots, follow), offsets, tuple(rows), inverse)
 
 
 def _elimination(n_u: int, nc: int, pivots: list[int], follow: Floats) -> Elimination:

@@ -23,10 +23,12 @@ NOISE = 0.002  # [m], or of a length above 1 m: what few points deviate from a s
 END_NOISE = 3.0  # an end point lies within three deviations of the noise, so the cable's end does
 MARGIN = 0.05  # of the length: how far feet of noisy points may lie beyond the ends
 SPEED_ERROR = 3e-4  # at quarter points; between them it is at most twice that, below the 1e-3 strain of a taut cable
+SLOWEST = 1e-3  # of the chord's speed: where the parameter of a fit moves on and the curve doesn't, it is a cusp
+MIN_SPANS = 8  # of a fit, at which even few points can show three bends
 MIN_UNIT_SPANS, MAX_UNIT_SPANS = (
     64,
     1024,
-)  # a curve that bends within less than this is no cable: a kink between two points
+)  # beyond which a curve is too sharp for a cable, and is fitted anew with fewer
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,28 +68,38 @@ def fit_points(points: Floats, length: float) -> PointFit:
     share = _share(distinct)
     p, progress, weight = _averaged(distinct, share)
     noise = _noise(p) if len(p) > SPARSE else 0.0
-    s = _chord_length(p, progress, length, noise)
-    spans = int(np.clip(len(p), 8, MAX_SPANS))
+    guess = _chord_length(p, progress, length, noise)
     most_noise = max(NOISE * max(length, 1.0), 1.5 * noise)
+    spans = int(np.clip(len(p), MIN_SPANS, MAX_SPANS))
+    while True:
+        spline, x, s = _smoothed(guess, p, weight, spans, noise, most_noise)
+        first, last = _ends(s, noise)
+        check_length("shape.points", "points along the whole cable", last - first, length)
+        doubt = 2 * END_NOISE * float(np.sqrt(((p - spline(x)) ** 2).sum(axis=1).mean()))
+        extra = float(np.clip(length - (last - first), -doubt, doubt))
+        start, end = first - extra / 2, last + extra / 2
+        curve = _unit_speed(spline, start, end)
+        if curve is not None:
+            at = np.clip(np.interp(share, progress, s) - start, 0.0, end - start)
+            return PointFit(curve=curve, length_given=last - first, at=at[which])
+        if spans == MIN_SPANS:
+            allowed = "points in order along a curve that a cable can follow"
+            raise SceneError("shape.points", "points that double back on themselves", allowed)
+        spans = max(spans // 2, MIN_SPANS)
+
+
+def _smoothed(
+    s: Floats, p: Floats, weight: Floats, spans: int, noise: float, most_noise: float
+) -> tuple[BSpline, Floats, Floats]:
+    """Return a spline through the points, their parameters on it (n,) and their arclengths (n,) from a guess of these."""
     for _ in range(REFITS):
         first, last = _ends(s, noise)
-        x, span = s - first, last - first
+        x, span = s - first, max(last - first, np.ptp(s) / 2)
         spline = smooth(x, p, weight, span, spans, most_noise)
         if len(p) > SPARSE:
             x = np.clip(_foot(spline, x, p), -MARGIN * span, (1 + MARGIN) * span)
-        grid, along = _arclength(spline, -MARGIN * span, (1 + MARGIN) * span, 4 * spans)
-        s = np.interp(x, grid, along)
-    first, last = _ends(s, noise)
-    check_length("shape.points", "points along the whole cable", last - first, length)
-    misfit = float(np.sqrt(((p - spline(x)) ** 2).sum(axis=1).mean()))
-    doubt = 2 * END_NOISE * misfit
-    extra = float(np.clip(length - (last - first), -doubt, doubt))
-    start, end = first - extra / 2, last + extra / 2
-    return PointFit(
-        curve=_unit_speed(spline, grid, along, start, end),
-        length_given=last - first,
-        at=np.clip(np.interp(share, progress, s) - start, 0.0, end - start)[which],
-    )
+        s = np.interp(x, *_arclength(spline))
+    return spline, x, s
 
 
 def check_length(name: str, allowed: str, given: float, length: float) -> None:
@@ -195,30 +207,35 @@ def _ends(s: Floats, noise: float) -> tuple[float, float]:
     return end(s), end(s[::-1])
 
 
-def _arclength(spline: BSpline, start: float, end: float, steps: int) -> tuple[Floats, Floats]:
-    """Return a grid (steps + 1,) of parameters and the arclength there [m], 0 at parameter 0; Simpson's rule."""
-    fine = np.linspace(start, end, 2 * steps + 1)
+def _arclength(spline: BSpline) -> tuple[Floats, Floats]:
+    """Return a grid of parameters with its margins and the arclength there [m], 0 at parameter 0; Simpson's rule."""
+    span, steps = spline.t[-DEGREE - 1], 4 * (len(spline.c) - DEGREE)
+    fine = np.linspace(-MARGIN * span, (1 + MARGIN) * span, 2 * steps + 1)
     speed = np.sqrt((spline(fine, 1) ** 2).sum(axis=1))
-    part = (speed[:-1:2] + 4 * speed[1::2] + speed[2::2]) * (end - start) / (6 * steps)
+    part = (speed[:-1:2] + 4 * speed[1::2] + speed[2::2]) * (fine[2] - fine[0]) / 6
     grid, s = fine[::2], np.concatenate([[0.0], np.cumsum(part)])
     return grid, s - np.interp(0.0, grid, s)
 
 
-def _unit_speed(spline: BSpline, grid: Floats, along: Floats, start: float, end: float) -> BSpline:
+def _unit_speed(spline: BSpline, start: float, end: float) -> BSpline | None:
     """Return the piece of a curve between two arclengths [m] as a spline in arclength.
 
-    Its knots are halved until | |r'| - 1 | <= SPEED_ERROR.
+    Its knots are halved until | |r'| - 1 | <= SPEED_ERROR; None where the curve is too sharp for that.
     """
-    x_of = CubicHermiteSpline(along, grid, 1 / np.sqrt((spline(grid, 1) ** 2).sum(axis=1)))
+    grid, along = _arclength(spline)
+    speed = np.sqrt((spline(grid, 1) ** 2).sum(axis=1))
+    if not speed.min() > SLOWEST:
+        return None
+    parameter = CubicHermiteSpline(along, grid, 1 / speed)
     spans = MIN_UNIT_SPANS
-    while True:
+    while spans <= MAX_UNIT_SPANS:
         s = np.linspace(start, end, spans + 1)
-        x = x_of(s)
+        x = parameter(s)
         first, last = (t / np.linalg.norm(t) for t in spline(x[[0, -1]], 1))
         ends: Any = ([(1, first)], [(1, last)])
         curve = make_interp_spline(s - start, spline(x), k=DEGREE, bc_type=ends)
         between = (s[:-1, None] + (end - start) / spans * np.array([0.25, 0.5, 0.75])).ravel() - start
-        speed = np.sqrt((curve(between, 1) ** 2).sum(axis=1))
-        if np.abs(speed - 1).max() <= SPEED_ERROR or spans >= MAX_UNIT_SPANS:
+        if np.abs(np.sqrt((curve(between, 1) ** 2).sum(axis=1)) - 1).max() <= SPEED_ERROR:
             return curve
         spans *= 2
+    return None

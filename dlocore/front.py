@@ -7,19 +7,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.discretisation import smallest_n_u
+from dlocore.discretisation import Grid, smallest_n_u
 from dlocore.errors import SceneError
 from dlocore.prediction import Accuracy, Iteration, OnIteration, Prediction, Status
 from dlocore.problem import Problem, pose
-from dlocore.report import effect_reports, reactions, start_energy, surface_of
+from dlocore.report import WindowForces, effect_reports, elastic_energy, reactions, surface_of
 from dlocore.scene import Quality, Scene
 from dlocore.solvers.ladder import ACCEPT, LEVELS, Level, distance, run_level, stretched
 from dlocore.solvers.march import smallest_n_t
 from dlocore.solvers.monitor import Monitor, TimeIsUp
+from dlocore.solvers.paper import MAX_ITERATIONS as PAPER_ITERATIONS
+from dlocore.solvers.paper import solve_as_printed
+from dlocore.solvers.spacetime import MAX_ITERATIONS, solve
 
 Floats = NDArray[np.float64]
 
 AUTO_TARGET = 2e-3  # of the length: the target error of quality "auto"
+FINER = 1.5  # times n_u, n_t and the steps of a given grid: the march that its error is estimated with
 
 
 def predict(
@@ -47,27 +51,96 @@ def predict(
     monitor = Monitor(on_iteration, deadline, cancelled)
     problem = pose(scene)
     quality = scene.quality
-    if quality.n_u is not None and quality.method in ("auto", "spacetime", "paper"):
-        raise SceneError("quality.method", quality.method, "march")
-    return _march(problem, quality, monitor)
+    method = quality.method
+    if method == "auto":
+        method = "march" if quality.n_u is None else "spacetime"
+    if method == "march":
+        level, status, message, estimate = _climb(problem, quality, monitor)
+        return _answer(problem, level, monitor, "march", status, message, estimate)
+    return _least_squares(problem, quality, monitor, method)
 
 
-def _march(problem: Problem, quality: Quality, monitor: Monitor) -> Prediction:
-    level, status, message, estimate = _climb(problem, quality, monitor)
-    return _answer(problem, level, monitor, "march", status, message, estimate)
+def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method: str) -> Prediction:
+    """Solve on the given grid by the weighted least squares from a march, or by the printed scheme from rest."""
+    assert quality.n_u is not None and quality.n_t is not None
+    _check_n_t(problem, quality.n_t)
+    level = run_level(problem, quality.n_u, quality.n_t, given_steps(quality.n_t), monitor)
+    if level.motion.stopped:
+        return _answer(problem, level, monitor, "march", *_march_status(problem, level), None)
+    grid, knots_t = level.motion.grid, level.knots_t
+    last = [level.control]
+
+    def on_step(control: Floats, update: float, residual: float, damping: float = 0.0, length: float = 1.0) -> None:
+        last[0] = control
+        _record(problem, grid, knots_t, control, update, residual, monitor, damping, length, method)
+
+    limit = {"spacetime": MAX_ITERATIONS, "paper": PAPER_ITERATIONS}[method]
+    forces: tuple[WindowForces, ...] | None = None
+    try:
+        if method == "spacetime":
+            solved = solve(problem, level.motion, knots_t, quality.delta, monitor, on_step)
+            control, converged, update, forces = solved.control, solved.converged, solved.update, solved.forces
+        else:
+            control, converged, update = solve_as_printed(problem, grid, knots_t, quality.delta, monitor, on_step)
+    except TimeIsUp:
+        monitor.phase(method)
+        level = replace(level, control=last[0])
+        message = "The time limit passed; this is the last iterate. Allow more time or a coarser grid."
+        return _answer(problem, level, monitor, method, "time_limit", message, None)
+    monitor.phase(method)
+    count = len(monitor.iterations)
+    status: Status = "converged" if converged else "max_iterations" if count >= limit else "stalled"
+    message = f"The update fell below delta = {quality.delta:g} m in {count} iterations."
+    if not converged:
+        message = (
+            f"The update is still {update:.2g} m after {count} iterations, above delta = {quality.delta:g} m. "
+            "Raise n_u and n_t, allow a larger delta, or take method march."
+        )
+    if not np.isfinite(control).all():
+        message += " The iterates grew beyond all bounds; the surface is that of the march it is compared with."
+        control, status = level.control, "stalled"
+    level = replace(level, control=control)
+    estimate = _companion(problem, quality, level, monitor) if converged else None
+    return _answer(problem, level, monitor, method, status, message, estimate, forces)
+
+
+def _companion(problem: Problem, quality: Quality, level: Level, monitor: Monitor) -> float | None:
+    """Return the distance of a level's surface to a march on a grid half as fine again: its error estimate [m]."""
+    assert quality.n_u is not None and quality.n_t is not None
+    if not quality.estimate:
+        return None
+    n_u = max(smallest_n_u(problem), round(FINER * quality.n_u))
+    n_t = max(smallest_n_t(problem), round(FINER * quality.n_t))
+    try:
+        monitor.check()
+        finer = run_level(problem, n_u, n_t, round(FINER * given_steps(quality.n_t)), monitor, booked=False)
+    except TimeIsUp:
+        return None
+    estimate = None if finer.motion.stopped else distance(level, finer, problem)
+    monitor.phase("estimate")
+    return estimate
+
+
+def given_steps(n_t: int) -> int:
+    """Return the number of time steps that goes with a given number of control points in time."""
+    return max(48, 5 * n_t)
+
+
+def _check_n_t(problem: Problem, n_t: int) -> None:
+    least = smallest_n_t(problem)
+    if n_t < least:
+        reason = "Every jump in the grasps' motion needs knots in time"
+        raise SceneError("quality.n_t", n_t, f"at least {least} in this scene", reason)
 
 
 def _climb(problem: Problem, quality: Quality, monitor: Monitor) -> tuple[Level, Status, str, float | None]:
     """March on the given grid, or up the ladder of grids until the target or the time budget is met."""
     if quality.n_u is not None and quality.n_t is not None:
-        least = smallest_n_t(problem)
-        if quality.n_t < least:
-            reason = "Every jump in the grasps' motion needs knots in time"
-            raise SceneError("quality.n_t", quality.n_t, f"at least {least} in this scene", reason)
-        level = run_level(problem, quality.n_u, quality.n_t, max(48, 5 * quality.n_t), monitor)
-        _record(problem, level, monitor)
+        _check_n_t(problem, quality.n_t)
+        level = run_level(problem, quality.n_u, quality.n_t, given_steps(quality.n_t), monitor)
+        _record_level(problem, level, monitor)
         status, message = _march_status(problem, level)
-        return level, status, message, None
+        return level, status, message, None if level.motion.stopped else _companion(problem, quality, level, monitor)
     target = quality.target_error or AUTO_TARGET * problem.scene.cable.length
     budget = quality.time_budget or np.inf
     before: Level | None = None
@@ -88,7 +161,7 @@ def _climb(problem: Problem, quality: Quality, monitor: Monitor) -> tuple[Level,
                 f"A finer grid did not converge: {_march_status(problem, level)[1]}",
                 before.change,
             )
-        _record(problem, level, monitor)
+        _record_level(problem, level, monitor)
         if level.motion.stopped == "time":
             return level, *_march_status(problem, level), None
         before = level
@@ -130,26 +203,49 @@ def _march_status(problem: Problem, level: Level) -> tuple[Status, str]:
     )
 
 
-def _record(problem: Problem, level: Level, monitor: Monitor) -> None:
+def _record_level(problem: Problem, level: Level, monitor: Monitor) -> None:
+    motion = level.motion
+    _record(problem, motion.grid, level.knots_t, level.control, level.change, motion.update, monitor, 0.0, 1.0, "march")
+
+
+def _record(
+    problem: Problem,
+    grid: Grid,
+    knots_t: Floats,
+    control: Floats,
+    update: float,
+    residual: float,
+    monitor: Monitor,
+    damping: float,
+    step_length: float,
+    note: str,
+) -> None:
     monitor.report(
         Iteration(
             number=len(monitor.iterations),
-            update=level.change,
-            residual=level.motion.update,
-            energy=start_energy(problem, level.motion.grid, level.motion.states[-1]),
+            update=update,
+            residual=residual,
+            energy=elastic_energy(problem, grid, np.ascontiguousarray(control[-1])),
             wall_time=monitor.elapsed(),
-            damping=0.0,
-            step_length=1.0,
-            n_u=level.motion.grid.n_u,
-            n_t=len(level.control),
-            surface=surface_of(problem, level.motion.grid, level.knots_t, level.control),
-            note="march",
+            damping=damping,
+            step_length=step_length,
+            n_u=grid.n_u,
+            n_t=len(control),
+            surface=surface_of(problem, grid, knots_t, control),
+            note=note,
         )
     )
 
 
 def _answer(
-    problem: Problem, level: Level, monitor: Monitor, method: str, status: Status, message: str, estimate: float | None
+    problem: Problem,
+    level: Level,
+    monitor: Monitor,
+    method: str,
+    status: Status,
+    message: str,
+    estimate: float | None,
+    forces: tuple[WindowForces, ...] | None = None,
 ) -> Prediction:
     grid = level.motion.grid
     surface = surface_of(problem, grid, level.knots_t, level.control)
@@ -158,7 +254,7 @@ def _answer(
         status=status,
         message=message,
         surface=surface,
-        grasps=reactions(problem, level.motion),
+        grasps=reactions(problem, grid, level.motion.forces if forces is None else forces),
         effects=effect_reports(problem, surface),
         iterations=tuple(monitor.iterations),
         accuracy=Accuracy(
@@ -172,7 +268,7 @@ def _answer(
             dimensions=problem.plane.dimensions,
             phases=dict(monitor.phases),
         ),
-        start_energy=start_energy(problem, grid, grid.start),
+        start_energy=elastic_energy(problem, grid, grid.start),
         start_fit=problem.start.fit_rms,
     )
 

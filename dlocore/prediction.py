@@ -43,7 +43,7 @@ class Iteration:
             change of the surface [m], infinite at the first.
         residual: root of the weighted mean square of the equations' residual over the whole motion, as a displacement
             [m] (docs/model.md eq. 16); for `paper` as a force [N]; for a level of `march` the largest Newton update [m].
-        energy: elastic + kinetic + gravitational energy at the end of the motion [J].
+        energy: elastic energy at the end of the motion [J].
         wall_time: since the solve began [s].
         damping: Levenberg-Marquardt damping of the step, 0 for a plain one.
         step_length: fraction of the full step that was taken.

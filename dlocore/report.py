@@ -1,16 +1,16 @@
 """What a solve tells about itself: world coordinates, reactions, effects and energies."""
 
+from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.discretisation import Grid
+from dlocore.discretisation import Grid, Held
 from dlocore.kernels.assembly import stored_energy
 from dlocore.prediction import EffectReport, GraspReaction
 from dlocore.problem import Problem
 from dlocore.scene import NOT_MODELLED_YET
-from dlocore.solvers.march import March
 from dlocore.spline import SplineSurface
 
 Floats = NDArray[np.float64]
@@ -23,33 +23,51 @@ def surface_of(problem: Problem, grid: Grid, knots_t: Floats, control: Floats) -
     return SplineSurface(world, grid.knots, knots_t)
 
 
-def start_energy(problem: Problem, grid: Grid, q: Floats) -> float:
+def elastic_energy(problem: Problem, grid: Grid, q: Floats) -> float:
     """Return the elastic energy stored in control points q (n_u, nc) [J]."""
     active, parameters = problem.law_table()
     return float(stored_energy(tuple(range(problem.plane.dimensions)), q, grid.tables, active, parameters, grid.memory))
 
 
-def reactions(problem: Problem, motion: March) -> tuple[GraspReaction, ...]:
-    """Return force [N] and moment [N m] of every grasp at the steps of a march.
+@dataclass(frozen=True, eq=False)
+class WindowForces:
+    """What holds the cable over a stretch of time.
+
+    Attributes:
+        held: the held degrees of freedom.
+        times: (k,) [s].
+        forces: residual of the equations at the held degrees of freedom (k, held) [N].
+        states: control points (k, n_u, nc) [m] at those times.
+    """
+
+    held: Held
+    times: Floats
+    forces: Floats
+    states: Floats
+
+
+def reactions(problem: Problem, grid: Grid, windows: tuple[WindowForces, ...]) -> tuple[GraspReaction, ...]:
+    """Return force [N] and moment [N m] of every grasp over time.
 
     The force is the multiplier of the constraint b(u_g) q = p, the moment d x (multiplier of b'(u_g) q = d).
     """
     nc = problem.plane.dimensions
-    t = motion.times
-    force = {id(g): np.zeros((len(t), 3)) for g in problem.scene.grasps}
-    moment = {id(g): np.zeros((len(t), 3)) for g in problem.scene.grasps}
-    for stretch, reaction in zip(motion.stretches, motion.forces, strict=True):
-        part = slice(stretch.first, stretch.last + 1)
-        multipliers = problem.plane.world_vectors(stretch.held.forces(reaction[part], nc))
-        for row, (i, derivative) in enumerate(stretch.held.rows):
-            g = stretch.held.grasps[i]
+    t = np.concatenate([w.times for w in windows])
+    force = {g: np.zeros((len(t), 3)) for g in problem.scene.grasps}
+    moment = {g: np.zeros((len(t), 3)) for g in problem.scene.grasps}
+    at = 0
+    for window in windows:
+        part = slice(at, at + len(window.times))
+        at = part.stop
+        multipliers = problem.plane.world_vectors(window.held.multipliers(window.forces, nc))
+        for row, (i, derivative) in enumerate(window.held.rows):
+            g = window.held.grasps[i]
             if derivative == 0:
-                force[id(g)][part] = multipliers[:, row]
+                force[g][part] = multipliers[:, row]
             else:
-                first, b = motion.grid.rows(g.u, 1)
-                tangent = np.einsum("i,kid->kd", b, motion.states[part, first : first + 4])
-                moment[id(g)][part] = np.cross(problem.plane.world_vectors(tangent), multipliers[:, row])
-    return tuple(GraspReaction(g.u, t, force[id(g)], moment[id(g)]) for g in problem.scene.grasps)
+                tangent = problem.plane.world_vectors(grid.at(window.states, g.u, 1))
+                moment[g][part] = np.cross(tangent, multipliers[:, row])
+    return tuple(GraspReaction(g.u, t, force[g], moment[g]) for g in problem.scene.grasps)
 
 
 def effect_reports(problem: Problem, surface: SplineSurface) -> tuple[EffectReport, ...]:

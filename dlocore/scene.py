@@ -255,6 +255,7 @@ class Quality:
         n_t: control points in time, 5 to 513.
         delta: the paper's threshold on the norm of the control-point update, eq. (25) [m], 1e-10 to 1e-2.
         method: "march", "spacetime", "paper", or "auto": `spacetime` where the grid is given, else `march`.
+        estimate: with a given grid, estimate the error by a second march on another grid; False saves its time.
     """
 
     n_u: int | None = None
@@ -263,6 +264,7 @@ class Quality:
     target_error: float | None = None
     time_budget: float | None = None
     method: Method = "auto"
+    estimate: bool = True
 
     def __post_init__(self) -> None:
         for name, most in (("n_u", 129), ("n_t", 513)):

@@ -81,6 +81,8 @@ def _score(
 ) -> float:
     """Return the restricted likelihood's -2 log, up to a constant, for one lambda."""
     factor, c = _solve(normal + strength * penalty, right)
+    if not factor[0].min() > 0:
+        return np.inf  # so weak that rounding leaves a long gap between the data without a curve
     misfit = max(square - float((c * right).sum()), 0.0) + LEAST_NOISE**2 * square + TINY
     free = normal.shape[1] - DEGREE
     seen = 3 * max(count - 3, 1)
@@ -94,11 +96,13 @@ def _least(strengths: Floats, score: Floats) -> float:
     i = int(np.clip(np.argmin(score), 1, len(score) - 2))
     left, middle, right = score[i - 1 : i + 2]
     bend = left - 2 * middle + right
-    shift = 0.5 * (left - right) / bend if bend > 0 else 0.0
+    shift = 0.5 * (left - right) / bend if 0 < bend < np.inf else 0.0
     return float(strengths[i] * (strengths[1] / strengths[0]) ** np.clip(shift, -1.0, 1.0))
 
 
 def _solve(band: Floats, right: Floats) -> tuple[Floats, Floats]:
-    """Return the banded Cholesky factor, its diagonal first, and the solution."""
-    factor, _ = dpbtrf(band, lower=1)
+    """Return the banded Cholesky factor, its diagonal first, and the solution; zeros unless positive definite."""
+    factor, failed = dpbtrf(band, lower=1)
+    if failed:
+        return np.zeros_like(band), np.zeros_like(right)
     return factor, dpbtrs(factor, right, lower=1)[0]

@@ -54,16 +54,19 @@ def stretched(problem: Problem, level: int) -> tuple[int, int, int]:
     return n_u, n_t, max(round(steps * factor), 3 * n_t)
 
 
-def run_level(problem: Problem, n_u: int, n_t: int, steps: int, monitor: Monitor) -> Level:
-    """March on one grid and fit the time spline."""
+def run_level(problem: Problem, n_u: int, n_t: int, steps: int, monitor: Monitor, *, booked: bool = True) -> Level:
+    """March on one grid and fit the time spline; `booked`: book the time by phase."""
     grid = make_grid(problem, n_u)
     knots_t = time_knots(problem, n_t)
     assert knots_t is not None, "the caller asks for enough control points"
-    monitor.phase("setup")
+    if booked:
+        monitor.phase("setup")
     motion = march(problem, grid, steps, monitor)
-    monitor.phase("march")
+    if booked:
+        monitor.phase("march")
     control = fit(motion, knots_t)
-    monitor.phase("fit")
+    if booked:
+        monitor.phase("fit")
     return Level(motion, knots_t, control, np.inf)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.discretisation import Grid, Held, applied_forces, hold
+from dlocore.discretisation import Grid, Starts, applied_forces, close_grasps, hold
 from dlocore.kernels.basis import graded_knots
 from dlocore.kernels.march import (
     FAILED_STEP,
@@ -18,6 +18,7 @@ from dlocore.kernels.march import (
 )
 from dlocore.paths import Move, Waypoints
 from dlocore.problem import Problem
+from dlocore.report import WindowForces
 from dlocore.scene import Grasp
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 
@@ -43,16 +44,6 @@ class Event:
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
-    """A stretch of the march between two events with the same grasps closed."""
-
-    first: int
-    last: int
-    step: float
-    held: Held
-
-
-@dataclass(frozen=True, eq=False)
 class March:
     """A marched motion.
 
@@ -61,8 +52,7 @@ class March:
         times: (steps + 1,) [s].
         states: (steps + 1, n_u, nc) control points at those times.
         velocity: (n_u, nc) [m/s] just after t = 0.
-        stretches: stretches between events.
-        forces: for each stretch, forces at the held degrees of freedom (steps + 1, held) [N].
+        forces: what holds the cable between each two events.
         reached: last step that found equilibrium.
         stopped: why it ended there: "" (the end), "step" (no equilibrium) or "time" (deadline).
         newton: Newton iterations.
@@ -73,8 +63,7 @@ class March:
     times: Floats
     states: Floats
     velocity: Floats
-    stretches: tuple[Stretch, ...]
-    forces: tuple[Floats, ...]
+    forces: tuple[WindowForces, ...]
     reached: int
     stopped: str
     newton: int
@@ -163,19 +152,20 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
     velocity = v
     info = np.zeros(5)
     info[FAILED_STEP] = -1
-    stretches: list[Stretch] = []
-    forces: list[Floats] = []
+    starts: Starts = {}
+    forces: list[WindowForces] = []
     reached, stopped = 0, ""
     first = 0
     for begin, end, count in zip(marks[:-1], marks[1:], counts, strict=True):
         last = first + count
         h = (end - begin) / count
         grasps = closed_grasps(problem, begin, end)
-        held = hold(problem, grid, grasps, times[first : last + 1], states[first])
+        close_grasps(problem, grid, grasps, starts, states[first])
+        held = hold(problem, grid, grasps, times[first : last + 1], starts)
         e = held.elimination
-        near = hold(problem, grid, grasps, begin + 1e-3 * h * np.arange(3.0), states[first]).offsets
+        near = hold(problem, grid, grasps, begin + 1e-3 * h * np.arange(3.0), starts).offsets
         rate = (4 * near[1] - 3 * near[0] - near[2]) / (2e-3 * h)
-        v = constrained_mass_solve(plane.dimensions, unit_mass, e, rate, _times_mass(unit_mass, v))
+        v = constrained_mass_solve(plane.dimensions, unit_mass, e, rate, times_mass(unit_mass, v))
         if first == 0:
             velocity = v.copy()
         load = applied[min(first, len(applied) - 1)]
@@ -191,8 +181,6 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
         offsets = np.zeros((len(times), len(e.held)))
         offsets[first : last + 1] = held.offsets
         reactions = np.zeros((len(times), len(e.held)))
-        stretches.append(Stretch(first, last, h, held))
-        forces.append(reactions)
         for k in range(first, last, _CHUNK):
             try:
                 monitor.check()
@@ -208,18 +196,21 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
             if info[FAILED_STEP] >= 0:
                 reached, stopped = int(info[FAILED_STEP]) - 1, "step"
                 break
+        reactions[first] = reactions[first + 1]
+        part = slice(first, last + 1)
+        forces.append(WindowForces(held, times[part], reactions[part], states[part]))
         if stopped:
             break
-        reactions[first] = reactions[first + 1]
         first = last
     states[reached + 1 :] = states[reached]
     return March(
-        grid, times, states, velocity, tuple(stretches), tuple(forces), reached, stopped, int(info[NEWTON]),
+        grid, times, states, velocity, tuple(forces), reached, stopped, int(info[NEWTON]),
         float(info[LAST_UPDATE]),
     )  # fmt: skip
 
 
-def _times_mass(mass: Floats, v: Floats) -> Floats:
+def times_mass(mass: Floats, v: Floats) -> Floats:
+    """Return M v (n_u, nc) for the scalar band `mass` (n_u, 4)."""
     out = mass[:, 0, None] * v
     for o in range(1, 4):
         out[:-o] += mass[:-o, o, None] * v[o:]

@@ -7,7 +7,7 @@ from dlocore.errors import Cancelled
 from dlocore.prediction import Iteration, OnIteration
 
 
-class TimeIsUp(Exception):
+class TimeIsUp(Exception):  # noqa: N818 - no error: the solver answers with what it has
     """The deadline of a solve has passed; the solver answers with what it has."""
 
 

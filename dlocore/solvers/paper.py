@@ -1,0 +1,112 @@
+"""The paper's scheme exactly as printed (eq. 20 to 25), for comparison.
+
+Plain least squares over all collocation points, started from the cable at rest, with the true stretch stiffness and
+the full Hessian, iterated until the update is below delta. It often does not converge (docs/model.md); then it says so.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.discretisation import Grid, Starts, applied_forces, close_grasps
+from dlocore.errors import SceneError
+from dlocore.kernels.assembly import assemble, multiply_scalar_band
+from dlocore.kernels.basis import basis_rows
+from dlocore.kernels.leastsquares import band_to_dense, states_at
+from dlocore.problem import Problem
+from dlocore.solvers.march import closed_grasps
+from dlocore.solvers.monitor import Monitor
+from dlocore.solvers.spacetime import WindowSolver, windows_of
+
+Floats = NDArray[np.float64]
+
+MAX_ITERATIONS = 50
+LARGEST_NET = 600  # control points: the least squares is dense, as printed
+
+
+def solve_as_printed(
+    problem: Problem,
+    grid: Grid,
+    knots_t: Floats,
+    delta: float,
+    monitor: Monitor,
+    on_step: Callable[[Floats, float, float], None],
+) -> tuple[Floats, bool, float]:
+    """Iterate the printed scheme; return control points (n_t, n_u, nc) [m], whether it converged, the last update [m].
+
+    Args:
+        on_step: called with (control, update [m], residual [N]) after every iteration.
+
+    Raises:
+        SceneError: the motion has jumps inside, or the net is too large for a dense least squares.
+        Cancelled: the caller asked to stop.
+    """
+    windows = windows_of(problem, knots_t)
+    if len(windows) > 1:
+        allowed = '"march" or "spacetime" where grasps open, close or jump in mid-motion'
+        raise SceneError("quality.method", "paper", allowed, "The printed scheme has one smooth motion")
+    n_t, n_u, nc = len(knots_t) - 4, grid.n_u, problem.plane.dimensions
+    if n_u * n_t > LARGEST_NET:
+        allowed = f"at most {LARGEST_NET} control points with the printed scheme, which is dense"
+        raise SceneError("quality.n_u", f"n_u n_t = {n_u * n_t}", allowed)
+    grasps = closed_grasps(problem, 0.0, problem.horizon)
+    starts: Starts = {}
+    close_grasps(problem, grid, grasps, starts, None)
+    window = WindowSolver(problem, grid, windows[0], grasps, starts, grid.velocity, problem.stretch.axial_stiffness)
+    times = np.linspace(0.0, problem.horizon, n_u * n_t + 1)[1:]
+    first, table = basis_rows(knots_t, times, 2)
+    applied = applied_forces(problem, grid, times)
+    control = window.constrain(np.tile(grid.start, (n_t, 1, 1)))
+    Z = np.array([window.expand(row)[2].ravel() for row in np.eye(window.free)]).T
+    update = np.inf
+    for _ in range(MAX_ITERATIONS):
+        monitor.check()
+        J, R = _equations(window, control, first, table, applied, Z)
+        if not np.isfinite(J).all():
+            break
+        x = np.linalg.lstsq(J, -R, rcond=None)[0]
+        step = window.expand(x)
+        control = control + step
+        update = float(np.linalg.norm(step))
+        on_step(control, update, float(np.sqrt(np.mean(R * R))))
+        if not np.isfinite(update) or update < delta:
+            break
+    return control, update < delta, update
+
+
+def _equations(
+    window: WindowSolver, control: Floats, first: NDArray[np.int64], table: Floats, applied: Floats, Z: Floats
+) -> tuple[Floats, Floats]:
+    """Return the stacked regression matrix (eq. 21, 23) in the free unknowns and the residuals at the iterate."""
+    n_t, n_u, nc = control.shape
+    size, free = n_u * nc, window.free
+    K, dense = np.empty((size, 4 * nc)), np.empty((size, size))
+    M, N = (_dense_band(band, nc) for band in (window.mass, window.drag))
+    f, state = np.empty((n_u, nc)), np.empty((3, n_u, nc))
+    J = np.zeros((len(first) * free, (n_t - 2) * free))
+    R = np.empty(len(first) * free)
+    for k in range(len(first)):
+        states_at(first[k], table[k], control, state)
+        laws = (window.active, window.parameters, window.grid.memory)
+        assemble(window.axes, state[0], state[1], window.grid.tables, *laws, (1.0, 0.0, 1.0), f, K)
+        band_to_dense(K, dense)
+        multiply_scalar_band(window.mass, state[2], 1.0, f)
+        multiply_scalar_band(window.drag, state[1], 1.0, f)
+        f -= applied[min(k, len(applied) - 1)]
+        rows = slice(k * free, (k + 1) * free)
+        R[rows] = Z.T @ f.ravel()
+        reduced = [Z.T @ matrix @ Z for matrix in (dense, N, M)]
+        for j in range(max(0, 2 - int(first[k])), 4):
+            column = (int(first[k]) + j - 2) * free
+            J[rows, column : column + free] = sum(table[k, o, j] * reduced[o] for o in range(3))
+    return J, R
+
+
+def _dense_band(band: Floats, nc: int) -> Floats:
+    n = len(band)
+    full = np.zeros((n, n))
+    for o in range(4):
+        full[np.arange(n - o) + o, np.arange(n - o)] = band[: n - o, o]
+        full[np.arange(n - o), np.arange(n - o) + o] = band[: n - o, o]
+    return np.kron(full, np.eye(nc))

@@ -1,0 +1,283 @@
+"""The paper's least squares over all collocation points, in a weighted form that converges.
+
+The motion is split into windows where velocity or acceleration jumps; in each the control points of a clamped time
+spline are found by Gauss-Newton iteration from a march, until the update is below delta (paper eq. 25).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.discretisation import Grid, Starts, applied_forces, close_grasps, hold
+from dlocore.kernels.assembly import axial_tension
+from dlocore.kernels.banded import expand_vector, place_held
+from dlocore.kernels.basis import GAUSS_2, basis_rows
+from dlocore.kernels.leastsquares import damped_step, normal_equations
+from dlocore.kernels.march import constrained_mass_solve, fit_time
+from dlocore.problem import Problem
+from dlocore.report import WindowForces
+from dlocore.scene import Grasp
+from dlocore.solvers.march import March, closed_grasps, events_of, times_mass
+from dlocore.solvers.monitor import Monitor
+
+Floats = NDArray[np.float64]
+
+MAX_ITERATIONS = 40
+_HISTORY = 4  # iterates that Anderson acceleration combines
+_DAMPING = 1e-6  # of the diagonal of normal equations that lost their positive factors to rounding
+_LARGEST_STEP = 0.25  # of the length, in one control point: beyond it a step is shortened
+LARGEST_STRAIN = 0.003  # that the bounded axial stiffness allows under the largest tension of the march
+RESOLVED = 30.0  # times mu L^2/h^2: the axial stiffness that a time spline of span h resolves
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """A smooth part of the motion, from `begin` to `end` [s], with its own clamped time knots (n + 4,) [s]."""
+
+    begin: float
+    end: float
+    knots: Floats
+    velocity_jumps: bool
+
+
+def windows_of(problem: Problem, knots_t: Floats) -> list[Window]:
+    """Split the time knots into windows at the events where velocity or acceleration jumps."""
+    cuts = [e for e in events_of(problem) if e.multiplicity > 1]
+    marks = [0.0, *[e.time for e in cuts], problem.horizon]
+    windows = []
+    for i, (a, b) in enumerate(zip(marks[:-1], marks[1:], strict=True)):
+        inner = knots_t[(knots_t > a) & (knots_t < b)]
+        knots = np.concatenate([np.full(4, a), inner, np.full(4, b)])
+        windows.append(Window(a, b, knots, i > 0 and cuts[i - 1].multiplicity == 3))
+    return windows
+
+
+def join(parts: list[Floats], windows: list[Window]) -> Floats:
+    """Join the windows' control points (n, ...) to those of the whole time spline."""
+    joined = parts[0]
+    for part, window in zip(parts[1:], windows[1:], strict=True):
+        kept = joined if window.velocity_jumps else joined[:-1]
+        joined = np.concatenate([kept, part[1:]])
+    return joined
+
+
+def bounded_axial_stiffness(problem: Problem, largest_tension: float, n_t: int) -> float:
+    """Return the axial stiffness [N] of the least squares: what the time spline resolves, never above the true one.
+
+    Collocated in time, near-inextensibility over-constrains the time spline (docs/model.md eq. 15).
+    """
+    cable = problem.scene.cable
+    true = problem.stretch.axial_stiffness
+    span = problem.horizon / max(1, n_t - 3)
+    resolved = RESOLVED * cable.linear_density * (cable.length / span) ** 2
+    buckles = 400.0 * (problem.bend.bending_stiffness if problem.bend else 0.0) / cable.length**2
+    return min(true, max(largest_tension / LARGEST_STRAIN, resolved, buckles))
+
+
+class WindowSolver:
+    """The least squares of one window; it holds the equations, the iterate is passed in and out."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        grid: Grid,
+        window: Window,
+        grasps: list[Grasp],
+        starts: Starts,
+        velocity: Floats,
+        axial_stiffness: float,
+    ) -> None:
+        self.problem, self.grid, self.window = problem, grid, window
+        self.nc = problem.plane.dimensions
+        self.axes = tuple(range(self.nc))
+        spans = np.flatnonzero(np.diff(window.knots))
+        half = 0.5 * np.diff(window.knots)[spans]
+        self.times = (window.knots[spans][:, None] + half[:, None] * (1 + GAUSS_2[0])).ravel()
+        self.weights = (half[:, None] * GAUSS_2[1]).ravel()
+        self.first, self.table = basis_rows(window.knots, self.times, 2)
+        self.span = (window.end - window.begin) / len(spans)
+        self.active, self.parameters = problem.law_table()
+        self.parameters[0, 0] = axial_stiffness
+        density = problem.scene.cable.linear_density
+        self.mass = grid.tables.mass * (1e-9 * density if problem.inertia is None else problem.inertia.density())
+        self.drag = grid.tables.mass * (0.0 if problem.drag is None else problem.drag.coefficient())
+        self.applied = applied_forces(problem, grid, self.times)
+        fine = np.linspace(window.begin, window.end, 6 * len(spans) + 1)
+        self.held = hold(problem, grid, grasps, fine, starts)
+        e = self.held.elimination
+        rates = velocity.reshape(-1)[e.held].copy()
+        for k in range(len(e.held)):
+            for s in range(e.start[k], e.start[k + 1]):
+                rates[k] -= e.coefficient[s] * velocity.reshape(-1)[e.dof[s]]
+        self.offsets = (
+            fit_time(window.knots, fine, self.held.offsets, rates)
+            if len(e.held)
+            else np.zeros((len(window.knots) - 4, 0))
+        )
+        self.free = grid.n_u * self.nc - len(e.held)
+
+    def constrain(self, control: Floats) -> Floats:
+        """Return control points (n, n_u, nc) whose held degrees of freedom follow the grasps."""
+        control = control.copy()
+        for j in range(2, len(control)):
+            place_held(self.held.elimination, self.offsets[j], control[j].reshape(-1))
+        return control
+
+    def objective(self, control: Floats, tangent: bool, geometric: float = 1.0) -> tuple[float, Floats, Floats, Floats]:
+        """Return the objective [m^2], the normal matrix, its right side and the holding forces at `control`."""
+        size = (len(control) - 2) * self.free
+        A = np.empty((size, 4 * self.free) if tangent else (1, 1))
+        right = np.empty(size)
+        forces = np.empty((len(self.times), len(self.held.elimination.held)))
+        value = normal_equations(
+            self.axes, control, self.first, self.table, self.weights, self.span, self.mass, self.drag, self.grid.tables,
+            self.active, self.parameters, self.grid.memory, self.applied, self.held.elimination, geometric, A, right,
+            forces, tangent,
+        )  # fmt: skip
+        return value, A, right, forces
+
+    def expand(self, x: Floats) -> Floats:
+        """Return the change (n, n_u, nc) of all control points for a step x of the free ones."""
+        steps = x.reshape(-1, self.free)
+        change = np.zeros((len(steps) + 2, self.grid.n_u, self.nc))
+        for j, row in enumerate(steps):
+            expand_vector(self.held.elimination, row, change[j + 2].reshape(-1))
+        return change
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A space-time solution.
+
+    Attributes:
+        control: (n_t, n_u, nc) [m].
+        converged: the update fell below delta in every window.
+        update: the last update norm [m], the largest over the windows.
+        forces: what holds the cable in each window, at its collocation points.
+    """
+
+    control: Floats
+    converged: bool
+    update: float
+    forces: tuple[WindowForces, ...]
+
+
+OnStep = Callable[[Floats, float, float, float, float], None]
+
+
+def solve(problem: Problem, motion: March, knots_t: Floats, delta: float, monitor: Monitor, on_step: OnStep) -> Solved:
+    """Solve the space-time least squares, started from a march on the same grid.
+
+    Gauss-Newton steps with the positive semidefinite part of the tangent, combined over the last iterates by Anderson
+    acceleration (Walker and Ni, 2011), until the norm of the update of all control points is below `delta`.
+
+    Args:
+        on_step: called with (control, update, residual, damping, step length) after every iteration.
+
+    Raises:
+        Cancelled: the caller asked to stop.
+    """
+    grid = motion.grid
+    active, parameters = problem.law_table()
+    axes = tuple(range(problem.plane.dimensions))
+    tension = max(
+        float(np.abs(axial_tension(axes, q, grid.tables, active, parameters)).max()) for q in motion.states[::4]
+    )
+    windows = windows_of(problem, knots_t)
+    guess = [_window_fit(motion, w) for w in windows]
+    parts: list[Floats] = []
+    forces = []
+    starts: Starts = {}
+    q, v = motion.states[0], motion.velocity
+    converged, worst = True, 0.0
+    for i, window in enumerate(windows):
+        grasps = closed_grasps(problem, window.begin, window.end)
+        close_grasps(problem, grid, grasps, starts, q)
+        stiffness = bounded_axial_stiffness(problem, tension, len(window.knots) - 4)
+        if i > 0:
+            near = hold(problem, grid, grasps, window.begin + 1e-6 * np.arange(3.0), starts)
+            rate = (4 * near.offsets[1] - 3 * near.offsets[0] - near.offsets[2]) / 2e-6
+            mass = times_mass(grid.tables.mass, v)
+            v = constrained_mass_solve(problem.plane.dimensions, grid.tables.mass, near.elimination, rate, mass)
+        solver = WindowSolver(problem, grid, window, grasps, starts, v, stiffness)
+        control = guess[i]
+        control[0] = q
+        control[1] = q + v * (window.knots[4] - window.knots[1]) / 3
+        control = solver.constrain(control)
+
+        def show(iterate: Floats, update: float, residual: float, damping: float, length: float, at: int = i) -> None:
+            on_step(join([*parts, iterate, *guess[at + 1 :]], windows), update, residual, damping, length)
+
+        control, update = _iterate(solver, control, delta, monitor, show)
+        parts.append(control)
+        states = np.einsum("kj,kjid->kid", solver.table[:, 0], control[solver.first[:, None] + np.arange(4)])
+        forces.append(WindowForces(solver.held, solver.times, solver.objective(control, False)[3], states))
+        converged &= update < delta
+        worst = max(worst, update)
+        q = control[-1]
+        v = 3 * (control[-1] - control[-2]) / (window.knots[-2] - window.knots[-5])
+    return Solved(join(parts, windows), converged, worst, tuple(forces))
+
+
+def _window_fit(motion: March, window: Window) -> Floats:
+    """Return control points (n, n_u, nc) of the march inside a window."""
+    inside = (motion.times >= window.begin - 1e-12) & (motion.times <= window.end + 1e-12)
+    times, states = motion.times[inside], motion.states[inside]
+    k, n_u, nc = states.shape
+    step = times[1] - times[0]
+    v = (4 * states[1] - 3 * states[0] - states[2]) / (2 * step)
+    return fit_time(window.knots, times, np.ascontiguousarray(states.reshape(k, -1)), v.reshape(-1)).reshape(
+        -1, n_u, nc
+    )
+
+
+def _iterate(
+    solver: WindowSolver, control: Floats, delta: float, monitor: Monitor, on_step: OnStep
+) -> tuple[Floats, float]:
+    """Iterate one window; return its control points and the norm of the last update [m]."""
+    largest = _LARGEST_STEP * solver.problem.scene.cable.length
+    points: list[Floats] = []
+    steps: list[Floats] = []
+    best = (np.inf, control)
+    for _ in range(MAX_ITERATIONS):
+        monitor.check()
+        value, A, right, _ = solver.objective(control, True, 0.0)
+        if not np.isfinite(value):
+            break
+        x, positive = damped_step(A, right, 0.0)
+        damping = 0.0
+        if not positive:
+            _, A, right, _ = solver.objective(control, True, 0.0)
+            damping = _DAMPING
+            x, positive = damped_step(A, right, damping)
+        step = solver.expand(x)
+        update = float(np.linalg.norm(step))
+        if not np.isfinite(update):
+            break
+        longest = float(np.abs(step).max())
+        length = min(1.0, largest / longest) if longest > 0 else 1.0
+        if update < best[0]:
+            best = (update, control + length * step)
+        if update < delta:
+            control = control + step
+            on_step(control, update, float(np.sqrt(value)), damping, 1.0)
+            return control, update
+        points.append(control.ravel())
+        steps.append(length * step.ravel())
+        del points[: -_HISTORY - 1], steps[: -_HISTORY - 1]
+        control = _accelerate(points, steps).reshape(control.shape)
+        on_step(control, update, float(np.sqrt(value)), damping, length)
+    return best[1], best[0]
+
+
+def _accelerate(points: list[Floats], steps: list[Floats]) -> Floats:
+    """Return the next iterate of Anderson acceleration from the last iterates and their steps."""
+    plain = points[-1] + steps[-1]
+    if len(points) < 2:
+        return plain
+    dx = np.diff(points, axis=0).T
+    df = np.diff(steps, axis=0).T
+    mix = np.linalg.lstsq(df, steps[-1], rcond=1e-8)[0]
+    return plain - (dx + df) @ mix
