@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from viser import SceneApi
 
 from app.viewer import geometry
-from app.viewer.palette import REACTION, STEEL
+from app.viewer.palette import REACTION, STEEL, linear
 from dlocore import GraspReaction, Prediction, SplineSurface
 
 Floats = NDArray[np.float64]
@@ -28,7 +28,7 @@ class GripperPicture:
         self._arrow = scene.add_arrows(
             f"/reaction/{number}",
             np.zeros((1, 2, 3)),
-            REACTION,
+            linear(np.array(REACTION)),
             shaft_radius=0.0035 * cable_length,
             head_radius=0.010 * cable_length,
             head_length=0.030 * cable_length,

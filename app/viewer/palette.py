@@ -27,7 +27,7 @@ def ramp(values: Floats) -> Colours:
     return np.rint(np.stack(channels, axis=-1)).astype(np.uint8)
 
 
-def linear(colours: Colours) -> Colours:
+def linear(colours: NDArray[np.integer]) -> Colours:
     """Return sRGB colours as linear light, as the client takes those of instances and vertices."""
     share = colours / 255.0
     light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
