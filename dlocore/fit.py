@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline, CubicHermiteSpline, make_interp_spline
 
 from dlocore.errors import SceneError
-from dlocore.smoothing import smooth
+from dlocore.smoothing import smooth, stiffness_of
 from dlocore.spline import DEGREE
 
 Floats = NDArray[np.float64]
@@ -24,6 +24,7 @@ END_NOISE = 3.0  # an end point lies within three deviations of the noise, so th
 MARGIN = 0.05  # of the length: how far feet of noisy points may lie beyond the ends
 SPEED_ERROR = 3e-4  # at quarter points; between them it is at most twice that, below the 1e-3 strain of a taut cable
 SLOWEST = 1e-3  # of the chord's speed: where the parameter of a fit moves on and the curve doesn't, it is a cusp
+MIN_STEPS = 512  # of the arclength of a fit, so that its inverse is smooth to SPEED_ERROR
 MIN_SPANS = 8  # of a fit, at which even few points can show three bends
 MIN_UNIT_SPANS, MAX_UNIT_SPANS = (
     64,
@@ -50,8 +51,8 @@ def fit_points(points: Floats, length: float) -> PointFit:
     """Fit a curve to ordered points along a whole cable.
 
     1. Average points closer than their noise, whose chords would add up to a length that isn't there.
-    2. Minimise sum |r(s_i) - p_i|^2 + lambda int |r'''|^2 ds (`smooth`), s_i the arclength of point i.
-    3. Project the points on the curve, measure its true arclength there, and fit again.
+    2. Minimise sum |r(s_i) - p_i|^2 + lambda int k |r'''|^2 ds (`smooth`), s_i the arclength of point i.
+    3. Project the points on the curve, measure its true arclength there, and fit again, more softly where it bends.
     4. As far as noise leaves in doubt where the first and the last point lie on the curve, the cable's length decides.
 
     Args:
@@ -83,23 +84,31 @@ def fit_points(points: Floats, length: float) -> PointFit:
             at = np.clip(np.interp(share, progress, s) - start, 0.0, end - start)
             return PointFit(curve=curve, length_given=last - first, at=at[which])
         if spans == MIN_SPANS:
-            allowed = "points in order along a curve that a cable can follow"
-            raise SceneError("shape.points", "points that double back on themselves", allowed)
+            raise _doubled_back()
         spans = max(spans // 2, MIN_SPANS)
 
 
 def _smoothed(
     s: Floats, p: Floats, weight: Floats, spans: int, noise: float, most_noise: float
 ) -> tuple[BSpline, Floats, Floats]:
-    """Return a spline through the points, their parameters on it (n,) and their arclengths (n,) from a guess of these."""
+    """Return a spline through the points, and their parameters on it and arclengths (n,) [m] from a guess of these."""
+    stiffness = np.ones(spans)
     for _ in range(REFITS):
         first, last = _ends(s, noise)
         x, span = s - first, max(last - first, np.ptp(s) / 2)
-        spline = smooth(x, p, weight, span, spans, most_noise)
+        if not span > 0:
+            raise _doubled_back()
+        spline = smooth(x, p, weight, span, spans, most_noise, stiffness)
+        stiffness = stiffness_of(spline)
         if len(p) > SPARSE:
             x = np.clip(_foot(spline, x, p), -MARGIN * span, (1 + MARGIN) * span)
         s = np.interp(x, *_arclength(spline))
     return spline, x, s
+
+
+def _doubled_back() -> SceneError:
+    allowed = "points in order along a curve that a cable can follow"
+    return SceneError("shape.points", "points that double back on themselves", allowed)
 
 
 def check_length(name: str, allowed: str, given: float, length: float) -> None:
@@ -189,7 +198,7 @@ def _leaves(p: Floats, i: int, distance: float) -> int:
 def _foot(spline: BSpline, x: Floats, p: Floats) -> Floats:
     """Move parameters towards the feet of the points on the curve: one Newton step along the tangent."""
     tangent = spline(x, 1)
-    return x + ((p - spline(x)) * tangent).sum(axis=1) / (tangent**2).sum(axis=1)
+    return x + ((p - spline(x)) * tangent).sum(axis=1) / np.maximum((tangent**2).sum(axis=1), SLOWEST**2)
 
 
 def _ends(s: Floats, noise: float) -> tuple[float, float]:
@@ -208,8 +217,8 @@ def _ends(s: Floats, noise: float) -> tuple[float, float]:
 
 
 def _arclength(spline: BSpline) -> tuple[Floats, Floats]:
-    """Return a grid of parameters with its margins and the arclength there [m], 0 at parameter 0; Simpson's rule."""
-    span, steps = spline.t[-DEGREE - 1], 4 * (len(spline.c) - DEGREE)
+    """Return a grid of parameters with margins and the arclength there [m], 0 at parameter 0; Simpson's rule."""
+    span, steps = spline.t[-DEGREE - 1], max(4 * (len(spline.c) - DEGREE), MIN_STEPS)
     fine = np.linspace(-MARGIN * span, (1 + MARGIN) * span, 2 * steps + 1)
     speed = np.sqrt((spline(fine, 1) ** 2).sum(axis=1))
     part = (speed[:-1:2] + 4 * speed[1::2] + speed[2::2]) * (fine[2] - fine[0]) / 6

@@ -142,7 +142,7 @@ def _velocity(
         spline = make_interp_spline(u, velocity - mean, k=DEGREE)
     else:
         spans = int(np.clip(len(u), 8, MAX_SPANS))
-        spline = smooth(u, velocity - mean, np.ones(len(u)), length, spans, np.inf)
+        spline = smooth(u, velocity - mean, np.ones(len(u)), length, spans, np.inf, np.ones(spans))
     return SplineCurve(knots=spline.t, control_points=mean + spline.c)
 
 

@@ -86,9 +86,9 @@ def test_noisy_points_give_back_the_curve(name: str, count: int, noise: float, a
     assert distance * 1e3 < lateral
 
 
-@pytest.mark.parametrize(("name", "most"), [("helix", 6.0), ("sine", 1.8), ("circle", 0.6), ("S", 2.1)])
+@pytest.mark.parametrize(("name", "most"), [("helix", 7.5), ("sine", 1.8), ("circle", 0.6), ("S", 2.1)])
 def test_eight_exact_points_give_the_curve_within_millimetres(name: str, most: float) -> None:
-    # a cubic through 8 points at h = 143 mm: some h^4/384 of the fourth derivative, 6 mm on the helix of radius 57 mm
+    # a cubic through 8 points at h = 143 mm: some h^4/384 of the fourth derivative, 5 mm on the helix of radius 57 mm
     fit = fitted(seen(CURVES[name], 8, 0.0))
     assert np.sqrt(((fit(U) - CURVES[name](U)) ** 2).sum(axis=1).mean()) * 1e3 < most
 
@@ -169,7 +169,7 @@ def test_repeated_points_change_nothing(count: int) -> None:
 
 def test_three_distinct_points_on_a_line_are_a_straight_cable() -> None:
     fit = fitted(np.repeat([[0.0, 0.0, 0.0], [0.15, 0.0, 0.2], [0.6, 0.0, 0.8]], 2, axis=0))
-    assert np.abs(fit(U) - U[:, None] * [0.6, 0.0, 0.8]).max() < 1e-9  # rounding, magnified by the smoothing
+    assert np.abs(fit(U) - U[:, None] * [0.6, 0.0, 0.8]).max() < 1e-6  # the least noise that the smoothing assumes
 
 
 def test_fewer_than_three_distinct_points_are_refused_by_name() -> None:
@@ -308,3 +308,36 @@ def test_alike_velocities_of_points_stay_alike() -> None:
     curve = start_curve(Points(points=seen(CURVES["S"], 50, 1e-3), velocity=np.tile([1.0, 2.0, 3.0], (50, 1))), 1.0)
     assert curve.velocity is not None
     assert np.abs(curve.velocity(U) - [1.0, 2.0, 3.0]).max() < 1e-14  # rounding
+
+
+def corner(angle: float) -> Curve:
+    """Two straight legs of half a metre that enclose `angle` [rad]."""
+    way = np.array([np.cos(angle), np.sin(angle), 0.0])
+    return lambda u: np.minimum(u, 0.5)[:, None] * [1.0, 0, 0] - np.maximum(u - 0.5, 0)[:, None] * way
+
+
+@pytest.mark.parametrize("count", [13, 100, 2000])
+@pytest.mark.parametrize("degrees", [60, 90])
+@pytest.mark.parametrize("noise", [0.0, 2e-3])
+def test_a_sharp_corner_is_rounded(count: int, degrees: float, noise: float) -> None:
+    truth = corner(np.radians(degrees))
+    fit = fitted(seen(truth, count, noise))
+    speed = np.linalg.norm(fit(np.linspace(0, 1, 5001), 1), axis=1)
+    assert np.abs(speed - 1).max() < 1e-3  # as for every fit
+    # the way cut off at the corner, which shifts both legs, is some 1 % of the cable and is scaled away
+    assert np.sqrt(((fit(U) - truth(U)) ** 2).sum(axis=1).mean()) < 9e-3
+
+
+def test_a_narrow_hairpin_keeps_its_bend() -> None:
+    error, distance = errors(unit_length(lambda t: hairpin(t, radius=0.02)), 60, 3e-3)
+    # with one stiffness for the bend and the legs the errors are 12 and 4 mm
+    assert error < 8e-3
+    assert distance < 3.2e-3
+
+
+def test_a_cable_that_doubles_back_on_itself_is_refused_by_name() -> None:
+    u = np.linspace(0, 1, 61)
+    for middle in (0.5, 0.52):
+        with pytest.raises(SceneError) as error:
+            fitted(np.column_stack([np.minimum(u, 2 * middle - u), 0 * u, 0 * u]))
+        assert error.value.field == "shape.points"
