@@ -17,7 +17,7 @@ MAX_LENGTH_MISMATCH = 0.10  # of the cable's length: beyond it the shape is anot
 SAME = 1e-6  # of the length: points closer than this are one point given twice
 MAX_GROUPS = 2000  # points are averaged down to about this many: then a group is a small part of a knot span
 MAX_SPANS = 160  # knot spans: three for each radius of a cable that turns eight full loops
-SPARSE = 40  # points: chords between so few are long against the noise, so their order and spacing are not in doubt
+SPARSE = 40  # points: so few are far apart against their noise, so their order and spacing are not in doubt
 REFITS = 4  # of the parameter: measured, a fifth moves the curve by less than a twentieth of the noise
 NOISE = 0.002  # [m], or of a length above 1 m: what few points deviate from a smooth curve beyond it is shape
 END_NOISE = 3.0  # an end point lies within three deviations of the noise, so the cable's end does
@@ -50,7 +50,8 @@ class PointFit:
 def fit_points(points: Floats, length: float) -> PointFit:
     """Fit a curve to ordered points along a whole cable.
 
-    1. Average points closer than their noise, whose chords would add up to a length that isn't there.
+    1. Take the length of the chords between the points as their first parameter. Among dense points noise makes it
+       many times too long, but evenly so; averaging points before was measured to change nothing.
     2. Minimise sum |r(s_i) - p_i|^2 + lambda int k |r'''|^2 ds (`smooth`), s_i the arclength of point i.
     3. Project the points on the curve, measure its true arclength there, and fit again, more softly where it bends.
     4. As far as noise leaves in doubt where the first and the last point lie on the curve, the cable's length decides.
@@ -69,11 +70,10 @@ def fit_points(points: Floats, length: float) -> PointFit:
     share = _share(distinct)
     p, progress, weight = _averaged(distinct, share)
     noise = _noise(p) if len(p) > SPARSE else 0.0
-    guess = _chord_length(p, progress, length, noise)
     most_noise = max(NOISE * max(length, 1.0), 1.5 * noise)
     spans = int(np.clip(len(p), MIN_SPANS, MAX_SPANS))
     while True:
-        spline, x, s = _smoothed(guess, p, weight, spans, noise, most_noise)
+        spline, x, s = _smoothed(_cumulated(p), p, weight, spans, noise, most_noise)
         first, last = _ends(s, noise)
         check_length("shape.points", "points along the whole cable", last - first, length)
         doubt = 2 * END_NOISE * float(np.sqrt(((p - spline(x)) ** 2).sum(axis=1).mean()))
@@ -144,10 +144,7 @@ def _averaged(p: Floats, share: Floats) -> tuple[Floats, Floats, Floats]:
     # An irrational number of parts about the middle: no regular spacing puts points on the boundaries, where rounding
     # would decide, and reversed points fall into the same groups.
     part = np.rint((share - 0.5) * (MAX_GROUPS - 0.38196601125))
-    return _means(p, share, np.flatnonzero(np.diff(part, prepend=np.nan) != 0))
-
-
-def _means(p: Floats, share: Floats, start: NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
+    start = np.flatnonzero(np.diff(part, prepend=np.nan) != 0)
     number = np.diff(start, append=len(p)).astype(float)
     return np.add.reduceat(p, start) / number[:, None], np.add.reduceat(share, start) / number, number
 
@@ -160,39 +157,6 @@ def _noise(p: Floats) -> float:
     offset = (1 - left)[:, None] * before - left[:, None] * after
     square = (offset**2).sum(axis=1) / (1 + left**2 + (1 - left) ** 2)
     return float(np.sqrt(np.median(square) / 1.39))  # the median of chi^2 with two degrees of freedom is 1.39
-
-
-def _chord_length(p: Floats, progress: Floats, length: float, noise: float) -> Floats:
-    """Return a first arclength of the points (n,) [m]: chords between averages of those closer than their noise."""
-    if len(p) <= SPARSE:
-        return _cumulated(p)
-    distance = float(np.clip(6 * noise, 0.01 * length, length / SPARSE))
-    forward = _chords_of_averages(p, progress, distance)
-    backward = _chords_of_averages(p[::-1], 1 - progress[::-1], distance)[::-1]
-    return 0.5 * (forward - forward[0] + backward[0] - backward)
-
-
-def _chords_of_averages(p: Floats, progress: Floats, distance: float) -> Floats:
-    start = [0]
-    while start[-1] < len(p):
-        start.append(_leaves(p, start[-1], distance))
-    q, at, _ = _means(p, progress, np.array(start[:-1]))
-    if len(q) < 2:
-        return _cumulated(p)
-    chord = _cumulated(q)
-    s = np.interp(progress, at, chord)
-    s += np.minimum(progress - at[0], 0.0) * (chord[1] - chord[0]) / (at[1] - at[0])
-    return s + np.maximum(progress - at[-1], 0.0) * (chord[-1] - chord[-2]) / (at[-1] - at[-2])
-
-
-def _leaves(p: Floats, i: int, distance: float) -> int:
-    """Return the first point after `i` that is farther than `distance` [m] from it, or the number of points."""
-    block = 32
-    for j in range(i + 1, len(p), block):
-        far = ((p[j : j + block] - p[i]) ** 2).sum(axis=1) > distance**2
-        if far.any():
-            return j + int(far.argmax())
-    return len(p)
 
 
 def _foot(spline: BSpline, x: Floats, p: Floats) -> Floats:

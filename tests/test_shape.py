@@ -137,6 +137,13 @@ def test_uneven_spacing_leaves_the_parameter_in_arclength() -> None:
     assert np.linalg.norm(fitted(points)(U) - CURVES["sine"](U), axis=1).max() < 3e-3
 
 
+def test_points_crowded_in_one_place_leave_the_rest_of_the_cable_its_shape() -> None:
+    u = np.concatenate([np.linspace(0, 0.3, 100), np.linspace(0.3, 0.31, 20_000), np.linspace(0.31, 1, 100)])
+    points = CURVES["helix"](u) + 1e-4 * np.random.default_rng(5).standard_normal((len(u), 3))
+    # averaged by their number alone, ten points of the 100 would make one, 70 mm apart
+    assert np.linalg.norm(fitted(points)(U) - CURVES["helix"](U), axis=1).max() < 1e-3
+
+
 @pytest.mark.parametrize("noise", [0.0, 3e-3])
 @pytest.mark.parametrize("count", [13, 60, 2000, 5000])
 def test_a_moved_cloud_gives_the_moved_curve(count: int, noise: float) -> None:
