@@ -17,7 +17,7 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _angle(sine: float, cosine: float) -> float:
+def turning_angle(sine: float, cosine: float) -> float:
     """Return atan2(sine, cosine) of a unit pair; by the series of asin where that is exact to 1e-16 and faster."""
     x = sine * sine
     if cosine > 0.0 and x < 0.0064:  # 4.6 degrees
@@ -37,7 +37,7 @@ def bend_plane(
     for j in range(len(first)):
         a, b = first[j], second[j]
         ax, ay, bx, by = t[0, a], t[1, a], t[0, b], t[1, b]
-        m = EI * (_angle(ax * by - ay * bx, ax * bx + ay * by) - rest[j])
+        m = EI * (turning_angle(ax * by - ay * bx, ax * bx + ay * by) - rest[j])
         if eta > 0.0:
             m += eta * (bx * rate[1, b] - by * rate[0, b] - ax * rate[1, a] + ay * rate[0, a])
         m *= per_length[j]
@@ -55,7 +55,8 @@ def bend_space(
     """Add to the edge forces `q` (3, e) [N] those of all hinges in space, where the angle has no sign.
 
     The damping is that of the model on D = t_b - t_a, the discrete curvature times l: the moment on D is
-    eta/l (eps^2 D' + D (D.D')) / (|D|^2 + eps^2), with `eps` (hinges,) the passage near zero curvature times l.
+    eta/l (eps^2 D* + D (D.D')/cos^2(phi/2)) / (|D|^2 + eps^2), with `eps` (hinges,) the passage near zero curvature
+    times l and D* the part of D' across the mean tangent. The cosine makes the radial part the rate of phi itself.
     """
     moment = np.zeros(3)
     for j in range(len(first)):
@@ -66,21 +67,25 @@ def bend_space(
             more += (t[d, b] + t[d, a]) ** 2
         cosine = 0.25 * (more - less)
         sine = 0.5 * np.sqrt(less * more)  # exact for small angles too
-        ratio = _angle(sine, cosine) / sine if sine > 1e-100 else 1.0
+        ratio = turning_angle(sine, cosine) / sine if sine > 1e-100 else 1.0
         stiff = EI * ratio * per_length[j]
         for d in range(3):
             q[d, a] -= stiff * inverse[a] * (t[d, b] - cosine * t[d, a])
             q[d, b] -= stiff * inverse[b] * (t[d, a] - cosine * t[d, b])
         if eta > 0.0:
             square = eps[j] * eps[j]
-            radial = 0.0
+            radial, turned = 0.0, 0.0
             for d in range(3):
                 radial += (t[d, b] - t[d, a]) * (rate[d, b] - rate[d, a])
+                turned += (t[d, b] + t[d, a]) * (rate[d, b] - rate[d, a])
+            radial *= 4.0 / more
+            turned /= more
             scale = eta * per_length[j] / (less + square)
             along_a, along_b = 0.0, 0.0
             for d in range(3):
                 turn = t[d, b] - t[d, a]
-                moment[d] = scale * (square * (rate[d, b] - rate[d, a]) + turn * radial)
+                across = rate[d, b] - rate[d, a] - turned * (t[d, b] + t[d, a])
+                moment[d] = scale * (square * across + turn * radial)
                 along_a += moment[d] * t[d, a]
                 along_b += moment[d] * t[d, b]
             for d in range(3):

@@ -7,6 +7,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from benchmarks.rod import converged, richardson, simulate
+from benchmarks.rod_kernel import turning_angle
 from dlocore.cable import Cable
 from dlocore.paths import Move
 from dlocore.scene import ControlPoints, Environment, Grasp, Load, Scene, Straight
@@ -150,6 +151,41 @@ def test_motion_does_not_depend_on_the_orientation_of_space():
     spatial = simulate(scene(TILTED), elements=20)[2]
     assert np.ptp(planar[-1], axis=0).min() == 0.0
     np.testing.assert_allclose(spatial, planar @ TILTED.T, atol=1e-11)  # the same sums in two and three coordinates
+
+
+def test_damping_of_strong_bending_in_space_is_that_in_the_plane():
+    def scene(turn: np.ndarray, eta: float) -> Scene:
+        path = Move(displacement=turn @ [0.0, 0.3, 0.0], duration=0.8)
+        shape = Straight(direction=turn[:, 0])
+        return Scene(
+            cable=cable(bending_damping=eta), shape=shape, grasps=(Grasp(u=0.5, path=path),), environment=WEIGHTLESS
+        )
+
+    free, planar = (simulate(scene(np.eye(3), eta), elements=32)[2] for eta in (0.0, 1e-4))
+    spatial = simulate(scene(TILTED, 1e-4), elements=32)[2] @ TILTED
+    effect = np.abs(planar - free).max()
+    assert effect > 0.01
+    # in the plane the rate has a radial part only, so both are the same sums but for eps^2 (1/cos^2 - 1)
+    assert np.abs(spatial - planar).max() < 1e-4 * effect
+
+
+def test_turning_angle_is_the_arctangent_to_rounding():
+    angles = np.concatenate([np.linspace(-3.1, 3.1, 1001), np.linspace(-0.1, 0.1, 1001)])
+    found = [turning_angle(s, c) for s, c in zip(np.sin(angles), np.cos(angles), strict=True)]
+    np.testing.assert_allclose(found, angles, rtol=2e-15, atol=1e-15)
+
+
+@pytest.mark.parametrize("u", [0.0, 0.5, 1.0])
+def test_a_turned_grasp_turns_the_cable(u):
+    turn = np.array([0.3, 0.4, 1.1])
+    grasp = Grasp(u=u, hold="tangent", path=Move(displacement=(0.0, 0.0, 0.0), duration=0.5, rotation=turn))
+    around = Environment(gravity=(0.0, 0.0, 0.0), drag=0.5)
+    scene = Scene(
+        cable=cable(bending_stiffness=0.1), shape=Straight(), grasps=(grasp,), environment=around, horizon=8.0
+    )
+    _, nodes, r = simulate(scene, elements=10, times=[8.0])
+    exact = [u, 0.0, 0.0] + (nodes - u)[:, None] * Rotation.from_rotvec(turn).as_matrix()[:, 0]
+    np.testing.assert_allclose(r[0], exact, atol=1e-6)  # exp(-2.5 t/s) of the slowest motion
 
 
 def test_grasps_close_where_the_cable_is_and_leave_it_free_when_they_open():
