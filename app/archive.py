@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dlocore import Iteration, Prediction, SplineSurface
 
 Floats = NDArray[np.float64]
-_SCALARS = ("update", "residual", "energy", "wall_time", "step_length")
+SCALARS = ("update", "residual", "energy", "wall_time", "damping", "step_length")  # of an iteration
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ def pack(prediction: Prediction) -> bytes:
         arrays[f"control_points_{k}"] = surface.control_points
         arrays[f"knots_u_{k}"] = surface.knots_u
         arrays[f"knots_t_{k}"] = surface.knots_t
-    for name in _SCALARS:
+    for name in SCALARS:
         arrays[name] = np.array([getattr(iteration, name) for iteration in prediction.iterations], dtype=float)
     return _npz(arrays)
 
@@ -50,7 +50,7 @@ def unpack(request: dict[str, Any], document: dict[str, Any], nets: bytes) -> Ru
             SplineSurface(arrays[f"control_points_{k}"], arrays[f"knots_u_{k}"], arrays[f"knots_t_{k}"])
             for k in range(len(document["iterations"]) + 1)
         ]
-        scalars = {name: arrays[name] for name in _SCALARS}
+        scalars = {name: arrays[name] for name in SCALARS}
     iterations = tuple(
         Iteration(
             number=shown["number"],

@@ -8,10 +8,10 @@ from app import commands
 
 _DESCRIPTION = "Predict how a cable moves when grippers move it."
 _EPILOG = """examples:
-  dlo serve                                     the page, the 3D scene and the API on http://127.0.0.1:8000
-  dlo predict scene.json -o out.npz             the surface as NumPy arrays
-  dlo predict scene.json --json - | jq .status  the whole answer, as the API gives it
-  dlo predict scene.json --rrd out.rrd          a recording for rerun: iterations and motion
+  dlo serve                             page, 3D scene and API on http://127.0.0.1:8000
+  dlo predict scene.json -o out.npz     the surface as NumPy arrays
+  dlo predict scene.json --json -       the whole answer, as the API gives it
+  dlo predict scene.json --rrd out.rrd  a recording for rerun: iterations and motion
 
 Settings come from the environment, e.g. DLO_PORT=9000, DLO_DATA_DIR=/srv/dlo, DLO_WORKERS=4."""
 _EXIT = """exit codes: 0 converged; 2 bad input, named on stderr; 3 not converged (the output is still written)"""

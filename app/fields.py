@@ -32,7 +32,9 @@ class BadField:
     def from_scene_error(error: SceneError) -> "BadField":
         """Return the field that the solver refused."""
         reason = f"{error.reason}. " if error.reason else ""
-        return BadField(error.field, error.given, error.allowed, f"{reason}Got {error.given}. Allowed: {error.allowed}.")
+        return BadField(
+            error.field, error.given, error.allowed, f"{reason}Got {error.given}. Allowed: {error.allowed}."
+        )
 
 
 def bad_fields(errors: Sequence[Any], body: Any) -> list[BadField]:

@@ -27,16 +27,18 @@ MAX_SCENE_TEXT = 20_000
 MAX_COORDINATE = 1e6  # m; an iterate beyond it has diverged and isn't drawn
 
 # Okabe-Ito
-BLUE, ORANGE, GREEN, VERMILION, SKY = (
+BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY = (
     (0, 114, 178),
     (230, 159, 0),
     (0, 158, 115),
     (213, 94, 0),
+    (204, 121, 167),
     (86, 180, 233),
 )
 LOG_SERIES = {"update": ("log10 update [m]", BLUE), "residual": ("log10 residual", VERMILION)}
 SERIES = {
     "energy": ("elastic energy [J]", GREEN),
+    "damping": ("damping", PURPLE),
     "step_length": ("step length", ORANGE),
 }
 
@@ -231,7 +233,7 @@ def layout() -> bytes:
             ),
             rrb.Vertical(
                 rrb.TimeSeriesView(origin="/convergence", name="Update and residual, log10"),
-                rrb.TimeSeriesView(origin="/solve", name="Elastic energy, step length"),
+                rrb.TimeSeriesView(origin="/solve", name="Energy, damping, step length"),
                 rrb.TextDocumentView(origin="/report", name="Report"),
                 row_shares=[3, 2, 3],
             ),

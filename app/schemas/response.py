@@ -49,6 +49,7 @@ class IterationModel(BaseModel):
     residual: float | None = Field(description="Root mean square residual over the motion [m]; method `paper`: [N].")
     energy: float | None = Field(description="Elastic energy at the end of the motion [J].")
     wall_time: float = Field(description="Since the solve began [s].")
+    damping: float | None = Field(description="Levenberg-Marquardt damping of the step, 0 for a plain one.")
     step_length: float | None = Field(description="Fraction of the full step taken.")
     n_u: int = Field(description="Control points along the cable.")
     n_t: int = Field(description="Control points in time.")
@@ -204,7 +205,7 @@ def from_prediction(prediction: Prediction, id: str, samples_u: int = 101, sampl
 def iteration_document(iteration: Iteration) -> dict[str, Any]:
     """Return an iteration without its surface, with None where a value is not finite."""
     document = {name: value for name, value in vars(iteration).items() if name != "surface"}
-    for name in ("update", "residual", "energy", "step_length"):
+    for name in ("update", "residual", "energy", "damping", "step_length"):
         document[name] = _finite(document[name])
     return document
 

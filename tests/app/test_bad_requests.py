@@ -9,12 +9,8 @@ from fastapi.testclient import TestClient
 from tests.app.conftest import ABSENT, contract_scene, paper_scene, put
 
 PAPER = paper_scene()
-HANGING = put(
-    put(contract_scene("two-grippers-hanging"), "primitives.0.hold", "point"), "primitives.1.hold", "point"
-)
-POINTS = put(
-    PAPER, "shape", {"kind": "points", "points": [[0, 0, 0], [0.3, 0, 0], [0.7, 0, 0], [1, 0, 0]]}
-)
+HANGING = put(put(contract_scene("two-grippers-hanging"), "primitives.0.hold", "point"), "primitives.1.hold", "point")
+POINTS = put(PAPER, "shape", {"kind": "points", "points": [[0, 0, 0], [0.3, 0, 0], [0.7, 0, 0], [1, 0, 0]]})
 WAYPOINTS = put(
     PAPER,
     "primitives.0.path",
@@ -218,7 +214,9 @@ def test_a_body_beyond_the_limit_is_refused_whether_it_says_so_or_not(client: Te
     the_problem(client.post("/v1/predictions", content=chunks, headers=headers), 413)
 
 
-@pytest.mark.parametrize("id", ["..", "%2e%2e", "..%2f..%2fetc%2fpasswd", "A" * 28, "0" * 28, "0" * 27, "x" * 10_000, "%00"])
+@pytest.mark.parametrize(
+    "id", ["..", "%2e%2e", "..%2f..%2fetc%2fpasswd", "A" * 28, "0" * 28, "0" * 27, "x" * 10_000, "%00"]
+)
 @pytest.mark.parametrize("part", ["", "/surface.npz", "/recording.rrd", "/scene.json", "/viewer"])
 def test_an_id_that_is_none_is_not_found(client: TestClient, id: str, part: str) -> None:
     response = client.get(f"/v1/predictions/{id}{part}", follow_redirects=False)

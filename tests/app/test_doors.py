@@ -1,0 +1,159 @@
+"""The same scene through every door gives the same surface, as the contract lays it out."""
+
+import io
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fastapi.testclient import TestClient
+
+from app.schemas import EXAMPLES, PredictionRequest, PredictionResponse, to_scene
+from dlocore import predict
+from tests.app.conftest import contract_scene, paper_scene, put
+
+SAME = {"rtol": 0.0, "atol": 1e-12}  # m: the same compiled code on the same numbers, but for the order of additions
+
+
+def arrays(content: bytes) -> dict[str, np.ndarray]:
+    with np.load(io.BytesIO(content), allow_pickle=False) as archive:
+        return dict(archive)
+
+
+def nothing_stored(id: str) -> None:
+    return None
+
+
+def test_http_answers_with_the_surface_that_python_predicts(answer: dict[str, Any]) -> None:
+    prediction = predict(to_scene(PredictionRequest.model_validate(paper_scene()), nothing_stored))
+    u, t, q = prediction.surface.sample(101, 33)
+    np.testing.assert_allclose(answer["surface"]["u"], u, **SAME)
+    np.testing.assert_allclose(answer["surface"]["t"], t, **SAME)
+    np.testing.assert_allclose(answer["surface"]["positions"], q[..., :3], **SAME)
+    np.testing.assert_allclose(answer["surface"]["twist"], q[..., 3], **SAME)
+    np.testing.assert_allclose(answer["control_points"], prediction.surface.control_points, **SAME)
+    assert np.ptp(q[..., 1]) > 0.3  # m: the cable has moved, so equal surfaces mean something
+
+
+def test_the_command_line_writes_the_surface_that_http_answers_with(answer: dict[str, Any], tmp_path: Path) -> None:
+    scene, npz, full = tmp_path / "scene.json", tmp_path / "out.npz", tmp_path / "out.json"
+    scene.write_text(json.dumps(paper_scene()))
+    command = [sys.executable, "-m", "app.cli", "predict", str(scene), "-o", str(npz), "--json", str(full)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240)
+    assert done.returncode == 0, done.stderr
+    written, document = arrays(npz.read_bytes()), json.loads(full.read_text())
+    for name in ("u", "t", "positions", "twist"):
+        np.testing.assert_allclose(written[name], answer["surface"][name], **SAME)
+        np.testing.assert_allclose(document["surface"][name], answer["surface"][name], **SAME)
+    np.testing.assert_allclose(written["control_points"], answer["control_points"], **SAME)
+
+
+def test_npz_holds_what_json_holds(client: TestClient, answer: dict[str, Any]) -> None:
+    by_link = arrays(client.get(answer["links"]["surface"]).content)
+    negotiated = client.get(answer["links"]["self"], headers={"accept": "application/x-npz"})
+    assert negotiated.headers["content-type"] == "application/x-npz"
+    by_accept = arrays(negotiated.content)
+    for npz in (by_link, by_accept):
+        for name in ("u", "t", "positions", "twist"):
+            np.testing.assert_array_equal(npz[name], answer["surface"][name])
+        for name in ("control_points", "knots_u", "knots_t", "degree"):
+            np.testing.assert_array_equal(npz[name], answer[name])
+        np.testing.assert_array_equal(npz["grasp_u"], [grasp["u"] for grasp in answer["grasps"]])
+        np.testing.assert_array_equal(npz["reaction"], [grasp["reaction"] for grasp in answer["grasps"]])
+        np.testing.assert_array_equal(npz["moment"], [grasp["moment"] for grasp in answer["grasps"]])
+
+
+def test_a_prediction_can_be_asked_for_as_npz(client: TestClient, answer: dict[str, Any]) -> None:
+    headers = {"accept": "application/json;q=0.5, application/x-npz"}
+    response = client.post("/v1/predictions", json=paper_scene(), headers=headers)
+    assert response.status_code == 201
+    assert response.headers["location"].startswith("/v1/predictions/")
+    np.testing.assert_allclose(arrays(response.content)["positions"], answer["surface"]["positions"], **SAME)
+
+
+def test_the_answer_is_that_of_the_contract(client: TestClient, answer: dict[str, Any]) -> None:
+    PredictionResponse.model_validate(answer, strict=True)
+    surface = answer["surface"]
+    assert np.shape(surface["positions"]) == (33, 101, 3)
+    assert np.shape(surface["twist"]) == (33, 101)
+    n_t, n_u, columns = np.shape(answer["control_points"])
+    assert columns == 4
+    assert answer["degree"] == 3
+    assert len(answer["knots_u"]) == n_u + 4
+    assert len(answer["knots_t"]) == n_t + 4
+    assert answer["knots_u"][-1] == 1.0
+    assert answer["knots_t"][-1] == 1.6
+    (grasp,) = answer["grasps"]
+    assert grasp["u"] == 0.25
+    assert np.shape(grasp["reaction"]) == np.shape(grasp["moment"]) == (33, 3)
+    assert answer["status"] == "converged"
+    assert set(answer["links"]) >= {"self", "recording", "surface"}
+    assert answer["accuracy"]["error_estimate"] > 0
+    assert all(set(effect) == {"name", "active", "reason", "magnitude", "unit"} for effect in answer["effects"])
+    assert {"update", "residual", "energy", "wall_time"} <= set(answer["iterations"][0])
+
+
+def test_the_grasp_follows_its_path(answer: dict[str, Any]) -> None:
+    t = np.array(answer["surface"]["t"])
+    s = t / 1.6
+    path = 0.5 * s**3 * (10 - 15 * s + 6 * s**2)
+    held = np.array(answer["surface"]["positions"])[:, 25]  # u = 0.25 m
+    # the grasp is imposed exactly on the spline, which takes its minimum jerk up to the grid in time: 1e-4 of 0.5 m
+    np.testing.assert_allclose(held[:, 1], path, rtol=0, atol=5e-5)
+    np.testing.assert_allclose(held[:, [0, 2]], [[0.25, 0.0]] * len(t), rtol=0, atol=1e-9)
+
+
+def test_a_null_stands_where_a_number_is_not_finite(client: TestClient, answer: dict[str, Any]) -> None:
+    assert answer["iterations"][0]["update"] is None  # the first level of a march has nothing to differ from
+    assert "NaN" not in client.get(answer["links"]["self"]).text
+
+
+def test_output_sets_the_sampling(client: TestClient) -> None:
+    response = client.post("/v1/predictions", json=paper_scene(output={"samples_u": 7, "samples_t": 5}))
+    assert np.shape(response.json()["surface"]["positions"]) == (5, 7, 3)
+
+
+def test_a_stored_request_can_be_sent_again(client: TestClient, answer: dict[str, Any]) -> None:
+    stored = client.get(answer["links"]["scene"])
+    assert stored.json() == paper_scene()
+    again = client.post("/v1/predictions", content=stored.content, headers={"content-type": "application/json"}).json()
+    np.testing.assert_allclose(again["surface"]["positions"], answer["surface"]["positions"], **SAME)
+
+
+def test_a_given_grid_and_threshold_are_solved_over_the_whole_space_time(client: TestClient) -> None:
+    response = client.post("/v1/predictions", json=contract_scene("paper-fig1"))
+    assert response.status_code == 201, response.text
+    document = response.json()
+    assert document["accuracy"]["method"] == "spacetime"
+    assert np.shape(document["control_points"]) == (13, 9, 4)
+    assert document["status"] == "converged"
+    assert document["iterations"][-1]["update"] < 1e-5
+
+
+def test_two_grippers_hold_a_hanging_cable(client: TestClient) -> None:
+    scene = contract_scene("two-grippers-hanging")
+    for i in range(2):
+        scene = put(scene, f"primitives.{i}.hold", "tangent")
+    document = client.post("/v1/predictions", json=scene).json()
+    assert document["status"] == "converged", document
+    positions = np.array(document["surface"]["positions"])
+    # the grasps are exact: the start fits its end points within their noise, the move is as asked
+    np.testing.assert_allclose(positions[-1, -1] - positions[0, -1], [-0.2, 0.2, 0.1], rtol=0, atol=1e-6)
+    assert positions[..., 2].min() < -0.25  # m: it hangs
+    assert [grasp["u"] for grasp in document["grasps"]] == [0.0, 1.0]
+
+
+def test_a_contract_scene_beyond_the_model_is_refused_by_name(client: TestClient) -> None:
+    for name, field in (("two-grippers-hanging", "primitives[0].hold"), ("table-with-friction", "cable.yield_strain")):
+        problem = client.post("/v1/predictions", json=contract_scene(name)).json()
+        assert [error["field"] for error in problem["errors"]] == [field]
+        assert "not modelled yet" in problem["detail"]
+
+
+def test_the_examples_of_the_docs_are_those_of_the_contract() -> None:
+    shown = {name: example["value"] for name, example in EXAMPLES.items()}
+    assert shown["paper"] == contract_scene("paper-fig1")
+    assert shown["two-clamps"] == contract_scene("two-grippers-hanging")
+    assert shown["friction"] == contract_scene("table-with-friction")

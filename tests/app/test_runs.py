@@ -1,0 +1,160 @@
+"""Stored runs: whole or not at all, found again, listed newest first, the oldest evicted first."""
+
+import time
+from pathlib import Path
+from typing import Any
+
+import orjson
+import pytest
+from fastapi.testclient import TestClient
+
+from app import runs
+from app.main import create_app
+from app.runs import RunStore
+from app.schemas import PredictionRequest, to_scene
+from app.settings import Settings
+from dlocore import Prediction, predict
+from tests.app.conftest import paper_scene, start
+
+
+@pytest.fixture(scope="module")
+def prediction() -> Prediction:
+    return predict(to_scene(PredictionRequest.model_validate(paper_scene()), lambda id: None))
+
+
+def store(directory: Path, **limits: Any) -> RunStore:
+    return RunStore(Settings(data_dir=directory, **limits))
+
+
+def listed(found: RunStore) -> list[str]:
+    return [summary["id"] for summary in found.page(1000, 0)[0]]
+
+
+def fill(directory: Path, prediction: Prediction, count: int, **limits: Any) -> tuple[RunStore, list[str]]:
+    target = store(directory, **limits)
+    ids = []
+    for _ in range(count):
+        ids.append(target.save(paper_scene(), prediction))
+        time.sleep(0.002)  # ids sort by the millisecond
+    return target, ids
+
+
+def test_a_restart_finds_the_runs(tmp_path: Path) -> None:
+    settings = Settings(data_dir=tmp_path)
+    with TestClient(create_app(settings)) as first:
+        document = start(first).post("/v1/predictions", json=paper_scene()).json()
+        recording = first.get(document["links"]["recording"]).content
+    with TestClient(create_app(settings)) as second:
+        again = second.get(document["links"]["self"])
+        assert again.json() == document
+        assert second.get(document["links"]["recording"]).content == recording
+        assert second.get(document["links"]["scene"]).json() == paper_scene()
+        (summary,) = second.get("/v1/predictions").json()["predictions"]
+        assert summary["id"] == document["id"]
+        assert summary["status"] == document["status"]
+
+
+def test_what_is_loaded_is_what_was_saved(tmp_path: Path, prediction: Prediction) -> None:
+    target, (id,) = fill(tmp_path, prediction, 1)
+    run = target.load(id)
+    assert run is not None
+    assert (run.surface.control_points == prediction.surface.control_points).all()
+    assert run.request == paper_scene()
+    assert len(run.iterations) == len(prediction.iterations)
+    for read, kept in zip(run.iterations, prediction.iterations, strict=True):
+        assert (read.surface.control_points == kept.surface.control_points).all()
+        assert {k: v for k, v in vars(read).items() if k != "surface"} == {
+            k: v for k, v in vars(kept).items() if k != "surface"
+        }
+
+
+def test_runs_are_listed_newest_first_in_pages(tmp_path: Path, prediction: Prediction) -> None:
+    target, ids = fill(tmp_path, prediction, 5)
+    assert listed(target) == ids[::-1]
+    page, total = target.page(2, 1)
+    assert [summary["id"] for summary in page] == [ids[3], ids[2]]
+    assert total == 5
+
+
+def test_the_pages_of_the_service_lead_on(client: TestClient, answer: dict[str, Any]) -> None:
+    client.post("/v1/predictions", json=paper_scene())
+    address, seen = "/v1/predictions?limit=2", []
+    while address:
+        page = client.get(address).json()
+        assert len(page["predictions"]) <= 2
+        seen += [summary["id"] for summary in page["predictions"]]
+        address = page["next"]
+    assert len(seen) == page["total"]
+    assert seen == sorted(set(seen), reverse=True)
+    assert answer["id"] in seen
+
+
+def test_the_oldest_go_first_when_there_are_too_many(tmp_path: Path, prediction: Prediction) -> None:
+    target, ids = fill(tmp_path, prediction, 6, max_runs=4)
+    assert listed(target) == ids[:1:-1]
+    assert target.document(ids[0]) is None
+    assert sorted(path.name for path in (tmp_path / "runs").iterdir()) == ids[2:]
+
+
+def test_the_oldest_go_first_when_they_are_too_large(tmp_path: Path, prediction: Prediction) -> None:
+    target, (id,) = fill(tmp_path / "one", prediction, 1)
+    size = sum(file.stat().st_size for file in (tmp_path / "one" / "runs" / id).iterdir())
+    keep = 1_000_000 // size + 1
+    target, ids = fill(tmp_path / "many", prediction, keep + 3, max_run_bytes=1_000_000)
+    kept = listed(target)
+    assert kept == ids[::-1][: len(kept)]
+    assert 1_000_000 // size - 1 <= len(kept) <= 1_000_000 // size + 1
+
+
+def test_recordings_count_as_bytes(tmp_path: Path, prediction: Prediction) -> None:
+    pytest.importorskip("rerun")
+    target, (id,) = fill(tmp_path, prediction, 1)
+    assert target.recording(id)
+    on_disk = sum(file.stat().st_size for file in (tmp_path / "runs" / id).iterdir())
+    assert target._entries[id].size == on_disk
+    assert store(tmp_path)._entries[id].size == on_disk
+
+
+def test_a_lower_cap_evicts_at_the_next_start(tmp_path: Path, prediction: Prediction) -> None:
+    _, ids = fill(tmp_path, prediction, 4)
+    assert listed(store(tmp_path, max_runs=2)) == ids[:1:-1]
+
+
+def test_an_unfinished_run_is_never_listed(
+    tmp_path: Path, prediction: Prediction, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target, ids = fill(tmp_path, prediction, 1)
+
+    def crash(directory: Path) -> None:
+        raise KeyboardInterrupt  # as if killed between writing and renaming
+
+    with monkeypatch.context() as patch:
+        patch.setattr(runs, "_sync", crash)
+        with pytest.raises(KeyboardInterrupt):
+            target.save(paper_scene(), prediction)
+    leftover = tmp_path / "runs" / ".new-1"
+    leftover.mkdir()
+    (leftover / runs.DOCUMENT).write_bytes(b"{")
+    (tmp_path / "runs" / ("0" * 28)).mkdir()  # without its summary: not one of ours
+    assert listed(target) == ids
+    assert listed(store(tmp_path)) == ids
+
+
+def test_a_removed_run_is_gone(client: TestClient, tmp_path: Path) -> None:
+    document = client.post("/v1/predictions", json=paper_scene()).json()
+    assert client.delete(document["links"]["self"]).status_code == 204
+    for link in ("self", "recording", "surface", "scene", "viewer"):
+        assert client.get(document["links"][link], follow_redirects=False).status_code == 404
+    assert client.delete(document["links"]["self"]).status_code == 404
+
+
+def test_ids_differ_and_sort_by_time() -> None:
+    ids = [runs.new_id() for _ in range(1000)]
+    assert len(set(ids)) == 1000
+    assert [id[:12] for id in ids] == sorted(id[:12] for id in ids)
+
+
+def test_a_run_may_be_saved_as_data_or_as_sent(tmp_path: Path, prediction: Prediction) -> None:
+    target = store(tmp_path)
+    data, sent = target.save(paper_scene(), prediction), target.save(orjson.dumps(paper_scene()), prediction)
+    assert target.request(data) == target.request(sent)
