@@ -149,9 +149,9 @@ def _velocity(
 def fit_to_knots(curve: SplineCurve, knots: Floats) -> Floats:
     """Return the control points (len(knots) - 4, 3) [m] of `curve` on clamped cubic `knots` [m], by least squares.
 
-    Exact for a straight cable, for the curve's own knots and for knots that contain them. Elsewhere the projection keeps
-    the shape, not the unit speed: on 9 control points and uniform knots a 1 m cable along one sine
-    wave is strained by 4 % in the middle of a span, on 13 by 0.9 %, on 25 by 0.07 %.
+    Exact for a straight cable, for the curve's own knots and for knots that contain them. Elsewhere the projection
+    keeps the shape and not the unit speed: on 9 control points and uniform knots a 1 m cable along one sine wave is
+    strained by 4 % in the middle of a span, on 13 by 0.9 %, on 25 by 0.07 %.
     """
     if len(curve.control_points) == 4:
         return _blossom(curve, knots)
