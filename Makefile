@@ -1,0 +1,71 @@
+# The whole project in two commands: make run, make test. Needs Python 3.11 or later (PYTHON=python3.12 make run).
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+
+.DEFAULT_GOAL := help
+.PHONY: help run test check format bench lock clean distclean
+
+help:
+	@echo 'make run     install into $(VENV) and serve the page, the 3D scene and the API on http://127.0.0.1:8000'
+	@echo 'make test    run all tests (PYTEST_ARGS="-m '"'not slow'"'" for the quick ones)'
+	@echo 'make check   ruff and mypy'
+	@echo 'make format  format the code'
+	@echo 'make bench   measure the predictor on the reference cases'
+	@echo 'make lock    resolve the locked requirements anew'
+	@echo 'make clean   remove caches and builds; distclean removes $(VENV) too'
+
+run: $(VENV)/.run-installed
+	$(BIN)/dlo serve
+
+test: $(VENV)/.dev-installed
+	@if ! command -v chromium chromium-browser google-chrome >/dev/null 2>&1; then \
+		echo 'No Chromium found: the browser tests will be skipped.'; fi
+	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+check: $(VENV)/.dev-installed
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+format: $(VENV)/.dev-installed
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+# one thread: threads of a linear algebra library only slow problems of this size down
+bench: $(VENV)/.dev-installed
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.paper_case
+
+# of both files for every Python from 3.11 on and every system; without index addresses, which are the user's
+lock: $(VENV)/.dev-installed
+	$(PIP) install --quiet uv
+	$(BIN)/uv pip compile --universal --python-version 3.11 --custom-compile-command 'make lock' \
+		--quiet --upgrade pyproject.toml --output-file requirements.lock
+	$(BIN)/uv pip compile --universal --python-version 3.11 --custom-compile-command 'make lock' \
+		--quiet --upgrade --extra plots --group dev --constraint requirements.lock \
+		pyproject.toml --output-file requirements-dev.lock
+
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "dlo needs Python 3.11 or later: PYTHON=python3.12 make")'
+	$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
+
+# set-up runs again only when the locks or pyproject.toml change
+$(VENV)/.run-installed: requirements.lock pyproject.toml | $(BIN)/python
+	@echo 'Installing into $(VENV); this takes a few minutes the first time.'
+	$(PIP) install --quiet --requirement requirements.lock
+	$(PIP) install --quiet --no-deps --editable .
+	@touch $@
+
+$(VENV)/.dev-installed: requirements-dev.lock pyproject.toml | $(BIN)/python
+	@echo 'Installing into $(VENV); this takes a few minutes the first time.'
+	$(PIP) install --quiet --requirement requirements-dev.lock
+	$(PIP) install --quiet --no-deps --editable .
+	@touch $@
+
+clean:
+	rm -rf build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name $(VENV) -prune -o -type d -name __pycache__ -exec rm -rf {} +
+
+distclean: clean
+	rm -rf $(VENV)
