@@ -20,8 +20,8 @@ run: $(VENV)/.run-installed
 	$(BIN)/dlo serve
 
 test: $(VENV)/.dev-installed
-	@if ! command -v chromium chromium-browser google-chrome >/dev/null 2>&1; then \
-		echo 'No Chromium found: the browser tests will be skipped.'; fi
+	@command -v chromium >/dev/null || command -v chromium-browser >/dev/null || command -v google-chrome >/dev/null || \
+		echo 'No Chromium found: the browser tests will be skipped.'
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
 
 check: $(VENV)/.dev-installed
