@@ -35,11 +35,14 @@ BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY = (
     (204, 121, 167),
     (86, 180, 233),
 )
-LOG_SERIES = {"update": ("log10 update [m]", BLUE), "residual": ("log10 residual", VERMILION)}
+GREY = (150, 150, 150)
+# field of an iteration: entity, name, colour; log10 where the entity is below /convergence
 SERIES = {
-    "energy": ("elastic energy [J]", GREEN),
-    "damping": ("damping", PURPLE),
-    "step_length": ("step length", ORANGE),
+    "update": ("/convergence/update", "log10 update [m]", BLUE),
+    "residual": ("/convergence/residual", "log10 residual", VERMILION),
+    "energy": ("/energy/elastic", "elastic energy [J]", GREEN),
+    "damping": ("/step/damping", "damping", PURPLE),
+    "step_length": ("/step/length", "step length", ORANGE),
 }
 
 
@@ -62,12 +65,11 @@ def _axes() -> "Chunk":
 def _convergence(run: Run) -> "list[Chunk]":
     """Return the scalars of the solve; log10 for norms. Where a value can't be drawn there is no row."""
     chunks = []
-    for field, (name, color) in (LOG_SERIES | SERIES).items():
+    for field, (entity, name, color) in SERIES.items():
         values = np.array([getattr(iteration, field) for iteration in run.iterations], dtype=float)
-        if field in LOG_SERIES:
+        if entity.startswith("/convergence"):
             values = np.log10(values, out=np.full(len(values), np.nan), where=values > 0)
         drawn = np.flatnonzero(np.isfinite(values))
-        entity = f"/convergence/{field}" if field in LOG_SERIES else f"/solve/{field}"
         chunks.append(_styled(entity, name, color))
         if len(drawn):
             chunks.append(_scalars(entity, run, drawn, values[drawn]))
@@ -111,7 +113,7 @@ def _iterates(run: Run) -> "list[Chunk]":
     strips = rr.LineStrips3D.columns(strips=shapes).partition([STRIPS] * len(drawn))
     points = rr.Points3D.columns(positions=np.concatenate(nets)).partition([len(net) for net in nets])
     colors = np.linspace(SKY, BLUE, STRIPS).astype(np.uint8)  # light at the start of the motion, dark at its end
-    thin = _length(run) * 0.002
+    thin = _length(run) * 0.003
     style = rr.LineStrips3D.columns(colors=colors, radii=[thin] * STRIPS).partition([STRIPS])
     dots = rr.Points3D.columns(colors=[ORANGE], radii=[2 * thin])
     return [
@@ -133,7 +135,10 @@ def _motion(run: Run) -> "list[Chunk]":
     times = [rr.TimeColumn("motion", duration=surface["t"])]
     chunk, thick = rr.chunk.Chunk.from_columns, _length(run) * 0.004
     style = rr.LineStrips3D.columns(colors=[BLUE], radii=[thick])
+    trace = positions[np.linspace(0, len(positions) - 1, STRIPS).astype(int)]  # whatever the time, as a backdrop
+    backdrop = rr.LineStrips3D.columns(strips=trace, colors=[GREY] * STRIPS, radii=[0.3 * thick] * STRIPS)
     chunks = [
+        chunk("/motion/trace", indexes=[], columns=backdrop.partition([STRIPS])),
         chunk("/motion/cable", indexes=times, columns=rr.LineStrips3D.columns(strips=positions)),
         chunk("/motion/cable", indexes=[], columns=style),
     ]
@@ -233,7 +238,10 @@ def layout() -> bytes:
             ),
             rrb.Vertical(
                 rrb.TimeSeriesView(origin="/convergence", name="Update and residual, log10"),
-                rrb.TimeSeriesView(origin="/solve", name="Energy, damping, step length"),
+                rrb.Tabs(
+                    rrb.TimeSeriesView(origin="/energy", name="Energy"),
+                    rrb.TimeSeriesView(origin="/step", name="Damping and step length"),
+                ),
                 rrb.TextDocumentView(origin="/report", name="Report"),
                 row_shares=[3, 2, 3],
             ),

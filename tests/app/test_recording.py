@@ -12,6 +12,13 @@ pytest.importorskip("rerun")
 import rerun as rr
 
 LOGS = ("update", "residual")
+ENTITIES = {
+    "update": "/convergence/update",
+    "residual": "/convergence/residual",
+    "energy": "/energy/elastic",
+    "damping": "/step/damping",
+    "step_length": "/step/length",
+}
 
 
 @pytest.fixture(scope="module")
@@ -42,10 +49,9 @@ def rows(chunks: list[Any], entity: str, component: str, timeline: str) -> tuple
     return times, values
 
 
-@pytest.mark.parametrize("field", ["update", "residual", "energy", "damping", "step_length"])
+@pytest.mark.parametrize("field", ENTITIES)
 def test_scalars_are_those_of_the_iterations(chunks: list[Any], answer: dict[str, Any], field: str) -> None:
-    entity = f"/convergence/{field}" if field in LOGS else f"/solve/{field}"
-    numbers, values = rows(chunks, entity, "scalars", "iteration")
+    numbers, values = rows(chunks, ENTITIES[field], "scalars", "iteration")
     shown = {i["number"]: i[field] for i in answer["iterations"] if i[field] is not None}
     if field in LOGS:  # a zero has no logarithm and no row
         shown = {number: value for number, value in shown.items() if value > 0}
@@ -56,7 +62,7 @@ def test_scalars_are_those_of_the_iterations(chunks: list[Any], answer: dict[str
 
 
 def test_the_solver_time_is_that_of_the_iterations(chunks: list[Any], answer: dict[str, Any]) -> None:
-    times, _ = rows(chunks, "/solve/energy", "scalars", "solver_time")
+    times, _ = rows(chunks, "/energy/elastic", "scalars", "solver_time")
     assert times == pytest.approx([i["wall_time"] for i in answer["iterations"]], abs=2e-9)  # whole nanoseconds
 
 
