@@ -10,6 +10,7 @@ from fastapi.testclient import TestClient
 from app.main import create_app
 from app.settings import Settings
 
+ROOT = Path(__file__).parent.parent.parent
 SCENES = Path(__file__).parent / "scenes"
 
 

@@ -12,7 +12,7 @@ from fastapi.testclient import TestClient
 
 from app.schemas import EXAMPLES, PredictionRequest, PredictionResponse, to_scene
 from dlocore import predict
-from tests.app.conftest import contract_scene, paper_scene, put
+from tests.app.conftest import ROOT, contract_scene, paper_scene, put
 
 SAME = {"rtol": 0.0, "atol": 1e-12}  # m: the same compiled code on the same numbers, but for the order of additions
 
@@ -41,7 +41,7 @@ def test_the_command_line_writes_the_surface_that_http_answers_with(answer: dict
     scene, npz, full = tmp_path / "scene.json", tmp_path / "out.npz", tmp_path / "out.json"
     scene.write_text(json.dumps(paper_scene()))
     command = [sys.executable, "-m", "app.cli", "predict", str(scene), "-o", str(npz), "--json", str(full)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=240)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240, cwd=ROOT)
     assert done.returncode == 0, done.stderr
     written, document = arrays(npz.read_bytes()), json.loads(full.read_text())
     for name in ("u", "t", "positions", "twist"):

@@ -1,11 +1,10 @@
 """What is installed is what is in the checkout."""
 
 import tomllib
-from pathlib import Path
 
 from setuptools import find_packages
 
-ROOT = Path(__file__).parent.parent.parent
+from tests.app.conftest import ROOT
 
 
 def test_every_package_is_installed_and_the_pages_with_them() -> None:

@@ -23,7 +23,7 @@ from app.problems import ProblemError
 from app.schemas import PredictionRequest, to_scene
 from app.settings import Settings
 from app.worker import Worker
-from tests.app.conftest import paper_scene, start
+from tests.app.conftest import ROOT, paper_scene, start
 from tests.app.test_bad_requests import the_problem
 
 # the finest grid there is: some tenths of a second
@@ -193,6 +193,7 @@ def test_serve_answers_on_its_port_and_stops_when_told(tmp_path: Path) -> None:
     process = subprocess.Popen(
         [sys.executable, "-m", "app.cli", "serve", "--port", str(port)],
         env={**os.environ, "DLO_DATA_DIR": str(tmp_path), "PYTHONUNBUFFERED": "1"},
+        cwd=ROOT,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
