@@ -4,11 +4,13 @@
 finished edit is kept on the panel while the last good prediction stays in the picture.
 """
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from dlocore import PRESETS, Cable, Environment, Grasp, Move, Quality, Scene, Still, Straight, Table
 
+REACH_SHARE = 0.9  # of the cable between two grippers, when the target is brought near
 GRAVITY = (0.0, 0.0, -9.81)
 PROFILE: Literal["minimum_jerk"] = "minimum_jerk"
 QualityMode = Literal["automatic", "target error", "grid"]
@@ -104,6 +106,15 @@ class Draft:
         """Hold the end u = L still by a second gripper, or let it go."""
         return replace(self, grasps=self.grasps[:1] + ((GraspDraft(u=self.cable.length),) if held else ()))
 
+    def with_target_in_reach(self) -> "Draft":
+        """Bring the target near enough to a held end that the cable between them can follow."""
+        if not self.end_is_held:
+            return self
+        end, (x, y, _) = self.grasps[1].u, self.target
+        reach = REACH_SHARE * (end - self.grasps[0].u)
+        shrink = min(1.0, reach / max(math.hypot(x - end, y), 1e-9))
+        return self.with_target(end + shrink * (x - end), shrink * y)
+
     @property
     def end_is_held(self) -> bool:
         """Whether a second gripper holds the end."""
@@ -165,4 +176,5 @@ def start_draft() -> Draft:
     return Draft(
         cable=CableDraft.preset("paper"),
         grasps=(GraspDraft(u=0.25, displacement=(0.0, 0.5, 0.0)),),
+        quality=QualityDraft(mode="grid", n_u=9, n_t=13),
     )

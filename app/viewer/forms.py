@@ -51,7 +51,7 @@ class GraspForm(Form):
         self._bind(self._u, lambda d: self._regrasped(d, self._u.value))
         self._bind(self._target, lambda d: d.with_target(*self._target.value))
         self._bind(self._duration, lambda d: replace(d, duration=self._duration.value))
-        self._bind(self._held, lambda d: d.with_held_end(self._held.value))
+        self._bind(self._held, lambda d: d.with_held_end(self._held.value).with_target_in_reach())
 
     @staticmethod
     def _regrasped(draft: Draft, u: float) -> Draft:

@@ -6,6 +6,7 @@ are refused: viser itself checks none.
 
 import asyncio
 import contextlib
+import re
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,6 +47,8 @@ GOING_AWAY = 1001
 
 
 KEY_HEADER = "X-Scene-Key"
+ADDRESS_HEADER = "X-Scene-Address"
+_HOST = re.compile(r"[A-Za-z0-9.\-_]+(:[0-9]{1,5})?|\[[0-9a-fA-F:.]+\](:[0-9]{1,5})?")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +75,13 @@ def origin_is_allowed(origin: str | None, host: str, allowed: Collection[str]) -
     if origin is None:
         return True
     return origin in allowed or (bool(host) and urlsplit(origin).netloc == host)
+
+
+def address(socket: WebSocket) -> str:
+    """Return the address at which the client sees the service, e.g. ``http://127.0.0.1:8000``; empty if it is odd."""
+    host = socket.headers.get("host", "")
+    scheme = "https" if socket.url.scheme == "wss" else "http"
+    return f"{scheme}://{host}" if _HOST.fullmatch(host) else ""
 
 
 def add_gateway(app: FastAPI) -> None:
@@ -109,7 +119,7 @@ async def _pass_on(socket: WebSocket, upstream: Upstream) -> None:
         inner = await connect(
             f"ws://127.0.0.1:{upstream.port}",
             subprotocols=protocols or None,
-            additional_headers={KEY_HEADER: upstream.key},
+            additional_headers={KEY_HEADER: upstream.key, ADDRESS_HEADER: address(socket)},
             compression=None,
             max_size=None,
             proxy=None,

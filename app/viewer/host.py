@@ -4,14 +4,26 @@ import asyncio
 import contextlib
 import hmac
 import secrets
-from collections.abc import AsyncIterator, Collection
+from collections.abc import AsyncIterator, Collection, Iterator
 
+import rich
 import viser
 from fastapi import FastAPI
 from viser import ClientHandle, _messages
 
-from app.viewer.gateway import KEY_HEADER, Upstream
+from app.viewer.gateway import ADDRESS_HEADER, KEY_HEADER, Upstream
 from app.viewer.session import Runs, Session
+
+
+@contextlib.contextmanager
+def _quiet_console() -> Iterator[None]:
+    """Keep viser from announcing its inner port, which is not for people to open."""
+    console = rich.get_console()
+    before, console.quiet = console.quiet, True
+    try:
+        yield
+    finally:
+        console.quiet = before
 
 
 class SceneHost:
@@ -25,7 +37,8 @@ class SceneHost:
         self._runs = runs
         self.key = secrets.token_urlsafe(32)
         self.sessions: dict[int, Session] = {}
-        self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        with _quiet_console():
+            self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         # any client could otherwise ask viser to publish itself on the internet
         for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
             self._server._websock_server.unregister_handler(message)
@@ -42,18 +55,19 @@ class SceneHost:
         for session in list(self.sessions.values()):
             session.close()
         self.sessions.clear()
-        self._server.stop()
+        with _quiet_console():
+            self._server.stop()
 
     async def _open(self, client: ClientHandle) -> None:
         connection = self._server._websock_server._live_connections.get(client.client_id)
         if connection is None:
             return
         request = connection.request
-        given = "" if request is None else request.headers.get(KEY_HEADER, "")
-        if not hmac.compare_digest(given.encode(), self.key.encode()):  # not through the gateway, which checks origins
-            await connection.close()
+        headers = {} if request is None else request.headers
+        if not hmac.compare_digest(headers.get(KEY_HEADER, "").encode(), self.key.encode()):
+            await connection.close()  # not through the gateway, which checks origins
             return
-        self.sessions[client.client_id] = Session(client, self._runs)
+        self.sessions[client.client_id] = Session(client, self._runs, headers.get(ADDRESS_HEADER, ""))
 
     async def _close(self, client: ClientHandle) -> None:
         session = self.sessions.pop(client.client_id, None)

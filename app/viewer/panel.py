@@ -1,6 +1,6 @@
 """The control panel: what a person sets, and what the last solve was worth."""
 
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 import numpy as np
@@ -26,10 +26,13 @@ class Panel:
     Args:
         client: whose panel it is.
         draft: the scene to start with.
+        playback: the clock of the animation.
+        address: of the service, for the shell line.
         on_edit: called with the edited draft.
         on_look: called when the picture's options change.
         on_seek: called when the timeline was moved or play was pressed.
         on_keep: called when the run is to be kept.
+        on_download: called when the scene is wanted as a file.
     """
 
     def __init__(
@@ -37,16 +40,19 @@ class Panel:
         client: ClientHandle,
         draft: Draft,
         playback: Playback,
+        address: str,
         *,
         on_edit: Callable[[Draft], None],
         on_look: Callable[[Look], None],
         on_seek: Callable[[], None],
-        on_keep: Callable[[], Any],
+        on_keep: Callable[[], Awaitable[None]],
+        on_download: Callable[[], None],
     ) -> None:
         self._gui = client.gui
         self._playback = playback
         self._on_seek = on_seek
         self._on_look = on_look
+        self._address = address
         self._status = self._gui.add_html(report.waiting_card())
         self._add_timeline()
         self._legend = self._gui.add_html("")
@@ -60,7 +66,7 @@ class Panel:
         with tabs.add_tab("Result", viser.Icon.CHART_LINE):
             self._add_result()
         with tabs.add_tab("Share", viser.Icon.SHARE):
-            self._add_share(on_keep)
+            self._add_share(on_keep, on_download)
         self._forms = (self._grasp, self._cable, self._quality)
         self.take_draft(draft)
 
@@ -146,9 +152,10 @@ class Panel:
         with self._gui.add_folder("Effects"):
             self._effects = self._gui.add_html("")
 
-    def _add_share(self, on_keep: Callable[[], Any]) -> None:
+    def _add_share(self, on_keep: Callable[[], Awaitable[None]], on_download: Callable[[], None]) -> None:
         self._keep = self._gui.add_button("Keep this run", icon=viser.Icon.BOOKMARK, disabled=True)
         self._links = self._gui.add_html("")
+        download = self._gui.add_button("Download scene.json", icon=viser.Icon.DOWNLOAD, color="gray")
         with self._gui.add_folder("The same from a shell"):
             self._curl = self._gui.add_markdown("")
         with self._gui.add_folder("Scene as JSON", expand_by_default=False):
@@ -157,6 +164,10 @@ class Panel:
         @self._keep.on_click
         async def _kept(_event: GuiEvent[Any]) -> None:
             await on_keep()
+
+        @download.on_click
+        async def _download(_event: GuiEvent[Any]) -> None:
+            on_download()
 
     def take_draft(self, draft: Draft) -> None:
         """Show the numbers of an edited draft in all controls."""
@@ -179,7 +190,7 @@ class Panel:
         self._plot.data = report.convergence(prediction)
         document = draft.json()
         self._json.content = report.json_block(document)
-        self._curl.content = report.curl_block(document)
+        self._curl.content = report.curl_block(self._address, document)
         self._keep.disabled = False
 
     def take_problem(self, problem: str) -> None:

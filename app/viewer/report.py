@@ -130,10 +130,10 @@ def json_block(document: dict[str, Any]) -> str:
     return f"```json\n{json.dumps(document, indent=1)}\n```"
 
 
-def curl_block(document: dict[str, Any]) -> str:
-    """Return the shell line that asks the service for the prediction of a scene, as a Markdown code block."""
+def curl_block(address: str, document: dict[str, Any]) -> str:
+    """Return the shell line that asks the service at `address` for the prediction, as a Markdown code block."""
     body = json.dumps(document, separators=(",", ":"))
-    return f"```sh\ncurl -s \"$DLO_URL/v1/predictions\" -H 'Content-Type: application/json' -d '{body}'\n```"
+    return f"```sh\ncurl -s {address}/v1/predictions -H 'Content-Type: application/json' -d '{body}'\n```"
 
 
 def run_links(run_id: str) -> str:

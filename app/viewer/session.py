@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import json
 import logging
 from typing import Any, Protocol
 
@@ -33,9 +34,15 @@ class Runs(Protocol):
 
 
 class Session:
-    """The state of one client. Everything but the solve runs on the viewer's event loop, so nothing is locked."""
+    """The state of one client. Everything but the solve runs on the viewer's event loop, so nothing is locked.
 
-    def __init__(self, client: ClientHandle, runs: Runs) -> None:
+    Args:
+        client: the client.
+        runs: where runs are stored.
+        address: at which the client sees the service.
+    """
+
+    def __init__(self, client: ClientHandle, runs: Runs, address: str) -> None:
         self._client = client
         self._runs = runs
         self._loop = asyncio.get_running_loop()
@@ -51,10 +58,12 @@ class Session:
             client,
             self._draft,
             self._playback,
+            address,
             on_edit=self.edit,
             on_look=self._restyle,
             on_seek=self._draw_time,
             on_keep=self._keep,
+            on_download=self._download,
         )
         self._solver = SolverThread(self._deliver, f"viewer-solver-{client.client_id}")
         self._solver.ask(self._draft, preview=False)
@@ -187,6 +196,11 @@ class Session:
             if self._playback.advance(now - before):
                 self._draw_time()
             before = now
+
+    def _download(self) -> None:
+        """Send the scene to the browser as the file that the API and the command line read."""
+        content = json.dumps(self._draft.json(), indent=2).encode()
+        self._client.send_file_download("scene.json", content, save_immediately=True)
 
     async def _keep(self) -> None:
         """Store the last refined prediction with its scene and link to it."""

@@ -11,7 +11,7 @@ from app.viewer.draft import Draft
 from dlocore import Cancelled, DloError, Prediction, Quality
 
 LONGEST_SOLVE = 20.0  # s, of a refined solve
-PREVIEW = Quality(time_budget=0.015)  # while the hand moves
+PREVIEW = Quality(time_budget=0.01)  # while the hand moves
 _log = logging.getLogger(__name__)
 
 

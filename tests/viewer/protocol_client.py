@@ -1,0 +1,154 @@
+"""A viewer client without a browser: the protocol of the scene's websocket, spoken by hand."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import msgspec.msgpack
+import numpy as np
+import viser
+import zstandard
+from websockets.sync.client import ClientConnection, connect
+
+SUBPROTOCOL = f"viser-v{viser.__version__}"
+
+
+def decode(frame: bytes) -> list[dict[str, Any]]:
+    """Return the messages of a frame; arrays in them as NumPy arrays."""
+    packed = int.from_bytes(frame[8:16], "little")
+    document = msgspec.msgpack.decode(zstandard.ZstdDecompressor().decompress(frame[16 : 16 + packed]))
+    buffers, offset = [], 16 + packed
+    for size in document["binaryBufferLengths"]:
+        offset += -offset % 8
+        buffers.append(frame[offset : offset + size])
+        offset += size
+
+    def filled(value: Any) -> Any:
+        if isinstance(value, dict):
+            if "__binary_index" in value:
+                return np.frombuffer(buffers[value["__binary_index"]], dtype=value["dtype"])
+            return {key: filled(part) for key, part in value.items()}
+        return [filled(part) for part in value] if isinstance(value, list) else value
+
+    return [filled(message) for message in document["messages"]]
+
+
+class SceneClient:
+    """Connects, and keeps what the scene's nodes and controls were last told to be."""
+
+    def __init__(self, url: str, **options: Any) -> None:
+        # frames that nobody reads hold up the closing handshake: don't wait for it
+        self.socket: ClientConnection = connect(
+            url, subprotocols=[SUBPROTOCOL], max_size=None, proxy=None, close_timeout=0.3, **options
+        )
+        self.nodes: dict[str, dict[str, Any]] = {}
+        self.positions: dict[str, list[float]] = {}
+        self.visible: dict[str, bool] = {}
+        self.owners: dict[str, str] = {}
+        self.controls: dict[str, dict[str, Any]] = {}
+        self.downloads: dict[str, bytes] = {}
+        self._transfers: dict[str, str] = {}
+        self.frames = 0
+        self.send(
+            type="ViewerCameraMessage",
+            wxyz=[1.0, 0.0, 0.0, 0.0],
+            position=[0.0, -1.0, 1.0],
+            fov=0.8,
+            near=0.01,
+            far=100.0,
+            image_height=600,
+            image_width=900,
+            look_at=[0.0, 0.0, 0.0],
+            up_direction=[0.0, 0.0, 1.0],
+        )
+
+    def __enter__(self) -> "SceneClient":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.socket.close()
+
+    def send(self, **message: Any) -> None:
+        self.socket.send(msgspec.msgpack.encode(message))
+
+    def wait_for(self, condition: Callable[[], Any], timeout: float = 20.0) -> Any:
+        """Take in messages until `condition` holds; return its value."""
+        give_up = time.monotonic() + timeout
+        while not (value := condition()):
+            remaining = give_up - time.monotonic()
+            assert remaining > 0, "the scene did not get there in time"
+            try:
+                self._take(self.socket.recv(timeout=min(remaining, 1.0)))
+            except TimeoutError:
+                continue
+        return value
+
+    def listen(self, seconds: float) -> None:
+        """Take in messages for a while."""
+        give_up = time.monotonic() + seconds
+        while (remaining := give_up - time.monotonic()) > 0:
+            try:
+                self._take(self.socket.recv(timeout=remaining))
+            except TimeoutError:
+                return
+
+    def _take(self, frame: bytes | str) -> None:
+        assert isinstance(frame, bytes)
+        self.frames += 1
+        for message in decode(frame):
+            kind, name = message["type"], message.get("name", "")
+            if kind == "SceneNodeUpdateMessage":
+                self.nodes.setdefault(name, {}).update(message["updates"])
+            elif kind == "GuiUpdateMessage":
+                self.controls[message["uuid"]].update(message["updates"])
+            elif kind == "SetPositionMessage":
+                self.positions[name] = message["position"]
+            elif kind == "SetSceneNodeVisibilityMessage":
+                self.visible[name] = message["visible"]
+            elif kind == "FileTransferStartDownload":
+                self._transfers[message["transfer_uuid"]] = message["filename"]
+            elif kind == "FileTransferPart":
+                self.downloads[self._transfers[message["transfer_uuid"]]] = bytes(message["content"])
+            elif kind.startswith("Gui") and "props" in message:
+                value = {"value": message["value"]} if "value" in message else {}
+                self.controls[message["uuid"]] = {"kind": kind, **message["props"], **value}
+            elif "props" in message and name:
+                self.nodes[name] = dict(message["props"])
+                self.owners[name] = message.get("owner", "")
+
+    def control(self, label: str) -> tuple[str, dict[str, Any]]:
+        """Return the id and the state of the control with this label."""
+        return next((uuid, state) for uuid, state in self.controls.items() if state.get("label") == label)
+
+    def set(self, label: str, value: Any) -> None:
+        """Set a control, as a person would."""
+        self.send(type="GuiUpdateMessage", uuid=self.control(label)[0], updates={"value": value})
+
+    def press(self, label: str) -> None:
+        """Press a button."""
+        self.set(label, True)
+
+    @property
+    def card(self) -> str:
+        """The status card's HTML."""
+        return next((c["content"] for c in self.controls.values() if "data-status" in c.get("content", "")), "")
+
+    def html(self, mark: str) -> str:
+        """The HTML of the element that contains `mark`; empty if there is none."""
+        return next((c["content"] for c in self.controls.values() if mark in c.get("content", "")), "")
+
+    def drag(self, phase: str, x: float = 0.0, y: float = 0.0) -> None:
+        """Start, move or end a drag of the target."""
+        kind = {"start": "DragStart", "update": "Update", "end": "DragEnd"}[phase]
+        pose = {"wxyz": [1.0, 0.0, 0.0, 0.0], "position": [x, y, 0.0]} if phase == "update" else {}
+        self.send(type=f"TransformControls{kind}Message", name="/target", owner=self.owners["/target"], **pose)
+
+    @property
+    def final_shape(self) -> np.ndarray:
+        """The last row of the drawn surface; (columns, 3) [m]."""
+        return self.nodes["/surface/7"]["vertices"].reshape(-1, 49, 3)[-1]
+
+    @property
+    def cable(self) -> np.ndarray:
+        """Centres of the drawn cable's segments; (segments, 3) [m]."""
+        return self.nodes["/cable"]["batched_positions"].reshape(-1, 3)

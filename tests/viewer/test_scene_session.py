@@ -1,0 +1,264 @@
+import json
+import threading
+import time
+
+import httpx
+import numpy as np
+import pytest
+from protocol_client import SUBPROTOCOL, SceneClient
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+from app.schemas import PredictionRequest, to_scene
+from app.viewer.draft import start_draft
+from dlocore import predict
+
+
+def connected(service, **options) -> SceneClient:
+    client = SceneClient(service.socket, **options)
+    client.wait_for(lambda: 'data-status="converged"' in client.card and "/cable" in client.nodes)
+    return client
+
+
+def solver_threads() -> list[str]:
+    return [thread.name for thread in threading.enumerate() if thread.name.startswith("viewer-solver")]
+
+
+def test_a_new_client_sees_the_papers_case_predicted(service):
+    with connected(service) as client:
+        expected = predict(start_draft().scene()).surface
+        final = client.final_shape
+        points = expected.positions(np.linspace(0, 1, 49), [1.6])[0]
+        assert np.abs(final[:, :2] - points[:, :2]).max() < 1e-6  # single precision on the wire
+        assert "spacetime, 9 × 13 control points" in client.card
+
+
+def test_dragging_the_target_changes_the_prediction(service):
+    with connected(service) as client:
+        client.drag("start")
+        for k in range(10):
+            client.drag("update", 0.25 - 0.01 * k, 0.5 - 0.02 * k)
+            client.listen(0.05)
+        client.drag("end")
+        draft = start_draft().with_target(0.16, 0.32)
+        points = predict(draft.scene()).surface.positions(np.linspace(0, 1, 49), [1.6])[0]
+        client.wait_for(lambda: np.abs(client.final_shape[:, :2] - points[:, :2]).max() < 1e-6)
+        assert 'data-status="converged"' in client.card
+        assert "Preview" not in client.card
+
+
+def test_previews_follow_the_hand_before_it_stops(service):
+    with connected(service) as client:
+        client.drag("start")
+        client.drag("update", 0.30, 0.40)
+        client.wait_for(lambda: "Preview" in client.card)
+        # the gripped point lies at the target at the end of every prediction
+        gripped = client.final_shape[12]
+        assert np.hypot(gripped[0] - 0.30, gripped[1] - 0.40) < 2e-3
+        client.drag("end")
+
+
+def test_the_newest_target_wins_over_a_flood_of_older_ones(service):
+    with connected(service) as client:
+        client.drag("start")
+        for k in range(400):
+            client.drag("update", 0.25, 0.1 + 0.001 * k)
+        client.drag("update", 0.25, -0.3)
+        began = time.monotonic()
+        client.wait_for(lambda: abs(client.final_shape[12, 1] + 0.3) < 2e-3)
+        # 400 queued solves of several ms each would take longer
+        assert time.monotonic() - began < 2.0
+        client.drag("end")
+
+
+def test_two_clients_have_their_own_scenes(service):
+    with connected(service) as one, connected(service) as other:
+        before = other.final_shape.copy()
+        one.drag("start")
+        one.drag("update", 0.4, 0.2)
+        one.drag("end")
+        one.wait_for(lambda: abs(one.final_shape[12, 1] - 0.2) < 2e-3)
+        other.listen(0.5)
+        assert np.array_equal(other.final_shape, before)
+
+
+def test_a_closed_tab_frees_its_solver_thread(service):
+    give_up = time.monotonic() + 5
+    while solver_threads():
+        assert time.monotonic() < give_up
+        time.sleep(0.02)
+    with connected(service), connected(service):
+        assert len(solver_threads()) == 2
+    give_up = time.monotonic() + 5
+    while solver_threads():
+        assert time.monotonic() < give_up, "a solver thread outlives its tab"
+        time.sleep(0.02)
+
+
+def test_an_impossible_target_is_said_and_the_last_good_prediction_stays(service, caplog):
+    with connected(service) as client:
+        client.set("Ask for", "automatic")
+        client.set("Hold the far end", True)
+        client.wait_for(lambda: np.abs(client.final_shape[-1] - (1, 0, client.final_shape[-1, 2])).max() < 1e-6)
+        client.wait_for(lambda: 'data-status="converged"' in client.card)
+        good = client.final_shape.copy()
+        client.drag("start")
+        client.drag("update", 0.25, 0.9)
+        client.wait_for(lambda: 'data-status="impossible"' in client.card)
+        assert "farther apart than the cable between them" in client.card
+        client.wait_for(lambda: client.visible.get("/warning"))
+        assert "Not possible" in client.nodes["/warning"]["text"]
+        assert np.array_equal(client.final_shape, good)
+        client.drag("update", 0.5, 0.2)
+        client.drag("end")
+        client.wait_for(lambda: 'data-status="converged"' in client.card and "Preview" not in client.card)
+        assert client.visible["/warning"] is False
+    assert not [record for record in caplog.records if record.levelname == "ERROR"]
+
+
+@pytest.mark.parametrize(
+    ("label", "value", "path", "expected"),
+    [
+        ("Grasp u [m]", 0.5, ("primitives", 0, "u"), 0.5),
+        ("Target x, y [m]", [0.3, 0.4], ("primitives", 0, "path", "displacement"), [0.05, 0.4, 0.0]),
+        ("Duration [s]", 2.0, ("primitives", 0, "path", "duration"), 2.0),
+        ("Hold the far end", True, ("primitives", 1, "path", "kind"), "still"),
+        ("Preset", "black-wire", ("cable", "linear_density"), 0.0272),
+        ("Length [m]", 1.4, ("cable", "length"), 1.4),
+        ("Diameter [mm]", 8.0, ("cable", "diameter"), 0.008),
+        ("Density [g/m]", 70.0, ("cable", "linear_density"), 0.07),
+        ("EI [10⁻³ N m²]", 3.0, ("cable", "bending_stiffness"), 0.003),
+        ("Drag [N s/m²]", 0.2, ("environment", "drag"), 0.2),
+        ("Ask for", "automatic", ("quality",), "auto"),
+        ("Points along n_u", 11, ("quality", "n_u"), 11),
+        ("Points in time n_t", 17, ("quality", "n_t"), 17),
+    ],
+)
+def test_every_scene_control_changes_the_scene(service, label, value, path, expected):
+    with connected(service) as client:
+        client.set(label, value)
+        client.listen(0.1)
+        client.wait_for(lambda: "control points" in client.card and "Preview" not in client.card)
+        client.press("Download scene.json")
+        client.wait_for(lambda: "scene.json" in client.downloads)
+        node = json.loads(client.downloads["scene.json"])
+        to_scene(PredictionRequest.model_validate(node), lambda id: None)
+        for key in path:
+            node = node[key]
+        assert node == pytest.approx(expected) if not isinstance(expected, str) else node == expected
+
+
+def test_a_target_error_can_be_asked_for(service):
+    with connected(service) as client:
+        client.set("Ask for", "target error")
+        client.wait_for(lambda: client.control("Target error [mm]")[1]["visible"])
+        client.set("Target error [mm]", 0.5)
+        client.wait_for(lambda: "march" in client.card and "Preview" not in client.card)
+        client.press("Download scene.json")
+        client.wait_for(lambda: "scene.json" in client.downloads)
+        assert json.loads(client.downloads["scene.json"])["quality"] == {"target_error": pytest.approx(0.0005)}
+
+
+def test_the_timeline_moves_the_cable(service):
+    with connected(service) as client:
+        client.press("Pause")
+        client.wait_for(lambda: any(c.get("label") == "Play" for c in client.controls.values()))
+        surface = predict(start_draft().scene()).surface
+        u = np.linspace(0, 1, 121)
+        for t in (0.4, 1.6):
+            client.set("Time [s]", t)
+            points = surface.positions(u, [t])[0]
+            middle = 0.5 * (points[1:] + points[:-1])
+            client.wait_for(lambda middle=middle: np.abs(client.cable - middle).max() < 1e-6)
+
+
+def test_playback_moves_the_cable_at_30_frames_a_second_or_more(service):
+    with connected(service) as client:
+        client.set("Speed", "¼×")
+        client.listen(0.3)
+        seen, shapes = time.monotonic(), set()
+        while time.monotonic() - seen < 1.0:
+            client.listen(0.004)
+            shapes.add(client.cable.tobytes())
+        assert len(shapes) >= 30
+
+
+@pytest.mark.parametrize("colour", ["time", "curvature", "speed", "axial strain"])
+def test_the_cable_can_be_coloured_by_each_quantity(service, colour):
+    with connected(service) as client:
+        client.set("Colour", colour)
+        client.wait_for(lambda: f"<span>{colour} [" in client.html("linear-gradient"))
+        client.press("Pause")
+        client.set("Time [s]", 1.2)
+        client.listen(0.3)
+        colours = client.nodes["/cable"]["batched_colors"].reshape(-1, 3)
+        assert (len(np.unique(colours, axis=0)) > 5) == (colour != "time")  # all points of a shape share one time
+
+
+def test_the_surface_can_be_raised_and_hidden(service):
+    with connected(service) as client:
+        client.set("Surface", "raised with time")
+        client.wait_for(lambda: client.final_shape[:, 2].min() > 0.4)
+        client.set("Surface", "hidden")
+        client.wait_for(lambda: client.visible.get("/surface/7") is False)
+        client.set("Shapes at intervals", False)
+        client.wait_for(lambda: client.visible.get("/ghosts") is False)
+
+
+def test_a_kept_run_is_stored_with_its_scene(service):
+    with connected(service) as client:
+        client.press("Keep this run")
+        html = client.wait_for(lambda: client.html("data-run"))
+        run_id = html.split('data-run="')[1].split('"')[0]
+        base = f"{service.address}/v1/predictions/{run_id}"
+        stored, scene = httpx.get(base).json(), httpx.get(f"{base}/scene.json").json()
+        assert scene == start_draft().json()
+        again = httpx.post(f"{service.address}/v1/predictions", json=scene).json()
+        difference = np.subtract(stored["surface"]["positions"], again["surface"]["positions"])
+        assert np.abs(difference).max() < 1e-9
+        assert httpx.get(f"{base}/recording.rrd").content[:4] == b"RRF2"
+        curl = next(c["_markdown"] for c in client.controls.values() if "curl -s" in c.get("_markdown", ""))
+        assert f"curl -s {service.address}/v1/predictions " in curl
+
+
+def test_a_foreign_origin_is_refused(service):
+    with pytest.raises(InvalidStatus) as refusal:
+        SceneClient(service.socket, origin="https://evil.example")
+    assert refusal.value.response.status_code == 403
+
+
+@pytest.mark.parametrize("origin", ["same", "https://friend.example"])
+def test_its_own_and_an_allowed_origin_are_let_in(service, origin):
+    connected(service, origin=service.address if origin == "same" else origin).socket.close()
+
+
+def test_the_inner_port_opens_no_scene(service):
+    port = service.app.state.viewer_upstream.port
+    with pytest.raises((ConnectionClosed, AssertionError)), SceneClient(f"ws://127.0.0.1:{port}") as client:
+        client.wait_for(lambda: "/cable" in client.nodes, timeout=5)
+    assert "/cable" not in client.nodes
+
+
+def test_nobody_can_make_the_scene_publish_itself(service):
+    with connected(service) as client:
+        client.send(type="ShareUrlRequest")
+        client.listen(0.3)
+        assert service.app.state.viewer_upstream is not None
+        server = service.app.state.viewer_upstream
+        assert server.port
+        client.drag("start")  # the connection still works
+        client.drag("end")
+
+
+def test_the_page_allows_nothing_from_other_hosts(service):
+    page = httpx.get(f"{service.address}/scene/")
+    policy = page.headers["content-security-policy"]
+    assert "default-src 'self'" in policy
+    assert "http" not in policy
+    assert "frame-ancestors 'self'" in policy
+
+
+def test_a_wrong_protocol_version_ends_the_connection(service):
+    with connect(service.socket, subprotocols=["viser-v0.0.1"], proxy=None) as socket, pytest.raises(ConnectionClosed):
+        socket.recv(timeout=5)
+    assert SUBPROTOCOL.startswith("viser-v")
