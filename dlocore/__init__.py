@@ -10,7 +10,8 @@ from dlocore.scene import ControlPoints, Environment, Grasp, Load, Points, Quali
 from dlocore.spline import SplineSurface
 
 if TYPE_CHECKING:
-    from dlocore.front import equilibrium, predict, warm_up
+    from dlocore.front import predict, warm_up
+    from dlocore.statics import Equilibrium, equilibrium
 
 __all__ = [
     "PRESETS",
@@ -21,6 +22,7 @@ __all__ = [
     "DloError",
     "EffectReport",
     "Environment",
+    "Equilibrium",
     "Grasp",
     "GraspReaction",
     "Iteration",
@@ -44,10 +46,9 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import the solver on first use: its compiler takes longer to import than the rest of the package together."""
-    if name in ("predict", "equilibrium", "warm_up"):
-        import importlib
+    homes = {"predict": "front", "warm_up": "front", "equilibrium": "statics", "Equilibrium": "statics"}
+    if name not in homes:
+        raise AttributeError(name)
+    import importlib
 
-        solver = importlib.import_module("dlocore.front")
-
-        return getattr(solver, name)
-    raise AttributeError(name)
+    return getattr(importlib.import_module(f"dlocore.{homes[name]}"), name)

@@ -11,9 +11,8 @@ from dlocore.kernels.banded import Elimination
 from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, Tables, basis_rows, build_tables, graded_knots
 from dlocore.kernels.relax import relax
 from dlocore.problem import Problem
-from dlocore.scene import Grasp
+from dlocore.scene import Grasp, Points
 from dlocore.shape import fit_to_knots, start_curve, velocity_to_knots
-from dlocore.scene import Points
 
 Floats = NDArray[np.float64]
 
@@ -55,7 +54,7 @@ class Grid:
     def at(self, q: Floats, u: float, derivative: int = 0) -> Floats:
         """Return the value or derivative at `u` [m] of control points q (..., n_u, nc)."""
         first, b = self.rows(u, derivative)
-        return np.einsum("i,...id->...d", b, q[..., first : first + 4, :])
+        return b @ q[..., first : first + 4, :]
 
 
 def smallest_n_u(problem: Problem) -> int:
@@ -131,7 +130,7 @@ def plane_curvature_of(tables: Tables, q: Floats) -> Floats:
 
 def _memory(problem: Problem, grid: Grid) -> Floats:
     rest = problem.scene.cable.rest_shape
-    if isinstance(rest, str) and rest == "straight" or problem.plane.dimensions == 3:
+    if (isinstance(rest, str) and rest == "straight") or problem.plane.dimensions == 3:
         return grid.memory
     if isinstance(rest, str):
         return plane_curvature_of(grid.tables, grid.start)
@@ -177,7 +176,7 @@ class Held:
 
     def multipliers(self, reactions: Floats, nc: int) -> Floats:
         """Return the multipliers (k, rows, nc) of the constraint rows for forces (k, held) at the held ones [N]."""
-        return np.einsum("rs,krd->ksd", self.inverse, reactions.reshape(len(reactions), -1, nc))
+        return self.inverse.T @ reactions.reshape(len(reactions), -1, nc)
 
 
 Starts = dict[Grasp, tuple[Floats, Floats]]  # position and unit tangent (nc,) where the path of a grasp begins
@@ -222,7 +221,7 @@ def hold(problem: Problem, grid: Grid, grasps: list[Grasp], t: Floats, starts: S
     inverse = np.linalg.inv(A[:, pivots])
     follow = -inverse @ A
     follow[:, pivots] = 0.0
-    offsets = np.einsum("rs,ksd->krd", inverse, target).reshape(len(t), -1)
+    offsets = (inverse @ target).reshape(len(t), -1)
     return Held(tuple(grasps), _elimination(grid.n_u, nc, pivots, follow), offsets, tuple(rows), inverse)
 
 

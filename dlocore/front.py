@@ -1,8 +1,8 @@
 """The front door: predict(scene) -> Prediction."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -255,7 +255,7 @@ def _answer(
         message=message,
         surface=surface,
         grasps=reactions(problem, grid, level.motion.forces if forces is None else forces),
-        effects=effect_reports(problem, surface),
+        report_effects=partial(effect_reports, problem),
         iterations=tuple(monitor.iterations),
         accuracy=Accuracy(
             method=method,

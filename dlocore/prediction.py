@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -123,7 +124,7 @@ class Prediction:
         message: the status in words, and what to do about it.
         surface: the bivariate spline q(u, t).
         grasps: reaction of each grasp, in the scene's order.
-        effects: what was simulated and why.
+        effects: what was simulated and why (a function of the rest, evaluated when it is first read).
         iterations: how the solve went.
         accuracy: method, estimated error, time.
         start_energy: elastic energy stored in the start shape [J].
@@ -135,8 +136,13 @@ class Prediction:
     message: str
     surface: SplineSurface
     grasps: tuple[GraspReaction, ...]
-    effects: tuple[EffectReport, ...]
     iterations: tuple[Iteration, ...]
     accuracy: Accuracy
     start_energy: float
     start_fit: float
+    report_effects: Callable[[SplineSurface], tuple[EffectReport, ...]] = field(repr=False)
+
+    @cached_property
+    def effects(self) -> tuple[EffectReport, ...]:
+        """What was simulated and why."""
+        return self.report_effects(self.surface)

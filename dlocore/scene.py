@@ -290,7 +290,7 @@ class Quality:
         given = [n for n in ("n_u", "target_error", "time_budget") if getattr(self, n) is not None]
         if len(given) > 1:
             raise SceneError(
-                given[1], getattr(self, given[1]), f"only one of n_u with n_t, target_error and time_budget"
+                given[1], getattr(self, given[1]), "only one of n_u with n_t, target_error and time_budget"
             )
         if self.method in ("spacetime", "paper") and self.n_u is None:
             raise SceneError("method", self.method, "n_u and n_t given with it")

@@ -11,10 +11,10 @@ curvature  kappa, its rate, its memory    moment M, stiffness dM/dkappa, viscosi
 body       position, velocity             force per unit length, minus its derivatives by position and by velocity
 ========== ============================== ============================================================================
 
-Curvature is a vector: one signed component in the plane, three world components across the tangent in space; a law is
-written once for both. Laws at strain sites know nothing of splines or of geometry: `kernels/strain.py` turns stress
+Curvature is a vector: in the plane its signed value and two zeros, in space three world components across the tangent;
+a law is written once for both. Vectors and symmetric tangents are tuples of scalars, which compilers keep in registers. Laws at strain sites know nothing of splines or of geometry: `kernels/strain.py` turns stress
 into generalised forces. Memory is the paper's eps_0, the curvature of the stress-free shape at the point: state that
-belongs to the solve, not to the law. Laws add to their outputs, so that effects at one site superpose.
+belongs to the solve, not to the law. Effects at one site superpose.
 `effects/laws.py` is the one list of them: adding an effect is adding a file and its line there.
 """
 
@@ -22,6 +22,8 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 Site = Literal["field", "axial", "curvature", "body"]
+Vector = tuple[float, float, float]
+Symmetric = tuple[float, float, float, float, float, float]  # xx, yy, zz, xy, xz, yz
 
 
 @dataclass(frozen=True)

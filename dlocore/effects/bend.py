@@ -4,9 +4,9 @@ kappa_0 is the paper's strain memory eps_0 at the point: the curvature of the st
 """
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
-from dlocore.effects.base import Effect, Site
+from dlocore.effects.base import Effect, Site, Symmetric, Vector
 from dlocore.kernels.compile import law
 
 
@@ -24,17 +24,14 @@ class Bend(Effect):
 
 
 @law
-def bending_moment(p: Any, kappa: Any, memory: Any, moment: Any, stiffness: Any) -> None:
-    """Add M = EI (kappa - kappa_0) and dM/dkappa = EI."""
-    for k in range(len(kappa)):
-        moment[k] += p[0] * (kappa[k] - memory[k])
-        stiffness[k, k] += p[0]
+def bending_moment(EI: float, kappa: Vector, memory: Vector) -> tuple[Vector, Symmetric]:
+    """Return M = EI (kappa - kappa_0) and dM/dkappa = EI."""
+    moment = (EI * (kappa[0] - memory[0]), EI * (kappa[1] - memory[1]), EI * (kappa[2] - memory[2]))
+    return moment, (EI, EI, EI, 0.0, 0.0, 0.0)
 
 
 @law
-def bending_energy(p: Any, kappa: Any, memory: Any) -> float:
+def bending_energy(EI: float, kappa: Vector, memory: Vector) -> float:
     """Return EI/2 |kappa - kappa_0|^2 [J/m]."""
-    total = 0.0
-    for k in range(len(kappa)):
-        total += (kappa[k] - memory[k]) ** 2
-    return 0.5 * p[0] * total
+    x, y, z = kappa[0] - memory[0], kappa[1] - memory[1], kappa[2] - memory[2]
+    return 0.5 * EI * (x * x + y * y + z * z)

@@ -10,9 +10,9 @@ in the plane, where kappa has one component, exactly eta/2 kappa_t^2.
 """
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
-from dlocore.effects.base import Effect, Site
+from dlocore.effects.base import Effect, Site, Symmetric, Vector
 from dlocore.kernels.compile import law
 
 EPSILON = 0.1  # times 1/L: a cable bent to less than a tenth of a radian over its length
@@ -33,17 +33,15 @@ class Damping(Effect):
 
 
 @law
-def damping_moment(p: Any, kappa: Any, rate: Any, moment: Any, viscosity: Any) -> None:
-    """Add M = V kappa_t with V = eta (eps^2 I + kappa kappa') / (|kappa|^2 + eps^2), which is positive definite."""
-    n = len(kappa)
-    square = p[1]
-    along = 0.0
-    for k in range(n):
-        square += kappa[k] * kappa[k]
-        along += kappa[k] * rate[k]
-    scale = p[0] / square
-    for k in range(n):
-        moment[k] += scale * (p[1] * rate[k] + kappa[k] * along)
-        viscosity[k, k] += scale * p[1]
-        for j in range(n):
-            viscosity[k, j] += scale * kappa[k] * kappa[j]
+def damping_moment(eta: float, epsilon2: float, kappa: Vector, rate: Vector) -> tuple[Vector, Symmetric]:
+    """Return M = V kappa_t and V = eta (eps^2 I + kappa kappa') / (|kappa|^2 + eps^2), which is positive definite."""
+    x, y, z = kappa
+    scale = eta / (epsilon2 + x * x + y * y + z * z)
+    along = x * rate[0] + y * rate[1] + z * rate[2]
+    moment = (
+        scale * (epsilon2 * rate[0] + x * along),
+        scale * (epsilon2 * rate[1] + y * along),
+        scale * (epsilon2 * rate[2] + z * along),
+    )
+    diagonal = (scale * (epsilon2 + x * x), scale * (epsilon2 + y * y), scale * (epsilon2 + z * z))
+    return moment, (*diagonal, scale * x * y, scale * x * z, scale * y * z)

@@ -1,11 +1,11 @@
 """Drag of the surrounding air: force per unit length -c v - c2 |v| v [N/m] (docs/model.md eq. 8)."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from dlocore.effects.base import Effect, Site
+from dlocore.effects.base import Effect, Site, Symmetric, Vector
 from dlocore.kernels.compile import law
 
 
@@ -36,16 +36,11 @@ class QuadraticDrag(Effect):
 
 
 @law
-def quadratic_drag(p: Any, x: Any, v: Any, force: Any, stiffness: Any, viscosity: Any) -> None:
-    """Add f = -c2 |v| v and -df/dv = c2 (|v| I + v v'/|v|), which is positive semidefinite."""
-    n = len(v)
-    speed = 0.0
-    for d in range(n):
-        speed += v[d] * v[d]
-    speed = np.sqrt(speed)
-    if speed > 0.0:
-        for d in range(n):
-            force[d] -= p[0] * speed * v[d]
-            viscosity[d, d] += p[0] * speed
-            for e in range(n):
-                viscosity[d, e] += p[0] * v[d] * v[e] / speed
+def quadratic_drag(c2: float, v: Vector) -> tuple[Vector, Symmetric]:
+    """Return f = -c2 |v| v and -df/dv = c2 (|v| I + v v'/|v|), which is positive semidefinite."""
+    x, y, z = v
+    speed = np.sqrt(x * x + y * y + z * z)
+    scale = c2 * speed
+    turn = c2 / speed if speed > 0.0 else 0.0
+    diagonal = (scale + turn * x * x, scale + turn * y * y, scale + turn * z * z)
+    return (-scale * x, -scale * y, -scale * z), (*diagonal, turn * x * y, turn * x * z, turn * y * z)

@@ -1,7 +1,7 @@
 """Stretch: energy density EA/2 e^2 [J/m] of the axial strain e = |r'| - 1 (paper eq. 8, first row)."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from dlocore.effects.base import Effect, Site
 from dlocore.kernels.compile import law
@@ -21,6 +21,6 @@ class Stretch(Effect):
 
 
 @law
-def tension(p: Any, strain: float) -> tuple[float, float]:
+def tension(EA: float, strain: float) -> tuple[float, float]:
     """Return N = EA e and dN/de = EA."""
-    return p[0] * strain, p[0]
+    return EA * strain, EA

@@ -5,8 +5,6 @@ A symmetric matrix of half-bandwidth m is stored by column below its diagonal: A
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from dlocore.kernels.compile import kernel
 
 

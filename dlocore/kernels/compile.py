@@ -31,4 +31,4 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 def law(function: Callable[..., Any]) -> Any:
     """Compile a pointwise law that is inlined into the kernels."""
-    return numba.njit(error_model="numpy", inline="never")(function)
+    return numba.njit(error_model="numpy", forceinline=True)(function)

@@ -9,7 +9,8 @@ from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_mat
 from dlocore.kernels.basis import basis_rows
 from dlocore.kernels.compile import kernel
 
-FAILED_STEP, NEWTON, FACTORISATIONS, ROBUST, LAST_UPDATE = range(5)  # places in `info`
+FAILED_STEP, NEWTON, FACTORISATIONS, ROBUST, LEFT = range(5)  # places in `info`
+_REFRESH = 0.1  # contraction of the updates above which the old factors no longer serve
 _PLAIN_ITERATIONS = 8  # Newton iterations before a step is done again with a line search
 _ROBUST_ITERATIONS = 60
 _LINE_SEARCH = 7  # halvings
@@ -60,7 +61,7 @@ def march_steps(
         begin: first step of the smooth stretch of motion that `start` lies in.
         h: time step [s].
         rho: spectral radius at infinite frequency, 0 (strong damping of the unresolved) to 1 (none).
-        tolerance: on the largest Newton update [m].
+        tolerance: on the estimated error of the Newton iteration [m], largest component.
         Q: (steps + 1, n, nc) control points; written from start + 1 to stop.
         v, a, G: (n, nc) velocity, acceleration and G at step `start`; at `stop` on return.
         mass, drag: (n, 4) scalar bands, times density [kg/m] and drag coefficient [N s/m^2].
@@ -81,6 +82,7 @@ def march_steps(
     to_v = gamma / (beta * h)
     inertia = (1.0 - alpha_m) * to_a
     free = size - len(e.held)
+    largest = 10.0 * np.sum(tables.weight)  # an update of ten lengths is divergence
     K = np.empty((size, 4 * nc))
     A = np.empty((free, 4 * nc))
     f = np.empty((n, nc))
@@ -98,17 +100,19 @@ def march_steps(
         q0 = Q[k - 1]
         for attempt in range(2):
             # --- predict
-            if attempt == 0 and k - begin > 2:
-                for i in range(n):
-                    for d in range(nc):
+            for i in range(n):
+                for d in range(nc):
+                    if attempt == 1:
+                        q1[i, d] = q0[i, d]
+                    elif k - begin > 2:
                         q1[i, d] = 3.0 * q0[i, d] - 3.0 * Q[k - 2, i, d] + Q[k - 3, i, d]
-            elif attempt == 0:
-                q1[:] = q0 + h * v + (0.5 * h * h) * a
-            else:
-                q1[:] = q0
+                    else:
+                        q1[i, d] = q0[i, d] + h * v[i, d] + 0.5 * h * h * a[i, d]
             place_held(e, offsets[k], q1.ravel())
-            a1[:] = to_a * (q1 - q0 - h * v) - (0.5 / beta - 1.0) * a
-            v1[:] = v + h * ((1.0 - gamma) * a + gamma * a1)
+            for i in range(n):
+                for d in range(nc):
+                    a1[i, d] = to_a * (q1[i, d] - q0[i, d] - h * v[i, d]) - (0.5 / beta - 1.0) * a[i, d]
+                    v1[i, d] = v[i, d] + h * ((1.0 - gamma) * a[i, d] + gamma * a1[i, d])
             # --- iterate
             limit = _PLAIN_ITERATIONS if attempt == 0 else _ROBUST_ITERATIONS
             fresh = False
@@ -140,8 +144,10 @@ def march_steps(
                 solve(A, trial_x)
                 info[NEWTON] += 1
                 expand_vector(e, trial_x, change)
-                update = np.max(np.abs(change))
-                if not update < 1e8 * tolerance:
+                update = 0.0
+                for i in range(size):
+                    update = max(update, abs(change[i])) if np.isfinite(change[i]) else np.inf
+                if not update < largest:
                     break
                 length = 1.0
                 if attempt == 1 and update > tolerance:
@@ -167,14 +173,17 @@ def march_steps(
                         q1[i, d] += s
                         v1[i, d] += to_v * s
                         a1[i, d] += to_a * s
-                info[LAST_UPDATE] = max(info[LAST_UPDATE], update) if update <= tolerance else info[LAST_UPDATE]
-                if update <= tolerance:
+                # with contraction c the error left after this update is c/(1-c) of it
+                contraction = min(update / previous, 1.0) if it > 0 else 0.5
+                left = update * min(1.0, contraction / (1.0 - contraction + 1e-300))
+                if left <= tolerance and length == 1.0:
+                    info[LEFT] = max(info[LEFT], left)
                     converged = True
                     break
-                if attempt == 0 and update > 0.3 * previous:
-                    fresh = False  # the old factors no longer serve
+                if attempt == 0:
                     if update > 2.0 * previous:
                         break
+                    fresh = contraction <= _REFRESH
                 previous = update
             if converged:
                 break
@@ -210,7 +219,8 @@ def _residual(
 ) -> None:
     """Turn f into G1 = f + C v1 - load, and write the residual R."""
     n, nc = f.shape
-    multiply_scalar_band(drag, v1, 1.0, f)
+    if drag[0, 0] != 0.0:
+        multiply_scalar_band(drag, v1, 1.0, f)
     for i in range(n):
         for d in range(nc):
             f[i, d] -= load[i, d]

@@ -9,96 +9,62 @@ A moment M conjugate to kappa gives generalised forces g1, g2 conjugate to r', r
 J'SJ, positive semidefinite, and a geometric part M . d2kappa. In space M and kappa are vectors across the tangent.
 """
 
-from typing import Any
-
 import numpy as np
 
+from dlocore.effects.base import Vector
 from dlocore.kernels.compile import law
 
 
 @law
-def plane_curvature(a: Any, b: Any, J: Any, H: Any) -> float:
-    """Return kappa [1/m] of r' = a, r'' = b (2,), and write J = dkappa (4,) and H = d2kappa (4, 4) by (r', r'')."""
-    square = a[0] * a[0] + a[1] * a[1]
-    inverse = 1.0 / square
-    kappa = (a[0] * b[1] - a[1] * b[0]) * inverse
-    n0, n1 = b[1] * inverse, -b[0] * inverse  # cross-product part of the derivative, over l^2
-    n2, n3 = -a[1] * inverse, a[0] * inverse
-    s0, s1 = 2.0 * a[0] * inverse, 2.0 * a[1] * inverse  # derivative of log l^2
-    J[0] = n0 - kappa * s0
-    J[1] = n1 - kappa * s1
-    J[2] = n2
-    J[3] = n3
-    H[0, 0] = -2.0 * n0 * s0 + kappa * (2.0 * s0 * s0 - 2.0 * inverse)
-    H[1, 1] = -2.0 * n1 * s1 + kappa * (2.0 * s1 * s1 - 2.0 * inverse)
-    H[0, 1] = -n0 * s1 - n1 * s0 + 2.0 * kappa * s0 * s1
-    H[0, 2] = -n2 * s0
-    H[0, 3] = inverse - n3 * s0
-    H[1, 2] = -inverse - n2 * s1
-    H[1, 3] = -n3 * s1
-    H[2, 2] = 0.0
-    H[2, 3] = 0.0
-    H[3, 3] = 0.0
-    for i in range(4):
-        for j in range(i):
-            H[i, j] = H[j, i]
-    return kappa
+def plane_curvature(ax: float, ay: float, cx: float, cy: float) -> tuple[float, tuple[float, float, float, float]]:
+    """Return kappa [1/m] of r' = (ax, ay), r'' = (cx, cy), and its derivatives by r' and r''."""
+    inverse = 1.0 / (ax * ax + ay * ay)
+    kappa = (ax * cy - ay * cx) * inverse
+    twice = 2.0 * kappa
+    return kappa, ((cy - twice * ax) * inverse, -(cx + twice * ay) * inverse, -ay * inverse, ax * inverse)
 
 
 @law
-def space_curvature(a: Any, b: Any, t: Any, kappa: Any) -> tuple[float, float]:
-    """Write the unit tangent t and curvature vector kappa [1/m] of r' = a, r'' = b (3,); return l and h = t . r''."""
+def plane_hessian(
+    ax: float, ay: float, cx: float, cy: float, kappa: float
+) -> tuple[float, float, float, float, float, float, float]:
+    """Return the second derivatives of kappa: by r' twice (xx, xy, yy), then by r' and r'' (xx, xy, yx, yy)."""
+    inverse = 1.0 / (ax * ax + ay * ay)
+    n0, n1 = cy * inverse, -cx * inverse  # cross-product part of the derivative, over l^2
+    n2, n3 = -ay * inverse, ax * inverse
+    s0, s1 = 2.0 * ax * inverse, 2.0 * ay * inverse  # derivative of log l^2
+    xx = -2.0 * n0 * s0 + kappa * (2.0 * s0 * s0 - 2.0 * inverse)
+    xy = -n0 * s1 - n1 * s0 + 2.0 * kappa * s0 * s1
+    yy = -2.0 * n1 * s1 + kappa * (2.0 * s1 * s1 - 2.0 * inverse)
+    return xx, xy, yy, -n2 * s0, inverse - n3 * s0, -inverse - n2 * s1, -n3 * s1
+
+
+@law
+def space_curvature(a: Vector, c: Vector) -> tuple[float, float, Vector, Vector]:
+    """Return l, h = t . r'', the unit tangent t and the curvature vector kappa [1/m] of r' = a, r'' = c."""
     length = np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
-    for d in range(3):
-        t[d] = a[d] / length
-    h = t[0] * b[0] + t[1] * b[1] + t[2] * b[2]
-    for d in range(3):
-        kappa[d] = (b[d] - h * t[d]) / length
-    return length, h
+    t = (a[0] / length, a[1] / length, a[2] / length)
+    h = t[0] * c[0] + t[1] * c[1] + t[2] * c[2]
+    return length, h, t, ((c[0] - h * t[0]) / length, (c[1] - h * t[1]) / length, (c[2] - h * t[2]) / length)
 
 
 @law
-def space_curvature_rate(length: float, h: float, t: Any, kappa: Any, da: Any, db: Any, rate: Any) -> None:
-    """Write the rate of kappa seen by sections that do not spin, P kappa_t, of the rates da of r' and db of r''."""
+def space_curvature_rate(length: float, h: float, t: Vector, kappa: Vector, da: Vector, dc: Vector) -> Vector:
+    """Return the rate of kappa seen by sections that do not spin, P kappa_t, of the rates da of r' and dc of r''."""
     da_t = t[0] * da[0] + t[1] * da[1] + t[2] * da[2]
-    db_t = t[0] * db[0] + t[1] * db[1] + t[2] * db[2]
-    for d in range(3):
-        rate[d] = ((db[d] - db_t * t[d]) - h * (da[d] - da_t * t[d]) / length - kappa[d] * da_t) / length
-
-
-@law
-def space_moment(length: float, h: float, t: Any, kappa: Any, M: Any, g: Any) -> None:
-    """Write the generalised forces g (6,) by (r', r'') of the moment vector M across the tangent."""
-    dot = (M[0] * kappa[0] + M[1] * kappa[1] + M[2] * kappa[2]) / length
-    for d in range(3):
-        g[d] = -h * M[d] / (length * length) - dot * t[d]
-        g[3 + d] = M[d] / length
-
-
-@law
-def space_tangent(length: float, h: float, t: Any, kappa: Any, M: Any, S: Any, geometric: float, H: Any) -> None:
-    """Write the tangent H (6, 6) by (r', r''): J'SJ + `geometric` times the symmetric part of M . d2kappa.
-
-    M and S act across the tangent: S t = 0.
-    """
-    l2 = length * length
-    Sk = (
-        S[0, 0] * kappa[0] + S[0, 1] * kappa[1] + S[0, 2] * kappa[2],
-        S[1, 0] * kappa[0] + S[1, 1] * kappa[1] + S[1, 2] * kappa[2],
-        S[2, 0] * kappa[0] + S[2, 1] * kappa[1] + S[2, 2] * kappa[2],
+    dc_t = t[0] * dc[0] + t[1] * dc[1] + t[2] * dc[2]
+    s = h / length
+    return (
+        (dc[0] - dc_t * t[0] - s * (da[0] - da_t * t[0]) - kappa[0] * da_t) / length,
+        (dc[1] - dc_t * t[1] - s * (da[1] - da_t * t[1]) - kappa[1] * da_t) / length,
+        (dc[2] - dc_t * t[2] - s * (da[2] - da_t * t[2]) - kappa[2] * da_t) / length,
     )
-    dot = geometric * (M[0] * kappa[0] + M[1] * kappa[1] + M[2] * kappa[2])
-    kSk = Sk[0] * kappa[0] + Sk[1] * kappa[1] + Sk[2] * kappa[2]
-    for i in range(3):
-        for j in range(3):
-            unit = 1.0 if i == j else 0.0
-            tt = t[i] * t[j]
-            MtM = geometric * (M[i] * t[j] + t[i] * M[j])
-            Mk = 0.5 * geometric * (M[i] * kappa[j] + kappa[i] * M[j])
-            SttS = Sk[i] * t[j] + t[i] * Sk[j]
-            H[3 + i, 3 + j] = S[i, j] / l2
-            H[3 + i, j] = -(h * S[i, j] / length + Sk[i] * t[j] + MtM) / l2
-            H[j, 3 + i] = H[3 + i, j]
-            H[i, j] = (
-                h * h * S[i, j] / l2 + (kSk + 2.0 * dot) * tt - dot * (unit - tt) + h / length * (SttS + 2.0 * MtM) - Mk
-            ) / l2
+
+
+@law
+def space_moment(length: float, h: float, t: Vector, kappa: Vector, M: Vector) -> tuple[Vector, Vector]:
+    """Return the generalised forces by r' and by r'' of the moment vector M across the tangent."""
+    dot = (M[0] * kappa[0] + M[1] * kappa[1] + M[2] * kappa[2]) / length
+    s = -h / (length * length)
+    by_first = (s * M[0] - dot * t[0], s * M[1] - dot * t[1], s * M[2] - dot * t[2])
+    return by_first, (M[0] / length, M[1] / length, M[2] / length)

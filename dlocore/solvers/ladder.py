@@ -5,11 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.discretisation import make_grid, smallest_n_u
+from dlocore.discretisation import smallest_n_u
 from dlocore.kernels.basis import basis_rows
 from dlocore.problem import Problem
 from dlocore.solvers.march import March, fit, march, smallest_n_t, time_knots
 from dlocore.solvers.monitor import Monitor
+from dlocore.statics import start_grid
 
 Floats = NDArray[np.float64]
 
@@ -56,7 +57,7 @@ def stretched(problem: Problem, level: int) -> tuple[int, int, int]:
 
 def run_level(problem: Problem, n_u: int, n_t: int, steps: int, monitor: Monitor, *, booked: bool = True) -> Level:
     """March on one grid and fit the time spline; `booked`: book the time by phase."""
-    grid = make_grid(problem, n_u)
+    grid = start_grid(problem, n_u, monitor)
     knots_t = time_knots(problem, n_t)
     assert knots_t is not None, "the caller asks for enough control points"
     if booked:

@@ -1,0 +1,155 @@
+"""Assembly in the plane: two coordinates, one signed curvature.
+
+All that is local to a point is scalars and tuples, never small arrays: the compiler then keeps it in registers, which
+is several times faster (docs/model.md, cost).
+"""
+
+from typing import Any
+
+import numpy as np
+
+from dlocore.effects.laws import DAMPING, axial_energy, axial_stress, body_force, curvature_energy, curvature_stress
+from dlocore.kernels.compile import law
+from dlocore.kernels.strain import plane_curvature, plane_hessian
+
+
+@law
+def _row(table: Any, i: int) -> tuple[float, float, float, float]:
+    return table[i, 0], table[i, 1], table[i, 2], table[i, 3]
+
+
+@law
+def _combine(q: Any, k: int, b: tuple[float, float, float, float]) -> tuple[float, float]:
+    x = b[0] * q[k, 0] + b[1] * q[k + 1, 0] + b[2] * q[k + 2, 0] + b[3] * q[k + 3, 0]
+    y = b[0] * q[k, 1] + b[1] * q[k + 1, 1] + b[2] * q[k + 2, 1] + b[3] * q[k + 3, 1]
+    return x, y
+
+
+@law
+def _add_block(K: Any, k: int, i: int, j: int, xx: float, xy: float, yx: float, yy: float) -> None:
+    """Add the block of control points k + i and k + j, i >= j; `xy` is row x, column y."""
+    column, offset = 2 * (k + j), 2 * (i - j)
+    K[column, offset] += xx
+    K[column, offset + 1] += yx
+    K[column + 1, offset] += yy
+    if i > j:
+        K[column + 1, offset - 1] += xy
+
+
+@law
+def axial(q: Any, tables: Any, active: Any, p: Any, scales: Any, tangent: bool, f: Any, K: Any) -> None:
+    """Add the forces and tangents of the axial site."""
+    elastic, _, geometric = scales
+    firsts, b1, weights = tables.axial_first, tables.axial_b1, tables.axial_w
+    for n in range(len(weights)):
+        k, w = firsts[n], weights[n]
+        b = _row(b1, n)
+        x, y = _combine(q, k, b)
+        square = x * x + y * y
+        length = np.sqrt(square)
+        tension, modulus = axial_stress(active, p, length - 1.0)
+        gx, gy = w * tension * x / length, w * tension * y / length
+        for i in range(4):
+            f[k + i, 0] += b[i] * gx
+            f[k + i, 1] += b[i] * gy
+        if tangent:
+            # the part of the stress is positive only in tension
+            stress = w * (geometric * tension if geometric != 0.0 else elastic * max(tension, 0.0)) / length
+            along = (w * elastic * modulus - stress) / square
+            xx, xy, yy = along * x * x + stress, along * x * y, along * y * y + stress
+            for j in range(4):
+                for i in range(j, 4):
+                    s = b[i] * b[j]
+                    _add_block(K, k, i, j, s * xx, s * xy, s * xy, s * yy)
+
+
+@law
+def curvature(
+    q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, scales: Any, tangent: bool, f: Any, K: Any
+) -> None:
+    """Add the forces and tangents of the curvature site."""
+    elastic, viscous, geometric = scales
+    firsts, b1, b2, weights = tables.curvature_first, tables.curvature_b1, tables.curvature_b2, tables.curvature_w
+    for n in range(len(weights)):
+        k, w = firsts[n], weights[n]
+        b, c = _row(b1, n), _row(b2, n)
+        ax, ay = _combine(q, k, b)
+        cx, cy = _combine(q, k, c)
+        kappa, J = plane_curvature(ax, ay, cx, cy)
+        rate = 0.0
+        if active[DAMPING]:
+            vx, vy = _combine(v, k, b)
+            ux, uy = _combine(v, k, c)
+            rate = J[0] * vx + J[1] * vy + J[2] * ux + J[3] * uy
+        rest = memory[n, 0]
+        moment, stiffness, viscosity = curvature_stress(
+            active, p, (kappa, 0.0, 0.0), (rate, 0.0, 0.0), (rest, 0.0, 0.0)
+        )
+        M = w * moment[0]
+        g0, g1, g2, g3 = M * J[0], M * J[1], M * J[2], M * J[3]
+        for i in range(4):
+            f[k + i, 0] += b[i] * g0 + c[i] * g2
+            f[k + i, 1] += b[i] * g1 + c[i] * g3
+        if tangent:
+            S = w * (elastic * stiffness[0] + viscous * viscosity[0])
+            H = plane_hessian(ax, ay, cx, cy, kappa)
+            M *= geometric
+            xx, xy, yy = M * H[0], M * H[1], M * H[2]  # by r', r'
+            ux, uy, vx, vy = M * H[3], M * H[4], M * H[5], M * H[6]  # by r', r''
+            for j in range(4):
+                bj, cj = b[j], c[j]
+                Gx, Gy = S * (bj * J[0] + cj * J[2]), S * (bj * J[1] + cj * J[3])
+                # columns of the tangent by r' (rows x, y) and by r''
+                rxx, rxy = bj * xx + cj * ux, bj * xy + cj * uy
+                ryx, ryy = bj * xy + cj * vx, bj * yy + cj * vy
+                sxx, sxy, syx, syy = bj * ux, bj * vx, bj * uy, bj * vy
+                for i in range(j, 4):
+                    bi, ci = b[i], c[i]
+                    Gi, Gk = bi * J[0] + ci * J[2], bi * J[1] + ci * J[3]
+                    _add_block(
+                        K, k, i, j,
+                        Gi * Gx + bi * rxx + ci * sxx,
+                        Gi * Gy + bi * rxy + ci * sxy,
+                        Gk * Gx + bi * ryx + ci * syx,
+                        Gk * Gy + bi * ryy + ci * syy,
+                    )  # fmt: skip
+
+
+@law
+def body(q: Any, v: Any, tables: Any, active: Any, p: Any, scales: Any, tangent: bool, f: Any, K: Any) -> None:
+    """Subtract the forces, and add the tangents, of the body site."""
+    elastic, viscous, _ = scales
+    firsts, b0, weights = tables.body_first, tables.body_b0, tables.body_w
+    for n in range(len(weights)):
+        k, w = firsts[n], weights[n]
+        b = _row(b0, n)
+        x, y = _combine(q, k, b)
+        vx, vy = _combine(v, k, b)
+        force, stiffness, viscosity = body_force(active, p, (x, y, 0.0), (vx, vy, 0.0))
+        for i in range(4):
+            f[k + i, 0] -= w * b[i] * force[0]
+            f[k + i, 1] -= w * b[i] * force[1]
+        if tangent:
+            xx = w * (elastic * stiffness[0] + viscous * viscosity[0])
+            yy = w * (elastic * stiffness[1] + viscous * viscosity[1])
+            xy = w * (elastic * stiffness[3] + viscous * viscosity[3])
+            for j in range(4):
+                for i in range(j, 4):
+                    s = b[i] * b[j]
+                    _add_block(K, k, i, j, s * xx, s * xy, s * xy, s * yy)
+
+
+@law
+def energy(q: Any, tables: Any, active: Any, p: Any, memory: Any) -> float:
+    """Return the stored energy [J]."""
+    total = 0.0
+    for n in range(len(tables.axial_w)):
+        x, y = _combine(q, tables.axial_first[n], _row(tables.axial_b1, n))
+        total += tables.axial_w[n] * axial_energy(active, p, np.sqrt(x * x + y * y) - 1.0)
+    for n in range(len(tables.curvature_w)):
+        k = tables.curvature_first[n]
+        ax, ay = _combine(q, k, _row(tables.curvature_b1, n))
+        cx, cy = _combine(q, k, _row(tables.curvature_b2, n))
+        kappa, _ = plane_curvature(ax, ay, cx, cy)
+        total += tables.curvature_w[n] * curvature_energy(active, p, (kappa, 0.0, 0.0), (memory[n, 0], 0.0, 0.0))
+    return total

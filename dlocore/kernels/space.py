@@ -1,0 +1,172 @@
+"""Assembly in space: three coordinates, a curvature vector across the tangent."""
+
+from typing import Any
+
+import numpy as np
+
+from dlocore.effects.base import Symmetric, Vector
+from dlocore.effects.laws import DAMPING, axial_energy, axial_stress, body_force, curvature_energy, curvature_stress
+from dlocore.kernels.compile import law
+from dlocore.kernels.strain import space_curvature, space_curvature_rate, space_moment
+
+
+@law
+def _row(table: Any, i: int) -> tuple[float, float, float, float]:
+    return table[i, 0], table[i, 1], table[i, 2], table[i, 3]
+
+
+@law
+def _combine(q: Any, k: int, b: tuple[float, float, float, float]) -> Vector:
+    x = b[0] * q[k, 0] + b[1] * q[k + 1, 0] + b[2] * q[k + 2, 0] + b[3] * q[k + 3, 0]
+    y = b[0] * q[k, 1] + b[1] * q[k + 1, 1] + b[2] * q[k + 2, 1] + b[3] * q[k + 3, 1]
+    z = b[0] * q[k, 2] + b[1] * q[k + 1, 2] + b[2] * q[k + 2, 2] + b[3] * q[k + 3, 2]
+    return x, y, z
+
+
+@law
+def _add_symmetric(K: Any, k: int, i: int, j: int, s: float, H: Symmetric) -> None:
+    """Add s H to the block of control points k + i and k + j, i >= j."""
+    column, offset = 3 * (k + j), 3 * (i - j)
+    K[column, offset] += s * H[0]
+    K[column, offset + 1] += s * H[3]
+    K[column, offset + 2] += s * H[4]
+    K[column + 1, offset] += s * H[1]
+    K[column + 1, offset + 1] += s * H[5]
+    K[column + 2, offset] += s * H[2]
+    if i > j:
+        K[column + 1, offset - 1] += s * H[3]
+        K[column + 2, offset - 2] += s * H[4]
+        K[column + 2, offset - 1] += s * H[5]
+
+
+@law
+def axial(q: Any, tables: Any, active: Any, p: Any, scales: Any, tangent: bool, f: Any, K: Any) -> None:
+    """Add the forces and tangents of the axial site."""
+    elastic, _, geometric = scales
+    firsts, b1, weights = tables.axial_first, tables.axial_b1, tables.axial_w
+    for n in range(len(weights)):
+        k, w = firsts[n], weights[n]
+        b = _row(b1, n)
+        x, y, z = _combine(q, k, b)
+        square = x * x + y * y + z * z
+        length = np.sqrt(square)
+        tension, modulus = axial_stress(active, p, length - 1.0)
+        g = w * tension / length
+        for i in range(4):
+            f[k + i, 0] += b[i] * g * x
+            f[k + i, 1] += b[i] * g * y
+            f[k + i, 2] += b[i] * g * z
+        if tangent:
+            # the part of the stress is positive only in tension
+            stress = w * (geometric * tension if geometric != 0.0 else elastic * max(tension, 0.0)) / length
+            s = (w * elastic * modulus - stress) / square
+            H = (s * x * x + stress, s * y * y + stress, s * z * z + stress, s * x * y, s * x * z, s * y * z)
+            for j in range(4):
+                for i in range(j, 4):
+                    _add_symmetric(K, k, i, j, b[i] * b[j], H)
+
+
+@law
+def curvature(
+    q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, scales: Any, tangent: bool, f: Any, K: Any
+) -> None:
+    """Add the forces and tangents of the curvature site.
+
+    With G_j = (c_j - h b_j / l) P / l - b_j kappa t' / l, the derivative of kappa by control point j, the material part of
+    the tangent is G_i' S G_j; the geometric part is that of `strain` eq. M . d2kappa.
+    """
+    elastic, viscous, geometric = scales
+    firsts, b1, b2, weights = tables.curvature_first, tables.curvature_b1, tables.curvature_b2, tables.curvature_w
+    G = np.empty((4, 3, 3))
+    SG = np.empty((3, 3))
+    A = np.empty((3, 3))
+    B = np.empty((3, 3))
+    S = np.empty((3, 3))
+    for n in range(len(weights)):
+        k, w = firsts[n], weights[n]
+        b, c = _row(b1, n), _row(b2, n)
+        length, h, t, kappa = space_curvature(_combine(q, k, b), _combine(q, k, c))
+        rate = (0.0, 0.0, 0.0)
+        if active[DAMPING]:
+            rate = space_curvature_rate(length, h, t, kappa, _combine(v, k, b), _combine(v, k, c))
+        rest = (memory[n, 0], memory[n, 1], memory[n, 2])
+        M, stiffness, viscosity = curvature_stress(active, p, kappa, rate, rest)
+        g, u = space_moment(length, h, t, kappa, M)
+        for i in range(4):
+            bi, ci = w * b[i], w * c[i]
+            f[k + i, 0] += bi * g[0] + ci * u[0]
+            f[k + i, 1] += bi * g[1] + ci * u[1]
+            f[k + i, 2] += bi * g[2] + ci * u[2]
+        if not tangent:
+            continue
+        for o in range(6):
+            d, e = (0, 1, 2, 0, 0, 1)[o], (0, 1, 2, 1, 2, 2)[o]
+            S[d, e] = w * (elastic * stiffness[o] + viscous * viscosity[o])
+            S[e, d] = S[d, e]
+        for j in range(4):
+            across, along = (c[j] - h * b[j] / length) / length, b[j] / length
+            for d in range(3):
+                for e in range(3):
+                    G[j, d, e] = -(across * t[d] + along * kappa[d]) * t[e]
+                G[j, d, d] += across
+        scale = w * geometric / (length * length)
+        dot = M[0] * kappa[0] + M[1] * kappa[1] + M[2] * kappa[2]
+        for d in range(3):
+            for e in range(3):
+                Mt = M[d] * t[e] + t[d] * M[e]
+                A[d, e] = -scale * Mt  # by r' and r''
+                B[d, e] = scale * (3.0 * dot * t[d] * t[e] + 2.0 * h / length * Mt)  # by r' twice
+                B[d, e] -= scale * 0.5 * (M[d] * kappa[e] + kappa[d] * M[e])
+            B[d, d] -= scale * dot
+        for j in range(4):
+            for d in range(3):
+                for e in range(3):
+                    SG[d, e] = S[d, 0] * G[j, 0, e] + S[d, 1] * G[j, 1, e] + S[d, 2] * G[j, 2, e]
+            for i in range(j, 4):
+                both = b[i] * b[j]
+                mixed = b[i] * c[j] + c[i] * b[j]
+                for e in range(3):
+                    column = 3 * (k + j) + e
+                    offset = 3 * (i - j) - e
+                    for d in range(e if i == j else 0, 3):
+                        value = G[i, 0, d] * SG[0, e] + G[i, 1, d] * SG[1, e] + G[i, 2, d] * SG[2, e]
+                        K[column, offset + d] += value + both * B[d, e] + mixed * A[d, e]
+
+
+@law
+def body(q: Any, v: Any, tables: Any, active: Any, p: Any, scales: Any, tangent: bool, f: Any, K: Any) -> None:
+    """Subtract the forces, and add the tangents, of the body site."""
+    elastic, viscous, _ = scales
+    firsts, b0, weights = tables.body_first, tables.body_b0, tables.body_w
+    for n in range(len(weights)):
+        k, w = firsts[n], weights[n]
+        b = _row(b0, n)
+        force, S, V = body_force(active, p, _combine(q, k, b), _combine(v, k, b))
+        for i in range(4):
+            f[k + i, 0] -= w * b[i] * force[0]
+            f[k + i, 1] -= w * b[i] * force[1]
+            f[k + i, 2] -= w * b[i] * force[2]
+        if tangent:
+            H = (
+                elastic * S[0] + viscous * V[0], elastic * S[1] + viscous * V[1], elastic * S[2] + viscous * V[2],
+                elastic * S[3] + viscous * V[3], elastic * S[4] + viscous * V[4], elastic * S[5] + viscous * V[5],
+            )  # fmt: skip
+            for j in range(4):
+                for i in range(j, 4):
+                    _add_symmetric(K, k, i, j, w * b[i] * b[j], H)
+
+
+@law
+def energy(q: Any, tables: Any, active: Any, p: Any, memory: Any) -> float:
+    """Return the stored energy [J]."""
+    total = 0.0
+    for n in range(len(tables.axial_w)):
+        x, y, z = _combine(q, tables.axial_first[n], _row(tables.axial_b1, n))
+        total += tables.axial_w[n] * axial_energy(active, p, np.sqrt(x * x + y * y + z * z) - 1.0)
+    for n in range(len(tables.curvature_w)):
+        k = tables.curvature_first[n]
+        a = _combine(q, k, _row(tables.curvature_b1, n))
+        kappa = space_curvature(a, _combine(q, k, _row(tables.curvature_b2, n)))[3]
+        rest = (memory[n, 0], memory[n, 1], memory[n, 2])
+        total += tables.curvature_w[n] * curvature_energy(active, p, kappa, rest)
+    return total

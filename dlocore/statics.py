@@ -1,0 +1,200 @@
+"""Static equilibrium alone: the paper's remark after eq. (20), the equations without M and N."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dlocore.discretisation import Grid, Starts, applied_forces, close_grasps, hold, make_grid, smallest_n_u
+from dlocore.errors import SceneError, number
+from dlocore.kernels.assembly import assemble
+from dlocore.kernels.relax import relax
+from dlocore.prediction import Status
+from dlocore.problem import Problem, pose
+from dlocore.report import WindowForces, elastic_energy, reactions
+from dlocore.scene import Scene
+from dlocore.solvers.march import closed_grasps
+from dlocore.solvers.monitor import Monitor, TimeIsUp
+from dlocore.spline import design_matrix
+
+Floats = NDArray[np.float64]
+
+LEVELS = (9, 13, 17, 25, 33, 49, 65, 97)
+TOLERANCE = 1e-10  # of the length, on the last Newton update
+ITERATIONS = 60  # of one relaxation
+ROUNDS = 400  # of relaxations, each held back less by where it started
+PATH_STEPS = 24  # that bring the grasps to their poses at a later time
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Equilibrium:
+    """A static equilibrium.
+
+    Attributes:
+        status: "converged", or why not.
+        message: the status in words.
+        control_points: (n_u, 4) [m, m, m, rad].
+        knots_u: (n_u + 4,) [m].
+        reactions: force of each grasp, in the scene's order (grasps, 3) [N]; zero where it is open.
+        moments: moment of each grasp (grasps, 3) [N m].
+        energy: elastic energy [J].
+        error_estimate: largest distance to the grid before [m]; None where n_u was given.
+    """
+
+    status: Status
+    message: str
+    control_points: Floats
+    knots_u: Floats
+    reactions: Floats
+    moments: Floats
+    energy: float
+    error_estimate: float | None
+
+    def positions(self, u: ArrayLike) -> Floats:
+        """Return r at the material coordinates u (k,) [m]; (k, 3) [m]."""
+        return design_matrix(self.knots_u, np.atleast_1d(u)) @ self.control_points[:, :3]
+
+
+def equilibrium(
+    scene: Scene,
+    *,
+    at: float = 0.0,
+    n_u: int | None = None,
+    deadline: float | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> Equilibrium:
+    """Find the static equilibrium of a scene's cable with its grasps at their poses of time `at`.
+
+    The cable is brought there from its start shape along the grasps' paths, so that of several equilibria the one is
+    found that it would slowly reach. Without a given `n_u` grids are refined until two agree to a tenth of a per mille
+    of the length, or to the scene's `target_error`.
+
+    Args:
+        scene: its horizon, inertia, drag and damping play no part.
+        at: time of the grasps' poses and of the loads [s].
+        n_u: number of control points; None: chosen.
+        deadline: time allowed [s].
+        cancelled: asked between relaxations; where it returns True the solve stops.
+
+    Raises:
+        SceneError: bad input, or nothing holds the cable against its weight.
+        Cancelled: `cancelled` returned True.
+    """
+    at = number("at", at, at_least=0.0, at_most=1e4, unit="s")
+    problem = pose(scene)
+    if not closed_grasps(problem, at, at) and (np.any(problem.weight() != 0) or scene.loads):
+        raise SceneError(
+            "primitives", "no grasp", "a grasp that holds the cable", "Nothing holds it against its forces"
+        )
+    monitor = Monitor(None, deadline, cancelled)
+    target = scene.quality.target_error or 1e-4 * scene.cable.length
+    least = smallest_n_u(problem)
+    sizes = [n_u] if n_u is not None else [max(n, least + 2 * i) for i, n in enumerate(LEVELS)]
+    found: tuple[Grid, Floats, bool, tuple[WindowForces, ...]] | None = None
+    change, status, message = np.inf, "time_limit", "The time limit passed. Allow more time or a smaller n_u."
+    for n in sizes:
+        try:
+            grid = make_grid(problem, n)
+            q, settled, forces = settle(problem, grid, at, monitor)
+        except TimeIsUp:
+            break
+        if found is not None:
+            u = np.linspace(0.0, scene.cable.length, 65)
+            before = design_matrix(found[0].knots, u) @ found[1]
+            change = float(np.linalg.norm(design_matrix(grid.knots, u) @ q - before, axis=1).max())
+        found = (grid, q, settled, forces)
+        status, message = "converged", "Forces balance." if n_u else f"Two grids agree to {change * 1e3:.2g} mm."
+        if change <= target:
+            break
+    if found is None:
+        raise SceneError("deadline", deadline, "more time", "Not even the coarsest grid was done")
+    grid, q, settled, forces = found
+    if not settled:
+        status = "stalled"
+        message = "The relaxation did not come to rest. The scene may have no equilibrium, or many side by side."
+    elif status == "converged" and n_u is None and not change <= target:
+        status, message = "max_iterations", f"The finest grid still moved the shape by {change * 1e3:.2g} mm."
+    world = np.zeros((grid.n_u, 4))
+    world[:, :3] = problem.plane.world(q)
+    held = reactions(problem, grid, forces)
+    return Equilibrium(
+        status=status,  # type: ignore[arg-type]
+        message=message,
+        control_points=world,
+        knots_u=grid.knots,
+        reactions=np.array([g.reaction[-1] for g in held]).reshape(-1, 3),
+        moments=np.array([g.moment[-1] for g in held]).reshape(-1, 3),
+        energy=elastic_energy(problem, grid, q),
+        error_estimate=None if n_u is not None or not np.isfinite(change) else change,
+    )
+
+
+def start_grid(problem: Problem, n_u: int, monitor: Monitor) -> Grid:
+    """Return the grid of a motion's start: settled to equilibrium where the scene asks for it.
+
+    Raises:
+        SceneError: the start was to settle and found no equilibrium.
+    """
+    grid = make_grid(problem, n_u)
+    if not problem.scene.shape.settle:
+        return grid
+    q, settled, _ = settle(problem, grid, 0.0, monitor)
+    if not settled:
+        allowed = "false, or a start that grasps hold in an equilibrium"
+        raise SceneError("shape.settle", True, allowed, "The start did not come to rest")
+    return replace(grid, start=q)
+
+
+def settle(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> tuple[Floats, bool, tuple[WindowForces, ...]]:
+    """Return control points (n_u, nc) [m] at rest with the grasps at their poses of time `at`, and what holds them.
+
+    Relaxations held back by a spring towards where they started: the first strongly, later ones less, so that a cable
+    without a stable tangent (buckling, free rotation) walks downhill instead of jumping.
+
+    Raises:
+        Cancelled, TimeIsUp: as `monitor` says.
+    """
+    q = grid.start.copy()
+    starts: Starts = {}
+    times = np.linspace(0.0, at, PATH_STEPS + 1)[1:] if at > 0 else np.zeros(1)
+    active, parameters = problem.law_table()
+    axes = tuple(range(problem.plane.dimensions))
+    length = problem.scene.cable.length
+    bending = problem.bend.bending_stiffness if problem.bend else 0.0
+    load = float(np.linalg.norm(problem.weight()))
+    springs = 10.0 * (bending / length**4 + load / length) + 1e-9
+    settled = False
+    forces: tuple[WindowForces, ...] = ()
+    for t in times:
+        grasps = closed_grasps(problem, t, t)
+        close_grasps(problem, grid, grasps, starts, q)
+        held = hold(problem, grid, grasps, np.array([t]), starts)
+        applied = applied_forces(problem, grid, np.array([t]))[0]
+        strength = springs
+        settled = False
+        for _ in range(ROUNDS if t == times[-1] else 4):
+            monitor.check()
+            before = q.copy()
+            update, used = relax(
+                axes, q, before, strength, applied, grid.tables, active, parameters, grid.memory, held.elimination,
+                held.offsets[0], TOLERANCE * length, ITERATIONS,
+            )  # fmt: skip
+            moved = float(np.abs(q - before).max())
+            strength *= 0.2 if used <= 12 else 1.0
+            if moved <= 1e-8 * length and update <= TOLERANCE * length:
+                settled = True
+                break
+        forces = (
+            WindowForces(held, np.array([t]), _holding(problem, grid, q, applied, held.elimination.held), q[None]),
+        )
+    return q, settled, forces
+
+
+def _holding(problem: Problem, grid: Grid, q: Floats, applied: Floats, held: NDArray[np.int64]) -> Floats:
+    active, parameters = problem.law_table()
+    f, nothing = np.empty_like(q), np.empty((1, 1))
+    axes = tuple(range(problem.plane.dimensions))
+    still = np.zeros_like(q)
+    assemble(axes, q, still, grid.tables, active, parameters, grid.memory, (0.0, 0.0, 0.0), f, nothing)
+    return (f - applied).reshape(1, -1)[:, held]
