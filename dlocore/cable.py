@@ -2,12 +2,11 @@
 
 import math
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, cast
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from dlocore.errors import SceneError, array, choice, number
+from dlocore.errors import SceneError, choice, number, points_array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,10 +70,8 @@ class Cable:
             put("bending_stiffness", self.youngs_modulus * math.pi * diameter**4 / 64)
         if self.axial_stiffness is None:
             modulus = self.youngs_modulus
-            put(
-                "axial_stiffness",
-                16 * self.bending_stiffness / diameter**2 if modulus is None else modulus * math.pi * diameter**2 / 4,
-            )
+            solid = 16 * cast(float, self.bending_stiffness) / diameter**2
+            put("axial_stiffness", solid if modulus is None else modulus * math.pi * diameter**2 / 4)
         if self.torsional_stiffness is None:
             modulus = self.shear_modulus
             put(
@@ -90,8 +87,7 @@ class Cable:
         if isinstance(self.rest_shape, str):
             choice("rest_shape", self.rest_shape, ("straight", "initial"))
         else:
-            columns = np.shape(self.rest_shape)[-1] if np.ndim(self.rest_shape) == 2 else 3
-            put("rest_shape", array("rest_shape", self.rest_shape, shape=(None, 2 if columns == 2 else 3), unit="m"))
+            put("rest_shape", points_array("rest_shape", self.rest_shape))
 
     @staticmethod
     def preset(name: str, **overrides: Any) -> "Cable":
@@ -117,7 +113,10 @@ class Preset:
 
 
 _WIRES = "measured wires of github.com/qj25/adapteddlo_muj (MIT), middle of the published range; length 1 m assumed"
-_ELECTRIC = "identified electric cables of github.com/sebtiburzio/floating_PAC_model, middle of the published range; length 1 m assumed"
+_ELECTRIC = (
+    "identified electric cables of github.com/sebtiburzio/floating_PAC_model, middle of the published range; "
+    "length 1 m assumed"
+)
 
 
 def _wire(density: float, diameter: float, EI: float, GJ: float | None) -> dict[str, float]:

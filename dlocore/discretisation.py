@@ -183,7 +183,7 @@ Starts = dict[Grasp, tuple[Floats, Floats]]  # position and unit tangent (nc,) w
 
 
 def close_grasps(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, q: Floats | None) -> None:
-    """Note where the paths of newly closed `grasps` begin: on the start curve at t = 0, else on the control points q."""
+    """Note where the paths of newly closed `grasps` begin: on the start curve at t = 0, else on q (n_u, nc)."""
     for g in grasps:
         if g in starts:
             continue
@@ -218,10 +218,10 @@ def hold(problem: Problem, grid: Grid, grasps: list[Grasp], t: Floats, starts: S
             rows.append((i, derivative))
             order = first + np.argsort(-np.abs(b), kind="stable")
             pivots.append(next(int(k) for k in order if k not in pivots))
-    inverse = np.linalg.inv(A[:, pivots])
+    inverse = np.asarray(np.linalg.inv(A[:, pivots]), dtype=np.float64)
     follow = -inverse @ A
     follow[:, pivots] = 0.0
-    offsets = (inverse @ target).reshape(len(t), -1)
+    offsets: Floats = (inverse @ target).reshape(len(t), -1)
     return Held(tuple(grasps), _elimination(grid.n_u, nc, pivots, follow), offsets, tuple(rows), inverse)
 
 

@@ -41,7 +41,7 @@ class SceneError(DloError, ValueError):
         return (type(self), (self.field, self.given, self.allowed, self.reason))
 
 
-class Cancelled(DloError):
+class Cancelled(DloError):  # noqa: N818 - named for what happened
     """The caller asked a running solve to stop."""
 
 
@@ -112,6 +112,24 @@ def array(field: str, value: ArrayLike, *, shape: tuple[int | None, ...], unit: 
         raise SceneError(field + "".join(f"[{i}]" for i in where), float(x[tuple(where)]), allowed)
     x.setflags(write=False)
     return x
+
+
+def columns_of(value: Any) -> int:
+    """Return the length of the rows of `value`, 0 where it is no table of equal rows."""
+    try:
+        shape = np.shape(value)
+    except ValueError:
+        return 0
+    return int(shape[1]) if len(shape) == 2 else 0
+
+
+def points_array(field: str, value: ArrayLike) -> NDArray[np.float64]:
+    """Return points (n, 3) [m] of the points (n, 2 or 3) `value`, 2D points at z = 0, or raise SceneError."""
+    points = array(field, value, shape=(None, 2 if columns_of(value) == 2 else 3), unit="m")
+    if points.shape[1] == 2:
+        points = np.column_stack([points, np.zeros(len(points))])
+        points.setflags(write=False)
+    return points
 
 
 def choice(field: str, value: Any, options: tuple[str, ...]) -> str:

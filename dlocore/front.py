@@ -62,7 +62,8 @@ def predict(
 
 def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method: str) -> Prediction:
     """Solve on the given grid by the weighted least squares from a march, or by the printed scheme from rest."""
-    assert quality.n_u is not None and quality.n_t is not None
+    assert quality.n_u is not None
+    assert quality.n_t is not None
     _check_n_t(problem, quality.n_t)
     level = run_level(problem, quality.n_u, quality.n_t, given_steps(quality.n_t), monitor)
     if level.motion.stopped:
@@ -106,7 +107,8 @@ def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method:
 
 def _companion(problem: Problem, quality: Quality, level: Level, monitor: Monitor) -> float | None:
     """Return the distance of a level's surface to a march on a grid half as fine again: its error estimate [m]."""
-    assert quality.n_u is not None and quality.n_t is not None
+    assert quality.n_u is not None
+    assert quality.n_t is not None
     if not quality.estimate:
         return None
     n_u = max(smallest_n_u(problem), round(FINER * quality.n_u))

@@ -4,6 +4,7 @@ A path's clock starts when its grasp does (`Grasp.grasp_time`, t = 0 by default)
 its last a path stands still.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, cast
 
@@ -18,12 +19,11 @@ Floats = NDArray[np.float64]
 Profile = Literal["minimum_jerk", "linear", "cubic"]
 
 # position law s(x) and its rate s'(x) on 0 <= x <= 1
-_PROFILES = {
+_PROFILES: dict[str, tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]] = {
     "minimum_jerk": (lambda x: x**3 * (10 - 15 * x + 6 * x**2), lambda x: 30 * x**2 * (1 - x) ** 2),
     "linear": (lambda x: x, np.ones_like),
     "cubic": (lambda x: x**2 * (3 - 2 * x), lambda x: 6 * x * (1 - x)),
 }
-_DURATION = {"above": 1e-4, "at_most": 1e4, "unit": "s"}
 MAX_WAYPOINTS = 100_000
 
 
@@ -68,7 +68,7 @@ class Move:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "displacement", array("displacement", self.displacement, shape=(3,), unit="m"))
-        object.__setattr__(self, "duration", number("duration", self.duration, **_DURATION))
+        object.__setattr__(self, "duration", number("duration", self.duration, above=1e-4, at_most=1e4, unit="s"))
         if self.rotation is not None:
             object.__setattr__(self, "rotation", array("rotation", self.rotation, shape=(3,), unit="rad"))
         choice("profile", self.profile, tuple(_PROFILES))
@@ -80,7 +80,7 @@ class Move:
 
     def _rate(self, t: float) -> float:
         x = t / self.duration
-        return float(_PROFILES[self.profile][1](np.float64(x))) / self.duration if 0.0 <= x < 1.0 else 0.0
+        return float(_PROFILES[self.profile][1](np.array(x))) / self.duration if 0.0 <= x < 1.0 else 0.0
 
     def velocity_at(self, t: float) -> Floats:
         """Velocity at time `t` [s]; (3,) [m/s]."""
@@ -120,14 +120,14 @@ class Waypoints:
             raise SceneError(f"times[{k + 1}]", times[k + 1], "times that rise by more than 1e-6 s")
         if times[0] < 0.0:
             raise SceneError("times[0]", times[0], "at least 0 [s]")
-        number("times[-1]", float(times[-1]), **_DURATION)
+        number("times[-1]", float(times[-1]), above=1e-4, at_most=1e4, unit="s")
         positions = array("positions", self.positions, shape=(None, 3), unit="m")
         if len(positions) != len(times):
             raise SceneError("positions", f"{len(positions)} positions", f"as many as times ({len(times)})")
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "positions", positions)
         boundary = ((1, np.zeros(3)), (2, np.zeros(3)))
-        object.__setattr__(self, "_spline", CubicSpline(times, positions, bc_type=boundary))
+        object.__setattr__(self, "_spline", CubicSpline(times, positions, bc_type=boundary))  # type: ignore[arg-type]
         if self.orientations is not None:
             quaternions = array("orientations", self.orientations, shape=(None, 4))
             if len(quaternions) != len(times):

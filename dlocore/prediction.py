@@ -43,7 +43,8 @@ class Iteration:
         update: norm of the change of the control points, the paper's eq. (25) [m]; for a refinement level the largest
             change of the surface [m], infinite at the first.
         residual: root of the weighted mean square of the equations' residual over the whole motion, as a displacement
-            [m] (docs/model.md eq. 16); for `paper` as a force [N]; for a level of `march` the largest Newton update [m].
+            [m] (docs/model.md eq. 16); for `paper` a force [N]; for a level of `march` the largest error left
+            by Newton's iterations [m].
         energy: elastic energy at the end of the motion [J].
         wall_time: since the solve began [s].
         damping: Levenberg-Marquardt damping of the step, 0 for a plain one.

@@ -117,7 +117,7 @@ class Problem:
         return self.plane.points(grasp.path.at(t - grasp.start, world))
 
     def direction(self, grasp: Grasp, t: Floats, start: Floats) -> Floats:
-        """Return the prescribed unit tangents (k, nc) of `grasp` at times t (k,) [s], `start` (nc,) at its beginning."""
+        """Return the prescribed unit tangents (k, nc) of `grasp` at times t (k,) [s], from `start` (nc,)."""
         turns = grasp.path.rotation_at(t - grasp.start)
         if turns is None:
             return np.broadcast_to(start, (len(t), self.plane.dimensions))

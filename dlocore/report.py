@@ -88,6 +88,7 @@ def effect_reports(problem: Problem, surface: SplineSurface) -> tuple[EffectRepo
 
     heavy = bool(np.any(cast(Floats, environment.gravity) != 0))
     table = environment.table is not None
+    drags = environment.drag > 0 or environment.drag_quadratic > 0
     reports = [
         EffectReport(
             "inertia", problem.inertia is not None, why("inertia", True, "the cable has mass and moves", ""),
@@ -95,7 +96,7 @@ def effect_reports(problem: Problem, surface: SplineSurface) -> tuple[EffectRepo
         ),
         EffectReport(
             "drag", problem.drag is not None or problem.quadratic_drag is not None,
-            why("drag", environment.drag > 0 or environment.drag_quadratic > 0, "the environment has drag", "no drag is given"),
+            why("drag", drags, "the environment has drag", "no drag is given"),
             float(np.trapezoid(environment.drag * speed + environment.drag_quadratic * speed**2, u, axis=1).max()), "N",
         ),
         EffectReport(
@@ -121,7 +122,7 @@ def effect_reports(problem: Problem, surface: SplineSurface) -> tuple[EffectRepo
     reports.append(
         EffectReport(
             "table", problem.on_table,
-            why("table", table, "the cable lies on it: it carries the weight and the motion is planar", "there is none"),
+            why("table", table, "the cable lies on it: it carries the weight, the motion is planar", "there is none"),
             float(mu * cable.length * np.linalg.norm(cast(Floats, environment.gravity))) if problem.on_table else None,
             "N" if problem.on_table else "",
         )

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.cable import Cable
-from dlocore.errors import SceneError, array, choice, number
+from dlocore.errors import SceneError, array, choice, columns_of, number, points_array
 from dlocore.paths import Move, Path, Still, Waypoints
 
 Floats = NDArray[np.float64]
@@ -93,8 +93,8 @@ class ControlPoints:
     velocity: ArrayLike | None = None
 
     def __post_init__(self) -> None:
-        columns = np.shape(self.control_points)[-1] if np.ndim(self.control_points) == 2 else 4
-        points = array("control_points", self.control_points, shape=(None, 3 if columns == 3 else 4), unit="m")
+        columns = 3 if columns_of(self.control_points) == 3 else 4
+        points = array("control_points", self.control_points, shape=(None, columns), unit="m")
         if not 4 <= len(points) <= 2000:
             raise SceneError("control_points", f"{len(points)} control points", "4 to 2000")
         if columns == 4 and np.any(points[:, 3] != 0.0):
@@ -114,13 +114,9 @@ Shape = Straight | Points | ControlPoints
 
 
 def _points(name: str, value: ArrayLike, *, at_least: int) -> Floats:
-    columns = np.shape(value)[-1] if np.ndim(value) == 2 else 3
-    points = array(name, value, shape=(None, 2 if columns == 2 else 3), unit="m")
+    points = points_array(name, value)
     if not at_least <= len(points) <= MAX_POINTS:
         raise SceneError(name, f"{len(points)} points", f"{at_least} to {MAX_POINTS} points")
-    if columns == 2:
-        points = np.column_stack([points, np.zeros(len(points))])
-        points.setflags(write=False)
     if not np.ptp(points, axis=0).max() > 1e-9:
         raise SceneError(name, points, "points that are not all the same")
     return points
@@ -129,7 +125,7 @@ def _points(name: str, value: ArrayLike, *, at_least: int) -> Floats:
 def _velocity(value: ArrayLike | None, count: int | None) -> Floats | None:
     if value is None:
         return None
-    if np.ndim(value) == 1:
+    if columns_of(value) == 0:
         return array("velocity", value, shape=(3,), unit="m/s")
     velocity = array("velocity", value, shape=(count, 3), unit="m/s")
     if len(velocity) < 4:
@@ -163,9 +159,7 @@ class Grasp:
         if not isinstance(self.path, Still | Move | Waypoints):
             raise SceneError("path", self.path, "Still, Move or Waypoints")
         if self.hold == "point":
-            turns = (
-                getattr(self.path, "rotation", None) is not None or getattr(self.path, "orientations", None) is not None
-            )
+            turns = any(getattr(self.path, name, None) is not None for name in ("rotation", "orientations"))
             if turns:
                 name = "path.rotation" if isinstance(self.path, Move) else "path.orientations"
                 raise SceneError(name, "a rotation", 'none with hold "point", or hold "tangent"')
@@ -210,7 +204,7 @@ class Load:
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """A horizontal table; `height` [m] is that of the centreline of a cable lying on it. `friction` must be 0 so far."""
+    """A horizontal table; `height` [m] is that of the centreline of a cable lying on it; `friction` must be 0."""
 
     height: float = 0.0
     friction: float = 0.0
@@ -329,10 +323,11 @@ class Scene:
         length = self.cable.length
         if len(self.grasps) > MAX_GRASPS:
             raise SceneError("primitives", f"{len(self.grasps)} primitives", f"at most {MAX_GRASPS}")
-        for name, parts in (("primitives", self.grasps), ("loads", self.loads)):
-            for i, part in enumerate(parts):
-                if not part.u <= length:
-                    raise SceneError(f"{name}[{i}].u", part.u, f"0 to the cable's length, {length:g} [m]")
+        places = [(f"primitives[{i}].u", g.u) for i, g in enumerate(self.grasps)]
+        places += [(f"loads[{i}].u", load.u) for i, load in enumerate(self.loads)]
+        for name, u in places:
+            if not u <= length:
+                raise SceneError(name, u, f"0 to the cable's length, {length:g} [m]")
         self._check_horizon()
         self._check_effects()
         self._check_overlap()

@@ -12,8 +12,9 @@ body       position, velocity             force per unit length, minus its deriv
 ========== ============================== ============================================================================
 
 Curvature is a vector: in the plane its signed value and two zeros, in space three world components across the tangent;
-a law is written once for both. Vectors and symmetric tangents are tuples of scalars, which compilers keep in registers. Laws at strain sites know nothing of splines or of geometry: `kernels/strain.py` turns stress
-into generalised forces. Memory is the paper's eps_0, the curvature of the stress-free shape at the point: state that
+a law is written once for both. Vectors and symmetric tangents are tuples of scalars, which compilers keep in registers.
+Laws at strain sites know nothing of splines or of geometry: `kernels/strain.py` turns stress into generalised forces.
+Memory is the paper's eps_0, the curvature of the stress-free shape at the point: state that
 belongs to the solve, not to the law. Effects at one site superpose.
 `effects/laws.py` is the one list of them: adding an effect is adding a file and its line there.
 """

@@ -15,7 +15,7 @@ _SAMPLES = 256  # of the knot density in one segment
 
 @kernel
 def basis(knots: Any, span: int, x: float, order: int, out: Any) -> None:
-    """Write the four cubic basis functions of `span` at `x`, and their derivatives to `order` (0 to 3), to out[order+1, 4].
+    """Write the four cubic basis functions of `span` at `x`, with derivatives to `order`, to out (order + 1, 4).
 
     `span` is the index k with knots[k] <= x <= knots[k+1] (Cox-de Boor; Piegl and Tiller, The NURBS Book, A2.3).
     """
@@ -231,7 +231,15 @@ def _axial_points(knots: Any, free_start: bool, free_end: bool, rule: Any, weigh
 
 @kernel
 def build_tables(
-    knots: Any, free_start: bool, free_end: bool, rule2: Any, w2: Any, rule3: Any, w3: Any, rule4: Any, w4: Any
+    knots: Any,
+    free_start: bool,
+    free_end: bool,
+    rule2: Any,
+    w2: Any,
+    rule3: Any,
+    w3: Any,
+    rule4: Any,
+    w4: Any,
 ) -> Any:
     """Return `Tables` of the clamped cubic `knots`; `free_*`: the direction at that end of the cable is free."""
     u, axial_w = _axial_points(knots, free_start, free_end, rule2, w2)

@@ -24,7 +24,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     numba's cache of a function looks only at the age of that function's own file, so a change of a law that is inlined
     into a kernel would go unnoticed. The stamp is therefore the hash of all compiled sources.
     """
-    compiled = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
     compiled._cache._cache_file._source_stamp = _SOURCE
     return compiled
 

@@ -44,8 +44,8 @@ def constrained_mass_solve(nc: int, mass: Any, e: Any, held: Any, right: Any) ->
 
 @kernel
 def march_steps(
-    axes: Any, start: int, stop: int, begin: int, h: float, rho: float, tolerance: float, Q: Any, v: Any, a: Any, G: Any,
-    mass: Any, drag: Any, tables: Any, active: Any, p: Any, memory: Any, applied: Any, e: Any, offsets: Any,
+    axes: Any, start: int, stop: int, begin: int, h: float, rho: float, tolerance: float, Q: Any, v: Any, a: Any,
+    G: Any, mass: Any, drag: Any, tables: Any, active: Any, p: Any, memory: Any, applied: Any, e: Any, offsets: Any,
     reactions: Any, info: Any,
 ) -> None:  # fmt: skip
     """Advance from step `start` to `stop` by the generalised-alpha method (Chung and Hulbert, 1993).

@@ -28,13 +28,13 @@ def _merit(
 
 @kernel
 def relax(
-    axes: Any, q: Any, target: Any, strength: float, applied: Any, tables: Any, active: Any, p: Any, memory: Any, e: Any,
-    offset: Any, tolerance: float, limit: int,
+    axes: Any, q: Any, target: Any, strength: float, applied: Any, tables: Any, active: Any, p: Any, memory: Any,
+    e: Any, offset: Any, tolerance: float, limit: int,
 ) -> Any:  # fmt: skip
     """Minimise energy over q (n, nc) in place by Newton steps with a line search; return (update [m], iterations).
 
-    The energy is the stored one, minus the work of the applied forces, plus a spring of `strength` [N/m^2] a unit length
-    towards `target`. Where the tangent is not positive its positive semidefinite part is taken. The work of the
+    The energy is the stored one, minus the work of the applied forces, plus a spring of `strength` [N/m^2] towards
+    `target`. Where the tangent is not positive its positive semidefinite part is taken. The work of the
     residual, not the energy, decides where energy differences drown in rounding.
 
     Args:

@@ -72,8 +72,8 @@ def curvature(
 ) -> None:
     """Add the forces and tangents of the curvature site.
 
-    With G_j = (c_j - h b_j / l) P / l - b_j kappa t' / l, the derivative of kappa by control point j, the material part of
-    the tangent is G_i' S G_j; the geometric part is that of `strain` eq. M . d2kappa.
+    With G_j = (c_j - h b_j / l) P / l - b_j kappa t' / l, the derivative of kappa by control point j, the material
+    part of the tangent is G_i' S G_j; the geometric part is M . d2kappa.
     """
     elastic, viscous, geometric = scales
     firsts, b1, b2, weights = tables.curvature_first, tables.curvature_b1, tables.curvature_b2, tables.curvature_w

@@ -1,6 +1,7 @@
 """The compiled march: implicit steps of the spatial spline, fitted by the time spline."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,10 +129,7 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
     plane = problem.plane
     axes = tuple(range(plane.dimensions))
     marks = [0.0, *[e.time for e in events_of(problem)], problem.horizon]
-    counts = [
-        max(8, steps // (2 * len(marks)), round(steps * (b - a) / problem.horizon))
-        for a, b in zip(marks[:-1], marks[1:], strict=True)
-    ]
+    counts = [max(8, steps // (2 * len(marks)), round(steps * (b - a) / problem.horizon)) for a, b in pairwise(marks)]
     if len(counts) == 1:
         counts = [steps]
     times = np.concatenate(

@@ -46,7 +46,7 @@ def solve_as_printed(
     if len(windows) > 1:
         allowed = '"march" or "spacetime" where grasps open, close or jump in mid-motion'
         raise SceneError("quality.method", "paper", allowed, "The printed scheme has one smooth motion")
-    n_t, n_u, nc = len(knots_t) - 4, grid.n_u, problem.plane.dimensions
+    n_t, n_u = len(knots_t) - 4, grid.n_u
     if n_u * n_t > LARGEST_NET:
         allowed = f"at most {LARGEST_NET} control points with the printed scheme, which is dense"
         raise SceneError("quality.n_u", f"n_u n_t = {n_u * n_t}", allowed)
@@ -65,7 +65,7 @@ def solve_as_printed(
         J, R = _equations(window, control, first, table, applied, Z)
         if not np.isfinite(J).all():
             break
-        x = np.linalg.lstsq(J, -R, rcond=None)[0]
+        x = np.asarray(np.linalg.lstsq(J, -R, rcond=None)[0], dtype=np.float64)
         step = window.expand(x)
         control = control + step
         update = float(np.linalg.norm(step))
@@ -109,4 +109,4 @@ def _dense_band(band: Floats, nc: int) -> Floats:
     for o in range(4):
         full[np.arange(n - o) + o, np.arange(n - o)] = band[: n - o, o]
         full[np.arange(n - o), np.arange(n - o) + o] = band[: n - o, o]
-    return np.kron(full, np.eye(nc))
+    return np.asarray(np.kron(full, np.eye(nc)), dtype=np.float64)

@@ -6,6 +6,7 @@ spline are found by Gauss-Newton iteration from a march, until the update is bel
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +48,7 @@ def windows_of(problem: Problem, knots_t: Floats) -> list[Window]:
     cuts = [e for e in events_of(problem) if e.multiplicity > 1]
     marks = [0.0, *[e.time for e in cuts], problem.horizon]
     windows = []
-    for i, (a, b) in enumerate(zip(marks[:-1], marks[1:], strict=True)):
+    for i, (a, b) in enumerate(pairwise(marks)):
         inner = knots_t[(knots_t > a) & (knots_t < b)]
         knots = np.concatenate([np.full(4, a), inner, np.full(4, b)])
         windows.append(Window(a, b, knots, i > 0 and cuts[i - 1].multiplicity == 3))
