@@ -1,11 +1,12 @@
 """The viser server inside the service: started with it, stopped with it, one session a connected client."""
 
-import asyncio
 import contextlib
 import hmac
 import secrets
 from collections.abc import AsyncIterator, Collection, Iterator
 
+import anyio
+import anyio.to_thread
 import rich
 import viser
 from fastapi import FastAPI
@@ -78,10 +79,11 @@ class SceneHost:
 @contextlib.asynccontextmanager
 async def hosting(app: FastAPI, allowed_origins: Collection[str], runs: Runs) -> AsyncIterator[SceneHost]:
     """Run a viser server behind the gateway of `app` while the context lasts."""
-    host = await asyncio.to_thread(SceneHost, runs)
+    host = await anyio.to_thread.run_sync(SceneHost, runs)
     app.state.viewer_upstream = Upstream(port=host.port, key=host.key, allowed_origins=frozenset(allowed_origins))
     try:
         yield host
     finally:
         app.state.viewer_upstream = None
-        await asyncio.to_thread(host.stop)
+        with anyio.CancelScope(shield=True):  # the service may be stopping because it was cancelled
+            await anyio.to_thread.run_sync(host.stop)

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from viser import ClientHandle, TransformControlsEvent
 
+from app.viewer.camera import FIELD_OF_VIEW, start_pose
 from app.viewer.draft import Draft, start_draft
 from app.viewer.palette import BRAND
 from app.viewer.panel import Panel
@@ -20,8 +21,6 @@ from dlocore import Prediction
 FRAME = 1 / 60  # s
 QUIET = 0.2  # s without an edit, after which the hand counts as still
 GIZMO_SIZE = 0.16  # of the cable's length
-CAMERA_FOV = 0.7  # rad
-CAMERA_DISTANCE = 1.75  # of the cable's length, in a picture wider than 1.2 times its height
 WARNING_HEIGHT = 0.06  # m above the target
 _log = logging.getLogger(__name__)
 
@@ -82,10 +81,10 @@ class Session:
         client.gui.set_panel_label("Cable")
         client.scene.set_up_direction("+z")
         client.gui.main_panel.dock_right()
-        distance = CAMERA_DISTANCE * length * max(1.0, 1.2 / client.camera.aspect)
-        client.camera.fov = CAMERA_FOV
-        client.camera.position = (0.5 * length, 0.2 * length - 0.66 * distance, 0.75 * distance)
-        client.camera.look_at = (0.5 * length, 0.2 * length, 0.0)
+        client.camera.fov = FIELD_OF_VIEW
+        client.camera.position, client.camera.look_at = start_pose(
+            length, client.camera.image_width, client.camera.image_height
+        )
         client.camera.max_orbit_distance = 20.0
 
     def _add_gizmo(self) -> None:

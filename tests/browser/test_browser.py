@@ -1,0 +1,167 @@
+import io
+import json
+import re
+import subprocess
+import sys
+from urllib.parse import urlsplit
+
+import httpx
+import numpy as np
+import pytest
+from PIL import Image
+from playwright.sync_api import Frame, Page, expect
+
+from app.schemas import PredictionRequest, to_scene
+from app.viewer.camera import FIELD_OF_VIEW, start_pose
+from app.viewer.session import GIZMO_SIZE
+from dlocore import predict
+
+pytestmark = pytest.mark.browser
+HANDLE = 1 / 7 + 0.225 / 2  # centre of the gizmo's square, of the gizmo's size along x and along y
+
+
+def open_scene(witness, service) -> Page:
+    page = witness.page
+    page.goto(f"{service.address}/scene/")
+    page.wait_for_selector('[data-status="converged"]')
+    return page
+
+
+def on_screen(page: Page, x: float, y: float) -> tuple[float, float]:
+    """Project the point (x, y, 0) of the table onto the page, as the start camera sees it."""
+    box = page.locator("canvas").first.bounding_box()
+    assert box is not None
+    size = page.viewport_size
+    assert size is not None
+    eye, centre = start_pose(1.0, size["width"], size["height"])
+    forward = (centre - eye) / np.linalg.norm(centre - eye)
+    right = np.cross(forward, [0, 0, 1])
+    right /= np.linalg.norm(right)
+    ray = np.array([x, y, 0.0]) - eye
+    scale = 0.5 * box["height"] / np.tan(0.5 * FIELD_OF_VIEW) / (ray @ forward)
+    up = np.cross(right, forward)
+    return box["x"] + 0.5 * box["width"] + scale * (ray @ right), box["y"] + 0.5 * box["height"] - scale * (ray @ up)
+
+
+def kept_run(page: Page | Frame) -> str:
+    """Keep the run on show; return its id."""
+    page.get_by_role("tab", name="Share").click()
+    page.get_by_role("button", name="Keep this run").click()
+    return page.locator("[data-run]").get_attribute("data-run") or ""
+
+
+def canvas(page: Page) -> np.ndarray:
+    """Return the picture of the 3D scene, left of the panel."""
+    box = page.locator("canvas").first.bounding_box()
+    assert box is not None
+    return np.asarray(Image.open(io.BytesIO(page.screenshot(clip=box))).convert("RGB"), dtype=int)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_landing_page_shows_the_scene_and_asks_no_other_host(service, witness, scheme):
+    page = witness.page
+    page.emulate_media(color_scheme=scheme)
+    page.goto(service.address)
+    expect(page.get_by_role("heading", level=1)).to_be_visible()
+    scene = page.frame_locator("#scene")
+    expect(scene.locator('[data-status="converged"]')).to_be_visible()
+    expect(page.locator("#runs-note, #runs-table table").locator("visible=true")).not_to_have_text("Loading …")
+    dark = scene.locator("html[data-mantine-color-scheme='dark']").count() == 1
+    assert dark == (scheme == "dark")
+    assert witness.errors == []
+    assert witness.hosts == {urlsplit(service.address).netloc}
+
+
+def test_the_landing_page_fits_a_phone(service, witness):
+    page = witness.page
+    page.set_viewport_size({"width": 375, "height": 740})
+    page.goto(service.address)
+    expect(page.frame_locator("#scene").locator("canvas").first).to_be_visible()
+    assert page.evaluate("document.documentElement.scrollWidth") <= 375
+
+
+def test_the_landing_page_can_be_walked_through_by_keyboard(service, witness):
+    page = witness.page
+    page.goto(service.address)
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.textContent") == "Skip the scene"
+    page.keyboard.press("Enter")
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.dataset.copy") == "curl"
+
+
+def test_the_examples_on_the_landing_page_work(service, witness, tmp_path):
+    page = witness.page
+    page.goto(service.address)
+    python, curl = page.locator("#python").inner_text(), page.locator("#curl").inner_text()
+    script = tmp_path / "example.py"
+    script.write_text(f"import sys; sys.path.insert(0, {str(service.root)!r})\n{python}\nprint(q.shape)")
+    printed = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True).stdout
+    assert "(33, 101, 4)" in printed
+    body = re.search(r"-d '(.*)'", curl, re.DOTALL)
+    address = re.search(r"http\S+", curl)
+    assert body is not None
+    assert address is not None
+    answer = httpx.post(address[0], json=json.loads(body[1]))
+    assert answer.json()["status"] == "converged"
+
+
+def test_a_kept_run_appears_on_the_landing_page_with_its_recording(service, witness):
+    page = witness.page
+    page.goto(service.address)
+    scene = page.frame_locator("#scene")
+    scene.locator('[data-status="converged"]').wait_for()
+    scene.get_by_role("tab", name="Share").click()
+    scene.get_by_role("button", name="Keep this run").click()
+    run_id = scene.locator("[data-run]").get_attribute("data-run")
+    row = page.locator("#runs-table tbody tr").filter(has=page.locator(f'a[href="/v1/predictions/{run_id}"]'))
+    expect(row).to_be_visible()
+    assert row.get_by_role("link", name="recording").get_attribute("href") == f"/v1/predictions/{run_id}/viewer"
+
+
+def test_dragging_the_gizmo_changes_the_prediction_to_that_of_the_python_api(service, witness):
+    page = open_scene(witness, service)
+    offset = HANDLE * GIZMO_SIZE
+    page.mouse.move(*on_screen(page, 0.25 + offset, 0.5 + offset))
+    page.wait_for_timeout(500)  # the gizmo takes hold of what it saw hovered in an earlier frame
+    page.mouse.down()
+    page.mouse.move(*on_screen(page, 0.40 + offset, 0.30 + offset), steps=8)
+    page.mouse.up()
+    page.wait_for_timeout(500)
+    page.wait_for_selector('[data-status="converged"]:not(:has-text("Preview"))')
+    base = f"{service.address}/v1/predictions/{kept_run(page)}"
+    scene = httpx.get(f"{base}/scene.json").json()
+    dx, dy, dz = scene["primitives"][0]["path"]["displacement"]
+    assert abs(dx - 0.15) < 0.02  # a pixel is about 2 mm
+    assert abs(dy - 0.30) < 0.02
+    assert dz == 0
+    request = PredictionRequest.model_validate(scene)
+    surface = predict(to_scene(request, lambda id: None)).surface
+    document = httpx.get(base).json()["surface"]
+    expected = surface.positions(document["u"], document["t"])
+    assert np.abs(np.array(document["positions"]) - expected).max() < 1e-9
+    assert witness.errors == []
+
+
+def test_playback_moves_the_cable_and_pause_holds_it(service, witness):
+    page = open_scene(witness, service)
+    page.get_by_role("button", name="Pause").click()
+    page.wait_for_timeout(1500)
+    still = canvas(page)
+    page.wait_for_timeout(700)
+    assert np.abs(canvas(page) - still).max() == 0
+    page.get_by_role("button", name="Play").click()
+    page.wait_for_timeout(700)
+    assert (np.abs(canvas(page) - still).max(axis=2) > 30).sum() > 100
+    assert witness.errors == []
+
+
+def test_an_impossible_target_is_said_in_the_panel(service, witness):
+    page = open_scene(witness, service)
+    page.get_by_label("Hold the far end").click()
+    page.wait_for_timeout(500)
+    box = page.get_by_text("Target x, y [m]").locator("xpath=ancestor::*[.//input][1]").locator("input").nth(1)
+    box.fill("0.9")
+    box.press("Enter")
+    expect(page.locator('[data-status="impossible"]')).to_contain_text("farther apart than the cable between them")
+    assert witness.errors == []
