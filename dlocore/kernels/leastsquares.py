@@ -69,6 +69,15 @@ def _gram(X: Any, Y: Any, out: Any) -> None:
 
 
 @kernel
+def _add_transposed(X: Any, r: Any, out: Any) -> None:
+    """Add X' r for r (n, 1)."""
+    for i in range(X.shape[0]):
+        s = r[i, 0]
+        for c in range(X.shape[1]):
+            out[c] += s * X[i, c]
+
+
+@kernel
 def states_at(first: Any, table: Any, C: Any, out: Any) -> None:
     """Write q, v and a (3, n, nc) of the control points C (n_t, n, nc) with basis `table` (3, 4) from `first`."""
     out[:] = 0.0
@@ -129,8 +138,9 @@ def normal_equations(
     band_to_dense(Mr, Md)
     band_to_dense(Nr, Nd)
     X, Y, Z = np.empty((free, free)), np.empty((free, free)), np.empty((free, free))
-    J = np.empty((4, free, free))
-    block = np.empty((free, free))
+    XX, XZ, ZZ = np.empty((free, free)), np.empty((free, free)), np.empty((free, free))
+    XY, YY, YZ = np.empty((free, free)), np.empty((free, free)), np.empty((free, free))
+    gradient = np.empty((3, free))
     r = np.empty((free, 1))
     state = np.empty((3, n, nc))
     viscous = active[DAMPING] != 0 or active[QUADRATIC_DRAG] != 0
@@ -174,32 +184,43 @@ def normal_equations(
         solve_rows(G, Z)
         _times_root(B, X)
         _times_root(B, Z)
+        # J_j = a_j X + b_j Y + c_j Z: the products of the three matrices serve all pairs of time basis functions. Without
+        # viscous laws the damping matrix is proportional to the mass matrix, and Y is merged into X.
+        _gram(X, X, XX)
+        _gram(X, Z, XZ)
+        _gram(Z, Z, ZZ)
+        gradient[:] = 0.0
+        _add_transposed(X, r, gradient[0])
+        _add_transposed(Z, r, gradient[2])
         if viscous:
             solve_rows(G, Y)
             _times_root(B, Y)
-        elif drag[0, 0] != 0.0:
-            Y[:] = (drag[0, 0] / mass[0, 0]) * X
-        else:
-            Y[:] = 0.0
-        for j in range(4):
-            t0, t1, t2 = table[k, 0, j], table[k, 1, j], table[k, 2, j]
-            for i in range(free):
-                for c in range(free):
-                    J[j, i, c] = t2 * X[i, c] + t1 * Y[i, c] + t0 * Z[i, c]
+            _gram(X, Y, XY)
+            _gram(Y, Y, YY)
+            _gram(Y, Z, YZ)
+            _add_transposed(Y, r, gradient[1])
+        merged = 0.0 if viscous else drag[0, 0] / mass[0, 0]
         for j in range(4):
             column = (first[k] + j - 2) * free
             if column < 0:
                 continue
-            for i in range(free):
-                s = share * r[i, 0]
-                for c in range(free):
-                    right[column + c] += s * J[j, i, c]
+            aj, bj, cj = table[k, 2, j] + merged * table[k, 1, j], table[k, 1, j], table[k, 0, j]
+            for c in range(free):
+                right[column + c] += share * (aj * gradient[0, c] + bj * gradient[1, c] + cj * gradient[2, c])
             for i in range(j, 4):
-                _gram(J[j], J[i], block)
+                ai, bi, ci = table[k, 2, i] + merged * table[k, 1, i], table[k, 1, i], table[k, 0, i]
                 shift = (i - j) * free
+                aa, ac, ca, cc = share * aj * ai, share * aj * ci, share * cj * ai, share * cj * ci
                 for c in range(free):
                     for d in range(c if i == j else 0, free):
-                        A[column + c, shift + d - c] += share * block[c, d]
+                        A[column + c, shift + d - c] += aa * XX[c, d] + ac * XZ[c, d] + ca * XZ[d, c] + cc * ZZ[c, d]
+                if viscous:
+                    ab, ba, bb = share * aj * bi, share * bj * ai, share * bj * bi
+                    bc, cb = share * bj * ci, share * cj * bi
+                    for c in range(free):
+                        for d in range(c if i == j else 0, free):
+                            value = ab * XY[c, d] + ba * XY[d, c] + bb * YY[c, d] + bc * YZ[c, d] + cb * YZ[d, c]
+                            A[column + c, shift + d - c] += value
     return objective
 
 
