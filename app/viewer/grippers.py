@@ -21,7 +21,16 @@ class GripperPicture:
         vertices, faces = geometry.gripper(cable_diameter)
         self._arrow_length = ARROW_LENGTH * cable_length
         self._lift = np.array([0.0, 0.0, 0.6 * cable_diameter])
-        self._body = scene.add_mesh_simple(f"/gripper/{number}", vertices, faces, color=STEEL)
+        # a batch of one: its pose then reaches the browser the same way as the cable's, and they are drawn in step
+        self._body = scene.add_batched_meshes_simple(
+            f"/gripper/{number}",
+            vertices,
+            faces,
+            batched_wxyzs=np.array([[1.0, 0.0, 0.0, 0.0]]),
+            batched_positions=np.zeros((1, 3)),
+            batched_colors=linear(np.array(STEEL)),
+            lod="off",
+        )
         self._path = scene.add_line_segments(
             f"/gripper_path/{number}", np.zeros((DASHES, 2, 3)), STEEL, thickness=2.0, thickness_units="screen"
         )
@@ -53,8 +62,9 @@ class GripperPicture:
             return
         grasp = self._grasp
         point = self._surface.positions([grasp.u], [time])[0, 0]
-        self._body.position = point
-        self._body.wxyz = geometry.yaw(self._surface([grasp.u], [time], du=1)[0, 0, :3])
+        along = self._surface([grasp.u], [time], du=1)[0, 0, :3]
+        self._body.batched_positions = point[None].astype(np.float32)
+        self._body.batched_wxyzs = geometry.yaw(along)[None].astype(np.float32)
         force = np.array([np.interp(time, grasp.times, grasp.reaction[:, axis]) for axis in range(3)])
         share = float(np.linalg.norm(force)) / self._newtons
         self._arrow.visible = share > SMALLEST_ARROW

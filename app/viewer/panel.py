@@ -193,9 +193,9 @@ class Panel:
         self._curl.content = report.curl_block(self._address, document)
         self._keep.disabled = False
 
-    def take_problem(self, problem: str) -> None:
+    def take_problem(self, problem: str, details: str) -> None:
         """Say why there is no prediction of the edited scene."""
-        self._status.content = report.problem_card(problem)
+        self._status.content = report.problem_card(problem, details)
         self._keep.disabled = True
 
     def take_scale(self, scale: ColourScale) -> None:

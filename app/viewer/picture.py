@@ -169,6 +169,7 @@ class Picture:
                 # strips that lie on each other must not be coplanar: later ones a little higher, all below the cable
                 rows[..., 2] -= radius * (1.0 - 0.9 * k / STRIPS)
             strip.vertices = rows.reshape(-1, 3).astype(np.float32)
+            strip.color = colour((k + 0.5) / STRIPS) if self._look.quantity.name == "time" else STEEL
             strip.visible = self._look.surface != "hidden"
 
     def _draw_ghosts(self) -> None:

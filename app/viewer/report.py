@@ -64,11 +64,12 @@ def status_card(prediction: Prediction, *, preview: bool) -> str:
     )
 
 
-def problem_card(problem: str) -> str:
+def problem_card(problem: str, details: str) -> str:
     """Return why there is no prediction, in words."""
     return (
         f'<div style="{_CARD} background: {_BAD};" data-status="impossible" role="alert"><b>This is not possible.</b> '
-        f"{escape(problem)}<div style='opacity: 0.75; margin-top: 0.3rem;'>The last good prediction stays.</div></div>"
+        f"{escape(problem)}.<div style='opacity: 0.75; margin-top: 0.3rem;'>{escape(details)} "
+        "The picture shows the last good prediction.</div></div>"
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from viser import ClientHandle, TransformControlsEvent
 
-from app.viewer.camera import FIELD_OF_VIEW, start_pose
+from app.viewer.camera import FIELD_OF_VIEW, PHONE, start_pose
 from app.viewer.draft import Draft, start_draft
 from app.viewer.palette import BRAND
 from app.viewer.panel import Panel
@@ -18,7 +18,8 @@ from app.viewer.playback import Playback
 from app.viewer.solving import Outcome, SolverThread
 from dlocore import Prediction
 
-FRAME = 1 / 60  # s
+FRAME = 1 / 40  # s
+PANEL_FRAMES = 3  # pictures for one update of the timeline: redrawing the panel is what costs the browser most
 QUIET = 0.2  # s without an edit, after which the hand counts as still
 GIZMO_SIZE = 0.16  # of the cable's length
 WARNING_HEIGHT = 0.06  # m above the target
@@ -80,7 +81,10 @@ class Session:
         client.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=BRAND, control_width="medium")
         client.gui.set_panel_label("Cable")
         client.scene.set_up_direction("+z")
-        client.gui.main_panel.dock_right()
+        if client.camera.image_width > PHONE:
+            client.gui.main_panel.dock_right()
+        else:
+            client.gui.main_panel.minimize()
         client.camera.fov = FIELD_OF_VIEW
         client.camera.position, client.camera.look_at = start_pose(
             length, client.camera.image_width, client.camera.image_height
@@ -114,7 +118,6 @@ class Session:
     def _begin_drag(self) -> None:
         """Show where the motion ends while the hand is on the target."""
         self._dragging = True
-        self._hint.visible = False
         self._playback.pause()
         self._playback.seek(self._playback.horizon)
         self._draw_time()
@@ -128,6 +131,8 @@ class Session:
         """Take over an edited draft: a preview at once, the asked quality as soon as the hand is still."""
         if draft == self._draft:
             return
+        if draft.target != self._draft.target:
+            self._hint.visible = False
         self._draft = draft
         with self._client.atomic():
             self._panel.take_draft(draft)
@@ -153,7 +158,7 @@ class Session:
     def _take(self, outcome: Outcome) -> None:
         with self._client.atomic():
             if outcome.prediction is None:
-                self._panel.take_problem(outcome.problem)
+                self._panel.take_problem(outcome.problem, outcome.details)
                 self._warn(outcome.problem)
             else:
                 draft, preview = outcome.job.draft, outcome.job.preview
@@ -170,7 +175,7 @@ class Session:
 
     def _warn(self, problem: str) -> None:
         x, y, z = self._draft.target
-        self._warning.text = "Not possible: " + (problem if len(problem) <= 90 else problem[:87] + "…")
+        self._warning.text = f"Not possible. {problem}."
         self._warning.position = (x, y, z + WARNING_HEIGHT)
         self._warning.visible = True
 
@@ -181,19 +186,24 @@ class Session:
                 self._panel.take_scale(scale)
         self._client.flush()
 
-    def _draw_time(self) -> None:
+    def _draw_time(self, *, panel: bool = True) -> None:
         with self._client.atomic():
             self._picture.pose(self._playback.time)
-            self._panel.show_time()
+            if panel:
+                self._panel.show_time()
         self._client.flush()
 
     async def _animate(self) -> None:
-        before = self._loop.time()
+        due = before = self._loop.time()
+        frame = 0
         while True:
-            await asyncio.sleep(FRAME)
+            due = max(due + FRAME, before)
+            await asyncio.sleep(max(due - self._loop.time(), 0.0))
             now = self._loop.time()
             if self._playback.advance(now - before):
-                self._draw_time()
+                frame += 1
+                at_rest = not 0.0 < self._playback.time < self._playback.horizon
+                self._draw_time(panel=at_rest or frame % PANEL_FRAMES == 0)
             before = now
 
     def _download(self) -> None:

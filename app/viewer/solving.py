@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import dlocore
 from app.viewer.draft import Draft
-from dlocore import Cancelled, DloError, Prediction, Quality
+from dlocore import Cancelled, DloError, Prediction, Quality, SceneError
 
 LONGEST_SOLVE = 20.0  # s, of a refined solve
 PREVIEW = Quality(time_budget=0.01)  # while the hand moves
@@ -26,11 +26,12 @@ class Job:
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What became of a job: a prediction, or the reason in words why there is none."""
+    """What became of a job: a prediction, or why there is none: in words, and with field, value and allowed range."""
 
     job: Job
     prediction: Prediction | None
     problem: str = ""
+    details: str = ""
 
 
 class SolverThread:
@@ -86,9 +87,12 @@ class SolverThread:
             prediction = dlocore.predict(scene, deadline=LONGEST_SOLVE, cancelled=cancelled)
         except Cancelled:
             return None
+        except SceneError as error:
+            details = f"{error.field}: got {error.given}, allowed: {error.allowed}."
+            return Outcome(job=job, prediction=None, problem=error.reason or error.field, details=details)
         except DloError as error:
             return Outcome(job=job, prediction=None, problem=str(error))
         except Exception:
             _log.exception("the solver failed on %s", job.draft)
-            return Outcome(job=job, prediction=None, problem="The solver failed on this scene; the log says why.")
+            return Outcome(job=job, prediction=None, problem="The solver failed on this scene; the log says why")
         return Outcome(job=job, prediction=prediction)
