@@ -13,7 +13,7 @@ from dlocore.kernels.relax import relax
 from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
 from dlocore.report import WindowForces, elastic_energy, reactions
-from dlocore.scene import Scene
+from dlocore.scene import Grasp, Scene
 from dlocore.solvers.march import closed_grasps
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.spline import design_matrix
@@ -170,6 +170,7 @@ def settle(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> tuple[F
         grasps = closed_grasps(problem, t, t)
         close_grasps(problem, grid, grasps, starts, q)
         held = hold(problem, grid, grasps, np.array([t]), starts)
+        _carry(problem, grid, grasps, starts, t, q)
         applied = applied_forces(problem, grid, np.array([t]))[0]
         strength = springs
         settled = False
@@ -189,6 +190,20 @@ def settle(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> tuple[F
             WindowForces(held, np.array([t]), _holding(problem, grid, q, applied, held.elimination.held), q[None]),
         )
     return q, settled, forces
+
+
+def _carry(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, t: float, q: Floats) -> None:
+    """Shift the control points q (n_u, nc) with the grasps, evenly in between, where they move to at time `t` [s].
+
+    A grasp that moves alone by more than a span folds the cable there, and a fold finer than the quadrature stays.
+    """
+    if not grasps:
+        return
+    order = sorted(grasps, key=lambda g: g.u)
+    shift = np.array([problem.position(g, np.array([t]), starts[g][0])[0] - grid.at(q, g.u) for g in order])
+    middle = (grid.knots[1:-3] + grid.knots[2:-2] + grid.knots[3:-1]) / 3  # of the control points
+    for d in range(q.shape[1]):
+        q[:, d] += np.interp(middle, [g.u for g in order], shift[:, d])
 
 
 def _holding(problem: Problem, grid: Grid, q: Floats, applied: Floats, held: NDArray[np.int64]) -> Floats:
