@@ -1,0 +1,201 @@
+"""Static equilibria against closed forms (docs/model.md; Love, Timoshenko and Gere, Bisshopp and Drucker)."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipk
+
+from dlocore import (
+    Cable,
+    ControlPoints,
+    Environment,
+    Equilibrium,
+    Grasp,
+    Load,
+    Move,
+    Points,
+    Scene,
+    Straight,
+    Waypoints,
+    equilibrium,
+)
+from tests.solver.scenes import WEIGHTLESS, G, arc, cable
+
+EI, MU = 1e-3, 0.05
+CLAMPED = Grasp(u=0.0, hold="tangent")
+
+
+def cantilever(a: float) -> Equilibrium:
+    """Return a cantilever under a tip force P = a EI/L^2."""
+    load = Load(u=1.0, force=(0.0, 0.0, -a * EI))
+    scene = Scene(cable=cable(), shape=Straight(), grasps=(CLAMPED,), loads=(load,), environment=WEIGHTLESS, horizon=1)
+    return equilibrium(scene)
+
+
+def test_small_cantilever_sinks_by_PL3_over_3EI():
+    tip = cantilever(1e-3).positions(1.0)[0]
+    # the next term of the series is 4 a^2/35 smaller relatively; the answer is refined to 1e-4 of L, here by far better
+    assert -tip[2] == pytest.approx(1e-3 / 3, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("a", "shortening", "deflection"),
+    [(1, 0.05643, 0.30172), (2, 0.16064, 0.49346), (3, 0.25442, 0.60325), (5, 0.38763, 0.71379), (10, 0.555, 0.81061)],
+)
+def test_large_cantilever_bends_as_the_elastica(a, shortening, deflection):
+    tip = cantilever(a).positions(1.0)[0]
+    # five digits in the table, and the axial stretch P L/EA of 1.6e-5
+    np.testing.assert_allclose([1 - tip[0], -tip[2]], [shortening, deflection], atol=3e-5)
+
+
+def test_an_end_moment_of_2_pi_EI_over_L_rolls_the_cable_to_a_circle():
+    turn = np.linspace(0.0, 2 * np.pi, 25)
+    ends = np.vstack([[1.0, 0.0, 0.0], *[arc(1.0, x, 2)[1:] for x in turn[1:]]])
+    quaternions = np.column_stack([np.cos(turn / 2), 0 * turn, 0 * turn, np.sin(turn / 2)])
+    path = Waypoints(times=np.linspace(0.0, 1.0, 25), positions=ends, orientations=quaternions)
+    grasps = (CLAMPED, Grasp(u=1.0, hold="tangent", path=path))
+    rolled = equilibrium(Scene(cable=cable(), shape=Straight(), grasps=grasps, environment=WEIGHTLESS), at=1.0)
+    assert rolled.status == "converged"
+    u = np.linspace(0.0, 1.0, 101)
+    np.testing.assert_allclose(rolled.positions(u), arc(1.0, 2 * np.pi, 101), atol=1e-4)  # the asked refinement
+    np.testing.assert_allclose(rolled.moments[1], [0, 0, 2 * np.pi * EI], atol=2e-3 * 2 * np.pi * EI)
+    np.testing.assert_allclose(rolled.moments[0], -rolled.moments[1], atol=2e-3 * 2 * np.pi * EI)
+    assert rolled.energy == pytest.approx(2 * np.pi**2 * EI, rel=1e-4)
+    assert np.abs(rolled.reactions).max() < 2e-3 * 4 * np.pi**2 * EI  # none in a circle; of EI kappa^2
+
+
+def hanging_arc(angle: float) -> np.ndarray:
+    """Return points of an arc that hangs in the x-z plane between two ends on the x-axis."""
+    c, s = np.cos(angle / 2), np.sin(angle / 2)
+    return (arc(1.0, angle) @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]).T)[:, [0, 2, 1]]
+
+
+@pytest.mark.parametrize(("ratio", "sag"), [(1.1, 0.20030), (1.25, 0.33180), (1.5, 0.50263), (2.0, 0.79639)])
+@pytest.mark.parametrize("bend", ["auto", "off"])
+def test_a_limp_cable_hangs_as_a_catenary(ratio, sag, bend):
+    d = 1.0 / ratio
+    half = brentq(lambda x: np.sin(x) / x - d, 1e-6, np.pi - 1e-6)
+    hanging = Scene(
+        cable=cable(bending_stiffness=1e-7, axial_stiffness=1e5),
+        shape=Points(points=hanging_arc(2 * half)),
+        grasps=(Grasp(u=0.0), Grasp(u=1.0)),
+        effects={"bend": bend},
+        horizon=1.0,
+    )
+    lowest = equilibrium(hanging).positions(0.5)[0, 2]
+    # EI 1e-7 stiffens the ends by a length sqrt(EI/T) of 1e-3 m; five digits in the table
+    assert -lowest / d == pytest.approx(sag, abs=3e-4)
+
+
+def elastica_column(shortening: float) -> tuple[float, float]:
+    """Return the modulus k and P L^2/EI of a pinned column whose ends have approached by `shortening` L."""
+    k = np.sqrt(brentq(lambda m: 2 * ellipe(m) / ellipk(m) - 1 - (1 - shortening), 1e-9, 0.9))
+    return k, 4 * ellipk(k * k) ** 2
+
+
+def bow(amplitude: float) -> ControlPoints:
+    """Return a cable along x that bows to the side and ends along x."""
+    knots = np.concatenate([np.zeros(3), np.linspace(0, 1, 11), np.ones(3)])
+    x = (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3
+    side = 0.5 * (1 - np.cos(2 * np.pi * x))
+    side[[1, -2]] = 0.0  # along x where a gripper may hold the direction
+    return ControlPoints(control_points=np.column_stack([x, amplitude * side, 0 * x]), knots=knots)
+
+
+def leaning(up: int, side: int) -> ControlPoints:
+    """Return a cable from the origin along one axis, bent towards another: by 0.02 L at the tip."""
+    control = np.zeros((4, 3))
+    control[:, up] = np.linspace(0.0, 1.0, 4)
+    control[2:, side] = [0.02 / 3, 0.02]
+    return ControlPoints(control_points=control)
+
+
+@pytest.mark.parametrize("shortening", [0.003, 0.1, 0.5])
+@pytest.mark.parametrize(("hold", "factor"), [("point", 1.0), ("tangent", 4.0)])
+def test_a_compressed_column_pushes_with_the_load_of_the_buckled_elastica(hold, factor, shortening):
+    # pinned: pi^2 EI/L^2 at first; built in at both ends: four times as much, being two halves of two quarters
+    push = Move(displacement=(-shortening, 0.0, 0.0), duration=1.0)
+    grasps = (Grasp(u=0.0, hold=hold), Grasp(u=1.0, hold=hold, path=push))
+    scene = Scene(cable=cable(axial_stiffness=1e4), shape=bow(1e-2), grasps=grasps, environment=WEIGHTLESS)
+    found = equilibrium(scene, at=1.0)
+    assert found.status == "converged"
+    _, load = elastica_column(shortening)
+    # the answer is refined to 1e-4 L
+    np.testing.assert_allclose(found.reactions[1], [-factor * load * EI, 0.0, 0.0], atol=2e-3 * factor * load * EI)
+
+
+def test_euler_load_of_a_free_standing_column_lies_between_standing_and_falling():
+    def lean(load: float) -> float:
+        scene = Scene(
+            cable=cable(axial_stiffness=1e4),
+            shape=leaning(0, 1),
+            grasps=(CLAMPED,),
+            loads=(Load(u=1.0, force=(-load * EI, 0.0, 0.0)),),
+            environment=WEIGHTLESS,
+            horizon=1.0,
+        )
+        return abs(equilibrium(scene).positions(1.0)[0, 1])
+
+    assert lean(0.99 * 2.4674) < 1e-6
+    # sideways tip of the elastica: 2 k L/K(k) with K(k)^2 = P L^2/EI
+    k = brentq(lambda k: ellipk(k * k) ** 2 - 1.05 * 2.4674, 1e-3, 0.9)
+    assert lean(1.05 * 2.4674) == pytest.approx(2 * k / ellipk(k * k), abs=1e-3)  # steep in the load: 0.06 a percent
+
+
+def test_self_weight_buckling_lies_between_standing_and_falling():
+    # q L^3/EI = 7.83735 (Greenhill)
+    def lean(q: float) -> float:
+        scene = Scene(
+            cable=cable(linear_density=q * EI / G, axial_stiffness=1e4),
+            shape=leaning(2, 0),
+            grasps=(CLAMPED,),
+            horizon=1.0,
+        )
+        return abs(equilibrium(scene).positions(1.0)[0, 0])
+
+    assert lean(0.99 * 7.83735) < 1e-6
+    assert lean(1.01 * 7.83735) > 0.1
+
+
+def hanging_with_load(hold: str) -> Scene:
+    lifted = Move(displacement=(-0.05, 0.2, 0.1), duration=1.0)
+    return Scene(
+        cable=cable(),
+        shape=Points(points=hanging_arc(2.4)),
+        grasps=(Grasp(u=0.0, hold=hold), Grasp(u=1.0, hold=hold, path=lifted)),
+        loads=(Load(u=0.3, force=(0.1, -0.05, -0.2)),),
+    )
+
+
+@pytest.mark.parametrize("hold", ["point", "tangent"])
+def test_reactions_balance_weight_and_loads(hold):
+    scene = hanging_with_load(hold)
+    found = equilibrium(scene, at=1.0, n_u=17)
+    load = np.array([0.1, -0.05, -0.2])
+    weight = np.array([0.0, 0.0, -MU * G])
+    # the last Newton step is below 1e-10 m, times the axial stiffness of a span, EA/h = 1e4 N/m
+    np.testing.assert_allclose(found.reactions.sum(axis=0) + load + weight, 0.0, atol=1e-6)
+    u, w = np.polynomial.legendre.leggauss(4)
+    cuts = np.unique(found.knots_u)
+    half = 0.5 * np.diff(cuts)[:, None]
+    r = found.positions((cuts[:-1, None] + half * (1 + u)).ravel())
+    moment = np.cross(found.positions([0.0, 1.0]), found.reactions).sum(axis=0) + found.moments.sum(axis=0)
+    moment += np.cross(found.positions(0.3)[0], load) + np.cross((half * w).ravel() @ r, weight)
+    np.testing.assert_allclose(moment, 0.0, atol=1e-6)
+
+
+def test_statics_do_not_depend_on_mass_where_there_is_no_weight():
+    def tip(density: float) -> np.ndarray:
+        light = Cable(length=1.0, diameter=0.005, linear_density=density, bending_stiffness=EI)
+        load = Load(u=1.0, force=(0.0, 2e-3, 0.0))
+        scene = Scene(
+            cable=light, shape=Straight(), grasps=(CLAMPED,), loads=(load,), environment=WEIGHTLESS, horizon=1
+        )
+        return equilibrium(scene, n_u=13).positions(1.0)
+
+    np.testing.assert_array_equal(tip(0.01), tip(1.0))
+
+
+def test_a_cable_held_by_nothing_has_no_equilibrium_under_its_weight():
+    with pytest.raises(ValueError, match="primitives"):
+        equilibrium(Scene(cable=cable(), shape=Straight(), environment=Environment(), horizon=1.0))
