@@ -199,14 +199,13 @@ def hold(problem: Problem, grid: Grid, grasps: list[Grasp], t: Floats, starts: S
     """Eliminate what `grasps` hold at the times t (k,) [s].
 
     The rows b(u_g) q = p(t), and b'(u_g) q = d(t) where the direction is held (unit stretch there), are solved for one
-    pivot control point each: those with the largest basis function (docs/model.md eq. 12).
+    pivot control point each (docs/model.md eq. 12).
     """
     nc = problem.plane.dimensions
     size = sum(2 if g.hold == "tangent" else 1 for g in grasps)
     A = np.zeros((size, grid.n_u))
     target = np.empty((len(t), size, nc))
     rows: list[tuple[int, int]] = []
-    pivots: list[int] = []
     for i, g in enumerate(grasps):
         position, direction = starts[g]
         for derivative in range(2 if g.hold == "tangent" else 1):
@@ -216,13 +215,29 @@ def hold(problem: Problem, grid: Grid, grasps: list[Grasp], t: Floats, starts: S
             path = problem.position if derivative == 0 else problem.direction
             target[:, r] = path(g, t, position if derivative == 0 else direction)
             rows.append((i, derivative))
-            order = first + np.argsort(-np.abs(b), kind="stable")
-            pivots.append(next(int(k) for k in order if k not in pivots))
+    pivots = _pivots(A, [r for r, (i, _) in enumerate(rows) if grasps[i].hold == "tangent"])
     inverse = np.asarray(np.linalg.inv(A[:, pivots]), dtype=np.float64)
     follow = -inverse @ A
     follow[:, pivots] = 0.0
     offsets: Floats = (inverse @ target).reshape(len(t), -1)
     return Held(tuple(grasps), _elimination(grid.n_u, nc, pivots, follow), offsets, tuple(rows), inverse)
+
+
+def _pivots(A: Floats, first: list[int]) -> list[int]:
+    """Choose a pivot column for each row of A (rows, n_u): Gauss elimination, the rows `first` before the others.
+
+    A held direction has just two control points to choose from, so it chooses before its neighbours do.
+    """
+    if len(A) == 1:
+        return [int(np.argmax(np.abs(A[0])))]
+    work = A.copy()
+    pivots = [-1] * len(A)
+    for r in sorted(range(len(A)), key=lambda row: row not in first):
+        for s, p in enumerate(pivots):
+            if p >= 0:
+                work[r] -= work[r, p] / work[s, p] * work[s]
+        pivots[r] = int(np.argmax(np.abs(work[r])))
+    return pivots
 
 
 def _elimination(n_u: int, nc: int, pivots: list[int], follow: Floats) -> Elimination:

@@ -14,7 +14,7 @@ from dlocore.problem import Problem, pose
 from dlocore.report import WindowForces, effect_reports, elastic_energy, reactions, surface_of
 from dlocore.scene import Quality, Scene
 from dlocore.solvers.ladder import ACCEPT, LEVELS, Level, distance, run_level, stretched
-from dlocore.solvers.march import smallest_n_t
+from dlocore.solvers.march import RHO, STRONGLY_DAMPED, smallest_n_t
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.paper import MAX_ITERATIONS as PAPER_ITERATIONS
 from dlocore.solvers.paper import solve_as_printed
@@ -23,6 +23,8 @@ from dlocore.solvers.spacetime import MAX_ITERATIONS, solve
 Floats = NDArray[np.float64]
 
 AUTO_TARGET = 2e-3  # of the length: the target error of quality "auto"
+ROUGH = 0.05  # of the length: two grids that differ more are in no order yet; the next is marched with strong damping
+TORN = 0.2  # axial strain: no cable of this kind follows
 FINER = 1.5  # times n_u, n_t and the steps of a given grid: the march that its error is estimated with
 
 
@@ -146,12 +148,13 @@ def _climb(problem: Problem, quality: Quality, monitor: Monitor) -> tuple[Level,
     target = quality.target_error or AUTO_TARGET * problem.scene.cable.length
     budget = quality.time_budget or np.inf
     before: Level | None = None
+    rho = RHO
     last_time = 0.0
     for i in range(len(LEVELS)):
         began = monitor.elapsed()
         try:
             monitor.check()
-            level = run_level(problem, *stretched(problem, i), monitor)
+            level = run_level(problem, *stretched(problem, i), monitor, rho=rho)
         except TimeIsUp:
             break
         if before is not None:
@@ -163,13 +166,17 @@ def _climb(problem: Problem, quality: Quality, monitor: Monitor) -> tuple[Level,
                 f"A finer grid did not converge: {_march_status(problem, level)[1]}",
                 before.change,
             )
+        if np.isfinite(level.change) and level.change > ROUGH * problem.scene.cable.length:
+            rho = STRONGLY_DAMPED
         _record_level(problem, level, monitor)
         if level.motion.stopped == "time":
             return level, *_march_status(problem, level), None
         before = level
         if level.change <= ACCEPT * target and quality.time_budget is None:
-            message = f"Two grids agree to {level.change * 1e3:.2g} mm, target {target * 1e3:.2g} mm."
-            return level, "converged", message, level.change
+            status, message = _march_status(problem, level)
+            if status == "converged":
+                message = f"Two grids agree to {level.change * 1e3:.2g} mm, target {target * 1e3:.2g} mm."
+            return level, status, message, level.change
         last_time = monitor.elapsed() - began
         if monitor.elapsed() + 2.5 * last_time > budget:
             message = (
@@ -193,6 +200,9 @@ def _finite(x: float) -> float | None:
 
 def _march_status(problem: Problem, level: Level) -> tuple[Status, str]:
     motion = level.motion
+    if not motion.stopped and motion.largest_strain > TORN:
+        strain = f"The motion stretches the cable by {motion.largest_strain:.0%}, which no cable follows."
+        return "stalled", f"{strain} Bring the grasps' paths closer together, or make the motion slower."
     if not motion.stopped:
         return "converged", "Every time step found its equilibrium."
     reached = motion.times[motion.reached]

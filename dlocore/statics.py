@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dlocore.discretisation import Grid, Starts, applied_forces, close_grasps, hold, make_grid, smallest_n_u
 from dlocore.errors import SceneError, number
-from dlocore.kernels.assembly import assemble
+from dlocore.kernels.assembly import NO_RATES, assemble
 from dlocore.kernels.relax import relax
 from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
@@ -211,5 +211,7 @@ def _holding(problem: Problem, grid: Grid, q: Floats, applied: Floats, held: NDA
     f, nothing = np.empty_like(q), np.empty((1, 1))
     axes = tuple(range(problem.plane.dimensions))
     still = np.zeros_like(q)
-    assemble(axes, q, still, grid.tables, active, parameters, grid.memory, (0.0, 0.0, 0.0), f, nothing)
+    assemble(
+        axes, q, still, grid.tables, active, parameters, grid.memory, grid.memory, NO_RATES, (0.0, 0.0, 0.0), f, nothing
+    )
     return (f - applied).reshape(1, -1)[:, held]

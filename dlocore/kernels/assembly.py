@@ -13,15 +13,18 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.effects.laws import BEND, DAMPING, QUADRATIC_DRAG, axial_stress
+from dlocore.effects.laws import BEND, DAMPING, QUADRATIC_DRAG
 from dlocore.kernels import plane, space
 from dlocore.kernels.compile import kernel
+
+NO_RATES = (0.0, 0.0, 0.0)  # `rates` of `assemble` where the rate of strain comes from v
 
 
 @kernel
 def assemble(
-    axes: Any, q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, scales: Any, f: Any, K: Any
-) -> None:
+    axes: Any, q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any,
+    f: Any, K: Any,
+) -> None:  # fmt: skip
     """Write internal forces minus body forces f (n, nc) [N] and their tangent K (n nc, 4 nc) [N/m].
 
     Args:
@@ -31,6 +34,9 @@ def assemble(
         active: switches of the laws (laws.COUNT,).
         p: parameters of the laws (laws.COUNT, laws.PARAMETERS).
         memory: curvature of the stress-free shape at the curvature points (points, 1 or 3) [1/m].
+        past: strain of earlier steps, see `remember`; not read where rates[0] is zero.
+        rates: (now, last, before): the rate of a strain as a combination of its values now and at the two last steps;
+            zeros: the rate comes from v.
         scales: (stiffness, viscosity, geometric) factors of the tangent.
         f, K: outputs; K is untouched where all scales are zero.
     """
@@ -42,15 +48,24 @@ def assemble(
     if len(axes) == 2:
         plane.axial(q, tables, active, p, scales, tangent, f, K)
         if bends:
-            plane.curvature(q, v, tables, active, p, memory, scales, tangent, f, K)
+            plane.curvature(q, v, tables, active, p, memory, past, rates, scales, tangent, f, K)
         if active[QUADRATIC_DRAG]:
             plane.body(q, v, tables, active, p, scales, tangent, f, K)
     else:
         space.axial(q, tables, active, p, scales, tangent, f, K)
         if bends:
-            space.curvature(q, v, tables, active, p, memory, scales, tangent, f, K)
+            space.curvature(q, v, tables, active, p, memory, past, rates, scales, tangent, f, K)
         if active[QUADRATIC_DRAG]:
             space.body(q, v, tables, active, p, scales, tangent, f, K)
+
+
+@kernel
+def remember(axes: Any, q: Any, tables: Any, past: Any) -> None:
+    """Note the curvature of q (n, nc) in `past` (points, 2 or 9) as that of the last step."""
+    if len(axes) == 2:
+        plane.remember(q, tables, past)
+    else:
+        space.remember(q, tables, past)
 
 
 @kernel
@@ -62,18 +77,19 @@ def stored_energy(axes: Any, q: Any, tables: Any, active: Any, p: Any, memory: A
 
 
 @kernel
-def axial_tension(axes: Any, q: Any, tables: Any, active: Any, p: Any) -> Any:
-    """Return the tension at the axial points (points,) [N] of the control points q (n, nc)."""
-    out = np.empty(len(tables.axial_w))
-    for n in range(len(out)):
-        square = 0.0
-        for d in range(len(axes)):
-            value = 0.0
-            for i in range(4):
-                value += tables.axial_b1[n, i] * q[tables.axial_first[n] + i, d]
-            square += value * value
-        out[n] = axial_stress(active, p, np.sqrt(square) - 1.0)[0]
-    return out
+def largest_strain(axes: Any, states: Any, tables: Any) -> float:
+    """Return the largest |axial strain| at the axial points over the states (k, n, nc)."""
+    largest = 0.0
+    for s in range(len(states)):
+        for n in range(len(tables.axial_w)):
+            square = 0.0
+            for d in range(len(axes)):
+                value = 0.0
+                for i in range(4):
+                    value += tables.axial_b1[n, i] * states[s, tables.axial_first[n] + i, d]
+                square += value * value
+            largest = max(largest, abs(np.sqrt(square) - 1.0))
+    return largest
 
 
 @kernel

@@ -25,7 +25,8 @@ def kernel(function: Callable[..., Any]) -> Any:
     into a kernel would go unnoticed. The stamp is therefore the hash of all compiled sources.
     """
     compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-    compiled._cache._cache_file._source_stamp = _SOURCE
+    if hasattr(compiled, "_cache"):  # not where compilation is switched off for debugging
+        compiled._cache._cache_file._source_stamp = _SOURCE
     return compiled
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from dlocore.effects.laws import DAMPING, QUADRATIC_DRAG
-from dlocore.kernels.assembly import add_scalar_band, assemble, multiply_scalar_band
+from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, multiply_scalar_band
 from dlocore.kernels.banded import factor, reduce_matrix, reduce_vector, solve
 from dlocore.kernels.compile import kernel
 
@@ -152,18 +152,18 @@ def normal_equations(
     for k in range(len(weights)):
         states_at(first[k], table[k], C, state)
         q, v, a = state[0], state[1], state[2]
-        assemble(axes, q, v, tables, active, p, memory, (1.0, 0.0, 0.0), f, K)
+        assemble(axes, q, v, tables, active, p, memory, memory, NO_RATES, (1.0, 0.0, 0.0), f, K)
         reduce_matrix(e, K, Kr)
         G[:] = B0 + Kr
         if viscous:
-            assemble(axes, q, v, tables, active, p, memory, (0.0, 1.0, 0.0), f, K)
+            assemble(axes, q, v, tables, active, p, memory, memory, NO_RATES, (0.0, 1.0, 0.0), f, K)
             reduce_matrix(e, K, Nr)
             G += 2.0 / h * Nr
             if tangent:
                 band_to_dense(Nr, Y)
                 Y += Nd
         if tangent and geometric != 0.0:
-            assemble(axes, q, v, tables, active, p, memory, (1.0, 0.0, 1.0), f, K)
+            assemble(axes, q, v, tables, active, p, memory, memory, NO_RATES, (1.0, 0.0, 1.0), f, K)
             reduce_matrix(e, K, Kr)
         factor(G)
         multiply_scalar_band(mass, a, 1.0, f)

@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.kernels.assembly import add_scalar_band, assemble, multiply_scalar_band
+from dlocore.effects.laws import DAMPING
+from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, multiply_scalar_band, remember
 from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_matrix, reduce_vector, solve
 from dlocore.kernels.basis import basis_rows
 from dlocore.kernels.compile import kernel
@@ -45,8 +46,8 @@ def constrained_mass_solve(nc: int, mass: Any, e: Any, held: Any, right: Any) ->
 @kernel
 def march_steps(
     axes: Any, start: int, stop: int, begin: int, h: float, rho: float, tolerance: float, Q: Any, v: Any, a: Any,
-    G: Any, mass: Any, drag: Any, tables: Any, active: Any, p: Any, memory: Any, applied: Any, e: Any, offsets: Any,
-    reactions: Any, info: Any,
+    G: Any, mass: Any, drag: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, applied: Any, e: Any,
+    offsets: Any, reactions: Any, info: Any,
 ) -> None:  # fmt: skip
     """Advance from step `start` to `stop` by the generalised-alpha method (Chung and Hulbert, 1993).
 
@@ -65,6 +66,7 @@ def march_steps(
         Q: (steps + 1, n, nc) control points; written from start + 1 to stop.
         v, a, G: (n, nc) velocity, acceleration and G at step `start`; at `stop` on return.
         mass, drag: (n, 4) scalar bands, times density [kg/m] and drag coefficient [N s/m^2].
+        past: curvature of the last steps; read and written where internal damping acts.
         applied: (1 or steps + 1, n, nc) applied forces [N].
         e: elimination of the held degrees of freedom.
         offsets: (steps + 1, held) their prescribed part [m].
@@ -98,6 +100,8 @@ def march_steps(
     for k in range(start + 1, stop + 1):
         load = applied[min(k, len(applied) - 1)]
         q0 = Q[k - 1]
+        # backward differences for the rate of curvature: its force then has a potential, and an exact tangent
+        rates = (1.5 / h, -2.0 / h, 0.5 / h) if k - begin > 1 else (1.0 / h, -1.0 / h, 0.0)
         for attempt in range(2):
             # --- predict
             for i in range(n):
@@ -121,7 +125,7 @@ def march_steps(
             for it in range(limit):
                 refactor = attempt == 1 or not fresh
                 scales = (1.0, to_v, 1.0) if refactor else (0.0, 0.0, 0.0)
-                assemble(axes, q1, v1, tables, active, p, memory, scales, f, K)
+                assemble(axes, q1, v1, tables, active, p, memory, past, rates, scales, f, K)
                 _residual(mass, drag, alpha_m, alpha_f, a, a1, v1, load, G, f, weighted, R)
                 reduce_vector(e, R.ravel(), x)
                 if refactor:
@@ -131,7 +135,7 @@ def march_steps(
                     if factor(A) >= 0:
                         if attempt == 0:
                             break
-                        assemble(axes, q1, v1, tables, active, p, memory, (1.0, to_v, 0.0), f, K)
+                        assemble(axes, q1, v1, tables, active, p, memory, past, rates, (1.0, to_v, 0.0), f, K)
                         _effective(nc, K, mass, drag, inertia, 1.0 - alpha_f, to_v)
                         for i in range(size):
                             K[i, 0] *= 1.0 + 1e-10
@@ -158,7 +162,7 @@ def march_steps(
                         q2 = q1 + length * step_change
                         v2 = v1 + (length * to_v) * step_change
                         a2 = a1 + (length * to_a) * step_change
-                        assemble(axes, q2, v2, tables, active, p, memory, (0.0, 0.0, 0.0), f, K)
+                        assemble(axes, q2, v2, tables, active, p, memory, past, rates, (0.0, 0.0, 0.0), f, K)
                         _residual(mass, drag, alpha_m, alpha_f, a, a2, v2, load, G, f, weighted, R)
                         reduce_vector(e, R.ravel(), x)
                         after = 0.0
@@ -167,6 +171,8 @@ def march_steps(
                         if abs(after) <= 0.9 * abs(work):
                             break
                         length *= 0.5
+                    else:
+                        length = 1.0
                 for i in range(n):
                     for d in range(nc):
                         s = length * step_change[i, d]
@@ -192,6 +198,8 @@ def march_steps(
         if not converged:
             info[FAILED_STEP] = k
             return
+        if active[DAMPING]:
+            remember(axes, q1, tables, past)
         for i in range(len(e.held)):
             reactions[k, i] = R[e.held[i] // nc, e.held[i] % nc]
         for i in range(n):
@@ -245,13 +253,15 @@ def _effective(nc: int, K: Any, mass: Any, drag: Any, inertia: float, share: flo
 
 @kernel
 def initial_state(
-    axes: Any, q: Any, v: Any, mass: Any, drag: Any, tables: Any, active: Any, p: Any, memory: Any, load: Any, e: Any,
-    held_acceleration: Any, G: Any,
+    axes: Any, q: Any, v: Any, mass: Any, drag: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any,
+    load: Any, e: Any, held_acceleration: Any, G: Any,
 ) -> Any:  # fmt: skip
     """Return the consistent acceleration (n, nc), and write G = f + C v - load, where a smooth stretch begins."""
     nc = len(axes)
     K = np.empty((1, 1))
-    assemble(axes, q, v, tables, active, p, memory, (0.0, 0.0, 0.0), G, K)
+    assemble(axes, q, v, tables, active, p, memory, past, NO_RATES, (0.0, 0.0, 0.0), G, K)
+    if active[DAMPING]:
+        remember(axes, q, tables, past)
     multiply_scalar_band(drag, v, 1.0, G)
     for i in range(len(G)):
         for d in range(nc):

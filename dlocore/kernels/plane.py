@@ -65,10 +65,13 @@ def axial(q: Any, tables: Any, active: Any, p: Any, scales: Any, tangent: bool, 
 
 @law
 def curvature(
-    q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, scales: Any, tangent: bool, f: Any, K: Any
-) -> None:
-    """Add the forces and tangents of the curvature site."""
+    q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any, tangent: bool,
+    f: Any, K: Any,
+) -> None:  # fmt: skip
+    """Add the forces and tangents of the curvature site; `past` holds kappa of the two last steps (points, 2)."""
     elastic, viscous, geometric = scales
+    if viscous != 0.0 and rates[0] != 0.0:
+        viscous = rates[0]
     firsts, b1, b2, weights = tables.curvature_first, tables.curvature_b1, tables.curvature_b2, tables.curvature_w
     for n in range(len(weights)):
         k, w = firsts[n], weights[n]
@@ -77,7 +80,9 @@ def curvature(
         cx, cy = _combine(q, k, c)
         kappa, J = plane_curvature(ax, ay, cx, cy)
         rate = 0.0
-        if active[DAMPING]:
+        if active[DAMPING] and rates[0] != 0.0:
+            rate = rates[0] * kappa + rates[1] * past[n, 0] + rates[2] * past[n, 1]
+        elif active[DAMPING]:
             vx, vy = _combine(v, k, b)
             ux, uy = _combine(v, k, c)
             rate = J[0] * vx + J[1] * vy + J[2] * ux + J[3] * uy
@@ -113,6 +118,17 @@ def curvature(
                         Gk * Gx + bi * ryx + ci * syx,
                         Gk * Gy + bi * ryy + ci * syy,
                     )  # fmt: skip
+
+
+@law
+def remember(q: Any, tables: Any, past: Any) -> None:
+    """Make kappa of q the last one in `past` (points, 2), and the last one the one before."""
+    for n in range(len(past)):
+        k = tables.curvature_first[n]
+        ax, ay = _combine(q, k, _row(tables.curvature_b1, n))
+        cx, cy = _combine(q, k, _row(tables.curvature_b2, n))
+        past[n, 1] = past[n, 0]
+        past[n, 0] = plane_curvature(ax, ay, cx, cy)[0]
 
 
 @law

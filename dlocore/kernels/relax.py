@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.kernels.assembly import add_scalar_band, assemble, multiply_scalar_band, stored_energy
+from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, multiply_scalar_band, stored_energy
 from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_matrix, reduce_vector, solve
 from dlocore.kernels.compile import kernel
 
@@ -61,7 +61,7 @@ def relax(
     for it in range(limit):
         for attempt in range(40):
             geometric = 1.0 if attempt == 0 else 0.0
-            assemble(axes, q, still, tables, active, p, memory, (1.0, 0.0, geometric), f, K)
+            assemble(axes, q, still, tables, active, p, memory, memory, NO_RATES, (1.0, 0.0, geometric), f, K)
             add_scalar_band(nc, tables.mass, strength, K)
             if attempt > 1:
                 damping = max(10.0 * damping, 1e-12 * np.max(K[:, 0]))

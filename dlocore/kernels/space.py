@@ -7,7 +7,7 @@ import numpy as np
 from dlocore.effects.base import Symmetric, Vector
 from dlocore.effects.laws import DAMPING, axial_energy, axial_stress, body_force, curvature_energy, curvature_stress
 from dlocore.kernels.compile import law
-from dlocore.kernels.strain import space_curvature, space_curvature_rate, space_moment
+from dlocore.kernels.strain import space_curvature, space_curvature_rate, space_moment, transport
 
 
 @law
@@ -68,14 +68,17 @@ def axial(q: Any, tables: Any, active: Any, p: Any, scales: Any, tangent: bool, 
 
 @law
 def curvature(
-    q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, scales: Any, tangent: bool, f: Any, K: Any
-) -> None:
-    """Add the forces and tangents of the curvature site.
+    q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any, tangent: bool,
+    f: Any, K: Any,
+) -> None:  # fmt: skip
+    """Add the forces and tangents of the curvature site; `past` holds kappa of two steps and t of the last (points, 9).
 
     With G_j = (c_j - h b_j / l) P / l - b_j kappa t' / l, the derivative of kappa by control point j, the material
     part of the tangent is G_i' S G_j; the geometric part is M . d2kappa.
     """
     elastic, viscous, geometric = scales
+    if viscous != 0.0 and rates[0] != 0.0:
+        viscous = rates[0]
     firsts, b1, b2, weights = tables.curvature_first, tables.curvature_b1, tables.curvature_b2, tables.curvature_w
     G = np.empty((4, 3, 3))
     SG = np.empty((3, 3))
@@ -87,7 +90,15 @@ def curvature(
         b, c = _row(b1, n), _row(b2, n)
         length, h, t, kappa = space_curvature(_combine(q, k, b), _combine(q, k, c))
         rate = (0.0, 0.0, 0.0)
-        if active[DAMPING]:
+        if active[DAMPING] and rates[0] != 0.0:
+            last = transport(_vector(past, n, 6), t, _vector(past, n, 0))
+            before = transport(_vector(past, n, 6), t, _vector(past, n, 3))
+            rate = (
+                rates[0] * kappa[0] + rates[1] * last[0] + rates[2] * before[0],
+                rates[0] * kappa[1] + rates[1] * last[1] + rates[2] * before[1],
+                rates[0] * kappa[2] + rates[1] * last[2] + rates[2] * before[2],
+            )
+        elif active[DAMPING]:
             rate = space_curvature_rate(length, h, t, kappa, _combine(v, k, b), _combine(v, k, c))
         rest = (memory[n, 0], memory[n, 1], memory[n, 2])
         M, stiffness, viscosity = curvature_stress(active, p, kappa, rate, rest)
@@ -131,6 +142,25 @@ def curvature(
                     for d in range(e if i == j else 0, 3):
                         value = G[i, 0, d] * SG[0, e] + G[i, 1, d] * SG[1, e] + G[i, 2, d] * SG[2, e]
                         K[column, offset + d] += value + both * B[d, e] + mixed * A[d, e]
+
+
+@law
+def _vector(table: Any, n: int, at: int) -> Vector:
+    return table[n, at], table[n, at + 1], table[n, at + 2]
+
+
+@law
+def remember(q: Any, tables: Any, past: Any) -> None:
+    """Make kappa and t of q the last ones in `past` (points, 9), and the last kappa, carried along, the one before."""
+    for n in range(len(past)):
+        k = tables.curvature_first[n]
+        a = _combine(q, k, _row(tables.curvature_b1, n))
+        _, _, t, kappa = space_curvature(a, _combine(q, k, _row(tables.curvature_b2, n)))
+        before = transport(_vector(past, n, 6), t, _vector(past, n, 0))
+        for d in range(3):
+            past[n, 3 + d] = before[d]
+            past[n, d] = kappa[d]
+            past[n, 6 + d] = t[d]
 
 
 @law

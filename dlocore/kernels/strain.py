@@ -62,6 +62,21 @@ def space_curvature_rate(length: float, h: float, t: Vector, kappa: Vector, da: 
 
 
 @law
+def transport(t0: Vector, t1: Vector, x: Vector) -> Vector:
+    """Return x turned by the smallest rotation that brings the unit vector t0 to t1 (parallel transport)."""
+    cosine = t0[0] * t1[0] + t0[1] * t1[1] + t0[2] * t1[2]
+    if cosine < -0.999999:
+        return x
+    b = (t0[1] * t1[2] - t0[2] * t1[1], t0[2] * t1[0] - t0[0] * t1[2], t0[0] * t1[1] - t0[1] * t1[0])
+    s = (b[0] * x[0] + b[1] * x[1] + b[2] * x[2]) / (1.0 + cosine)
+    return (
+        cosine * x[0] + b[1] * x[2] - b[2] * x[1] + s * b[0],
+        cosine * x[1] + b[2] * x[0] - b[0] * x[2] + s * b[1],
+        cosine * x[2] + b[0] * x[1] - b[1] * x[0] + s * b[2],
+    )
+
+
+@law
 def space_moment(length: float, h: float, t: Vector, kappa: Vector, M: Vector) -> tuple[Vector, Vector]:
     """Return the generalised forces by r' and by r'' of the moment vector M across the tangent."""
     dot = (M[0] * kappa[0] + M[1] * kappa[1] + M[2] * kappa[2]) / length

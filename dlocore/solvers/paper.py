@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dlocore.discretisation import Grid, Starts, applied_forces, close_grasps
 from dlocore.errors import SceneError
-from dlocore.kernels.assembly import assemble, multiply_scalar_band
+from dlocore.kernels.assembly import NO_RATES, assemble, multiply_scalar_band
 from dlocore.kernels.basis import basis_rows
 from dlocore.kernels.leastsquares import band_to_dense, states_at
 from dlocore.problem import Problem
@@ -88,7 +88,7 @@ def _equations(
     R = np.empty(len(first) * free)
     for k in range(len(first)):
         states_at(first[k], table[k], control, state)
-        laws = (window.active, window.parameters, window.grid.memory)
+        laws = (window.active, window.parameters, window.grid.memory, window.grid.memory, NO_RATES)
         assemble(window.axes, state[0], state[1], window.grid.tables, *laws, (1.0, 0.0, 1.0), f, K)
         band_to_dense(K, dense)
         multiply_scalar_band(window.mass, state[2], 1.0, f)

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.discretisation import Grid, Starts, applied_forces, close_grasps, hold
-from dlocore.kernels.assembly import axial_tension
 from dlocore.kernels.banded import expand_vector, place_held
 from dlocore.kernels.basis import GAUSS_2, basis_rows
 from dlocore.kernels.leastsquares import damped_step, normal_equations
@@ -181,11 +180,7 @@ def solve(problem: Problem, motion: March, knots_t: Floats, delta: float, monito
         Cancelled: the caller asked to stop.
     """
     grid = motion.grid
-    active, parameters = problem.law_table()
-    axes = tuple(range(problem.plane.dimensions))
-    tension = max(
-        float(np.abs(axial_tension(axes, q, grid.tables, active, parameters)).max()) for q in motion.states[::4]
-    )
+    tension = motion.largest_strain * problem.stretch.axial_stiffness
     windows = windows_of(problem, knots_t)
     guess = [_window_fit(motion, w) for w in windows]
     parts: list[Floats] = []
