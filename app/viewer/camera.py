@@ -8,7 +8,9 @@ FIELD_OF_VIEW = 0.7  # rad, vertical
 DISTANCE = 1.75  # from the middle, of the cable's length
 WIDE = 1.2  # picture at least that much wider than high: the whole cable is in it from `DISTANCE`
 PANEL = 320  # px that the docked panel takes
-PHONE = 576  # px: a narrower page has its panel in a sheet at the bottom
+PHONE = 576  # px: a page no wider has its panel in a sheet over the lower part of the picture
+SHEET = 0.6  # of the picture's height, that the sheet covers
+VIEW = np.array([0.0, 0.66, -0.75])  # from the camera to what it looks at
 
 
 def start_pose(length: float, page_width: int, page_height: int) -> tuple[Floats, Floats]:
@@ -19,8 +21,10 @@ def start_pose(length: float, page_width: int, page_height: int) -> tuple[Floats
         page_width: of the whole page [px], the panel included.
         page_height: of the whole page [px].
     """
-    picture_width = page_width - PANEL if page_width > PHONE else page_width
-    aspect = max(picture_width, 1) / max(page_height, 1)
+    phone = page_width <= PHONE
+    aspect = max(page_width if phone else page_width - PANEL, 1) / max(page_height, 1)
     distance = DISTANCE * length * max(1.0, WIDE / aspect)
     middle = np.array([0.5 * length, 0.2 * length, 0.0])
-    return middle + distance * np.array([0.0, -0.66, 0.75]), middle
+    if phone:  # look at a nearer point of the table, so that the cable comes to lie above the sheet
+        middle[1] -= SHEET * np.tan(0.5 * FIELD_OF_VIEW) * distance / -VIEW[2]
+    return middle - distance * VIEW, middle

@@ -66,8 +66,9 @@ def status_card(prediction: Prediction, *, preview: bool) -> str:
 
 def problem_card(problem: str, details: str) -> str:
     """Return why there is no prediction, in words."""
+    headline = "This is not possible." if details else "No prediction."
     return (
-        f'<div style="{_CARD} background: {_BAD};" data-status="impossible" role="alert"><b>This is not possible.</b> '
+        f'<div style="{_CARD} background: {_BAD};" data-status="impossible" role="alert"><b>{headline}</b> '
         f"{escape(problem)}.<div style='opacity: 0.75; margin-top: 0.3rem;'>{escape(details)} "
         "The picture shows the last good prediction.</div></div>"
     )

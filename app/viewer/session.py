@@ -83,8 +83,6 @@ class Session:
         client.scene.set_up_direction("+z")
         if client.camera.image_width > PHONE:
             client.gui.main_panel.dock_right()
-        else:
-            client.gui.main_panel.minimize()
         client.camera.fov = FIELD_OF_VIEW
         client.camera.position, client.camera.look_at = start_pose(
             length, client.camera.image_width, client.camera.image_height
