@@ -148,14 +148,17 @@ def _climb(problem: Problem, quality: Quality, monitor: Monitor) -> tuple[Level,
     target = quality.target_error or AUTO_TARGET * problem.scene.cable.length
     budget = quality.time_budget or np.inf
     before: Level | None = None
+    status: Status = "converged"
     rho = RHO
     last_time = 0.0
     for i in range(len(LEVELS)):
         began = monitor.elapsed()
         try:
-            monitor.check()
+            if before is not None:
+                monitor.check()
             level = run_level(problem, *stretched(problem, i), monitor, rho=rho)
         except TimeIsUp:
+            status = "time_limit"
             break
         if before is not None:
             level = replace(level, change=distance(before, level, problem))
@@ -184,6 +187,9 @@ def _climb(problem: Problem, quality: Quality, monitor: Monitor) -> tuple[Level,
             )
             return level, "converged" if np.isfinite(level.change) else "time_limit", message, _finite(level.change)
     assert before is not None
+    if status == "time_limit":
+        message = f"The time limit passed; the last refinement moved the surface by {before.change * 1e3:.3g} mm."
+        return before, status, f"{message} Allow more time or a larger target_error.", _finite(before.change)
     status, message = _march_status(problem, before)
     if status == "converged":
         status = "max_iterations"
@@ -267,7 +273,7 @@ def _answer(
         message=message,
         surface=surface,
         grasps=reactions(problem, grid, level.motion.forces if forces is None else forces),
-        report_effects=partial(effect_reports, problem),
+        report_effects=partial(effect_reports, problem, grid),
         iterations=tuple(monitor.iterations),
         accuracy=Accuracy(
             method=method,
@@ -289,10 +295,20 @@ def warm_up() -> None:
     """Compile, or load from the cache, every kernel, so that the first prediction is as fast as the next."""
     from dlocore.cable import Cable
     from dlocore.paths import Move
-    from dlocore.scene import Environment, Grasp, Straight, Table
+    from dlocore.scene import Environment, Grasp, Points, Table
+    from dlocore.statics import equilibrium
 
+    cable = Cable.preset("paper", bending_damping=1e-4)
+    arc = np.linspace(0.0, 1.0, 12)[:, None] * [1.0, 0.0, 0.0] + 0.05 * np.sin(np.linspace(0, 3, 12))[:, None] * [
+        0,
+        1,
+        0,
+    ]
+    grasp = Grasp(u=0.3, hold="tangent", path=Move(displacement=(0.0, 0.01, 0.0), duration=1.0))
     for table in (Table(), None):
-        cable = Cable.preset("paper", bending_damping=1e-4)
-        grasp = Grasp(u=0.3, path=Move(displacement=(0.0, 0.1, 0.0), duration=1.0))
         environment = Environment(drag=0.1, drag_quadratic=0.1, table=table)
-        predict(Scene(cable=cable, shape=Straight(), grasps=(grasp,), environment=environment))
+        for quality in (Quality(), Quality(n_u=9, n_t=9)):
+            shape = Points(points=arc, settle=table is None)
+            scene = Scene(cable=cable, shape=shape, grasps=(grasp,), environment=environment, quality=quality)
+            predict(scene)
+        equilibrium(scene, n_u=9)

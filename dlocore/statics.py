@@ -139,7 +139,10 @@ def start_grid(problem: Problem, n_u: int, monitor: Monitor) -> Grid:
     grid = make_grid(problem, n_u)
     if not problem.scene.shape.settle:
         return grid
-    q, settled, _ = settle(problem, grid, 0.0, monitor)
+    try:
+        q, settled, _ = settle(problem, grid, 0.0, monitor)
+    except TimeIsUp:
+        return grid  # the march will find the time used up, and say so
     if not settled:
         allowed = "false, or a start that grasps hold in an equilibrium"
         raise SceneError("shape.settle", True, allowed, "The start did not come to rest")

@@ -262,6 +262,6 @@ def build_tables(
             for j in range(i, 4):
                 mass[f + i, j - i] += weights4[p] * table4[p, 0, i] * table4[p, 0, j]
     return Tables(
-        axial_first, axial_b1, axial_w, curvature_u, curvature_first, b1, b2, curvature_w, curvature_first, b0, curvature_w,
-        mass, weight,
+        axial_first, axial_b1, axial_w, curvature_u, curvature_first, b1, b2, curvature_w, curvature_first, b0,
+        curvature_w, mass, weight,
     )  # fmt: skip

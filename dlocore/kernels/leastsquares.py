@@ -184,8 +184,8 @@ def normal_equations(
         solve_rows(G, Z)
         _times_root(B, X)
         _times_root(B, Z)
-        # J_j = a_j X + b_j Y + c_j Z: the products of the three matrices serve all pairs of time basis functions. Without
-        # viscous laws the damping matrix is proportional to the mass matrix, and Y is merged into X.
+        # J_j = a_j X + b_j Y + c_j Z: the products of the three matrices serve all pairs of time basis functions.
+        # Without viscous laws the damping matrix is proportional to the mass matrix, and Y is merged into X.
         _gram(X, X, XX)
         _gram(X, Z, XZ)
         _gram(Z, Z, ZZ)

@@ -61,8 +61,8 @@ def run_level(
 ) -> Level:
     """March on one grid and fit the time spline.
 
-    A march that found no equilibrium, or stretched the cable beyond belief, is done again with strong numerical damping,
-    and the better one is kept.
+    A march that found no equilibrium, or stretched the cable beyond belief, is done again with strong numerical
+    damping, and the better one is kept.
 
     Args:
         rho: spectral radius of the march.

@@ -26,8 +26,8 @@ from dlocore.solvers.monitor import Monitor, TimeIsUp
 
 Floats = NDArray[np.float64]
 
-# Spectral radius at infinite frequency. 0.9 is a little more accurate where the motion is smooth, but in stiff, undamped
-# motion energy grows without bounds; 0.5 holds nearly always, 0 always (docs/model.md).
+# Spectral radius at infinite frequency. 0.9 is a little more accurate where the motion is smooth, but in stiff,
+# undamped motion energy grows without bounds; 0.5 holds nearly always, 0 always (docs/model.md).
 RHO = 0.5
 STRONGLY_DAMPED = 0.0
 TOLERANCE = 3e-7  # of the length, on the error that the Newton iterations of a step leave
@@ -202,6 +202,7 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
         offsets = np.zeros((len(times), len(e.held)))
         offsets[first : last + 1] = held.offsets[3:]
         reactions = np.zeros((len(times), len(e.held)))
+        reactions[first] = (times_mass(mass, a) + G).reshape(-1)[e.held]
         at, smooth = first, first  # the step reached, and the first of the smooth stretch that it lies in
         while at < last and not stopped:
             try:
@@ -211,8 +212,8 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
                 break
             until = min(at + _CHUNK, last)
             march_steps(
-                axes, at, until, smooth, h, rho, tolerance, states, v, a, G, mass, drag, grid.tables, active, parameters,
-                grid.memory, past, applied, e, offsets, reactions, info,
+                axes, at, until, smooth, h, rho, tolerance, states, v, a, G, mass, drag, grid.tables, active,
+                parameters, grid.memory, past, applied, e, offsets, reactions, info,
             )  # fmt: skip
             at = until
             failed = int(info[FAILED_STEP])
@@ -229,8 +230,8 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
                 inner_reactions = np.zeros((parts + 1, len(e.held)))
                 kept = [x.copy() for x in (v, a, G, past)]
                 march_steps(
-                    axes, 0, parts, 0, h / parts, 0.0, tolerance, inner_states, v, a, G, mass, drag, grid.tables, active,
-                    parameters, grid.memory, past, applied_forces(problem, grid, inner), e, inner_offsets,
+                    axes, 0, parts, 0, h / parts, STRONGLY_DAMPED, tolerance, inner_states, v, a, G, mass, drag,
+                    grid.tables, active, parameters, grid.memory, past, applied_forces(problem, grid, inner), e, inner_offsets,
                     inner_reactions, info,
                 )  # fmt: skip
                 if info[FAILED_STEP] < 0:
@@ -244,7 +245,7 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
             else:
                 stopped = "step"
         reached = at
-        reactions[first] = reactions[first + 1]
+        _to_ends_of_steps(reactions[first : reached + 1], rho / (1.0 + rho))
         part = slice(first, last + 1)
         forces.append(WindowForces(held, times[part], reactions[part], states[part]))
         if stopped:
@@ -255,6 +256,17 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
         grid, times, states, velocity, tuple(forces), reached, stopped, split, int(info[NEWTON]),
         float(largest_strain(axes, states, grid.tables)), float(info[LEFT]),
     )  # fmt: skip
+
+
+def _to_ends_of_steps(reactions: Floats, lag: float) -> None:
+    """Bring the reactions (k, held) of steps 1 to k - 1 to their times, in place.
+
+    A generalised-alpha step balances its forces `lag` steps before its end (alpha_f).
+    """
+    if len(reactions) > 2:
+        rate = np.diff(reactions[1:], axis=0)
+        reactions[1:-1] += lag * rate
+        reactions[-1] += lag * rate[-1]
 
 
 def times_mass(mass: Floats, v: Floats) -> Floats:
