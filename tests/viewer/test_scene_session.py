@@ -99,8 +99,9 @@ def test_an_impossible_target_is_said_and_the_last_good_prediction_stays(service
     with connected(service) as client:
         client.set("Ask for", "automatic")
         client.set("Hold the far end", True)
-        client.wait_for(lambda: np.abs(client.final_shape[-1] - (1, 0, client.final_shape[-1, 2])).max() < 1e-6)
-        client.wait_for(lambda: 'data-status="converged"' in client.card)
+        client.wait_for(lambda: np.abs(client.final_shape[-1, :2] - (1, 0)).max() < 1e-6)
+        client.wait_for(lambda: "control points" in client.card and "Preview" not in client.card)
+        client.listen(0.2)
         good = client.final_shape.copy()
         client.drag("start")
         client.drag("update", 0.25, 0.9)
@@ -111,8 +112,9 @@ def test_an_impossible_target_is_said_and_the_last_good_prediction_stays(service
         assert np.array_equal(client.final_shape, good)
         client.drag("update", 0.5, 0.2)
         client.drag("end")
-        client.wait_for(lambda: 'data-status="converged"' in client.card and "Preview" not in client.card)
+        client.wait_for(lambda: "control points" in client.card and "Preview" not in client.card)
         assert client.visible["/warning"] is False
+        assert not np.array_equal(client.final_shape, good)
     assert not [record for record in caplog.records if record.levelname == "ERROR"]
 
 
