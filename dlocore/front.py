@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,8 +58,8 @@ def predict(
     if method == "auto":
         method = "march" if quality.n_u is None else "spacetime"
     if method == "march":
-        level, status, message, estimate = _climb(problem, quality, monitor)
-        return _answer(problem, level, monitor, "march", status, message, estimate)
+        outcome = (_climb if quality.n_u is None else _given)(problem, quality, monitor)
+        return _answer(problem, monitor, "march", outcome)
     return _least_squares(problem, quality, monitor, method)
 
 
@@ -69,7 +70,7 @@ def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method:
     _check_n_t(problem, quality.n_t)
     level = run_level(problem, quality.n_u, quality.n_t, given_steps(quality.n_t), monitor)
     if level.motion.stopped:
-        return _answer(problem, level, monitor, "march", *_march_status(problem, level), None)
+        return _answer(problem, monitor, "march", Outcome(level, *_march_status(problem, level), None))
     grid, knots_t = level.motion.grid, level.knots_t
     last = [level.control]
 
@@ -89,7 +90,7 @@ def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method:
         monitor.phase(method)
         level = replace(level, control=last[0])
         message = "The time limit passed; this is the last iterate. Allow more time or a coarser grid."
-        return _answer(problem, level, monitor, method, "time_limit", message, None)
+        return _answer(problem, monitor, method, Outcome(level, "time_limit", message, None))
     monitor.phase(method)
     count = len(monitor.iterations)
     status: Status = "converged" if converged else "max_iterations" if count >= limit else "stalled"
@@ -104,7 +105,7 @@ def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method:
         control, status = level.control, "stalled"
     level = replace(level, control=control)
     estimate = _companion(problem, quality, level, monitor) if converged else None
-    return _answer(problem, level, monitor, method, status, message, estimate, forces)
+    return _answer(problem, monitor, method, Outcome(level, status, message, estimate), forces)
 
 
 def _companion(problem: Problem, quality: Quality, level: Level, monitor: Monitor) -> float | None:
@@ -137,67 +138,69 @@ def _check_n_t(problem: Problem, n_t: int) -> None:
         raise SceneError("quality.n_t", n_t, f"at least {least} in this scene", reason)
 
 
-def _climb(problem: Problem, quality: Quality, monitor: Monitor) -> tuple[Level, Status, str, float | None]:
-    """March on the given grid, or up the ladder of grids until the target or the time budget is met."""
-    if quality.n_u is not None and quality.n_t is not None:
-        _check_n_t(problem, quality.n_t)
-        level = run_level(problem, quality.n_u, quality.n_t, given_steps(quality.n_t), monitor)
-        _record_level(problem, level, monitor)
-        status, message = _march_status(problem, level)
-        return level, status, message, None if level.motion.stopped else _companion(problem, quality, level, monitor)
+class Outcome(NamedTuple):
+    """A level of refinement, what to say of it, and its estimated error [m]."""
+
+    level: Level
+    status: Status
+    message: str
+    estimate: float | None
+
+
+def _given(problem: Problem, quality: Quality, monitor: Monitor) -> Outcome:
+    """March on the given grid."""
+    assert quality.n_u is not None
+    assert quality.n_t is not None
+    _check_n_t(problem, quality.n_t)
+    level = run_level(problem, quality.n_u, quality.n_t, given_steps(quality.n_t), monitor)
+    _record_level(problem, level, monitor)
+    estimate = None if level.motion.stopped else _companion(problem, quality, level, monitor)
+    return Outcome(level, *_march_status(problem, level), estimate)
+
+
+def _climb(problem: Problem, quality: Quality, monitor: Monitor) -> Outcome:
+    """March up the ladder of grids until two agree within the target, or the time budget is used."""
     target = quality.target_error or AUTO_TARGET * problem.scene.cable.length
     budget = quality.time_budget or np.inf
-    before: Level | None = None
-    status: Status = "converged"
+    best: Level | None = None
     rho = RHO
-    last_time = 0.0
     for i in range(len(LEVELS)):
         began = monitor.elapsed()
         try:
-            if before is not None:
+            if best is not None:
                 monitor.check()
             level = run_level(problem, *stretched(problem, i), monitor, rho=rho)
         except TimeIsUp:
-            status = "time_limit"
             break
-        if before is not None:
-            level = replace(level, change=distance(before, level, problem))
-        if level.motion.stopped and before is not None and not before.motion.stopped:
-            return (
-                before,
-                "stalled",
-                f"A finer grid did not converge: {_march_status(problem, level)[1]}",
-                before.change,
-            )
-        if np.isfinite(level.change) and level.change > ROUGH * problem.scene.cable.length:
-            rho = STRONGLY_DAMPED
+        if best is not None:
+            level = replace(level, change=distance(best, level, problem))
+            if level.motion.stopped and not best.motion.stopped:
+                message = f"A finer grid did not converge: {_march_status(problem, level)[1]}"
+                return Outcome(best, "stalled", message, _finite(best.change))
+            if level.change > ROUGH * problem.scene.cable.length:
+                rho = STRONGLY_DAMPED
         _record_level(problem, level, monitor)
+        best = level
+        status, message = _march_status(problem, level)
+        moved = f"the last refinement moved the surface by {level.change * 1e3:.2g} mm"
         if level.motion.stopped == "time":
-            return level, *_march_status(problem, level), None
-        before = level
+            return Outcome(level, status, message, None)
         if level.change <= ACCEPT * target and quality.time_budget is None:
-            status, message = _march_status(problem, level)
-            if status == "converged":
-                message = f"Two grids agree to {level.change * 1e3:.2g} mm, target {target * 1e3:.2g} mm."
-            return level, status, message, level.change
-        last_time = monitor.elapsed() - began
-        if monitor.elapsed() + 2.5 * last_time > budget:
-            message = (
-                f"The best grid in {budget * 1e3:.3g} ms; the last refinement moved it by {level.change * 1e3:.2g} mm."
-            )
-            return level, "converged" if np.isfinite(level.change) else "time_limit", message, _finite(level.change)
-    assert before is not None
-    if status == "time_limit":
-        message = f"The time limit passed; the last refinement moved the surface by {before.change * 1e3:.3g} mm."
-        return before, status, f"{message} Allow more time or a larger target_error.", _finite(before.change)
-    status, message = _march_status(problem, before)
-    if status == "converged":
-        status = "max_iterations"
-        message = (
-            f"The finest grid still moved the surface by {before.change * 1e3:.3g} mm, more than the target of "
-            f"{target * 1e3:.3g} mm. Allow a larger target_error or a shorter motion."
-        )
-    return before, status, message, _finite(before.change)
+            agreed = f"Two grids agree to {level.change * 1e3:.2g} mm, target {target * 1e3:.2g} mm."
+            return Outcome(level, status, agreed if status == "converged" else message, level.change)
+        if 2.5 * (monitor.elapsed() - began) > budget - monitor.elapsed():
+            if i == 0:
+                return Outcome(level, "time_limit", f"{budget * 1e3:.3g} ms allow one grid, unchecked.", None)
+            return Outcome(level, status, f"The best grid in {budget * 1e3:.3g} ms; {moved}.", level.change)
+    assert best is not None
+    status, message = _march_status(problem, best)
+    moved = f"the last refinement moved the surface by {best.change * 1e3:.3g} mm, target {target * 1e3:.3g} mm"
+    advice = "Allow a larger target_error, more time or a shorter motion."
+    if status == "converged" and monitor.remaining() <= 0:
+        status, message = "time_limit", f"The time limit passed; {moved}. {advice}"
+    elif status == "converged":
+        status, message = "max_iterations", f"No finer grid; {moved}. {advice}"
+    return Outcome(best, status, message, _finite(best.change))
 
 
 def _finite(x: float) -> float | None:
@@ -257,27 +260,25 @@ def _record(
 
 def _answer(
     problem: Problem,
-    level: Level,
     monitor: Monitor,
     method: str,
-    status: Status,
-    message: str,
-    estimate: float | None,
+    outcome: Outcome,
     forces: tuple[WindowForces, ...] | None = None,
 ) -> Prediction:
+    level = outcome.level
     grid = level.motion.grid
     surface = surface_of(problem, grid, level.knots_t, level.control)
     return Prediction(
         scene=problem.scene,
-        status=status,
-        message=message,
+        status=outcome.status,
+        message=outcome.message,
         surface=surface,
         grasps=reactions(problem, grid, level.motion.forces if forces is None else forces),
         report_effects=partial(effect_reports, problem, grid),
         iterations=tuple(monitor.iterations),
         accuracy=Accuracy(
             method=method,
-            error_estimate=estimate,
+            error_estimate=outcome.estimate,
             wall_time=monitor.elapsed(),
             n_u=grid.n_u,
             n_t=len(level.control),

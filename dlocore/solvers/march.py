@@ -231,8 +231,8 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
                 kept = [x.copy() for x in (v, a, G, past)]
                 march_steps(
                     axes, 0, parts, 0, h / parts, STRONGLY_DAMPED, tolerance, inner_states, v, a, G, mass, drag,
-                    grid.tables, active, parameters, grid.memory, past, applied_forces(problem, grid, inner), e, inner_offsets,
-                    inner_reactions, info,
+                    grid.tables, active, parameters, grid.memory, past, applied_forces(problem, grid, inner), e,
+                    inner_offsets, inner_reactions, info,
                 )  # fmt: skip
                 if info[FAILED_STEP] < 0:
                     states[failed], reactions[failed] = inner_states[-1], inner_reactions[-1]
