@@ -1,6 +1,6 @@
 """What every effect's compiled law owes: forces, tangents and energies that belong together, and no preferred frame."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from dlocore.effects.bend import Bend
 from dlocore.effects.damping import EPSILON, Damping
 from dlocore.effects.drag import QuadraticDrag
 from dlocore.effects.stretch import Stretch
-from dlocore.kernels.assembly import assemble, stored_energy
+from dlocore.kernels.assembly import NO_RATES, assemble, remember, stored_energy
 from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, Tables, build_tables, graded_knots
 from dlocore.spline import design_matrix
 
@@ -39,6 +39,14 @@ class Body:
     active: NDArray[np.int64]
     parameters: Floats
     memory: Floats
+    past: Floats
+    rates: tuple[float, float, float] = NO_RATES
+
+    def after(self, h: float, *steps: Floats) -> "Body":
+        """Return this body with the rate of curvature by backward differences of step h from the two last `steps`."""
+        for q in steps:
+            remember(tuple(range(self.nc)), q, self.tables, self.past)
+        return replace(self, rates=(1.5 / h, -2.0 / h, 0.5 / h))
 
     def forces(self, q: Floats, v: Floats) -> Floats:
         f = np.empty_like(q)
@@ -61,7 +69,8 @@ class Body:
         return float(stored_energy(axes, q, self.tables, self.active, self.parameters, self.memory))
 
     def _state(self, q: Floats, v: Floats) -> tuple:
-        return tuple(range(self.nc)), q, v, self.tables, self.active, self.parameters, self.memory
+        laws_at = (self.tables, self.active, self.parameters, self.memory, self.past, self.rates)
+        return tuple(range(self.nc)), q, v, *laws_at
 
 
 def body(name: str, nc: int, n_u: int = N_U, rest: float = 0.0) -> Body:
@@ -79,7 +88,8 @@ def body(name: str, nc: int, n_u: int = N_U, rest: float = 0.0) -> Body:
     memory = np.zeros((len(tables.curvature_w), 1 if nc == 2 else 3))
     if name.endswith("memory") and nc == 2:
         memory[:] = rest or 3.0
-    return Body(nc, knots, tables, active, parameters, memory)
+    past = np.zeros((len(memory), 2 if nc == 2 else 9))
+    return Body(nc, knots, tables, active, parameters, memory, past)
 
 
 def bent(nc: int, n_u: int = N_U, seed: int = 7) -> tuple[Floats, Floats]:
@@ -229,7 +239,7 @@ def test_a_naturally_curved_cable_at_rest_stores_no_energy():
 
 
 @DIMENSIONS
-def test_a_circle_stores_half_EI_times_curvature_squared(nc):
+def test_a_circle_stores_half_ei_kappa_squared(nc):
     b = body("bend", nc, n_u=33)
     exact = 0.5 * 1e-3 * 3.0**2 * LENGTH
     # the curvature of a cubic spline misses (kappa h)^2/24 of a circle's, here 1e-4 of it on average
@@ -237,7 +247,7 @@ def test_a_circle_stores_half_EI_times_curvature_squared(nc):
 
 
 @DIMENSIONS
-def test_a_stretched_cable_pulls_with_EA_times_strain(nc):
+def test_a_stretched_cable_pulls_with_ea_times_strain(nc):
     b = body("stretch", nc)
     q = np.zeros((N_U, nc))
     q[:, 0] = 1.01 * greville(b.knots)
@@ -296,6 +306,39 @@ def test_damping_does_no_work_in_a_rigid_swing(nc):
         else:
             # near zero curvature the whole rate costs: eta/2 eps^2 |spin|^2 a length at most (docs/model.md eq. 9)
             assert 0.0 <= power <= 2e-3 * (EPSILON / LENGTH) ** 2 * (spin @ spin) * LENGTH * 1.5
+
+
+def test_damping_by_differences_has_a_potential_in_the_plane():
+    # so its tangent, material and geometric, is all of dF/dq
+    q, v = bent(2)
+    h = 0.01
+    b = body("damping", 2).after(h, q - 0.02 * v, q - 0.01 * v)
+    K = b.tangent(q, v, (1.0, 1.5 / h, 1.0))
+    np.testing.assert_allclose(differences(lambda x: b.forces(x, v), q, 1e-6), K, atol=1e-7 * np.abs(K).max())
+
+
+@DIMENSIONS
+def test_damping_by_differences_tends_to_that_by_velocity(nc):
+    q, v = bent(nc)
+    exact = body("damping", nc).forces(q, v)
+    errors = []
+    for h in (1e-3, 5e-4):
+        f = body("damping", nc).after(h, q - 2 * h * v, q - h * v).forces(q, v)
+        errors.append(np.abs(f - exact).max() / np.abs(exact).max())
+    assert errors[1] < 1e-3
+    assert 1.8 < np.log2(errors[0] / errors[1]) < 2.2  # second order
+
+
+@DIMENSIONS
+def test_damping_by_differences_does_no_work_in_a_rigid_turn(nc):
+    q, _ = bent(nc)
+    h = 1e-3
+    spin = np.array([1.0, -2.0, 3.0]) if nc == 3 else np.array([0.0, 0.0, 5.0])
+    turned = [q @ Rotation.from_rotvec(k * h * spin).as_matrix()[:nc, :nc].T for k in (-2, -1, 0)]
+    b = body("damping", nc).after(h, *turned[:2])
+    v = (turned[2] - turned[1]) / h
+    bound = 1e-9 if nc == 2 else 1.5 * 2e-3 * (EPSILON / LENGTH) ** 2 * (spin @ spin) * LENGTH  # rounding / h; as above
+    assert abs(power_of_bending(b, q, v)) < bound
 
 
 @DIMENSIONS

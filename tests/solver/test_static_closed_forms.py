@@ -32,7 +32,7 @@ def cantilever(a: float) -> Equilibrium:
     return equilibrium(scene)
 
 
-def test_small_cantilever_sinks_by_PL3_over_3EI():
+def test_small_cantilever_sinks_by_pl3_over_3ei():
     tip = cantilever(1e-3).positions(1.0)[0]
     # the next term of the series is 4 a^2/35 smaller relatively; the answer is refined to 1e-4 of L, here by far better
     assert -tip[2] == pytest.approx(1e-3 / 3, rel=1e-6)
@@ -48,7 +48,7 @@ def test_large_cantilever_bends_as_the_elastica(a, shortening, deflection):
     np.testing.assert_allclose([1 - tip[0], -tip[2]], [shortening, deflection], atol=3e-5)
 
 
-def test_an_end_moment_of_2_pi_EI_over_L_rolls_the_cable_to_a_circle():
+def test_an_end_moment_of_2_pi_ei_over_l_rolls_the_cable_to_a_circle():
     turn = np.linspace(0.0, 2 * np.pi, 25)
     ends = np.vstack([[1.0, 0.0, 0.0], *[arc(1.0, x, 2)[1:] for x in turn[1:]]])
     quaternions = np.column_stack([np.cos(turn / 2), 0 * turn, 0 * turn, np.sin(turn / 2)])
