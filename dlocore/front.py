@@ -24,7 +24,7 @@ from dlocore.solvers.spacetime import MAX_ITERATIONS, solve
 Floats = NDArray[np.float64]
 
 AUTO_TARGET = 2e-3  # of the length: the target error of quality "auto"
-ROUGH = 0.05  # of the length: two grids that differ more are in no order yet; the next is marched with strong damping
+ROUGH = 0.05  # of the length: two grids that differ more are in no order yet: the next is marched with strong damping
 TORN = 0.2  # axial strain: no cable of this kind follows
 FINER = 1.5  # times n_u, n_t and the steps of a given grid: the march that its error is estimated with
 
@@ -177,8 +177,7 @@ def _climb(problem: Problem, quality: Quality, monitor: Monitor) -> Outcome:
             if level.motion.stopped and not best.motion.stopped:
                 message = f"A finer grid did not converge: {_march_status(problem, level)[1]}"
                 return Outcome(best, "stalled", message, _finite(best.change))
-            if level.change > ROUGH * problem.scene.cable.length:
-                rho = STRONGLY_DAMPED
+            rho = STRONGLY_DAMPED if level.change > ROUGH * problem.scene.cable.length else RHO
         _record_level(problem, level, monitor)
         best = level
         status, message = _march_status(problem, level)
@@ -196,7 +195,9 @@ def _climb(problem: Problem, quality: Quality, monitor: Monitor) -> Outcome:
     status, message = _march_status(problem, best)
     moved = f"the last refinement moved the surface by {best.change * 1e3:.3g} mm, target {target * 1e3:.3g} mm"
     advice = "Allow a larger target_error, more time or a shorter motion."
-    if status == "converged" and monitor.remaining() <= 0:
+    if status == "converged" and best.change <= target:
+        message = f"Two grids agree to {best.change * 1e3:.2g} mm, target {target * 1e3:.2g} mm."
+    elif status == "converged" and monitor.remaining() <= 0:
         status, message = "time_limit", f"The time limit passed; {moved}. {advice}"
     elif status == "converged":
         status, message = "max_iterations", f"No finer grid; {moved}. {advice}"
