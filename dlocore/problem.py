@@ -141,6 +141,10 @@ def pose(scene: Scene) -> Problem:
     bent = not isinstance(cable.rest_shape, str) or (
         cable.rest_shape == "initial" and len(start.control_points) > 4 and not _is_straight(start)
     )
+    natural = _natural_points(scene)
+    if on_table and natural is not None and not np.ptp(natural[:, 2]) <= TABLE_TOLERANCE:
+        reason = "The cable lies on the table"
+        raise SceneError("cable.rest_shape", cable.rest_shape, "points in a horizontal plane", reason)
     if plane.dimensions == 3 and bent:
         reason = "A bent rest shape twists a cable that moves in three dimensions, and twist is not modelled yet"
         raise SceneError("cable.rest_shape", cable.rest_shape, '"straight", or a planar scene', reason)
@@ -165,6 +169,15 @@ def pose(scene: Scene) -> Problem:
         if active("drag", environment.drag_quadratic > 0)
         else None,
     )
+
+
+def _natural_points(scene: Scene) -> Floats | None:
+    """Return the points (n, 3) [m] of a given natural shape, whose plane is that of the cable's bends, or None."""
+    rest = scene.cable.rest_shape
+    if isinstance(rest, str):
+        return None
+    points = cast(Floats, rest)
+    return np.column_stack([points, np.zeros(len(points))]) if points.shape[1] == 2 else points
 
 
 def _is_straight(start: StartCurve) -> bool:
@@ -269,6 +282,9 @@ def _find_plane(scene: Scene, start: StartCurve, on_table: bool) -> Plane:
     for load in scene.loads:
         force = np.atleast_2d(cast(Floats, load.force))
         spread.append(force / max(1e-300, np.abs(force).max()))
+    natural = _natural_points(scene)
+    if natural is not None:
+        spread.append((natural - natural[0]) / length)
     vectors = np.concatenate(spread)
     _, sizes, principal = np.linalg.svd(np.concatenate([vectors, np.zeros((2, 3))]), full_matrices=False)
     collinear = not sizes[1] > FLATNESS * sizes[0]
