@@ -100,11 +100,14 @@ def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method:
             f"The update is still {update:.2g} m after {count} iterations, above delta = {quality.delta:g} m. "
             "Raise n_u and n_t, allow a larger delta, or take method march."
         )
-    if not np.isfinite(control).all():
-        message += " The iterates grew beyond all bounds; the surface is that of the march it is compared with."
-        control, status = level.control, "stalled"
+    if not converged and method == "spacetime":
+        message += " The surface is that of the march it started from."
+        control, forces = level.control, None
+    elif not np.isfinite(control).all():
+        message += " The iterates grew beyond all bounds; the surface is that of a march."
+        control = level.control
     level = replace(level, control=control)
-    estimate = _companion(problem, quality, level, monitor) if converged else None
+    estimate = _companion(problem, quality, level, monitor) if method == "spacetime" or converged else None
     return _answer(problem, monitor, method, Outcome(level, status, message, estimate), forces)
 
 
@@ -211,8 +214,12 @@ def _finite(x: float) -> float | None:
 def _march_status(problem: Problem, level: Level) -> tuple[Status, str]:
     motion = level.motion
     if not motion.stopped and motion.largest_strain > TORN:
-        strain = f"The motion stretches the cable by {motion.largest_strain:.0%}, which no cable follows."
-        return "stalled", f"{strain} Bring the grasps' paths closer together, or make the motion slower."
+        strain = f"The motion strains the cable along itself by {motion.largest_strain:.0%}, which no cable follows."
+        advice = "Keep the grasps apart less than the cable between them, make the motion slower, or, where a straight cable "
+        return (
+            "stalled",
+            f"{strain} {advice}is pushed along itself, start it slightly bent: it has no side to buckle to.",
+        )
     if not motion.stopped:
         return "converged", "Every time step found its equilibrium."
     reached = motion.times[motion.reached]
