@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dlocore import Scene, predict
+from dlocore import Quality, Scene, predict
 from dlocore.problem import Problem, pose
 from dlocore.solvers.ladder import run_level
 from dlocore.solvers.monitor import Monitor
