@@ -1,7 +1,8 @@
-"""What the choices of the space discretisation are worth: `python -m benchmarks.choices`.
+"""What the choices of the discretisation are worth: `python -m benchmarks.choices`.
 
 The final worst error of a march on the paper's case, against the converged motion, as the solver is and with one choice
-undone: the quadrature of the stretch energy, and the knots.
+undone: the quadrature of the stretch energy, the knots, the numerical damping of the time steps. Then the energy of a
+free, undamped motion, which should stay, over the numerical damping.
 """
 
 import os
@@ -9,6 +10,7 @@ import os
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
 
 from collections.abc import Callable
+from functools import partial
 from itertools import product
 from typing import Any
 from unittest.mock import patch
@@ -17,11 +19,14 @@ import numpy as np
 
 from benchmarks.machine import machine_line
 from benchmarks.paper_case import errors, paper_scene, reference
-from dlocore import Quality, discretisation, predict
+from dlocore import Cable, Environment, Grasp, Move, Quality, Scene, Straight, discretisation, front, predict
 from dlocore.kernels.basis import GAUSS_1, GAUSS_2, basis_rows, build_tables, graded_knots
 from dlocore.spline import uniform_knots
 
 GRIDS = ((9, 13), (13, 19), (17, 25))
+RADII = (0.0, 0.5, 0.9, 1.0)  # spectral radii at infinite frequency
+BENDING = 0.1  # [N m^2] of the stiff cable
+POINTS, TIMES = np.linspace(0.0, 1.0, 201), np.array([0.5, 1.0, 2.0, 5.0, 10.0])  # [m], [s]
 CASES = tuple(product((1e-2, 1e-3), (0.0, 0.25, 0.5, 0.8)))  # EI [N m^2], grasp [m]
 
 
@@ -49,28 +54,58 @@ def ungraded(n: int, length: float, features: Any, multiplicity: Any, power: Any
     return graded_knots(n, length, features, multiplicity, np.zeros_like(power), width)
 
 
-CHOICES: dict[str, dict[str, Any]] = {
-    "as it is": {},
-    "stretch: 1 point in every span": {"build_tables": stretch_points(GAUSS_1)},
-    "stretch: 2 points in every span": {"build_tables": stretch_points(GAUSS_2)},
-    "knots: at the grasp, not graded": {"graded_knots": ungraded},
-    "knots: uniform": {"graded_knots": uniform},
+def damped(rho: float) -> dict[str, Any]:
+    """Return the change to a march of spectral radius `rho`."""
+    return {"run_level": partial(front.run_level, rho=rho)}
+
+
+CHOICES: dict[str, tuple[Any, dict[str, Any]]] = {
+    "as it is": (front, {"FINER": front.FINER}),
+    "stretch: 1 point in every span": (discretisation, {"build_tables": stretch_points(GAUSS_1)}),
+    "stretch: 2 points in every span": (discretisation, {"build_tables": stretch_points(GAUSS_2)}),
+    "knots: at the grasp, not graded": (discretisation, {"graded_knots": ungraded}),
+    "knots: uniform": (discretisation, {"graded_knots": uniform}),
+    **{f"steps: rho = {rho:g}": (front, damped(rho)) for rho in RADII},
 }
 
 
-def main() -> None:
+def print_errors() -> None:
     truths = {case: reference(paper_scene(*case, Quality()))[0] for case in CASES}
-    print(f"{'final worst error [mm], median and largest of 8 cases':34}")
+    print("final worst error [mm], median and largest of 8 cases")
     print(f"{'':34}" + "".join(f"{f'{n_u} x {n_t}':>18}" for n_u, n_t in GRIDS))
-    for name, changes in CHOICES.items():
+    for name, (module, changes) in CHOICES.items():
         cells = []
         for n_u, n_t in GRIDS:
             quality = Quality(n_u=n_u, n_t=n_t, method="march", estimate=False)
-            with patch.multiple(discretisation, **changes) if changes else patch.dict({}):
+            with patch.multiple(module, **changes):
                 motions = {case: predict(paper_scene(*case, quality)) for case in CASES}
             worst = [1e3 * errors(m.surface.sample()[2][..., :3], truths[c])["final"] for c, m in motions.items()]
             cells.append(f"{np.median(worst):9.2f}{max(worst):9.2f}")
         print(f"{name:34}" + "".join(cells))
+
+
+def print_energies() -> None:
+    move = Move(displacement=(0.0, 0.3, 0.0), duration=0.3)
+    scene = Scene(
+        cable=Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=BENDING),
+        shape=Straight(),
+        grasps=(Grasp(u=0.25, path=move, release_time=0.4),),
+        environment=Environment(gravity=(0.0, 0.0, 0.0)),
+        horizon=10.0,
+        quality=Quality(n_u=13, n_t=201, method="march", estimate=False),
+    )
+    print("energy (motion and bending) at 1, 2, 5 and 10 s over that at 0.5 s: a stiff cable let go at 0.4 s, undamped")
+    for rho in RADII:
+        with patch.multiple(front, **damped(rho)):
+            surface = predict(scene).surface
+        kinetic = 0.5 * 0.05 * (surface(POINTS, TIMES, dt=1)[..., :3] ** 2).sum(axis=-1).mean(axis=1)
+        energy = kinetic + 0.5 * BENDING * (surface.curvature(POINTS, TIMES) ** 2).mean(axis=1)
+        print(f"{f'steps: rho = {rho:g}':34}" + "".join(f"{e:10.3g}" for e in energy[1:] / energy[0]))
+
+
+def main() -> None:
+    print_errors()
+    print_energies()
     print(machine_line())
 
 
