@@ -10,7 +10,9 @@ from dlocore.scene import ControlPoints, Environment, Grasp, Load, Points, Quali
 from dlocore.spline import SplineSurface
 
 if TYPE_CHECKING:
+    from dlocore.balance import effect_forces, energies
     from dlocore.front import predict, warm_up
+    from dlocore.planning import Plan, plan
     from dlocore.statics import Equilibrium, equilibrium
 
 __all__ = [
@@ -28,6 +30,7 @@ __all__ = [
     "Iteration",
     "Load",
     "Move",
+    "Plan",
     "Points",
     "Prediction",
     "Quality",
@@ -38,7 +41,10 @@ __all__ = [
     "Straight",
     "Table",
     "Waypoints",
+    "effect_forces",
+    "energies",
     "equilibrium",
+    "plan",
     "predict",
     "warm_up",
 ]
@@ -47,6 +53,7 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     """Import the solver on first use: its compiler takes longer to import than the rest of the package together."""
     homes = {"predict": "front", "warm_up": "front", "equilibrium": "statics", "Equilibrium": "statics"}
+    homes |= {"plan": "planning", "Plan": "planning", "energies": "balance", "effect_forces": "balance"}
     if name not in homes:
         raise AttributeError(name)
     import importlib

@@ -76,6 +76,11 @@ def make_grid(problem: Problem, n_u: int) -> Grid:
     if len(knots) == 0:
         reason = f"{len(features)} grasps and loads need a knot each"
         raise SceneError("quality.n_u", n_u, f"at least {smallest_n_u(problem)} in this scene", reason)
+    return grid_on(problem, knots)
+
+
+def grid_on(problem: Problem, knots: Floats) -> Grid:
+    """Return the grid of a problem on given knots (n_u + 4,) [m], with the start shape on it."""
     free_start, free_end = _free_ends(problem)
     tables = build_tables(knots, free_start, free_end, *GAUSS_2, *GAUSS_3, *GAUSS_4)
     nc = problem.plane.dimensions

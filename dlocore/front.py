@@ -14,7 +14,7 @@ from dlocore.prediction import Accuracy, Iteration, OnIteration, Prediction, Sta
 from dlocore.problem import Problem, pose
 from dlocore.report import WindowForces, effect_reports, elastic_energy, reactions, surface_of
 from dlocore.scene import Quality, Scene
-from dlocore.solvers.ladder import ACCEPT, LEVELS, Level, distance, run_level, stretched
+from dlocore.solvers.ladder import ACCEPT, FINER, LEVELS, Level, distance, given_steps, run_level, stretched
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED, smallest_n_t
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.paper import MAX_ITERATIONS as PAPER_ITERATIONS
@@ -26,7 +26,6 @@ Floats = NDArray[np.float64]
 AUTO_TARGET = 2e-3  # of the length: the target error of quality "auto"
 ROUGH = 0.05  # of the length: two grids that differ more are in no order yet: the next is marched with strong damping
 TORN = 0.2  # axial strain: no cable of this kind follows
-FINER = 1.5  # times n_u, n_t and the steps of a given grid: the march that its error is estimated with
 
 
 def predict(
@@ -129,11 +128,6 @@ def _companion(problem: Problem, quality: Quality, level: Level, monitor: Monito
     return estimate
 
 
-def given_steps(n_t: int) -> int:
-    """Return the number of time steps that goes with a given number of control points in time."""
-    return max(48, 5 * n_t)
-
-
 def _check_n_t(problem: Problem, n_t: int) -> None:
     least = smallest_n_t(problem)
     if n_t < least:
@@ -215,11 +209,9 @@ def _march_status(problem: Problem, level: Level) -> tuple[Status, str]:
     motion = level.motion
     if not motion.stopped and motion.largest_strain > TORN:
         strain = f"The motion strains the cable along itself by {motion.largest_strain:.0%}, which no cable follows."
-        advice = "Keep the grasps apart less than the cable between them, make the motion slower, or, where a straight cable "
-        return (
-            "stalled",
-            f"{strain} {advice}is pushed along itself, start it slightly bent: it has no side to buckle to.",
-        )
+        advice = "Bring the grasps no farther apart than the cable between them, or make the motion slower."
+        push = "A straight cable pushed along itself has no side to buckle to: start it slightly bent."
+        return "stalled", f"{strain} {advice} {push}"
     if not motion.stopped:
         return "converged", "Every time step found its equilibrium."
     reached = motion.times[motion.reached]
@@ -293,6 +285,7 @@ def _answer(
             delta=problem.scene.quality.delta,
             steps=len(level.motion.times) - 1,
             dimensions=problem.plane.dimensions,
+            dimensions_reason=problem.plane.reason,
             phases=dict(monitor.phases),
         ),
         start_energy=elastic_energy(problem, grid, grid.start),

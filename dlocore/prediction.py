@@ -101,6 +101,7 @@ class Accuracy:
         delta: threshold on the update [m].
         steps: time steps of the march.
         dimensions: 2 where the motion is planar, else 3.
+        dimensions_reason: why, in words.
         phases: time by phase [s]: "setup", "march", "fit", "spacetime", "estimate", "report".
     """
 
@@ -112,6 +113,7 @@ class Accuracy:
     delta: float
     steps: int
     dimensions: int
+    dimensions_reason: str
     phases: dict[str, float] = field(default_factory=dict)
 
 

@@ -20,6 +20,7 @@ from dlocore.shape import StartCurve, start_curve
 
 Floats = NDArray[np.float64]
 
+LEAST_MASS = 1e-9  # of the true one, where inertia is off: it keeps rigid motion determined
 FLATNESS = 1e-9  # of the length: a start and a motion this close to a plane are planar
 TABLE_TOLERANCE = 0.005  # [m]: points seen this close to the table lie on it
 GRASP_TOLERANCE = 0.010  # [m]: of the first waypoint from the cable
@@ -89,6 +90,14 @@ class Problem:
     def horizon(self) -> float:
         """Predicted time [s]."""
         return cast(float, self.scene.horizon)
+
+    def mass_density(self) -> float:
+        """Return the coefficient of the mass matrix [kg/m]; where inertia is off a trace that fixes rigid motion."""
+        return LEAST_MASS * self.scene.cable.linear_density if self.inertia is None else self.inertia.density()
+
+    def drag_coefficient(self) -> float:
+        """Return the coefficient of the linear drag matrix [N s/m^2]."""
+        return 0.0 if self.drag is None else self.drag.coefficient()
 
     def law_table(self) -> tuple[NDArray[np.int64], Floats]:
         """Return the switches (laws.COUNT,) and parameters (laws.COUNT, laws.PARAMETERS) of the compiled laws."""

@@ -1,6 +1,6 @@
 """What a solve tells about itself: world coordinates, reactions, effects and energies."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
@@ -10,7 +10,6 @@ from dlocore.discretisation import Grid, Held
 from dlocore.kernels.assembly import largest_strain, stored_energy
 from dlocore.prediction import EffectReport, GraspReaction
 from dlocore.problem import Problem
-from dlocore.scene import NOT_MODELLED_YET
 from dlocore.spline import SplineSurface
 
 Floats = NDArray[np.float64]
@@ -70,76 +69,71 @@ def reactions(problem: Problem, grid: Grid, windows: tuple[WindowForces, ...]) -
     return tuple(GraspReaction(g.u, t, force[g], moment[g]) for g in problem.scene.grasps)
 
 
+def planned_effects(problem: Problem) -> tuple[EffectReport, ...]:
+    """Return for each effect whether the scene calls for it, and why; magnitudes are known only after solving."""
+    cable, environment = problem.scene.cable, problem.scene.environment
+    table = environment.table is not None
+    heavy = bool(np.any(cast(Floats, environment.gravity) != 0))
+    no_gravity = "the table carries the weight" if table and heavy else "there is no gravity"
+    drags = environment.drag > 0 or environment.drag_quadratic > 0
+    # name, whether it is simulated, whether the scene has it, why if it has, why if not
+    rows = (
+        ("inertia", problem.inertia is not None, True, "the cable has mass and moves", ""),
+        (
+            "drag", problem.drag is not None or problem.quadratic_drag is not None, drags,
+            "the environment has drag", "no drag is given",
+        ),
+        (
+            "damping", problem.damping is not None, cable.bending_damping > 0,
+            "the cable has bending damping", "no bending damping is given",
+        ),
+        ("gravity", problem.gravity is not None, heavy and not table, "the cable has weight", no_gravity),
+        ("stretch", True, True, "it keeps the cable's length", ""),
+        ("bend", problem.bend is not None, True, "the cable has bending stiffness", ""),
+        (
+            "table", problem.on_table, table,
+            "the cable lies on it: it carries the weight, the motion is planar", "there is none",
+        ),
+        ("twist", False, False, "", "nothing holds an orientation at two places"),
+        ("plasticity", False, False, "", "the cable is elastic: no yield strain is given"),
+        ("friction", False, False, "", "the table has none" if table else "there is no table"),
+        ("obstacles", False, False, "", "there are none"),
+        ("self_contact", False, False, "", "contact of the cable with itself is not modelled yet"),
+    )  # fmt: skip
+    switched_off = {name for name, value in problem.scene.effects.items() if value == "off"}
+    return tuple(
+        EffectReport(name, active, "switched off in the scene" if name in switched_off else yes if present else no)
+        for name, active, present, yes, no in rows
+    )
+
+
 def effect_reports(problem: Problem, grid: Grid, surface: SplineSurface) -> tuple[EffectReport, ...]:
     """Return for each effect whether it was simulated, why, and its size on the predicted motion.
 
     The axial strain is that at the axial points: between them reduced integration leaves it free to oscillate.
     """
-    scene, cable, environment = problem.scene, problem.scene.cable, problem.scene.environment
+    cable, environment = problem.scene.cable, problem.scene.environment
     u = np.linspace(0.0, cable.length, 33)
     t = np.linspace(0.0, surface.horizon, 33)
     speed = np.linalg.norm(surface(u, t, dt=1)[..., :3], axis=-1)
     acceleration = np.linalg.norm(surface(u, t, dt=2)[..., :3], axis=-1)
     curvature = surface.curvature(u, t)
-    states = problem.plane.points(surface.states(t)[..., :3])
-    strain = largest_strain(tuple(range(problem.plane.dimensions)), np.ascontiguousarray(states), grid.tables)
+    states = np.ascontiguousarray(problem.plane.points(surface.states(t)[..., :3]))
     mu, EI = cable.linear_density, cast(float, cable.bending_stiffness)
-    asked = scene.effects.get
-
-    def why(name: str, active: bool, yes: str, no: str) -> str:
-        if asked(name, "auto") == "off":
-            return "switched off in the scene"
-        return yes if active else no
-
-    heavy = bool(np.any(cast(Floats, environment.gravity) != 0))
-    table = environment.table is not None
-    drags = environment.drag > 0 or environment.drag_quadratic > 0
-    reports = [
-        EffectReport(
-            "inertia", problem.inertia is not None, why("inertia", True, "the cable has mass and moves", ""),
-            float(mu * np.trapezoid(acceleration, u, axis=1).max()), "N",
-        ),
-        EffectReport(
-            "drag", problem.drag is not None or problem.quadratic_drag is not None,
-            why("drag", drags, "the environment has drag", "no drag is given"),
-            float(np.trapezoid(environment.drag * speed + environment.drag_quadratic * speed**2, u, axis=1).max()), "N",
-        ),
-        EffectReport(
-            "damping", problem.damping is not None,
-            why("damping", cable.bending_damping > 0, "the cable has bending damping", "no bending damping is given"),
-            float(cable.bending_damping * np.abs(np.gradient(curvature, t, axis=0)).max()), "N m",
-        ),
-        EffectReport(
-            "gravity", problem.gravity is not None,
-            why("gravity", problem.gravity is not None, "the cable has weight",
-                "the table carries the weight" if table and heavy else "there is no gravity"),
-            float(mu * cable.length * np.linalg.norm(cast(Floats, environment.gravity))), "N",
-        ),
-        EffectReport(
-            "stretch", True, "it keeps the cable's length",
-            float(strain), "axial strain",
-        ),
-        EffectReport(
-            "bend", problem.bend is not None, why("bend", True, "the cable has bending stiffness", ""),
-            float(EI * curvature.max()), "N m",
-        ),
-    ]  # fmt: skip
-    reports.append(
-        EffectReport(
-            "table", problem.on_table,
-            why("table", table, "the cable lies on it: it carries the weight, the motion is planar", "there is none"),
-            float(mu * cable.length * np.linalg.norm(cast(Floats, environment.gravity))) if problem.on_table else None,
-            "N" if problem.on_table else "",
-        )
-    )  # fmt: skip
-    absent = {
-        "twist": "nothing holds an orientation at two places",
-        "friction": "the table has none" if table else "no table",
+    drag = environment.drag * speed + environment.drag_quadratic * speed**2
+    weight = float(mu * cable.length * np.linalg.norm(cast(Floats, environment.gravity)))
+    sizes: dict[str, tuple[float, str]] = {
+        "inertia": (float(mu * np.trapezoid(acceleration, u, axis=1).max()), "N"),
+        "drag": (float(np.trapezoid(drag, u, axis=1).max()), "N"),
+        "damping": (float(cable.bending_damping * np.abs(np.gradient(curvature, t, axis=0)).max()), "N m"),
+        "gravity": (weight, "N"),
+        "stretch": (float(largest_strain(tuple(range(problem.plane.dimensions)), states, grid.tables)), "axial strain"),
+        "bend": (float(EI * curvature.max()), "N m"),
+        "table": (weight, "N"),
     }
-    for name in NOT_MODELLED_YET:
-        reason = absent.get(
-            name,
-            "the scene has none" if name != "self_contact" else "contact of the cable with itself is not modelled yet",
-        )
-        reports.append(EffectReport(name, False, reason))
-    return tuple(reports)
+    if not problem.on_table:
+        del sizes["table"]
+    return tuple(
+        replace(report, magnitude=sizes[report.name][0], unit=sizes[report.name][1]) if report.name in sizes else report
+        for report in planned_effects(problem)
+    )

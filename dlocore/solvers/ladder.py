@@ -26,6 +26,7 @@ LEVELS = (
     (97, 145, 576),
 )
 CREDIBLE_STRAIN = 0.02  # axial: a march that stretches the cable more is tried again with strong damping
+FINER = 1.5  # times n_u, n_t and the steps of a given grid: the march that its error is estimated with
 ACCEPT = 0.75  # of the target: a refinement that moved the surface less is believed
 
 
@@ -54,6 +55,11 @@ def stretched(problem: Problem, level: int) -> tuple[int, int, int]:
     n_u = max(n_u, smallest_n_u(problem) + 2 * level)
     n_t = max(round(n_t * factor), smallest_n_t(problem) + 4 * (level + 1))
     return n_u, n_t, max(round(steps * factor), 3 * n_t)
+
+
+def given_steps(n_t: int) -> int:
+    """Return the number of time steps that goes with a given number of control points in time."""
+    return max(48, 5 * n_t)
 
 
 def run_level(

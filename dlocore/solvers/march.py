@@ -33,7 +33,6 @@ STRONGLY_DAMPED = 0.0
 TOLERANCE = 3e-7  # of the length, on the error that the Newton iterations of a step leave
 _CHUNK = 256  # steps between looks at the clock
 _SPLITS = (4, 16, 64)  # parts of a step that found no equilibrium
-_MIN_MASS = 1e-9  # of the true one, where inertia is off: it keeps rigid motion determined
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,12 +144,11 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
         [[0.0], *[np.linspace(a, b, n + 1)[1:] for a, b, n in zip(marks[:-1], marks[1:], counts, strict=True)]]
     )
     active, parameters = problem.law_table()
-    density = problem.scene.cable.linear_density
     if problem.inertia is None:
         rho = 0.0
     unit_mass = grid.tables.mass
-    mass = unit_mass * (density * _MIN_MASS if problem.inertia is None else problem.inertia.density())
-    drag = unit_mass * (0.0 if problem.drag is None else problem.drag.coefficient())
+    mass = unit_mass * problem.mass_density()
+    drag = unit_mass * problem.drag_coefficient()
     applied = applied_forces(problem, grid, times)
     tolerance = TOLERANCE * problem.scene.cable.length
     states = np.empty((len(times), grid.n_u, plane.dimensions))

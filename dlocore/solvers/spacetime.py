@@ -100,9 +100,8 @@ class WindowSolver:
         self.span = (window.end - window.begin) / len(spans)
         self.active, self.parameters = problem.law_table()
         self.parameters[0, 0] = axial_stiffness
-        density = problem.scene.cable.linear_density
-        self.mass = grid.tables.mass * (1e-9 * density if problem.inertia is None else problem.inertia.density())
-        self.drag = grid.tables.mass * (0.0 if problem.drag is None else problem.drag.coefficient())
+        self.mass = grid.tables.mass * problem.mass_density()
+        self.drag = grid.tables.mass * problem.drag_coefficient()
         self.applied = applied_forces(problem, grid, self.times)
         fine = np.linspace(window.begin, window.end, 6 * len(spans) + 1)
         self.held = hold(problem, grid, grasps, fine, starts)
