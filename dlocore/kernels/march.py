@@ -148,9 +148,13 @@ def march_steps(
                 solve(A, trial_x)
                 info[NEWTON] += 1
                 expand_vector(e, trial_x, change)
-                update = 0.0
-                for i in range(size):
-                    update = max(update, abs(change[i])) if np.isfinite(change[i]) else np.inf
+                update = 0.0  # largest step of a control point, the same in every frame
+                for i in range(n):
+                    square = 0.0
+                    for d in range(nc):
+                        square += step_change[i, d] * step_change[i, d]
+                    update = max(update, square) if np.isfinite(square) else np.inf
+                update = np.sqrt(update)
                 if not update < largest:
                     break
                 length = 1.0
