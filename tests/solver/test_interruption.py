@@ -1,0 +1,108 @@
+"""Cancelling, deadlines, and what a prediction says about itself."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dlocore import Cancelled, Grasp, Iteration, Load, Move, Quality, Scene, Straight, equilibrium, predict
+from tests.solver.scenes import cable, march, paper_scene
+
+METHODS = {
+    "march": march(9, 13),
+    "auto": Quality(),
+    "spacetime": Quality(n_u=9, n_t=13),
+    "paper": Quality(n_u=9, n_t=13, method="paper"),
+}
+every_method = pytest.mark.parametrize("method", METHODS)
+
+
+@every_method
+def test_a_cancelled_solve_stops_at_the_next_look(method):
+    looks = 0
+
+    def cancelled() -> bool:
+        nonlocal looks
+        looks += 1
+        return looks > 1
+
+    with pytest.raises(Cancelled):
+        predict(paper_scene(0.25, quality=replace(METHODS[method], estimate=True)), cancelled=cancelled)
+    assert looks == 2
+
+
+def test_a_long_solve_is_cancelled_within_a_tenth_of_a_second():
+    scene = paper_scene(0.25, quality=Quality(n_u=65, n_t=257))
+    began = time.perf_counter()
+    with pytest.raises(Cancelled):
+        predict(scene, cancelled=lambda: time.perf_counter() > began + 0.05)
+    assert time.perf_counter() - began < 2.0  # an iteration of a net of 65 x 257 takes a second
+
+
+@every_method
+@pytest.mark.parametrize("deadline", [0.0, 1e-3, 5e-3])
+def test_a_deadline_gives_a_finite_surface_and_says_so(method, deadline):
+    n_t = 13 if method == "paper" else 97
+    quality = METHODS[method] if method == "auto" else replace(METHODS[method], n_u=33 if n_t == 97 else 9, n_t=n_t)
+    prediction = predict(paper_scene(0.25, 1e-4, quality=quality), deadline=deadline)
+    assert prediction.status in (("time_limit",) if deadline == 0.0 else ("time_limit", "stalled", "converged"))
+    assert np.isfinite(prediction.surface.control_points).all()
+    assert prediction.message
+    if prediction.status == "time_limit":
+        assert "time" in prediction.message
+
+
+def test_a_deadline_is_kept():
+    scene = paper_scene(0.25, 1e-4, quality=Quality(target_error=1e-6))
+    prediction = predict(scene, deadline=0.05)
+    assert prediction.status == "time_limit"
+    assert prediction.accuracy.wall_time < 0.3  # a stretch of 256 steps of a fine grid on a busy machine
+
+
+def test_statics_keep_deadlines_and_can_be_cancelled():
+    load = Load(u=1.0, force=(0.0, 0.0, -0.01))
+    scene = Scene(cable=cable(), shape=Straight(), grasps=(Grasp(u=0.0, hold="tangent"),), loads=(load,), horizon=1.0)
+    with pytest.raises(Cancelled):
+        equilibrium(scene, cancelled=lambda: True)
+    found = equilibrium(scene, deadline=0.002)
+    assert np.isfinite(found.control_points).all()
+
+
+@every_method
+def test_every_iteration_is_reported_as_it_is_recorded(method):
+    seen: list[Iteration] = []
+    prediction = predict(paper_scene(0.25, quality=METHODS[method]), on_iteration=seen.append)
+    assert tuple(seen) == prediction.iterations
+    assert [step.number for step in seen] == list(range(len(seen)))
+    times = [step.wall_time for step in seen]
+    assert times == sorted(times)
+    assert all(step.residual >= 0 for step in seen)
+    last = seen[-1].surface.control_points
+    np.testing.assert_array_equal(prediction.surface.control_points, last)
+
+
+def test_residual_of_the_least_squares_falls():
+    steps = predict(paper_scene(0.25)).iterations
+    assert steps[-1].residual < steps[0].residual
+    assert steps[-1].update < 1e-5 < steps[0].update
+
+
+def test_a_jump_that_no_grid_resolves_is_not_called_converged():
+    path = Move(displacement=(0.0, 0.9, 0.0), duration=2e-3)
+    scene = Scene(cable=cable(), shape=Straight(), grasps=(Grasp(u=0.5, path=path),), horizon=1.0)
+    prediction = predict(scene)
+    assert np.isfinite(prediction.surface.control_points).all()
+    assert prediction.status != "converged"
+    assert prediction.message
+
+
+def test_effects_are_reported_with_reasons_and_sizes():
+    prediction = predict(paper_scene(0.25))
+    effects = {e.name: e for e in prediction.effects}
+    assert effects["table"].active
+    assert not effects["gravity"].active
+    assert effects["inertia"].magnitude > 0
+    assert all(e.reason for e in effects.values())
+    off = replace(paper_scene(0.25), effects={"drag": "off"})
+    assert not {e.name: e for e in predict(off).effects}["drag"].active
