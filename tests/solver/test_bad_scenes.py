@@ -1,0 +1,157 @@
+# ruff: noqa: E501
+"""Bad scenes: an error that names the field, in Python."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dlocore import (
+    Cable,
+    ControlPoints,
+    DloError,
+    Environment,
+    Grasp,
+    Load,
+    Move,
+    Points,
+    Quality,
+    Scene,
+    SceneError,
+    Straight,
+    Table,
+    Waypoints,
+    equilibrium,
+    predict,
+)
+from tests.solver.scenes import arc, cable
+
+NAN, INF = float("nan"), float("inf")
+UP = Move(displacement=(0.0, 0.1, 0.0), duration=1.0)
+SIDE = Grasp(u=0.3, path=UP)
+
+
+def scene(**parts: Any) -> Scene:
+    values: dict[str, Any] = {"cable": cable(), "shape": Straight(), "grasps": (SIDE,)}
+    return Scene(**(values | parts))
+
+
+def waypoints(first: tuple[float, float, float]) -> Grasp:
+    return Grasp(u=0.3, path=Waypoints(times=[0.0, 1.0], positions=[first, (0.3, 0.1, 0.0)]))
+
+
+def apart(distance: float) -> tuple[Grasp, Grasp]:
+    """Return grasps at 0.2 and 0.8 m that are `distance` apart in the end."""
+    return Grasp(u=0.2), Grasp(u=0.8, path=Move(displacement=(distance - 0.6, 0.0, 0.0), duration=1.0))
+
+
+BAD: list[tuple[str, Callable[[], object]]] = [
+    # cable
+    ("length", lambda: cable(length=-1.0)),
+    ("length", lambda: cable(length=NAN)),
+    ("length", lambda: cable(length="1")),
+    ("length", lambda: cable(length=True)),
+    ("diameter", lambda: cable(diameter=0.0)),
+    ("linear_density", lambda: cable(linear_density=INF)),
+    ("bending_stiffness", lambda: cable(bending_stiffness=0.0)),
+    ("bending_stiffness", lambda: Cable(length=1.0, diameter=0.01, linear_density=0.1)),
+    ("axial_stiffness", lambda: cable(axial_stiffness=NAN)),
+    ("bending_damping", lambda: cable(bending_damping=-1e-9)),
+    ("torsional_damping", lambda: cable(torsional_damping=1e-3)),
+    ("yield_strain", lambda: cable(yield_strain=0.01)),
+    ("memory_rate", lambda: cable(memory_rate=10.0)),
+    ("rest_shape", lambda: cable(rest_shape="bent")),
+    ("rest_shape[1][0]", lambda: cable(rest_shape=[[0, 0], [NAN, 0], [1, 1], [2, 1]])),
+    ("preset", lambda: Cable.preset("rope")),
+    ("colour", lambda: Cable.preset("paper", colour="red")),
+    # start
+    ("direction", lambda: Straight(direction=(0, 0, 0))),
+    ("start[2]", lambda: Straight(start=(0, 0, NAN))),
+    ("velocity", lambda: Straight(velocity=[[0, 0, 0]] * 3)),
+    ("points", lambda: Points(points=[[0, 0, 0]] * 3)),
+    ("points", lambda: Points(points=[[0, 0, 0]] * 9)),
+    ("points[2][1]", lambda: Points(points=[[0, 0], [1, 0], [2, INF], [3, 0]])),
+    ("control_points[1][3]", lambda: ControlPoints(control_points=[[0, 0, 0, 0], [0, 0, 0, 1], [0, 0, 1, 0], [1, 0, 0, 0]])),
+    ("knots", lambda: ControlPoints(control_points=np.eye(4, 3), knots=[0, 0, 0, 0, 1, 1, 1, 2])),
+    ("shape.knots[-1]", lambda: scene(shape=ControlPoints(control_points=np.outer(np.linspace(0, 1, 4), [1, 0, 0]), knots=[0] * 4 + [2] * 4))),
+    ("shape.points", lambda: predict(scene(shape=Points(points=1.5 * arc(1.0, 1.0))))),
+    # grasps
+    ("primitives[0].u", lambda: scene(grasps=(Grasp(u=1.2, path=UP),))),
+    ("u", lambda: Grasp(u=-0.1)),
+    ("u", lambda: Grasp(u=NAN)),
+    ("hold", lambda: Grasp(u=0.3, hold="clamp")),
+    ("hold", lambda: Grasp(u=0.3, hold="glue")),  # type: ignore[arg-type]
+    ("path", lambda: Grasp(u=0.3, path="up")),  # type: ignore[arg-type]
+    ("path.rotation", lambda: Grasp(u=0.3, path=Move(displacement=(0, 0, 0), duration=1.0, rotation=(0, 0, 1)))),
+    ("release_time", lambda: Grasp(u=0.3, grasp_time=1.0, release_time=0.5)),
+    ("grasp_time", lambda: Grasp(u=0.3, grasp_time=-1.0)),
+    ("duration", lambda: Move(displacement=(0, 0, 0), duration=0.0)),
+    ("displacement[0]", lambda: Move(displacement=(NAN, 0, 0), duration=1.0)),
+    ("profile", lambda: Move(displacement=(0, 0, 0), duration=1.0, profile="fast")),  # type: ignore[arg-type]
+    ("times[1]", lambda: Waypoints(times=[0.0, 0.0], positions=np.zeros((2, 3)))),
+    ("positions", lambda: Waypoints(times=[0.0, 1.0], positions=np.zeros((3, 3)))),
+    ("orientations[1]", lambda: Waypoints(times=[0, 1], positions=np.zeros((2, 3)), orientations=[[1, 0, 0, 0], [2, 0, 0, 0]])),
+    ("primitives[0].path.positions[0]", lambda: predict(scene(grasps=(waypoints((0.3, 0.05, 0.0)),)))),
+    ("primitives", lambda: scene(grasps=[Grasp(u=i / 40, path=UP) for i in range(33)])),
+    ("primitives[1].u", lambda: scene(grasps=(SIDE, Grasp(u=0.30001)))),
+    ("primitives[1].path", lambda: predict(scene(grasps=apart(0.7)))),
+    ("primitives[1].path", lambda: predict(scene(grasps=apart(-0.7)))),
+    # loads and surroundings
+    ("loads[0].u", lambda: scene(loads=(Load(u=2.0, force=(0, 0, 1)),))),
+    ("force[1]", lambda: Load(u=0.1, force=(0, NAN, 0))),
+    ("times", lambda: Load(u=0.1, force=[[0, 0, 0]] * 2, times=[1.0, 0.5])),
+    ("gravity[2]", lambda: Environment(gravity=(0, 0, NAN))),
+    ("gravity", lambda: Environment(gravity=(0, 0, -1e5))),
+    ("drag", lambda: Environment(drag=-0.1)),
+    ("friction", lambda: Table(friction=0.3)),
+    ("obstacles", lambda: Environment(obstacles=("sphere",))),
+    ("environment.table", lambda: predict(scene(shape=Straight(start=(0, 0, 0.1)), environment=Environment(table=Table())))),
+    ("environment.table", lambda: predict(scene(grasps=(Grasp(u=0.3, path=Move(displacement=(0, 0, 0.1), duration=1.0)),), environment=Environment(table=Table())))),
+    ("environment.table", lambda: predict(scene(environment=Environment(gravity=(0, -9.81, 0), table=Table())))),
+    # the whole
+    ("horizon", lambda: scene(grasps=())),
+    ("horizon", lambda: scene(horizon=0.0)),
+    ("horizon", lambda: scene(horizon=NAN)),
+    ("effects.twist", lambda: scene(effects={"twist": "on"})),
+    ("effects.plasticity", lambda: scene(effects={"plasticity": "on"})),
+    ("effects.stretch", lambda: scene(effects={"stretch": "off"})),
+    ("effects", lambda: scene(effects={"magnetism": "on"})),
+    ("effects.bend", lambda: scene(effects={"bend": "maybe"})),
+    ("cable.rest_shape", lambda: predict(scene(cable=cable(rest_shape=arc(1.0, 2.0)), grasps=(Grasp(u=0.3, path=Move(displacement=(0, 0.1, 0.1), duration=1.0)),)))),
+    ("cable.rest_shape", lambda: predict(scene(cable=cable(rest_shape=arc(1.0, 2.0)[:, [0, 2, 1]]), environment=Environment(table=Table())))),
+    ("shape.settle", lambda: predict(scene(shape=Straight(settle=True), grasps=(), horizon=1.0))),
+    ("primitives", lambda: equilibrium(scene(grasps=(), horizon=1.0))),
+    ("at", lambda: equilibrium(scene(), at=NAN)),
+    # quality
+    ("n_u", lambda: Quality(n_u=4, n_t=13)),
+    ("n_u", lambda: Quality(n_u=9.0, n_t=13)),  # type: ignore[arg-type]
+    ("n_t", lambda: Quality(n_u=9, n_t=514)),
+    ("n_t", lambda: Quality(n_u=9)),
+    ("delta", lambda: Quality(delta=0.0)),
+    ("target_error", lambda: Quality(target_error=-1.0)),
+    ("time_budget", lambda: Quality(time_budget=NAN)),
+    ("time_budget", lambda: Quality(target_error=1e-3, time_budget=1.0)),
+    ("method", lambda: Quality(method="spacetime")),
+    ("method", lambda: Quality(method="paper")),
+    ("method", lambda: Quality(method="magic")),  # type: ignore[arg-type]
+    ("quality.n_u", lambda: predict(scene(grasps=[Grasp(u=i / 10, path=UP) for i in range(1, 8)], quality=Quality(n_u=9, n_t=13)))),
+    ("quality.n_t", lambda: predict(scene(grasps=[Grasp(u=0.3, path=UP, release_time=0.5), Grasp(u=0.6, grasp_time=0.3)], quality=Quality(n_u=9, n_t=7)))),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("field", "make"), BAD, ids=[f"{i}-{field}" for i, (field, _) in enumerate(BAD)])
+def test_bad_scene_is_refused_by_the_name_of_its_field(field, make):
+    with pytest.raises(SceneError) as caught:
+        make()
+    error = caught.value
+    assert error.field == field
+    assert error.allowed
+    assert isinstance(error, DloError)
+    assert isinstance(error, ValueError)
+    assert str(error).startswith(f"{field}: got ")
+
+
+def test_two_grasps_pulled_exactly_taut_are_no_bad_scene():
+    prediction = predict(scene(grasps=(Grasp(u=0.2, path=UP), Grasp(u=0.8, path=UP))))
+    assert np.isfinite(prediction.surface.control_points).all()
