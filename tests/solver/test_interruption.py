@@ -32,12 +32,12 @@ def test_a_cancelled_solve_stops_at_the_next_look(method):
     assert looks == 2
 
 
-def test_a_long_solve_is_cancelled_within_a_tenth_of_a_second():
-    scene = paper_scene(0.25, quality=Quality(n_u=65, n_t=257))
+def test_a_running_solve_is_cancelled_within_an_iteration():
+    scene = paper_scene(0.25, 1e-4, quality=Quality(n_u=33, n_t=97, delta=1e-10))
     began = time.perf_counter()
     with pytest.raises(Cancelled):
-        predict(scene, cancelled=lambda: time.perf_counter() > began + 0.05)
-    assert time.perf_counter() - began < 2.0  # an iteration of a net of 65 x 257 takes a second
+        predict(scene, cancelled=lambda: time.perf_counter() > began + 0.2)
+    assert time.perf_counter() - began < 1.5  # of a net of 33 x 97 takes 0.1 s on a free core
 
 
 @every_method
