@@ -10,6 +10,7 @@ from dlocore.errors import SceneError
 from dlocore.kernels.banded import Elimination
 from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, Tables, basis_rows, build_tables, graded_knots
 from dlocore.kernels.relax import relax
+from dlocore.paths import Waypoints
 from dlocore.problem import Problem
 from dlocore.scene import Grasp, Points
 from dlocore.shape import fit_to_knots, start_curve, velocity_to_knots
@@ -89,7 +90,8 @@ def grid_on(problem: Problem, knots: Floats) -> Grid:
     given = velocity_to_knots(problem.start, knots)
     velocity = np.zeros_like(start) if given is None else np.ascontiguousarray(problem.plane.vectors(given))
     grid = Grid(knots, tables, memory, start, velocity)
-    if len(problem.start.control_points) > 4:
+    waypoints = any(g.start == 0.0 and isinstance(g.path, Waypoints) for g in problem.scene.grasps)
+    if waypoints or len(problem.start.control_points) > 4:
         start = consistent_start(problem, grid)
         grid = Grid(knots, tables, memory, start, velocity)
     return Grid(knots, tables, _memory(problem, grid), start, velocity)

@@ -213,7 +213,8 @@ def _march_status(problem: Problem, level: Level) -> tuple[Status, str]:
         push = "A straight cable pushed along itself has no side to buckle to: start it slightly bent."
         return "stalled", f"{strain} {advice} {push}"
     if not motion.stopped:
-        return "converged", "Every time step found its equilibrium."
+        split = f", {motion.split} of them in smaller steps" if motion.split else ""
+        return "converged", f"Every time step found its equilibrium{split}."
     reached = motion.times[motion.reached]
     rest = f"The surface stands still after {reached:.4g} s of {problem.horizon:.4g} s."
     if motion.stopped == "time":
@@ -226,7 +227,9 @@ def _march_status(problem: Problem, level: Level) -> tuple[Status, str]:
 
 def _record_level(problem: Problem, level: Level, monitor: Monitor) -> None:
     motion = level.motion
-    _record(problem, motion.grid, level.knots_t, level.control, level.change, motion.update, monitor, 0.0, 1.0, "march")
+    note = "march" + (", strongly damped" if motion.rho == STRONGLY_DAMPED else "")
+    note += f", {motion.split} steps in smaller ones" if motion.split else ""
+    _record(problem, motion.grid, level.knots_t, level.control, level.change, motion.update, monitor, 0.0, 1.0, note)
 
 
 def _record(

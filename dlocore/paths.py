@@ -18,11 +18,11 @@ from dlocore.errors import SceneError, array, choice, number
 Floats = NDArray[np.float64]
 Profile = Literal["minimum_jerk", "linear", "cubic"]
 
-# position law s(x) and its rate s'(x) on 0 <= x <= 1
-_PROFILES: dict[str, tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]] = {
-    "minimum_jerk": (lambda x: x**3 * (10 - 15 * x + 6 * x**2), lambda x: 30 * x**2 * (1 - x) ** 2),
-    "linear": (lambda x: x, np.ones_like),
-    "cubic": (lambda x: x**2 * (3 - 2 * x), lambda x: 6 * x * (1 - x)),
+# position s(x) on 0 <= x <= 1
+_PROFILES: dict[str, Callable[[Floats], Floats]] = {
+    "minimum_jerk": lambda x: x**3 * (10 - 15 * x + 6 * x**2),
+    "linear": lambda x: x,
+    "cubic": lambda x: x**2 * (3 - 2 * x),
 }
 MAX_WAYPOINTS = 100_000
 
@@ -40,17 +40,9 @@ class Still:
         """Positions at times `t` (k,) [s] of a grasp that began at `start` (3,) [m]; (k, 3) [m]."""
         return np.broadcast_to(start, (len(t), 3))
 
-    def velocity_at(self, t: float) -> Floats:
-        """Velocity at time `t` [s]; (3,) [m/s]."""
-        return np.zeros(3)
-
     def rotation_at(self, t: Floats) -> Floats | None:
         """Rotations since the grasp began at times `t`; (k, 3, 3), or None where it never turns."""
         return None
-
-    def angular_velocity_at(self, t: float) -> Floats:
-        """Angular velocity at time `t` [s]; (3,) [rad/s]."""
-        return np.zeros(3)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,27 +67,15 @@ class Move:
 
     def at(self, t: Floats, start: Floats) -> Floats:
         """Positions at times `t` (k,) [s] of a grasp that began at `start` (3,) [m]; (k, 3) [m]."""
-        s = _PROFILES[self.profile][0](np.clip(t / self.duration, 0.0, 1.0))
+        s = _PROFILES[self.profile](np.clip(t / self.duration, 0.0, 1.0))
         return start + s[:, None] * cast(Floats, self.displacement)
-
-    def _rate(self, t: float) -> float:
-        x = t / self.duration
-        return float(_PROFILES[self.profile][1](np.array(x))) / self.duration if 0.0 <= x < 1.0 else 0.0
-
-    def velocity_at(self, t: float) -> Floats:
-        """Velocity at time `t` [s]; (3,) [m/s]."""
-        return self._rate(t) * cast(Floats, self.displacement)
 
     def rotation_at(self, t: Floats) -> Floats | None:
         """Rotations since the grasp began at times `t`; (k, 3, 3), or None where it never turns."""
         if self.rotation is None:
             return None
-        s = _PROFILES[self.profile][0](np.clip(t / self.duration, 0.0, 1.0))
+        s = _PROFILES[self.profile](np.clip(t / self.duration, 0.0, 1.0))
         return Rotation.from_rotvec(s[:, None] * cast(Floats, self.rotation)).as_matrix()
-
-    def angular_velocity_at(self, t: float) -> Floats:
-        """Angular velocity at time `t` [s]; (3,) [rad/s]."""
-        return np.zeros(3) if self.rotation is None else self._rate(t) * cast(Floats, self.rotation)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -103,8 +83,8 @@ class Waypoints:
     """Pass through `positions` (n, 3) [m] at `times` (n,) [s] along a C2 cubic spline that starts at rest.
 
     `orientations` (n, 4), unit quaternions (w, x, y, z), turn the grasp by their rotation since the first. The first
-    position must be that of the cable at the grasped point, within `dlocore.shape.GRASP_TOLERANCE`; it is then the
-    cable that is brought to it.
+    position must be that of the cable at the grasped point, within `dlocore.problem.GRASP_TOLERANCE`; the start
+    shape is then brought to it.
     """
 
     times: ArrayLike
@@ -153,23 +133,9 @@ class Waypoints:
         """Positions at times `t` (k,) [s]; (k, 3) [m]. `start` is not used: waypoints are absolute."""
         return self._spline(self._clip(t))  # type: ignore[attr-defined]
 
-    def velocity_at(self, t: float) -> Floats:
-        """Velocity at time `t` [s]; (3,) [m/s]."""
-        times = cast(Floats, self.times)
-        return self._spline(t, 1) if times[0] <= t < times[-1] else np.zeros(3)  # type: ignore[attr-defined]
-
     def rotation_at(self, t: Floats) -> Floats | None:
         """Rotations since the grasp began at times `t`; (k, 3, 3), or None where it never turns."""
         return None if self.orientations is None else self._slerp(self._clip(t)).as_matrix()  # type: ignore[attr-defined]
-
-    def angular_velocity_at(self, t: float) -> Floats:
-        """Angular velocity at time `t` [s]; (3,) [rad/s]."""
-        times = cast(Floats, self.times)
-        if self.orientations is None or not times[0] <= t < times[-1]:
-            return np.zeros(3)
-        step = min(1e-4, 0.5 * (times[-1] - t))
-        now, later = self._slerp([t, t + step])  # type: ignore[attr-defined]
-        return (later * now.inv()).as_rotvec() / step
 
 
 Path = Still | Move | Waypoints

@@ -6,7 +6,6 @@ import numpy as np
 
 from dlocore.kernels.compile import kernel
 
-GAUSS_1 = (np.array([0.0]), np.array([2.0]))
 GAUSS_2 = np.polynomial.legendre.leggauss(2)
 GAUSS_3 = np.polynomial.legendre.leggauss(3)
 GAUSS_4 = np.polynomial.legendre.leggauss(4)

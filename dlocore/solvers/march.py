@@ -60,6 +60,7 @@ class March:
         forces: what holds the cable between each two events.
         reached: last step that found equilibrium.
         stopped: why it ended there: "" (the end), "step" (no equilibrium) or "time" (deadline).
+        rho: spectral radius it was marched with.
         split: steps that found equilibrium only in smaller ones.
         newton: Newton iterations.
         largest_strain: largest |axial strain| of the motion.
@@ -73,6 +74,7 @@ class March:
     forces: tuple[WindowForces, ...]
     reached: int
     stopped: str
+    rho: float
     split: int
     newton: int
     largest_strain: float
@@ -251,7 +253,7 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
         first = last
     states[reached + 1 :] = states[reached]
     return March(
-        grid, times, states, velocity, tuple(forces), reached, stopped, split, int(info[NEWTON]),
+        grid, times, states, velocity, tuple(forces), reached, stopped, rho, split, int(info[NEWTON]),
         float(largest_strain(axes, states, grid.tables)), float(info[LEFT]),
     )  # fmt: skip
 
