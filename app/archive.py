@@ -2,12 +2,15 @@
 
 import io
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore import Iteration, Prediction, SplineSurface
+from app.machine import machine_line
+from app.schemas import PredictionRequest, to_scene
+from dlocore import ControlPoints, Iteration, Prediction, Scene, SplineSurface
 
 Floats = NDArray[np.float64]
 SCALARS = ("update", "residual", "energy", "wall_time", "damping", "step_length")  # of an iteration
@@ -22,17 +25,53 @@ class Run:
         document: the response.
         surface: the predicted surface.
         iterations: the iterates.
+        start: the start shape where it was given by control points, also as the end of another run.
+        machine: what it was solved on.
     """
 
     request: dict[str, Any]
     document: dict[str, Any]
     surface: SplineSurface
     iterations: tuple[Iteration, ...]
+    start: ControlPoints | None
+    machine: str
+
+    @staticmethod
+    def of(request: dict[str, Any], document: dict[str, Any], prediction: Prediction) -> "Run":
+        """Return a run that was just solved here."""
+        shape = prediction.scene.shape
+        start = shape if isinstance(shape, ControlPoints) else None
+        return Run(request, document, prediction.surface, prediction.iterations, start, machine_line())
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The scene that was solved; it needs no other run, even where it continued from one."""
+        request = self.request
+        if request["shape"]["kind"] == "prediction":
+            request = {**request, "shape": _as_request(self.start)}
+        return to_scene(PredictionRequest.model_validate(request), lambda id: None)
+
+
+def _as_request(start: ControlPoints | None) -> dict[str, Any]:
+    if start is None:
+        raise ValueError("The run was stored without the shape it continued from")
+    shape: dict[str, Any] = {"kind": "control_points", "settle": start.settle}
+    shape["control_points"] = cast(Floats, start.control_points).tolist()
+    if start.knots is not None:
+        shape["knots"] = cast(Floats, start.knots).tolist()
+    if start.velocity is not None:
+        velocity = cast(Floats, start.velocity).tolist()
+        shape["velocity"] = {"kind": "control_points", "control_points": velocity}
+    return shape
 
 
 def pack(prediction: Prediction) -> bytes:
-    """Return the nets of a prediction, of its answer and its iterations, as .npz."""
-    arrays: dict[str, Any] = {}
+    """Return the nets of a prediction, of its answer, its iterations and its start, as .npz."""
+    arrays: dict[str, Any] = {"machine": np.array(machine_line())}
+    shape = prediction.scene.shape
+    if isinstance(shape, ControlPoints):
+        given = {name: value for name, value in vars(shape).items() if value is not None}
+        arrays |= {f"start_{name}": np.asarray(value) for name, value in given.items()}
     surfaces = [prediction.surface, *(iteration.surface for iteration in prediction.iterations)]
     for k, surface in enumerate(surfaces):
         arrays[f"control_points_{k}"] = surface.control_points
@@ -51,6 +90,8 @@ def unpack(request: dict[str, Any], document: dict[str, Any], nets: bytes) -> Ru
             for k in range(len(document["iterations"]) + 1)
         ]
         scalars = {name: arrays[name] for name in SCALARS}
+        start = {name.removeprefix("start_"): arrays[name] for name in arrays.files if name.startswith("start_")}
+        machine = str(arrays["machine"]) if "machine" in arrays.files else "unknown"  # stored before it was noted
     iterations = tuple(
         Iteration(
             number=shown["number"],
@@ -62,7 +103,8 @@ def unpack(request: dict[str, Any], document: dict[str, Any], nets: bytes) -> Ru
         )
         for k, shown in enumerate(document["iterations"])
     )
-    return Run(request, document, surfaces[0], iterations)
+    shape = ControlPoints(**{**start, "settle": bool(start["settle"])}) if start else None
+    return Run(request, document, surfaces[0], iterations, shape, machine)
 
 
 def surface_npz(document: dict[str, Any]) -> bytes:

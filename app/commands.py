@@ -155,7 +155,7 @@ def _record(rrd: str, *, request_json: dict[str, Any], document: dict[str, Any],
     from app.recording import layout, write_recording
 
     path = Path(rrd)
-    run = Run(request_json, {**document, "id": path.stem}, prediction.surface, prediction.iterations)
+    run = Run.of(request_json, {**document, "id": path.stem}, prediction)
     try:
         write_recording(run, path)
     except (OSError, RuntimeError) as error:

@@ -1,6 +1,9 @@
 """A recording read back: entities, timelines, and values equal to the answer's."""
 
+import json
 import math
+import threading
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +13,17 @@ from fastapi.testclient import TestClient
 
 pytest.importorskip("rerun")
 import rerun as rr
+
+from app.archive import Run
+from app.cli import main
+from app.machine import machine_line
+from app.recording import write_recording
+from app.runs import RunStore
+from app.schemas import PredictionRequest, from_prediction, to_scene
+from app.service import Service
+from app.settings import Settings
+from dlocore import Prediction, effect_forces, energies, predict
+from tests.app.conftest import paper_scene
 
 LOGS = ("update", "residual")
 ENTITIES = {
@@ -94,16 +108,97 @@ def test_grasps_and_their_forces_move_along(chunks: list[Any], answer: dict[str,
     np.testing.assert_allclose(drawn, forces * 0.25 / largest, rtol=0, atol=1e-6)
 
 
-def test_the_report_has_status_effects_and_scene(chunks: list[Any], answer: dict[str, Any]) -> None:
-    (chunk,) = [chunk for chunk in chunks if chunk.entity_path == "/report"]
+def page(chunks: list[Any], entity: str) -> str:
+    (chunk,) = [chunk for chunk in chunks if chunk.entity_path == entity]
+    assert chunk.is_static  # shown whatever the timeline
     batch = chunk.to_record_batch().to_pydict()
     ((text,),) = next(values for name, values in batch.items() if name.endswith(":text"))
+    return str(text)
+
+
+def test_the_report_has_status_settings_machine_and_scene(chunks: list[Any], answer: dict[str, Any]) -> None:
+    text = page(chunks, "/report")
     assert answer["status"] in text
     assert answer["message"] in text
     assert answer["accuracy"]["method"] in text
-    for effect in answer["effects"]:
-        assert effect["name"] in text
+    assert answer["id"] in text
+    assert '`"auto"`' in text  # the asked quality
+    assert machine_line() in text
     assert '"bending_stiffness": 0.001' in text
+
+
+def test_the_effects_are_those_of_the_answer_with_their_reasons(chunks: list[Any], answer: dict[str, Any]) -> None:
+    rows = [line.strip("| ").split(" | ") for line in page(chunks, "/effects").splitlines()[2:]]
+    assert len(rows) == len(answer["effects"])
+    told = {name: (active, why) for name, active, why, *_ in rows}
+    for effect in answer["effects"]:
+        assert told[effect["name"]] == ("yes" if effect["active"] else "no", effect["reason"])
+
+
+@pytest.fixture(scope="module")
+def run(client: TestClient, answer: dict[str, Any]) -> Run:
+    service: Service = client.app.state.service  # type: ignore[attr-defined]
+    found = service.runs.load(answer["id"])
+    assert found is not None
+    return found
+
+
+def test_the_energies_of_an_iterate_are_those_at_its_end(chunks: list[Any], run: Run, answer: dict[str, Any]) -> None:
+    terms = {}
+    for name in ("kinetic", "bend", "stretch", "gravity"):
+        numbers, values = rows(chunks, f"/energy/{name}", "scalars", "iteration")
+        assert numbers == [i["number"] for i in answer["iterations"]]
+        terms[name] = np.array([value for (value,) in values])
+        expected = [
+            energies(run.scene, i.surface, np.linspace(0, i.surface.horizon, 5))[name][-1] for i in run.iterations
+        ]
+        np.testing.assert_allclose(terms[name], expected, rtol=1e-12)
+    elastic = [i["energy"] for i in answer["iterations"]]  # two ways to the same sum, apart by rounding
+    np.testing.assert_allclose(terms["bend"] + terms["stretch"], elastic, rtol=1e-9)
+
+
+def test_the_forces_are_those_of_every_active_effect(chunks: list[Any], run: Run) -> None:
+    expected = effect_forces(run.scene, run.surface, np.linspace(0.0, run.surface.horizon, 17))
+    assert {"inertia", "drag", "stretch", "bend"} <= set(expected)
+    drawn = {c.entity_path.removeprefix("/forces/") for c in chunks if c.entity_path.startswith("/forces/")}
+    assert drawn == set(expected)
+    for name, force in expected.items():
+        _, values = rows(chunks, f"/forces/{name}", "scalars", "iteration")
+        assert values[-1][0] == pytest.approx(math.log10(force), rel=1e-9)  # the last iterate is the answer
+
+
+def test_energies_and_reactions_are_plotted_over_the_motion(
+    chunks: list[Any], run: Run, answer: dict[str, Any]
+) -> None:
+    for name, expected in energies(run.scene, run.surface, answer["surface"]["t"]).items():
+        times, values = rows(chunks, f"/over_time/energy/{name}", "scalars", "motion")
+        assert times == pytest.approx(answer["surface"]["t"], abs=2e-9)
+        np.testing.assert_allclose([value for (value,) in values], expected, rtol=1e-12)
+    _, sizes = rows(chunks, "/over_time/reaction/0", "scalars", "motion")
+    expected = np.linalg.norm(answer["grasps"][0]["reaction"], axis=1)
+    np.testing.assert_allclose([size for (size,) in sizes], expected, rtol=1e-12)
+
+
+def test_the_log_has_a_line_for_every_iteration(chunks: list[Any], answer: dict[str, Any]) -> None:
+    numbers, lines = rows(chunks, "/log", "text", "iteration")
+    assert numbers == [i["number"] for i in answer["iterations"]]
+    for (line,), iteration in zip(lines, answer["iterations"], strict=True):
+        assert f"residual {iteration['residual']:.3g}" in line
+
+
+def test_the_net_is_drawn_along_the_cable_and_over_time(chunks: list[Any], answer: dict[str, Any]) -> None:
+    _, lines = rows(chunks, "/iterate/net/lines", "strips", "iteration")
+    assert [len(strips) for strips in lines] == [i["n_t"] + i["n_u"] for i in answer["iterations"]]
+    control = np.array(answer["control_points"])[..., :3]
+    np.testing.assert_allclose(lines[-1][len(control) - 1], control[-1], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(lines[-1][-1], control[:, -1], rtol=0, atol=1e-6)
+
+
+def test_solve_and_motion_are_on_timelines_of_their_own(chunks: list[Any]) -> None:
+    for chunk in chunks:
+        if not chunk.is_static:
+            solve = not chunk.entity_path.startswith(("/motion", "/over_time"))
+            assert set(chunk.timeline_names) == ({"iteration", "solver_time"} if solve else {"motion"})
 
 
 def test_a_recording_is_written_once_and_kept(client: TestClient, answer: dict[str, Any]) -> None:
@@ -134,3 +229,103 @@ def test_the_viewer_link_opens_layout_and_recording_from_this_service(
     assert wasm.headers["content-type"] == "application/wasm"
     assert wasm.content[:4] == b"\0asm"
     assert client.get("/rerun/../settings").status_code == 404
+
+
+# What tells one solve of a scene from the next, and a stored run from one that is not.
+OF_ITS_OWN = {"/report", "/log"}
+
+
+def content(path: Path, *, clock: bool = True) -> dict[str, Any]:
+    """Return every column of a recording by entity and name, without the ids of its rows.
+
+    Args:
+        path: of the recording.
+        clock: whether with what two solves of one scene do not share.
+    """
+    columns: dict[str, Any] = {}
+    for chunk in rr.chunk.RrdReader(path).stream().to_chunks():
+        if not clock and chunk.entity_path in OF_ITS_OWN:
+            continue
+        batch = chunk.to_record_batch()
+        for name, values in zip(batch.schema.names, batch.columns, strict=True):
+            if name != "rerun.controls.RowId" and (clock or name != "solver_time"):
+                key = f"{chunk.entity_path} {name} {'static' if chunk.is_static else ''}"
+                columns[key] = (
+                    [*columns.get(key, []), *values.cast("int64").to_pylist()]
+                    if (name in ("iteration", "solver_time", "motion"))
+                    else [*columns.get(key, []), *values.to_pylist()]
+                )
+    return columns
+
+
+def solved(scene: dict[str, Any], kept: RunStore) -> Prediction:
+    return predict(to_scene(PredictionRequest.model_validate(scene), kept.surface))
+
+
+def test_a_stored_run_gives_the_recording_of_the_solve_itself(tmp_path: Path) -> None:
+    scene = paper_scene(quality={"n_u": 9, "n_t": 13, "delta": 1e-5})
+    kept = RunStore(Settings(data_dir=tmp_path))
+    prediction = solved(scene, kept)
+    id = kept.save(scene, prediction)
+    stored, fresh = tmp_path / "stored.rrd", tmp_path / "fresh.rrd"
+    stored.write_bytes(kept.recording(id) or b"")
+    document = json.loads(kept.document(id) or b"")
+    again = from_prediction(prediction, id, 101, 33)
+    write_recording(Run.of(scene, {**again, "created": document["created"]}, prediction), fresh)
+    assert content(stored) == content(fresh)
+
+
+def test_the_command_line_gives_the_recording_of_the_service(
+    chunks: list[Any], tmp_path: Path, client: TestClient, answer: dict[str, Any]
+) -> None:
+    scene, served, written = (tmp_path / name for name in ("scene.json", "served.rrd", "written.rrd"))
+    scene.write_bytes(client.get(answer["links"]["scene"]).content)
+    served.write_bytes(client.get(answer["links"]["recording"]).content)
+    assert main(["predict", str(scene), "--rrd", str(written)]) == 0
+    shared = content(served, clock=False)
+    assert len(shared) > 50
+    assert content(written, clock=False) == shared
+
+
+def test_a_run_that_continues_another_keeps_its_recording_without_it(tmp_path: Path) -> None:
+    kept = RunStore(Settings(data_dir=tmp_path))
+    first = kept.save(paper_scene(), solved(paper_scene(), kept))
+    scene = paper_scene(shape={"kind": "prediction", "id": first, "t": 0.8})
+    prediction = solved(scene, kept)
+    second = kept.save(scene, prediction)
+    assert kept.delete(first)
+    run = kept.load(second)
+    assert run is not None
+    times = np.linspace(0.0, run.surface.horizon, 5)
+    for name, expected in energies(prediction.scene, prediction.surface, times).items():
+        np.testing.assert_array_equal(energies(run.scene, run.surface, times)[name], expected)
+    assert kept.recording(second)
+
+
+@pytest.mark.parametrize("lost", [math.nan, math.inf, 1e9])
+def test_an_iterate_that_grew_beyond_all_bounds_is_not_drawn(tmp_path: Path, lost: float) -> None:
+    kept = RunStore(Settings(data_dir=tmp_path))
+    prediction = solved(paper_scene(), kept)
+    first, *others = prediction.iterations
+    surface = replace(first.surface, control_points=np.full_like(first.surface.control_points, lost))
+    broken = replace(first, surface=surface, residual=lost, energy=lost)
+    path = tmp_path / "run.rrd"
+    id = kept.save(paper_scene(), replace(prediction, iterations=(broken, *others)))
+    path.write_bytes(kept.recording(id) or b"")
+    chunks = list(rr.chunk.RrdReader(path).stream().to_chunks())
+    for entity, component in (("/iterate/shape", "strips"), ("/forces/bend", "scalars"), ("/energy/bend", "scalars")):
+        assert rows(chunks, entity, component, "iteration")[0] == [i.number for i in others]
+    assert rows(chunks, "/log", "text", "iteration")[0] == [i.number for i in prediction.iterations]
+
+
+def test_writing_recordings_leaves_no_threads(run: Run, tmp_path: Path) -> None:
+    write_recording(run, tmp_path / "0.rrd")
+    before = native_threads()
+    for k in range(1, 21):
+        write_recording(run, tmp_path / f"{k}.rrd")
+    assert native_threads() <= before
+
+
+def native_threads() -> int:
+    tasks = Path("/proc/self/task")  # those of compiled code too
+    return len(list(tasks.iterdir())) if tasks.is_dir() else threading.active_count()
