@@ -233,6 +233,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="file to write every result to")
     options = parser.parse_args()
     warm_up()
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
     results, moved = run_paper(options.repeats)
     print(table(results))
     print()
@@ -241,13 +242,18 @@ def main() -> None:
         f"Medians, slowest and largest over the grasps at {grasps} m; errors against a march that its last refinement"
     )
     print(f"moved by at most {1e3 * moved:.3f} mm; `estimate` is what the predictor says of its worst point.")
-    print(machine_line())
+    print(f"{machine_line()}, load average {load:.1f} before")
     stored = run_stored(options.reference) if options.reference else []
     if stored:
         print()
         print(stored_table(stored))
     if options.json:
-        content = {"machine": machine(), "paper": [asdict(r) for r in results], "stored": [asdict(r) for r in stored]}
+        content = {
+            "machine": machine(),
+            "load": load,
+            "paper": [asdict(r) for r in results],
+            "stored": [asdict(r) for r in stored],
+        }
         options.json.write_text(json.dumps(content, indent=1))
 
 
