@@ -94,10 +94,10 @@ def normal_equations(
     axes: Any, C: Any, first: Any, table: Any, weights: Any, h: float, mass: Any, drag: Any, tables: Any, active: Any,
     p: Any, memory: Any, applied: Any, e: Any, geometric: float, A: Any, right: Any, forces: Any, tangent: bool,
 ) -> float:  # fmt: skip
-    """Write the normal equations of the weighted least squares at the iterate C; return its objective [m^2].
+    """Write the normal equations of the weighted least squares at the iterate C; return its objective [J].
 
     The objective is (1/T) sum_k w_k |W_k Z' R_k|^2 with the residual R = M a + C v + f(q, v) - F of the motion at the
-    collocation point k and W'W = G^-1 B G^-1, B = 12/h^2 M + 2/h C, G = B + K+: a displacement (docs/model.md eq. 16).
+    collocation point k and W'W = G^-1 B G^-1, B = 12/h^2 M + 2/h C, G = B + K+ (docs/model.md eq. 16).
 
     Args:
         axes: (0, 1) or (0, 1, 2).

@@ -125,7 +125,7 @@ class WindowSolver:
         return control
 
     def objective(self, control: Floats, tangent: bool, geometric: float = 1.0) -> tuple[float, Floats, Floats, Floats]:
-        """Return the objective [m^2], the normal matrix, its right side and the holding forces at `control`."""
+        """Return the objective, eq. 16 [m^2], the normal matrix, its right side and the holding forces at `control`."""
         size = (len(control) - 2) * self.free
         A = np.empty((size, 4 * self.free) if tangent else (1, 1))
         right = np.empty(size)
@@ -135,7 +135,8 @@ class WindowSolver:
             self.active, self.parameters, self.grid.memory, self.applied, self.held.elimination, geometric, A, right,
             forces, tangent,
         )  # fmt: skip
-        return value, A, right, forces
+        weight = 12.0 * self.problem.mass_density() / self.span**2 + 2.0 * self.problem.drag_coefficient() / self.span
+        return value / (weight * self.problem.scene.cable.length), A, right, forces
 
     def expand(self, x: Floats) -> Floats:
         """Return the change (n, n_u, nc) of all control points for a step x of the free ones."""
