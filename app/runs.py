@@ -6,6 +6,7 @@ import secrets
 import shutil
 import threading
 import time
+import weakref
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import orjson
 
 from app.archive import Run, pack, unpack
+from app.leftovers import claim
 from app.recording import write_recording
 from app.schemas.response import from_prediction
 from app.settings import Settings
@@ -20,7 +22,6 @@ from dlocore import Prediction, SplineSurface
 
 _ID = re.compile(r"[0-9a-f]{28}")
 REQUEST, DOCUMENT, NETS, SUMMARY, RECORDING = "scene.json", "prediction.json", "nets.npz", "summary.json", "run.rrd"
-_ABANDONED_AFTER = 3600.0  # s; an unfinished directory that old belongs to no running process
 
 
 def new_id() -> str:
@@ -49,11 +50,10 @@ class RunStore:
         self._recording = threading.Lock()
         self._entries: dict[str, _Entry] = {}
         self._root.mkdir(parents=True, exist_ok=True)
+        weakref.finalize(self, os.close, claim(settings.data_dir))
         for path in sorted(self._root.iterdir()):
             if _ID.fullmatch(path.name) and (path / SUMMARY).is_file():
                 self._entries[path.name] = _Entry(orjson.loads((path / SUMMARY).read_bytes()), _size(path))
-            elif path.name.startswith(".") and time.time() - path.stat().st_mtime > _ABANDONED_AFTER:
-                shutil.rmtree(path, ignore_errors=True)
         with self._lock:
             removed = self._evict()
         _delete(removed)
