@@ -205,25 +205,45 @@ def _points(knots: Any, rule: Any, weights: Any) -> Any:
 
 @kernel
 def _axial_points(knots: Any, free_start: bool, free_end: bool, rule: Any, weights: Any) -> Any:
+    """Return points u (k,) [m] of the stretch and their weights: as many as the control points have strains.
+
+    One a span, two in an end span whose direction is free, and one at a double knot, to which the spans beside it give
+    a sixth of their length. Fewer leave a mode without energy, in which the cable folds; more lock its bending.
+    """
+    last = len(knots) - 4
     spans = 0
-    for k in range(3, len(knots) - 4):
+    doubles = 0
+    for k in range(3, last):
         spans += knots[k + 1] > knots[k]
-    u = np.empty(spans + 2)
-    w = np.empty(spans + 2)
+        doubles += k > 3 and knots[k + 1] == knots[k]
+    u = np.empty(spans + doubles + 2)
+    w = np.empty(spans + doubles + 2)
     p = 0
     s = 0
-    for k in range(3, len(knots) - 4):
+    knot = 0  # place of the double knot at the beginning of the span
+    for k in range(3, last):
         half = 0.5 * (knots[k + 1] - knots[k])
         if half > 0.0:
             s += 1
+            begins = s > 1 and knots[k - 1] == knots[k]
+            ends = s < spans and knots[k + 1] == knots[k + 2]
+            given = half / 3.0
+            kept = 1.0 - (begins + ends) / 6.0
+            if begins:
+                w[knot] += given
             if (s == 1 and free_start) or (s == spans and free_end):
                 for i in range(2):
                     u[p] = knots[k] + half * (1.0 + rule[i])
-                    w[p] = half * weights[i]
+                    w[p] = kept * half * weights[i]
                     p += 1
             else:
                 u[p] = knots[k] + half
-                w[p] = 2.0 * half
+                w[p] = kept * 2.0 * half
+                p += 1
+            if ends:
+                knot = p
+                u[p] = knots[k + 1]
+                w[p] = given
                 p += 1
     return u[:p], w[:p]
 

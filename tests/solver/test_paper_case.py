@@ -71,20 +71,23 @@ def test_refined_march_agrees_with_the_independent_rod(u, EI, hold):
 
 
 @every_grasp
+@every_hold
 @pytest.mark.parametrize("EI", [1e-2, 1e-3, 1e-4])
-def test_error_estimate_of_auto_is_an_upper_bound_within_a_factor(u, EI):
-    prediction = predict(paper_scene(u, EI, quality=Quality()))
-    true = apart(prediction.surface, truth(u, EI, "point").surface).max()
-    # the change of the last refinement, which has an error several times smaller
-    assert 0.7 * true < prediction.accuracy.error_estimate < 20 * true
+def test_error_estimate_of_auto_is_an_upper_bound_within_a_factor(u, EI, hold):
+    prediction = predict(paper_scene(u, EI, hold=hold, quality=Quality()))
+    true = apart(prediction.surface, truth(u, EI, hold).surface).max()
+    # the change of the last refinement, which left an error some times smaller; measured: 1.1 to 4.4
+    assert 0.8 * true < prediction.accuracy.error_estimate < 6 * true
 
 
 @every_grasp
-@pytest.mark.parametrize("EI", [1e-2, 1e-3])
-def test_error_estimate_of_the_paper_grid_is_within_a_factor(u, EI):
-    prediction = predict(paper_scene(u, EI))
-    true = apart(prediction.surface, truth(u, EI, "point").surface).max()
-    assert 0.5 * true < prediction.accuracy.error_estimate < 2 * true
+@every_hold
+@pytest.mark.parametrize("EI", [1e-2, 1e-3, 1e-4])
+def test_error_estimate_of_the_paper_grid_is_within_a_factor(u, EI, hold):
+    prediction = predict(paper_scene(u, EI, hold=hold))
+    true = apart(prediction.surface, truth(u, EI, hold).surface).max()
+    # the distance to a finer march; measured: 0.86 to 1.36 (also where the iteration did not converge)
+    assert 0.7 * true < prediction.accuracy.error_estimate < 1.6 * true
 
 
 @every_grasp
