@@ -14,15 +14,25 @@ from dlocore.prediction import Accuracy, Iteration, OnIteration, Prediction, Sta
 from dlocore.problem import Problem, pose
 from dlocore.report import WindowForces, effect_reports, elastic_energy, reactions, surface_of
 from dlocore.scene import Quality, Scene
-from dlocore.solvers.ladder import ACCEPT, FINER, LEVELS, Level, distance, given_steps, run_level, stretched
+from dlocore.solvers.ladder import (
+    ACCEPT,
+    FINER,
+    LEVELS,
+    Level,
+    distance,
+    extrapolated,
+    given_steps,
+    run_level,
+    stretched,
+)
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED, smallest_n_t
 from dlocore.solvers.monitor import Monitor, TimeIsUp
-from dlocore.solvers.paper import MAX_ITERATIONS as PAPER_ITERATIONS
 from dlocore.solvers.paper import solve_as_printed
-from dlocore.solvers.spacetime import MAX_ITERATIONS, solve
+from dlocore.solvers.spacetime import solve
 
 Floats = NDArray[np.float64]
 
+SAFETY = 1.5  # times the distance to a finer march: what a slowly converging motion may be off beyond it
 AUTO_TARGET = 2e-3  # of the length: the target error of quality "auto"
 ROUGH = 0.05  # of the length: two grids that differ more are in no order yet: the next is marched with strong damping
 TORN = 0.2  # axial strain: no cable of this kind follows
@@ -68,7 +78,7 @@ def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method:
     assert quality.n_t is not None
     _check_n_t(problem, quality.n_t)
     level = run_level(problem, quality.n_u, quality.n_t, given_steps(quality.n_t), monitor)
-    if level.motion.stopped:
+    if level.motion.stopped or level.motion.largest_strain > TORN:
         return _answer(problem, monitor, "march", Outcome(level, *_march_status(problem, level), None))
     grid, knots_t = level.motion.grid, level.knots_t
     last = [level.control]
@@ -77,7 +87,6 @@ def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method:
         last[0] = control
         _record(problem, grid, knots_t, control, update, residual, monitor, damping, length, method)
 
-    limit = {"spacetime": MAX_ITERATIONS, "paper": PAPER_ITERATIONS}[method]
     forces: tuple[WindowForces, ...] | None = None
     try:
         if method == "spacetime":
@@ -92,7 +101,7 @@ def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method:
         return _answer(problem, monitor, method, Outcome(level, "time_limit", message, None))
     monitor.phase(method)
     count = len(monitor.iterations)
-    status: Status = "converged" if converged else "max_iterations" if count >= limit else "stalled"
+    status: Status = "converged" if converged else "max_iterations"
     message = f"The update fell below delta = {quality.delta:g} m in {count} iterations."
     if not converged:
         message = (
@@ -103,6 +112,7 @@ def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method:
         message += " The surface is that of the march it started from."
         control, forces = level.control, None
     elif not np.isfinite(control).all():
+        status = "stalled"
         message += " The iterates grew beyond all bounds; the surface is that of a march."
         control = level.control
     level = replace(level, control=control)
@@ -111,7 +121,7 @@ def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method:
 
 
 def _companion(problem: Problem, quality: Quality, level: Level, monitor: Monitor) -> float | None:
-    """Return the distance of a level's surface to a march on a grid half as fine again: its error estimate [m]."""
+    """Return the error estimate [m]: the distance to a march on a grid half as fine again, with a margin."""
     assert quality.n_u is not None
     assert quality.n_t is not None
     if not quality.estimate:
@@ -123,7 +133,7 @@ def _companion(problem: Problem, quality: Quality, level: Level, monitor: Monito
         finer = run_level(problem, n_u, n_t, round(FINER * given_steps(quality.n_t)), monitor, booked=False)
     except TimeIsUp:
         return None
-    estimate = None if finer.motion.stopped else distance(level, finer, problem)
+    estimate = None if finer.motion.stopped else SAFETY * distance(level, finer, problem)
     monitor.phase("estimate")
     return estimate
 
@@ -160,6 +170,7 @@ def _climb(problem: Problem, quality: Quality, monitor: Monitor) -> Outcome:
     target = quality.target_error or AUTO_TARGET * problem.scene.cable.length
     budget = quality.time_budget or np.inf
     best: Level | None = None
+    estimate = np.inf
     rho = RHO
     for i in range(len(LEVELS)):
         began = monitor.elapsed()
@@ -171,9 +182,10 @@ def _climb(problem: Problem, quality: Quality, monitor: Monitor) -> Outcome:
             break
         if best is not None:
             level = replace(level, change=distance(best, level, problem))
+            estimate = extrapolated(level.change, best.change)
             if level.motion.stopped and not best.motion.stopped:
-                message = f"A finer grid did not converge: {_march_status(problem, level)[1]}"
-                return Outcome(best, "stalled", message, _finite(best.change))
+                status, message = _march_status(problem, level)
+                return Outcome(best, status, f"A finer grid was not finished: {message}", _finite(best.change))
             rho = STRONGLY_DAMPED if level.change > ROUGH * problem.scene.cable.length else RHO
         _record_level(problem, level, monitor)
         best = level
@@ -181,24 +193,24 @@ def _climb(problem: Problem, quality: Quality, monitor: Monitor) -> Outcome:
         moved = f"the last refinement moved the surface by {level.change * 1e3:.2g} mm"
         if level.motion.stopped == "time":
             return Outcome(level, status, message, None)
-        if level.change <= ACCEPT * target and quality.time_budget is None:
+        if estimate <= ACCEPT * target and quality.time_budget is None:
             agreed = f"Two grids agree to {level.change * 1e3:.2g} mm, target {target * 1e3:.2g} mm."
-            return Outcome(level, status, agreed if status == "converged" else message, level.change)
+            return Outcome(level, status, agreed if status == "converged" else message, estimate)
         if 2.5 * (monitor.elapsed() - began) > budget - monitor.elapsed():
             if i == 0:
                 return Outcome(level, "time_limit", f"{budget * 1e3:.3g} ms allow one grid, unchecked.", None)
-            return Outcome(level, status, f"The best grid in {budget * 1e3:.3g} ms; {moved}.", level.change)
+            return Outcome(level, status, f"The best grid in {budget * 1e3:.3g} ms; {moved}.", estimate)
     assert best is not None
     status, message = _march_status(problem, best)
     moved = f"the last refinement moved the surface by {best.change * 1e3:.3g} mm, target {target * 1e3:.3g} mm"
     advice = "Allow a larger target_error, more time or a shorter motion."
-    if status == "converged" and best.change <= target:
+    if status == "converged" and estimate <= target:
         message = f"Two grids agree to {best.change * 1e3:.2g} mm, target {target * 1e3:.2g} mm."
     elif status == "converged" and monitor.remaining() <= 0:
         status, message = "time_limit", f"The time limit passed; {moved}. {advice}"
     elif status == "converged":
         status, message = "max_iterations", f"No finer grid; {moved}. {advice}"
-    return Outcome(best, status, message, _finite(best.change))
+    return Outcome(best, status, message, _finite(estimate))
 
 
 def _finite(x: float) -> float | None:

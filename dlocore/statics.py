@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +25,7 @@ LEVELS = (9, 13, 17, 25, 33, 49, 65, 97)
 TOLERANCE = 1e-10  # of the length, on the last Newton update
 ITERATIONS = 60  # of one relaxation
 ROUNDS = 400  # of relaxations, each held back less by where it started
+Rest = Literal["settled", "restless", "time"]  # at rest; no rest found; the time was up
 PATH_STEPS = 24  # that bring the grasps to their poses at a later time
 
 
@@ -91,26 +93,26 @@ def equilibrium(
     target = scene.quality.target_error or 1e-4 * scene.cable.length
     least = smallest_n_u(problem)
     sizes = [n_u] if n_u is not None else [max(n, least + 2 * i) for i, n in enumerate(LEVELS)]
-    found: tuple[Grid, Floats, bool, tuple[WindowForces, ...]] | None = None
+    found: tuple[Grid, Floats, Rest, tuple[WindowForces, ...]] | None = None
     change, status, message = np.inf, "time_limit", "The time limit passed. Allow more time or a smaller n_u."
     for n in sizes:
-        try:
-            grid = make_grid(problem, n)
-            q, settled, forces = settle(problem, grid, at, monitor)
-        except TimeIsUp:
+        grid = make_grid(problem, n)
+        q, rest, forces = settle(problem, grid, at, monitor)
+        if rest == "time" and found is not None:
             break
         if found is not None:
             u = np.linspace(0.0, scene.cable.length, 65)
             before = design_matrix(found[0].knots, u) @ found[1]
             change = float(np.linalg.norm(design_matrix(grid.knots, u) @ q - before, axis=1).max())
-        found = (grid, q, settled, forces)
+        found = (grid, q, rest, forces)
+        if rest == "time":
+            break
         status, message = "converged", "Forces balance." if n_u else f"Two grids agree to {change * 1e3:.2g} mm."
         if change <= target:
             break
-    if found is None:
-        raise SceneError("deadline", deadline, "more time", "Not even the coarsest grid was done")
-    grid, q, settled, forces = found
-    if not settled:
+    assert found is not None, "every list of sizes has a first"
+    grid, q, rest, forces = found
+    if rest == "restless":
         status = "stalled"
         message = "The relaxation did not come to rest. The scene may have no equilibrium, or many side by side."
     elif status == "converged" and n_u is None and not change <= target:
@@ -139,24 +141,21 @@ def start_grid(problem: Problem, n_u: int, monitor: Monitor) -> Grid:
     grid = make_grid(problem, n_u)
     if not problem.scene.shape.settle:
         return grid
-    try:
-        q, settled, _ = settle(problem, grid, 0.0, monitor)
-    except TimeIsUp:
-        return grid  # the march will find the time used up, and say so
-    if not settled:
+    q, rest, _ = settle(problem, grid, 0.0, monitor)
+    if rest == "restless":
         allowed = "false, or a start that grasps hold in an equilibrium"
         raise SceneError("shape.settle", True, allowed, "The start did not come to rest")
     return replace(grid, start=q)
 
 
-def settle(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> tuple[Floats, bool, tuple[WindowForces, ...]]:
-    """Return control points (n_u, nc) [m] at rest with the grasps at their poses of time `at`, and what holds them.
+def settle(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> tuple[Floats, Rest, tuple[WindowForces, ...]]:
+    """Return control points (n_u, nc) [m] with the grasps at their poses of time `at`, how they rest, what holds them.
 
     Relaxations held back by a spring towards where they started: the first strongly, later ones less, so that a cable
     without a stable tangent (buckling, free rotation) walks downhill instead of jumping.
 
     Raises:
-        Cancelled, TimeIsUp: as `monitor` says.
+        Cancelled: the caller asked to stop.
     """
     q = grid.start.copy()
     starts: Starts = {}
@@ -167,7 +166,7 @@ def settle(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> tuple[F
     bending = problem.bend.bending_stiffness if problem.bend else 0.0
     load = float(np.linalg.norm(problem.weight()))
     springs = 10.0 * (bending / length**4 + load / length) + 1e-9
-    settled = False
+    rest: Rest = "restless"
     forces: tuple[WindowForces, ...] = ()
     for t in times:
         grasps = closed_grasps(problem, t, t)
@@ -176,9 +175,13 @@ def settle(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> tuple[F
         _carry(problem, grid, grasps, starts, t, q)
         applied = applied_forces(problem, grid, np.array([t]))[0]
         strength = springs
-        settled = False
+        rest = "restless"
         for _ in range(ROUNDS if t == times[-1] else 4):
-            monitor.check()
+            try:
+                monitor.check()
+            except TimeIsUp:
+                rest = "time"
+                break
             before = q.copy()
             update, used = relax(
                 axes, q, before, strength, applied, grid.tables, active, parameters, grid.memory, held.elimination,
@@ -187,12 +190,14 @@ def settle(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> tuple[F
             moved = float(np.abs(q - before).max())
             strength *= 0.2 if used <= 12 else 1.0
             if moved <= 1e-8 * length and update <= TOLERANCE * length:
-                settled = True
+                rest = "settled"
                 break
         forces = (
             WindowForces(held, np.array([t]), _holding(problem, grid, q, applied, held.elimination.held), q[None]),
         )
-    return q, settled, forces
+        if rest == "time":
+            break
+    return q, rest, forces
 
 
 def _carry(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, t: float, q: Floats) -> None:

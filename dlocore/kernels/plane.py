@@ -1,7 +1,7 @@
 """Assembly in the plane: two coordinates, one signed curvature.
 
 All that is local to a point is scalars and tuples, never small arrays: the compiler then keeps it in registers, which
-is several times faster (docs/model.md, cost).
+is more than twice as fast (docs/model.md, cost).
 """
 
 from typing import Any

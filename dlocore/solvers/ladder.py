@@ -93,6 +93,16 @@ def run_level(
     return Level(motion, knots_t, control, np.inf)
 
 
+def extrapolated(change: float, before: float) -> float:
+    """Return the error [m] that the last two changes of a refinement point to.
+
+    The last change is the error of the level before, mostly far above that of the last. Where changes shrink by less
+    than half from level to level, the sum of those to come is larger: change c/(1 - c), c = change/before, at most 0.9.
+    """
+    contraction = min(change / before, 0.9) if np.isfinite(before) and before > 0 else 0.0
+    return change * max(1.0, contraction / (1.0 - contraction))
+
+
 def sample(level: Level, u: Floats, t: Floats) -> Floats:
     """Return the surface of a level on a grid of u (k,) and t (m,); (m, k, nc) [m]."""
     return _matrix(level.knots_t, t) @ np.einsum(

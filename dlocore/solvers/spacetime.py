@@ -29,7 +29,7 @@ _HISTORY = 4  # iterates that Anderson acceleration combines
 _DAMPING = 1e-6  # of the diagonal of normal equations that lost their positive factors to rounding
 _LARGEST_STEP = 0.25  # of the length, in one control point: beyond it a step is shortened
 LARGEST_STRAIN = 0.003  # that the bounded axial stiffness allows under the largest tension of the march
-RESOLVED = 30.0  # times mu L^2/h^2: the axial stiffness that a time spline of span h resolves
+RESOLVED = 15.0  # times mu L^2/h^2: the axial stiffness that a time spline of span h resolves
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,14 +63,13 @@ def join(parts: list[Floats], windows: list[Window]) -> Floats:
     return joined
 
 
-def bounded_axial_stiffness(problem: Problem, largest_tension: float, n_t: int) -> float:
+def bounded_axial_stiffness(problem: Problem, largest_tension: float, span: float) -> float:
     """Return the axial stiffness [N] of the least squares: what the time spline resolves, never above the true one.
 
     Collocated in time, near-inextensibility over-constrains the time spline (docs/model.md eq. 15).
     """
     cable = problem.scene.cable
     true = problem.stretch.axial_stiffness
-    span = problem.horizon / max(1, n_t - 3)
     resolved = RESOLVED * cable.linear_density * (cable.length / span) ** 2
     buckles = 400.0 * (problem.bend.bending_stiffness if problem.bend else 0.0) / cable.length**2
     return min(true, max(largest_tension / LARGEST_STRAIN, resolved, buckles))
@@ -191,7 +190,8 @@ def solve(problem: Problem, motion: March, knots_t: Floats, delta: float, monito
     for i, window in enumerate(windows):
         grasps = closed_grasps(problem, window.begin, window.end)
         close_grasps(problem, grid, grasps, starts, q)
-        stiffness = bounded_axial_stiffness(problem, tension, len(window.knots) - 4)
+        span = (window.end - window.begin) / (len(window.knots) - 7)
+        stiffness = bounded_axial_stiffness(problem, tension, span)
         if i > 0:
             near = hold(problem, grid, grasps, window.begin + 1e-6 * np.arange(3.0), starts)
             rate = (4 * near.offsets[1] - 3 * near.offsets[0] - near.offsets[2]) / 2e-6
