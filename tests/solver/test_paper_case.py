@@ -86,8 +86,8 @@ def test_error_estimate_of_auto_is_an_upper_bound_within_a_factor(u, EI, hold):
 def test_error_estimate_of_the_paper_grid_is_within_a_factor(u, EI, hold):
     prediction = predict(paper_scene(u, EI, hold=hold))
     true = apart(prediction.surface, truth(u, EI, hold).surface).max()
-    # the distance to a finer march; measured: 0.86 to 1.36 (also where the iteration did not converge)
-    assert 0.7 * true < prediction.accuracy.error_estimate < 1.6 * true
+    # the distance to a finer march with a margin of 1.5; measured: 1.29 to 2.05
+    assert true < prediction.accuracy.error_estimate < 2.4 * true
 
 
 @every_grasp
