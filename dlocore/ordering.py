@@ -107,7 +107,7 @@ def _in_company(points: Floats) -> Indices:
     """Return the points that aren't far from all others (m,)."""
     if len(points) < 6:
         return np.arange(len(points))
-    distance = cKDTree(points).query(points, k=3)[0][:, 1:].mean(axis=1)
+    distance = np.asarray(cKDTree(points).query(points, k=3)[0])[:, 1:].mean(axis=1)
     return np.flatnonzero(distance <= LONELY * np.median(distance) + 1e-12)
 
 
@@ -120,7 +120,7 @@ def _backbone(points: Floats) -> Floats:
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     if not size > 0:
         raise _no_curve("they are all in one place")
-    nearest = cKDTree(points).query(points, k=2)[0][:, 1]
+    nearest = np.asarray(cKDTree(points).query(points, k=2)[0])[:, 1]
     radius = max(1.01 * float(np.median(nearest)), size / MAX_BALLS)
     best, most = points[:0], 0.0
     while radius < 0.25 * size:
