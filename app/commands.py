@@ -1,6 +1,8 @@
 """What the commands of ``dlo`` do."""
 
+import ipaddress
 import json as stdlib_json
+import math
 import sys
 import time
 from pathlib import Path
@@ -32,19 +34,35 @@ def serve(host: str | None, port: int | None) -> int:
     given = {name: value for name, value in (("host", host), ("port", port)) if value is not None}
     settings = _settings(**given)
     _settings()  # what the environment says must be right even where an option overrides it
+    from app import logs
     from app.main import create_app
 
     # one process: the 3D scene and the queue of solves live in it; viser compresses nothing, so neither do we
     config = uvicorn.Config(
-        create_app(settings), host=settings.host, port=settings.port, log_level="info", ws_per_message_deflate=False
+        create_app(settings),
+        host=settings.host,
+        port=settings.port,
+        log_config=logs.configuration(settings.log_format),
+        access_log=False,
+        ws_per_message_deflate=False,
+        timeout_graceful_shutdown=math.ceil(settings.shutdown_grace),
     )
     socket = config.bind_socket()
     where = f"[{settings.host}]" if ":" in settings.host else settings.host
     address = f"http://{where}:{socket.getsockname()[1]}"
     print(f"page      {address}/\n3D scene  {address}/scene/\nAPI docs  {address}/docs", flush=True)
+    if settings.token is None and not _is_loopback(settings.host):
+        print("warning   anyone who reaches this address can use it; DLO_TOKEN asks for a token", file=sys.stderr)
     print(f"runs      {settings.data_dir / 'runs'}", flush=True)
     uvicorn.Server(config).run(sockets=[socket])
     return 0
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 def predict(scene: str, *, npz: str | None, json: str | None, rrd: str | None) -> int:
@@ -53,7 +71,7 @@ def predict(scene: str, *, npz: str | None, json: str | None, rrd: str | None) -
     request = _request(raw)
     prediction = _solve(request)
     document = from_prediction(prediction, "", request.output.samples_u, request.output.samples_t)
-    del document["links"], document["id"]
+    del document["links"], document["id"], document["state"]
     if npz is not None:
         from app.archive import surface_npz
 

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+from pydantic import BaseModel
+
 from app.schemas.request import PredictionRequest
 from dlocore import SceneError
 
@@ -37,9 +39,16 @@ class BadField:
         )
 
 
-def bad_fields(errors: Sequence[Any], body: Any) -> list[BadField]:
-    """Return pydantic's `errors` about the request `body`, at most 50 of them."""
-    return [_bad_field(error, body) for error in errors[:MAX_REPORTED]]
+def bad_fields(errors: Sequence[Any], body: Any, model: type[BaseModel] = PredictionRequest) -> list[BadField]:
+    """Return pydantic's `errors` about the request `body`, at most 50 of them.
+
+    Args:
+        errors: what pydantic found.
+        body: the request.
+        model: what it should have been.
+    """
+    schema = _schema_of(model)
+    return [_bad_field(error, body, schema) for error in errors[:MAX_REPORTED]]
 
 
 _WHAT = {
@@ -49,7 +58,7 @@ _WHAT = {
 }
 
 
-def _bad_field(error: Any, body: Any) -> BadField:
+def _bad_field(error: Any, body: Any, schema: "_Schema") -> BadField:
     loc = list(error["loc"])
     where = loc[0] if loc and loc[0] in ("path", "query", "header") else _WHOLE
     kind, context = error["type"], error.get("ctx", {})
@@ -64,7 +73,7 @@ def _bad_field(error: Any, body: Any) -> BadField:
     given = "nothing" if kind in ("missing", "union_tag_not_found") else _shown(error["input"], kind)
     if kind == "union_tag_invalid":
         steps, given = [*steps, "kind"], _shown(error["input"].get("kind"), kind)
-    allowed = _allowed(kind, context, tagged)
+    allowed = _allowed(kind, context, tagged, schema)
     return BadField(_text(steps), given, allowed, f"{_WHAT.get(kind, '')}Got {given}. Allowed: {allowed}.")
 
 
@@ -100,6 +109,7 @@ def _shown(value: Any, kind: str) -> str:
     return text if len(text) <= 120 else text[:117] + "..."
 
 
+_TIME = "a time in ISO 8601 with its offset from UTC, e.g. 2026-01-31T12:00:00Z"
 _TYPES = {
     "float_type": "a finite number",
     "float_parsing": "a finite number",
@@ -108,6 +118,12 @@ _TYPES = {
     "int_from_float": "an integer",
     "int_parsing": "an integer",
     "bool_type": "true or false",
+    "bool_parsing": "true or false",
+    "datetime_type": _TIME,
+    "datetime_parsing": _TIME,
+    "datetime_from_date_parsing": _TIME,
+    "datetime_object_invalid": _TIME,
+    "timezone_naive": _TIME,
     "string_type": "a text",
     "list_type": "a list",
     "dict_type": "an object",
@@ -116,10 +132,10 @@ _TYPES = {
 }
 
 
-def _allowed(kind: str, context: dict[str, Any], loc: list[Any]) -> str:
-    schema = _schema_at(loc)
+def _allowed(kind: str, context: dict[str, Any], loc: list[Any], whole: "_Schema") -> str:
+    schema = whole.at(loc)
     if kind == "extra_forbidden":
-        return "one of " + ", ".join(_names(_schema_at(loc[:-1])))
+        return "one of " + ", ".join(whole.names(loc[:-1]))
     if kind == "union_tag_invalid":
         return "one of " + context["expected_tags"].replace("'", "")
     if kind == "union_tag_not_found":
@@ -160,51 +176,55 @@ def _range(schema: dict[str, Any]) -> str:
     return ""
 
 
+class _Schema:
+    """The JSON schema of a request, read field by field."""
+
+    def __init__(self, document: dict[str, Any]) -> None:
+        self._document = document
+
+    def at(self, loc: list[Any]) -> dict[str, Any]:
+        """Return the schema of the field at `loc`, with union branches as pydantic names them; {} where unknown."""
+        node = self._document
+        for item in loc:
+            if isinstance(item, str) and item.startswith("~"):
+                continue
+            node = self._child(self._resolved(node), item)
+            if not node:
+                return {}
+        description = node.get("description")
+        resolved = self._resolved(node)
+        return {**resolved, "description": description} if description else resolved
+
+    def names(self, loc: list[Any]) -> list[str]:
+        """Return the field names of the object at `loc`, or of the one object among the forms that it may have."""
+        node = self.at(loc)
+        options = [node, *map(self._resolved, _options(node))]
+        return next((list(option["properties"]) for option in options if "properties" in option), [])
+
+    def _resolved(self, node: dict[str, Any]) -> dict[str, Any]:
+        while "$ref" in node:
+            node = self._document["$defs"][node["$ref"].rsplit("/", 1)[1]]
+        return node
+
+    def _child(self, node: dict[str, Any], item: Any) -> dict[str, Any]:
+        mapping = node.get("discriminator", {}).get("mapping", {})
+        if item in mapping:
+            return {"$ref": mapping[item]}
+        if isinstance(item, str) and item in node.get("properties", {}):
+            return node["properties"][item]
+        if isinstance(item, int) and "items" in node:
+            return node["items"]
+        for option in _options(node):
+            found = self._child(self._resolved(option), item)
+            if found:
+                return found
+        return {}
+
+
 @cache
-def _schema() -> dict[str, Any]:
-    return PredictionRequest.model_json_schema()
-
-
-def _schema_at(loc: list[Any]) -> dict[str, Any]:
-    """Return the JSON schema of the field at `loc`, with union branches as pydantic names them; {} where unknown."""
-    node = _schema()
-    for item in loc:
-        if isinstance(item, str) and item.startswith("~"):
-            continue
-        node = _child(_resolved(node), item)
-        if not node:
-            return {}
-    description = node.get("description")
-    resolved = _resolved(node)
-    return {**resolved, "description": description} if description else resolved
-
-
-def _names(node: dict[str, Any]) -> list[str]:
-    """Return the field names of an object, or of the one object among the forms that a field may have."""
-    options = [node, *map(_resolved, _options(node))]
-    return next((list(option["properties"]) for option in options if "properties" in option), [])
+def _schema_of(model: type[BaseModel]) -> _Schema:
+    return _Schema(model.model_json_schema())
 
 
 def _options(node: dict[str, Any]) -> list[dict[str, Any]]:
     return [*node.get("anyOf", []), *node.get("oneOf", [])]
-
-
-def _resolved(node: dict[str, Any]) -> dict[str, Any]:
-    while "$ref" in node:
-        node = _schema()["$defs"][node["$ref"].rsplit("/", 1)[1]]
-    return node
-
-
-def _child(node: dict[str, Any], item: Any) -> dict[str, Any]:
-    mapping = node.get("discriminator", {}).get("mapping", {})
-    if item in mapping:
-        return {"$ref": mapping[item]}
-    if isinstance(item, str) and item in node.get("properties", {}):
-        return node["properties"][item]
-    if isinstance(item, int) and "items" in node:
-        return node["items"]
-    for option in _options(node):
-        found = _child(_resolved(option), item)
-        if found:
-            return found
-    return {}

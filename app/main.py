@@ -4,14 +4,14 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from importlib.metadata import PackageNotFoundError, version
 
-import anyio
 from fastapi import FastAPI
 from fastapi.middleware.cors import CORSMiddleware
 from fastapi_offline import FastAPIOffline
 
 from app import openapi, problems, viewer
-from app.middleware import BodyLimit, PageHeaders
-from app.routes import cables, health, pages, predictions, rerun
+from app.access import Access
+from app.middleware import AccessLog, BodyLimit, PageHeaders
+from app.routes import batch, cables, files, health, pages, predictions, rerun, shapes
 from app.service import Service
 from app.settings import Settings
 
@@ -33,25 +33,26 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         service = Service.of(settings)
         app.state.service = service
-        async with anyio.create_task_group() as tasks, viewer.running(app, settings, service.runs):
-            tasks.start_soon(service.warm_up)
+        async with viewer.running(app, settings, service.runs), service.running():
             yield
-            service.worker.close()
-            tasks.cancel_scope.cancel()
 
     app = FastAPIOffline(title="dlo", version=_version(), description=_ABOUT, lifespan=lifespan, redoc_url=None)
     problems.install(app)
     openapi.install(app)
     app.add_middleware(BodyLimit, limit=settings.max_body_bytes)
+    if settings.token is not None:
+        app.add_middleware(Access, token=settings.token.get_secret_value())
     app.add_middleware(PageHeaders)
-    if settings.allowed_origins:
+    if settings.allowed_origins:  # outside of the token: a browser asks for leave without it
         app.add_middleware(
             CORSMiddleware,
             allow_origins=settings.allowed_origins,
             allow_methods=["GET", "POST", "DELETE"],
-            allow_headers=["Content-Type"],
+            allow_headers=["Authorization", "Content-Type", "Last-Event-ID", "Prefer"],
+            expose_headers=["Location", "Preference-Applied", "Retry-After"],
         )
-    for routes in (predictions, cables, health, rerun):
+    app.add_middleware(AccessLog)
+    for routes in (batch, predictions, files, shapes, cables, health, rerun):
         app.include_router(routes.router)
     viewer.add_routes(app)
     pages.add_pages(app)

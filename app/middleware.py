@@ -1,4 +1,7 @@
-"""What every request and response passes through: a limit on bodies, and headers that keep a page to itself."""
+"""What every request and response passes through: the log, a limit on bodies, headers that keep a page to itself."""
+
+import logging
+import time
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
@@ -18,6 +21,38 @@ POLICY = "; ".join(
         "frame-ancestors 'self'",
     ]
 )
+
+
+_log = logging.getLogger("dlo.access")
+
+
+class AccessLog:
+    """Write one line for each request: method, path without its query, status, time, and the run if there is one."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass the request on, and note how it ended."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        began = time.perf_counter()
+        status = 0  # of a request that was given up
+
+        async def noted(message: Message) -> None:
+            nonlocal status
+            if message["type"] == "http.response.start":
+                status = message["status"]
+            await send(message)
+
+        try:
+            await self.app(scope, receive, noted)
+        finally:
+            level = logging.DEBUG if scope["path"] in ("/health", "/ready", "/metrics") else logging.INFO
+            seconds = round(time.perf_counter() - began, 6)
+            extra = {"method": scope["method"], "path": scope["path"], "status": status, "seconds": seconds}
+            _log.log(level, "%s %s %s", scope["method"], scope["path"], status, extra=extra)
 
 
 class BodyLimit:

@@ -5,7 +5,8 @@ from typing import Any
 from fastapi import FastAPI
 from pydantic import BaseModel
 
-from app.schemas.response import PredictionResponse, ProblemDocument, problem_document
+from app.schemas.batch import BatchLine
+from app.schemas.response import JobResponse, PredictionResponse, ProblemDocument, problem_document
 
 _REFERENCE = "#/components/schemas/{model}"
 
@@ -18,7 +19,7 @@ def install(app: FastAPI) -> None:
         if app.openapi_schema is None:
             document = described()
             schemas = document.setdefault("components", {}).setdefault("schemas", {})
-            for model in (PredictionResponse, ProblemDocument):
+            for model in (PredictionResponse, JobResponse, BatchLine, ProblemDocument):
                 schemas.update(_schemas(model))
             for path in document["paths"].values():
                 for operation in path.values():

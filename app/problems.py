@@ -12,15 +12,16 @@ from fastapi.responses import Response
 from starlette.exceptions import HTTPException
 
 from app.fields import BadField, bad_fields
+from app.schemas.request import PredictionRequest
 from dlocore import SceneError
 
 MEDIA_TYPE = "application/problem+json"
 _log = logging.getLogger("dlo")
 
+_DEFECT = "The service failed; this is a defect. Its log says where."
 _DETAILS = {
     404: "There is nothing at this address.",
     405: "This address exists, but not for this method.",
-    415: "Send the body as application/json.",
 }
 
 
@@ -46,16 +47,29 @@ class ProblemError(Exception):
         self.extra = extra
 
 
-def problem_response(problem: ProblemError) -> Response:
-    """Return the problem as an HTTP response."""
-    document = {
+def document_of(problem: ProblemError) -> dict[str, Any]:
+    """Return the problem as its document."""
+    return {
         "type": f"urn:dlo:problem:{problem.kind}",
         "title": HTTPStatus(problem.status).phrase,
         "status": problem.status,
         "detail": problem.detail,
         **problem.extra,
     }
-    return Response(orjson.dumps(document), problem.status, problem.headers, MEDIA_TYPE)
+
+
+def problem_response(problem: ProblemError) -> Response:
+    """Return the problem as an HTTP response."""
+    return Response(orjson.dumps(document_of(problem)), problem.status, problem.headers, MEDIA_TYPE)
+
+
+def problem_of(error: Exception) -> ProblemError:
+    """Return what to tell of an error of a solve; what is no one's input is a defect, and only named so."""
+    if isinstance(error, ProblemError):
+        return error
+    if isinstance(error, SceneError):
+        return bad_scene([BadField.from_scene_error(error)])
+    return ProblemError(500, "internal-error", _DEFECT)
 
 
 def bad_scene(fields: list[BadField]) -> ProblemError:
@@ -65,19 +79,14 @@ def bad_scene(fields: list[BadField]) -> ProblemError:
     return ProblemError(422, "bad-request", first + more, errors=[vars(field) for field in fields])
 
 
-async def _on_problem(request: Request, error: Exception) -> Response:
-    assert isinstance(error, ProblemError)
-    return problem_response(error)
-
-
-async def _on_scene_error(request: Request, error: Exception) -> Response:
-    assert isinstance(error, SceneError)
-    return problem_response(bad_scene([BadField.from_scene_error(error)]))
+async def _on_known_error(request: Request, error: Exception) -> Response:
+    return problem_response(problem_of(error))
 
 
 async def _on_validation_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
-    return problem_response(bad_scene(bad_fields(error.errors(), error.body)))
+    model = getattr(request.scope.get("route"), "body_model", None)
+    return problem_response(bad_scene(bad_fields(error.errors(), error.body, model or PredictionRequest)))
 
 
 async def _on_http_error(request: Request, error: Exception) -> Response:
@@ -89,14 +98,13 @@ async def _on_http_error(request: Request, error: Exception) -> Response:
 
 async def _on_crash(request: Request, error: Exception) -> Response:
     _log.error("%s %s failed", request.method, request.url.path, exc_info=error)
-    detail = "The service failed; this is a defect. Its log says where."
-    return problem_response(ProblemError(500, "internal-error", detail))
+    return problem_response(problem_of(error))
 
 
 def install(app: FastAPI) -> None:
     """Make every failure of `app` a problem document."""
-    app.add_exception_handler(ProblemError, _on_problem)
-    app.add_exception_handler(SceneError, _on_scene_error)
+    app.add_exception_handler(ProblemError, _on_known_error)
+    app.add_exception_handler(SceneError, _on_known_error)
     app.add_exception_handler(RequestValidationError, _on_validation_error)
     app.add_exception_handler(HTTPException, _on_http_error)
     app.add_exception_handler(Exception, _on_crash)

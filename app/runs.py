@@ -7,6 +7,7 @@ import shutil
 import threading
 import time
 import weakref
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -59,7 +60,14 @@ class RunStore:
         _delete(removed)
 
     def save(
-        self, scene_json: dict[str, Any] | bytes, prediction: Prediction, *, samples_u: int = 101, samples_t: int = 33
+        self,
+        scene_json: dict[str, Any] | bytes,
+        prediction: Prediction,
+        *,
+        samples_u: int = 101,
+        samples_t: int = 33,
+        id: str | None = None,
+        name: str = "",
     ) -> str:
         """Store a prediction and return its id.
 
@@ -68,12 +76,15 @@ class RunStore:
             prediction: what the solver returned.
             samples_u: samples along the cable in the stored document.
             samples_t: samples in time.
+            id: that of the run, of `new_id`; absent: a new one.
+            name: what the run is called in lists.
         """
-        id = new_id()
+        id = id or new_id()
         request = scene_json if isinstance(scene_json, bytes) else orjson.dumps(scene_json)
         document = from_prediction(prediction, id, samples_u, samples_t)
         summary = {
             "id": id,
+            "name": name,
             "created": document["created"],
             "status": prediction.status,
             "method": prediction.accuracy.method,
@@ -139,11 +150,28 @@ class RunStore:
     def __contains__(self, id: str) -> bool:
         return id in self._entries
 
-    def page(self, limit: int, offset: int) -> tuple[list[dict[str, Any]], int]:
-        """Return the summaries of at most `limit` runs after `offset` newer ones, and how many there are in all."""
+    def page(
+        self, limit: int, offset: int = 0, *, cursor: str = "", where: Callable[[dict[str, Any]], bool] | None = None
+    ) -> tuple[list[dict[str, Any]], int]:
+        """Return the summaries of runs, newest first, and how many match in all.
+
+        Args:
+            limit: at most so many.
+            offset: pass over so many newer ones.
+            cursor: only runs older than the one with this id, which need not exist any more.
+            where: only runs for whose summary this holds.
+        """
         with self._lock:
-            ids = sorted(self._entries, reverse=True)
-            return [self._entries[id].summary for id in ids[offset : offset + limit]], len(ids)
+            entries = [(id, self._entries[id].summary) for id in sorted(self._entries, reverse=True)]
+        matching = [(id, summary) for id, summary in entries if where is None or where(summary)]
+        older = [summary for id, summary in matching if not cursor or id < cursor]
+        return older[offset : offset + limit], len(matching)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """How many runs are stored, and their bytes."""
+        with self._lock:
+            return len(self._entries), sum(entry.size for entry in self._entries.values())
 
     def request(self, id: str) -> bytes | None:
         """Return the request as it was sent, or None where there is no such run."""

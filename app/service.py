@@ -1,18 +1,31 @@
-"""What the routes work with: the settings, the stored runs, the worker, and whether the solver is ready."""
+"""What the routes work with: the settings, the stored runs, the solves under way, and whether the solver is ready."""
 
+import asyncio
+import logging
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from threading import Event
 from typing import Annotated
 
+import anyio
 import anyio.to_thread
+import orjson
+from anyio.abc import TaskGroup
 from fastapi import Depends, Request
 
-from app.problems import ProblemError
+from app.jobs import Job, Jobs
+from app.logs import RUN
+from app.metrics import Metrics
+from app.problems import ProblemError, problem_of
 from app.runs import RunStore
-from app.schemas import PredictionRequest, to_scene
+from app.schemas import PredictionRequest, from_prediction, to_scene
+from app.schemas.response import iteration_document
 from app.settings import Settings
 from app.worker import Worker
-from dlocore import warm_up
+from dlocore import Iteration, Prediction, Scene, SceneError, warm_up
+
+_log = logging.getLogger("dlo")
 
 
 @dataclass
@@ -23,58 +36,161 @@ class Service:
         settings: the settings.
         runs: the stored runs.
         worker: the worker threads.
+        metrics: what is counted.
+        jobs: predictions that no stored run stands for.
         ready: whether the solver is compiled.
     """
 
     settings: Settings
     runs: RunStore
     worker: Worker
+    metrics: Metrics
+    jobs: Jobs = field(default_factory=Jobs)
     ready: bool = field(default=False)
+    _tasks: TaskGroup | None = field(init=False, default=None)
 
     @staticmethod
     def of(settings: Settings) -> "Service":
         """Return the service that `settings` describe."""
-        return Service(settings, RunStore(settings), Worker.of(settings))
+        runs, worker = RunStore(settings), Worker.of(settings)
+        return Service(settings, runs, worker, Metrics(worker, runs))
 
-    async def warm_up(self) -> None:
-        """Compile the solver."""
+    @asynccontextmanager
+    async def running(self) -> AsyncIterator[None]:
+        """Compile the solver and work at jobs while the context lasts; then finish them or, at last, cancel them."""
+        async with anyio.create_task_group() as self._tasks:
+            self._tasks.start_soon(self._warm_up)
+            try:
+                yield
+            finally:
+                with anyio.CancelScope(shield=True):
+                    await self._close()
+                self._tasks.cancel_scope.cancel()
+
+    async def _warm_up(self) -> None:
         await anyio.to_thread.run_sync(warm_up, abandon_on_cancel=True)
         self.ready = True
+        _log.info("ready", extra={"workers": self.worker.workers})
+
+    async def _close(self) -> None:
+        self.worker.close()
+        with anyio.move_on_after(self.settings.shutdown_grace):
+            await self.worker.idle()
+        if self.worker.admitted:
+            _log.warning("cancelling what is still under way", extra={"requests": self.worker.admitted})
+        self.jobs.cancel_all()
+        self.worker.cancel_all()
+        with anyio.move_on_after(1.0):  # of the 0.1 s that a solve takes to notice
+            await self.worker.idle()
 
     def check_ready(self) -> None:
-        """Raise a 503 problem while the solver is being compiled."""
+        """Raise a 503 problem while the solver is being compiled, and when the service stops."""
         if not self.ready:
             detail = "The solver is being compiled. Try again in a few seconds."
             raise ProblemError(503, "not-ready", detail, headers={"Retry-After": "2"})
+        if self.worker.closed:
+            raise ProblemError(503, "shutting-down", "The service is shutting down.", headers={"Retry-After": "5"})
 
-    async def predict(self, request: PredictionRequest, raw: bytes, cancelled: Event) -> str:
-        """Predict, store and return the id of the run.
+    async def submit(self, request: PredictionRequest, raw: bytes, *, store: bool) -> Job:
+        """Take up a prediction and return it as it is waiting.
 
         Args:
             request: the valid request.
             raw: the same as it was sent.
-            cancelled: set it to stop the solve.
+            store: whether to keep the run.
 
         Raises:
             SceneError: the scene is impossible.
-            ProblemError: 429, 503 or 504; 504 names the stored run with the best iterate.
+            ProblemError: 429 or 503.
         """
         self.check_ready()
         scene = await anyio.to_thread.run_sync(to_scene, request, self.runs.surface)
-        prediction = await self.worker.solve(scene, cancelled)
+        self.worker.admit()
+        assert self._tasks is not None
+        job = Job(store)
+        RUN.set(job.id)
+        self.jobs.add(job)
+        self._tasks.start_soon(self._work, job, scene, request, raw)
+        return job
 
-        def save() -> str:
-            output = request.output
-            return self.runs.save(raw, prediction, samples_u=output.samples_u, samples_t=output.samples_t)
+    async def _work(self, job: Job, scene: Scene, request: PredictionRequest, raw: bytes) -> None:
+        try:
+            with job.scope:
+                prediction = await self._solved(job, scene)
+                limit = self.settings.time_limit
+                job.beyond_limit = prediction.status == "time_limit" and prediction.accuracy.wall_time >= limit
+                document = await anyio.to_thread.run_sync(self.keep, prediction, request, raw, job.id, job.store)
+                if job.store:
+                    self.jobs.forget(job.id)  # the stored run stands for it
+                else:
+                    job.document = document
+                job.end("done")
+        except Exception as error:
+            problem = problem_of(error)
+            if problem.status == 500:
+                _log.error("the solve failed", exc_info=error)
+            job.end("cancelled" if job.cancelled.is_set() and problem.kind == "cancelled" else "failed", problem)
+        finally:
+            self.worker.release()
+        if not job.finished.is_set():  # its scope was cancelled while it waited
+            self.metrics.ended("cancelled", scene.quality.method)
+            job.end("cancelled", ProblemError(503, "cancelled", "The solve was cancelled."))
 
-        id = await anyio.to_thread.run_sync(save)
-        limit = self.settings.time_limit
-        if prediction.status == "time_limit" and prediction.accuracy.wall_time >= limit:
-            detail = (
-                f"The solve reached the limit of {limit:g} s; the best iterate so far is kept. {prediction.message}"
-            )
-            raise ProblemError(504, "time-limit", detail, prediction=f"/v1/predictions/{id}")
-        return id
+    async def _solved(self, job: Job, scene: Scene) -> Prediction:
+        loop = asyncio.get_running_loop()
+
+        def report(iteration: Iteration) -> None:
+            loop.call_soon_threadsafe(job.add, iteration_document(iteration))
+
+        return await self.solve(scene, job.cancelled, on_start=job.begin, on_iteration=report)
+
+    async def solve(
+        self,
+        scene: Scene,
+        cancelled: Event,
+        *,
+        on_start: Callable[[], None],
+        on_iteration: Callable[[Iteration], None],
+    ) -> Prediction:
+        """Predict `scene` in a worker thread as `Worker.solve` does; count it and write it to the log."""
+        method = scene.quality.method
+        try:
+            prediction = await self.worker.solve(scene, cancelled, on_start=on_start, on_iteration=on_iteration)
+        except SceneError:
+            self.metrics.ended("refused", method)
+            raise
+        except ProblemError as problem:
+            self.metrics.ended("cancelled" if problem.kind == "cancelled" else "time_limit", method)
+            raise
+        except Exception:
+            self.metrics.ended("failed", method)
+            raise
+        self.metrics.solved(prediction)
+        accuracy = prediction.accuracy
+        _log.info(
+            "solved",
+            extra={"status": prediction.status, "method": accuracy.method, "seconds": round(accuracy.wall_time, 6)},
+        )
+        return prediction
+
+    def keep(self, prediction: Prediction, request: PredictionRequest, raw: bytes, id: str, store: bool) -> bytes:
+        """Return the answer as JSON, and store it where that is asked for; for any thread."""
+        u, t = request.output.samples_u, request.output.samples_t
+        if not store:
+            document = {**from_prediction(prediction, id, u, t), "links": None}
+            return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
+        self.runs.save(raw, prediction, samples_u=u, samples_t=t, id=id, name=request.name)
+        return self.runs.document(id) or b""
+
+    def document(self, id: str, job: Job | None = None) -> bytes | None:
+        """Return the answer `id` as JSON, or None where there is none; for any thread.
+
+        Args:
+            id: of a run, stored or not.
+            job: that of the run, where it is known.
+        """
+        job = job or self.jobs.get(id)
+        return job.document if job is not None and job.document is not None else self.runs.document(id)
 
 
 def service_of(request: Request) -> Service:

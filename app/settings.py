@@ -2,8 +2,9 @@
 
 import os
 from pathlib import Path
+from typing import Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, SecretStr, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 
@@ -29,10 +30,18 @@ class Settings(BaseSettings):
     max_body_bytes: int = Field(default=10_000_000, ge=1_000, description="Largest request body [bytes].")
     workers: int = Field(default_factory=usable_cores, ge=1, le=1024, description="Solves that run at once.")
     queue_size: int = Field(default=64, ge=0, le=100_000, description="Solves that may wait for a worker.")
+    max_batch: int = Field(default=1000, ge=1, le=100_000, description="Scenes in one batch.")
     time_limit: float = Field(default=60.0, gt=0.0, le=86_400.0, description="Longest solve [s].")
     allowed_origins: tuple[str, ...] = Field(
         default=(), description='Other origins whose pages may call the API, as JSON: ["https://lab.example"].'
     )
+    token: SecretStr | None = Field(
+        default=None, min_length=8, description="Bearer token that every request must carry; absent: none is needed."
+    )
+    shutdown_grace: float = Field(
+        default=5.0, ge=0.0, le=3600.0, description="Time for running solves to finish when the service stops [s]."
+    )
+    log_format: Literal["json", "text"] = Field(default="json", description="Form of the log on standard error.")
     max_runs: int = Field(default=1000, ge=1, description="Stored runs kept; the oldest go first.")
     max_run_bytes: int = Field(default=2_000_000_000, ge=1_000_000, description="Bytes of stored runs kept.")
 

@@ -1,9 +1,8 @@
-"""The only mutable state of the service: how many solves run and wait."""
+"""The solves that run and wait: bounded worker threads, one solve each."""
 
 import math
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from threading import Event
 
@@ -12,30 +11,42 @@ import anyio.to_thread
 
 from app.problems import ProblemError
 from app.settings import Settings
-from dlocore import Cancelled, Prediction, Scene, predict
+from dlocore import Cancelled, Iteration, Prediction, Scene, predict
 
 GRACE = 5.0  # s that a solve may take beyond its deadline, which it looks at between steps
 _MEMORY = 0.8  # weight of the past in the running mean of solve times
+
+
+def _nothing(*_: object) -> None:
+    pass
 
 
 @dataclass
 class Worker:
     """Bounded worker threads for solves. Use it from one event loop.
 
+    A client's request is admitted first, or refused; what is admitted waits in order for a free worker.
+
     Args:
         workers: solves that run at once.
-        queue_size: solves that may wait.
+        queue_size: requests that may wait.
         time_limit: longest solve [s].
+
+    Attributes:
+        running: solves that run.
+        admitted: requests that run or wait.
+        closed: whether new requests are refused.
     """
 
     workers: int
     queue_size: int
     time_limit: float
+    running: int = field(init=False, default=0)
+    admitted: int = field(init=False, default=0)
+    closed: bool = field(init=False, default=False)
     _limiter: anyio.CapacityLimiter = field(init=False)
-    _running: set[Event] = field(init=False, default_factory=set)
-    _pending: int = field(init=False, default=0)
+    _solves: set[Event] = field(init=False, default_factory=set)
     _mean_time: float = field(init=False, default=0.1)
-    _closed: bool = field(init=False, default=False)
 
     def __post_init__(self) -> None:
         self._limiter = anyio.CapacityLimiter(self.workers)
@@ -45,26 +56,65 @@ class Worker:
         """Return the worker that `settings` describe."""
         return Worker(settings.workers, settings.queue_size, settings.time_limit)
 
-    async def solve(self, scene: Scene, cancelled: Event) -> Prediction:
-        """Predict `scene` in a worker thread.
+    @property
+    def waiting(self) -> int:
+        """How many solves wait for a worker."""
+        return self._limiter.statistics().tasks_waiting
+
+    def admit(self) -> None:
+        """Take a place among the requests that run or wait; to be followed by `release`.
+
+        Raises:
+            ProblemError: 429 where the queue is full, 503 when shutting down.
+        """
+        if self.closed:
+            raise ProblemError(503, "shutting-down", "The service is shutting down.", headers={"Retry-After": "5"})
+        if self.admitted >= self.workers + self.queue_size:
+            wait = max(1, math.ceil(self._mean_time * self.admitted / self.workers))
+            detail = f"{self.admitted} solves are under way or waiting, as many as allowed. Try again in {wait} s."
+            raise ProblemError(429, "queue-full", detail, headers={"Retry-After": str(wait)})
+        self.admitted += 1
+
+    def release(self) -> None:
+        """Give the place back."""
+        self.admitted -= 1
+
+    async def solve(
+        self,
+        scene: Scene,
+        cancelled: Event,
+        *,
+        on_start: Callable[[], None] = _nothing,
+        on_iteration: Callable[[Iteration], None] = _nothing,
+    ) -> Prediction:
+        """Predict `scene` in a worker thread; the caller has been admitted.
 
         Args:
             scene: the scene.
             cancelled: set it to stop the solve.
+            on_start: called when a worker is free.
+            on_iteration: called in the worker thread after every iteration.
 
         Raises:
-            ProblemError: 429 where the queue is full, 503 when cancelled or shutting down, 504 where the solve went
-                on past the time limit without an answer.
+            SceneError: the scene can't be solved as it was given.
+            ProblemError: 503 when cancelled, 504 where the solve went on past the time limit without an answer.
         """
-        if self._closed:
-            raise ProblemError(503, "shutting-down", "The service is shutting down.", headers={"Retry-After": "5"})
-        if self._pending >= self.workers + self.queue_size:
-            wait = max(1, math.ceil(self._mean_time * self._pending / self.workers))
-            detail = f"{self._pending} solves are under way or waiting, as many as allowed. Try again in {wait} s."
-            raise ProblemError(429, "queue-full", detail, headers={"Retry-After": str(wait)})
-        with self._counted(cancelled):
+        self._solves.add(cancelled)
+        try:
             async with self._limiter:
-                return await self._run(lambda: predict(scene, deadline=self.time_limit, cancelled=cancelled.is_set))
+                on_start()
+                self.running += 1
+                try:
+                    return await self._run(
+                        lambda: predict(
+                            scene, on_iteration=on_iteration, deadline=self.time_limit, cancelled=cancelled.is_set
+                        )
+                    )
+                finally:
+                    self.running -= 1
+        finally:
+            cancelled.set()  # a thread left behind stops at its next step
+            self._solves.discard(cancelled)
 
     async def _run(self, solve: Callable[[], Prediction]) -> Prediction:
         began = time.perf_counter()
@@ -79,19 +129,16 @@ class Worker:
         finally:
             self._mean_time = _MEMORY * self._mean_time + (1 - _MEMORY) * (time.perf_counter() - began)
 
-    @contextmanager
-    def _counted(self, cancelled: Event) -> Iterator[None]:
-        self._pending += 1
-        self._running.add(cancelled)
-        try:
-            yield
-        finally:
-            cancelled.set()  # a thread left behind stops at its next step
-            self._running.discard(cancelled)
-            self._pending -= 1
-
     def close(self) -> None:
-        """Cancel every solve and refuse new ones."""
-        self._closed = True
-        for event in self._running:
+        """Refuse new requests."""
+        self.closed = True
+
+    def cancel_all(self) -> None:
+        """Stop every solve that runs or waits."""
+        for event in self._solves:
             event.set()
+
+    async def idle(self) -> None:
+        """Wait until nothing runs or waits."""
+        while self.admitted:
+            await anyio.sleep(0.02)

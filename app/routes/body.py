@@ -4,12 +4,12 @@ import asyncio
 import json
 from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager
-from threading import Event
 from typing import Any
 
 import orjson
 from fastapi import Request, Response
 from fastapi.routing import APIRoute
+from pydantic import BaseModel
 
 from app.problems import ProblemError
 
@@ -31,6 +31,12 @@ class JsonRequest(Request):
 
 class JsonRoute(APIRoute):
     """A route that takes JSON only."""
+
+    @property
+    def body_model(self) -> type[BaseModel] | None:
+        """What the body should be, for the words about one that isn't."""
+        model = None if self.body_field is None else self.body_field.field_info.annotation
+        return model if isinstance(model, type) and issubclass(model, BaseModel) else None
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """Return the handler with the checks around it."""
@@ -56,17 +62,22 @@ def check_content_type(request: Request) -> None:
 
 
 @asynccontextmanager
-async def cancelled_when_gone(request: Request) -> AsyncIterator[Event]:
-    """Give an event that is set when the client closes the connection; the body must have been read."""
-    gone = Event()
+async def calling_when_gone(request: Request, call: Callable[[], None]) -> AsyncIterator[None]:
+    """Call back where the client closes the connection, or the server gives the request up, inside the context.
+
+    The body must have been read.
+    """
 
     async def watch() -> None:
         while (await request.receive())["type"] != "http.disconnect":
             pass
-        gone.set()
+        call()
 
     watcher = asyncio.create_task(watch())
     try:
-        yield gone
+        yield
+    except BaseException:
+        call()
+        raise
     finally:
         watcher.cancel()

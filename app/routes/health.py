@@ -1,10 +1,12 @@
-"""``/health`` and ``/ready``, for whoever watches over the service."""
+"""``/health``, ``/ready`` and ``/metrics``, for whoever watches over the service."""
 
 from typing import Literal
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Response
 from pydantic import BaseModel
 
+from app import metrics
+from app.routes import described
 from app.schemas import problem_document
 from app.service import TheService
 
@@ -34,3 +36,17 @@ async def ready(service: TheService) -> Ready:
     """Answer once the solver is compiled."""
     service.check_ready()
     return Ready()
+
+
+@router.get(
+    "/metrics",
+    response_class=Response,
+    summary="Counters for Prometheus",
+    responses={
+        200: {"description": "Prometheus' text form.", "content": {"text/plain": {"schema": {"type": "string"}}}},
+        **described.failures(401),
+    },
+)
+async def counters(service: TheService) -> Response:
+    """Return solves by status and method, iterations, solve times, the queue, the stored runs, and the process."""
+    return Response(service.metrics.text(), media_type=metrics.MEDIA_TYPE)

@@ -1,32 +1,29 @@
-"""``/v1/predictions``: predict, and read back what was predicted."""
+"""``/v1/predictions``: predict, follow, list, read, cancel and remove."""
 
 from collections.abc import Callable
-from typing import Annotated, Any
+from datetime import datetime
+from typing import Annotated, Any, Literal
 
+import anyio
 import anyio.to_thread
 import orjson
-from fastapi import APIRouter, Body, Query, Request
-from fastapi.responses import RedirectResponse, Response
+from fastapi import APIRouter, Body, Header, Query, Request
+from fastapi.responses import Response
+from pydantic import AwareDatetime
 
-from app.archive import surface_npz
+from app import events
+from app.formats import EVENTS, FORMS, JSON, negotiated, prediction_response
+from app.jobs import Job
+from app.preferences import preferences
 from app.problems import ProblemError
-from app.routes.body import JsonRoute, cancelled_when_gone
-from app.schemas import EXAMPLES, PredictionList, PredictionRequest, problem_document
+from app.routes import described
+from app.routes.body import JsonRoute, calling_when_gone
+from app.schemas import EXAMPLES, PredictionList, PredictionRequest
 from app.service import Service, TheService
+from dlocore.prediction import Status
 
-NPZ = "application/x-npz"
 router = APIRouter(prefix="/v1/predictions", tags=["predictions"], route_class=JsonRoute)
-_NOT_FOUND: dict[int | str, dict[str, Any]] = {404: problem_document("There is no such run.")}
-_AS_NPZ = {NPZ: {"schema": {"type": "string", "format": "binary"}}}
-_PREDICTION = {"$ref": "#/components/schemas/PredictionResponse"}
-_FAILURES: dict[int | str, dict[str, Any]] = {
-    413: problem_document("The body is too large."),
-    415: problem_document("The body is not declared as JSON."),
-    422: problem_document("The request is wrong: `errors` names each field, what was given, and what is allowed."),
-    429: problem_document("Too many solves are waiting; `Retry-After` says when to try again."),
-    503: problem_document("The solver is not ready yet."),
-    504: problem_document("The time limit has passed; `prediction` is the address of the best iterate."),
-}
+CANCEL_TIME = 2.0  # s to wait for a cancelled solve, which stops within 0.1 s
 
 
 @router.post(
@@ -34,171 +31,208 @@ _FAILURES: dict[int | str, dict[str, Any]] = {
     status_code=201,
     response_class=Response,
     summary="Predict the motion of a cable",
-    responses={
-        201: {
-            "description": "The prediction, stored. As JSON, or as .npz where `Accept` prefers `application/x-npz`.",
-            "content": {"application/json": {"schema": _PREDICTION}, **_AS_NPZ},
-            "headers": {"Location": {"description": "Address of the prediction.", "schema": {"type": "string"}}},
-        },
-        **_FAILURES,
-    },
+    responses=described.PREDICT,
 )
 async def predict(
-    request: Request, scene: Annotated[PredictionRequest, Body(openapi_examples=EXAMPLES)], service: TheService
+    request: Request,
+    scene: Annotated[PredictionRequest, Body(openapi_examples=EXAMPLES)],
+    service: TheService,
+    store: Annotated[bool, Query(description="Whether to keep the run.", examples=[True])] = True,
+    prefer: Annotated[
+        str | None,
+        Header(description=described.PREFER, examples=["respond-async", "respond-async, wait=5"]),
+    ] = None,
 ) -> Response:
-    """Solve the scene, store the run, and answer with the predicted space-time surface.
+    """Solve the scene and answer with the predicted space-time surface.
 
     The answer says whether it converged (`status`, `message`), how accurate it is, and what was simulated and why.
-    Closing the connection cancels the solve.
+    Closing the connection cancels the solve, unless `Prefer: respond-async` was sent.
     """
-    raw = await request.body()
-    async with cancelled_when_gone(request) as cancelled:
-        id = await service.predict(scene, raw, cancelled)
-    response = await _document(service, id, request)
-    response.status_code = 201
-    response.headers["Location"] = f"/v1/predictions/{id}"
+    form = negotiated(request.headers.get("accept"), (*FORMS, EVENTS))
+    wishes = preferences(prefer)
+    job = await service.submit(scene, await request.body(), store=store)
+    if form == EVENTS:
+        response = events.of_job(job, service, cancel=not wishes.respond_async)
+    elif wishes.respond_async:
+        with anyio.move_on_after(wishes.wait):
+            await job.finished.wait()
+        response = await _answer(job, service, form) if job.finished.is_set() else _state(job, 202)
+    else:
+        async with calling_when_gone(request, job.cancel):
+            await job.finished.wait()
+        if not job.beyond_limit:
+            service.jobs.forget(job.id)  # it is answered here and now
+        response = await _answer(job, service, form)
+    if response.status_code == 201 or form == EVENTS or wishes.respond_async:
+        response.headers["Location"] = f"/v1/predictions/{job.id}"
+    if wishes.applied:
+        response.headers["Preference-Applied"] = wishes.applied
     return response
 
 
-@router.get("", response_model=PredictionList, summary="List the stored runs, newest first")
+async def _answer(job: Job, service: Service, form: str) -> Response:
+    """Return what came of a job: 201 for a stored run, 200 for one that is not."""
+    if job.problem is not None:
+        raise job.problem
+    address = f"/v1/predictions/{job.id}"
+    document = await anyio.to_thread.run_sync(service.document, job.id, job)
+    if document is None:
+        raise no_run(job.id)
+    if job.beyond_limit:
+        message = orjson.loads(document)["message"]
+        limit = service.settings.time_limit
+        detail = f"The solve reached the limit of {limit:g} s; the best iterate so far is kept. {message}"
+        raise ProblemError(504, "time-limit", detail, prediction=address)
+    return await prediction_response(document, form, 201 if job.store else 200)
+
+
+def _state(job: Job, status: int = 200) -> Response:
+    headers = {"Vary": "Accept"} | ({} if job.finished.is_set() else {"Retry-After": "1"})
+    return Response(orjson.dumps(job.summary()), status, headers, JSON)
+
+
+@router.get(
+    "",
+    response_model=PredictionList,
+    summary="List the stored runs, newest first",
+    responses=described.failures(406, 422),
+)
 async def listed(
+    request: Request,
     service: TheService,
-    limit: Annotated[int, Query(ge=1, le=1000, description="At most so many.")] = 20,
-    offset: Annotated[int, Query(ge=0, le=10**9, description="Pass over so many newer ones.")] = 0,
+    limit: Annotated[int, Query(ge=1, le=1000, description="At most so many.", examples=[20])] = 20,
+    offset: Annotated[int, Query(ge=0, le=10**9, description="Pass over so many newer ones.", examples=[0])] = 0,
+    cursor: Annotated[
+        str,
+        Query(pattern="^[0-9a-f]{28}$|^$", description="Only runs older than the one with this id, as in `next`."),
+    ] = "",
+    status: Annotated[list[Status] | None, Query(description="Only runs with one of these.")] = None,
+    method: Annotated[
+        Literal["march", "spacetime", "paper", "reference"] | None, Query(description="Only runs solved by it.")
+    ] = None,
+    name: Annotated[str, Query(max_length=200, description="Only runs with this in their name, in any case.")] = "",
+    since: Annotated[
+        AwareDatetime | None, Query(description="Only runs made at that time or later, ISO 8601 with offset.")
+    ] = None,
+    before: Annotated[
+        AwareDatetime | None, Query(description="Only runs made before that time, ISO 8601 with offset.")
+    ] = None,
 ) -> Response:
-    """List the stored runs."""
-    runs, total = service.runs.page(limit, offset)
-    following = offset + limit
+    """List the stored runs. Follow `next` for the next page: runs that come or go meanwhile don't shift it."""
+    negotiated(request.headers.get("accept"), (JSON,))
+
+    def wanted(run: dict[str, Any]) -> bool:
+        created = datetime.fromisoformat(run["created"])
+        return (
+            (not status or run["status"] in status)
+            and (method is None or run["method"] == method)
+            and name.casefold() in run.get("name", "").casefold()
+            and (since is None or created >= since)
+            and (before is None or created < before)
+        )
+
+    def page() -> tuple[list[dict[str, Any]], int]:
+        return service.runs.page(limit + 1, offset, cursor=cursor, where=wanted)
+
+    runs, total = await anyio.to_thread.run_sync(page)
+    following = None
+    if len(runs) > limit:
+        runs = runs[:limit]
+        following = str(request.url.include_query_params(cursor=runs[-1]["id"]).remove_query_params("offset").query)
     document = {
         "predictions": runs,
         "total": total,
         "limit": limit,
         "offset": offset,
-        "next": f"/v1/predictions?limit={limit}&offset={following}" if following < total else None,
+        "next": None if following is None else f"/v1/predictions?{following}",
     }
-    return Response(orjson.dumps(document), media_type="application/json")
+    return Response(orjson.dumps(document), media_type=JSON)
 
 
-@router.get(
-    "/{id}",
-    response_class=Response,
-    summary="Read a stored prediction",
-    responses={
-        200: {
-            "description": "The prediction.",
-            "content": {"application/json": {"schema": _PREDICTION}, **_AS_NPZ},
-        },
-        **_NOT_FOUND,
-    },
-)
+@router.get("/{id}", response_class=Response, summary="Read a prediction, or how far it is", responses=described.READ)
 async def read(id: str, request: Request, service: TheService) -> Response:
-    """Return the prediction as it was answered."""
-    return await _document(service, id, request)
+    """Return the prediction as it was answered; while there is none (yet), its state and its iterations so far."""
+    form = negotiated(request.headers.get("accept"), FORMS)
+    document = await anyio.to_thread.run_sync(service.document, id)
+    if document is not None:
+        return await prediction_response(document, form)
+    job = service.jobs.get(id)
+    if job is None:
+        raise no_run(id)
+    if form != JSON:
+        raise not_done(job)
+    return _state(job)
 
 
-@router.delete("/{id}", status_code=204, summary="Remove a stored run", responses=_NOT_FOUND)
+@router.delete(
+    "/{id}",
+    status_code=204,
+    response_class=Response,
+    summary="Cancel a prediction, or remove it",
+    responses=described.DELETE,
+)
 async def remove(id: str, service: TheService) -> Response:
-    """Remove the run."""
-    if not await anyio.to_thread.run_sync(service.runs.delete, id):
-        raise _no_run(id)
+    """Cancel the prediction where it is queued or running (200, with its state); else remove it (204)."""
+    job = service.jobs.get(id)
+    if job is not None and not job.finished.is_set():
+        job.cancel()
+        with anyio.move_on_after(CANCEL_TIME):
+            await job.finished.wait()
+        if job.state != "done":
+            return _state(job)
+    known = service.jobs.forget(id)
+    if not await anyio.to_thread.run_sync(service.runs.delete, id) and not known:
+        raise no_run(id)
     return Response(status_code=204)
 
 
-@router.get(
-    "/{id}/surface.npz",
-    response_class=Response,
-    summary="The surface for NumPy",
-    responses={
-        200: {"description": "Arrays of the surface, the spline and the reactions.", "content": _AS_NPZ},
-        **_NOT_FOUND,
-    },
-)
-async def surface(id: str, service: TheService) -> Response:
-    """Return `u`, `t`, `positions`, `twist`, the spline, and the reactions of the grasps."""
-    document = await _part(service.runs.document, id)
-    content = await anyio.to_thread.run_sync(_npz, document)
-    return _file(content, NPZ, f"{id}.npz")
+@router.get("/{id}/events", response_class=Response, summary="Follow a prediction", responses=described.FOLLOW)
+async def follow(
+    id: str,
+    request: Request,
+    service: TheService,
+    last_event_id: Annotated[
+        str | None, Header(description="Number of the last event seen, to go on after it.", examples=["3"])
+    ] = None,
+) -> Response:
+    """Give the course of the solve as server-sent events.
+
+    `state` has the id and the state, `iteration` one item of `iterations`; the last one is `done` with the prediction
+    or `error` with a problem document. Who comes late gets the past iterations first. 204: nothing is left to tell.
+    """
+    negotiated(request.headers.get("accept"), (EVENTS,))
+    seen = events.seen_before(last_event_id)
+    job = service.jobs.get(id)
+    if job is not None:
+        over = job.finished.is_set() and seen > len(job.iterations)
+        return Response(status_code=204) if over else events.of_job(job, service, seen)
+    document = await anyio.to_thread.run_sync(service.document, id)
+    if document is None:
+        raise no_run(id)
+    if seen > len(orjson.loads(document)["iterations"]):
+        return Response(status_code=204)
+    return events.of_document(document, seen)
 
 
-@router.get(
-    "/{id}/recording.rrd",
-    response_class=Response,
-    summary="The recording for rerun",
-    responses={
-        200: {"description": "How the solve went and the motion.", "content": {"application/octet-stream": {}}},
-        **_NOT_FOUND,
-    },
-)
-async def recording(id: str, service: TheService) -> Response:
-    """Return the recording; it is written when first asked for."""
-    return _file(await _part(service.runs.recording, id), "application/octet-stream", f"{id}.rrd")
+def no_run(id: str) -> ProblemError:
+    """Return the problem of an id that is none."""
+    return ProblemError(404, "no-such-run", f"There is no run {id[:64]!r}; it may have been removed.")
 
 
-@router.get(
-    "/{id}/scene.json",
-    response_class=Response,
-    summary="The request as it was sent",
-    responses={
-        200: {"description": "Send it again to repeat the run.", "content": {"application/json": {}}},
-        **_NOT_FOUND,
-    },
-)
-async def scene_json(id: str, service: TheService) -> Response:
-    """Return the request."""
-    return Response(await _part(service.runs.request, id), media_type="application/json")
+def not_done(job: Job) -> ProblemError:
+    """Return the problem of asking for parts of a prediction that has no answer."""
+    detail = f"The prediction is {job.state}; this part of it is there when it is done and stored."
+    return ProblemError(409, "not-done", detail, headers={} if job.finished.is_set() else {"Retry-After": "1"})
 
 
-@router.get(
-    "/{id}/viewer",
-    status_code=307,
-    response_class=RedirectResponse,
-    summary="The recording in the browser",
-    responses=_NOT_FOUND,
-)
-async def viewer(id: str, request: Request, service: TheService) -> Response:
-    """Redirect to the recording in rerun's web viewer, which this service serves too."""
-    if id not in service.runs:
-        raise _no_run(id)
-    origin = str(request.base_url).rstrip("/")  # the viewer takes whole addresses only
-    urls = f"url={origin}/rerun/layout.rbl&url={origin}/v1/predictions/{id}/recording.rrd"
-    return RedirectResponse(f"/rerun/?{urls}&renderer=webgl", 307)
+async def part(service: Service, read: Callable[[str], bytes | None], id: str) -> bytes:
+    """Return what `read` finds of the stored run `id`.
 
-
-async def _document(service: Service, id: str, request: Request) -> Response:
-    document = await _part(service.runs.document, id)
-    if not prefers_npz(request.headers.get("accept", "")):
-        return Response(document, media_type="application/json", headers={"Vary": "Accept"})
-    content = await anyio.to_thread.run_sync(_npz, document)
-    return Response(content, media_type=NPZ, headers={"Vary": "Accept"})
-
-
-def prefers_npz(accept: str) -> bool:
-    """Return whether an ``Accept`` header ranks .npz above JSON."""
-    ranks: dict[str, float] = {}
-    for part in accept.lower().split(","):
-        media, *parameters = (word.strip() for word in part.split(";"))
-        quality = next((p[2:] for p in parameters if p.startswith("q=")), "1")
-        try:
-            ranks[media] = float(quality)
-        except ValueError:
-            ranks[media] = 0.0
-    return ranks.get(NPZ, 0.0) > ranks.get("application/json", 0.0)
-
-
-def _npz(document: bytes) -> bytes:
-    return surface_npz(orjson.loads(document))
-
-
-async def _part(read: Callable[[str], bytes | None], id: str) -> bytes:
+    Raises:
+        ProblemError: 404 where there is no such run, 409 where it has no answer or is not stored.
+    """
     content = await anyio.to_thread.run_sync(read, id)
     if content is None:
-        raise _no_run(id)
+        job = service.jobs.get(id)
+        raise no_run(id) if job is None else not_done(job)
     return content
-
-
-def _no_run(id: str) -> ProblemError:
-    return ProblemError(404, "no-such-run", f"There is no stored run {id[:64]!r}; it may have been removed.")
-
-
-def _file(content: bytes, media_type: str, name: str) -> Response:
-    return Response(content, media_type=media_type, headers={"Content-Disposition": f'attachment; filename="{name}"'})

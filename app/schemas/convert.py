@@ -71,7 +71,7 @@ def to_scene(request: PredictionRequest, stored: StoredSurface) -> Scene:
 def _cable(model: CableModel) -> Cable:
     values = model.model_dump(exclude={"preset"}, exclude_none=True, exclude_unset=True)
     if isinstance(model.rest_shape, list):
-        _check_columns("rest_shape", model.rest_shape)
+        check_columns("rest_shape", model.rest_shape)
     if model.preset is not None:
         return Cable.preset(model.preset, **values)
     for name in ("length", "diameter", "linear_density"):
@@ -89,9 +89,9 @@ def _shape(request: PredictionRequest, cable: Cable, stored: StoredSurface) -> S
             velocity = _velocity(model.velocity, "points")
             return Straight(start=model.start, direction=model.direction, settle=model.settle, velocity=velocity)
         if isinstance(model, PointsShape):
-            _check_columns("points", model.points)
+            check_columns("points", model.points)
             return Points(points=model.points, settle=model.settle, velocity=_velocity(model.velocity, "points"))
-        _check_columns("control_points", model.control_points)
+        check_columns("control_points", model.control_points)
         return ControlPoints(
             control_points=model.control_points,
             knots=model.knots,
@@ -100,7 +100,8 @@ def _shape(request: PredictionRequest, cable: Cable, stored: StoredSurface) -> S
         )
 
 
-def _check_columns(name: str, rows: list[list[float]]) -> None:
+def check_columns(name: str, rows: list[list[float]]) -> None:
+    """Raise SceneError on the first row of the field `name` that differs in length from the first one."""
     columns = len(rows[0])
     for i, row in enumerate(rows):
         if len(row) != columns:

@@ -15,6 +15,12 @@ from app.schemas.surroundings import Effects, EnvironmentModel, OutputModel, Qua
 class PredictionRequest(Model):
     """A scene and what to predict of it. SI units: metres, seconds, radians, newtons, kilograms."""
 
+    name: str = Field(
+        default="",
+        max_length=200,
+        description="What to call the run in lists; `GET /v1/predictions?name=` finds it.",
+        examples=["Lay the cable along the wall"],
+    )
     cable: CableModel = Field(description="The cable.")
     shape: ShapeModel = Field(description="Where the cable is at t = 0.")
     primitives: list[PrimitiveModel] = Field(default=[], max_length=32, description="One for each grasp.")
@@ -40,7 +46,7 @@ _WIRE = {
     "axial_stiffness": 640.0,
     "torsional_stiffness": 1e-3,
 }
-_PAPER: dict[str, Any] = {
+PAPER: dict[str, Any] = {
     "cable": _WIRE,
     "shape": {"kind": "straight", "start": [0, 0, 0], "direction": [1, 0, 0]},
     "primitives": [
@@ -138,10 +144,11 @@ def _holding(hold: str) -> dict[str, Any]:
     return {**_HANGING, "primitives": [{**primitive, "hold": hold} for primitive in _HANGING["primitives"]]}
 
 
+TWO_GRIPPERS = _holding("tangent")
 _CLAMPS = "Clamps hold the twist, which is not modelled yet: refused by name."
 EXAMPLES: dict[str, Example] = {
-    "paper": {"summary": "The paper's Fig. 1: a straight cable on a table, one grasp", "value": _PAPER},
-    "two-grippers": {"summary": "A hanging cable between two grippers", "value": _holding("tangent")},
+    "paper": {"summary": "The paper's Fig. 1: a straight cable on a table, one grasp", "value": PAPER},
+    "two-grippers": {"summary": "A hanging cable between two grippers", "value": TWO_GRIPPERS},
     "two-clamps": {"summary": "The same with clamps", "description": _CLAMPS, "value": _HANGING},
     "friction": {
         "summary": "A bent cable on a table with friction, an obstacle and plasticity",

@@ -1,7 +1,7 @@
 """The response of the predictions, as data to serialise and as a schema to read."""
 
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,12 +85,14 @@ class LinksModel(BaseModel):
     surface: str = Field(description="The surface for NumPy (.npz).")
     scene: str = Field(description="The request, to be sent again.")
     viewer: str = Field(description="The recording in the browser.")
+    events: str = Field(description="The course of the solve as server-sent events.")
 
 
 class PredictionResponse(BaseModel):
     """A predicted motion."""
 
-    id: str = Field(description="Id of the stored run.")
+    id: str = Field(description="Id of the run.")
+    state: Literal["done"] = Field(description="There is an answer.")
     created: str = Field(description="When it was made, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000000Z"])
     status: Status = Field(description="`converged`, or why not.")
     message: str = Field(description="The status in words, and what to do about it.")
@@ -106,13 +108,34 @@ class PredictionResponse(BaseModel):
     iterations: list[IterationModel]
     accuracy: AccuracyModel
     start: StartModel
-    links: LinksModel
+    links: LinksModel | None = Field(description="Addresses of its parts; null where the run is not stored.")
+
+
+class JobLinksModel(BaseModel):
+    """Addresses of a prediction under way, relative to the service."""
+
+    self: str = Field(description="This document; the prediction once it is done.")
+    events: str = Field(description="Its progress as server-sent events.")
+
+
+class JobResponse(BaseModel):
+    """A prediction that has no answer: not yet, or not any more."""
+
+    id: str = Field(description="Id of the run.", examples=["019b1f5a2c07f3e9d1c5b6a7e8f0"])
+    created: str = Field(
+        description="When it was asked for, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000000Z"]
+    )
+    state: Literal["queued", "running", "failed", "cancelled"] = Field(description="How far it is.")
+    iterations: list[IterationModel] = Field(description="The iterations so far.")
+    problem: "ProblemDocument | None" = Field(description="Why it failed.")
+    links: JobLinksModel
 
 
 class RunSummary(BaseModel):
     """A stored run in a list."""
 
     id: str = Field(description="Its id.")
+    name: str = Field(description="What the request calls it.", examples=["Lay the cable along the wall"])
     created: str = Field(description="When it was made, ISO 8601 in UTC.")
     status: Status = Field(description="`converged`, or why not.")
     method: str = Field(description="Method that gave the answer.")
@@ -125,7 +148,7 @@ class PredictionList(BaseModel):
     """Stored runs, newest first."""
 
     predictions: list[RunSummary]
-    total: int = Field(description="How many are stored.")
+    total: int = Field(description="How many stored runs match, on all pages.")
     limit: int = Field(description="At most so many are listed.")
     offset: int = Field(description="So many newer ones were passed over.")
     next: str | None = Field(description="Address of the next page, or null.")
@@ -166,7 +189,18 @@ def links(id: str) -> dict[str, str]:
         "surface": f"{base}/surface.npz",
         "scene": f"{base}/scene.json",
         "viewer": f"{base}/viewer",
+        "events": f"{base}/events",
     }
+
+
+def job_links(id: str) -> dict[str, str]:
+    """Return the addresses of the prediction `id` under way, relative to the service."""
+    return {name: address for name, address in links(id).items() if name in JobLinksModel.model_fields}
+
+
+def now() -> str:
+    """Return the time, ISO 8601 in UTC, to the microsecond."""
+    return datetime.now(UTC).isoformat(timespec="microseconds").replace("+00:00", "Z")
 
 
 def from_prediction(prediction: Prediction, id: str, samples_u: int = 101, samples_t: int = 33) -> dict[str, Any]:
@@ -182,7 +216,8 @@ def from_prediction(prediction: Prediction, id: str, samples_u: int = 101, sampl
     accuracy = vars(prediction.accuracy)
     return {
         "id": id,
-        "created": datetime.now(UTC).isoformat(timespec="microseconds").replace("+00:00", "Z"),
+        "state": "done",
+        "created": now(),
         "status": prediction.status,
         "message": prediction.message,
         "surface": {"u": u, "t": t, "positions": np.ascontiguousarray(q[..., :3]), "twist": q[..., 3].copy()},

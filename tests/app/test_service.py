@@ -98,8 +98,9 @@ def test_a_worker_shutting_down_cancels_and_refuses() -> None:
             tasks.start_soon(solve)
             await anyio.sleep(0.05)
             worker.close()
+            worker.cancel_all()
         with pytest.raises(ProblemError, match="shutting down"):
-            await worker.solve(scene_of(SLOW), threading.Event())
+            worker.admit()
 
     anyio.run(run)
 

@@ -1,0 +1,104 @@
+"""Many predictions in one request: all workers at once, a line for each, one bad scene spoiling no other."""
+
+import logging
+from threading import Event
+from typing import Any, Literal
+
+import anyio
+import anyio.to_thread
+import orjson
+from pydantic import ValidationError
+
+from app.fields import bad_fields
+from app.logs import RUN
+from app.problems import ProblemError, bad_scene, document_of, problem_of
+from app.runs import new_id
+from app.schemas import PredictionRequest, to_scene
+from app.service import Service
+from app.streamed import Emit
+from dlocore import Iteration, Scene
+
+_log = logging.getLogger("dlo")
+AHEAD = 4  # lines that may be ready before the one that is due, for each worker
+
+
+async def predict_all(
+    service: Service, scenes: list[Any], emit: Emit, *, store: bool, order: Literal["index", "finished"]
+) -> None:
+    """Predict `scenes` and emit a line of JSON for each; when cancelled, cancel those under way.
+
+    Args:
+        service: whose workers are used; the batch has been admitted as one request.
+        scenes: requests as data, right or wrong.
+        emit: takes a line; it is waited for, so that a slow client slows the batch down.
+        store: whether to keep the runs.
+        order: in that of the scenes, or as they finish.
+    """
+    waiting: dict[int, bytes] = {}
+    turn = anyio.Condition()
+    following = 0
+
+    async def deliver(index: int, line: bytes) -> None:
+        nonlocal following
+        async with turn:
+            await turn.wait_for(lambda: index < following + AHEAD * service.worker.workers)
+            waiting[index] = line
+            while following in waiting:
+                await emit(waiting.pop(following))
+                following += 1
+            turn.notify_all()
+
+    indices = iter(range(len(scenes)))
+    one_at_a_time = anyio.Lock()
+
+    async def work() -> None:
+        for index in indices:
+            line = await _line(service, index, scenes[index], store)
+            if order == "index":
+                await deliver(index, line)
+            else:
+                async with one_at_a_time:
+                    await emit(line)
+
+    async with anyio.create_task_group() as tasks:
+        for _ in range(min(service.worker.workers, len(scenes))):
+            tasks.start_soon(work)
+
+
+async def _line(service: Service, index: int, data: Any, store: bool) -> bytes:
+    id = new_id()
+    RUN.set(id)
+    try:
+        request, scene = await anyio.to_thread.run_sync(_scene, service, data)
+        prediction = await service.solve(scene, Event(), on_start=lambda: None, on_iteration=_pass)
+
+        def keep() -> bytes:
+            return service.keep(prediction, request, orjson.dumps(data), id, store)
+
+        document = await anyio.to_thread.run_sync(keep)
+        head = orjson.dumps({"index": index, "status": prediction.status})
+        return head[:-1] + b',"result":' + document + b"}\n"
+    except Exception as error:
+        problem = problem_of(error)
+        if problem.status == 500:
+            _log.error("the solve failed", exc_info=error)
+        return orjson.dumps({"index": index, "status": "failed", "problem": document_of(problem)}) + b"\n"
+
+
+def _pass(iteration: Iteration) -> None:
+    pass
+
+
+def _scene(service: Service, data: Any) -> tuple[PredictionRequest, Scene]:
+    try:
+        request = PredictionRequest.model_validate(data)
+    except ValidationError as error:
+        raise bad_scene(bad_fields(error.errors(), data)) from None
+    return request, to_scene(request, service.runs.surface)
+
+
+def check_size(count: int, most: int, field: str) -> None:
+    """Raise a 413 problem where a batch has more than `most` scenes."""
+    if count > most:
+        detail = f"{field}: {count} scenes are more than the {most} that one batch may have. Send them in parts."
+        raise ProblemError(413, "batch-too-large", detail)

@@ -1,0 +1,76 @@
+"""The course of a prediction as server-sent events: its state, each iteration, and its end."""
+
+import anyio.to_thread
+import orjson
+from fastapi import Response
+
+from app.formats import EVENTS
+from app.jobs import Job
+from app.problems import ProblemError, document_of
+from app.service import Service
+from app.streamed import Emit, Streamed
+
+# nothing may keep events back: no cache, and no proxy that collects them
+_HEADERS = {"Cache-Control": "no-store", "X-Accel-Buffering": "no", "Vary": "Accept"}
+
+
+def _event(kind: str, data: bytes, number: int | None = None) -> bytes:
+    """Return one event; `data` is JSON, so it has no line breaks. Only a numbered one can be continued after."""
+    numbered = b"" if number is None else f"id: {number}\n".encode()
+    return numbered + f"event: {kind}\ndata: ".encode() + data + b"\n\n"
+
+
+def _state(id: str, state: str) -> bytes:
+    return _event("state", orjson.dumps({"id": id, "state": state}))
+
+
+def of_job(job: Job, service: Service, seen: int = 0, *, cancel: bool = False) -> Response:
+    """Return the events of a job: states, the iterations after the first `seen`, and `done` or `error`.
+
+    Args:
+        job: the job.
+        service: where its answer is.
+        seen: how many iterations the client knows.
+        cancel: whether the job ends when the client goes.
+    """
+
+    async def produce(emit: Emit) -> None:
+        try:
+            await _follow(job, service, seen, emit)
+        except BaseException:
+            if cancel:
+                job.cancel()
+            raise
+
+    return Streamed(produce, EVENTS, _HEADERS)
+
+
+async def _follow(job: Job, service: Service, seen: int, emit: Emit) -> None:
+    async for news in job.progress(seen):
+        if news is None:
+            await emit(b": still here\n\n")
+        elif isinstance(news, str):
+            await emit(_state(job.id, news))
+        else:
+            await emit(_event("iteration", orjson.dumps(news), news["number"]))
+    document = await anyio.to_thread.run_sync(service.document, job.id, job) if job.state == "done" else None
+    if document is not None:
+        await emit(_event("done", document, len(job.iterations)))
+    else:
+        problem = job.problem or ProblemError(404, "no-such-run", "The run has been removed.")
+        await emit(_event("error", orjson.dumps(document_of(problem)), len(job.iterations)))
+
+
+def of_document(document: bytes, seen: int = 0) -> Response:
+    """Return the events of a stored run, as those of its job were."""
+    answer = orjson.loads(document)
+    pieces = [_state(answer["id"], "done")]
+    pieces += [_event("iteration", orjson.dumps(shown), shown["number"]) for shown in answer["iterations"][seen:]]
+    pieces.append(_event("done", document, len(answer["iterations"])))
+    return Response(b"".join(pieces), media_type=EVENTS, headers=_HEADERS)
+
+
+def seen_before(last_event_id: str | None) -> int:
+    """Return how many iterations a client has seen by its ``Last-Event-ID``; 0 where that makes no sense."""
+    given = (last_event_id or "").strip()
+    return int(given) + 1 if given.isascii() and given.isdigit() and len(given) < 10 else 0

@@ -1,0 +1,84 @@
+"""What a client accepts (RFC 9110, 12.5.1), and a prediction in the forms there are: JSON, .npz, MessagePack."""
+
+from collections.abc import Callable, Sequence
+
+import anyio.to_thread
+import msgpack
+import orjson
+from fastapi import Response
+
+from app.archive import surface_npz
+from app.problems import ProblemError
+
+JSON = "application/json"
+NPZ = "application/x-npz"
+MSGPACK = "application/vnd.msgpack"
+EVENTS = "text/event-stream"
+LINES = "application/jsonl"
+
+# other names under which a form is asked for
+_SYNONYMS = {
+    MSGPACK: (MSGPACK, "application/msgpack", "application/x-msgpack"),
+    LINES: (LINES, "application/x-ndjson", "application/x-jsonlines", "application/jsonlines"),
+}
+FORMS = (JSON, NPZ, MSGPACK)
+
+
+def negotiated(accept: str | None, offers: Sequence[str]) -> str:
+    """Return the one of `offers` that an ``Accept`` header ranks highest, the first of equals.
+
+    Args:
+        accept: the header; absent or empty, anything is accepted.
+        offers: media types, the preferred one first.
+
+    Raises:
+        ProblemError: 406, none of them is accepted.
+    """
+    ranges = _ranges(accept or "*/*")
+    ranked = [(max(_quality(name, ranges) for name in _SYNONYMS.get(offer, (offer,))), offer) for offer in offers]
+    best = max(quality for quality, _ in ranked)
+    if not best > 0.0:
+        detail = f"This address answers with {', '.join(offers)}; the request accepts {(accept or '')[:120]!r}."
+        raise ProblemError(406, "not-acceptable", detail)
+    return next(offer for quality, offer in ranked if quality == best)
+
+
+def _ranges(accept: str) -> dict[str, float]:
+    """Return the quality of each media range; parameters other than ``q`` don't tell our forms apart."""
+    ranges: dict[str, float] = {}
+    for part in accept.lower().split(","):
+        media, *parameters = (word.strip() for word in part.split(";"))
+        given = next((p[2:] for p in parameters if p.startswith("q=")), "1")
+        try:
+            quality = float(given)
+        except ValueError:
+            quality = 0.0
+        ranges[media] = max(ranges.get(media, 0.0), quality if 0.0 <= quality <= 1.0 else 0.0)
+    return ranges
+
+
+def _quality(media: str, ranges: dict[str, float]) -> float:
+    """Return the quality that the most specific range gives to a media type."""
+    kind = media.split("/")[0]
+    return next((ranges[name] for name in (media, f"{kind}/*", "*/*") if name in ranges), 0.0)
+
+
+def as_msgpack(document: bytes) -> bytes:
+    """Return a JSON document as MessagePack, the same names and nesting; every number of a surface a float64."""
+    packed: bytes = msgpack.packb(orjson.loads(document))
+    return packed
+
+
+def as_npz(document: bytes) -> bytes:
+    """Return the arrays of a prediction's JSON document as .npz."""
+    return surface_npz(orjson.loads(document))
+
+
+_ENCODERS: dict[str, Callable[[bytes], bytes]] = {NPZ: as_npz, MSGPACK: as_msgpack}
+
+
+async def prediction_response(document: bytes, form: str, status: int = 200) -> Response:
+    """Return a prediction's JSON document as a response of the media type `form`, one of `FORMS`."""
+    encode = _ENCODERS.get(form)
+    content = document if encode is None else await anyio.to_thread.run_sync(encode, document)
+    return Response(content, status, {"Vary": "Accept"}, form)

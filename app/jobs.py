@@ -1,0 +1,139 @@
+"""Predictions under way: their state, their progress for whoever follows it, and their end."""
+
+from collections.abc import AsyncIterator
+from dataclasses import dataclass, field
+from threading import Event
+from typing import Any, Literal
+
+import anyio
+
+from app.problems import ProblemError, document_of
+from app.runs import new_id
+from app.schemas.response import job_links, now
+
+State = Literal["queued", "running", "done", "failed", "cancelled"]
+MAX_FINISHED = 256  # jobs remembered after their end, where no stored run stands for them
+MAX_BYTES = 256_000_000  # of their answers
+HEARTBEAT = 15.0  # s without news after which a follower hears that the connection is alive
+
+
+@dataclass(eq=False)
+class Job:
+    """One prediction from the request to its end. Use it from the event loop; only `cancelled` crosses threads.
+
+    Attributes:
+        store: whether the run is to be stored.
+        id: that of the run.
+        created: when it was asked for, ISO 8601 in UTC.
+        state: how far it is.
+        iterations: the documents of the iterations so far.
+        document: the answer as JSON, where it was not stored.
+        problem: why there is none.
+        beyond_limit: whether the answer is the best iterate within the time limit of the service.
+        cancelled: set by `cancel`.
+        finished: set at the end.
+    """
+
+    store: bool
+    id: str = field(default_factory=new_id)
+    created: str = field(default_factory=now)
+    state: State = "queued"
+    iterations: list[dict[str, Any]] = field(default_factory=list)
+    document: bytes | None = None
+    problem: ProblemError | None = None
+    beyond_limit: bool = False
+    cancelled: Event = field(default_factory=Event)
+    finished: anyio.Event = field(default_factory=anyio.Event)
+    scope: anyio.CancelScope = field(default_factory=anyio.CancelScope)
+    _changed: anyio.Event = field(default_factory=anyio.Event)
+
+    def cancel(self) -> None:
+        """Stop it: at once while it waits, at the solver's next check while it runs."""
+        self.cancelled.set()
+        if self.state == "queued":
+            self.scope.cancel()
+
+    def begin(self) -> None:
+        """Note that a worker has taken it up."""
+        self.state = "running"
+        self._tell()
+
+    def add(self, iteration: dict[str, Any]) -> None:
+        """Note an iteration."""
+        self.iterations.append(iteration)
+        self._tell()
+
+    def end(self, state: State, problem: ProblemError | None = None) -> None:
+        """Note the end."""
+        self.state = state
+        self.problem = problem
+        self.finished.set()
+        self._tell()
+
+    def _tell(self) -> None:
+        changed, self._changed = self._changed, anyio.Event()
+        changed.set()
+
+    async def progress(self, seen: int = 0) -> AsyncIterator[State | dict[str, Any] | None]:
+        """Give each state and each iteration after the first `seen`, the past ones first, until the end.
+
+        None stands for a time without news.
+        """
+        shown: State | None = None
+        while True:
+            changed = self._changed
+            if shown is None or (self.state == "running" and shown == "queued"):
+                shown = self.state
+                yield shown
+            while seen < len(self.iterations):
+                seen += 1
+                yield self.iterations[seen - 1]
+            if self.finished.is_set():
+                return
+            if changed is self._changed:
+                with anyio.move_on_after(HEARTBEAT) as waiting:
+                    await changed.wait()
+                if waiting.cancelled_caught:
+                    yield None
+
+    def summary(self) -> dict[str, Any]:
+        """Return its state as a document."""
+        return {
+            "id": self.id,
+            "created": self.created,
+            "state": self.state,
+            "iterations": self.iterations,
+            "problem": None if self.problem is None else document_of(self.problem),
+            "links": job_links(self.id),
+        }
+
+
+class Jobs:
+    """The jobs that no stored run stands for: under way, failed, cancelled, or not to be stored."""
+
+    def __init__(self) -> None:
+        self._jobs: dict[str, Job] = {}
+
+    def add(self, job: Job) -> None:
+        """Remember a job; forget the oldest finished ones beyond the caps."""
+        self._jobs[job.id] = job
+        finished = [kept for kept in self._jobs.values() if kept.finished.is_set()]
+        total = sum(len(kept.document or b"") for kept in finished)
+        while len(finished) > MAX_FINISHED or total > MAX_BYTES:
+            oldest = finished.pop(0)
+            total -= len(oldest.document or b"")
+            del self._jobs[oldest.id]
+
+    def get(self, id: str) -> Job | None:
+        """Return a job, or None."""
+        return self._jobs.get(id)
+
+    def forget(self, id: str) -> bool:
+        """Forget a job; return whether it was there."""
+        return self._jobs.pop(id, None) is not None
+
+    def cancel_all(self) -> None:
+        """Cancel what is under way."""
+        for job in list(self._jobs.values()):
+            if not job.finished.is_set():
+                job.cancel()

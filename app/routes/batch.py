@@ -1,0 +1,49 @@
+"""``/v1/predictions:batch``: many predictions in one request."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Body, Request
+from fastapi.responses import Response
+
+from app.batch import check_size, predict_all
+from app.formats import LINES, negotiated
+from app.routes import described
+from app.routes.body import JsonRoute
+from app.schemas.batch import BATCH_EXAMPLES, BatchRequest
+from app.service import TheService
+from app.streamed import Emit, Streamed
+
+router = APIRouter(tags=["predictions"], route_class=JsonRoute)
+_LINE = {"itemSchema": {"$ref": "#/components/schemas/BatchLine"}, "schema": {"type": "string"}}
+
+
+@router.post(
+    "/v1/predictions:batch",
+    response_class=Response,
+    summary="Predict many scenes",
+    responses={
+        200: {"description": "One JSON object a line, see `BatchLine`.", "content": {LINES: _LINE}},
+        **described.failures(401, 406, 413, 415, 422, 429, 503),
+    },
+)
+async def batch(
+    request: Request, wanted: Annotated[BatchRequest, Body(openapi_examples=BATCH_EXAMPLES)], service: TheService
+) -> Response:
+    """Predict many scenes, or one scene with many primitives, on all cores.
+
+    The answer is JSON lines, streamed. A wrong scene gives a line with its problem and spoils no other one. Closing
+    the connection cancels the rest. The runs are not stored unless `store` says so.
+    """
+    negotiated(request.headers.get("accept"), (LINES,))
+    scenes = wanted.scenes()
+    check_size(len(scenes), service.settings.max_batch, "scenes")
+    service.check_ready()
+    service.worker.admit()
+
+    async def produce(emit: Emit) -> None:
+        try:
+            await predict_all(service, scenes, emit, store=wanted.root.store, order=wanted.root.order)
+        finally:
+            service.worker.release()
+
+    return Streamed(produce, LINES, {"X-Accel-Buffering": "no"})

@@ -1,0 +1,84 @@
+"""What the predictions' routes answer, for the OpenAPI document."""
+
+from typing import Any
+
+from app.formats import EVENTS, JSON, MSGPACK, NPZ
+from app.schemas import problem_document
+
+Responses = dict[int | str, dict[str, Any]]
+
+PREFER = (
+    "RFC 7240: `respond-async` answers 202 with the address of the prediction before it is done; with `wait=5` it "
+    "waits so many seconds for it first."
+)
+_BINARY = {"schema": {"type": "string", "format": "binary"}}
+_PREDICTION = {"$ref": "#/components/schemas/PredictionResponse"}
+_JOB = {"$ref": "#/components/schemas/JobResponse"}
+_EVENTS = {
+    "schema": {"type": "string"},
+    "example": 'id: 0\nevent: iteration\ndata: {"number":0,"update":null,"residual":1.2e-9}\n\n',
+}
+_FAILURES = {
+    401: "The service needs a bearer token.",
+    404: "There is no such run.",
+    406: "None of the accepted media types is there.",
+    409: "The prediction has no answer (yet), or is not stored.",
+    413: "The body is too large.",
+    415: "The body is not declared as JSON.",
+    422: "The request is wrong: `errors` names each field, what was given, and what is allowed.",
+    429: "Too many solves are waiting; `Retry-After` says when to try again.",
+    503: "The solver is not ready yet, the service stops, or the solve was cancelled.",
+    504: "The time limit has passed; `prediction` is the address of the best iterate.",
+}
+
+
+def failures(*statuses: int) -> Responses:
+    """Return the descriptions of failures."""
+    return {status: problem_document(_FAILURES[status]) for status in statuses}
+
+
+def _location(what: str) -> dict[str, Any]:
+    return {"Location": {"description": f"Address of {what}.", "schema": {"type": "string"}}}
+
+
+_FORMS = {JSON: {"schema": _PREDICTION}, NPZ: _BINARY, MSGPACK: _BINARY}
+PREDICT: Responses = {
+    200: {
+        "description": "The prediction, not stored (`store=false`); or its course as server-sent events.",
+        "content": {**_FORMS, EVENTS: _EVENTS},
+    },
+    201: {
+        "description": "The prediction, stored: as JSON, .npz or MessagePack, by `Accept`.",
+        "content": _FORMS,
+        "headers": _location("the prediction"),
+    },
+    202: {
+        "description": "Taken up, with `Prefer: respond-async`.",
+        "content": {JSON: {"schema": _JOB}},
+        "headers": _location("its state and, later, the prediction"),
+    },
+    **failures(401, 406, 413, 415, 422, 429, 503, 504),
+}
+READ: Responses = {
+    200: {
+        "description": "The prediction (`state` is `done`), or how far it is.",
+        "content": {**_FORMS, JSON: {"schema": {"oneOf": [_PREDICTION, _JOB]}}},
+    },
+    **failures(401, 404, 406, 409),
+}
+DELETE: Responses = {
+    200: {"description": "It was under way and is cancelled.", "content": {JSON: {"schema": _JOB}}},
+    204: {"description": "It is removed."},
+    **failures(401, 404),
+}
+FOLLOW: Responses = {
+    200: {"description": "The events.", "content": {EVENTS: _EVENTS}},
+    204: {"description": "Nothing comes after the given event."},
+    **failures(401, 404, 406),
+}
+
+
+def a_file(description: str, media: str) -> Responses:
+    """Return the descriptions of a route that gives a part of a stored run."""
+    schema = {"schema": {"type": "object"}} if media == JSON else _BINARY
+    return {200: {"description": description, "content": {media: schema}}, **failures(401, 404, 409)}

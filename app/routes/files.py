@@ -1,0 +1,67 @@
+"""The parts of a stored run: its surface, its recording, its request, and the viewer that opens it."""
+
+import anyio.to_thread
+from fastapi import APIRouter, Request
+from fastapi.responses import RedirectResponse, Response
+
+from app.formats import JSON, NPZ, as_npz
+from app.routes import described
+from app.routes.predictions import no_run, part
+from app.service import TheService
+
+_ANY = "application/octet-stream"
+router = APIRouter(prefix="/v1/predictions/{id}", tags=["predictions"])
+
+
+@router.get(
+    "/surface.npz",
+    response_class=Response,
+    summary="The surface for NumPy",
+    responses=described.a_file("Arrays of the surface, the spline and the reactions.", NPZ),
+)
+async def surface(id: str, service: TheService) -> Response:
+    """Return `u`, `t`, `positions`, `twist`, the spline, and the reactions of the grasps."""
+    document = await part(service, service.document, id)
+    return _file(await anyio.to_thread.run_sync(as_npz, document), NPZ, f"{id}.npz")
+
+
+@router.get(
+    "/recording.rrd",
+    response_class=Response,
+    summary="The recording for rerun",
+    responses=described.a_file("How the solve went and the motion.", _ANY),
+)
+async def recording(id: str, service: TheService) -> Response:
+    """Return the recording; it is written when first asked for."""
+    return _file(await part(service, service.runs.recording, id), _ANY, f"{id}.rrd")
+
+
+@router.get(
+    "/scene.json",
+    response_class=Response,
+    summary="The request as it was sent",
+    responses=described.a_file("Send it again to repeat the run.", JSON),
+)
+async def scene_json(id: str, service: TheService) -> Response:
+    """Return the request."""
+    return Response(await part(service, service.runs.request, id), media_type=JSON)
+
+
+@router.get(
+    "/viewer",
+    status_code=307,
+    response_class=RedirectResponse,
+    summary="The recording in the browser",
+    responses=described.failures(401, 404),
+)
+async def viewer(id: str, request: Request, service: TheService) -> Response:
+    """Redirect to the recording in rerun's web viewer, which this service serves too."""
+    if id not in service.runs:
+        raise no_run(id)
+    origin = str(request.base_url).rstrip("/")  # the viewer takes whole addresses only
+    urls = f"url={origin}/rerun/layout.rbl&url={origin}/v1/predictions/{id}/recording.rrd"
+    return RedirectResponse(f"/rerun/?{urls}&renderer=webgl", 307)
+
+
+def _file(content: bytes, media_type: str, name: str) -> Response:
+    return Response(content, media_type=media_type, headers={"Content-Disposition": f'attachment; filename="{name}"'})

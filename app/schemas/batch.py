@@ -1,0 +1,95 @@
+"""The request of ``POST /v1/predictions:batch``, and the lines of its answer."""
+
+from typing import Annotated, Any, Literal
+
+from fastapi.openapi.models import Example
+from pydantic import BaseModel, Discriminator, Field, RootModel, Tag
+
+from app.schemas.base import Flag, Model
+from app.schemas.request import PAPER, TWO_GRIPPERS
+from app.schemas.response import PredictionResponse, ProblemDocument
+
+_MOST = 100_000  # a service may allow less: DLO_MAX_BATCH
+
+
+class _Batch(Model):
+    store: Flag = Field(default=False, description="Whether to keep the runs.", examples=[False])
+    order: Literal["index", "finished"] = Field(
+        default="index",
+        description="Lines in the order of the scenes, each as soon as all before it are done; or as they finish.",
+        examples=["index"],
+    )
+
+
+class ScenesBatch(_Batch):
+    """Many scenes."""
+
+    scenes: list[Any] = Field(
+        min_length=1,
+        max_length=_MOST,
+        description="Requests as for `POST /v1/predictions`. A wrong one gives a line with a problem.",
+        examples=[[PAPER]],
+    )
+
+
+class PrimitivesBatch(_Batch):
+    """One scene with many ways to move the cable."""
+
+    scene: dict[str, Any] = Field(
+        description="A request as for `POST /v1/predictions`; its `primitives` are replaced.",
+        examples=[PAPER],
+    )
+    primitives: list[Any] = Field(
+        min_length=1,
+        max_length=_MOST,
+        description="Lists of primitives, one for each prediction. A wrong one gives a line with a problem.",
+        examples=[[PAPER["primitives"]]],
+    )
+
+
+def _form(value: Any) -> str:
+    one = "scene" in value if isinstance(value, dict) else isinstance(value, PrimitivesBatch)
+    return "~primitives" if one else "~scenes"
+
+
+class BatchRequest(RootModel):
+    """Many predictions in one request."""
+
+    root: Annotated[
+        Annotated[ScenesBatch, Tag("~scenes")] | Annotated[PrimitivesBatch, Tag("~primitives")], Discriminator(_form)
+    ]
+
+    def scenes(self) -> list[Any]:
+        """Return the requests, as data."""
+        if isinstance(self.root, ScenesBatch):
+            return self.root.scenes
+        return [{**self.root.scene, "primitives": primitives} for primitives in self.root.primitives]
+
+
+class BatchLine(BaseModel):
+    """One line of the answer: `result` or `problem`."""
+
+    index: int = Field(description="Which scene, from 0.", examples=[0])
+    status: str = Field(
+        description="That of the prediction, e.g. `converged`; `failed` where there is none.", examples=["converged"]
+    )
+    result: PredictionResponse | None = Field(default=None, description="The prediction.")
+    problem: ProblemDocument | None = Field(default=None, description="Why there is none.")
+
+
+def _swept(y: float) -> list[dict[str, Any]]:
+    path = {"kind": "move", "displacement": [0, y, 0], "duration": 1.6, "profile": "minimum_jerk"}
+    return [{"u": 0.25, "hold": "point", "path": path}]
+
+
+_QUICK = {**PAPER, "quality": "auto"}
+BATCH_EXAMPLES: dict[str, Example] = {
+    "sweep": {
+        "summary": "One scene, three moves of the gripper",
+        "value": {"scene": _QUICK, "primitives": [_swept(y) for y in (0.3, 0.4, 0.5)]},
+    },
+    "scenes": {
+        "summary": "Two scenes, stored",
+        "value": {"scenes": [_QUICK, TWO_GRIPPERS], "store": True},
+    },
+}

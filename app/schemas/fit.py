@@ -1,0 +1,66 @@
+"""The request and the answer of ``POST /v1/shapes:fit``."""
+
+from typing import Any, Literal
+
+from fastapi.openapi.models import Example
+from pydantic import BaseModel, Field
+
+from app.schemas.base import Flag, Model, Number, Point, Vector
+
+
+class FitRequest(Model):
+    """Points of a cable, as a vision system sees them: noisy, unevenly spaced, with outliers, 2D or 3D."""
+
+    points: list[Point] = Field(
+        min_length=4,
+        max_length=100_000,
+        description="Points [m], all 2D (z = 0) or all 3D; at most 20,000 where they are in no order.",
+        examples=[[[0.02, 0.01], [0.24, 0.05], [0.47, -0.03], [0.74, 0.13]]],
+    )
+    ordered: Flag = Field(default=True, description="Whether they are in order along the cable.", examples=[True])
+    length: Number | None = Field(
+        default=None,
+        ge=0.01,
+        le=1000.0,
+        description="Length of the cable [m], which the curve gets; absent: as it is measured.",
+        examples=[0.8],
+    )
+    start: Vector | None = Field(
+        default=None,
+        description="Near the cable's end at u = 0 [m], for points in no order; absent: the end with the smaller x.",
+        examples=[[0.02, 0.01, 0.0]],
+    )
+    outliers: Literal["remove", "keep"] = Field(
+        default="remove", description="What to do with points that are not of the cable.", examples=["remove"]
+    )
+
+
+class FitErrorModel(BaseModel):
+    """Distances of the points from the curve."""
+
+    rms: float = Field(description="Root mean square [m].", examples=[0.0012])
+    max: float = Field(description="Largest [m].", examples=[0.0031])
+
+
+class FitResponse(BaseModel):
+    """A cubic spline in arclength through the points."""
+
+    control_points: list[list[float]] = Field(description="Control points [n][3] [m].", examples=[[[0.0, 0.0, 0.0]]])
+    knots: list[float] = Field(description="Clamped knots (n + 4) from 0 to the length [m].", examples=[[0.0, 0.8]])
+    degree: int = Field(description="Degree of the spline.", examples=[3])
+    length: float = Field(description="Length of the spline [m].", examples=[0.8])
+    measured_length: float = Field(description="Length that the points show [m].", examples=[0.795])
+    fit_error: FitErrorModel
+    order: list[int] = Field(description="Indices of the points along the cable.", examples=[[0, 1, 2, 3]])
+    outliers: list[int] = Field(description="Indices of the points that were left out.", examples=[[]])
+    shape: dict[str, Any] = Field(description="The curve as the `shape` of a request.")
+
+
+_SEEN = [[0.02, 0.01], [0.13, 0.06], [0.24, 0.05], [0.36, -0.01], [0.47, -0.03], [0.58, 0.02], [0.68, 0.09]]
+FIT_EXAMPLES: dict[str, Example] = {
+    "ordered": {"summary": "Points in order along a cable of known length", "value": {"points": _SEEN, "length": 0.73}},
+    "cloud": {
+        "summary": "The same points in no order, and one that is not of the cable",
+        "value": {"points": [*_SEEN[::-2], *_SEEN[::2], [0.3, 0.6]], "ordered": False},
+    },
+}
