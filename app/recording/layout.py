@@ -9,32 +9,45 @@ from app.recording.style import APPLICATION
 
 @cache
 def layout() -> bytes:
-    """Return the layout of the viewer for these recordings, as the bytes of an .rbl file."""
+    """Return the layout of the viewer for these recordings, as the bytes of an .rbl file.
+
+    One tab a kind of timeline: the viewer shows a single timeline at a time, so on the other tab there is no more than
+    what holds at every time.
+    """
     import rerun.blueprint as rrb
 
-    shapes = rrb.Vertical(
-        rrb.Spatial3DView(origin="/iterate", name="Iterate (timeline: iteration)"),
-        rrb.Spatial3DView(origin="/motion", name="Motion (timeline: motion)"),
-    )
-    plots = rrb.Vertical(
-        rrb.TimeSeriesView(origin="/convergence", name="Update and residual, log10"),
-        rrb.TimeSeriesView(origin="/forces", name="Forces by effect, log10"),
-        rrb.Tabs(
-            rrb.TimeSeriesView(origin="/energy", name="Energy at the end"),
-            rrb.TimeSeriesView(origin="/step", name="Damping, step"),
-            rrb.TextLogView(origin="/log", name="Log"),
+    solve = rrb.Horizontal(
+        rrb.Vertical(
+            rrb.Spatial3DView(origin="/iterate", name="Iterate: shape over time, control net"),
+            rrb.Tabs(
+                rrb.TimeSeriesView(origin="/energy", name="Energy at the end"),
+                rrb.TimeSeriesView(origin="/step", name="Damping and step length"),
+                rrb.TextLogView(origin="/log", name="Log"),
+            ),
+            row_shares=[2, 1],
         ),
-    )
-    words = rrb.Vertical(
-        rrb.TextDocumentView(origin="/report", name="Report"),
-        rrb.Tabs(
+        rrb.Vertical(
+            rrb.TimeSeriesView(origin="/convergence", name="Update and residual, log10"),
+            rrb.TimeSeriesView(origin="/forces", name="Forces by effect, log10"),
+        ),
+        rrb.Vertical(
+            rrb.TextDocumentView(origin="/report", name="Report"),
             rrb.TextDocumentView(origin="/effects", name="Effects"),
-            rrb.TimeSeriesView(origin="/over_time/reaction", name="Reactions (motion)"),
-            rrb.TimeSeriesView(origin="/over_time/energy", name="Energy (motion)"),
         ),
+        column_shares=[4, 3, 3],
+        name="Solve (timeline: iteration or solver_time)",
+    )
+    motion = rrb.Horizontal(
+        rrb.Spatial3DView(origin="/motion", name="Motion: cable, grasps, reactions"),
+        rrb.Vertical(
+            rrb.TimeSeriesView(origin="/over_time/reaction", name="Reactions"),
+            rrb.TimeSeriesView(origin="/over_time/energy", name="Energy"),
+        ),
+        column_shares=[5, 2],
+        name="Motion (timeline: motion)",
     )
     blueprint = rrb.Blueprint(
-        rrb.Horizontal(shapes, plots, words, column_shares=[4, 3, 3]),
+        rrb.Tabs(solve, motion),
         rrb.TimePanel(timeline="iteration", state="collapsed", play_state="following"),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),

@@ -39,7 +39,7 @@ def motion_chunks(run: Run) -> "list[Chunk]":
     if not drawable(positions):
         return []
     times = [rr.TimeColumn("motion", duration=surface["t"])]
-    thick = 0.004 * run.surface.length
+    thick = 0.006 * run.surface.length
     cable = rr.LineStrips3D.columns(colors=[BLUE], radii=[thick])
     shown = np.linspace(0, len(positions) - 1, STRIPS).astype(int)
     trace = rr.LineStrips3D.columns(strips=positions[shown], colors=time_ramp(), radii=[0.4 * thick] * STRIPS)
@@ -67,7 +67,7 @@ def _grasp(run: Run, k: int, shown: NDArray[np.intp], thick: float) -> "list[Chu
     vectors = forces * arrow_scale(run)
     path = rr.LineStrips3D.columns(strips=[held], colors=[ORANGE], radii=[0.4 * thick])
     along = rr.Arrows3D.columns(
-        origins=held[shown], vectors=vectors[shown], colors=[(*VERMILION, 110)] * STRIPS, radii=[0.3 * thick] * STRIPS
+        origins=held[shown], vectors=vectors[shown], colors=[VERMILION] * STRIPS, radii=[0.3 * thick] * STRIPS
     )
     name = f"grasp at u = {grasp['u']:g} m"
     look = rr.Points3D.columns(colors=[ORANGE], radii=[2.5 * thick], labels=[name], show_labels=[False])

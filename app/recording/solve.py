@@ -116,7 +116,7 @@ def _iterates(run: Run, drawn: NDArray[np.intp]) -> "list[Chunk]":
     rows = [row for surface in surfaces for row in _net(surface.control_points[..., :3])]
     counts = [sum(surface.control_points.shape[:2]) for surface in surfaces]
     indexes = _indexes(run, drawn)
-    thin = 0.003 * run.surface.length
+    thin = 0.004 * run.surface.length
     strips = rr.LineStrips3D.columns(strips=shapes).partition([STRIPS] * len(drawn))
     style = rr.LineStrips3D.columns(colors=time_ramp(), radii=[thin] * STRIPS).partition([STRIPS])
     dots = rr.Points3D.columns(positions=np.concatenate(points)).partition([len(net) for net in points])
