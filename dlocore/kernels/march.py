@@ -108,6 +108,8 @@ def march_steps(
                 for d in range(nc):
                     if attempt == 1:
                         q1[i, d] = q0[i, d]
+                    elif k - begin > 3:
+                        q1[i, d] = 4.0 * q0[i, d] - 6.0 * Q[k - 2, i, d] + 4.0 * Q[k - 3, i, d] - Q[k - 4, i, d]
                     elif k - begin > 2:
                         q1[i, d] = 3.0 * q0[i, d] - 3.0 * Q[k - 2, i, d] + Q[k - 3, i, d]
                     else:
