@@ -103,13 +103,12 @@ def march_steps(
         # backward differences for the rate of curvature: its force then has a potential, and an exact tangent
         rates = (1.5 / h, -2.0 / h, 0.5 / h) if k - begin > 1 else (1.0 / h, -1.0 / h, 0.0)
         for attempt in range(2):
-            # --- predict
+            # predict: quadratic, since after a cubic prediction the iteration ends a fifth sooner, but before the
+            # forces of the stiff stretch modes, and with them the reactions, are right
             for i in range(n):
                 for d in range(nc):
                     if attempt == 1:
                         q1[i, d] = q0[i, d]
-                    elif k - begin > 3:
-                        q1[i, d] = 4.0 * q0[i, d] - 6.0 * Q[k - 2, i, d] + 4.0 * Q[k - 3, i, d] - Q[k - 4, i, d]
                     elif k - begin > 2:
                         q1[i, d] = 3.0 * q0[i, d] - 3.0 * Q[k - 2, i, d] + Q[k - 3, i, d]
                     else:
