@@ -71,7 +71,8 @@ def _bad_field(error: Any, body: Any, schema: "_Schema") -> BadField:
     if kind == "union_tag_not_found":
         steps = [*steps, "kind"]
     given = "nothing" if kind in ("missing", "union_tag_not_found") else _shown(error["input"], kind)
-    if kind == "union_tag_invalid":
+    by_kind = not context.get("tag", "").startswith("~")  # else by form, which has no field of its own
+    if kind == "union_tag_invalid" and by_kind:
         steps, given = [*steps, "kind"], _shown(error["input"].get("kind"), kind)
     allowed = _allowed(kind, context, tagged, schema)
     return BadField(_text(steps), given, allowed, f"{_WHAT.get(kind, '')}Got {given}. Allowed: {allowed}.")
@@ -109,6 +110,15 @@ def _shown(value: Any, kind: str) -> str:
     return text if len(text) <= 120 else text[:117] + "..."
 
 
+_FORMS = {
+    "~text": "a text",
+    "~list": "a list",
+    "~object": "an object",
+    "~one": "one vector",
+    "~rows": "a list of vectors",
+    "~scenes": "an object with scenes",
+    "~primitives": "an object with scene and primitives",
+}
 _TIME = "a time in ISO 8601 with its offset from UTC, e.g. 2026-01-31T12:00:00Z"
 _TYPES = {
     "float_type": "a finite number",
@@ -137,7 +147,8 @@ def _allowed(kind: str, context: dict[str, Any], loc: list[Any], whole: "_Schema
     if kind == "extra_forbidden":
         return "one of " + ", ".join(whole.names(loc[:-1]))
     if kind == "union_tag_invalid":
-        return "one of " + context["expected_tags"].replace("'", "")
+        tags = context["expected_tags"].replace("'", "").split(", ")
+        return " or ".join(_FORMS[tag] for tag in tags) if tags[0] in _FORMS else "one of " + ", ".join(tags)
     if kind == "union_tag_not_found":
         return "the kind of object, one of " + ", ".join(schema.get("discriminator", {}).get("mapping", {}))
     if kind == "literal_error":

@@ -10,6 +10,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import Response
 from starlette.exceptions import HTTPException
+from starlette.routing import Match
 
 from app.fields import BadField, bad_fields
 from app.schemas.request import PredictionRequest
@@ -93,7 +94,14 @@ async def _on_http_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     kind = HTTPStatus(error.status_code).phrase.lower().replace(" ", "-")
     detail = _DETAILS.get(error.status_code, str(error.detail))
-    return problem_response(ProblemError(error.status_code, kind, detail, headers=error.headers))
+    headers = {**(error.headers or {}), **({"Allow": _allowed(request)} if error.status_code == 405 else {})}
+    return problem_response(ProblemError(error.status_code, kind, detail, headers=headers))
+
+
+def _allowed(request: Request) -> str:
+    """Return the methods of this address: those of all routes that lead to it."""
+    routes = [route for route in request.app.routes if route.matches(request.scope)[0] is not Match.NONE]
+    return ", ".join(sorted({method for route in routes for method in getattr(route, "methods", None) or ()}))
 
 
 async def _on_crash(request: Request, error: Exception) -> Response:

@@ -14,7 +14,7 @@ from app.service import TheService
 from app.streamed import Emit, Streamed
 
 router = APIRouter(tags=["predictions"], route_class=JsonRoute)
-_LINE = {"itemSchema": {"$ref": "#/components/schemas/BatchLine"}, "schema": {"type": "string"}}
+_LINE = {"itemSchema": {"$ref": "#/components/schemas/BatchLine"}}
 
 
 @router.post(

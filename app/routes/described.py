@@ -15,7 +15,15 @@ _BINARY = {"schema": {"type": "string", "format": "binary"}}
 _PREDICTION = {"$ref": "#/components/schemas/PredictionResponse"}
 _JOB = {"$ref": "#/components/schemas/JobResponse"}
 _EVENTS = {
-    "schema": {"type": "string"},
+    "itemSchema": {
+        "type": "object",
+        "properties": {
+            "event": {"enum": ["state", "iteration", "done", "error"]},
+            "id": {"type": "string", "description": "Number of the event, but for `state`.", "examples": ["0"]},
+            "data": {"type": "string", "contentMediaType": JSON, "description": "JSON in one line."},
+        },
+        "required": ["event", "data"],
+    },
     "example": 'id: 0\nevent: iteration\ndata: {"number":0,"update":null,"residual":1.2e-9}\n\n',
 }
 _FAILURES = {

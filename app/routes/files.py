@@ -6,7 +6,7 @@ from fastapi.responses import RedirectResponse, Response
 
 from app.formats import JSON, NPZ, as_npz
 from app.routes import described
-from app.routes.predictions import no_run, part
+from app.routes.predictions import part
 from app.service import TheService
 
 _ANY = "application/octet-stream"
@@ -52,12 +52,11 @@ async def scene_json(id: str, service: TheService) -> Response:
     status_code=307,
     response_class=RedirectResponse,
     summary="The recording in the browser",
-    responses=described.failures(401, 404),
+    responses=described.failures(401, 404, 409),
 )
 async def viewer(id: str, request: Request, service: TheService) -> Response:
     """Redirect to the recording in rerun's web viewer, which this service serves too."""
-    if id not in service.runs:
-        raise no_run(id)
+    await part(service, service.runs.document, id)
     origin = str(request.base_url).rstrip("/")  # the viewer takes whole addresses only
     urls = f"url={origin}/rerun/layout.rbl&url={origin}/v1/predictions/{id}/recording.rrd"
     return RedirectResponse(f"/rerun/?{urls}&renderer=webgl", 307)

@@ -1,5 +1,6 @@
 """``/v1/predictions``: predict, follow, list, read, cancel and remove."""
 
+import re
 from collections.abc import Callable
 from datetime import datetime
 from typing import Annotated, Any, Literal
@@ -9,7 +10,8 @@ import anyio.to_thread
 import orjson
 from fastapi import APIRouter, Body, Header, Query, Request
 from fastapi.responses import Response
-from pydantic import AwareDatetime
+from pydantic import AwareDatetime, BeforeValidator
+from pydantic_core import PydanticCustomError
 
 from app import events
 from app.formats import EVENTS, FORMS, JSON, negotiated, prediction_response
@@ -23,7 +25,18 @@ from app.service import Service, TheService
 from dlocore.prediction import Status
 
 router = APIRouter(prefix="/v1/predictions", tags=["predictions"], route_class=JsonRoute)
+_ISO = re.compile(r"\d{4}-\d\d-\d\d[Tt ]\d\d:\d\d(:\d\d([.,]\d+)?)?([Zz]|[+-]\d\d:?\d\d)", re.ASCII)
 CANCEL_TIME = 2.0  # s to wait for a cancelled solve, which stops within 0.1 s
+
+
+def _iso(value: str) -> str:
+    """Return `value` as it is; pydantic alone would take a bare number for seconds since 1970."""
+    if not _ISO.fullmatch(value):
+        raise PydanticCustomError("datetime_parsing", "not ISO 8601")
+    return value
+
+
+Instant = Annotated[AwareDatetime, BeforeValidator(_iso)]
 
 
 @router.post(
@@ -112,10 +125,10 @@ async def listed(
     ] = None,
     name: Annotated[str, Query(max_length=200, description="Only runs with this in their name, in any case.")] = "",
     since: Annotated[
-        AwareDatetime | None, Query(description="Only runs made at that time or later, ISO 8601 with offset.")
+        Instant | None, Query(description="Only runs made at that time or later, ISO 8601 with offset.")
     ] = None,
     before: Annotated[
-        AwareDatetime | None, Query(description="Only runs made before that time, ISO 8601 with offset.")
+        Instant | None, Query(description="Only runs made before that time, ISO 8601 with offset.")
     ] = None,
 ) -> Response:
     """List the stored runs. Follow `next` for the next page: runs that come or go meanwhile don't shift it."""

@@ -54,21 +54,22 @@ def to_scene(request: PredictionRequest, stored: StoredSurface) -> Scene:
         SceneError: the scene is impossible or asks for what is not modelled; its field is the path in the request.
     """
     with within("cable"):
-        cable = _cable(request.cable)
+        cable = cable_of(request.cable)
     effects = request.effects if isinstance(request.effects, str) else request.effects.model_dump()
     return Scene(
         cable=cable,
-        shape=_shape(request, cable, stored),
-        grasps=tuple(_grasp(i, primitive) for i, primitive in enumerate(request.primitives)),
-        loads=tuple(_load(i, load) for i, load in enumerate(request.loads)),
-        environment=_environment(request.environment),
+        shape=shape_of(request, cable, stored),
+        grasps=tuple(grasp_of(i, primitive) for i, primitive in enumerate(request.primitives)),
+        loads=tuple(load_of(i, load) for i, load in enumerate(request.loads)),
+        environment=environment_of(request.environment),
         horizon=request.horizon,
         effects={} if isinstance(effects, str) else effects,
-        quality=_quality(request.quality),
+        quality=quality_of(request.quality),
     )
 
 
-def _cable(model: CableModel) -> Cable:
+def cable_of(model: CableModel) -> Cable:
+    """Return the cable of the solver, or raise SceneError."""
     values = model.model_dump(exclude={"preset"}, exclude_none=True, exclude_unset=True)
     if isinstance(model.rest_shape, list):
         check_columns("rest_shape", model.rest_shape)
@@ -80,7 +81,8 @@ def _cable(model: CableModel) -> Cable:
     return Cable(**values)
 
 
-def _shape(request: PredictionRequest, cable: Cable, stored: StoredSurface) -> Shape:
+def shape_of(request: PredictionRequest, cable: Cable, stored: StoredSurface) -> Shape:
+    """Return the start shape of the solver, or raise SceneError."""
     model = request.shape
     if isinstance(model, PredictionShape):
         return _continued(model, cable, stored)
@@ -147,7 +149,8 @@ def _at(surface: SplineSurface, t: float, derivative: int) -> NDArray[np.float64
     return np.einsum("j,jic->ic", row, surface.control_points)
 
 
-def _grasp(i: int, model: PrimitiveModel) -> Grasp:
+def grasp_of(i: int, model: PrimitiveModel) -> Grasp:
+    """Return the grasp `i` of the solver, or raise SceneError."""
     with within(f"primitives[{i}]"):
         with within("path"):
             path = _path(model.path)
@@ -166,7 +169,8 @@ def _path(model: StillPath | MovePath | WaypointsPath) -> Path:
     return Waypoints(times=model.times, positions=model.positions, orientations=model.orientations)
 
 
-def _load(i: int, model: LoadModel) -> Load:
+def load_of(i: int, model: LoadModel) -> Load:
+    """Return the load `i` of the solver, or raise SceneError."""
     prefix = f"loads[{i}]"
     if not isinstance(model.force, ForceOverTime):
         with within(prefix):
@@ -180,7 +184,8 @@ def _load(i: int, model: LoadModel) -> Load:
         return Load(u=model.u, force=values, times=times)
 
 
-def _environment(model: EnvironmentModel) -> Environment:
+def environment_of(model: EnvironmentModel) -> Environment:
+    """Return the environment of the solver, or raise SceneError."""
     table = None
     if model.table is not None:
         with within("environment.table"):
@@ -195,7 +200,8 @@ def _environment(model: EnvironmentModel) -> Environment:
         )
 
 
-def _quality(model: str | QualityModel) -> Quality:
+def quality_of(model: str | QualityModel) -> Quality:
+    """Return the asked quality of the solver, or raise SceneError."""
     if isinstance(model, str):
         return Quality()
     with within("quality"):

@@ -47,6 +47,12 @@ CASES: list[tuple[dict[str, Any], str, Any, str]] = [
     (PAPER, "output.samples_u", True, "output.samples_u"),
     (PAPER, "primitives", {}, "primitives"),
     (PAPER, "cable.rest_shape", 3, "cable.rest_shape"),
+    (PAPER, "quality", [None], "quality"),
+    (PAPER, "effects", [], "effects"),
+    (PAPER, "cable.rest_shape", {}, "cable.rest_shape"),
+    (PAPER, "name", 5, "name"),
+    (PAPER, "name", "x" * 201, "name"),
+    (LOADED, "loads.0.force", "much", "loads[0].force"),
     (POINTS, "shape.points.1", 0.5, "shape.points[1]"),
     (POINTS, "shape.points.2.1", True, "shape.points[2][1]"),
     # wrong length
