@@ -1,0 +1,147 @@
+"""The token, the log, the metrics, and how the service stops."""
+
+import json
+import signal
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from fastapi.testclient import TestClient
+from starlette.websockets import WebSocketDisconnect
+
+from app.main import create_app
+from app.settings import Settings
+from tests.app.conftest import paper_scene, put, start
+from tests.app.live import serving
+from tests.app.test_bad_requests import the_problem
+
+TOKEN = "a token that is hard to guess"
+BEARER = {"authorization": f"Bearer {TOKEN}"}
+SLOW = paper_scene(quality={"n_u": 129, "n_t": 513, "method": "march"})  # some tenths of a second
+
+
+@pytest.fixture(scope="module")
+def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+    origins = ("https://lab.example",)
+    settings = Settings(data_dir=tmp_path_factory.mktemp("data"), token=TOKEN, allowed_origins=origins)
+    with TestClient(create_app(settings)) as client:
+        start(client)
+        yield client
+
+
+@pytest.mark.parametrize(
+    "address", ["/", "/docs", "/openapi.json", "/metrics", "/scene/", "/rerun/", "/v1/predictions", "/v1/cables", "/no"]
+)
+def test_every_address_asks_for_the_token(guarded: TestClient, address: str) -> None:
+    problem = guarded.get(address)
+    the_problem(problem, 401)
+    assert problem.headers["www-authenticate"].startswith("Bearer")
+    assert TOKEN not in problem.text
+    for wrong in ("Bearer", "Bearer x", f"Basic {TOKEN}", TOKEN, f"Bearer {TOKEN}x", "Bearer \xff"):
+        assert guarded.get(address, headers={"authorization": wrong.encode("latin-1")}).status_code == 401
+    assert guarded.get(address, headers=BEARER).status_code in (200, 404)
+
+
+def test_the_scene_asks_for_the_token_too(guarded: TestClient) -> None:
+    with pytest.raises(WebSocketDisconnect), guarded.websocket_connect("/scene", subprotocols=["viser-v1.1.1"]):
+        pass
+    with guarded.websocket_connect("/scene", subprotocols=["viser-v1.1.1"], headers=BEARER):
+        pass
+
+
+def test_health_needs_no_token(guarded: TestClient) -> None:
+    assert guarded.get("/health").status_code == guarded.get("/ready").status_code == 200
+
+
+def test_a_browser_gets_in_by_the_token_in_an_address_once(guarded: TestClient) -> None:
+    welcome = guarded.get("/docs", params={"token": TOKEN, "a": "b c"}, follow_redirects=False)
+    assert welcome.status_code == 303
+    assert welcome.headers["location"] == "/docs?a=b+c"
+    cookie = welcome.headers["set-cookie"]
+    assert "HttpOnly" in cookie
+    assert "SameSite=strict" in cookie
+    assert TOKEN not in cookie
+    value = cookie.split(";")[0]
+    guarded.cookies.clear()
+    assert guarded.get("/docs", headers={"cookie": value}).status_code == 200
+    assert guarded.get("/docs", headers={"cookie": value[:-1]}).status_code == 401
+    away = guarded.get("//evil.example/", params={"token": TOKEN}, follow_redirects=False)
+    assert not away.headers["location"].startswith("//")
+    guarded.cookies.clear()
+    assert guarded.post("/v1/predictions", params={"token": TOKEN}, json=paper_scene()).status_code == 401
+
+
+def test_another_origin_may_ask_for_leave_without_the_token(guarded: TestClient) -> None:
+    asks = {
+        "origin": "https://lab.example",
+        "access-control-request-method": "POST",
+        "access-control-request-headers": "authorization, content-type, prefer",
+    }
+    leave = guarded.options("/v1/predictions", headers=asks)
+    assert leave.status_code == 200
+    assert leave.headers["access-control-allow-origin"] == "https://lab.example"
+    assert guarded.options("/v1/predictions", headers={**asks, "origin": "https://evil.example"}).status_code == 400
+    answer = guarded.get("/v1/predictions", headers={**BEARER, "origin": "https://lab.example"})
+    assert "Location" in answer.headers["access-control-expose-headers"]
+
+
+def samples(text: str) -> dict[str, float]:
+    return {line.rsplit(" ", 1)[0]: float(line.rsplit(" ", 1)[1]) for line in text.splitlines() if line[:1] != "#"}
+
+
+def test_what_was_solved_is_counted(tmp_path: Path) -> None:
+    with TestClient(create_app(Settings(data_dir=tmp_path))) as client:
+        start(client)
+        for _ in range(3):
+            iterations = len(client.post("/v1/predictions", json=paper_scene()).json()["iterations"])
+        client.post("/v1/predictions", json=put(paper_scene(), "primitives.0.u", 2))  # not solved, so not counted
+        address = client.post("/v1/predictions", json=SLOW, headers={"prefer": "respond-async"}).headers["location"]
+        time.sleep(0.05)
+        running = samples(client.get("/metrics").text)
+        client.delete(address)
+        response = client.get("/metrics")
+        found = samples(response.text)
+    assert response.headers["content-type"].startswith("text/plain; version=0.0.4")
+    assert found['dlo_solves_total{method="march",status="converged"}'] == 3
+    assert found['dlo_solves_total{method="march",status="cancelled"}'] == 1
+    assert found['dlo_iterations_total{method="march"}'] == 3 * iterations
+    assert found['dlo_solve_seconds_count{method="march"}'] == 3
+    assert found["dlo_stored_runs"] == 3
+    assert running["dlo_running"] == 1
+    assert found["dlo_running"] == found["dlo_queue_depth"] == 0
+
+
+def logged(path: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in path.read_text().splitlines()]
+
+
+def test_the_log_is_json_with_the_run_and_a_stop_lets_a_solve_finish(tmp_path: Path) -> None:
+    with serving(tmp_path, token=TOKEN) as live, httpx.Client(base_url=live.url, headers=BEARER, timeout=60) as http:
+        document = http.post("/v1/predictions", json=paper_scene()).json()
+        http.get("/v1/predictions", params={"token": TOKEN})
+        slow = http.post("/v1/predictions", json=SLOW, headers={"prefer": "respond-async"}).json()
+        live.process.send_signal(signal.SIGTERM)
+        live.process.wait(timeout=20)
+    lines = logged(live.log)
+    solved = next(line for line in lines if line["message"] == "solved")
+    assert solved["run"] == document["id"]
+    assert solved["status"] == "converged"
+    assert solved["seconds"] == pytest.approx(document["accuracy"]["wall_time"], abs=1e-5)
+    posts = [line for line in lines if line["logger"] == "dlo.access" and line["method"] == "POST"]
+    assert [(line["status"], line["run"]) for line in posts] == [(201, document["id"]), (202, slow["id"])]
+    assert TOKEN not in live.log.read_text()
+    with serving(tmp_path) as live, httpx.Client(base_url=live.url) as http:
+        stored = {run["id"] for run in http.get("/v1/predictions").json()["predictions"]}
+    assert stored == {document["id"], slow["id"]}  # it was let finish, and both were found again
+
+
+def test_a_stop_without_grace_cancels(tmp_path: Path) -> None:
+    with serving(tmp_path, shutdown_grace="0") as live, httpx.Client(base_url=live.url, timeout=60) as http:
+        http.post("/v1/predictions", json=SLOW, headers={"prefer": "respond-async"})
+        live.process.send_signal(signal.SIGTERM)
+        live.process.wait(timeout=10)
+    assert any("cancelling" in line["message"] for line in logged(live.log))
+    assert not any(line["message"] == "solved" for line in logged(live.log))

@@ -1,0 +1,125 @@
+"""Many predictions in one request."""
+
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from app.main import create_app
+from app.schemas import PredictionResponse
+from app.settings import Settings
+from tests.app.conftest import paper_scene, put, start
+from tests.app.live import Live, serving
+from tests.app.test_bad_requests import the_problem
+
+BATCH = "/v1/predictions:batch"
+SLOW = paper_scene(quality={"n_u": 129, "n_t": 513, "method": "march"})  # some tenths of a second
+
+
+def lines(text: str) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in text.splitlines()]
+
+
+@pytest.fixture(scope="module")
+def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
+    with serving(tmp_path_factory.mktemp("live"), workers="2") as service:
+        yield service
+
+
+def test_a_bad_scene_is_a_line_of_its_own_and_spoils_no_other(client: TestClient, answer: dict[str, Any]) -> None:
+    before = client.get("/v1/predictions").json()["total"]
+    scenes = [paper_scene(), put(paper_scene(), "primitives.0.u", 1.5), "scene", put(paper_scene(), "solver", 1), None]
+    response = client.post(BATCH, json={"scenes": [*scenes, paper_scene()]})
+    assert response.status_code == 200
+    assert response.headers["content-type"] == "application/jsonl"
+    found = lines(response.text)
+    assert [line["index"] for line in found] == list(range(6))
+    assert [line["status"] for line in found] == ["converged", *["failed"] * 4, "converged"]
+    for line, scene in zip(found[1:5], scenes[1:], strict=True):
+        assert set(line) == {"index", "status", "problem"}
+        if isinstance(scene, dict):
+            assert line["problem"] == the_problem(client.post("/v1/predictions", json=scene), 422)
+        else:
+            assert [error["field"] for error in line["problem"]["errors"]] == ["body"]
+    for line in (found[0], found[5]):
+        PredictionResponse.model_validate(line["result"], strict=True)
+        np.testing.assert_allclose(line["result"]["surface"]["positions"], answer["surface"]["positions"], atol=1e-12)
+        assert line["result"]["links"] is None
+    assert client.get("/v1/predictions").json()["total"] == before
+
+
+def test_one_scene_is_moved_in_many_ways_and_stored_where_asked(client: TestClient) -> None:
+    ways = [put(paper_scene(), "primitives.0.path.displacement", [0, y, 0])["primitives"] for y in (0.1, 0.2, 0.3)]
+    response = client.post(BATCH, json={"scene": paper_scene(name="sweep"), "primitives": ways, "store": True})
+    for line, y in zip(lines(response.text), (0.1, 0.2, 0.3), strict=True):
+        assert line["result"]["surface"]["positions"][-1][25][1] == pytest.approx(y, abs=1e-9)
+        links = line["result"]["links"]
+        assert client.get(links["self"]).json() == line["result"]
+        assert client.get(links["scene"]).json()["primitives"] == ways[line["index"]]
+    assert client.get("/v1/predictions?name=SWEEP").json()["total"] == 3
+
+
+def test_lines_come_as_they_finish_where_asked(client: TestClient) -> None:
+    scenes = [SLOW, *[paper_scene()] * 5]
+    as_they_finish = lines(client.post(BATCH, json={"scenes": scenes, "order": "finished"}).text)
+    assert sorted(line["index"] for line in as_they_finish) == list(range(6))
+    if client.app.state.service.worker.workers > 1:  # type: ignore[attr-defined]
+        assert as_they_finish[-1]["index"] == 0
+    in_order = lines(client.post(BATCH, json={"scenes": scenes}).text)
+    assert [line["index"] for line in in_order] == list(range(6))
+
+
+@pytest.mark.parametrize(
+    ("body", "field"),
+    [
+        ({}, "scenes"),
+        ({"scenes": []}, "scenes"),
+        ({"scenes": {}}, "scenes"),
+        ({"scene": paper_scene()}, "primitives"),
+        ({"scene": 3, "primitives": [[]]}, "scene"),
+        ({"scenes": [1], "store": "yes"}, "store"),
+        ({"scenes": [1], "order": "any"}, "order"),
+        ({"scenes": [1], "scene": paper_scene(), "primitives": [[]]}, "scenes"),
+        ([], "scenes"),
+    ],
+    ids=range(9),
+)
+def test_a_batch_that_is_none_is_refused_as_a_whole(client: TestClient, body: Any, field: str) -> None:
+    problem = the_problem(client.post(BATCH, json=body), 422)
+    assert field in [error["field"] for error in problem["errors"]] or problem["errors"][0]["field"] == "body"
+
+
+def test_a_batch_has_a_bound(tmp_path: Path) -> None:
+    with TestClient(create_app(Settings(data_dir=tmp_path, max_batch=2))) as client:
+        start(client)
+        assert client.post(BATCH, json={"scenes": [paper_scene()] * 2}).status_code == 200
+        the_problem(client.post(BATCH, json={"scenes": [paper_scene()] * 3}), 413)
+        assert client.app.state.service.worker.admitted == 0  # type: ignore[attr-defined]
+
+
+def test_all_workers_are_used_and_a_client_that_leaves_cancels_the_rest(live: Live) -> None:
+    with httpx.Client(base_url=live.url, timeout=60) as http:
+        most = 0
+        with http.stream("POST", BATCH, json={"scenes": [SLOW] * 40}) as stream:
+            for line in stream.iter_lines():
+                assert json.loads(line)["status"] == "converged"
+                most = max(most, gauge(http, "dlo_running"))
+                if json.loads(line)["index"] == 1:
+                    break
+        assert most == 2
+        give_up = time.monotonic() + 5
+        while gauge(http, "dlo_running") or gauge(http, "dlo_queue_depth"):
+            assert time.monotonic() < give_up, "the rest of the batch went on"
+            time.sleep(0.02)
+        assert http.post("/v1/predictions", json=paper_scene()).status_code == 201
+
+
+def gauge(http: httpx.Client, name: str) -> int:
+    text = http.get("/metrics").text
+    return int(float(next(line.split()[1] for line in text.splitlines() if line.startswith(f"{name} "))))
