@@ -24,6 +24,7 @@ Indices = NDArray[np.intp]
 
 MAX_BALLS = 600  # of the backbone: more show nothing more, and the tree takes their number squared
 GROWTH = 1.4  # of the radius from one try to the next
+WIDEST = 0.06  # of the size of the cloud: in wider balls any shape is a short path
 A_PATH = 0.97  # share of the points on or beside the longest path from which on the tree counts as a path
 LEAST_PATH = 0.85  # below it at every radius the points are of no single curve
 BESIDE = 2.5  # radii from the path within which a ball is beside it, not on a branch
@@ -122,8 +123,9 @@ def _backbone(points: Floats) -> Floats:
         raise _no_curve("they are all in one place")
     nearest = np.asarray(cKDTree(points).query(points, k=2)[0])[:, 1]
     radius = max(1.01 * float(np.median(nearest)), size / MAX_BALLS)
+    largest = max(radius, WIDEST * size)
     best, most = points[:0], 0.0
-    while radius < 0.25 * size:
+    while radius <= largest:
         centres, count = _balls(points, radius)
         if 3 <= len(centres) <= MAX_BALLS:
             path, covered = _longest_path(centres, count, radius)
