@@ -12,20 +12,20 @@ class CablePreset(BaseModel):
     """A real cable with measured values."""
 
     name: str = Field(description="For `cable.preset`.", examples=["black-wire"])
-    source: str = Field(description="Where the values come from.")
-    length: float = Field(description="Length [m].")
-    diameter: float = Field(description="Diameter [m].")
-    linear_density: float = Field(description="Mass per length [kg/m].")
-    bending_stiffness: float = Field(description="EI [N m^2].")
-    axial_stiffness: float = Field(description="EA [N].")
-    torsional_stiffness: float = Field(description="GJ [N m^2].")
-    bending_damping: float = Field(description="Internal damping on the rate of curvature [N m^2 s].")
+    source: str = Field(description="Where the values come from.", examples=["measured: weight, and sag over an edge"])
+    length: float = Field(description="Length [m].", examples=[1.0])
+    diameter: float = Field(description="Diameter [m].", examples=[0.005])
+    linear_density: float = Field(description="Mass per length [kg/m].", examples=[0.05])
+    bending_stiffness: float = Field(description="EI [N m^2].", examples=[1e-3])
+    axial_stiffness: float = Field(description="EA [N].", examples=[640.0])
+    torsional_stiffness: float = Field(description="GJ [N m^2].", examples=[1e-3])
+    bending_damping: float = Field(description="Internal damping on the rate of curvature [N m^2 s].", examples=[1e-4])
 
 
 class CablePresets(BaseModel):
     """The presets."""
 
-    cables: list[CablePreset]
+    cables: list[CablePreset] = Field(description="The presets.")
 
 
 @router.get("", summary="List the cable presets")

@@ -50,10 +50,13 @@ class FitResponse(BaseModel):
     degree: int = Field(description="Degree of the spline.", examples=[3])
     length: float = Field(description="Length of the spline [m].", examples=[0.8])
     measured_length: float = Field(description="Length that the points show [m].", examples=[0.795])
-    fit_error: FitErrorModel
+    fit_error: FitErrorModel = Field(description="Distances of the points from the curve.")
     order: list[int] = Field(description="Indices of the points along the cable.", examples=[[0, 1, 2, 3]])
     outliers: list[int] = Field(description="Indices of the points that were left out.", examples=[[]])
-    shape: dict[str, Any] = Field(description="The curve as the `shape` of a request.")
+    shape: dict[str, Any] = Field(
+        description="The curve as the `shape` of a request.",
+        examples=[{"kind": "control_points", "control_points": [[0.0, 0.0, 0.0]], "knots": [0.0, 0.8]}],
+    )
 
 
 _SEEN = [[0.02, 0.01], [0.13, 0.06], [0.24, 0.05], [0.36, -0.01], [0.47, -0.03], [0.58, 0.02], [0.68, 0.09]]

@@ -12,110 +12,136 @@ from dlocore.prediction import Iteration, Status
 from dlocore.spline import DEGREE
 
 Floats = NDArray[np.float64]
+_ID = "019b1f5a2c07f3e9d1c5b6a7e8f0"
+_RUN = f"/v1/predictions/{_ID}"
 
 
 class SurfaceModel(BaseModel):
     """The predicted space-time surface, sampled evenly."""
 
-    u: list[float] = Field(description="Material coordinates [m].")
-    t: list[float] = Field(description="Times [s].")
-    positions: list[list[list[float]]] = Field(description="Positions [t][u][3] [m].")
-    twist: list[list[float]] = Field(description="Twist angles [t][u] [rad].")
+    u: list[float] = Field(description="Material coordinates [m].", examples=[[0.0, 0.01, 0.02]])
+    t: list[float] = Field(description="Times [s].", examples=[[0.0, 0.05, 0.1]])
+    positions: list[list[list[float]]] = Field(
+        description="Positions [t][u][3] [m].", examples=[[[[0.0, 0.0, 0.0], [0.01, 0.0, 0.0]]]]
+    )
+    twist: list[list[float]] = Field(description="Twist angles [t][u] [rad].", examples=[[[0.0, 0.0]]])
 
 
 class GraspModel(BaseModel):
     """What a gripper must give to the cable."""
 
-    u: float = Field(description="Material coordinate [m].")
-    reaction: list[list[float]] = Field(description="Force at the times of the surface [t][3] [N].")
-    moment: list[list[float]] = Field(description="Moment at the times of the surface [t][3] [N m].")
+    u: float = Field(description="Material coordinate [m].", examples=[0.25])
+    reaction: list[list[float]] = Field(
+        description="Force at the times of the surface [t][3] [N].", examples=[[[0.0, 0.12, 0.0]]]
+    )
+    moment: list[list[float]] = Field(
+        description="Moment at the times of the surface [t][3] [N m].", examples=[[[0.0, 0.0, 0.0]]]
+    )
 
 
 class EffectModel(BaseModel):
     """Whether an effect was simulated, and why."""
 
     name: str = Field(description="As in the request.", examples=["gravity"])
-    active: bool = Field(description="Whether it was simulated.")
-    reason: str = Field(description="Why, in words.")
-    magnitude: float | None = Field(description="Its size on the predicted motion; null where that means nothing.")
+    active: bool = Field(description="Whether it was simulated.", examples=[True])
+    reason: str = Field(description="Why, in words.", examples=["the cable has weight and hangs free"])
+    magnitude: float | None = Field(
+        description="Its size on the predicted motion; null where that means nothing.", examples=[0.49]
+    )
     unit: str = Field(description="Unit of the magnitude.", examples=["N"])
 
 
 class IterationModel(BaseModel):
     """One iteration of the solve, or one refinement level of a march. Null where a value is not finite."""
 
-    number: int = Field(description="From 0.")
-    update: float | None = Field(description="Norm of the change of the control points, the paper's eq. (25) [m].")
-    residual: float | None = Field(description="Root mean square residual over the motion [m]; method `paper`: [N].")
-    energy: float | None = Field(description="Elastic energy at the end of the motion [J].")
-    wall_time: float = Field(description="Since the solve began [s].")
-    damping: float | None = Field(description="Levenberg-Marquardt damping of the step, 0 for a plain one.")
-    step_length: float | None = Field(description="Fraction of the full step taken.")
-    n_u: int = Field(description="Control points along the cable.")
-    n_t: int = Field(description="Control points in time.")
-    note: str = Field(description="What happened, in words.")
+    number: int = Field(description="From 0.", examples=[0])
+    update: float | None = Field(
+        description="Norm of the change of the control points, the paper's eq. (25) [m].", examples=[8.9e-4]
+    )
+    residual: float | None = Field(
+        description="Root mean square residual over the motion [m]; method `paper`: [N].", examples=[2.7e-7]
+    )
+    energy: float | None = Field(description="Elastic energy at the end of the motion [J].", examples=[2.9e-5])
+    wall_time: float = Field(description="Since the solve began [s].", examples=[0.002])
+    damping: float | None = Field(
+        description="Levenberg-Marquardt damping of the step, 0 for a plain one.", examples=[0.0]
+    )
+    step_length: float | None = Field(description="Fraction of the full step taken.", examples=[1.0])
+    n_u: int = Field(description="Control points along the cable.", examples=[13])
+    n_t: int = Field(description="Control points in time.", examples=[19])
+    note: str = Field(description="What happened, in words.", examples=["march"])
 
 
 class AccuracyModel(BaseModel):
     """What the answer is worth and what it cost."""
 
     method: str = Field(description="Method that gave the answer.", examples=["spacetime"])
-    error_estimate: float | None = Field(description="Error of position at the worst point [m]; null where unknown.")
-    wall_time: float = Field(description="Time of the solve [s].")
-    n_u: int = Field(description="Control points along the cable.")
-    n_t: int = Field(description="Control points in time.")
-    delta: float = Field(description="Threshold on the update [m].")
-    steps: int = Field(description="Time steps of the march.")
-    dimensions: int = Field(description="2 where the motion is planar, else 3.")
-    phases: dict[str, float] = Field(description="Time by phase [s].")
+    error_estimate: float | None = Field(
+        description="Error of position at the worst point [m]; null where unknown.", examples=[8.9e-4]
+    )
+    wall_time: float = Field(description="Time of the solve [s].", examples=[0.004])
+    n_u: int = Field(description="Control points along the cable.", examples=[13])
+    n_t: int = Field(description="Control points in time.", examples=[19])
+    delta: float = Field(description="Threshold on the update [m].", examples=[1e-5])
+    steps: int = Field(description="Time steps of the march.", examples=[64])
+    dimensions: int = Field(description="2 where the motion is planar, else 3.", examples=[2])
+    phases: dict[str, float] = Field(description="Time by phase [s].", examples=[{"setup": 0.001, "march": 0.003}])
 
 
 class StartModel(BaseModel):
     """The start shape as the solver took it."""
 
-    elastic_energy: float = Field(description="Elastic energy stored in the start shape [J].")
-    fit_error: float = Field(description="Root mean square distance from the given points [m].")
+    elastic_energy: float = Field(description="Elastic energy stored in the start shape [J].", examples=[0.0])
+    fit_error: float = Field(description="Root mean square distance from the given points [m].", examples=[0.0])
 
 
 class LinksModel(BaseModel):
     """Addresses on this service."""
 
-    self: str = Field(description="This document.")
-    recording: str = Field(description="The iterations and the motion, for rerun (.rrd).")
-    surface: str = Field(description="The surface for NumPy (.npz).")
-    scene: str = Field(description="The request, to be sent again.")
-    viewer: str = Field(description="The recording in the browser.")
-    events: str = Field(description="The course of the solve as server-sent events.")
+    self: str = Field(description="This document.", examples=[_RUN])
+    recording: str = Field(
+        description="The iterations and the motion, for rerun (.rrd).", examples=[_RUN + "/recording.rrd"]
+    )
+    surface: str = Field(description="The surface for NumPy (.npz).", examples=[_RUN + "/surface.npz"])
+    scene: str = Field(description="The request, to be sent again.", examples=[_RUN + "/scene.json"])
+    viewer: str = Field(description="The recording in the browser.", examples=[_RUN + "/viewer"])
+    events: str = Field(description="The course of the solve as server-sent events.", examples=[_RUN + "/events"])
 
 
 class PredictionResponse(BaseModel):
     """A predicted motion."""
 
-    id: str = Field(description="Id of the run.")
+    id: str = Field(description="Id of the run.", examples=[_ID])
     state: Literal["done"] = Field(description="There is an answer.")
     created: str = Field(description="When it was made, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000000Z"])
-    status: Status = Field(description="`converged`, or why not.")
-    message: str = Field(description="The status in words, and what to do about it.")
-    surface: SurfaceModel
-    control_points: list[list[list[float]]] = Field(
-        description="Control points of the bivariate spline [n_t][n_u][4] [m, m, m, rad]."
+    status: Status = Field(description="`converged`, or why not.", examples=["converged"])
+    message: str = Field(
+        description="The status in words, and what to do about it.",
+        examples=["Two grids agree to 0.89 mm, target 2 mm."],
     )
-    knots_u: list[float] = Field(description="Knots along the cable [m].")
-    knots_t: list[float] = Field(description="Knots in time [s].")
+    surface: SurfaceModel = Field(description="The predicted surface, sampled as `output` asks.")
+    control_points: list[list[list[float]]] = Field(
+        description="Control points of the bivariate spline [n_t][n_u][4] [m, m, m, rad].",
+        examples=[[[[0.0, 0.0, 0.0, 0.0]]]],
+    )
+    knots_u: list[float] = Field(
+        description="Knots along the cable [m].", examples=[[0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]]
+    )
+    knots_t: list[float] = Field(description="Knots in time [s].", examples=[[0.0, 0.0, 0.0, 0.0, 1.6, 1.6, 1.6, 1.6]])
     degree: int = Field(description="Degree of the spline.", examples=[3])
-    grasps: list[GraspModel]
-    effects: list[EffectModel]
-    iterations: list[IterationModel]
-    accuracy: AccuracyModel
-    start: StartModel
+    grasps: list[GraspModel] = Field(description="What each gripper must give, in the order of `primitives`.")
+    effects: list[EffectModel] = Field(description="What was simulated, and why.")
+    iterations: list[IterationModel] = Field(description="How the solve went.")
+    accuracy: AccuracyModel = Field(description="What the answer is worth and what it cost.")
+    start: StartModel = Field(description="The start shape as the solver took it.")
     links: LinksModel | None = Field(description="Addresses of its parts; null where the run is not stored.")
 
 
 class JobLinksModel(BaseModel):
     """Addresses of a prediction under way, relative to the service."""
 
-    self: str = Field(description="This document; the prediction once it is done.")
-    events: str = Field(description="Its progress as server-sent events.")
+    self: str = Field(description="This document; the prediction once it is done.", examples=[_RUN])
+    events: str = Field(description="Its progress as server-sent events.", examples=[_RUN + "/events"])
 
 
 class JobResponse(BaseModel):
@@ -125,53 +151,62 @@ class JobResponse(BaseModel):
     created: str = Field(
         description="When it was asked for, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000000Z"]
     )
-    state: Literal["queued", "running", "failed", "cancelled"] = Field(description="How far it is.")
+    state: Literal["queued", "running", "failed", "cancelled"] = Field(
+        description="How far it is.", examples=["running"]
+    )
     iterations: list[IterationModel] = Field(description="The iterations so far.")
     problem: "ProblemDocument | None" = Field(description="Why it failed.")
-    links: JobLinksModel
+    links: JobLinksModel = Field(description="Addresses of its parts.")
 
 
 class RunSummary(BaseModel):
     """A stored run in a list."""
 
-    id: str = Field(description="Its id.")
+    id: str = Field(description="Its id.", examples=[_ID])
     name: str = Field(description="What the request calls it.", examples=["Lay the cable along the wall"])
-    created: str = Field(description="When it was made, ISO 8601 in UTC.")
-    status: Status = Field(description="`converged`, or why not.")
-    method: str = Field(description="Method that gave the answer.")
-    error_estimate: float | None = Field(description="Error of position at the worst point [m].")
-    wall_time: float = Field(description="Time of the solve [s].")
-    links: LinksModel
+    created: str = Field(description="When it was made, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000000Z"])
+    status: Status = Field(description="`converged`, or why not.", examples=["converged"])
+    method: str = Field(description="Method that gave the answer.", examples=["march"])
+    error_estimate: float | None = Field(description="Error of position at the worst point [m].", examples=[8.9e-4])
+    wall_time: float = Field(description="Time of the solve [s].", examples=[0.004])
+    links: LinksModel = Field(description="Addresses of its parts.")
 
 
 class PredictionList(BaseModel):
     """Stored runs, newest first."""
 
-    predictions: list[RunSummary]
-    total: int = Field(description="How many stored runs match, on all pages.")
-    limit: int = Field(description="At most so many are listed.")
-    offset: int = Field(description="So many newer ones were passed over.")
-    next: str | None = Field(description="Address of the next page, or null.")
+    predictions: list[RunSummary] = Field(description="The runs on this page.")
+    total: int = Field(description="How many stored runs match, on all pages.", examples=[42])
+    limit: int = Field(description="At most so many are listed.", examples=[20])
+    offset: int = Field(description="So many newer ones were passed over.", examples=[0])
+    next: str | None = Field(
+        description="Address of the next page, or null.", examples=["/v1/predictions?limit=20&cursor=" + _ID]
+    )
 
 
 class BadFieldModel(BaseModel):
     """One wrong field."""
 
-    field: str = Field(examples=["primitives[0].u"])
-    given: str = Field(examples=["2.0"])
-    allowed: str = Field(examples=["0 to the cable's length, 1 [m]"])
-    message: str
+    field: str = Field(description="Path of the field; `body` for the whole.", examples=["primitives[0].u"])
+    given: str = Field(description="What was given, shortened.", examples=["2.0"])
+    allowed: str = Field(description="What would be accepted.", examples=["0 to the cable's length, 1 [m]"])
+    message: str = Field(description="What is wrong, in words.", examples=["Got 2.0. Allowed: 0 to 1 [m]."])
 
 
 class ProblemDocument(BaseModel):
     """What went wrong (RFC 9457)."""
 
-    type: str = Field(examples=["urn:dlo:problem:bad-request"])
-    title: str = Field(examples=["Unprocessable Content"])
-    status: int = Field(examples=[422])
-    detail: str = Field(description="What went wrong and what to do, in words.")
+    type: str = Field(description="A name of the kind of problem.", examples=["urn:dlo:problem:bad-request"])
+    title: str = Field(description="The phrase of the status.", examples=["Unprocessable Content"])
+    status: int = Field(description="The HTTP status.", examples=[422])
+    detail: str = Field(
+        description="What went wrong and what to do, in words.",
+        examples=["primitives[0].u: Got 2.0. Allowed: 0 to the cable's length, 1 [m]."],
+    )
     errors: list[BadFieldModel] | None = Field(default=None, description="The wrong fields, with status 422.")
-    prediction: str | None = Field(default=None, description="Address of the best iterate, with status 504.")
+    prediction: str | None = Field(
+        default=None, description="Address of the best iterate, with status 504.", examples=[_RUN]
+    )
 
 
 def problem_document(description: str) -> dict[str, Any]:

@@ -62,7 +62,7 @@ class StraightShape(Model):
         default=[1.0, 0.0, 0.0], description="Direction from there; any length but zero.", examples=[[1, 0, 0]]
     )
     settle: Settle = False
-    velocity: Velocity | None = None
+    velocity: Velocity | None = Field(default=None, description="Initial velocity [m/s]; absent: at rest.")
 
 
 class PointsShape(Model):
@@ -76,7 +76,7 @@ class PointsShape(Model):
         examples=[[[0.02, 0.01], [0.24, 0.05], [0.47, -0.03], [0.74, 0.13]]],
     )
     settle: Settle = False
-    velocity: Velocity | None = None
+    velocity: Velocity | None = Field(default=None, description="Initial velocity [m/s]; absent: at rest.")
 
 
 class ControlPointsShape(Model):
@@ -95,7 +95,7 @@ class ControlPointsShape(Model):
         examples=[[0, 0, 0, 0, 1, 1, 1, 1]],
     )
     settle: Settle = False
-    velocity: Velocity | None = None
+    velocity: Velocity | None = Field(default=None, description="Initial velocity [m/s]; absent: at rest.")
 
 
 class PredictionShape(Model):

@@ -85,18 +85,18 @@ class EnvironmentModel(Model):
 class EffectsModel(Model):
     """Which effects to simulate; `auto` asks the scene."""
 
-    inertia: Switch = "auto"
-    drag: Switch = "auto"
-    damping: Switch = "auto"
-    gravity: Switch = "auto"
-    stretch: Switch = "auto"
-    bend: Switch = "auto"
-    twist: Switch = "auto"
-    plasticity: Switch = "auto"
-    table: Switch = "auto"
-    friction: Switch = "auto"
-    obstacles: Switch = "auto"
-    self_contact: Switch = "auto"
+    inertia: Switch = Field(default="auto", description="Inertia of the cable.", examples=["auto"])
+    drag: Switch = Field(default="auto", description="Drag of the surrounding air or liquid.", examples=["auto"])
+    damping: Switch = Field(default="auto", description="Internal damping of bending.", examples=["auto"])
+    gravity: Switch = Field(default="auto", description="Weight.", examples=["auto"])
+    stretch: Switch = Field(default="auto", description="Axial stretch, which holds the length.", examples=["auto"])
+    bend: Switch = Field(default="auto", description="Bending stiffness.", examples=["auto"])
+    twist: Switch = Field(default="auto", description="Twist and its stiffness.", examples=["auto"])
+    plasticity: Switch = Field(default="auto", description="Yield and memory of the shape.", examples=["auto"])
+    table: Switch = Field(default="auto", description="Contact with the table.", examples=["auto"])
+    friction: Switch = Field(default="auto", description="Friction on the table.", examples=["auto"])
+    obstacles: Switch = Field(default="auto", description="Contact with obstacles.", examples=["auto"])
+    self_contact: Switch = Field(default="auto", description="Contact of the cable with itself.", examples=["auto"])
 
 
 class QualityModel(Model):
