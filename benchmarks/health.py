@@ -91,10 +91,10 @@ def main() -> None:
         for solving in (False, True):
             times = [1e3 * t for t in measure(address, solving)]
             what = f"{CLIENTS} solves running" if solving else "idle"
+            middle = statistics.median(times)
             centile = times[int(0.99 * len(times))]
-            print(
-                f"{what:18} median {statistics.median(times):6.2f} ms, 99 % {centile:6.2f} ms, worst {times[-1]:6.2f} ms"
-            )
+            tail = f"99 % {centile:6.2f} ms, worst {times[-1]:6.2f} ms"
+            print(f"{what:18} median {middle:6.2f} ms, {tail}")
 
 
 if __name__ == "__main__":
