@@ -1,4 +1,4 @@
-"""What this program runs on, in words."""
+"""What this program runs on."""
 
 import platform
 from functools import cache
@@ -8,16 +8,24 @@ from pathlib import Path
 from app.settings import usable_cores
 
 _PACKAGES = ("numpy", "scipy", "numba")
+_BARE = ("processor", "system")  # they name themselves
 
 
 @cache
+def machine() -> dict[str, str]:
+    """Return processor, cores that may be used, system and versions."""
+    return {
+        "processor": _processor(),
+        "cores": str(usable_cores()),
+        "system": f"{platform.system()} {platform.machine()}",
+        "Python": platform.python_version(),
+        **{name: version(name) for name in _PACKAGES},
+    }
+
+
 def machine_line() -> str:
-    """Return processor, cores that may be used, system and versions in one line."""
-    system = f"{platform.system()} {platform.machine()}"
-    versions = [f"{name} {version(name)}" for name in _PACKAGES]
-    return ", ".join(
-        [_processor(), f"{usable_cores()} cores", system, f"Python {platform.python_version()}", *versions]
-    )
+    """Return `machine()` in one line."""
+    return ", ".join(value if name in _BARE else f"{name} {value}" for name, value in machine().items())
 
 
 def _processor() -> str:
