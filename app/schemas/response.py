@@ -85,6 +85,9 @@ class AccuracyModel(BaseModel):
     delta: float = Field(description="Threshold on the update [m].", examples=[1e-5])
     steps: int = Field(description="Time steps of the march.", examples=[64])
     dimensions: int = Field(description="2 where the motion is planar, else 3.", examples=[2])
+    dimensions_reason: str = Field(
+        description="Why, in words.", examples=["the cable lies on the table and moves in its plane"]
+    )
     phases: dict[str, float] = Field(description="Time by phase [s].", examples=[{"setup": 0.001, "march": 0.003}])
 
 
