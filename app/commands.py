@@ -102,7 +102,8 @@ def summary(prediction: Prediction) -> str:
     return "\n".join(
         [
             f"{prediction.status}: {prediction.message}",
-            f"method   {accuracy.method}, {accuracy.n_u} x {accuracy.n_t} control points, {accuracy.dimensions}D: {accuracy.dimensions_reason}",
+            f"method   {accuracy.method}, {accuracy.n_u} x {accuracy.n_t} control points",
+            f"motion   {accuracy.dimensions}D: {accuracy.dimensions_reason}",
             f"error    {error} (estimated, worst point)",
             f"time     {1e3 * accuracy.wall_time:.3g} ms",
             f"effects  {active}",
