@@ -76,6 +76,7 @@ READ: Responses = {
 }
 DELETE: Responses = {
     200: {"description": "It was under way and is cancelled.", "content": {JSON: {"schema": _JOB}}},
+    202: {"description": "It stops after its current iteration.", "content": {JSON: {"schema": _JOB}}},
     204: {"description": "It is removed."},
     **failures(401, 404),
 }

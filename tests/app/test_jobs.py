@@ -12,6 +12,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.main import create_app
+from app.routes import predictions
 from app.settings import Settings
 from tests.app.conftest import paper_scene, start
 from tests.app.live import Live, serving
@@ -105,6 +106,18 @@ def test_a_running_solve_is_cancelled_at_once_and_then_removed(client: TestClien
     assert client.delete(address).status_code == 204
     the_problem(client.get(address), 404)
     the_problem(client.delete(address), 404)
+
+
+def test_a_solve_that_is_slow_to_stop_is_said_to_be_stopping(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(predictions, "CANCEL_TIME", 0.0)
+    address = client.post("/v1/predictions", json=SLOW, headers=ASYNC).headers["location"]
+    until(client, address, "running")
+    stopping = client.delete(address)
+    assert stopping.status_code == 202
+    assert stopping.json()["state"] == "running"
+    until(client, address, "cancelled")
 
 
 def test_a_waiting_solve_is_cancelled_without_a_worker(tmp_path: Path) -> None:
