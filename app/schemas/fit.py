@@ -1,17 +1,20 @@
 """The request and the answer of ``POST /v1/shapes:fit``."""
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from fastapi.openapi.models import Example
 from pydantic import BaseModel, Field
 
-from app.schemas.base import Flag, Model, Number, Point, Vector
+from app.schemas.base import Flag, Model, Number
+
+Coordinate = Annotated[Number, Field(ge=-1e5, le=1e5)]  # [m]
+Seen = Annotated[list[Coordinate], Field(min_length=2, max_length=3)]
 
 
 class FitRequest(Model):
     """Points of a cable, as a vision system sees them: noisy, unevenly spaced, with outliers, 2D or 3D."""
 
-    points: list[Point] = Field(
+    points: list[Seen] = Field(
         min_length=4,
         max_length=100_000,
         description="Points [m], all 2D (z = 0) or all 3D; at most 20,000 where they are in no order.",
@@ -25,7 +28,7 @@ class FitRequest(Model):
         description="Length of the cable [m], which the curve gets; absent: as it is measured.",
         examples=[0.8],
     )
-    start: Vector | None = Field(
+    start: Annotated[list[Coordinate], Field(min_length=3, max_length=3)] | None = Field(
         default=None,
         description="Near the cable's end at u = 0 [m], for points in no order; absent: the end with the smaller x.",
         examples=[[0.02, 0.01, 0.0]],

@@ -108,6 +108,7 @@ def test_the_curve_can_be_predicted_from(client: TestClient) -> None:
     ("body", "field"),
     [
         ({}, "points"),
+        ({"points": [[0, 1e300], [1, 0], [2, 0], [3, 0]]}, "points[0][1]"),
         ({"points": [[0, 0]] * 3}, "points"),
         ({"points": [[0, 0]] * 5}, "points"),
         ({"points": [[0, 0]] * 5, "ordered": False}, "points"),
@@ -118,7 +119,7 @@ def test_the_curve_can_be_predicted_from(client: TestClient) -> None:
         ({"points": [[0, 0], [1, 0], [2, 0], [3, 0]], "ordered": "no"}, "ordered"),
         ({"points": [[i, 0] for i in range(20_001)], "ordered": False}, "points"),
     ],
-    ids=range(10),
+    ids=range(11),
 )
 def test_points_of_no_cable_are_refused_by_name(client: TestClient, body: dict[str, Any], field: str) -> None:
     problem = the_problem(client.post(FIT, json=body), 422)
