@@ -1,0 +1,48 @@
+"""``/v1/scenes:explain``: what a prediction of a scene would be, without making it."""
+
+from typing import Annotated, Any
+
+import anyio.to_thread
+import orjson
+from fastapi import APIRouter, Body, Request
+from fastapi.responses import Response
+
+from app.fields import BadField
+from app.formats import JSON, negotiated
+from app.problems import bad_scene
+from app.routes import described
+from app.routes.body import JsonRoute
+from app.schemas import EXAMPLES, PredictionRequest, to_scene
+from app.schemas.check import scene_errors
+from app.schemas.plan import PlanResponse
+from app.service import Service, TheService
+from dlocore import plan
+
+router = APIRouter(tags=["scenes"], route_class=JsonRoute)
+
+
+@router.post(
+    "/v1/scenes:explain",
+    response_model=PlanResponse,
+    summary="Explain a scene without solving it",
+    responses=described.failures(401, 406, 413, 415, 422, 503),
+)
+async def explain(
+    request: Request, scene: Annotated[PredictionRequest, Body(openapi_examples=EXAMPLES)], service: TheService
+) -> Response:
+    """Say which effects the scene calls for and why, and what grid and time a solve would take.
+
+    422 names everything that is wrong with the scene, not only the first fault.
+    """
+    negotiated(request.headers.get("accept"), (JSON,))
+    service.check_ready()
+    document = await anyio.to_thread.run_sync(_explained, service, scene)
+    return Response(orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY), media_type=JSON)
+
+
+def _explained(service: Service, request: PredictionRequest) -> dict[str, Any]:
+    errors = scene_errors(request, service.runs.surface)
+    if errors:
+        raise bad_scene([BadField.from_scene_error(error) for error in errors])
+    found = plan(to_scene(request, service.runs.surface))
+    return {**vars(found), "effects": [vars(effect) for effect in found.effects]}

@@ -1,0 +1,18 @@
+"""The answer of ``POST /v1/scenes:explain``."""
+
+from pydantic import BaseModel, Field
+
+from app.schemas.response import EffectModel
+
+
+class PlanResponse(BaseModel):
+    """What a prediction of a scene would be."""
+
+    dimensions: int = Field(description="2 where the motion is planar, else 3.", examples=[2])
+    reason: str = Field(description="Why so many, in words.", examples=["all lies in one plane"])
+    effects: list[EffectModel] = Field(description="Which effects the scene calls for, and why.")
+    method: str = Field(description="How it would be solved.", examples=["march"])
+    n_u: int = Field(description="Control points along the cable.", examples=[25])
+    n_t: int = Field(description="Control points in time.", examples=[33])
+    steps: int = Field(description="Time steps of the march.", examples=[160])
+    expected_time: float = Field(description="About how long a solve would take [s].", examples=[0.02])
