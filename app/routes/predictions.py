@@ -26,7 +26,7 @@ from dlocore.prediction import Status
 
 router = APIRouter(prefix="/v1/predictions", tags=["predictions"], route_class=JsonRoute)
 _ISO = re.compile(r"\d{4}-\d\d-\d\d[Tt ]\d\d:\d\d(:\d\d([.,]\d+)?)?([Zz]|[+-]\d\d:?\d\d)", re.ASCII)
-CANCEL_TIME = 1.0  # s to wait for a cancelled solve; an iteration on the finest grids takes longer
+CANCEL_TIME = 1.0  # s to wait for a cancelled solve to stop
 
 
 def _iso(value: str) -> str:

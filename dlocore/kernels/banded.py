@@ -11,8 +11,14 @@ from dlocore.kernels.compile import kernel
 @kernel
 def factor(A: Any) -> int:
     """Factor A = L D L' in place; return -1, or the column where a pivot is not positive (A is then spoilt)."""
+    return factor_columns(A, 0, A.shape[0])
+
+
+@kernel
+def factor_columns(A: Any, start: int, stop: int) -> int:
+    """Factor the columns `start` to `stop` of A, those before them being factored; return as `factor`."""
     n, width = A.shape
-    for j in range(n):
+    for j in range(start, stop):
         pivot = A[j, 0]
         if not pivot > 0.0:
             return j

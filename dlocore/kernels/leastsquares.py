@@ -6,7 +6,7 @@ import numpy as np
 
 from dlocore.effects.laws import DAMPING, QUADRATIC_DRAG
 from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, multiply_scalar_band
-from dlocore.kernels.banded import factor, reduce_matrix, reduce_vector, solve
+from dlocore.kernels.banded import factor, reduce_matrix, reduce_vector
 from dlocore.kernels.compile import kernel
 
 
@@ -93,8 +93,9 @@ def states_at(first: Any, table: Any, C: Any, out: Any) -> None:
 def normal_equations(
     axes: Any, C: Any, first: Any, table: Any, weights: Any, h: float, mass: Any, drag: Any, tables: Any, active: Any,
     p: Any, memory: Any, applied: Any, e: Any, geometric: float, A: Any, right: Any, forces: Any, tangent: bool,
+    begin: int, end: int,
 ) -> float:  # fmt: skip
-    """Write the normal equations of the weighted least squares at the iterate C; return its objective [J].
+    """Add points to the normal equations of the weighted least squares at C; return their part of the objective [J].
 
     The objective is (1/T) sum_k w_k |W_k Z' R_k|^2 with the residual R = M a + C v + f(q, v) - F of the motion at the
     collocation point k and W'W = G^-1 B G^-1, B = 12/h^2 M + 2/h C, G = B + K+ (docs/model.md eq. 16).
@@ -109,9 +110,11 @@ def normal_equations(
         applied: (1 or k, n, nc) [N].
         e: elimination of the held degrees of freedom.
         geometric: 1 for the full tangent in the Jacobian, 0 for its positive semidefinite part.
-        A, right: normal matrix, banded ((n_t - 2) free, 4 free), and right side; untouched where `tangent` is False.
+        A, right: normal matrix, banded ((n_t - 2) free, 4 free), and right side, which are added to; untouched where
+            `tangent` is False.
         forces: (k, held) residual at the held degrees of freedom: the forces that hold them [N]; written.
         tangent: whether A and right are wanted.
+        begin, end: collocation points to add.
     """
     nc = len(axes)
     n = C.shape[1]
@@ -144,12 +147,9 @@ def normal_equations(
     r = np.empty((free, 1))
     state = np.empty((3, n, nc))
     viscous = active[DAMPING] != 0 or active[QUADRATIC_DRAG] != 0
-    if tangent:
-        A[:] = 0.0
-        right[:] = 0.0
     objective = 0.0
     total = np.sum(weights)
-    for k in range(len(weights)):
+    for k in range(begin, end):
         states_at(first[k], table[k], C, state)
         q, v, a = state[0], state[1], state[2]
         assemble(axes, q, v, tables, active, p, memory, memory, NO_RATES, (1.0, 0.0, 0.0), f, K)
@@ -222,15 +222,3 @@ def normal_equations(
                             value = ab * XY[c, d] + ba * XY[d, c] + bb * YY[c, d] + bc * YZ[c, d] + cb * YZ[d, c]
                             A[column + c, shift + d - c] += value
     return objective
-
-
-@kernel
-def damped_step(A: Any, right: Any, damping: float) -> Any:
-    """Return the step -(A + damping diag A)^-1 right, and whether the factors were positive; A is spoilt."""
-    for i in range(len(A)):
-        A[i, 0] *= 1.0 + damping
-    if factor(A) >= 0:
-        return np.zeros(len(right)), False
-    x = -right
-    solve(A, x)
-    return x, True

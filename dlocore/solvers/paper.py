@@ -53,7 +53,9 @@ def solve_as_printed(
     grasps = closed_grasps(problem, 0.0, problem.horizon)
     starts: Starts = {}
     close_grasps(problem, grid, grasps, starts, None)
-    window = WindowSolver(problem, grid, windows[0], grasps, starts, grid.velocity, problem.stretch.axial_stiffness)
+    window = WindowSolver(
+        problem, grid, windows[0], grasps, starts, grid.velocity, problem.stretch.axial_stiffness, monitor
+    )
     times = np.linspace(0.0, problem.horizon, n_u * n_t + 1)[1:]
     first, table = basis_rows(knots_t, times, 2)
     applied = applied_forces(problem, grid, times)

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.discretisation import Grid, Starts, applied_forces, close_grasps, hold
-from dlocore.kernels.banded import expand_vector, place_held
+from dlocore.kernels.banded import expand_vector, factor_columns, place_held
+from dlocore.kernels.banded import solve as solve_factored
 from dlocore.kernels.basis import GAUSS_2, basis_rows
-from dlocore.kernels.leastsquares import damped_step, normal_equations
+from dlocore.kernels.leastsquares import normal_equations
 from dlocore.kernels.march import constrained_mass_solve, fit_time
 from dlocore.problem import Problem
 from dlocore.report import WindowForces
@@ -25,6 +26,7 @@ from dlocore.solvers.monitor import Monitor
 Floats = NDArray[np.float64]
 
 MAX_ITERATIONS = 40
+_CHUNK = 1.5e7  # about the multiplications between two looks at the clock
 _HISTORY = 4  # iterates that Anderson acceleration combines
 _DAMPING = 1e-6  # of the diagonal of normal equations that lost their positive factors to rounding
 _LARGEST_STEP = 0.25  # of the length, in one control point: beyond it a step is shortened
@@ -87,8 +89,9 @@ class WindowSolver:
         starts: Starts,
         velocity: Floats,
         axial_stiffness: float,
+        monitor: Monitor,
     ) -> None:
-        self.problem, self.grid, self.window = problem, grid, window
+        self.problem, self.grid, self.window, self.monitor = problem, grid, window, monitor
         self.nc = problem.plane.dimensions
         self.axes = tuple(range(self.nc))
         spans = np.flatnonzero(np.diff(window.knots))
@@ -126,16 +129,32 @@ class WindowSolver:
     def objective(self, control: Floats, tangent: bool, geometric: float = 1.0) -> tuple[float, Floats, Floats, Floats]:
         """Return the objective, eq. 16 [m^2], the normal matrix, its right side and the holding forces at `control`."""
         size = (len(control) - 2) * self.free
-        A = np.empty((size, 4 * self.free) if tangent else (1, 1))
-        right = np.empty(size)
+        A = np.zeros((size, 4 * self.free) if tangent else (1, 1))  # lazily: a large one is not cleared at once
+        right = np.zeros(size)
         forces = np.empty((len(self.times), len(self.held.elimination.held)))
-        value = normal_equations(
-            self.axes, control, self.first, self.table, self.weights, self.span, self.mass, self.drag, self.grid.tables,
-            self.active, self.parameters, self.grid.memory, self.applied, self.held.elimination, geometric, A, right,
-            forces, tangent,
-        )  # fmt: skip
+        value = 0.0
+        points = max(1, round(_CHUNK / self.free**3)) if tangent else len(self.times)
+        for begin in range(0, len(self.times), points):
+            self.monitor.check()
+            value += normal_equations(
+                self.axes, control, self.first, self.table, self.weights, self.span, self.mass, self.drag,
+                self.grid.tables, self.active, self.parameters, self.grid.memory, self.applied, self.held.elimination,
+                geometric, A, right, forces, tangent, begin, min(begin + points, len(self.times)),
+            )  # fmt: skip
         weight = 12.0 * self.problem.mass_density() / self.span**2 + 2.0 * self.problem.drag_coefficient() / self.span
         return value / (weight * self.problem.scene.cable.length), A, right, forces
+
+    def step(self, A: Floats, right: Floats, damping: float) -> tuple[Floats, bool]:
+        """Return the step -(A + damping diag A)^-1 right, and whether the factors were positive; A is spoilt."""
+        A[:, 0] *= 1.0 + damping
+        columns = max(1, round(_CHUNK / A.shape[1] ** 2))
+        for start in range(0, len(A), columns):
+            self.monitor.check()
+            if factor_columns(A, start, min(start + columns, len(A))) >= 0:
+                return np.zeros(len(right)), False
+        x = -right
+        solve_factored(A, x)
+        return x, True
 
     def expand(self, x: Floats) -> Floats:
         """Return the change (n, n_u, nc) of all control points for a step x of the free ones."""
@@ -197,7 +216,7 @@ def solve(problem: Problem, motion: March, knots_t: Floats, delta: float, monito
             rate = (4 * near.offsets[1] - 3 * near.offsets[0] - near.offsets[2]) / 2e-6
             mass = times_mass(grid.tables.mass, v)
             v = constrained_mass_solve(problem.plane.dimensions, grid.tables.mass, near.elimination, rate, mass)
-        solver = WindowSolver(problem, grid, window, grasps, starts, v, stiffness)
+        solver = WindowSolver(problem, grid, window, grasps, starts, v, stiffness, monitor)
         control = guess[i]
         control[0] = q
         control[1] = q + v * (window.knots[4] - window.knots[1]) / 3
@@ -242,12 +261,12 @@ def _iterate(
         value, A, right, _ = solver.objective(control, True, 0.0)
         if not np.isfinite(value):
             break
-        x, positive = damped_step(A, right, 0.0)
+        x, positive = solver.step(A, right, 0.0)
         damping = 0.0
         if not positive:
             _, A, right, _ = solver.objective(control, True, 0.0)
             damping = _DAMPING
-            x, positive = damped_step(A, right, damping)
+            x, positive = solver.step(A, right, damping)
         step = solver.expand(x)
         update = float(np.linalg.norm(step))
         if not np.isfinite(update):
