@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 
 import httpx
 import pytest
-from playwright.sync_api import Browser, ConsoleMessage, Page, sync_playwright
+from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
 
 FLAGS = [
     "--headless",
@@ -26,6 +26,7 @@ FLAGS = [
     "--enable-unsafe-swiftshader",
 ]
 ROOT = Path(__file__).parents[2]
+expect.set_options(timeout=60_000)  # [ms], as for the pages: without a GPU the first picture alone takes some seconds
 
 
 @dataclass
