@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dlocore.kernels.compile import kernel
+from dlocore.kernels.compile import kernel, law
 
 GAUSS_2 = np.polynomial.legendre.leggauss(2)
 GAUSS_3 = np.polynomial.legendre.leggauss(3)
@@ -158,6 +158,12 @@ def graded_knots(n: int, length: float, features: Any, multiplicity: Any, power:
                 k += 1
     knots[k:] = length
     return knots
+
+
+@law
+def row_of(table: Any, i: int) -> tuple[float, float, float, float]:
+    """Return row i of a table (points, 4) as scalars."""
+    return table[i, 0], table[i, 1], table[i, 2], table[i, 3]
 
 
 class Tables(NamedTuple):

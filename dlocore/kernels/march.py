@@ -10,7 +10,7 @@ from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_mat
 from dlocore.kernels.basis import basis_rows
 from dlocore.kernels.compile import kernel
 
-FAILED_STEP, NEWTON, FACTORISATIONS, ROBUST, LEFT = range(5)  # places in `info`
+FAILED_STEP, LEFT = range(2)  # places in `info`
 _REFRESH = 0.1  # contraction of the updates above which the old factors no longer serve
 _PLAIN_ITERATIONS = 8  # Newton iterations before a step is done again with a line search
 _ROBUST_ITERATIONS = 60
@@ -71,7 +71,7 @@ def march_steps(
         e: elimination of the held degrees of freedom.
         offsets: (steps + 1, held) their prescribed part [m].
         reactions: (steps + 1, held) forces that hold them [N]; written.
-        info: (5,) counters, see the names above; FAILED_STEP is -1, or the step that found no equilibrium.
+        info: (2,) the step that found no equilibrium, or -1, and the largest error that Newton's iterations left [m].
     """
     nc = len(axes)
     n = Q.shape[1]
@@ -130,7 +130,6 @@ def march_steps(
                 _residual(mass, drag, alpha_m, alpha_f, a, a1, v1, load, G, f, weighted, R)
                 reduce_vector(e, R.ravel(), x)
                 if refactor:
-                    info[FACTORISATIONS] += 1
                     _effective(nc, K, mass, drag, inertia, 1.0 - alpha_f, to_v)
                     reduce_matrix(e, K, A)
                     if factor(A) >= 0:
@@ -147,7 +146,6 @@ def march_steps(
                 for i in range(free):
                     trial_x[i] = -x[i]
                 solve(A, trial_x)
-                info[NEWTON] += 1
                 expand_vector(e, trial_x, change)
                 update = 0.0  # largest step of a control point, the same in every frame
                 for i in range(n):
@@ -198,8 +196,6 @@ def march_steps(
                 previous = update
             if converged:
                 break
-            if attempt == 0:
-                info[ROBUST] += 1
         if not converged:
             info[FAILED_STEP] = k
             return

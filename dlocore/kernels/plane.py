@@ -9,13 +9,9 @@ from typing import Any
 import numpy as np
 
 from dlocore.effects.laws import DAMPING, axial_energy, axial_stress, body_force, curvature_energy, curvature_stress
+from dlocore.kernels.basis import row_of
 from dlocore.kernels.compile import law
 from dlocore.kernels.strain import plane_curvature, plane_hessian
-
-
-@law
-def _row(table: Any, i: int) -> tuple[float, float, float, float]:
-    return table[i, 0], table[i, 1], table[i, 2], table[i, 3]
 
 
 @law
@@ -43,7 +39,7 @@ def axial(q: Any, tables: Any, active: Any, p: Any, scales: Any, tangent: bool, 
     firsts, b1, weights = tables.axial_first, tables.axial_b1, tables.axial_w
     for n in range(len(weights)):
         k, w = firsts[n], weights[n]
-        b = _row(b1, n)
+        b = row_of(b1, n)
         x, y = _combine(q, k, b)
         square = x * x + y * y
         length = np.sqrt(square)
@@ -75,7 +71,7 @@ def curvature(
     firsts, b1, b2, weights = tables.curvature_first, tables.curvature_b1, tables.curvature_b2, tables.curvature_w
     for n in range(len(weights)):
         k, w = firsts[n], weights[n]
-        b, c = _row(b1, n), _row(b2, n)
+        b, c = row_of(b1, n), row_of(b2, n)
         ax, ay = _combine(q, k, b)
         cx, cy = _combine(q, k, c)
         kappa, J = plane_curvature(ax, ay, cx, cy)
@@ -125,8 +121,8 @@ def remember(q: Any, tables: Any, past: Any) -> None:
     """Make kappa of q the last one in `past` (points, 2), and the last one the one before."""
     for n in range(len(past)):
         k = tables.curvature_first[n]
-        ax, ay = _combine(q, k, _row(tables.curvature_b1, n))
-        cx, cy = _combine(q, k, _row(tables.curvature_b2, n))
+        ax, ay = _combine(q, k, row_of(tables.curvature_b1, n))
+        cx, cy = _combine(q, k, row_of(tables.curvature_b2, n))
         past[n, 1] = past[n, 0]
         past[n, 0] = plane_curvature(ax, ay, cx, cy)[0]
 
@@ -138,7 +134,7 @@ def body(q: Any, v: Any, tables: Any, active: Any, p: Any, scales: Any, tangent:
     firsts, b0, weights = tables.body_first, tables.body_b0, tables.body_w
     for n in range(len(weights)):
         k, w = firsts[n], weights[n]
-        b = _row(b0, n)
+        b = row_of(b0, n)
         x, y = _combine(q, k, b)
         vx, vy = _combine(v, k, b)
         force, stiffness, viscosity = body_force(active, p, (x, y, 0.0), (vx, vy, 0.0))
@@ -160,12 +156,12 @@ def energy(q: Any, tables: Any, active: Any, p: Any, memory: Any) -> float:
     """Return the stored energy [J]."""
     total = 0.0
     for n in range(len(tables.axial_w)):
-        x, y = _combine(q, tables.axial_first[n], _row(tables.axial_b1, n))
+        x, y = _combine(q, tables.axial_first[n], row_of(tables.axial_b1, n))
         total += tables.axial_w[n] * axial_energy(active, p, np.sqrt(x * x + y * y) - 1.0)
     for n in range(len(tables.curvature_w)):
         k = tables.curvature_first[n]
-        ax, ay = _combine(q, k, _row(tables.curvature_b1, n))
-        cx, cy = _combine(q, k, _row(tables.curvature_b2, n))
+        ax, ay = _combine(q, k, row_of(tables.curvature_b1, n))
+        cx, cy = _combine(q, k, row_of(tables.curvature_b2, n))
         kappa, _ = plane_curvature(ax, ay, cx, cy)
         total += tables.curvature_w[n] * curvature_energy(active, p, (kappa, 0.0, 0.0), (memory[n, 0], 0.0, 0.0))
     return total

@@ -6,13 +6,9 @@ import numpy as np
 
 from dlocore.effects.base import Symmetric, Vector
 from dlocore.effects.laws import DAMPING, axial_energy, axial_stress, body_force, curvature_energy, curvature_stress
+from dlocore.kernels.basis import row_of
 from dlocore.kernels.compile import law
 from dlocore.kernels.strain import space_curvature, space_curvature_rate, space_moment, transport
-
-
-@law
-def _row(table: Any, i: int) -> tuple[float, float, float, float]:
-    return table[i, 0], table[i, 1], table[i, 2], table[i, 3]
 
 
 @law
@@ -46,7 +42,7 @@ def axial(q: Any, tables: Any, active: Any, p: Any, scales: Any, tangent: bool, 
     firsts, b1, weights = tables.axial_first, tables.axial_b1, tables.axial_w
     for n in range(len(weights)):
         k, w = firsts[n], weights[n]
-        b = _row(b1, n)
+        b = row_of(b1, n)
         x, y, z = _combine(q, k, b)
         square = x * x + y * y + z * z
         length = np.sqrt(square)
@@ -87,7 +83,7 @@ def curvature(
     S = np.empty((3, 3))
     for n in range(len(weights)):
         k, w = firsts[n], weights[n]
-        b, c = _row(b1, n), _row(b2, n)
+        b, c = row_of(b1, n), row_of(b2, n)
         length, h, t, kappa = space_curvature(_combine(q, k, b), _combine(q, k, c))
         rate = (0.0, 0.0, 0.0)
         if active[DAMPING] and rates[0] != 0.0:
@@ -154,8 +150,8 @@ def remember(q: Any, tables: Any, past: Any) -> None:
     """Make kappa and t of q the last ones in `past` (points, 9), and the last kappa, carried along, the one before."""
     for n in range(len(past)):
         k = tables.curvature_first[n]
-        a = _combine(q, k, _row(tables.curvature_b1, n))
-        _, _, t, kappa = space_curvature(a, _combine(q, k, _row(tables.curvature_b2, n)))
+        a = _combine(q, k, row_of(tables.curvature_b1, n))
+        _, _, t, kappa = space_curvature(a, _combine(q, k, row_of(tables.curvature_b2, n)))
         before = transport(_vector(past, n, 6), t, _vector(past, n, 0))
         for d in range(3):
             past[n, 3 + d] = before[d]
@@ -170,7 +166,7 @@ def body(q: Any, v: Any, tables: Any, active: Any, p: Any, scales: Any, tangent:
     firsts, b0, weights = tables.body_first, tables.body_b0, tables.body_w
     for n in range(len(weights)):
         k, w = firsts[n], weights[n]
-        b = _row(b0, n)
+        b = row_of(b0, n)
         force, S, V = body_force(active, p, _combine(q, k, b), _combine(v, k, b))
         for i in range(4):
             f[k + i, 0] -= w * b[i] * force[0]
@@ -191,12 +187,12 @@ def energy(q: Any, tables: Any, active: Any, p: Any, memory: Any) -> float:
     """Return the stored energy [J]."""
     total = 0.0
     for n in range(len(tables.axial_w)):
-        x, y, z = _combine(q, tables.axial_first[n], _row(tables.axial_b1, n))
+        x, y, z = _combine(q, tables.axial_first[n], row_of(tables.axial_b1, n))
         total += tables.axial_w[n] * axial_energy(active, p, np.sqrt(x * x + y * y + z * z) - 1.0)
     for n in range(len(tables.curvature_w)):
         k = tables.curvature_first[n]
-        a = _combine(q, k, _row(tables.curvature_b1, n))
-        kappa = space_curvature(a, _combine(q, k, _row(tables.curvature_b2, n)))[3]
+        a = _combine(q, k, row_of(tables.curvature_b1, n))
+        kappa = space_curvature(a, _combine(q, k, row_of(tables.curvature_b2, n)))[3]
         rest = (memory[n, 0], memory[n, 1], memory[n, 2])
         total += tables.curvature_w[n] * curvature_energy(active, p, kappa, rest)
     return total

@@ -12,7 +12,6 @@ from dlocore.kernels.basis import graded_knots
 from dlocore.kernels.march import (
     FAILED_STEP,
     LEFT,
-    NEWTON,
     constrained_mass_solve,
     fit_time,
     initial_state,
@@ -62,7 +61,6 @@ class March:
         stopped: why it ended there: "" (the end), "step" (no equilibrium) or "time" (deadline).
         rho: spectral radius it was marched with.
         split: steps that found equilibrium only in smaller ones.
-        newton: Newton iterations.
         largest_strain: largest |axial strain| of the motion.
         update: largest error left by the Newton iterations of a step, as estimated [m].
     """
@@ -76,7 +74,6 @@ class March:
     stopped: str
     rho: float
     split: int
-    newton: int
     largest_strain: float
     update: float
 
@@ -157,7 +154,7 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
     states[0] = grid.start
     v = grid.velocity.copy()
     velocity = v
-    info = np.zeros(5)
+    info = np.zeros(2)
     info[FAILED_STEP] = -1
     starts: Starts = {}
     forces: list[WindowForces] = []
@@ -253,7 +250,7 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
         first = last
     states[reached + 1 :] = states[reached]
     return March(
-        grid, times, states, velocity, tuple(forces), reached, stopped, rho, split, int(info[NEWTON]),
+        grid, times, states, velocity, tuple(forces), reached, stopped, rho, split,
         float(largest_strain(axes, states, grid.tables)), float(info[LEFT]),
     )  # fmt: skip
 
