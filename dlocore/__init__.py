@@ -4,9 +4,10 @@ from typing import TYPE_CHECKING, Any
 
 from dlocore.cable import PRESETS, Cable
 from dlocore.errors import Cancelled, DloError, SceneError
+from dlocore.obstacles import Box, Capsule, Cylinder, Sphere
 from dlocore.paths import Move, Still, Waypoints
-from dlocore.prediction import Accuracy, EffectReport, GraspReaction, Iteration, Prediction
-from dlocore.scene import ControlPoints, Environment, Grasp, Load, Points, Quality, Scene, Straight, Table
+from dlocore.prediction import Accuracy, EffectReport, GraspReaction, Iteration, MaterialMotion, Prediction, continued
+from dlocore.scene import ControlPoints, Environment, Grasp, Load, Material, Points, Quality, Scene, Straight, Table
 from dlocore.spline import SplineSurface
 
 if TYPE_CHECKING:
@@ -18,9 +19,12 @@ if TYPE_CHECKING:
 __all__ = [
     "PRESETS",
     "Accuracy",
+    "Box",
     "Cable",
     "Cancelled",
+    "Capsule",
     "ControlPoints",
+    "Cylinder",
     "DloError",
     "EffectReport",
     "Environment",
@@ -29,6 +33,8 @@ __all__ = [
     "GraspReaction",
     "Iteration",
     "Load",
+    "Material",
+    "MaterialMotion",
     "Move",
     "Plan",
     "Points",
@@ -36,11 +42,13 @@ __all__ = [
     "Quality",
     "Scene",
     "SceneError",
+    "Sphere",
     "SplineSurface",
     "Still",
     "Straight",
     "Table",
     "Waypoints",
+    "continued",
     "effect_forces",
     "energies",
     "equilibrium",

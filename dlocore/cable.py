@@ -28,9 +28,13 @@ class Cable:
         youngs_modulus: E [Pa].
         shear_modulus: G [Pa].
         bending_damping: internal damping on the rate of curvature [N m^2 s].
-        torsional_damping: internal damping on the rate of twist [N m^2 s]; not modelled yet, must be 0.
-        yield_strain: the paper's eps_M; not modelled yet, must be absent.
-        memory_rate: the paper's k_eps [1/s]; not modelled yet, must be absent.
+        torsional_damping: internal damping on the rate of twist [N m^2 s].
+        yield_strain: the paper's eps_M in bending, a strain of the outermost fibre: the cable yields at the curvature
+            2 eps_M/D (docs/model.md). None: elastic in bending.
+        yield_twist: eps_M in twist, a shear of the outermost fibre: it yields at the twist rate 2 eps_M/D.
+        yield_stretch: eps_M of the axial strain.
+        memory_rate: the paper's k_eps [1/s], how fast what yields is remembered; needed with any yield strain.
+        hardening: what of the remembered strain resists as a back stress, 0 (the paper's law) to 1.
         rest_shape: the stress-free shape: "straight", "initial" (that of the start shape) or points (n, 2 or 3) [m].
 
     Raises:
@@ -48,7 +52,10 @@ class Cable:
     bending_damping: float = 0.0
     torsional_damping: float = 0.0
     yield_strain: float | None = None
+    yield_twist: float | None = None
+    yield_stretch: float | None = None
     memory_rate: float | None = None
+    hardening: float = 0.1
     rest_shape: str | ArrayLike = "straight"
 
     def __post_init__(self) -> None:
@@ -79,11 +86,18 @@ class Cable:
                 self.bending_stiffness if modulus is None else modulus * math.pi * diameter**4 / 32,
             )
         put("bending_damping", number("bending_damping", self.bending_damping, at_least=0.0, unit="N m^2 s"))
-        if number("torsional_damping", self.torsional_damping, at_least=0.0, unit="N m^2 s") > 0:
-            raise SceneError("torsional_damping", self.torsional_damping, "0", "Twist is not modelled yet")
-        for name in ("yield_strain", "memory_rate"):
+        put("torsional_damping", number("torsional_damping", self.torsional_damping, at_least=0.0, unit="N m^2 s"))
+        yields = ("yield_strain", "yield_twist", "yield_stretch")
+        for name in yields:
             if getattr(self, name) is not None:
-                raise SceneError(name, getattr(self, name), "absent", "Plasticity is not modelled yet")
+                put(name, number(name, getattr(self, name), above=0.0, at_most=10.0))
+                if self.memory_rate is None:
+                    raise SceneError("memory_rate", None, f"k_eps [1/s], since {name} is given", "It is missing")
+        if self.memory_rate is not None:
+            put("memory_rate", number("memory_rate", self.memory_rate, above=0.0, at_most=1e9, unit="1/s"))
+            if all(getattr(self, name) is None for name in yields):
+                raise SceneError("yield_strain", None, "eps_M, since memory_rate is given", "It is missing")
+        put("hardening", number("hardening", self.hardening, at_least=0.0, at_most=1.0))
         if isinstance(self.rest_shape, str):
             choice("rest_shape", self.rest_shape, ("straight", "initial"))
         else:

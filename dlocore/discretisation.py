@@ -1,19 +1,23 @@
 """A grid for a problem: knots, basis tables, held degrees of freedom and the start on them."""
 
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.effects import laws
 from dlocore.errors import SceneError
-from dlocore.kernels.banded import Elimination
-from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, Tables, basis_rows, build_tables, graded_knots
+from dlocore.grid import Grid
+from dlocore.holding import Starts, close_grasps, hold
+from dlocore.kernels.assembly import History, remember
+from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, Tables, build_tables, graded_knots
 from dlocore.kernels.relax import relax
+from dlocore.kernels.twisted import DIRECTOR, PAST, start_frames
 from dlocore.paths import Waypoints
 from dlocore.problem import Problem
-from dlocore.scene import Grasp, Points
-from dlocore.shape import fit_to_knots, start_curve, velocity_to_knots
+from dlocore.scene import Material, Points
+from dlocore.shape import SplineCurve, fit_to_knots, start_curve, velocity_to_knots
 
 Floats = NDArray[np.float64]
 
@@ -22,40 +26,6 @@ Floats = NDArray[np.float64]
 _INTERIOR = (0.6, 0.02)
 _END = (0.3, 0.04)
 _SAME = 1e-9  # of the length: features this close are one
-
-
-@dataclass(frozen=True, eq=False)
-class Grid:
-    """Space discretisation of a problem.
-
-    Attributes:
-        knots: (n_u + 4,) [m].
-        tables: basis functions at the quadrature points.
-        memory: curvature of the stress-free shape at the curvature points (points, 1 or 3) [1/m].
-        start: control points at t = 0 (n_u, nc) [m].
-        velocity: their given velocities, before grasps close (n_u, nc) [m/s].
-    """
-
-    knots: Floats
-    tables: Tables
-    memory: Floats
-    start: Floats
-    velocity: Floats
-
-    @property
-    def n_u(self) -> int:
-        """Number of control points."""
-        return len(self.knots) - 4
-
-    def rows(self, u: float, derivative: int = 0) -> tuple[int, Floats]:
-        """Return the first control point and the four basis functions, or derivatives, at `u` [m]."""
-        first, table = basis_rows(self.knots, np.array([u]), derivative)
-        return int(first[0]), table[0, derivative]
-
-    def at(self, q: Floats, u: float, derivative: int = 0) -> Floats:
-        """Return the value or derivative at `u` [m] of control points q (..., n_u, nc)."""
-        first, b = self.rows(u, derivative)
-        return b @ q[..., first : first + 4, :]
 
 
 def smallest_n_u(problem: Problem) -> int:
@@ -83,25 +53,74 @@ def make_grid(problem: Problem, n_u: int) -> Grid:
 def grid_on(problem: Problem, knots: Floats) -> Grid:
     """Return the grid of a problem on given knots (n_u + 4,) [m], with the start shape on it."""
     free_start, free_end = _free_ends(problem)
-    tables = build_tables(knots, free_start, free_end, *GAUSS_2, *GAUSS_3, *GAUSS_4)
-    nc = problem.plane.dimensions
-    memory = np.zeros((len(tables.curvature_w), 1 if nc == 2 else 3))
-    start = np.ascontiguousarray(problem.plane.points(fit_to_knots(problem.start, knots)))
-    given = velocity_to_knots(problem.start, knots)
-    velocity = np.zeros_like(start) if given is None else np.ascontiguousarray(problem.plane.vectors(given))
-    grid = Grid(knots, tables, memory, start, velocity)
+    tables = build_tables(knots, free_start, free_end, *GAUSS_2, *GAUSS_3, *GAUSS_4, problem.contact_spacing())
+    curve = problem.start
+    theta = None if curve.theta is None else fit_to_knots(curve.theta, knots)[:, 0]
+    start = np.ascontiguousarray(problem.coordinates(fit_to_knots(curve, knots), theta))
+    given = velocity_to_knots(curve, knots)
+    velocity = np.zeros_like(start) if given is None else np.ascontiguousarray(problem.rates(given))
+    grid = Grid(knots, tables, _no_history(problem, tables), start, velocity)
     waypoints = any(g.start == 0.0 and isinstance(g.path, Waypoints) for g in problem.scene.grasps)
-    if waypoints or len(problem.start.control_points) > 4:
-        start = consistent_start(problem, grid)
-        grid = Grid(knots, tables, memory, start, velocity)
-    return Grid(knots, tables, _memory(problem, grid), start, velocity)
+    if waypoints or len(curve.control_points) > 4:
+        if problem.twist is not None:
+            start_frames(knots, start, tables, start_director(problem), grid.history.past)
+        grid = replace(grid, start=consistent_start(problem, grid))
+    _write_history(problem, grid)
+    return grid
+
+
+def _no_history(problem: Problem, tables: Tables) -> History:
+    points, nc = len(tables.curvature_w), problem.nc
+    kept = points if problem.keeps_history else 0
+    columns = {2: 2, 3: 9, 4: PAST}[nc]
+    rubs = problem.friction is not None
+    lies = rubs and problem.on_table
+    return History(
+        memory=np.zeros((points, 2 if nc == 2 else 6)),
+        past=np.zeros((kept, columns)),
+        axial=np.zeros((len(tables.axial_w), 2)),
+        stick=np.zeros((len(tables.contact_w) if rubs else 0, 6)),
+        slide=np.zeros((len(tables.body_w) if lies else 0, 2)),
+    )
+
+
+def _write_history(problem: Problem, grid: Grid) -> None:
+    """Write what the start of a grid has behind it: its stress-free strain, and frames without twist along it."""
+    history = grid.history
+    if problem.twist is not None:
+        start_frames(grid.knots, grid.start, grid.tables, start_director(problem), history.past)
+    history.memory[:] = _memory(problem, grid, history)
+    if problem.start.material is not None:
+        _write_stretch(grid, history, problem.start.material)
+    if problem.keeps_history:
+        remember(problem.axes, grid.start, grid.tables, *problem.law_table(), history, 0.0, True)
+
+
+def start_director(problem: Problem) -> Floats:
+    """Return the director (3,) of the section at u = 0, where its theta is zero, at t = 0.
+
+    It is the remembered one, or the horizontal one to the left of the tangent.
+    """
+    tangent = problem.start(0.0, 1)[0]
+    tangent = tangent / np.linalg.norm(tangent)
+    material = problem.start.material
+    director = plane_director(tangent) if material is None else cast(Floats, material.director)
+    across = director - tangent * (tangent @ director)
+    return np.asarray(across / np.linalg.norm(across))
+
+
+def plane_director(tangent: Floats) -> Floats:
+    """Return the horizontal unit vector (3,) to the left of a tangent (3,); x for a vertical one."""
+    left = np.array([-tangent[1], tangent[0], 0.0])
+    size = float(np.linalg.norm(left))
+    return left / size if size > 1e-9 * float(np.linalg.norm(tangent)) else np.array([1.0, 0.0, 0.0])
 
 
 def _features(problem: Problem) -> tuple[Floats, NDArray[np.int64], Floats, Floats]:
     """Return sorted coordinates of grasps and loads, knot multiplicities, grading exponents and widths."""
     length = problem.scene.cable.length
     found: dict[float, tuple[int, float, float]] = {}
-    places = [(g.u, 2 if g.hold == "tangent" else 1) for g in problem.scene.grasps]
+    places = [(g.u, 1 if g.hold == "point" else 2) for g in problem.scene.grasps]
     places += [(load.u, 1) for load in problem.scene.loads]
     for place, multiplicity in places:
         u = next((v for v in found if abs(v - place) <= _SAME * length), place)
@@ -120,7 +139,7 @@ def _free_ends(problem: Problem) -> tuple[bool, bool]:
 
     def free(end: float) -> bool:
         for g in problem.scene.grasps:
-            if abs(g.u - end) <= _SAME * length and g.hold == "tangent":
+            if abs(g.u - end) <= _SAME * length and g.hold != "point":
                 return g.start > 0 or g.release_time is not None
         return True
 
@@ -135,134 +154,93 @@ def plane_curvature_of(tables: Tables, q: Floats) -> Floats:
     return ((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / (a * a).sum(axis=1))[:, None]
 
 
-def _memory(problem: Problem, grid: Grid) -> Floats:
-    rest = problem.scene.cable.rest_shape
-    if (isinstance(rest, str) and rest == "straight") or problem.plane.dimensions == 3:
-        return grid.memory
+def _memory(problem: Problem, grid: Grid, history: History) -> Floats:
+    """Return the stress-free strain at the curvature points, and its natural value, (points, 2 m)."""
+    rest, material = problem.scene.cable.rest_shape, problem.start.material
+    nc = problem.nc
+    if nc == 3:
+        return history.memory
+    if material is not None:
+        return _remembered(problem, grid, material, problem.start(0.0, 1)[0])
+    if isinstance(rest, str) and rest == "straight":
+        return history.memory
     if isinstance(rest, str):
-        return plane_curvature_of(grid.tables, grid.start)
-    curve = start_curve(Points(points=rest), problem.scene.cable.length)
-    return plane_curvature_of(grid.tables, problem.plane.points(fit_to_knots(curve, grid.knots)))
+        curve: SplineCurve = problem.start
+    else:
+        curve = start_curve(Points(points=rest), problem.scene.cable.length)
+    natural = problem.coordinates(fit_to_knots(curve, grid.knots))
+    if nc == 2:
+        kappa = plane_curvature_of(grid.tables, natural if curve is not problem.start else grid.start)
+        return np.concatenate([kappa, kappa], axis=1)
+    # the bends of the natural curve in a frame without twist that starts like that of the sections
+    frames = np.zeros_like(history.past)
+    own = natural if curve is not problem.start else grid.start
+    start_frames(grid.knots, own, grid.tables, plane_director(curve(0.0, 1)[0]), frames)
+    first, second = frames[:, DIRECTOR : DIRECTOR + 3], np.cross(frames[:, :3], frames[:, DIRECTOR : DIRECTOR + 3])
+    bends = frames[:, 3:6]
+    strain = np.column_stack([(bends * first).sum(1), (bends * second).sum(1), np.zeros(len(bends))])
+    return np.concatenate([strain, strain], axis=1)
+
+
+def write_material(problem: Problem, grid: Grid, q: Floats, history: History, material: Material) -> None:
+    """Write what the sections remember at the state q (n_u, nc) of a motion of this problem into a history."""
+    if problem.nc != 3:
+        tangent = problem.plane.world_vectors(grid.at(q, 0.0, 1)[: problem.plane.dimensions])
+        history.memory[:] = _remembered(problem, grid, material, tangent)
+    _write_stretch(grid, history, material)
+
+
+def _write_stretch(grid: Grid, history: History, material: Material) -> None:
+    if material.stretch is not None:
+        history.axial[:, 0] = np.interp(grid.tables.axial_u, cast(Floats, material.u), cast(Floats, material.stretch))
+
+
+def _remembered(problem: Problem, grid: Grid, material: Material, tangent: Floats) -> Floats:
+    """Return the stress-free strain at the curvature points, and its natural value, (points, 2 m), of a material.
+
+    `tangent` (3,) is that at u = 0, where the material's director lies.
+    """
+    u = grid.tables.curvature_u
+    columns = [np.zeros(len(u))] * 6
+    for k, values in enumerate((material.memory, material.natural)):
+        if values is not None:
+            for d in range(3):
+                columns[3 * k + d] = np.interp(u, cast(Floats, material.u), cast(Floats, values)[:, d])
+    sections = np.column_stack(columns)
+    return sections if problem.nc == 4 else _planar_memory(problem, sections, cast(Floats, material.director), tangent)
+
+
+def _planar_memory(problem: Problem, sections: Floats, director: Floats, tangent: Floats) -> Floats:
+    """Return the signed curvatures (points, 2) in the solve's plane of bends (points, 6) in the sections' frame."""
+    normal = np.cross(problem.plane.axes[0], problem.plane.axes[1])
+    first = np.cross(normal, tangent / np.linalg.norm(tangent))
+    along, across = float(director @ first), float(director @ normal)
+    # the second director is t x director
+    return np.column_stack(
+        [along * sections[:, 0] - across * sections[:, 1], along * sections[:, 3] - across * sections[:, 4]]
+    )
 
 
 def consistent_start(problem: Problem, grid: Grid) -> Floats:
-    """Return start control points (n_u, nc) of unit speed that pass exactly through the held points of the curve."""
+    """Return start control points (n_u, nc) of unit speed that pass exactly through the held points of the curve.
+
+    What the knots leave inside the table or an obstacle is pushed out.
+    """
     grasps = [g for g in problem.scene.grasps if g.start == 0.0]
     starts: Starts = {}
     close_grasps(problem, grid, grasps, starts, None)
-    held = hold(problem, grid, grasps, np.zeros(1), starts)
+    held = hold(problem, grid, grasps, np.zeros(1), starts, grid.start)
     active, parameters = problem.law_table()
-    active[:] = 0
-    active[0] = 1
+    kept = [laws.STRETCH, laws.CONTACT, laws.TABLE]
+    active[[row for row in range(laws.COUNT) if row not in kept]] = 0
     strength = 1e-3 * parameters[0, 0] * (grid.n_u / problem.scene.cable.length) ** 2
     q = grid.start.copy()
     relax(
-        tuple(range(problem.plane.dimensions)), q, grid.start.copy(), strength, np.zeros_like(q), grid.tables, active,
-        parameters, grid.memory, held.elimination, held.offsets[0], 1e-10 * problem.scene.cable.length, 50,
+        problem.axes, q, grid.start.copy(), strength, np.zeros_like(q), grid.tables, active, parameters, grid.history,
+        held.elimination, held.offsets[0], 1e-10 * problem.scene.cable.length, 50,
     )  # fmt: skip
+    q[:, 3:] = grid.start[:, 3:]  # the angle of the sections is none of its business
     return q
-
-
-@dataclass(frozen=True, eq=False)
-class Held:
-    """Held degrees of freedom over a stretch of time.
-
-    Attributes:
-        grasps: those that hold, in the scene's order.
-        elimination: for the compiled kernels.
-        offsets: (k, held) [m] prescribed part of the held degrees of freedom at the k times.
-        rows: constraint rows per coordinate: (grasp, derivative) in the order of `inverse`.
-        inverse: (rows, rows) inverse of the constraint rows' pivot block.
-    """
-
-    grasps: tuple[Grasp, ...]
-    elimination: Elimination
-    offsets: Floats
-    rows: tuple[tuple[int, int], ...]
-    inverse: Floats
-
-    def multipliers(self, reactions: Floats, nc: int) -> Floats:
-        """Return the multipliers (k, rows, nc) of the constraint rows for forces (k, held) at the held ones [N]."""
-        return self.inverse.T @ reactions.reshape(len(reactions), -1, nc)
-
-
-Starts = dict[Grasp, tuple[Floats, Floats]]  # position and unit tangent (nc,) where the path of a grasp begins
-
-
-def close_grasps(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, q: Floats | None) -> None:
-    """Note where the paths of newly closed `grasps` begin: on the start curve at t = 0, else on q (n_u, nc)."""
-    for g in grasps:
-        if g in starts:
-            continue
-        if q is None or g.start == 0.0:
-            position = problem.plane.points(problem.start(g.u)[0])
-            tangent = problem.plane.vectors(problem.start(g.u, 1)[0])
-        else:
-            position, tangent = grid.at(q, g.u), grid.at(q, g.u, 1)
-        starts[g] = (position, tangent / np.linalg.norm(tangent))
-
-
-def hold(problem: Problem, grid: Grid, grasps: list[Grasp], t: Floats, starts: Starts) -> Held:
-    """Eliminate what `grasps` hold at the times t (k,) [s].
-
-    The rows b(u_g) q = p(t), and b'(u_g) q = d(t) where the direction is held (unit stretch there), are solved for one
-    pivot control point each (docs/model.md eq. 12).
-    """
-    nc = problem.plane.dimensions
-    size = sum(2 if g.hold == "tangent" else 1 for g in grasps)
-    A = np.zeros((size, grid.n_u))
-    target = np.empty((len(t), size, nc))
-    rows: list[tuple[int, int]] = []
-    for i, g in enumerate(grasps):
-        position, direction = starts[g]
-        for derivative in range(2 if g.hold == "tangent" else 1):
-            first, b = grid.rows(g.u, derivative)
-            r = len(rows)
-            A[r, first : first + 4] = b
-            path = problem.position if derivative == 0 else problem.direction
-            target[:, r] = path(g, t, position if derivative == 0 else direction)
-            rows.append((i, derivative))
-    pivots = _pivots(A, [r for r, (i, _) in enumerate(rows) if grasps[i].hold == "tangent"])
-    inverse = np.asarray(np.linalg.inv(A[:, pivots]), dtype=np.float64)
-    follow = -inverse @ A
-    follow[:, pivots] = 0.0
-    offsets: Floats = (inverse @ target).reshape(len(t), -1)
-    return Held(tuple(grasps), _elimination(grid.n_u, nc, pivots, follow), offsets, tuple(rows), inverse)
-
-
-def _pivots(A: Floats, first: list[int]) -> list[int]:
-    """Choose a pivot column for each row of A (rows, n_u): Gauss elimination, the rows `first` before the others.
-
-    A held direction has just two control points to choose from, so it chooses before its neighbours do.
-    """
-    if len(A) == 1:
-        return [int(np.argmax(np.abs(A[0])))]
-    work = A.copy()
-    pivots = [-1] * len(A)
-    for r in sorted(range(len(A)), key=lambda row: row not in first):
-        for s, p in enumerate(pivots):
-            if p >= 0:
-                work[r] -= work[r, p] / work[s, p] * work[s]
-        pivots[r] = int(np.argmax(np.abs(work[r])))
-    return pivots
-
-
-def _elimination(n_u: int, nc: int, pivots: list[int], follow: Floats) -> Elimination:
-    held = np.array([k * nc + d for k in pivots for d in range(nc)], dtype=np.int64)
-    index = np.zeros(n_u * nc, np.int64)
-    index[held] = -1 - np.arange(len(held))
-    free = np.flatnonzero(index == 0)
-    index[free] = np.arange(len(free))
-    start = [0]
-    dof: list[int] = []
-    coefficient: list[float] = []
-    for row in follow:
-        columns = np.flatnonzero(np.abs(row) > 1e-14)
-        for d in range(nc):
-            dof += [int(c) * nc + d for c in columns]
-            coefficient += [float(row[c]) for c in columns]
-            start.append(len(dof))
-    return Elimination(index, held, np.array(start, np.int64), np.array(dof, np.int64), np.array(coefficient, float))
 
 
 def applied_forces(problem: Problem, grid: Grid, t: Floats) -> Floats:
@@ -273,6 +251,6 @@ def applied_forces(problem: Problem, grid: Grid, t: Floats) -> Floats:
     applied = np.tile(steady, (len(t), 1, 1))
     for load in problem.scene.loads:
         first, b = grid.rows(load.u)
-        force = problem.plane.vectors(load.at(t))
+        force = problem.rates(load.at(t))
         applied[:, first : first + 4] += b[:, None] * force[:, None, :]
     return applied

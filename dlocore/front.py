@@ -8,12 +8,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.discretisation import Grid, smallest_n_u
+from dlocore.discretisation import smallest_n_u
 from dlocore.errors import SceneError
-from dlocore.prediction import Accuracy, Iteration, OnIteration, Prediction, Status
+from dlocore.frames import free_control, material_of
+from dlocore.prediction import Accuracy, Iteration, MaterialMotion, OnIteration, Prediction, Status
 from dlocore.problem import Problem, pose
 from dlocore.report import WindowForces, effect_reports, elastic_energy, reactions, surface_of
-from dlocore.scene import Quality, Scene
+from dlocore.review import called_for, neglected, objections
+from dlocore.scene import Method, Quality, Scene
 from dlocore.solvers.ladder import (
     ACCEPT,
     FINER,
@@ -29,12 +31,14 @@ from dlocore.solvers.march import RHO, STRONGLY_DAMPED, smallest_n_t
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.paper import solve_as_printed
 from dlocore.solvers.spacetime import solve
+from dlocore.spline import SplineSurface, uniform_knots
 
 Floats = NDArray[np.float64]
 
 SAFETY = 1.5  # times the distance to a finer march: what a slowly converging motion may be off beyond it
 AUTO_TARGET = 2e-3  # of the length: the target error of quality "auto"
 ROUGH = 0.05  # of the length: two grids that differ more are in no order yet: the next is marched with strong damping
+TOO_DEEP = 0.25  # of the diameter, in the table, an obstacle or itself
 TORN = 0.2  # axial strain: no cable of this kind follows
 
 
@@ -65,11 +69,21 @@ def predict(
     quality = scene.quality
     method = quality.method
     if method == "auto":
-        method = "march" if quality.n_u is None else "spacetime"
+        method = automatic_method(problem)
     if method == "march":
         outcome = (_climb if quality.n_u is None else _given)(problem, quality, monitor)
-        return _answer(problem, monitor, "march", outcome)
+        return _answer(monitor, "march", outcome)
     return _least_squares(problem, quality, monitor, method)
+
+
+def automatic_method(problem: Problem) -> Method:
+    """Return the method of quality "auto": the least squares on a given grid where the motion is smooth, else a march.
+
+    What touches, slips or yields does so at instants that a march steps over and collocation points miss.
+    """
+    jumps = ("plasticity", "self_contact")
+    smooth = problem.contact is None and problem.friction is None and not any(problem.choices[j].active for j in jumps)
+    return "spacetime" if problem.scene.quality.n_u is not None and smooth else "march"
 
 
 def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method: str) -> Prediction:
@@ -77,15 +91,16 @@ def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method:
     assert quality.n_u is not None
     assert quality.n_t is not None
     _check_n_t(problem, quality.n_t)
-    level = run_level(problem, quality.n_u, quality.n_t, given_steps(quality.n_t), monitor)
+    level = _level(problem, quality.n_u, quality.n_t, given_steps(quality.n_t), monitor)
+    problem = level.problem
     if level.motion.stopped or level.motion.largest_strain > TORN:
-        return _answer(problem, monitor, "march", Outcome(level, *_march_status(problem, level), None))
-    grid, knots_t = level.motion.grid, level.knots_t
+        return _answer(monitor, "march", Outcome(level, *_march_status(problem, level), None))
+    knots_t = level.knots_t
     last = [level.control]
 
     def on_step(control: Floats, update: float, residual: float, damping: float = 0.0, length: float = 1.0) -> None:
         last[0] = control
-        _record(problem, grid, knots_t, control, update, residual, monitor, damping, length, method)
+        _record(problem, level, control, update, residual, monitor, damping, length, method)
 
     forces: tuple[WindowForces, ...] | None = None
     try:
@@ -93,12 +108,14 @@ def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method:
             solved = solve(problem, level.motion, knots_t, quality.delta, monitor, on_step)
             control, converged, update, forces = solved.control, solved.converged, solved.update, solved.forces
         else:
-            control, converged, update = solve_as_printed(problem, grid, knots_t, quality.delta, monitor, on_step)
+            control, converged, update = solve_as_printed(
+                problem, level.motion, knots_t, quality.delta, monitor, on_step
+            )
     except TimeIsUp:
         monitor.phase(method)
         level = replace(level, control=last[0])
         message = "The time limit passed; this is the last iterate. Allow more time or a coarser grid."
-        return _answer(problem, monitor, method, Outcome(level, "time_limit", message, None))
+        return _answer(monitor, method, Outcome(level, "time_limit", message, None))
     monitor.phase(method)
     count = len(monitor.iterations)
     status: Status = "converged" if converged else "max_iterations"
@@ -108,6 +125,8 @@ def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method:
             f"The update is still {update:.2g} m after {count} iterations, above delta = {quality.delta:g} m. "
             "Raise n_u and n_t, allow a larger delta, or take method march."
         )
+    if problem.self_contact is not None:
+        message += " The least squares does not know of contact of the cable with itself; method march does."
     if not converged and method == "spacetime":
         message += " The surface is that of the march it started from."
         control, forces = level.control, None
@@ -117,7 +136,7 @@ def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method:
         control = level.control
     level = replace(level, control=control)
     estimate = _companion(problem, quality, level, monitor) if method == "spacetime" or converged else None
-    return _answer(problem, monitor, method, Outcome(level, status, message, estimate), forces)
+    return _answer(monitor, method, Outcome(level, status, message, estimate), forces)
 
 
 def _companion(problem: Problem, quality: Quality, level: Level, monitor: Monitor) -> float | None:
@@ -159,10 +178,43 @@ def _given(problem: Problem, quality: Quality, monitor: Monitor) -> Outcome:
     assert quality.n_u is not None
     assert quality.n_t is not None
     _check_n_t(problem, quality.n_t)
-    level = run_level(problem, quality.n_u, quality.n_t, given_steps(quality.n_t), monitor)
+    level = _level(problem, quality.n_u, quality.n_t, given_steps(quality.n_t), monitor)
+    problem = level.problem
     _record_level(problem, level, monitor)
     estimate = None if level.motion.stopped else _companion(problem, quality, level, monitor)
     return Outcome(level, *_march_status(problem, level), estimate)
+
+
+def _level(
+    problem: Problem,
+    n_u: int,
+    n_t: int,
+    steps: int,
+    monitor: Monitor,
+    rho: float = RHO,
+    free_knots: bool = False,
+    rough: bool = False,
+    known: Level | None = None,
+) -> Level:
+    """March on one grid; where the motion calls for effects that were left out, again with them.
+
+    On a `rough` grid, which another follows, strands that meet may do so because of the grid. A march of this grid that
+    is `known` is not done again.
+    """
+    called = dict(problem.called_for)
+    while True:
+        if free_knots:
+            n_u, n_t = max(n_u, smallest_n_u(problem)), max(n_t, smallest_n_t(problem))
+        level = known or run_level(problem, n_u, n_t, steps, monitor, rho=rho, free_knots=free_knots)
+        known = None
+        new = {} if level.motion.stopped == "time" else called_for(level)
+        if rough:
+            new.pop("self_contact", None)
+        if not new:
+            return level
+        _record_level(problem, replace(level, note=f"calls for {', '.join(new)}"), monitor)
+        called |= new
+        problem = pose(problem.scene, called)
 
 
 def _climb(problem: Problem, quality: Quality, monitor: Monitor) -> Outcome:
@@ -177,11 +229,17 @@ def _climb(problem: Problem, quality: Quality, monitor: Monitor) -> Outcome:
         try:
             if best is not None:
                 monitor.check()
-            level = run_level(problem, *stretched(problem, i), monitor, rho=rho)
+            level = _level(problem, *stretched(problem, i), monitor, rho, free_knots=True, rough=True)
+            if best is not None and level.posed is problem:
+                level = replace(level, change=distance(best, level, problem))
+                if level.change <= ROUGH * problem.scene.cable.length:  # so strands do not meet because of the grid
+                    level = _level(problem, *stretched(problem, i), monitor, rho, free_knots=True, known=level)
+            if level.posed is not problem:
+                best = None  # another motion: the grid before says nothing about it
+            problem = level.posed  # a rough grid may have needed contact that is too stiff for a fine one
         except TimeIsUp:
             break
         if best is not None:
-            level = replace(level, change=distance(best, level, problem))
             estimate = extrapolated(level.change, best.change)
             if level.motion.stopped and not best.motion.stopped:
                 status, message = _march_status(problem, level)
@@ -224,6 +282,10 @@ def _march_status(problem: Problem, level: Level) -> tuple[Status, str]:
         advice = "Bring the grasps no farther apart than the cable between them, or make the motion slower."
         push = "A straight cable pushed along itself has no side to buckle to: start it slightly bent."
         return "stalled", f"{strain} {advice} {push}"
+    deep = motion.deepest / problem.scene.cable.diameter
+    if not motion.stopped and deep > TOO_DEEP:
+        pushed = f"The cable is pressed {deep:.0%} of its diameter into the table, an obstacle or itself."
+        return "stalled", f"{pushed} Take finer grids, or a motion that does not jam it."
     if not motion.stopped:
         split = f", {motion.split} of them in smaller steps" if motion.split else ""
         return "converged", f"Every time step found its equilibrium{split}."
@@ -241,13 +303,13 @@ def _record_level(problem: Problem, level: Level, monitor: Monitor) -> None:
     motion = level.motion
     note = "march" + (", strongly damped" if motion.rho == STRONGLY_DAMPED else "")
     note += f", {motion.split} steps in smaller ones" if motion.split else ""
-    _record(problem, motion.grid, level.knots_t, level.control, level.change, motion.update, monitor, 0.0, 1.0, note)
+    note += f", {level.note}" if level.note else ""
+    _record(problem, level, level.control, level.change, motion.update, monitor, 0.0, 1.0, note)
 
 
 def _record(
     problem: Problem,
-    grid: Grid,
-    knots_t: Floats,
+    level: Level,
     control: Floats,
     update: float,
     residual: float,
@@ -256,44 +318,50 @@ def _record(
     step_length: float,
     note: str,
 ) -> None:
+    grid = level.motion.grid
     monitor.report(
         Iteration(
             number=len(monitor.iterations),
             update=update,
             residual=residual,
-            energy=elastic_energy(problem, grid, np.ascontiguousarray(control[-1])),
+            energy=elastic_energy(problem, grid, np.ascontiguousarray(control[-1]), level.motion.history),
             wall_time=monitor.elapsed(),
             damping=damping,
             step_length=step_length,
             n_u=grid.n_u,
             n_t=len(control),
-            surface=surface_of(problem, grid, knots_t, control),
+            surface=_surface(problem, level, control),
             note=note,
         )
     )
 
 
 def _answer(
-    problem: Problem,
     monitor: Monitor,
     method: str,
     outcome: Outcome,
     forces: tuple[WindowForces, ...] | None = None,
 ) -> Prediction:
     level = outcome.level
+    problem = level.problem
     grid = level.motion.grid
-    surface = surface_of(problem, grid, level.knots_t, level.control)
+    surface = _surface(problem, level, level.control)
+    left_out = neglected(level)
+    estimate = None if outcome.estimate is None else outcome.estimate + left_out
+    message = " ".join([outcome.message, *[f"Note: {objection}." for objection in objections(level)]])
     return Prediction(
         scene=problem.scene,
         status=outcome.status,
-        message=outcome.message,
+        message=message,
         surface=surface,
         grasps=reactions(problem, grid, level.motion.forces if forces is None else forces),
-        report_effects=partial(effect_reports, problem, grid),
+        report_effects=partial(effect_reports, problem, grid, partial(_material, problem, level)),
+        report_material=partial(_material, problem, level),
         iterations=tuple(monitor.iterations),
         accuracy=Accuracy(
             method=method,
-            error_estimate=outcome.estimate,
+            error_estimate=estimate,
+            neglected=left_out,
             wall_time=monitor.elapsed(),
             n_u=grid.n_u,
             n_t=len(level.control),
@@ -303,29 +371,54 @@ def _answer(
             dimensions_reason=problem.plane.reason,
             phases=dict(monitor.phases),
         ),
-        start_energy=elastic_energy(problem, grid, grid.start),
+        start_energy=elastic_energy(problem, grid, grid.start, grid.history),
         start_fit=problem.start.fit_rms,
     )
+
+
+def _surface(problem: Problem, level: Level, control: Floats) -> SplineSurface:
+    grid = level.motion.grid
+    free = free_control(problem, grid, level.knots_t, control, level.motion.times, level.motion.frames)
+    return surface_of(problem, grid.knots, level.knots_t, free)
+
+
+def _material(problem: Problem, level: Level) -> MaterialMotion | None:
+    motion = level.motion
+    if len(motion.log) == 0 and not np.any(motion.grid.history.memory):
+        return None
+    memory, axial = motion.memory, motion.axial_memory
+    if len(motion.log) == 0:
+        memory = np.broadcast_to(motion.grid.history.memory[:, :1], (len(motion.times), len(motion.history.memory), 1))
+    if len(motion.log) == 0 or axial.shape[1] == 0:
+        axial = np.broadcast_to(motion.grid.history.axial[:, 0], (len(motion.times), len(motion.history.axial)))
+    return material_of(problem, motion.grid, motion.times, motion.states, memory, axial)
 
 
 def warm_up() -> None:
     """Compile, or load from the cache, every kernel, so that the first prediction is as fast as the next."""
     from dlocore.cable import Cable
+    from dlocore.effects.selfcontact import nearest_strands
     from dlocore.paths import Move
-    from dlocore.scene import Environment, Grasp, Points, Table
+    from dlocore.scene import Environment, Grasp, Points, Switch, Table
     from dlocore.statics import equilibrium
 
     cable = Cable.preset("paper", bending_damping=1e-4)
-    arc = np.linspace(0.0, 1.0, 12)[:, None] * [1.0, 0.0, 0.0] + 0.05 * np.sin(np.linspace(0, 3, 12))[:, None] * [
-        0,
-        1,
-        0,
-    ]
-    grasp = Grasp(u=0.3, hold="tangent", path=Move(displacement=(0.0, 0.01, 0.0), duration=1.0))
-    for table in (Table(), None):
+    u = np.linspace(0.0, 1.0, 12)[:, None]
+    arc = u * [1.0, 0.0, 0.0] + 0.05 * np.sin(3.0 * u) * [0.0, 1.0, 0.0]
+    grasp = Grasp(u=0.3, hold="clamp", path=Move(displacement=(0.0, 0.01, 0.0), duration=1.0))
+    kinds: tuple[tuple[Table | None, Switch], ...] = ((Table(), "auto"), (None, "auto"), (None, "on"))
+    for table, switch in kinds:  # two, three and four coordinates
         environment = Environment(drag=0.1, drag_quadratic=0.1, table=table)
         for quality in (Quality(), Quality(n_u=9, n_t=9)):
-            shape = Points(points=arc, settle=table is None)
-            scene = Scene(cable=cable, shape=shape, grasps=(grasp,), environment=environment, quality=quality)
+            scene = Scene(
+                cable=cable,
+                shape=Points(points=arc, settle=table is None),
+                grasps=(grasp,),
+                environment=environment,
+                effects={"twist": switch},
+                quality=quality,
+            )
             predict(scene)
         equilibrium(scene, n_u=9)
+    loop = np.column_stack([np.cos(np.linspace(0.0, 7.0, 9)), np.sin(np.linspace(0.0, 7.0, 9)), 0.1 * u[:9, 0]])
+    nearest_strands(uniform_knots(9, 1.0), loop[None], 3, 0.01, 0.03)

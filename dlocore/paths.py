@@ -44,6 +44,10 @@ class Still:
         """Rotations since the grasp began at times `t`; (k, 3, 3), or None where it never turns."""
         return None
 
+    def spin(self, t: Floats, tangents: Floats) -> Floats:
+        """Turn about the `tangents` (k, 3) between each two of the times `t` (k,) [s]; (k - 1,) [rad]."""
+        return np.zeros(len(t) - 1)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Move:
@@ -77,13 +81,23 @@ class Move:
         s = _PROFILES[self.profile](np.clip(t / self.duration, 0.0, 1.0))
         return Rotation.from_rotvec(s[:, None] * cast(Floats, self.rotation)).as_matrix()
 
+    def spin(self, t: Floats, tangents: Floats) -> Floats:
+        """Turn about the `tangents` (k, 3) between each two of the times `t` (k,) [s]; (k - 1,) [rad].
+
+        The angle of the tangent to the rotation vector stays, so this is exact.
+        """
+        if self.rotation is None:
+            return np.zeros(len(t) - 1)
+        s = _PROFILES[self.profile](np.clip(t / self.duration, 0.0, 1.0))
+        return np.diff(s) * float(tangents[0] @ cast(Floats, self.rotation))
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Waypoints:
     """Pass through `positions` (n, 3) [m] at `times` (n,) [s] along a C2 cubic spline that starts at rest.
 
     `orientations` (n, 4), unit quaternions (w, x, y, z), turn the grasp by their rotation since the first. The first
-    position must be that of the cable at the grasped point, within `dlocore.problem.GRASP_TOLERANCE`; the start
+    position must be that of the cable at the grasped point, within `dlocore.checks.GRASP_TOLERANCE`; the start
     shape is then brought to it.
     """
 
@@ -136,6 +150,21 @@ class Waypoints:
     def rotation_at(self, t: Floats) -> Floats | None:
         """Rotations since the grasp began at times `t`; (k, 3, 3), or None where it never turns."""
         return None if self.orientations is None else self._slerp(self._clip(t)).as_matrix()  # type: ignore[attr-defined]
+
+    def spin(self, t: Floats, tangents: Floats) -> Floats:
+        """Turn about the `tangents` (k, 3) between each two of the times `t` (k,) [s]; (k - 1,) [rad].
+
+        Between two waypoints the gripper turns the shorter way; a full turn needs three of them or more.
+        """
+        if self.orientations is None:
+            return np.zeros(len(t) - 1)
+        fine = np.unique(np.concatenate([t, cast(Floats, self.times)]))
+        turns = self._slerp(self._clip(fine))  # type: ignore[attr-defined]
+        steps = (turns[1:] * turns[:-1].inv()).as_rotvec()
+        at = np.clip(np.searchsorted(t, fine[:-1], side="right") - 1, 0, len(t) - 2)
+        inside = (fine[:-1] >= t[0]) & (fine[1:] <= t[-1])
+        along = (steps * tangents[at]).sum(axis=1)
+        return np.asarray(np.bincount(at[inside], along[inside], minlength=len(t) - 1), dtype=np.float64)
 
 
 Path = Still | Move | Waypoints

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from dlocore.discretisation import smallest_n_u
 from dlocore.errors import SceneError
+from dlocore.front import automatic_method
 from dlocore.prediction import EffectReport
 from dlocore.problem import pose
 from dlocore.report import planned_effects
@@ -12,7 +13,7 @@ from dlocore.solvers.ladder import FINER, given_steps, stretched
 from dlocore.solvers.march import smallest_n_t
 
 # Medians measured on one 2-core cloud machine of 2026; they tell the order of the time it takes.
-_MARCH = {2: 9e-7, 3: 2.2e-6}  # [s] per step and control point, by dimensions
+_MARCH = {2: 9e-7, 3: 2.2e-6, 4: 3.1e-6}  # [s] per step and control point, by coordinates
 _ITERATION = 2.5e-4  # [s] of the least squares
 _UNKNOWNS = 1.6e-9  # [s] per iteration, time span and cubed number of free coordinates
 _SETUP = 5e-4  # [s]
@@ -53,7 +54,7 @@ def plan(scene: Scene) -> Plan:
     quality = scene.quality
     method = quality.method
     if method == "auto":
-        method = "march" if quality.n_u is None else "spacetime"
+        method = automatic_method(problem)
     if quality.n_u is None or quality.n_t is None:
         n_u, n_t, steps = stretched(problem, _LEVEL)
         marches = [stretched(problem, i) for i in range(_LEVEL + 1)]
@@ -66,9 +67,9 @@ def plan(scene: Scene) -> Plan:
         if quality.estimate:
             marches.append((round(FINER * n_u), round(FINER * n_t), round(FINER * steps)))
     dimensions = problem.plane.dimensions
-    expected = _SETUP + sum(_MARCH[dimensions] * size * count for size, _, count in marches)
+    expected = _SETUP + sum(_MARCH[problem.nc] * size * count for size, _, count in marches)
     if method != "march":
-        expected += _ITERATIONS * (_ITERATION + _UNKNOWNS * n_t * (dimensions * n_u) ** 3)
+        expected += _ITERATIONS * (_ITERATION + _UNKNOWNS * n_t * (problem.nc * n_u) ** 3)
     return Plan(
         dimensions=dimensions,
         reason=problem.plane.reason,

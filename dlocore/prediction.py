@@ -8,8 +8,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.scene import Scene
-from dlocore.spline import SplineSurface
+from dlocore.errors import number
+from dlocore.scene import ControlPoints, Material, Scene
+from dlocore.spline import SplineSurface, design_matrix
 
 Floats = NDArray[np.float64]
 Status = Literal["converged", "max_iterations", "stalled", "time_limit"]
@@ -88,6 +89,40 @@ class GraspReaction:
     moment: Floats
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MaterialMotion:
+    """What the sections of the cable remember, over time; see `dlocore.Material`.
+
+    Attributes:
+        times: (m,) [s].
+        director: (m, 3), at u = 0.
+        u: (k,) [m].
+        memory: (m, k, 3) [1/m, 1/m, rad/m].
+        stretch: (m, k).
+        natural: (k, 3) [1/m, 1/m, rad/m].
+    """
+
+    times: Floats
+    director: Floats
+    u: Floats
+    memory: Floats
+    stretch: Floats
+    natural: Floats
+
+    def at(self, t: float) -> Material:
+        """Return what the sections remember at time `t` [s], linear between the stored times."""
+        k = int(np.clip(np.searchsorted(self.times, t) - 1, 0, len(self.times) - 2))
+        s = float(np.clip((t - self.times[k]) / (self.times[k + 1] - self.times[k]), 0.0, 1.0))
+        director = (1 - s) * self.director[k] + s * self.director[k + 1]
+        return Material(
+            director=director / np.linalg.norm(director),
+            u=self.u,
+            memory=(1 - s) * self.memory[k] + s * self.memory[k + 1],
+            stretch=(1 - s) * self.stretch[k] + s * self.stretch[k + 1],
+            natural=self.natural,
+        )
+
+
 @dataclass(frozen=True, kw_only=True)
 class Accuracy:
     """What the answer is worth and what it cost.
@@ -96,6 +131,7 @@ class Accuracy:
         method: the method that gave the answer.
         error_estimate: estimated error of the position at the worst point of the surface [m]; None where nothing was
             computed that tells.
+        neglected: the part of it that effects left out by "auto" may have, about [m].
         wall_time: time of the whole solve [s].
         n_u, n_t: size of the net of control points.
         delta: threshold on the update [m].
@@ -107,6 +143,7 @@ class Accuracy:
 
     method: str
     error_estimate: float | None
+    neglected: float
     wall_time: float
     n_u: int
     n_t: int
@@ -144,8 +181,41 @@ class Prediction:
     start_energy: float
     start_fit: float
     report_effects: Callable[[SplineSurface], tuple[EffectReport, ...]] = field(repr=False)
+    report_material: Callable[[], MaterialMotion | None] = field(repr=False)
 
     @cached_property
     def effects(self) -> tuple[EffectReport, ...]:
         """What was simulated and why."""
         return self.report_effects(self.surface)
+
+    @cached_property
+    def material(self) -> MaterialMotion | None:
+        """What the sections remember over time; None where they are elastic, naturally straight and untwisted."""
+        return self.report_material()
+
+    def shape_at(self, t: float | None = None) -> ControlPoints:
+        """Return the cable at time `t` [s], its last by default, as the start of another motion.
+
+        Shape, velocity, twist and memory go on, so that primitives chain: grasp, move, release, grasp elsewhere.
+
+        Raises:
+            SceneError: `t` is outside the predicted time.
+        """
+        return continued(self.surface, self.material, t)
+
+
+def continued(surface: SplineSurface, material: MaterialMotion | None, t: float | None = None) -> ControlPoints:
+    """Return the cable of a predicted motion at time `t` [s], its last by default, as the start of another motion.
+
+    Raises:
+        SceneError: `t` is outside the predicted time.
+    """
+    at = surface.horizon if t is None else number("t", t, at_least=0.0, at_most=surface.horizon, unit="s")
+    over = [design_matrix(surface.knots_t, [at], order)[0] for order in (0, 1)]
+    control, velocity = (np.tensordot(row, surface.control_points, axes=1) for row in over)
+    return ControlPoints(
+        control_points=control,
+        knots=surface.knots_u,
+        velocity=velocity[:, :3],
+        material=None if material is None else material.at(at),
+    )

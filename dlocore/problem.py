@@ -1,65 +1,39 @@
 """From a scene to the equations of its motion, before any grid: dimensions, effects, features, prescribed motion."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.checks import check_above, check_outside, check_reach, check_waypoints
 from dlocore.effects import laws
+from dlocore.effects.base import Effect
 from dlocore.effects.bend import Bend
-from dlocore.effects.damping import Damping
+from dlocore.effects.contact import Contact, TableContact
+from dlocore.effects.damping import Damping, TwistDamping
 from dlocore.effects.drag import LinearDrag, QuadraticDrag
+from dlocore.effects.friction import Friction
 from dlocore.effects.gravity import Gravity
 from dlocore.effects.inertia import Inertia
+from dlocore.effects.laws import keeps_history
+from dlocore.effects.plasticity import BendingMemory, StretchMemory, TwistMemory
+from dlocore.effects.selfcontact import SelfContact
 from dlocore.effects.stretch import Stretch
+from dlocore.effects.twist import Twist
 from dlocore.errors import SceneError
-from dlocore.paths import Move, Waypoints
-from dlocore.scene import MAX_PRESCRIBED_STRAIN, Grasp, Scene
+from dlocore.obstacles import Box, Cylinder, Obstacle
+from dlocore.plane import Plane, find_plane, is_straight, lay_on_table, off_the_table
+from dlocore.scene import Grasp, Scene
+from dlocore.selection import Choice, choose, reached
 from dlocore.shape import StartCurve, start_curve
 
 Floats = NDArray[np.float64]
 
 LEAST_MASS = 1e-9  # of the true one, where inertia is off: it keeps rigid motion determined
-FLATNESS = 1e-9  # of the length: a start and a motion this close to a plane are planar
-TABLE_TOLERANCE = 0.005  # [m]: points seen this close to the table lie on it
-GRASP_TOLERANCE = 0.010  # [m]: of the first waypoint from the cable
-
-
-@dataclass(frozen=True, eq=False)
-class Plane:
-    """Coordinates of the solve: x = axes (r - origin).
-
-    Attributes:
-        axes: (nc, 3), orthonormal rows; nc = 2 in the plane, 3 in space.
-        origin: (3,) [m].
-        reason: why the scene is planar or not, in words.
-    """
-
-    axes: Floats
-    origin: Floats
-    reason: str
-
-    @property
-    def dimensions(self) -> int:
-        """Number of coordinates, 2 or 3."""
-        return len(self.axes)
-
-    def points(self, r: Floats) -> Floats:
-        """Return plane coordinates (..., nc) of the points r (..., 3) [m]."""
-        return (r - self.origin) @ self.axes.T
-
-    def vectors(self, v: Floats) -> Floats:
-        """Return components (..., nc) of the vectors v (..., 3)."""
-        return v @ self.axes.T
-
-    def world(self, x: Floats) -> Floats:
-        """Return the points r (..., 3) [m] of plane coordinates x (..., nc)."""
-        return self.origin + x @ self.axes
-
-    def world_vectors(self, x: Floats) -> Floats:
-        """Return the vectors (..., 3) of components x (..., nc)."""
-        return x @ self.axes
+MOST_NODES = 4000  # of contact
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,15 +43,19 @@ class Problem:
     Attributes:
         scene: the scene.
         start: start curve [m].
-        plane: coordinates of the solve.
+        plane: coordinates of the centreline in the solve.
         on_table: the cable lies on the table, which carries its weight.
-        inertia, drag, gravity, stretch, bend, damping, quadratic_drag: the active effects, None where inactive.
+        choices: for each effect whether it is simulated, and why.
+        called_for: the effects that a result has called for, and why.
+        inertia, drag, gravity, ...: the active effects, None where inactive.
     """
 
     scene: Scene
     start: StartCurve
     plane: Plane
     on_table: bool
+    choices: Mapping[str, Choice]
+    called_for: Mapping[str, str]
     inertia: Inertia | None
     drag: LinearDrag | None
     gravity: Gravity | None
@@ -85,11 +63,55 @@ class Problem:
     bend: Bend | None
     damping: Damping | None
     quadratic_drag: QuadraticDrag | None
+    twist: Twist | None
+    twist_damping: TwistDamping | None
+    bending_memory: BendingMemory | None
+    twist_memory: TwistMemory | None
+    stretch_memory: StretchMemory | None
+    contact: Contact | None
+    table: TableContact | None
+    friction: Friction | None
+    self_contact: SelfContact | None
+    obstacles: tuple[Obstacle, ...]
 
     @property
     def horizon(self) -> float:
         """Predicted time [s]."""
         return cast(float, self.scene.horizon)
+
+    @property
+    def nc(self) -> int:
+        """Number of coordinates of a control point: 2 in the plane, 3 in space, 4 with twist."""
+        return self.plane.dimensions + (self.twist is not None)
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """(0, 1), (0, 1, 2) or (0, 1, 2, 3), from which the compiled kernels know the number of coordinates."""
+        return tuple(range(self.nc))
+
+    def coordinates(self, r: Floats, theta: Floats | None = None) -> Floats:
+        """Return control points (..., nc) in the solve's coordinates of r (..., 3) [m] and theta (...) [rad]."""
+        x = self.plane.points(r)
+        if self.twist is None:
+            return np.ascontiguousarray(x)
+        turned = np.zeros(x.shape[:-1]) if theta is None else theta
+        return np.concatenate([x, self.twist.radius * turned[..., None]], axis=-1)
+
+    def rates(self, v: Floats, theta_rate: Floats | None = None) -> Floats:
+        """Return velocities (..., nc) in the solve's coordinates of v (..., 3) [m/s] and of theta [rad/s]."""
+        x = self.plane.vectors(v)
+        if self.twist is None:
+            return np.ascontiguousarray(x)
+        turned = np.zeros(x.shape[:-1]) if theta_rate is None else theta_rate
+        return np.concatenate([x, self.twist.radius * turned[..., None]], axis=-1)
+
+    def world(self, q: Floats) -> Floats:
+        """Return (x, y, z, theta) (..., 4) [m, m, m, rad] of control points q (..., nc)."""
+        out = np.zeros((*q.shape[:-1], 4))
+        out[..., :3] = self.plane.world(q[..., : self.plane.dimensions])
+        if self.twist is not None:
+            out[..., 3] = q[..., 3] / self.twist.radius
+        return out
 
     def mass_density(self) -> float:
         """Return the coefficient of the mass matrix [kg/m]; where inertia is off a trace that fixes rigid motion."""
@@ -100,222 +122,198 @@ class Problem:
         return 0.0 if self.drag is None else self.drag.coefficient()
 
     def law_table(self) -> tuple[NDArray[np.int64], Floats]:
-        """Return the switches (laws.COUNT,) and parameters (laws.COUNT, laws.PARAMETERS) of the compiled laws."""
+        """Return switches (laws.COUNT,) and parameters (laws.COUNT + obstacles, laws.PARAMETERS) of compiled laws."""
+        active, parameters = self._law_table
+        return active.copy(), parameters.copy()
+
+    @cached_property
+    def keeps_history(self) -> bool:
+        """Whether a law reads what earlier steps left behind."""
+        return bool(keeps_history(self._law_table[0]))
+
+    @cached_property
+    def _law_table(self) -> tuple[NDArray[np.int64], Floats]:
         active = np.zeros(laws.COUNT, np.int64)
-        parameters = np.zeros((laws.COUNT, laws.PARAMETERS))
-        effects = (
+        parameters = np.zeros((laws.COUNT + len(self.obstacles), laws.PARAMETERS))
+        for i, obstacle in enumerate(self.obstacles):
+            parameters[laws.COUNT + i] = obstacle.row()
+            parameters[laws.COUNT + i, 1:4] -= self.plane.origin
+        effects: tuple[tuple[int, Effect | None], ...] = (
             (laws.STRETCH, self.stretch),
             (laws.BEND, self.bend),
             (laws.DAMPING, self.damping),
             (laws.QUADRATIC_DRAG, self.quadratic_drag),
+            (laws.TWIST, self.twist),
+            (laws.TWIST_DAMPING, self.twist_damping),
+            (laws.BENDING_MEMORY, self.bending_memory),
+            (laws.TWIST_MEMORY, self.twist_memory),
+            (laws.STRETCH_MEMORY, self.stretch_memory),
+            (laws.CONTACT, self.contact),
+            (laws.TABLE, self.table),
+            (laws.FRICTION, self.friction),
+            (laws.SELF_CONTACT, self.self_contact),
         )
         for row, effect in effects:
             if effect is not None:
                 active[row] = 1
                 values = effect.parameters()
                 parameters[row, : len(values)] = values
+        if self.table is not None and self.contact is not None:
+            # so that a cable at the table's height is at rest there
+            parameters[laws.TABLE, 0] += self.contact.depth_under(max(0.0, -float(self.weight()[2])))
         return active, parameters
+
+    def contact_spacing(self) -> float:
+        """Return how close the nodes of contact lie [m]; infinite where there is none.
+
+        Between nodes a diameter apart a straight cable comes nearer to a peg of 2 cm by less than 3 % of a diameter of
+        5 mm; over an edge the cable slides from node to node unless they are much closer; on a table there is nothing
+        to fall between.
+        """
+        cable = self.scene.cable
+        if self.contact is None or not self.obstacles:
+            apart = cable.diameter if self.self_contact is not None else np.inf
+            rests = np.inf if self.contact is None else cable.length / 64
+            return max(min(apart, rests), cable.length / MOST_NODES)
+        flat = [o for o in self.obstacles if isinstance(o, Box | Cylinder)]
+        sharp = (bool(flat) and not self.on_table) or any(isinstance(o, Box) for o in flat)
+        return max(cable.diameter / (8.0 if sharp else 1.0), cable.length / MOST_NODES)
 
     def weight(self) -> Floats:
         """Return the weight per unit length in the solve's coordinates (nc,) [N/m]."""
-        return np.zeros(self.plane.dimensions) if self.gravity is None else self.plane.vectors(self.gravity.weight())
+        return np.zeros(self.nc) if self.gravity is None else self.rates(self.gravity.weight())
 
     def position(self, grasp: Grasp, t: Floats, start: Floats) -> Floats:
-        """Return the prescribed positions (k, nc) of `grasp` at times t (k,) [s] of a path begun at `start` (nc,)."""
+        """Return the prescribed positions (k, 2 or 3) of `grasp` at times t (k,) [s] of a path begun at `start`."""
         world = self.plane.world(start)
         return self.plane.points(grasp.path.at(t - grasp.start, world))
 
     def direction(self, grasp: Grasp, t: Floats, start: Floats) -> Floats:
-        """Return the prescribed unit tangents (k, nc) of `grasp` at times t (k,) [s], from `start` (nc,)."""
+        """Return the prescribed unit tangents (k, 2 or 3) of `grasp` at times t (k,) [s], from `start`."""
         turns = grasp.path.rotation_at(t - grasp.start)
         if turns is None:
             return np.broadcast_to(start, (len(t), self.plane.dimensions))
         return self.plane.vectors(turns @ self.plane.world_vectors(start))
 
 
-def pose(scene: Scene) -> Problem:
+def pose(scene: Scene, called_for: Mapping[str, str] | None = None) -> Problem:
     """Turn a scene into the equations of its motion.
 
+    Args:
+        scene: the scene.
+        called_for: effects that a result of this scene has called for, and the reason for each.
+
     Raises:
-        SceneError: the scene needs what is not modelled yet, or asks what no cable can follow.
+        SceneError: the scene asks what no cable can follow, or switches off what the rest of it needs.
     """
-    cable, environment, effects = scene.cable, scene.environment, scene.effects
+    cable, environment = scene.cable, scene.environment
     start = start_curve(scene.shape, cable.length)
-    _check_waypoints(scene, start)
-    _check_reach(scene, start)
-    on_table = environment.table is not None and effects.get("table", "auto") != "off"
+    check_waypoints(scene, start)
+    check_reach(scene, start)
+    table, switch = environment.table, scene.effects.get
+    called_for = called_for or {}
+    with_table = table is not None and switch("table", "auto") != "off"
+    if with_table:
+        check_above(scene, start)
+    met = reached(scene, start, called_for)
+    check_outside(scene, start, met)
+    leaves = off_the_table(scene, start, met) if with_table else "there is no table"
+    on_table = not leaves
     if on_table:
-        start = _lay_on_table(scene, start)
-    plane = _find_plane(scene, start, on_table)
-    bent = not isinstance(cable.rest_shape, str) or (
-        cable.rest_shape == "initial" and len(start.control_points) > 4 and not _is_straight(start)
-    )
-    natural = _natural_points(scene)
-    if on_table and natural is not None and not np.ptp(natural[:, 2]) <= TABLE_TOLERANCE:
-        reason = "The cable lies on the table"
-        raise SceneError("cable.rest_shape", cable.rest_shape, "points in a horizontal plane", reason)
-    if plane.dimensions == 3 and bent:
-        reason = "A bent rest shape twists a cable that moves in three dimensions, and twist is not modelled yet"
-        raise SceneError("cable.rest_shape", cable.rest_shape, '"straight", or a planar scene', reason)
+        start = lay_on_table(scene, start)
+    plane = find_plane(scene, start, on_table, bool(met))
+    bent = _is_bent(scene, start)
+    choices = choose(scene, start, plane.dimensions, on_table, leaves, met, bent, called_for)
+    if plane.dimensions == 3 and not choices["twist"].active:
+        for name, wanted in (("cable.rest_shape", bent), ("effects.plasticity", choices["plasticity"].active)):
+            if wanted:
+                given = cable.rest_shape if bent else scene.effects.get("plasticity", "auto")
+                reason = "In space bends remembered by the sections turn with them"
+                raise SceneError(name, given, 'what it is with effects.twist "on" or "auto"', reason)
 
-    def active(name: str, present: bool) -> bool:
-        return present and effects.get(name, "auto") != "off"
+    def active(name: str, present: bool = True) -> bool:
+        return present and choices[name].active
 
+    def yields(strain: float | None, scale: float = 1.0) -> tuple[float, float, float]:
+        return scale * cast(float, strain), cast(float, cable.memory_rate), cable.hardening
+
+    touches = active("table", not on_table) or active("obstacles")
+    rubs = active("friction")
+    lying = 0.0
+    if on_table and rubs:
+        assert table is not None
+        lying = table.friction * cable.linear_density * abs(float(cast(Floats, environment.gravity)[2]))
+    by_diameter = 2.0 / cable.diameter
+    plastic, twisted = active("plasticity"), active("twist")
     return Problem(
         scene=scene,
         start=start,
         plane=plane,
         on_table=on_table,
-        inertia=Inertia(cable.linear_density) if active("inertia", True) else None,
+        choices=choices,
+        called_for=called_for,
+        inertia=Inertia(cable.linear_density) if active("inertia") else None,
         drag=LinearDrag(environment.drag) if active("drag", environment.drag > 0) else None,
-        gravity=Gravity(cable.linear_density, cast(Floats, environment.gravity))
-        if active("gravity", not on_table and bool(np.any(cast(Floats, environment.gravity) != 0)))
-        else None,
+        gravity=Gravity(cable.linear_density, cast(Floats, environment.gravity)) if active("gravity") else None,
         stretch=Stretch(cast(float, cable.axial_stiffness)),
-        bend=Bend(cast(float, cable.bending_stiffness)) if active("bend", True) else None,
-        damping=Damping(cable.bending_damping, cable.length) if active("damping", cable.bending_damping > 0) else None,
+        bend=Bend(cast(float, cable.bending_stiffness)) if active("bend") else None,
+        damping=Damping(cable.bending_damping, cable.length, twisted)
+        if active("damping", cable.bending_damping > 0)
+        else None,
         quadratic_drag=QuadraticDrag(environment.drag_quadratic)
         if active("drag", environment.drag_quadratic > 0)
         else None,
+        twist=Twist(cast(float, cable.torsional_stiffness), cable.diameter) if twisted else None,
+        twist_damping=TwistDamping(cable.torsional_damping)
+        if twisted and active("damping", cable.torsional_damping > 0)
+        else None,
+        bending_memory=BendingMemory(*yields(cable.yield_strain, by_diameter))
+        if plastic and cable.yield_strain is not None
+        else None,
+        twist_memory=TwistMemory(*yields(cable.yield_twist, by_diameter))
+        if plastic and twisted and cable.yield_twist is not None
+        else None,
+        stretch_memory=StretchMemory(*yields(cable.yield_stretch))
+        if plastic and cable.yield_stretch is not None
+        else None,
+        contact=Contact(0.5 * cable.diameter, _contact_stiffness(scene), cable.linear_density) if touches else None,
+        table=TableContact(table.height - plane.origin[2], table.friction)
+        if table is not None and active("table", not on_table)
+        else None,
+        friction=Friction(cable.diameter, lying) if rubs else None,
+        self_contact=SelfContact(cable.diameter, 10.0 * _contact_stiffness(scene), cable.linear_density)
+        if active("self_contact")
+        else None,
+        obstacles=tuple(environment.obstacles[i] for i in met) if active("obstacles") else (),
     )
 
 
-def _natural_points(scene: Scene) -> Floats | None:
-    """Return the points (n, 3) [m] of a given natural shape, whose plane is that of the cable's bends, or None."""
-    rest = scene.cable.rest_shape
-    if isinstance(rest, str):
-        return None
-    points = cast(Floats, rest)
-    return np.column_stack([points, np.zeros(len(points))]) if points.shape[1] == 2 else points
+def stiffer(problem: Problem, ratio: float) -> Problem:
+    """Return the problem with all contact stiffer by a ratio."""
+    contact, own = problem.contact, problem.self_contact
+    return replace(
+        problem,
+        contact=None if contact is None else replace(contact, stiffness=ratio * contact.stiffness),
+        self_contact=None if own is None else replace(own, stiffness=ratio * own.stiffness),
+    )
 
 
-def _is_straight(start: StartCurve) -> bool:
-    chord = start.control_points - start.control_points[0]
-    return float(np.linalg.svd(chord, compute_uv=False)[1]) <= FLATNESS * float(np.abs(chord).max())
+def _contact_stiffness(scene: Scene) -> float:
+    """Return a stiffness [N/m^2] under which weight and bending sink the cable in by half a per cent of its diameter.
+
+    Bending: that of a tenth of the length, EI/(0.1 L)^3.
+    """
+    cable = scene.cable
+    weight = cable.linear_density * float(np.linalg.norm(cast(Floats, scene.environment.gravity)))
+    bending = cast(float, cable.bending_stiffness) / (0.1 * cable.length) ** 3
+    return (weight + bending) / (0.005 * cable.diameter)
 
 
-def _check_waypoints(scene: Scene, start: StartCurve) -> None:
-    for i, grasp in enumerate(scene.grasps):
-        if isinstance(grasp.path, Waypoints) and grasp.start == 0.0:
-            first = cast(Floats, grasp.path.positions)[0]
-            off = float(np.linalg.norm(first - start(grasp.u)[0]))
-            if not off <= GRASP_TOLERANCE:
-                reason = f"The cable is {off:.3g} m from it at u = {grasp.u:g} m"
-                allowed = f"a point within {GRASP_TOLERANCE:g} m of the grasped point"
-                raise SceneError(f"primitives[{i}].path.positions[0]", first, allowed, reason)
-
-
-def _check_reach(scene: Scene, start: StartCurve) -> None:
-    """Refuse two grasps that are at some time farther apart than the cable between them."""
-    if len(scene.grasps) < 2:
-        return
-    t = np.linspace(0.0, cast(float, scene.horizon), 257)
-    paths = [g.path.at(t - g.start, start(g.u)[0]) for g in scene.grasps]
-    for j, b in enumerate(scene.grasps):
-        for i, a in enumerate(scene.grasps[:j]):
-            together = (t >= max(a.start, b.start)) & (t <= min(a.release_time or np.inf, b.release_time or np.inf))
-            late = max(a.start, b.start) > 0 and not all(isinstance(g.path, Waypoints) for g in (a, b) if g.start > 0)
-            if late or not together.any():
-                continue  # a later grasp begins where the cable is then, which only the solve can tell
-            between = abs(b.u - a.u)
-            apart = np.where(together, np.linalg.norm(paths[j] - paths[i], axis=1), 0.0)
-            k = int(np.argmax(apart))
-            if not apart[k] <= between * (1.0 + MAX_PRESCRIBED_STRAIN) + 1e-6:
-                raise SceneError(
-                    f"primitives[{j}].path",
-                    f"{apart[k]:.4g} m from primitives[{i}] at {t[k]:.3g} s",
-                    f"at most {between:.4g} m",
-                    "No cable can follow: the two grasps are farther apart than the cable between them",
-                )
-
-
-def _lay_on_table(scene: Scene, start: StartCurve) -> StartCurve:
-    """Check that the cable lies on the table and moves in its plane; return the start at the table's height."""
-    table = scene.environment.table
-    assert table is not None
-    height = table.height
-    allowed = "a cable that lies on it and moves in its plane, or table null"
-    reason = "Contact with a table is not modelled yet"
-
-    def refuse(what: str) -> None:
-        raise SceneError("environment.table", what, allowed, reason)
-
-    control = start.control_points
-    off = float(np.abs(control[:, 2] - height).max())
-    if not off <= TABLE_TOLERANCE:
-        refuse(f"a start up to {off:.3g} m off its height")
-    gravity = cast(Floats, scene.environment.gravity)
-    if gravity[0] != 0 or gravity[1] != 0 or gravity[2] > 0:
-        refuse(f"gravity {gravity.tolist()}")
-    if start.velocity is not None and np.any(np.abs(start.velocity.control_points[:, 2]) > 1e-9):
-        refuse("a start velocity off its plane")
-    for i, grasp in enumerate(scene.grasps):
-        path = grasp.path
-        if isinstance(path, Move) and cast(Floats, path.displacement)[2] != 0:
-            refuse(f"primitives[{i}].path.displacement[2] = {cast(Floats, path.displacement)[2]:g} m")
-        if isinstance(path, Waypoints) and np.ptp(cast(Floats, path.positions)[:, 2]) > 0:
-            refuse(f"primitives[{i}].path.positions off its plane")
-        turns = path.rotation_at(np.linspace(0, path.duration, 9)) if path.duration else None
-        if turns is not None and np.abs(turns[:, 2, :2]).max() > 1e-9:
-            refuse(f"primitives[{i}].path turns the cable off its plane")
-    for i, load in enumerate(scene.loads):
-        if np.any(np.atleast_2d(cast(Floats, load.force))[:, 2] > 0):
-            refuse(f"loads[{i}] lifts the cable")
-    flat = control.copy()
-    flat[:, 2] = height
-    return StartCurve(
-        knots=start.knots, control_points=flat, velocity=start.velocity, fit_rms=start.fit_rms, fit_max=start.fit_max,
-        length_given=start.length_given,
-    )  # fmt: skip
-
-
-def _find_plane(scene: Scene, start: StartCurve, on_table: bool) -> Plane:
-    """Decide between two and three coordinates from everything that could move the cable out of a plane."""
-    origin = start.control_points[0]
-    if on_table:
-        return Plane(np.eye(3)[:2], origin, "the cable lies on the table and moves in its plane")
-    length = scene.cable.length
-    spread = [(start.control_points - origin) / length]
-    if start.velocity is not None:
-        spread.append(start.velocity.control_points / max(1e-9, np.abs(start.velocity.control_points).max()))
-    for grasp in scene.grasps:
-        if isinstance(grasp.path, Move):
-            spread.append(cast(Floats, grasp.path.displacement)[None] / length)
-        if isinstance(grasp.path, Waypoints):
-            positions = cast(Floats, grasp.path.positions)
-            spread.append((positions - positions[0]) / length)
-            spread.append((positions[:1] - start(grasp.u)) / length)
-    gravity = cast(Floats, scene.environment.gravity)
-    if np.any(gravity != 0) and scene.effects.get("gravity", "auto") != "off":
-        spread.append(gravity[None] / np.linalg.norm(gravity))
-    for load in scene.loads:
-        force = np.atleast_2d(cast(Floats, load.force))
-        spread.append(force / max(1e-300, np.abs(force).max()))
-    natural = _natural_points(scene)
-    if natural is not None:
-        spread.append((natural - natural[0]) / length)
-    vectors = np.concatenate(spread)
-    _, sizes, principal = np.linalg.svd(np.concatenate([vectors, np.zeros((2, 3))]), full_matrices=False)
-    collinear = not sizes[1] > FLATNESS * sizes[0]
-    normal = _unit_across(principal[0]) if collinear else principal[2]
-    off_plane = float(np.abs(vectors @ normal).max())
-    if not off_plane <= FLATNESS * max(1.0, np.abs(vectors).max()):
-        return Plane(np.eye(3), origin, "start, motion and forces do not lie in one plane")
-    flat_turns = True
-    for grasp in scene.grasps:
-        turns = grasp.path.rotation_at(np.linspace(0, grasp.path.duration, 33)) if grasp.path.duration else None
-        if turns is not None and np.abs(turns @ normal - normal).max() > 1e-9:
-            flat_turns = False
-    if not flat_turns:
-        return Plane(np.eye(3), origin, "a grasp turns the cable out of the plane of its motion")
-    normal = normal * (1.0 if normal[np.argmax(np.abs(normal))] > 0 else -1.0)
-    first = _unit_across(normal)
-    second = np.cross(normal, first)
-    return Plane(np.array([first, second]), origin, "start, motion and forces lie in one plane")
-
-
-def _unit_across(normal: Floats) -> Floats:
-    """Return a unit vector in the plane of `normal`: the world axis nearest to it, x before y before z."""
-    axis = np.eye(3)[int(np.argmin(np.round(np.abs(normal), 9)))]
-    across = axis - normal * (axis @ normal)
-    return across / np.linalg.norm(across)
+def _is_bent(scene: Scene, start: StartCurve) -> bool:
+    """Tell whether the stress-free shape is bent or twisted, so that it matters how the sections are turned."""
+    rest, material = scene.cable.rest_shape, start.material
+    if material is not None and bool(np.any(cast(Floats, material.memory))):
+        return True
+    if material is None and not isinstance(rest, str):
+        return True
+    return material is None and rest == "initial" and len(start.control_points) > 4 and not is_straight(start)

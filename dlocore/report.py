@@ -1,31 +1,33 @@
 """What a solve tells about itself: world coordinates, reactions, effects and energies."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.discretisation import Grid, Held
-from dlocore.kernels.assembly import largest_strain, stored_energy
-from dlocore.prediction import EffectReport, GraspReaction
+from dlocore.effects.distance import distances
+from dlocore.grid import Grid
+from dlocore.holding import Held
+from dlocore.kernels.assembly import History, largest_strain, stored_energy
+from dlocore.prediction import EffectReport, GraspReaction, MaterialMotion
 from dlocore.problem import Problem
+from dlocore.scene import Grasp
 from dlocore.spline import SplineSurface
 
 Floats = NDArray[np.float64]
 
 
-def surface_of(problem: Problem, grid: Grid, knots_t: Floats, control: Floats) -> SplineSurface:
+def surface_of(problem: Problem, knots_u: Floats, knots_t: Floats, control: Floats) -> SplineSurface:
     """Return the surface in the world frame of control points (n_t, n_u, nc) in the solve's coordinates."""
-    world = np.zeros((*control.shape[:2], 4))
-    world[..., :3] = problem.plane.world(control)
-    return SplineSurface(world, grid.knots, knots_t)
+    return SplineSurface(problem.world(control), knots_u, knots_t)
 
 
-def elastic_energy(problem: Problem, grid: Grid, q: Floats) -> float:
-    """Return the elastic energy stored in control points q (n_u, nc) [J]."""
+def elastic_energy(problem: Problem, grid: Grid, q: Floats, history: History) -> float:
+    """Return the elastic energy stored in control points q (n_u, nc) [J] with `history` behind them."""
     active, parameters = problem.law_table()
-    return float(stored_energy(tuple(range(problem.plane.dimensions)), q, grid.tables, active, parameters, grid.memory))
+    return float(stored_energy(problem.axes, q, grid.tables, active, parameters, history))
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +52,7 @@ def reactions(problem: Problem, grid: Grid, windows: tuple[WindowForces, ...]) -
 
     The force is the multiplier of the constraint b(u_g) q = p, the moment d x (multiplier of b'(u_g) q = d).
     """
-    nc = problem.plane.dimensions
+    dimensions = problem.plane.dimensions
     t = np.concatenate([w.times for w in windows])
     force = {g: np.zeros((len(t), 3)) for g in problem.scene.grasps}
     moment = {g: np.zeros((len(t), 3)) for g in problem.scene.grasps}
@@ -58,56 +60,36 @@ def reactions(problem: Problem, grid: Grid, windows: tuple[WindowForces, ...]) -
     for window in windows:
         part = slice(at, at + len(window.times))
         at = part.stop
-        multipliers = problem.plane.world_vectors(window.held.multipliers(window.forces, nc))
+        multipliers = problem.plane.world_vectors(window.held.multipliers(window.forces, dimensions))
         for row, (i, derivative) in enumerate(window.held.rows):
             g = window.held.grasps[i]
             if derivative == 0:
                 force[g][part] = multipliers[:, row]
             else:
-                tangent = problem.plane.world_vectors(grid.at(window.states, g.u, 1))
-                moment[g][part] = np.cross(tangent, multipliers[:, row])
+                moment[g][part] = np.cross(_tangents(problem, grid, window, g), multipliers[:, row])
+        if window.held.turned:
+            assert problem.twist is not None
+            torques = problem.twist.radius * window.held.torques(window.forces, dimensions)
+            for r, i in enumerate(window.held.turned):
+                g = window.held.grasps[i]
+                moment[g][part] += torques[:, r, None] * _tangents(problem, grid, window, g)
     return tuple(GraspReaction(g.u, t, force[g], moment[g]) for g in problem.scene.grasps)
+
+
+def _tangents(problem: Problem, grid: Grid, window: WindowForces, grasp: Grasp) -> Floats:
+    """Return the tangents (k, 3) of a held direction, which has unit length."""
+    slope = grid.at(window.states, grasp.u, 1)[..., : problem.plane.dimensions]
+    return problem.plane.world_vectors(slope)
 
 
 def planned_effects(problem: Problem) -> tuple[EffectReport, ...]:
     """Return for each effect whether the scene calls for it, and why; magnitudes are known only after solving."""
-    cable, environment = problem.scene.cable, problem.scene.environment
-    table = environment.table is not None
-    heavy = bool(np.any(cast(Floats, environment.gravity) != 0))
-    no_gravity = "the table carries the weight" if table and heavy else "there is no gravity"
-    drags = environment.drag > 0 or environment.drag_quadratic > 0
-    # name, whether it is simulated, whether the scene has it, why if it has, why if not
-    rows = (
-        ("inertia", problem.inertia is not None, True, "the cable has mass and moves", ""),
-        (
-            "drag", problem.drag is not None or problem.quadratic_drag is not None, drags,
-            "the environment has drag", "no drag is given",
-        ),
-        (
-            "damping", problem.damping is not None, cable.bending_damping > 0,
-            "the cable has bending damping", "no bending damping is given",
-        ),
-        ("gravity", problem.gravity is not None, heavy and not table, "the cable has weight", no_gravity),
-        ("stretch", True, True, "it keeps the cable's length", ""),
-        ("bend", problem.bend is not None, True, "the cable has bending stiffness", ""),
-        (
-            "table", problem.on_table, table,
-            "the cable lies on it: it carries the weight, the motion is planar", "there is none",
-        ),
-        ("twist", False, False, "", "nothing holds an orientation at two places"),
-        ("plasticity", False, False, "", "the cable is elastic: no yield strain is given"),
-        ("friction", False, False, "", "the table has none" if table else "there is no table"),
-        ("obstacles", False, False, "", "there are none"),
-        ("self_contact", False, False, "", "contact of the cable with itself is not modelled yet"),
-    )  # fmt: skip
-    switched_off = {name for name, value in problem.scene.effects.items() if value == "off"}
-    return tuple(
-        EffectReport(name, active, "switched off in the scene" if name in switched_off else yes if present else no)
-        for name, active, present, yes, no in rows
-    )
+    return tuple(EffectReport(name, choice.active, choice.reason) for name, choice in problem.choices.items())
 
 
-def effect_reports(problem: Problem, grid: Grid, surface: SplineSurface) -> tuple[EffectReport, ...]:
+def effect_reports(
+    problem: Problem, grid: Grid, material: Callable[[], MaterialMotion | None], surface: SplineSurface
+) -> tuple[EffectReport, ...]:
     """Return for each effect whether it was simulated, why, and its size on the predicted motion.
 
     The axial strain is that at the axial points: between them reduced integration leaves it free to oscillate.
@@ -118,7 +100,9 @@ def effect_reports(problem: Problem, grid: Grid, surface: SplineSurface) -> tupl
     speed = np.linalg.norm(surface(u, t, dt=1)[..., :3], axis=-1)
     acceleration = np.linalg.norm(surface(u, t, dt=2)[..., :3], axis=-1)
     curvature = surface.curvature(u, t)
-    states = np.ascontiguousarray(problem.plane.points(surface.states(t)[..., :3]))
+    controls = surface.states(t)
+    states = problem.coordinates(controls[..., :3], controls[..., 3])
+    tau = surface.twist_rate(u, t)
     mu, EI = cable.linear_density, cast(float, cable.bending_stiffness)
     drag = environment.drag * speed + environment.drag_quadratic * speed**2
     weight = float(mu * cable.length * np.linalg.norm(cast(Floats, environment.gravity)))
@@ -127,12 +111,27 @@ def effect_reports(problem: Problem, grid: Grid, surface: SplineSurface) -> tupl
         "drag": (float(np.trapezoid(drag, u, axis=1).max()), "N"),
         "damping": (float(cable.bending_damping * np.abs(np.gradient(curvature, t, axis=0)).max()), "N m"),
         "gravity": (weight, "N"),
-        "stretch": (float(largest_strain(tuple(range(problem.plane.dimensions)), states, grid.tables)), "axial strain"),
+        "stretch": (float(largest_strain(problem.axes, states, grid.tables)), "axial strain"),
         "bend": (float(EI * curvature.max()), "N m"),
         "table": (weight, "N"),
+        "twist": (float(cast(float, cable.torsional_stiffness) * np.abs(tau).max()), "N m"),
     }
+    if problem.twist is None:
+        del sizes["twist"]
     if not problem.on_table:
         del sizes["table"]
+    if problem.friction is not None and environment.table is not None:
+        sizes["friction"] = (environment.table.friction * weight, "N")
+    if problem.obstacles:
+        near = surface.positions(np.linspace(0.0, cable.length, 129), np.linspace(0.0, surface.horizon, 65))
+        rows = np.array([obstacle.row() for obstacle in problem.obstacles])
+        gap = distances(rows, np.ascontiguousarray(near.reshape(-1, 3))).min() - 0.5 * cable.diameter
+        sizes["obstacles"] = (float(gap), "m, the smallest gap")
+    if problem.choices["plasticity"].active:
+        kept = material()
+        if kept is not None:
+            change = np.linalg.norm(kept.memory[-1] - kept.natural, axis=1).max()
+            sizes["plasticity"] = (float(change), "1/m, the bend that is kept")
     return tuple(
         replace(report, magnitude=sizes[report.name][0], unit=sizes[report.name][1]) if report.name in sizes else report
         for report in planned_effects(problem)

@@ -5,13 +5,14 @@ Frozen data in SI units, world frame right-handed with z up. Everything is valid
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, cast
+from typing import Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.cable import Cable
 from dlocore.errors import SceneError, array, choice, columns_of, number, points_array
+from dlocore.obstacles import Obstacle
 from dlocore.paths import Move, Path, Still, Waypoints
 
 Floats = NDArray[np.float64]
@@ -33,8 +34,8 @@ EFFECTS = (
     "obstacles",
     "self_contact",
 )
-NOT_MODELLED_YET = ("twist", "plasticity", "friction", "obstacles", "self_contact")
 MAX_GRASPS = 32
+MAX_OBSTACLES = 100
 MAX_POINTS = 100_000
 MAX_PRESCRIBED_STRAIN = 0.005  # of the chord between two grasps: beyond it no cable of this kind can follow
 
@@ -81,26 +82,64 @@ class Points:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Material:
+    """What the sections of a cable remember: how they are turned, and the strain that has become theirs.
+
+    Args:
+        director: unit vector (3,) across the cable at u = 0, fixed in its section where theta is zero.
+        u: material coordinates (k,) [m], rising.
+        memory: stress-free strain there (k, 3): two curvatures in the sections' frame and the twist rate
+            [1/m, 1/m, rad/m] (the paper's eps_0, eq. 9).
+        stretch: stress-free axial strain there (k,); None: zero.
+        natural: what `memory` was before anything yielded (k, 3): hardening pulls back to it; None: zero.
+    """
+
+    director: ArrayLike
+    u: ArrayLike
+    memory: ArrayLike
+    stretch: ArrayLike | None = None
+    natural: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        director = array("material.director", self.director, shape=(3,))
+        if not abs(float(np.linalg.norm(director)) - 1.0) < 1e-6:
+            raise SceneError("material.director", director, "a unit vector")
+        u = array("material.u", self.u, shape=(None,), unit="m")
+        if not (len(u) >= 2 and (np.diff(u) > 0).all()):
+            raise SceneError("material.u", u, "at least two rising coordinates [m]")
+        object.__setattr__(self, "director", director)
+        object.__setattr__(self, "u", u)
+        object.__setattr__(self, "memory", array("material.memory", self.memory, shape=(len(u), 3), unit="1/m"))
+        if self.stretch is not None:
+            object.__setattr__(self, "stretch", array("material.stretch", self.stretch, shape=(len(u),)))
+        if self.natural is not None:
+            object.__setattr__(self, "natural", array("material.natural", self.natural, shape=(len(u), 3), unit="1/m"))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class ControlPoints:
     """A cubic spline by its control points (n, 3 or 4) [m, m, m, rad], on `knots` (n + 4,) [m] or uniform ones.
 
-    The knots are clamped (four equal at each end) and run from 0 to the cable's length.
+    The knots are clamped (four equal at each end) and run from 0 to the cable's length. The fourth column is theta,
+    the angle of the sections against a frame without twist (docs/model.md eq. 19). `material` is what the sections
+    remember of an earlier motion.
     """
 
     control_points: ArrayLike
     knots: ArrayLike | None = None
     settle: bool = False
     velocity: ArrayLike | None = None
+    material: Material | None = None
 
     def __post_init__(self) -> None:
         columns = 3 if columns_of(self.control_points) == 3 else 4
         points = array("control_points", self.control_points, shape=(None, columns), unit="m")
         if not 4 <= len(points) <= 2000:
             raise SceneError("control_points", f"{len(points)} control points", "4 to 2000")
-        if columns == 4 and np.any(points[:, 3] != 0.0):
-            k = int(np.argmax(points[:, 3] != 0.0))
-            raise SceneError(f"control_points[{k}][3]", points[k, 3], "0", "Twist is not modelled yet")
-        object.__setattr__(self, "control_points", points[:, :3])
+        if columns == 3:
+            points = np.column_stack([points, np.zeros(len(points))])
+            points.setflags(write=False)
+        object.__setattr__(self, "control_points", points)
         if self.knots is not None:
             knots = array("knots", self.knots, shape=(len(points) + 4,), unit="m")
             clamped = np.ptp(knots[:4]) == 0 and np.ptp(knots[-4:]) == 0 and knots[0] == 0
@@ -139,7 +178,7 @@ class Grasp:
 
     Args:
         u: material coordinate [m], 0 to the cable's length.
-        hold: "point" holds the position, "tangent" position and direction; "clamp" (twist too) is not modelled yet.
+        hold: "point" holds the position, "tangent" position and direction, "clamp" the twist of the section too.
         path: `Still`, `Move` or `Waypoints`; its clock starts at `grasp_time`.
         grasp_time: when the gripper closes [s]; None: it holds from the start.
         release_time: when it opens [s]; None: never.
@@ -154,8 +193,6 @@ class Grasp:
     def __post_init__(self) -> None:
         object.__setattr__(self, "u", number("u", self.u, at_least=0.0, at_most=1000.0, unit="m"))
         choice("hold", self.hold, ("point", "tangent", "clamp"))
-        if self.hold == "clamp":
-            raise SceneError("hold", "clamp", '"point" or "tangent"', "A clamp holds twist, which is not modelled yet")
         if not isinstance(self.path, Still | Move | Waypoints):
             raise SceneError("path", self.path, "Still, Move or Waypoints")
         if self.hold == "point":
@@ -204,26 +241,25 @@ class Load:
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """A horizontal table; `height` [m] is that of the centreline of a cable lying on it; `friction` must be 0."""
+    """A horizontal table; `height` [m] is that of the centreline of a cable lying on it, `friction` Coulomb's mu."""
 
     height: float = 0.0
     friction: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "height", number("height", self.height, at_least=-1e4, at_most=1e4, unit="m"))
-        if number("friction", self.friction, at_least=0.0, at_most=10.0) > 0:
-            raise SceneError("friction", self.friction, "0", "Friction is not modelled yet")
+        object.__setattr__(self, "friction", number("friction", self.friction, at_least=0.0, at_most=10.0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Environment:
-    """Gravity (3,) [m/s^2], drag per unit length: linear [N s/m^2] and quadratic [N s^2/m^3], and a table or None."""
+    """Gravity (3,) [m/s^2], drag per unit length: linear [N s/m^2] and quadratic [N s^2/m^3], a table, obstacles."""
 
     gravity: ArrayLike = (0.0, 0.0, -9.81)
     drag: float = 0.0
     drag_quadratic: float = 0.0
     table: Table | None = None
-    obstacles: tuple[Any, ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
 
     def __post_init__(self) -> None:
         gravity = array("gravity", self.gravity, shape=(3,), unit="m/s^2")
@@ -233,8 +269,12 @@ class Environment:
         object.__setattr__(self, "drag", number("drag", self.drag, at_least=0.0, at_most=1e6, unit="N s/m^2"))
         quadratic = number("drag_quadratic", self.drag_quadratic, at_least=0.0, at_most=1e6, unit="N s^2/m^3")
         object.__setattr__(self, "drag_quadratic", quadratic)
-        if self.obstacles:
-            raise SceneError("obstacles", f"{len(self.obstacles)} obstacles", "none", "Obstacles are not modelled yet")
+        object.__setattr__(self, "obstacles", tuple(self.obstacles))
+        if len(self.obstacles) > MAX_OBSTACLES:
+            raise SceneError("obstacles", f"{len(self.obstacles)} obstacles", f"at most {MAX_OBSTACLES}")
+        for i, obstacle in enumerate(self.obstacles):
+            if not isinstance(obstacle, Obstacle):
+                raise SceneError(f"obstacles[{i}]", obstacle, "Sphere, Capsule, Cylinder or Box")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -352,8 +392,6 @@ class Scene:
         for name, value in self.effects.items():
             choice("effects", name, EFFECTS)
             choice(f"effects.{name}", value, ("auto", "on", "off"))
-            if name in NOT_MODELLED_YET and value == "on":
-                raise SceneError(f"effects.{name}", "on", '"off" or "auto"', f"The effect {name} is not modelled yet")
             if name == "stretch" and value == "off":
                 reason = "Without axial stiffness a cable has no length"
                 raise SceneError("effects.stretch", "off", '"on" or "auto"', reason)

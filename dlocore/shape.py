@@ -11,19 +11,20 @@ from scipy.linalg import solveh_banded
 
 from dlocore.errors import SceneError
 from dlocore.fit import MAX_SPANS, check_length, fit_points
-from dlocore.scene import ControlPoints, Points, Shape, Straight
+from dlocore.scene import ControlPoints, Material, Points, Shape, Straight
 from dlocore.smoothing import normal_equations, smooth
 from dlocore.spline import DEGREE, uniform_knots
 
 Floats = NDArray[np.float64]
 
 SPEED_RANGE = (0.5, 1.5)  # of |r'|: a coarse spline of a hairpin stays within, evenly spaced control points don't
+SAME_ANGLE = 1e-9  # [rad]
 GAUSS = ((np.polynomial.legendre.leggauss(4)[0] + 1) / 2, np.polynomial.legendre.leggauss(4)[1] / 2)  # on [0, 1]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SplineCurve:
-    """A cubic spline over the material coordinate: control points (n, 3) on knots (n + 4,) [m]."""
+    """A cubic spline over the material coordinate: control points (n, 3 or 1) on knots (n + 4,) [m]."""
 
     knots: Floats
     control_points: Floats
@@ -42,12 +43,17 @@ class StartCurve(SplineCurve):
         fit_rms: root mean square distance of the given points from the curve [m]; 0 where it is given exactly.
         fit_max: the largest of these distances [m].
         length_given: length of the curve before it was made as long as the cable [m].
+        theta: angle of the sections, a spline with control points (n, 1) [rad], or None where it is the same
+            everywhere.
+        material: what the sections remember, or None where the scene's `rest_shape` tells.
     """
 
     velocity: SplineCurve | None = None
     fit_rms: float = 0.0
     fit_max: float = 0.0
     length_given: float = 0.0
+    theta: SplineCurve | None = None
+    material: Material | None = None
 
 
 def start_curve(shape: Shape, length: float) -> StartCurve:
@@ -72,7 +78,7 @@ def _straight(shape: Straight, length: float) -> StartCurve:
 
 
 def _given(shape: ControlPoints, length: float) -> StartCurve:
-    control = cast(Floats, shape.control_points)
+    control, angles = np.split(cast(Floats, shape.control_points), [3], axis=1)
     knots = uniform_knots(len(control), length) if shape.knots is None else cast(Floats, shape.knots)
     speed, width = _speed(SplineCurve(knots=knots, control_points=control))
     given = float((speed * width).sum())
@@ -87,7 +93,16 @@ def _given(shape: ControlPoints, length: float) -> StartCurve:
     velocity = None
     if shape.velocity is not None:
         velocity = SplineCurve(knots=knots, control_points=np.array(np.broadcast_to(shape.velocity, control.shape)))
-    return StartCurve(knots=knots, control_points=control, velocity=velocity, length_given=given)
+    turned = np.ptp(angles) > SAME_ANGLE or (shape.material is not None and np.abs(angles).max() > SAME_ANGLE)
+    theta = SplineCurve(knots=knots, control_points=angles) if turned else None
+    return StartCurve(
+        knots=knots,
+        control_points=control,
+        velocity=velocity,
+        length_given=given,
+        theta=theta,
+        material=shape.material,
+    )
 
 
 def _speed(curve: SplineCurve) -> tuple[Floats, Floats]:

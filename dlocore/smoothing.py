@@ -59,11 +59,11 @@ def _basis(x: Floats, spans: int) -> tuple[NDArray[np.intp], Floats]:
 
 
 def normal_equations(k: NDArray[np.intp], basis: Floats, weight: Floats, y: Floats, n: int) -> tuple[Floats, Floats]:
-    """Return the lower band (4, n) of B^T W B and B^T W y (n, 3) for rows of four values `basis` (4, N) from `k` on."""
-    normal, right = np.zeros((4, n)), np.zeros((n, 3))
+    """Return the lower band (4, n) of B^T W B, and B^T W y (n, d), for rows of four values `basis` (4, N) from `k`."""
+    normal, right = np.zeros((4, n)), np.zeros((n, y.shape[1]))
     for i in range(4):
         weighted = weight * basis[i]
-        for d in range(3):
+        for d in range(y.shape[1]):
             right[:, d] += np.bincount(k + i, weighted * y[:, d], n)
         for j in range(i + 1):
             normal[i - j] += np.bincount(k + j, weighted * basis[j], n)

@@ -81,6 +81,23 @@ class SplineSurface:
         cross = np.linalg.norm(np.cross(first, second), axis=-1)
         return cross / np.maximum(np.linalg.norm(first, axis=-1), 1e-300) ** 3
 
+    def twist_rate(self, u: ArrayLike, t: ArrayLike) -> Floats:
+        """Return the twist strain tau = theta' on the grid (docs/model.md eq. 19); (k_t, k_u) [rad/m]."""
+        return self(u, t, du=1)[..., 3]
+
+    def frenet_twist(self, u: ArrayLike, t: ArrayLike, regularisation: float) -> Floats:
+        """Return the paper's twist strain, theta' minus the Frenet torsion (paper eq. 8), regularised; (k_t, k_u).
+
+        For comparison only: the torsion (r_u x r_uu) . r_uuu / |r_u x r_uu|^2 is undefined where the cable is straight
+        or inflected. The denominator is raised by the square of `regularisation` [1/m], a curvature below which the
+        torsion fades out, and with it the twist that belongs there. theta is read as the paper's, against the Frenet
+        frame.
+        """
+        first, second, third = (self(u, t, du=order)[..., :3] for order in (1, 2, 3))
+        binormal = np.cross(first, second)
+        square = (binormal**2).sum(axis=-1) + regularisation**2
+        return self.twist_rate(u, t) - (binormal * third).sum(axis=-1) / square
+
     def axial_strain(self, u: ArrayLike, t: ArrayLike) -> Floats:
         """Return the axial strain |r'| - 1 on the grid; (k_t, k_u).
 

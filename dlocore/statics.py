@@ -7,9 +7,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dlocore.discretisation import Grid, Starts, applied_forces, close_grasps, hold, make_grid, smallest_n_u
+from dlocore.discretisation import applied_forces, make_grid, smallest_n_u
 from dlocore.errors import SceneError, number
-from dlocore.kernels.assembly import NO_RATES, assemble
+from dlocore.frames import free_of_frames
+from dlocore.grid import Grid
+from dlocore.holding import Starts, close_grasps, hold
+from dlocore.kernels.assembly import NO_RATES, History, assemble, remember
 from dlocore.kernels.relax import relax
 from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
@@ -26,6 +29,7 @@ TOLERANCE = 1e-10  # of the length, on the last Newton update
 ITERATIONS = 60  # of one relaxation
 ROUNDS = 400  # of relaxations, each held back less by where it started
 Rest = Literal["settled", "restless", "time"]  # at rest; no rest found; the time was up
+Settled = tuple[Floats, Rest, tuple[WindowForces, ...], History]
 PATH_STEPS = 24  # that bring the grasps to their poses at a later time
 
 
@@ -93,32 +97,31 @@ def equilibrium(
     target = scene.quality.target_error or 1e-4 * scene.cable.length
     least = smallest_n_u(problem)
     sizes = [n_u] if n_u is not None else [max(n, least + 2 * i) for i, n in enumerate(LEVELS)]
-    found: tuple[Grid, Floats, Rest, tuple[WindowForces, ...]] | None = None
+    found: tuple[Grid, *Settled] | None = None
     change, status, message = np.inf, "time_limit", "The time limit passed. Allow more time or a smaller n_u."
     for n in sizes:
         grid = make_grid(problem, n)
-        q, rest, forces = settle(problem, grid, at, monitor)
+        q, rest, forces, history = settle(problem, grid, at, monitor)
         if rest == "time" and found is not None:
             break
         if found is not None:
             u = np.linspace(0.0, scene.cable.length, 65)
-            before = design_matrix(found[0].knots, u) @ found[1]
-            change = float(np.linalg.norm(design_matrix(grid.knots, u) @ q - before, axis=1).max())
-        found = (grid, q, rest, forces)
+            before = design_matrix(found[0].knots, u) @ found[1][:, :3]
+            change = float(np.linalg.norm(design_matrix(grid.knots, u) @ q[:, :3] - before, axis=1).max())
+        found = (grid, q, rest, forces, history)
         if rest == "time":
             break
         status, message = "converged", "Forces balance." if n_u else f"Two grids agree to {change * 1e3:.2g} mm."
         if change <= target:
             break
     assert found is not None, "every list of sizes has a first"
-    grid, q, rest, forces = found
+    grid, q, rest, forces, history = found
     if rest == "restless":
         status = "stalled"
         message = "The relaxation did not come to rest. The scene may have no equilibrium, or many side by side."
     elif status == "converged" and n_u is None and not change <= target:
         status, message = "max_iterations", f"The finest grid still moved the shape by {change * 1e3:.2g} mm."
-    world = np.zeros((grid.n_u, 4))
-    world[:, :3] = problem.plane.world(q)
+    world = problem.world(free_of_frames(problem, grid, q[None], history.past[None])[0])
     held = reactions(problem, grid, forces)
     return Equilibrium(
         status=status,  # type: ignore[arg-type]
@@ -127,7 +130,7 @@ def equilibrium(
         knots_u=grid.knots,
         reactions=np.array([g.reaction[-1] for g in held]).reshape(-1, 3),
         moments=np.array([g.moment[-1] for g in held]).reshape(-1, 3),
-        energy=elastic_energy(problem, grid, q),
+        energy=elastic_energy(problem, grid, q, history),
         error_estimate=None if n_u is not None or not np.isfinite(change) else change,
     )
 
@@ -141,15 +144,16 @@ def start_grid(problem: Problem, n_u: int, monitor: Monitor) -> Grid:
     grid = make_grid(problem, n_u)
     if not problem.scene.shape.settle:
         return grid
-    q, rest, _ = settle(problem, grid, 0.0, monitor)
+    q, rest, _, history = settle(problem, grid, 0.0, monitor)
     if rest == "restless":
         allowed = "false, or a start that grasps hold in an equilibrium"
         raise SceneError("shape.settle", True, allowed, "The start did not come to rest")
-    return replace(grid, start=q)
+    return replace(grid, start=q, history=history)
 
 
-def settle(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> tuple[Floats, Rest, tuple[WindowForces, ...]]:
-    """Return control points (n_u, nc) [m] with the grasps at their poses of time `at`, how they rest, what holds them.
+def settle(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> Settled:
+    """Return control points (n_u, nc) [m] with the grasps at their poses of time `at`, how they rest, what holds them,
+    and what lies behind them.
 
     Relaxations held back by a spring towards where they started: the first strongly, later ones less, so that a cable
     without a stable tangent (buckling, free rotation) walks downhill instead of jumping.
@@ -159,9 +163,10 @@ def settle(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> tuple[F
     """
     q = grid.start.copy()
     starts: Starts = {}
+    before_t = 0.0
     times = np.linspace(0.0, at, PATH_STEPS + 1)[1:] if at > 0 else np.zeros(1)
     active, parameters = problem.law_table()
-    axes = tuple(range(problem.plane.dimensions))
+    axes, history = problem.axes, grid.past()
     length = problem.scene.cable.length
     bending = problem.bend.bending_stiffness if problem.bend else 0.0
     load = float(np.linalg.norm(problem.weight()))
@@ -171,8 +176,9 @@ def settle(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> tuple[F
     for t in times:
         grasps = closed_grasps(problem, t, t)
         close_grasps(problem, grid, grasps, starts, q)
-        held = hold(problem, grid, grasps, np.array([t]), starts)
+        held = hold(problem, grid, grasps, np.array([before_t, t]), starts, q)
         _carry(problem, grid, grasps, starts, t, q)
+        before_t = t
         applied = applied_forces(problem, grid, np.array([t]))[0]
         strength = springs
         rest = "restless"
@@ -184,20 +190,24 @@ def settle(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> tuple[F
                 break
             before = q.copy()
             update, used = relax(
-                axes, q, before, strength, applied, grid.tables, active, parameters, grid.memory, held.elimination,
-                held.offsets[0], TOLERANCE * length, ITERATIONS,
+                axes, q, before, strength, applied, grid.tables, active, parameters, history, held.elimination,
+                held.offsets[-1], TOLERANCE * length, ITERATIONS,
             )  # fmt: skip
+            if problem.twist is not None:
+                remember(axes, q, grid.tables, active, parameters, history, 0.0, True)
             moved = float(np.abs(q - before).max())
             strength *= 0.2 if used <= 12 else 1.0
             if moved <= 1e-8 * length and update <= TOLERANCE * length:
                 rest = "settled"
                 break
         forces = (
-            WindowForces(held, np.array([t]), _holding(problem, grid, q, applied, held.elimination.held), q[None]),
+            WindowForces(
+                held, np.array([t]), _holding(problem, grid, history, q, applied, held.elimination.held), q[None]
+            ),
         )
         if rest == "time":
             break
-    return q, rest, forces
+    return q, rest, forces, history
 
 
 def _carry(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, t: float, q: Floats) -> None:
@@ -208,18 +218,22 @@ def _carry(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, t:
     if not grasps:
         return
     order = sorted(grasps, key=lambda g: g.u)
-    shift = np.array([problem.position(g, np.array([t]), starts[g][0])[0] - grid.at(q, g.u) for g in order])
+    dimensions = problem.plane.dimensions
+    shift = np.array(
+        [problem.position(g, np.array([t]), starts[g][0])[0] - grid.at(q, g.u)[:dimensions] for g in order]
+    )
     middle = (grid.knots[1:-3] + grid.knots[2:-2] + grid.knots[3:-1]) / 3  # of the control points
-    for d in range(q.shape[1]):
+    for d in range(dimensions):
         q[:, d] += np.interp(middle, [g.u for g in order], shift[:, d])
 
 
-def _holding(problem: Problem, grid: Grid, q: Floats, applied: Floats, held: NDArray[np.int64]) -> Floats:
+def _holding(
+    problem: Problem, grid: Grid, history: History, q: Floats, applied: Floats, held: NDArray[np.int64]
+) -> Floats:
     active, parameters = problem.law_table()
     f, nothing = np.empty_like(q), np.empty((1, 1))
-    axes = tuple(range(problem.plane.dimensions))
     still = np.zeros_like(q)
     assemble(
-        axes, q, still, grid.tables, active, parameters, grid.memory, grid.memory, NO_RATES, (0.0, 0.0, 0.0), f, nothing
-    )
+        problem.axes, q, still, grid.tables, active, parameters, history, NO_RATES, (0.0, 0.0, 0.0), f, nothing
+    )  # fmt: skip
     return (f - applied).reshape(1, -1)[:, held]

@@ -1,6 +1,7 @@
 """Internal damping on the rate of curvature, so that a rigid swing costs nothing (docs/model.md eq. 9).
 
-Without a twist coordinate the spin of the sections about the tangent is free, and only the radial part of the rate
+With a twist coordinate the rate is that of the two curvatures in the frame of the sections, and of the twist rate.
+Without one the spin of the sections about the tangent is free, and only the radial part of the rate
 costs: kappa_t . kappa/|kappa|. Near zero curvature that direction is undefined; there the whole rate costs, with a
 smooth passage at |kappa| of about `EPSILON`/L: the dissipation density is
 
@@ -20,16 +21,32 @@ EPSILON = 0.1  # times 1/L: a cable bent to less than a tenth of a radian over i
 
 @dataclass(frozen=True)
 class Damping(Effect):
-    """Bending damping eta [N m^2 s] and the length L [m] that scales the passage near zero curvature."""
+    """Bending damping eta [N m^2 s], the length L [m] that scales the passage near zero curvature, and whether the
+    curvature is that in the frame of the sections, whose whole rate costs.
+    """
 
     name: ClassVar[str] = "damping"
     site: ClassVar[Site] = "curvature"
     bending_damping: float
     length: float
+    of_sections: bool = False
 
     def parameters(self) -> tuple[float, ...]:
         """Return (eta, eps^2)."""
-        return (self.bending_damping, (EPSILON / self.length) ** 2)
+        return (self.bending_damping, 1e12 if self.of_sections else (EPSILON / self.length) ** 2)
+
+
+@dataclass(frozen=True)
+class TwistDamping(Effect):
+    """Torsional damping [N m^2 s] on the rate of the twist rate."""
+
+    name: ClassVar[str] = "damping"
+    site: ClassVar[Site] = "twist"
+    torsional_damping: float
+
+    def parameters(self) -> tuple[float, ...]:
+        """Return the damping."""
+        return (self.torsional_damping,)
 
 
 @law

@@ -1,6 +1,7 @@
 """The one list of compiled laws: which of them act at each site.
 
 `active[EFFECT]` switches a law, `p[EFFECT]` holds its parameters. A law that is not active costs one untaken branch.
+Rows of `p` from COUNT on are obstacles (`dlocore/obstacles.py`).
 """
 
 from typing import Any
@@ -8,38 +9,122 @@ from typing import Any
 from dlocore.effects.base import Symmetric, Vector
 from dlocore.effects.bend import bending_energy, bending_moment
 from dlocore.effects.damping import damping_moment
+from dlocore.effects.distance import ROW
 from dlocore.effects.drag import quadratic_drag
+from dlocore.effects.plasticity import yielded
 from dlocore.effects.stretch import tension
+from dlocore.effects.twist import torque
 from dlocore.kernels.compile import law
 
-STRETCH, BEND, DAMPING, QUADRATIC_DRAG = range(4)
-COUNT = 4  # of compiled laws
-PARAMETERS = 4  # room for parameters of one law
+(
+    STRETCH, BEND, DAMPING, QUADRATIC_DRAG, TWIST, TWIST_DAMPING, BENDING_MEMORY, TWIST_MEMORY, STRETCH_MEMORY, CONTACT,
+    TABLE, FRICTION, SELF_CONTACT,
+) = range(13)  # fmt: skip
+COUNT = 13  # of compiled laws
+PARAMETERS = ROW  # room for parameters of one law, or for an obstacle
 
 _NO_VECTOR = (0.0, 0.0, 0.0)
 _NO_TANGENT = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @law
-def axial_stress(active: Any, p: Any, strain: float) -> tuple[float, float]:
-    """Return the tension [N] and its derivative by the strain [N]."""
-    return tension(p[STRETCH, 0], strain)
+def keeps_history(active: Any) -> bool:
+    """Tell whether a law reads what earlier steps left behind."""
+    return bool(
+        active[DAMPING]
+        or active[TWIST]
+        or active[BENDING_MEMORY]
+        or active[STRETCH_MEMORY]
+        or active[FRICTION]
+        or active[CONTACT]
+    )
 
 
 @law
-def axial_energy(active: Any, p: Any, strain: float) -> float:
+def has_kinks(active: Any) -> bool:
+    """Tell whether the force of a law has kinks: where something yields, touches or slips."""
+    return bool(
+        active[BENDING_MEMORY] or active[TWIST_MEMORY] or active[STRETCH_MEMORY] or active[CONTACT] or active[FRICTION]
+    )
+
+
+@law
+def has_viscosity(active: Any) -> bool:
+    """Tell whether a law depends on velocities, or rates of strain, other than by the drag matrix."""
+    return bool(
+        active[DAMPING] or active[QUADRATIC_DRAG] or active[TWIST_DAMPING] or active[CONTACT] or active[FRICTION]
+    )
+
+
+@law
+def _origin(memory: float, natural: float, soft: float) -> float:
+    """Return z, the strain about which the section is elastic (docs/model.md eq. 20)."""
+    return natural + (memory - natural) / soft
+
+
+@law
+def axial_memory(active: Any, p: Any, strain: float, memory: float, last: float, h: float) -> tuple[float, float]:
+    """Return the stress-free axial strain after a step h, and its derivative by the strain."""
+    if not active[STRETCH_MEMORY] or h == 0.0:
+        return memory, 0.0
+    soft = p[STRETCH_MEMORY, 2]
+    z = _origin(memory, 0.0, soft)
+    e, De = yielded((strain, 0.0, 0.0), (last, 0.0, 0.0), (z, 0.0, 0.0), h, p[STRETCH_MEMORY, 0], p[STRETCH_MEMORY, 1])
+    return soft * (strain - e[0]), soft * (1.0 - De[0])
+
+
+@law
+def axial_stress(active: Any, p: Any, strain: float, memory: float, last: float, h: float) -> tuple[float, float]:
+    """Return the tension [N] and its derivative by the strain [N]."""
+    free, change = axial_memory(active, p, strain, memory, last, h)
+    N, modulus = tension(p[STRETCH, 0], strain - free)
+    return N, modulus * (1.0 - change)
+
+
+@law
+def axial_energy(active: Any, p: Any, strain: float, memory: float) -> float:
     """Return the stored energy density [J/m] of the axial strain."""
-    return 0.5 * p[STRETCH, 0] * strain * strain
+    return 0.5 * p[STRETCH, 0] * (strain - memory) * (strain - memory)
+
+
+@law
+def curvature_memory(
+    active: Any, p: Any, kappa: Vector, memory: Vector, natural: Vector, last: Vector, h: float
+) -> tuple[Vector, Symmetric]:
+    """Return the stress-free curvature after a step h, and its derivative by kappa."""
+    if not active[BENDING_MEMORY] or h == 0.0:
+        return memory, _NO_TANGENT
+    soft = p[BENDING_MEMORY, 2]
+    z = (
+        _origin(memory[0], natural[0], soft),
+        _origin(memory[1], natural[1], soft),
+        _origin(memory[2], natural[2], soft),
+    )
+    e, De = yielded(kappa, last, z, h, p[BENDING_MEMORY, 0], p[BENDING_MEMORY, 1])
+    free = (
+        natural[0] + soft * (kappa[0] - e[0] - natural[0]),
+        natural[1] + soft * (kappa[1] - e[1] - natural[1]),
+        natural[2] + soft * (kappa[2] - e[2] - natural[2]),
+    )
+    diagonal = (soft * (1.0 - De[0]), soft * (1.0 - De[1]), soft * (1.0 - De[2]))
+    return free, (*diagonal, -soft * De[3], -soft * De[4], -soft * De[5])
 
 
 @law
 def curvature_stress(
-    active: Any, p: Any, kappa: Vector, rate: Vector, memory: Vector
+    active: Any, p: Any, kappa: Vector, rate: Vector, memory: Vector, natural: Vector, last: Vector, h: float
 ) -> tuple[Vector, Symmetric, Symmetric]:
     """Return the moment [N m] of the active laws and its derivatives by kappa [N m^2] and by its rate [N m^2 s]."""
     moment, stiffness, viscosity = _NO_VECTOR, _NO_TANGENT, _NO_TANGENT
     if active[BEND]:
-        moment, stiffness = bending_moment(p[BEND, 0], kappa, memory)
+        free, change = curvature_memory(active, p, kappa, memory, natural, last, h)
+        moment, stiffness = bending_moment(p[BEND, 0], kappa, free)
+        if active[BENDING_MEMORY]:
+            EI = p[BEND, 0]
+            stiffness = (
+                stiffness[0] - EI * change[0], stiffness[1] - EI * change[1], stiffness[2] - EI * change[2],
+                -EI * change[3], -EI * change[4], -EI * change[5],
+            )  # fmt: skip
     if active[DAMPING]:
         damping, viscosity = damping_moment(p[DAMPING, 0], p[DAMPING, 1], kappa, rate)
         moment = (moment[0] + damping[0], moment[1] + damping[1], moment[2] + damping[2])
@@ -50,6 +135,38 @@ def curvature_stress(
 def curvature_energy(active: Any, p: Any, kappa: Vector, memory: Vector) -> float:
     """Return the stored energy density [J/m] of the curvature."""
     return bending_energy(p[BEND, 0], kappa, memory) if active[BEND] else 0.0
+
+
+@law
+def twist_memory(
+    active: Any, p: Any, tau: float, memory: float, natural: float, last: float, h: float
+) -> tuple[float, float]:
+    """Return the stress-free twist rate after a step h, and its derivative by tau."""
+    if not active[TWIST_MEMORY] or h == 0.0:
+        return memory, 0.0
+    soft = p[TWIST_MEMORY, 2]
+    z = _origin(memory, natural, soft)
+    e, De = yielded((tau, 0.0, 0.0), (last, 0.0, 0.0), (z, 0.0, 0.0), h, p[TWIST_MEMORY, 0], p[TWIST_MEMORY, 1])
+    return natural + soft * (tau - e[0] - natural), soft * (1.0 - De[0])
+
+
+@law
+def twist_stress(
+    active: Any, p: Any, tau: float, rate: float, memory: float, natural: float, last: float, h: float
+) -> tuple[float, float, float]:
+    """Return the torque [N m] of the active laws and its derivatives by tau [N m^2] and by its rate [N m^2 s]."""
+    if not active[TWIST]:
+        return 0.0, 0.0, 0.0
+    free, change = twist_memory(active, p, tau, memory, natural, last, h)
+    T, stiffness = torque(p[TWIST, 0], tau, free)
+    viscosity = p[TWIST_DAMPING, 0] if active[TWIST_DAMPING] else 0.0
+    return T + viscosity * rate, stiffness * (1.0 - change), viscosity
+
+
+@law
+def twist_energy(active: Any, p: Any, tau: float, memory: float) -> float:
+    """Return the stored energy density [J/m] of the twist rate."""
+    return 0.5 * p[TWIST, 0] * (tau - memory) * (tau - memory) if active[TWIST] else 0.0
 
 
 @law

@@ -1,42 +1,69 @@
 """Assembly of forces and tangents over the quadrature points: the only place that knows the sparsity.
 
-Control points q are (n, nc) with nc = 2 in the plane and 3 in space; `axes` is the tuple (0, 1) or (0, 1, 2), so that
-the compiler knows nc and unrolls. A symmetric banded matrix is stored by column below its diagonal, A[j, i - j], with
-degree of freedom i * nc + d and half-bandwidth 4 nc - 1.
+Control points q are (n, nc): nc = 2 in the plane, 3 in space, 4 in space with twist; `axes` is the tuple (0, 1),
+(0, 1, 2) or (0, 1, 2, 3), so that the compiler knows nc and unrolls. A symmetric banded matrix is stored by column
+below its diagonal, A[j, i - j], with degree of freedom i * nc + d and half-bandwidth 4 nc - 1.
 
 A tangent is asked for as `scales` = (stiffness, viscosity, geometric): the factors of dF/dstrain, dF/d(strain rate) and
 of the part that comes from the stress at hand. (1, c, 1) is the full tangent of a step where dv/dq = c, (1, c, 0) its
 positive semidefinite part, (0, 1, 0) the damping matrix alone, (0, 0, 0) forces only.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from dlocore.effects.laws import BEND, DAMPING, QUADRATIC_DRAG
-from dlocore.kernels import plane, space
+from dlocore.effects.laws import BEND, CONTACT, DAMPING, FRICTION, QUADRATIC_DRAG, STRETCH_MEMORY, axial_memory
+from dlocore.kernels import contact, plane, space, twisted
+from dlocore.kernels.basis import row_of
 from dlocore.kernels.compile import kernel
+from dlocore.kernels.strain import space_curvature
 
-NO_RATES = (0.0, 0.0, 0.0)  # `rates` of `assemble` where the rate of strain comes from v
+NO_RATES = (0.0, 0.0, 0.0, 0.0)  # `rates` of `assemble` where the rate of strain comes from v and nothing yields
+
+
+class History(NamedTuple):
+    """What earlier steps left behind, at the quadrature points.
+
+    Attributes:
+        memory: (points, 2 m) stress-free strain, and what it was before anything yielded: m = 1 in the plane
+            (curvature), 3 in space (two curvatures of the sections and the twist rate) [1/m].
+        past: (points, 2, 9 or 16) strain, and with twist frames, of the last steps: see `plane.remember`,
+            `space.remember`, `twisted.py`; (0, ...) where no law reads it.
+        axial: (axial points, 2) stress-free axial strain, and the axial strain of the last step.
+        stick: (contact nodes, 6) anchor of the friction there, and position at the last step [m]; (0, 6) without.
+        slide: (body points, 2) anchor of the friction of a cable that lies on the table [m]; (0, 2) without.
+    """
+
+    memory: Any
+    past: Any
+    axial: Any
+    stick: Any
+    slide: Any
+
+
+@kernel
+def history_at(histories: Any, k: int) -> Any:
+    """Return the `History` of time k from one with arrays (1 or more times, ...)."""
+    at = min(k, len(histories.memory) - 1)
+    return History(histories.memory[at], histories.past[at], histories.axial[at], histories.stick, histories.slide)
 
 
 @kernel
 def assemble(
-    axes: Any, q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any,
-    f: Any, K: Any,
-) -> None:  # fmt: skip
+    axes: Any, q: Any, v: Any, tables: Any, active: Any, p: Any, history: Any, rates: Any, scales: Any, f: Any, K: Any
+) -> None:
     """Write internal forces minus body forces f (n, nc) [N] and their tangent K (n nc, 4 nc) [N/m].
 
     Args:
-        axes: (0, 1) or (0, 1, 2).
+        axes: (0, 1), (0, 1, 2) or (0, 1, 2, 3).
         q, v: control points and their velocities (n, nc) [m, m/s].
         tables: `basis.Tables`.
         active: switches of the laws (laws.COUNT,).
-        p: parameters of the laws (laws.COUNT, laws.PARAMETERS).
-        memory: curvature of the stress-free shape at the curvature points (points, 1 or 3) [1/m].
-        past: strain of earlier steps, see `remember`; not read where rates[0] is zero.
-        rates: (now, last, before): the rate of a strain as a combination of its values now and at the two last steps;
-            zeros: the rate comes from v.
+        p: parameters of the laws, and obstacles (laws.COUNT + obstacles, laws.PARAMETERS).
+        history: `History`.
+        rates: (now, last, before, h): the rate of a strain as a combination of its values now and at the two last
+            steps, and the step in which strain yields; zeros: the rate comes from v, and nothing yields.
         scales: (stiffness, viscosity, geometric) factors of the tangent.
         f, K: outputs; K is untouched where all scales are zero.
     """
@@ -46,34 +73,92 @@ def assemble(
         K[:] = 0.0
     bends = active[BEND] or active[DAMPING]
     if len(axes) == 2:
-        plane.axial(q, tables, active, p, scales, tangent, f, K)
+        plane.axial(q, tables, active, p, history.axial, rates[3], scales, tangent, f, K)
         if bends:
-            plane.curvature(q, v, tables, active, p, memory, past, rates, scales, tangent, f, K)
+            plane.curvature(q, v, tables, active, p, history.memory, history.past, rates, scales, tangent, f, K)
         if active[QUADRATIC_DRAG]:
             plane.body(q, v, tables, active, p, scales, tangent, f, K)
     else:
-        space.axial(q, tables, active, p, scales, tangent, f, K)
-        if bends:
-            space.curvature(q, v, tables, active, p, memory, past, rates, scales, tangent, f, K)
+        space.axial(len(axes), q, tables, active, p, history.axial, rates[3], scales, tangent, f, K)
+        if len(axes) == 4:
+            twisted.curvature(q, v, tables, active, p, history.memory, history.past, rates, scales, tangent, f, K)
+        elif bends:
+            space.curvature(q, v, tables, active, p, history.past, rates, scales, tangent, f, K)
         if active[QUADRATIC_DRAG]:
-            space.body(q, v, tables, active, p, scales, tangent, f, K)
+            space.body(len(axes), q, v, tables, active, p, scales, tangent, f, K)
+    if active[CONTACT]:
+        contact.contact(len(axes), q, v, tables, active, p, history.stick, rates[3], scales, tangent, f, K)
+    if active[FRICTION] and p[FRICTION, 2] > 0.0:
+        contact.lying(len(axes), q, v, tables, p, history.slide, rates[3], scales, tangent, f, K)
 
 
 @kernel
-def remember(axes: Any, q: Any, tables: Any, past: Any) -> None:
-    """Note the curvature of q (n, nc) in `past` (points, 2 or 9) as that of the last step."""
+def remember(axes: Any, q: Any, tables: Any, active: Any, p: Any, history: Any, h: float, loose: bool) -> float:
+    """Note in `history` the strain of q (n, nc) as that of the last step, of length h, what yielded and slipped in it.
+
+    With h = 0 nothing yields; `loose` puts the anchors of friction under the cable, as at the start.
+
+    Returns:
+        the largest depth of the cable in an obstacle or the table [m].
+    """
+    deepest = 0.0
+    if active[CONTACT]:
+        deepest = contact.remember(len(axes), q, tables, active, p, history.stick, loose)
+    if active[FRICTION] and p[FRICTION, 2] > 0.0:
+        contact.drag_anchors(len(axes), q, tables, p, history.slide, loose)
+    if active[STRETCH_MEMORY]:
+        for n in range(len(tables.axial_w)):
+            square = 0.0
+            for d in range(min(len(axes), 3)):
+                value = 0.0
+                for i in range(4):
+                    value += tables.axial_b1[n, i] * q[tables.axial_first[n] + i, d]
+                square += value * value
+            strain = np.sqrt(square) - 1.0
+            free, _ = axial_memory(active, p, strain, history.axial[n, 0], history.axial[n, 1], h)
+            history.axial[n, 0] = free
+            history.axial[n, 1] = strain
     if len(axes) == 2:
-        plane.remember(q, tables, past)
+        plane.remember(q, tables, active, p, history.memory, history.past, h)
+    elif len(axes) == 3:
+        space.remember(q, tables, history.past)
     else:
-        space.remember(q, tables, past)
+        twisted.remember(q, tables, active, p, history.memory, history.past, h)
+    return deepest
 
 
 @kernel
-def stored_energy(axes: Any, q: Any, tables: Any, active: Any, p: Any, memory: Any) -> float:
+def note(axes: Any, history: Any, out: Any) -> None:
+    """Write to out (points, columns) the frames, in space with twist, and then the memory.
+
+    Rows beyond the curvature points hold the stress-free axial strain in their first column.
+    """
+    frames = twisted.PAST if len(axes) == 4 else 0
+    points = len(history.memory)
+    for n in range(points, len(out)):
+        out[n, 0] = history.axial[n - points, 0]
+    for n in range(points):
+        for d in range(frames):
+            out[n, d] = history.past[n, d]
+        for d in range(out.shape[1] - frames):
+            out[n, frames + d] = history.memory[n, d]
+
+
+@kernel
+def stored_energy(axes: Any, q: Any, tables: Any, active: Any, p: Any, history: Any) -> float:
     """Return the elastic energy [J] of the control points q (n, nc)."""
     if len(axes) == 2:
-        return plane.energy(q, tables, active, p, memory)
-    return space.energy(q, tables, active, p, memory)
+        return plane.energy(q, tables, active, p, history.memory, history.axial)
+    total = space.axial_energies(q, tables, active, p, history.axial)
+    if len(axes) == 4:
+        return total + twisted.energy(q, tables, active, p, history.memory, history.past)
+    return total + space.energy(q, tables, active, p)
+
+
+@kernel
+def contact_energy(axes: Any, q: Any, tables: Any, active: Any, p: Any) -> float:
+    """Return the potential of contact [J] at the control points q (n, nc)."""
+    return contact.energy(len(axes), q, tables, active, p) if active[CONTACT] else 0.0
 
 
 @kernel
@@ -83,12 +168,32 @@ def largest_strain(axes: Any, states: Any, tables: Any) -> float:
     for s in range(len(states)):
         for n in range(len(tables.axial_w)):
             square = 0.0
-            for d in range(len(axes)):
+            for d in range(min(len(axes), 3)):
                 value = 0.0
                 for i in range(4):
                     value += tables.axial_b1[n, i] * states[s, tables.axial_first[n] + i, d]
                 square += value * value
             largest = max(largest, abs(np.sqrt(square) - 1.0))
+    return largest
+
+
+@kernel
+def largest_curvature(axes: Any, states: Any, tables: Any, memory: Any) -> float:
+    """Return the largest |kappa - kappa_0| [1/m] at the curvature points over the states (k, n, nc).
+
+    In space without twist the stress-free shape is straight; with twist, what it is bent by is left out.
+    """
+    largest = 0.0
+    for s in range(len(states)):
+        for n in range(len(tables.curvature_w)):
+            k = tables.curvature_first[n]
+            if len(axes) == 2:
+                kappa = plane.curvature_at(states[s], tables, n) - memory[n, 0]
+                largest = max(largest, abs(kappa))
+            else:
+                a = space.combine(states[s], k, row_of(tables.curvature_b1, n))
+                bend = space_curvature(a, space.combine(states[s], k, row_of(tables.curvature_b2, n)))[3]
+                largest = max(largest, np.sqrt(bend[0] * bend[0] + bend[1] * bend[1] + bend[2] * bend[2]))
     return largest
 
 

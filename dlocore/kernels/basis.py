@@ -172,9 +172,11 @@ class Tables(NamedTuple):
     `*_first` (p,): index of the first of the four control points at each point; `*_b1` (p, 4): first derivatives of
     their basis functions [1/m], `*_b2` second [1/m^2], `*_b0` values; `*_w` (p,): weights [m]. Axial points: one a span
     and two in an end span whose end direction is free (selective reduced integration, docs/model.md). Curvature and
-    body points: three a span. `mass` (n, 4): integrals of b_i b_{i+d} du [m]; `weight` (n,): integrals of b_i du [m].
+    body points: three a span. Contact nodes: every span in parts of one length, with their ends; none where contact is
+    off. `mass` (n, 4): integrals of b_i b_{i+d} du [m]; `weight` (n,): integrals of b_i du [m].
     """
 
+    axial_u: Any
     axial_first: Any
     axial_b1: Any
     axial_w: Any
@@ -186,6 +188,10 @@ class Tables(NamedTuple):
     body_first: Any
     body_b0: Any
     body_w: Any
+    contact_u: Any
+    contact_first: Any
+    contact_b0: Any
+    contact_w: Any
     mass: Any
     weight: Any
 
@@ -255,6 +261,30 @@ def _axial_points(knots: Any, free_start: bool, free_end: bool, rule: Any, weigh
 
 
 @kernel
+def _nodes(knots: Any, spacing: float) -> Any:
+    """Return nodes u (k,) [m] at most `spacing` apart, the knots among them, and their trapezoidal weights [m]."""
+    if not np.isfinite(spacing):
+        return np.empty(0), np.empty(0)
+    last = len(knots) - 4
+    count = 1
+    for k in range(3, last):
+        count += int(np.ceil((knots[k + 1] - knots[k]) / spacing - 1e-9))
+    u = np.empty(count)
+    w = np.zeros(count)
+    u[0] = knots[0]
+    n = 0
+    for k in range(3, last):
+        parts = int(np.ceil((knots[k + 1] - knots[k]) / spacing - 1e-9))
+        for i in range(parts):
+            width = (knots[k + 1] - knots[k]) / parts
+            w[n] += 0.5 * width
+            n += 1
+            u[n] = knots[k] + (i + 1) * width
+            w[n] += 0.5 * width
+    return u, w
+
+
+@kernel
 def build_tables(
     knots: Any,
     free_start: bool,
@@ -265,8 +295,13 @@ def build_tables(
     w3: Any,
     rule4: Any,
     w4: Any,
+    spacing: float,
 ) -> Any:
-    """Return `Tables` of the clamped cubic `knots`; `free_*`: the direction at that end of the cable is free."""
+    """Return `Tables` of the clamped cubic `knots`.
+
+    `free_*`: the direction at that end of the cable is free; `spacing`: largest distance of contact nodes [m], infinite
+    for none.
+    """
     u, axial_w = _axial_points(knots, free_start, free_end, rule2, w2)
     axial_first, table = basis_rows(knots, u, 1)
     axial_b1 = np.ascontiguousarray(table[:, 1])
@@ -275,6 +310,9 @@ def build_tables(
     b0 = np.ascontiguousarray(table[:, 0])
     b1 = np.ascontiguousarray(table[:, 1])
     b2 = np.ascontiguousarray(table[:, 2])
+    contact_u, contact_w = _nodes(knots, spacing)
+    contact_first, table = basis_rows(knots, contact_u, 0)
+    contact_b0 = np.ascontiguousarray(table[:, 0])
     n = len(knots) - 4
     mass = np.zeros((n, 4))
     weight = np.zeros(n)
@@ -287,6 +325,6 @@ def build_tables(
             for j in range(i, 4):
                 mass[f + i, j - i] += weights4[p] * table4[p, 0, i] * table4[p, 0, j]
     return Tables(
-        axial_first, axial_b1, axial_w, curvature_u, curvature_first, b1, b2, curvature_w, curvature_first, b0,
-        curvature_w, mass, weight,
+        u, axial_first, axial_b1, axial_w, curvature_u, curvature_first, b1, b2, curvature_w, curvature_first, b0,
+        curvature_w, contact_u, contact_first, contact_b0, contact_w, mass, weight,
     )  # fmt: skip

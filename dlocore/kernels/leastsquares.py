@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.effects.laws import DAMPING, QUADRATIC_DRAG
-from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, multiply_scalar_band
+from dlocore.effects.laws import has_viscosity
+from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, history_at, multiply_scalar_band
 from dlocore.kernels.banded import factor, reduce_matrix, reduce_vector
 from dlocore.kernels.compile import kernel
 
@@ -92,7 +92,7 @@ def states_at(first: Any, table: Any, C: Any, out: Any) -> None:
 @kernel
 def normal_equations(
     axes: Any, C: Any, first: Any, table: Any, weights: Any, h: float, mass: Any, drag: Any, tables: Any, active: Any,
-    p: Any, memory: Any, applied: Any, e: Any, geometric: float, A: Any, right: Any, forces: Any, tangent: bool,
+    p: Any, histories: Any, applied: Any, e: Any, geometric: float, A: Any, right: Any, forces: Any, tangent: bool,
     begin: int, end: int,
 ) -> float:  # fmt: skip
     """Add points to the normal equations of the weighted least squares at C; return their part of the objective [J].
@@ -107,6 +107,7 @@ def normal_equations(
         weights: (k,) [s].
         h: length of a time span [s].
         mass, drag: scalar bands (n, 4) times density and drag coefficient.
+        histories: `History` with arrays (1 or k, ...), what lies behind each collocation point.
         applied: (1 or k, n, nc) [N].
         e: elimination of the held degrees of freedom.
         geometric: 1 for the full tangent in the Jacobian, 0 for its positive semidefinite part.
@@ -146,24 +147,25 @@ def normal_equations(
     gradient = np.empty((3, free))
     r = np.empty((free, 1))
     state = np.empty((3, n, nc))
-    viscous = active[DAMPING] != 0 or active[QUADRATIC_DRAG] != 0
+    viscous = has_viscosity(active)
     objective = 0.0
     total = np.sum(weights)
     for k in range(begin, end):
         states_at(first[k], table[k], C, state)
         q, v, a = state[0], state[1], state[2]
-        assemble(axes, q, v, tables, active, p, memory, memory, NO_RATES, (1.0, 0.0, 0.0), f, K)
+        history = history_at(histories, k)
+        assemble(axes, q, v, tables, active, p, history, NO_RATES, (1.0, 0.0, 0.0), f, K)
         reduce_matrix(e, K, Kr)
         G[:] = B0 + Kr
         if viscous:
-            assemble(axes, q, v, tables, active, p, memory, memory, NO_RATES, (0.0, 1.0, 0.0), f, K)
+            assemble(axes, q, v, tables, active, p, history, NO_RATES, (0.0, 1.0, 0.0), f, K)
             reduce_matrix(e, K, Nr)
             G += 2.0 / h * Nr
             if tangent:
                 band_to_dense(Nr, Y)
                 Y += Nd
         if tangent and geometric != 0.0:
-            assemble(axes, q, v, tables, active, p, memory, memory, NO_RATES, (1.0, 0.0, 1.0), f, K)
+            assemble(axes, q, v, tables, active, p, history, NO_RATES, (1.0, 0.0, 1.0), f, K)
             reduce_matrix(e, K, Kr)
         factor(G)
         multiply_scalar_band(mass, a, 1.0, f)

@@ -4,17 +4,21 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.effects.laws import DAMPING
-from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, multiply_scalar_band, remember
+from dlocore.effects.laws import CONTACT, SELF_CONTACT, has_kinks, keeps_history
+from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, multiply_scalar_band, note, remember
 from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_matrix, reduce_vector, solve
 from dlocore.kernels.basis import basis_rows
 from dlocore.kernels.compile import kernel
+from dlocore.kernels.contact import strikes
+from dlocore.kernels.selfcontact import clear_way, closing, factor_wide, place_nodes, press, solve_wide, widen
 
-FAILED_STEP, LEFT = range(2)  # places in `info`
+FAILED_STEP, LEFT, DEEPEST = range(3)  # places in `info`
 _REFRESH = 0.1  # contraction of the updates above which the old factors no longer serve
 _PLAIN_ITERATIONS = 8  # Newton iterations before a step is done again with a line search
 _ROBUST_ITERATIONS = 60
-_LINE_SEARCH = 7  # halvings
+_STRIKE = 0.02  # [m/s]: a node that comes faster to what it touches would bounce, by an amount that steps decide
+_DULL = 3  # steps by backward Euler, of which the cable does not bounce
+_LINE_SEARCH = 12  # looks along a step
 
 
 @kernel
@@ -46,8 +50,8 @@ def constrained_mass_solve(nc: int, mass: Any, e: Any, held: Any, right: Any) ->
 @kernel
 def march_steps(
     axes: Any, start: int, stop: int, begin: int, h: float, rho: float, tolerance: float, Q: Any, v: Any, a: Any,
-    G: Any, mass: Any, drag: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, applied: Any, e: Any,
-    offsets: Any, reactions: Any, info: Any,
+    G: Any, mass: Any, drag: Any, tables: Any, active: Any, p: Any, history: Any, applied: Any, e: Any,
+    offsets: Any, reactions: Any, log: Any, info: Any,
 ) -> None:  # fmt: skip
     """Advance from step `start` to `stop` by the generalised-alpha method (Chung and Hulbert, 1993).
 
@@ -57,7 +61,7 @@ def march_steps(
     of the tangent where needed and a line search on the work of the residual.
 
     Args:
-        axes: (0, 1) or (0, 1, 2).
+        axes: (0, 1), (0, 1, 2) or (0, 1, 2, 3).
         start, stop: step numbers.
         begin: first step of the smooth stretch of motion that `start` lies in.
         h: time step [s].
@@ -66,14 +70,18 @@ def march_steps(
         Q: (steps + 1, n, nc) control points; written from start + 1 to stop.
         v, a, G: (n, nc) velocity, acceleration and G at step `start`; at `stop` on return.
         mass, drag: (n, 4) scalar bands, times density [kg/m] and drag coefficient [N s/m^2].
-        past: curvature of the last steps; read and written where internal damping acts.
+        history: what earlier steps left behind; read and written where a law keeps it.
         applied: (1 or steps + 1, n, nc) applied forces [N].
         e: elimination of the held degrees of freedom.
         offsets: (steps + 1, held) their prescribed part [m].
         reactions: (steps + 1, held) forces that hold them [N]; written.
-        info: (2,) the step that found no equilibrium, or -1, and the largest error that Newton's iterations left [m].
+        log: (steps + 1, points, columns) of each step the frames and the memory, see `note`; or (0, 0, 0).
+        info: (3,) the step that found no equilibrium, or -1, the largest error that Newton's iterations left [m], and
+            the largest depth in an obstacle or the table [m].
     """
     nc = len(axes)
+    keeps = keeps_history(active)
+    exact = has_kinks(active)
     n = Q.shape[1]
     size = n * nc
     alpha_m = (2.0 * rho - 1.0) / (rho + 1.0)
@@ -82,7 +90,11 @@ def march_steps(
     beta = 0.25 * (1.0 - alpha_m + alpha_f) ** 2
     to_a = 1.0 / (beta * h * h)
     to_v = gamma / (beta * h)
-    inertia = (1.0 - alpha_m) * to_a
+    touches = bool(active[CONTACT])
+    tight = bool(active[SELF_CONTACT])
+    attempts = 4 if touches or tight else 2
+    # steps to come by backward Euler; the first one, as the acceleration at the start knows of no contact yet
+    dull = 1 if touches and start == begin else 0
     free = size - len(e.held)
     largest = 10.0 * np.sum(tables.weight)  # an update of ten lengths is divergence
     K = np.empty((size, 4 * nc))
@@ -93,21 +105,42 @@ def march_steps(
     x = np.empty(free)
     trial_x = np.empty(free)
     change = np.empty(size)
+    moved = np.empty(size)
     step_change = change.reshape((n, nc))
     q1 = np.empty((n, nc))
     v1 = np.empty((n, nc))
     a1 = np.empty((n, nc))
+    # contact of the cable with itself: nodes before, at and after an update, pairs, and the widened tangent
+    shape = (len(tables.contact_w) if tight else 0, min(nc, 3))
+    x0, x1, x2 = np.empty(shape), np.empty(shape), np.empty(shape)
+    found = np.empty((64 if tight else 0, 2), np.int64)
+    row_end = np.empty(free if tight else 0, np.int64)
+    S = np.empty((free if tight else 0, free if tight else 0))
+    pairs, wide, depth, share = 0, False, 0.0, 1.0
     for k in range(start + 1, stop + 1):
         load = applied[min(k, len(applied) - 1)]
         q0 = Q[k - 1]
         # backward differences for the rate of curvature: its force then has a potential, and an exact tangent
-        rates = (1.5 / h, -2.0 / h, 0.5 / h) if k - begin > 1 else (1.0 / h, -1.0 / h, 0.0)
-        for attempt in range(2):
+        rates = (1.5 / h, -2.0 / h, 0.5 / h, h) if k - begin > 1 else (1.0 / h, -1.0 / h, 0.0, h)
+        first = 2 if dull > 0 else 0
+        dull -= 1
+        converged = False
+        for attempt in range(attempts):  # plain and robust; where the cable strikes something, both by backward Euler
+            if attempt < first:
+                continue
+            robust = attempt % 2 == 1
+            late = attempt >= 2
+            al_m, al_f = (0.0, 0.0) if late else (alpha_m, alpha_f)
+            ta = 1.0 / (h * h) if late else to_a
+            tv = 1.0 / h if late else to_v
+            carry = 0.0 if late else 0.5 / beta - 1.0
+            gm = 1.0 if late else gamma
+            inertia = (1.0 - al_m) * ta
             # predict: quadratic, since after a cubic prediction the iteration ends a fifth sooner, but before the
             # forces of the stiff stretch modes, and with them the reactions, are right
             for i in range(n):
                 for d in range(nc):
-                    if attempt == 1:
+                    if robust:
                         q1[i, d] = q0[i, d]
                     elif k - begin > 2:
                         q1[i, d] = 3.0 * q0[i, d] - 3.0 * Q[k - 2, i, d] + Q[k - 3, i, d]
@@ -116,36 +149,56 @@ def march_steps(
             place_held(e, offsets[k], q1.ravel())
             for i in range(n):
                 for d in range(nc):
-                    a1[i, d] = to_a * (q1[i, d] - q0[i, d] - h * v[i, d]) - (0.5 / beta - 1.0) * a[i, d]
-                    v1[i, d] = v[i, d] + h * ((1.0 - gamma) * a[i, d] + gamma * a1[i, d])
+                    a1[i, d] = ta * (q1[i, d] - q0[i, d] - h * v[i, d]) - carry * a[i, d]
+                    v1[i, d] = v[i, d] + h * ((1.0 - gm) * a[i, d] + gm * a1[i, d])
+            if tight:
+                place_nodes(q0, tables, x0)
+                if robust:
+                    place_nodes(q1, tables, x1)
+                    found, share = clear_way(x0, x1, tables.contact_u, p[SELF_CONTACT, 0], p[SELF_CONTACT, 4], found)
+                    if share < 1.0:
+                        converged = False
+                        continue  # what is held passes through a strand
             # --- iterate
-            limit = _PLAIN_ITERATIONS if attempt == 0 else _ROBUST_ITERATIONS
+            limit = _PLAIN_ITERATIONS if not robust else _ROBUST_ITERATIONS
             fresh = False
             converged = False
             previous = np.inf
             for it in range(limit):
-                refactor = attempt == 1 or not fresh
-                scales = (1.0, to_v, 1.0) if refactor else (0.0, 0.0, 0.0)
-                assemble(axes, q1, v1, tables, active, p, memory, past, rates, scales, f, K)
-                _residual(mass, drag, alpha_m, alpha_f, a, a1, v1, load, G, f, weighted, R)
+                refactor = robust or not fresh
+                scales = (1.0, tv, 1.0) if refactor else (0.0, 0.0, 0.0)
+                assemble(axes, q1, v1, tables, active, p, history, rates, scales, f, K)
+                if tight:
+                    found, pairs, depth = press(q1, v1, tables, p, x1, found, f)
+                _residual(mass, drag, al_m, al_f, a, a1, v1, load, G, f, weighted, R)
                 reduce_vector(e, R.ravel(), x)
                 if refactor:
-                    _effective(nc, K, mass, drag, inertia, 1.0 - alpha_f, to_v)
+                    _effective(nc, K, mass, drag, inertia, 1.0 - al_f, tv)
                     reduce_matrix(e, K, A)
-                    if factor(A) >= 0:
-                        if attempt == 0:
+                    wide = pairs > 0
+                    if wide:
+                        part = (1.0 - al_f, (1.0 - al_f) * tv, 1.0 - al_f)
+                        widen(nc, v1, tables, p, x1, found, pairs, part, e, A, row_end, S)
+                    if (factor_wide(S, row_end) if wide else factor(A)) >= 0:
+                        if not robust:
                             break
-                        assemble(axes, q1, v1, tables, active, p, memory, past, rates, (1.0, to_v, 0.0), f, K)
-                        _effective(nc, K, mass, drag, inertia, 1.0 - alpha_f, to_v)
+                        assemble(axes, q1, v1, tables, active, p, history, rates, (1.0, tv, 0.0), f, K)
+                        _effective(nc, K, mass, drag, inertia, 1.0 - al_f, tv)
                         for i in range(size):
                             K[i, 0] *= 1.0 + 1e-10
                         reduce_matrix(e, K, A)
-                        if factor(A) >= 0:
+                        if wide:
+                            part = (1.0 - al_f, (1.0 - al_f) * tv, 0.0)
+                            widen(nc, v1, tables, p, x1, found, pairs, part, e, A, row_end, S)
+                        if (factor_wide(S, row_end) if wide else factor(A)) >= 0:
                             break
                     fresh = True
                 for i in range(free):
                     trial_x[i] = -x[i]
-                solve(A, trial_x)
+                if wide:
+                    solve_wide(S, row_end, trial_x)
+                else:
+                    solve(A, trial_x)
                 expand_vector(e, trial_x, change)
                 update = 0.0  # largest step of a control point, the same in every frame
                 for i in range(n):
@@ -157,31 +210,41 @@ def march_steps(
                 if not update < largest:
                     break
                 length = 1.0
-                if attempt == 1 and update > tolerance:
+                if tight and robust:
+                    place_nodes(q1 + step_change, tables, x2)
+                    found, length = clear_way(x1, x2, tables.contact_u, p[SELF_CONTACT, 0], p[SELF_CONTACT, 4], found)
+                if robust and update > tolerance:
                     work = 0.0
                     for i in range(free):
                         work += trial_x[i] * x[i]
-                    for _ in range(_LINE_SEARCH):
+                    # the work of the residual along the step rises through zero where the step's potential is least
+                    low, low_work, high, high_work = 0.0, work, length, 0.0
+                    for search in range(_LINE_SEARCH):
                         q2 = q1 + length * step_change
-                        v2 = v1 + (length * to_v) * step_change
-                        a2 = a1 + (length * to_a) * step_change
-                        assemble(axes, q2, v2, tables, active, p, memory, past, rates, (0.0, 0.0, 0.0), f, K)
-                        _residual(mass, drag, alpha_m, alpha_f, a, a2, v2, load, G, f, weighted, R)
+                        v2 = v1 + (length * tv) * step_change
+                        a2 = a1 + (length * ta) * step_change
+                        assemble(axes, q2, v2, tables, active, p, history, rates, (0.0, 0.0, 0.0), f, K)
+                        if tight:
+                            found, pairs, depth = press(q2, v2, tables, p, x2, found, f)
+                        _residual(mass, drag, al_m, al_f, a, a2, v2, load, G, f, weighted, R)
                         reduce_vector(e, R.ravel(), x)
                         after = 0.0
                         for i in range(free):
                             after += trial_x[i] * x[i]
-                        if abs(after) <= 0.9 * abs(work):
+                        if abs(after) <= 0.5 * abs(work) or (search == 0 and after * work > 0.0):
                             break
-                        length *= 0.5
-                    else:
-                        length = 1.0
+                        if not np.isfinite(after) or after * work < 0.0:
+                            high, high_work = length, after
+                        else:
+                            low, low_work = length, after
+                        share = low_work / (low_work - high_work) if np.isfinite(high_work) else 0.5
+                        length = low + min(max(share, 0.1), 0.9) * (high - low)
                 for i in range(n):
                     for d in range(nc):
                         s = length * step_change[i, d]
                         q1[i, d] += s
-                        v1[i, d] += to_v * s
-                        a1[i, d] += to_a * s
+                        v1[i, d] += tv * s
+                        a1[i, d] += ta * s
                 # with contraction c the error left after this update is c/(1-c) of it
                 contraction = min(update / previous, 1.0) if it > 0 else 0.5
                 left = update * min(1.0, contraction / (1.0 - contraction + 1e-300))
@@ -189,20 +252,63 @@ def march_steps(
                     info[LEFT] = max(info[LEFT], left)
                     converged = True
                     break
-                if attempt == 0:
+                if not robust:
                     if update > 2.0 * previous:
                         break
                     fresh = contraction <= _REFRESH
                 previous = update
+            if converged and tight:
+                place_nodes(q1, tables, x1)
+                if not robust:
+                    found, share = clear_way(x0, x1, tables.contact_u, p[SELF_CONTACT, 0], p[SELF_CONTACT, 4], found)
+                    converged = share == 1.0
+            struck = 0.0
+            if converged and not late and touches:
+                struck = strikes(nc, q0, q1, tables, active, p)
+            if converged and not late and pairs > 0:
+                struck = max(struck, closing(x0, x1, tables.contact_u, p[SELF_CONTACT, 0], found, pairs))
+            if struck > _STRIKE * h:
+                converged = False
+                dull = _DULL
+                first = 2
+                continue
             if converged:
                 break
         if not converged:
             info[FAILED_STEP] = k
             return
-        if active[DAMPING]:
-            remember(axes, q1, tables, past)
+        anew = exact or pairs > 0
+        if anew:  # where the law has kinks
+            assemble(axes, q1, v1, tables, active, p, history, rates, (0.0, 0.0, 0.0), f, K)
+            if tight:
+                found, pairs, depth = press(q1, v1, tables, p, x1, found, f)
+                info[DEEPEST] = max(info[DEEPEST], depth)
+            _residual(mass, drag, al_m, al_f, a, a1, v1, load, G, f, weighted, R)
+        if keeps:
+            info[DEEPEST] = max(info[DEEPEST], remember(axes, q1, tables, active, p, history, h, False))
+            if len(log) > 0:
+                note(axes, history, log[k])
+        # the last update is not in R and f yet
+        if anew:
+            for i in range(size):
+                moved[i] = 0.0
+        else:
+            # its first order is that of the tangent
+            for i in range(size):
+                moved[i] = K[i, 0] * change[i]
+            for j in range(size):
+                for o in range(1, min(4 * nc, size - j)):
+                    moved[j + o] += K[j, o] * change[j]
+                    moved[j] += K[j, o] * change[j + o]
+            for i in range(n):
+                for d in range(nc):
+                    weighted[i, d] = 0.0
+            multiply_scalar_band(mass, step_change, inertia, weighted)
+            for i in range(n):
+                for d in range(nc):
+                    f[i, d] += (moved[i * nc + d] - weighted[i, d]) / (1.0 - al_f)
         for i in range(len(e.held)):
-            reactions[k, i] = R[e.held[i] // nc, e.held[i] % nc]
+            reactions[k, i] = R[e.held[i] // nc, e.held[i] % nc] + moved[e.held[i]]
         for i in range(n):
             for d in range(nc):
                 Q[k, i, d] = q1[i, d]
@@ -254,15 +360,18 @@ def _effective(nc: int, K: Any, mass: Any, drag: Any, inertia: float, share: flo
 
 @kernel
 def initial_state(
-    axes: Any, q: Any, v: Any, mass: Any, drag: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any,
-    load: Any, e: Any, held_acceleration: Any, G: Any,
+    axes: Any, q: Any, v: Any, mass: Any, drag: Any, tables: Any, active: Any, p: Any, history: Any, load: Any,
+    e: Any, held_acceleration: Any, G: Any,
 ) -> Any:  # fmt: skip
     """Return the consistent acceleration (n, nc), and write G = f + C v - load, where a smooth stretch begins."""
     nc = len(axes)
     K = np.empty((1, 1))
-    assemble(axes, q, v, tables, active, p, memory, past, NO_RATES, (0.0, 0.0, 0.0), G, K)
-    if active[DAMPING]:
-        remember(axes, q, tables, past)
+    assemble(axes, q, v, tables, active, p, history, NO_RATES, (0.0, 0.0, 0.0), G, K)
+    if active[SELF_CONTACT]:
+        x = np.empty((len(tables.contact_w), min(nc, 3)))
+        press(q, v, tables, p, x, np.empty((64, 2), np.int64), G)
+    if keeps_history(active):
+        remember(axes, q, tables, active, p, history, 0.0, False)
     multiply_scalar_band(drag, v, 1.0, G)
     for i in range(len(G)):
         for d in range(nc):

@@ -8,9 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.effects.laws import DAMPING, axial_energy, axial_stress, body_force, curvature_energy, curvature_stress
+from dlocore.effects.laws import (
+    BENDING_MEMORY,
+    DAMPING,
+    axial_energy,
+    axial_stress,
+    body_force,
+    curvature_energy,
+    curvature_memory,
+    curvature_stress,
+)
 from dlocore.kernels.basis import row_of
-from dlocore.kernels.compile import law
+from dlocore.kernels.compile import kernel, law
 from dlocore.kernels.strain import plane_curvature, plane_hessian
 
 
@@ -32,8 +41,10 @@ def _add_block(K: Any, k: int, i: int, j: int, xx: float, xy: float, yx: float, 
         K[column + 1, offset - 1] += xy
 
 
-@law
-def axial(q: Any, tables: Any, active: Any, p: Any, scales: Any, tangent: bool, f: Any, K: Any) -> None:
+@kernel
+def axial(
+    q: Any, tables: Any, active: Any, p: Any, past: Any, h: float, scales: Any, tangent: bool, f: Any, K: Any
+) -> None:
     """Add the forces and tangents of the axial site."""
     elastic, _, geometric = scales
     firsts, b1, weights = tables.axial_first, tables.axial_b1, tables.axial_w
@@ -43,7 +54,7 @@ def axial(q: Any, tables: Any, active: Any, p: Any, scales: Any, tangent: bool, 
         x, y = _combine(q, k, b)
         square = x * x + y * y
         length = np.sqrt(square)
-        tension, modulus = axial_stress(active, p, length - 1.0)
+        tension, modulus = axial_stress(active, p, length - 1.0, past[n, 0], past[n, 1], h)
         gx, gy = w * tension * x / length, w * tension * y / length
         for i in range(4):
             f[k + i, 0] += b[i] * gx
@@ -59,7 +70,7 @@ def axial(q: Any, tables: Any, active: Any, p: Any, scales: Any, tangent: bool, 
                     _add_block(K, k, i, j, s * xx, s * xy, s * xy, s * yy)
 
 
-@law
+@kernel
 def curvature(
     q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any, tangent: bool,
     f: Any, K: Any,
@@ -82,10 +93,11 @@ def curvature(
             vx, vy = _combine(v, k, b)
             ux, uy = _combine(v, k, c)
             rate = J[0] * vx + J[1] * vy + J[2] * ux + J[3] * uy
-        rest = memory[n, 0]
+        last = past[n, 0] if active[BENDING_MEMORY] else 0.0
         moment, stiffness, viscosity = curvature_stress(
-            active, p, (kappa, 0.0, 0.0), (rate, 0.0, 0.0), (rest, 0.0, 0.0)
-        )
+            active, p, (kappa, 0.0, 0.0), (rate, 0.0, 0.0), (memory[n, 0], 0.0, 0.0), (memory[n, 1], 0.0, 0.0),
+            (last, 0.0, 0.0), rates[3],
+        )  # fmt: skip
         M = w * moment[0]
         g0, g1, g2, g3 = M * J[0], M * J[1], M * J[2], M * J[3]
         for i in range(4):
@@ -117,17 +129,28 @@ def curvature(
 
 
 @law
-def remember(q: Any, tables: Any, past: Any) -> None:
-    """Make kappa of q the last one in `past` (points, 2), and the last one the one before."""
+def curvature_at(q: Any, tables: Any, n: int) -> float:
+    """Return the curvature [1/m] of q at a curvature point."""
+    k = tables.curvature_first[n]
+    ax, ay = _combine(q, k, row_of(tables.curvature_b1, n))
+    cx, cy = _combine(q, k, row_of(tables.curvature_b2, n))
+    return plane_curvature(ax, ay, cx, cy)[0]
+
+
+@kernel
+def remember(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h: float) -> None:
+    """Make kappa of q the last one in `past` (points, 2), the last one the one before; let what yielded be memory."""
     for n in range(len(past)):
-        k = tables.curvature_first[n]
-        ax, ay = _combine(q, k, row_of(tables.curvature_b1, n))
-        cx, cy = _combine(q, k, row_of(tables.curvature_b2, n))
+        kappa = curvature_at(q, tables, n)
+        free, _ = curvature_memory(
+            active, p, (kappa, 0.0, 0.0), (memory[n, 0], 0.0, 0.0), (memory[n, 1], 0.0, 0.0), (past[n, 0], 0.0, 0.0), h
+        )
+        memory[n, 0] = free[0]
         past[n, 1] = past[n, 0]
-        past[n, 0] = plane_curvature(ax, ay, cx, cy)[0]
+        past[n, 0] = kappa
 
 
-@law
+@kernel
 def body(q: Any, v: Any, tables: Any, active: Any, p: Any, scales: Any, tangent: bool, f: Any, K: Any) -> None:
     """Subtract the forces, and add the tangents, of the body site."""
     elastic, viscous, _ = scales
@@ -151,17 +174,14 @@ def body(q: Any, v: Any, tables: Any, active: Any, p: Any, scales: Any, tangent:
                     _add_block(K, k, i, j, s * xx, s * xy, s * xy, s * yy)
 
 
-@law
-def energy(q: Any, tables: Any, active: Any, p: Any, memory: Any) -> float:
+@kernel
+def energy(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any) -> float:
     """Return the stored energy [J]."""
     total = 0.0
     for n in range(len(tables.axial_w)):
         x, y = _combine(q, tables.axial_first[n], row_of(tables.axial_b1, n))
-        total += tables.axial_w[n] * axial_energy(active, p, np.sqrt(x * x + y * y) - 1.0)
+        total += tables.axial_w[n] * axial_energy(active, p, np.sqrt(x * x + y * y) - 1.0, past[n, 0])
     for n in range(len(tables.curvature_w)):
-        k = tables.curvature_first[n]
-        ax, ay = _combine(q, k, row_of(tables.curvature_b1, n))
-        cx, cy = _combine(q, k, row_of(tables.curvature_b2, n))
-        kappa, _ = plane_curvature(ax, ay, cx, cy)
+        kappa = curvature_at(q, tables, n)
         total += tables.curvature_w[n] * curvature_energy(active, p, (kappa, 0.0, 0.0), (memory[n, 0], 0.0, 0.0))
     return total

@@ -4,7 +4,14 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, multiply_scalar_band, stored_energy
+from dlocore.kernels.assembly import (
+    NO_RATES,
+    add_scalar_band,
+    assemble,
+    contact_energy,
+    multiply_scalar_band,
+    stored_energy,
+)
 from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_matrix, reduce_vector, solve
 from dlocore.kernels.compile import kernel
 
@@ -13,13 +20,22 @@ _HALVINGS = 30
 
 @kernel
 def _merit(
-    axes: Any, q: Any, target: Any, strength: float, applied: Any, tables: Any, active: Any, p: Any, memory: Any, w: Any
+    axes: Any,
+    q: Any,
+    target: Any,
+    strength: float,
+    applied: Any,
+    tables: Any,
+    active: Any,
+    p: Any,
+    history: Any,
+    w: Any,
 ) -> float:
     """Return the energy: stored + strength/2 (q - target)' B (q - target) - applied . q."""
     w[:] = 0.0
     away = q - target
     multiply_scalar_band(tables.mass, away, strength, w)
-    total = stored_energy(axes, q, tables, active, p, memory)
+    total = stored_energy(axes, q, tables, active, p, history) + contact_energy(axes, q, tables, active, p)
     for i in range(q.shape[0]):
         for d in range(q.shape[1]):
             total += 0.5 * away[i, d] * w[i, d] - applied[i, d] * q[i, d]
@@ -28,7 +44,7 @@ def _merit(
 
 @kernel
 def relax(
-    axes: Any, q: Any, target: Any, strength: float, applied: Any, tables: Any, active: Any, p: Any, memory: Any,
+    axes: Any, q: Any, target: Any, strength: float, applied: Any, tables: Any, active: Any, p: Any, history: Any,
     e: Any, offset: Any, tolerance: float, limit: int,
 ) -> Any:  # fmt: skip
     """Minimise energy over q (n, nc) in place by Newton steps with a line search; return (update [m], iterations).
@@ -54,14 +70,14 @@ def relax(
     x = np.empty(free)
     change = np.empty(size)
     place_held(e, offset, q.ravel())
-    energy = _merit(axes, q, target, strength, applied, tables, active, p, memory, w)
+    energy = _merit(axes, q, target, strength, applied, tables, active, p, history, w)
     update = np.inf
     damping = 0.0
     largest = 0.25 * np.sum(tables.weight)  # a step no longer than a quarter of the cable
     for it in range(limit):
         for attempt in range(40):
             geometric = 1.0 if attempt == 0 else 0.0
-            assemble(axes, q, still, tables, active, p, memory, memory, NO_RATES, (1.0, 0.0, geometric), f, K)
+            assemble(axes, q, still, tables, active, p, history, NO_RATES, (1.0, 0.0, geometric), f, K)
             add_scalar_band(nc, tables.mass, strength, K)
             if attempt > 1:
                 damping = max(10.0 * damping, 1e-12 * np.max(K[:, 0]))
@@ -86,12 +102,12 @@ def relax(
         step = change.reshape((n, nc))
         if update > tolerance:
             for _ in range(_HALVINGS):
-                after = _merit(axes, q - length * step, target, strength, applied, tables, active, p, memory, w)
+                after = _merit(axes, q - length * step, target, strength, applied, tables, active, p, history, w)
                 if after <= energy - 1e-4 * length * slope + 1e-14 * abs(energy):
                     break
                 length *= 0.5
         q -= length * step
-        energy = _merit(axes, q, target, strength, applied, tables, active, p, memory, w)
+        energy = _merit(axes, q, target, strength, applied, tables, active, p, history, w)
         if update <= tolerance:
             return update, it + 1
     return update, limit

@@ -1,4 +1,7 @@
-"""Assembly in space: three coordinates, a curvature vector across the tangent."""
+"""Assembly in space: three coordinates, a curvature vector across the tangent.
+
+The axial and the body site serve four coordinates too, `nc` = 4 (`twisted.py`).
+"""
 
 from typing import Any
 
@@ -7,12 +10,15 @@ import numpy as np
 from dlocore.effects.base import Symmetric, Vector
 from dlocore.effects.laws import DAMPING, axial_energy, axial_stress, body_force, curvature_energy, curvature_stress
 from dlocore.kernels.basis import row_of
-from dlocore.kernels.compile import law
+from dlocore.kernels.compile import kernel, law
 from dlocore.kernels.strain import space_curvature, space_curvature_rate, space_moment, transport
+
+STRAIGHT = (0.0, 0.0, 0.0)  # the stress-free curvature without a twist coordinate
 
 
 @law
-def _combine(q: Any, k: int, b: tuple[float, float, float, float]) -> Vector:
+def combine(q: Any, k: int, b: tuple[float, float, float, float]) -> Vector:
+    """Return the first three coordinates of the combination of four control points from k on."""
     x = b[0] * q[k, 0] + b[1] * q[k + 1, 0] + b[2] * q[k + 2, 0] + b[3] * q[k + 3, 0]
     y = b[0] * q[k, 1] + b[1] * q[k + 1, 1] + b[2] * q[k + 2, 1] + b[3] * q[k + 3, 1]
     z = b[0] * q[k, 2] + b[1] * q[k + 1, 2] + b[2] * q[k + 2, 2] + b[3] * q[k + 3, 2]
@@ -20,9 +26,9 @@ def _combine(q: Any, k: int, b: tuple[float, float, float, float]) -> Vector:
 
 
 @law
-def _add_symmetric(K: Any, k: int, i: int, j: int, s: float, H: Symmetric) -> None:
+def add_symmetric(nc: int, K: Any, k: int, i: int, j: int, s: float, H: Symmetric) -> None:
     """Add s H to the block of control points k + i and k + j, i >= j."""
-    column, offset = 3 * (k + j), 3 * (i - j)
+    column, offset = nc * (k + j), nc * (i - j)
     K[column, offset] += s * H[0]
     K[column, offset + 1] += s * H[3]
     K[column, offset + 2] += s * H[4]
@@ -35,18 +41,20 @@ def _add_symmetric(K: Any, k: int, i: int, j: int, s: float, H: Symmetric) -> No
         K[column + 2, offset - 1] += s * H[5]
 
 
-@law
-def axial(q: Any, tables: Any, active: Any, p: Any, scales: Any, tangent: bool, f: Any, K: Any) -> None:
+@kernel
+def axial(
+    nc: int, q: Any, tables: Any, active: Any, p: Any, past: Any, h: float, scales: Any, tangent: bool, f: Any, K: Any
+) -> None:
     """Add the forces and tangents of the axial site."""
     elastic, _, geometric = scales
     firsts, b1, weights = tables.axial_first, tables.axial_b1, tables.axial_w
     for n in range(len(weights)):
         k, w = firsts[n], weights[n]
         b = row_of(b1, n)
-        x, y, z = _combine(q, k, b)
+        x, y, z = combine(q, k, b)
         square = x * x + y * y + z * z
         length = np.sqrt(square)
-        tension, modulus = axial_stress(active, p, length - 1.0)
+        tension, modulus = axial_stress(active, p, length - 1.0, past[n, 0], past[n, 1], h)
         g = w * tension / length
         for i in range(4):
             f[k + i, 0] += b[i] * g * x
@@ -59,13 +67,13 @@ def axial(q: Any, tables: Any, active: Any, p: Any, scales: Any, tangent: bool, 
             H = (s * x * x + stress, s * y * y + stress, s * z * z + stress, s * x * y, s * x * z, s * y * z)
             for j in range(4):
                 for i in range(j, 4):
-                    _add_symmetric(K, k, i, j, b[i] * b[j], H)
+                    add_symmetric(nc, K, k, i, j, b[i] * b[j], H)
 
 
-@law
+@kernel
 def curvature(
-    q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any, tangent: bool,
-    f: Any, K: Any,
+    q: Any, v: Any, tables: Any, active: Any, p: Any, past: Any, rates: Any, scales: Any, tangent: bool, f: Any,
+    K: Any,
 ) -> None:  # fmt: skip
     """Add the forces and tangents of the curvature site; `past` holds kappa of two steps and t of the last (points, 9).
 
@@ -84,20 +92,19 @@ def curvature(
     for n in range(len(weights)):
         k, w = firsts[n], weights[n]
         b, c = row_of(b1, n), row_of(b2, n)
-        length, h, t, kappa = space_curvature(_combine(q, k, b), _combine(q, k, c))
+        length, h, t, kappa = space_curvature(combine(q, k, b), combine(q, k, c))
         rate = (0.0, 0.0, 0.0)
         if active[DAMPING] and rates[0] != 0.0:
-            last = transport(_vector(past, n, 6), t, _vector(past, n, 0))
-            before = transport(_vector(past, n, 6), t, _vector(past, n, 3))
+            last = transport(vector(past, n, 6), t, vector(past, n, 0))
+            before = transport(vector(past, n, 6), t, vector(past, n, 3))
             rate = (
                 rates[0] * kappa[0] + rates[1] * last[0] + rates[2] * before[0],
                 rates[0] * kappa[1] + rates[1] * last[1] + rates[2] * before[1],
                 rates[0] * kappa[2] + rates[1] * last[2] + rates[2] * before[2],
             )
         elif active[DAMPING]:
-            rate = space_curvature_rate(length, h, t, kappa, _combine(v, k, b), _combine(v, k, c))
-        rest = (memory[n, 0], memory[n, 1], memory[n, 2])
-        M, stiffness, viscosity = curvature_stress(active, p, kappa, rate, rest)
+            rate = space_curvature_rate(length, h, t, kappa, combine(v, k, b), combine(v, k, c))
+        M, stiffness, viscosity = curvature_stress(active, p, kappa, rate, STRAIGHT, STRAIGHT, STRAIGHT, 0.0)
         g, u = space_moment(length, h, t, kappa, M)
         for i in range(4):
             bi, ci = w * b[i], w * c[i]
@@ -141,33 +148,34 @@ def curvature(
 
 
 @law
-def _vector(table: Any, n: int, at: int) -> Vector:
+def vector(table: Any, n: int, at: int) -> Vector:
+    """Return three columns from `at` on of row n."""
     return table[n, at], table[n, at + 1], table[n, at + 2]
 
 
-@law
+@kernel
 def remember(q: Any, tables: Any, past: Any) -> None:
     """Make kappa and t of q the last ones in `past` (points, 9), and the last kappa, carried along, the one before."""
     for n in range(len(past)):
         k = tables.curvature_first[n]
-        a = _combine(q, k, row_of(tables.curvature_b1, n))
-        _, _, t, kappa = space_curvature(a, _combine(q, k, row_of(tables.curvature_b2, n)))
-        before = transport(_vector(past, n, 6), t, _vector(past, n, 0))
+        a = combine(q, k, row_of(tables.curvature_b1, n))
+        _, _, t, kappa = space_curvature(a, combine(q, k, row_of(tables.curvature_b2, n)))
+        before = transport(vector(past, n, 6), t, vector(past, n, 0))
         for d in range(3):
             past[n, 3 + d] = before[d]
             past[n, d] = kappa[d]
             past[n, 6 + d] = t[d]
 
 
-@law
-def body(q: Any, v: Any, tables: Any, active: Any, p: Any, scales: Any, tangent: bool, f: Any, K: Any) -> None:
+@kernel
+def body(nc: int, q: Any, v: Any, tables: Any, active: Any, p: Any, scales: Any, tangent: bool, f: Any, K: Any) -> None:
     """Subtract the forces, and add the tangents, of the body site."""
     elastic, viscous, _ = scales
     firsts, b0, weights = tables.body_first, tables.body_b0, tables.body_w
     for n in range(len(weights)):
         k, w = firsts[n], weights[n]
         b = row_of(b0, n)
-        force, S, V = body_force(active, p, _combine(q, k, b), _combine(v, k, b))
+        force, S, V = body_force(active, p, combine(q, k, b), combine(v, k, b))
         for i in range(4):
             f[k + i, 0] -= w * b[i] * force[0]
             f[k + i, 1] -= w * b[i] * force[1]
@@ -179,20 +187,27 @@ def body(q: Any, v: Any, tables: Any, active: Any, p: Any, scales: Any, tangent:
             )  # fmt: skip
             for j in range(4):
                 for i in range(j, 4):
-                    _add_symmetric(K, k, i, j, w * b[i] * b[j], H)
+                    add_symmetric(nc, K, k, i, j, w * b[i] * b[j], H)
 
 
-@law
-def energy(q: Any, tables: Any, active: Any, p: Any, memory: Any) -> float:
-    """Return the stored energy [J]."""
+@kernel
+def axial_energies(q: Any, tables: Any, active: Any, p: Any, past: Any) -> float:
+    """Return the stored energy of the axial site [J]."""
     total = 0.0
     for n in range(len(tables.axial_w)):
-        x, y, z = _combine(q, tables.axial_first[n], row_of(tables.axial_b1, n))
-        total += tables.axial_w[n] * axial_energy(active, p, np.sqrt(x * x + y * y + z * z) - 1.0)
+        x, y, z = combine(q, tables.axial_first[n], row_of(tables.axial_b1, n))
+        strain = np.sqrt(x * x + y * y + z * z) - 1.0
+        total += tables.axial_w[n] * axial_energy(active, p, strain, past[n, 0])
+    return total
+
+
+@kernel
+def energy(q: Any, tables: Any, active: Any, p: Any) -> float:
+    """Return the stored energy of the curvature site [J]."""
+    total = 0.0
     for n in range(len(tables.curvature_w)):
         k = tables.curvature_first[n]
-        a = _combine(q, k, row_of(tables.curvature_b1, n))
-        kappa = space_curvature(a, _combine(q, k, row_of(tables.curvature_b2, n)))[3]
-        rest = (memory[n, 0], memory[n, 1], memory[n, 2])
-        total += tables.curvature_w[n] * curvature_energy(active, p, kappa, rest)
+        a = combine(q, k, row_of(tables.curvature_b1, n))
+        kappa = space_curvature(a, combine(q, k, row_of(tables.curvature_b2, n)))[3]
+        total += tables.curvature_w[n] * curvature_energy(active, p, kappa, STRAIGHT)
     return total

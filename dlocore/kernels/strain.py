@@ -77,6 +77,39 @@ def transport(t0: Vector, t1: Vector, x: Vector) -> Vector:
 
 
 @law
+def twist_increment(t0: Vector, k0: Vector, t: Vector, kappa: Vector) -> tuple[float, Vector, Vector]:
+    """Return how much the twist of a frame grows that is carried from t0 to t, and its derivatives.
+
+    A frame without twist along the cable, where the tangent is t0 with t0' = k0, is turned at every point by the
+    smallest rotation that brings t0 to t, where t' = kappa. Its twist rate is then (docs/model.md eq. 19)
+
+        s (t x t0) . (k0 + kappa),  s = 1/(1 + t . t0).
+
+    Returns:
+        that twist rate [rad/m]; spin = s (t x t0), its derivative by kappa, which is also how much the carried frame
+        spins about t for each change of t; the derivative by t.
+    """
+    s = 1.0 / (1.0 + t[0] * t0[0] + t[1] * t0[1] + t[2] * t0[2])
+    spin = (
+        s * (t[1] * t0[2] - t[2] * t0[1]),
+        s * (t[2] * t0[0] - t[0] * t0[2]),
+        s * (t[0] * t0[1] - t[1] * t0[0]),
+    )
+    w = (k0[0] + kappa[0], k0[1] + kappa[1], k0[2] + kappa[2])
+    twist = spin[0] * w[0] + spin[1] * w[1] + spin[2] * w[2]
+    change = s * twist
+    return (
+        twist,
+        spin,
+        (
+            s * (t0[1] * w[2] - t0[2] * w[1]) - change * t0[0],
+            s * (t0[2] * w[0] - t0[0] * w[2]) - change * t0[1],
+            s * (t0[0] * w[1] - t0[1] * w[0]) - change * t0[2],
+        ),
+    )
+
+
+@law
 def space_moment(length: float, h: float, t: Vector, kappa: Vector, M: Vector) -> tuple[Vector, Vector]:
     """Return the generalised forces by r' and by r'' of the moment vector M across the tangent."""
     dot = (M[0] * kappa[0] + M[1] * kappa[1] + M[2] * kappa[2]) / length

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.discretisation import smallest_n_u
+from dlocore.effects.contact import DEEPEST
 from dlocore.kernels.basis import basis_rows
-from dlocore.problem import Problem
-from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, fit, march, smallest_n_t, time_knots
+from dlocore.problem import Problem, stiffer
+from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, fit, march, refined, smallest_n_t, time_knots
 from dlocore.solvers.monitor import Monitor
 from dlocore.statics import start_grid
 
@@ -26,6 +27,10 @@ LEVELS = (
     (97, 145, 576),
 )
 CREDIBLE_STRAIN = 0.02  # axial: a march that stretches the cable more is tried again with strong damping
+_STIFFER = 5  # times that contact is made stiffer on one grid
+_MISSED = 0.01  # of the diameter: what the time spline may miss of a motion with contact
+_STIFFENING = 10.0  # at most each time
+_YIELDING = 0.8  # of the depth, at most, is left by a stiffer contact where it is one of stiffness
 FINER = 1.5  # times n_u, n_t and the steps of a given grid: the march that its error is estimated with
 ACCEPT = 0.75  # of the target: a refinement that moved the surface less is believed
 
@@ -35,16 +40,22 @@ class Level:
     """A march on one grid and its spline.
 
     Attributes:
+        posed: what was to be solved.
+        problem: what was solved: contact may have been made stiffer.
         motion: the march.
         knots_t: (n_t + 4,) [s].
         control: (n_t, n_u, nc) [m].
         change: largest distance to the level before [m], infinite at the first.
+        note: what was found on it, in words.
     """
 
+    posed: Problem
+    problem: Problem
     motion: March
     knots_t: Floats
     control: Floats
     change: float
+    note: str = ""
 
 
 def stretched(problem: Problem, level: int) -> tuple[int, int, int]:
@@ -63,34 +74,60 @@ def given_steps(n_t: int) -> int:
 
 
 def run_level(
-    problem: Problem, n_u: int, n_t: int, steps: int, monitor: Monitor, *, rho: float = RHO, booked: bool = True
+    problem: Problem,
+    n_u: int,
+    n_t: int,
+    steps: int,
+    monitor: Monitor,
+    *,
+    rho: float = RHO,
+    booked: bool = True,
+    free_knots: bool = False,
 ) -> Level:
     """March on one grid and fit the time spline.
 
     A march that found no equilibrium, or stretched the cable beyond belief, is done again with strong numerical
-    damping, and the better one is kept.
+    damping, or without where it had it, and the better one is kept.
 
     Args:
         rho: spectral radius of the march.
         booked: whether to book the time by phase.
+        free_knots: whether to add time knots where the cable strikes something.
     """
+    posed = problem
     grid = start_grid(problem, n_u, monitor)
     knots_t = time_knots(problem, n_t)
     assert knots_t is not None, "the caller asks for enough control points"
     if booked:
         monitor.phase("setup")
     motion = march(problem, grid, steps, monitor, rho=rho)
+    for _ in range(_STIFFER):
+        allowed = DEEPEST * problem.scene.cable.diameter
+        if motion.stopped == "time" or motion.deepest <= allowed:
+            break
+        if motion.stopped and problem.self_contact is None:
+            break  # a soft contact may be why strands got through each other, and the march ended
+        # where strands strike each other, the depth goes only with the root of the stiffness
+        ratio = (1.5 * motion.deepest / allowed) ** (1 if problem.self_contact is None else 2)
+        harder = stiffer(problem, min(ratio, _STIFFENING))
+        again = march(harder, grid, steps, monitor, rho=rho)
+        if (again.reached, -again.deepest) < (motion.reached, -_YIELDING * motion.deepest):
+            break  # what is this deep was not pushed in
+        problem, motion = harder, again
     doubtful = motion.stopped == "step" or motion.largest_strain > CREDIBLE_STRAIN
-    if doubtful and rho > STRONGLY_DAMPED:
-        again = march(problem, grid, steps, monitor, rho=STRONGLY_DAMPED)
+    if doubtful and (rho > STRONGLY_DAMPED or motion.stopped == "step"):
+        again = march(problem, grid, steps, monitor, rho=RHO if rho == STRONGLY_DAMPED else STRONGLY_DAMPED)
         if (again.reached, -again.largest_strain) > (motion.reached, -motion.largest_strain):
             motion = again
     if booked:
         monitor.phase("march")
-    control = fit(motion, knots_t)
+    smooth = motion
+    if free_knots and (problem.contact is not None or motion.deepest > 0.0):
+        knots_t, smooth = refined(motion, knots_t, _MISSED * problem.scene.cable.diameter)
+    control = fit(smooth, knots_t)
     if booked:
         monitor.phase("fit")
-    return Level(motion, knots_t, control, np.inf)
+    return Level(posed, problem, motion, knots_t, control, np.inf)
 
 
 def extrapolated(change: float, before: float) -> float:
@@ -121,6 +158,6 @@ def distance(a: Level, b: Level, problem: Problem) -> float:
     """Return the largest distance between the surfaces of two levels [m]."""
     u = np.linspace(0.0, problem.scene.cable.length, 33)
     t = np.linspace(0.0, problem.horizon, 17)
-    nc = problem.plane.dimensions
-    away = (sample(a, u, t) - sample(b, u, t)).reshape(-1, nc)
+    nc = problem.nc
+    away = (sample(a, u, t) - sample(b, u, t)).reshape(-1, nc)[:, : problem.plane.dimensions]
     return float(np.sqrt((away * away).sum(axis=1).max()))

@@ -1,15 +1,20 @@
 """The compiled march: implicit steps of the spatial spline, fitted by the time spline."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.discretisation import Grid, Starts, applied_forces, close_grasps, hold
-from dlocore.kernels.assembly import largest_strain
+from dlocore.discretisation import applied_forces
+from dlocore.effects.friction import SLIP_SPEED
+from dlocore.grid import Grid
+from dlocore.holding import Starts, close_grasps, hold
+from dlocore.kernels.assembly import History, largest_strain, note
+from dlocore.kernels.banded import Elimination
 from dlocore.kernels.basis import graded_knots
 from dlocore.kernels.march import (
+    DEEPEST,
     FAILED_STEP,
     LEFT,
     constrained_mass_solve,
@@ -17,11 +22,13 @@ from dlocore.kernels.march import (
     initial_state,
     march_steps,
 )
+from dlocore.kernels.twisted import PAST
 from dlocore.paths import Move, Waypoints
 from dlocore.problem import Problem
 from dlocore.report import WindowForces
 from dlocore.scene import Grasp
 from dlocore.solvers.monitor import Monitor, TimeIsUp
+from dlocore.spline import design_matrix
 
 Floats = NDArray[np.float64]
 
@@ -30,6 +37,8 @@ Floats = NDArray[np.float64]
 RHO = 0.5
 STRONGLY_DAMPED = 0.0
 TOLERANCE = 3e-7  # of the length, on the error that the Newton iterations of a step leave
+_REFINEMENTS = 8  # of the time knots: each halves spans
+_RESTS = 0.05  # of the diameter above the table: nearer to it the cable rests on it
 _CHUNK = 256  # steps between looks at the clock
 _SPLITS = (4, 16, 64)  # parts of a step that found no equilibrium
 
@@ -57,12 +66,16 @@ class March:
         states: (steps + 1, n_u, nc) control points at those times.
         velocity: (n_u, nc) [m/s] just after t = 0.
         forces: what holds the cable between each two events.
+        history: what the motion leaves behind at its end.
+        log: frames and memory at the times (steps + 1, points, columns), see `kernels.assembly.note`; (0, 0, 0) where
+            nothing is kept.
         reached: last step that found equilibrium.
         stopped: why it ended there: "" (the end), "step" (no equilibrium) or "time" (deadline).
         rho: spectral radius it was marched with.
         split: steps that found equilibrium only in smaller ones.
         largest_strain: largest |axial strain| of the motion.
         update: largest error left by the Newton iterations of a step, as estimated [m].
+        deepest: largest depth of the cable in an obstacle or the table [m].
     """
 
     grid: Grid
@@ -70,12 +83,48 @@ class March:
     states: Floats
     velocity: Floats
     forces: tuple[WindowForces, ...]
+    history: History
+    log: Floats
     reached: int
     stopped: str
     rho: float
     split: int
     largest_strain: float
     update: float
+    deepest: float
+
+    @property
+    def frames(self) -> Floats:
+        """Frames of the curvature points at the times (steps + 1, points, PAST); no columns without twist."""
+        return self.log[:, : len(self.grid.tables.curvature_w), : self.log.shape[2] - self._remembered]
+
+    @property
+    def memory(self) -> Floats:
+        """Stress-free strain of the curvature points at the times (steps + 1, points, 1 in the plane or 3)."""
+        return self.log[:, : len(self.grid.tables.curvature_w), self.log.shape[2] - self._remembered :]
+
+    @property
+    def axial_memory(self) -> Floats:
+        """Stress-free axial strain at the times (steps + 1, axial points); no columns where none is kept."""
+        return np.asarray(self.log[:, len(self.grid.tables.curvature_w) :, :1].sum(axis=2))
+
+    @property
+    def _remembered(self) -> int:
+        return 3 if self.log.shape[2] > PAST else min(1, self.log.shape[2])
+
+    def behind(self, times: Floats) -> History:
+        """Return what lies behind the motion at the times (k,) [s]: a `History` with arrays (1 or k, ...)."""
+        start = self.grid.history
+        if len(self.log) == 0:
+            return History(start.memory[None], start.past[None], start.axial[None], start.stick, start.slide)
+        at = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 1)
+        memory = np.broadcast_to(start.memory, (len(at), *start.memory.shape)).copy()
+        memory[..., : self._remembered] = self.memory[at]
+        past = self.frames[at] if self.frames.shape[2] else np.zeros((len(at), *start.past.shape))
+        axial = np.broadcast_to(start.axial, (len(at), *start.axial.shape)).copy()
+        if self.axial_memory.shape[1]:
+            axial[..., 0] = self.axial_memory[at]
+        return History(memory, np.ascontiguousarray(past), axial, start.stick, start.slide)
 
 
 def events_of(problem: Problem) -> list[Event]:
@@ -133,8 +182,7 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
     Raises:
         Cancelled: the caller asked to stop.
     """
-    plane = problem.plane
-    axes = tuple(range(plane.dimensions))
+    axes, nc = problem.axes, problem.nc
     marks = [0.0, *[e.time for e in events_of(problem)], problem.horizon]
     counts = [max(8, steps // (2 * len(marks)), round(steps * (b - a) / problem.horizon)) for a, b in pairwise(marks)]
     if len(counts) == 1:
@@ -143,23 +191,26 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
         [[0.0], *[np.linspace(a, b, n + 1)[1:] for a, b, n in zip(marks[:-1], marks[1:], counts, strict=True)]]
     )
     active, parameters = problem.law_table()
-    if problem.inertia is None:
-        rho = 0.0
+    if problem.inertia is None or problem.contact is not None or problem.friction is not None:
+        rho = STRONGLY_DAMPED  # forces that jump are balanced at the end of each step
     unit_mass = grid.tables.mass
     mass = unit_mass * problem.mass_density()
     drag = unit_mass * problem.drag_coefficient()
     applied = applied_forces(problem, grid, times)
     tolerance = TOLERANCE * problem.scene.cable.length
-    states = np.empty((len(times), grid.n_u, plane.dimensions))
+    states = np.empty((len(times), grid.n_u, nc))
     states[0] = grid.start
     v = grid.velocity.copy()
     velocity = v
-    info = np.zeros(2)
+    info = np.zeros(3)
     info[FAILED_STEP] = -1
     starts: Starts = {}
     forces: list[WindowForces] = []
     reached, stopped, split = 0, "", 0
-    past = np.zeros((len(grid.tables.curvature_w) if problem.damping else 0, 2 if plane.dimensions == 2 else 9))
+    history = grid.past()
+    log = _empty_log(problem, grid, len(times))
+    if len(log):
+        note(axes, history, log[0])
     first = 0
     for begin, end, count in zip(marks[:-1], marks[1:], counts, strict=True):
         last = first + count
@@ -167,10 +218,10 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
         grasps = closed_grasps(problem, begin, end)
         close_grasps(problem, grid, grasps, starts, states[first])
         near_times = begin + 1e-3 * h * np.arange(3.0)  # for velocity and acceleration of the paths at the beginning
-        held = hold(problem, grid, grasps, np.concatenate([near_times, times[first : last + 1]]), starts)
+        held = hold(problem, grid, grasps, np.concatenate([near_times, times[first : last + 1]]), starts, states[first])
         near, e = held.offsets[:3], held.elimination
         rate = (4 * near[1] - 3 * near[0] - near[2]) / (2e-3 * h)
-        v = constrained_mass_solve(plane.dimensions, unit_mass, e, rate, times_mass(unit_mass, v))
+        v = constrained_mass_solve(nc, unit_mass, e, rate, times_mass(unit_mass, v))
         if first == 0:
             velocity = v.copy()
         load = applied[min(first, len(applied) - 1)]
@@ -187,13 +238,16 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
             grid.tables,
             active,
             parameters,
-            grid.memory,
-            past,
+            history,
             load,
             e,
             acceleration,
             G,
         )
+        if problem.friction is not None and problem.table is not None and first == 0:
+            _lean_on_table(problem, grid, a, history)
+        if problem.friction is not None and problem.friction.lying > 0 and first == 0:
+            a = _lean_on_anchors(problem, grid, v, a, mass, e, G, history)
         if problem.inertia is None:
             a = np.zeros_like(v)
         offsets = np.zeros((len(times), len(e.held)))
@@ -210,7 +264,7 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
             until = min(at + _CHUNK, last)
             march_steps(
                 axes, at, until, smooth, h, rho, tolerance, states, v, a, G, mass, drag, grid.tables, active,
-                parameters, grid.memory, past, applied, e, offsets, reactions, info,
+                parameters, history, applied, e, offsets, reactions, log, info,
             )  # fmt: skip
             at = until
             failed = int(info[FAILED_STEP])
@@ -221,23 +275,25 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
             at = failed - 1
             for parts in _SPLITS:
                 inner = np.linspace(times[at], times[failed], parts + 1)
-                inner_offsets = hold(problem, grid, grasps, inner, starts).offsets
+                inner_offsets = hold(problem, grid, grasps, inner, starts, states[at]).offsets
                 inner_states = np.empty((parts + 1, *states.shape[1:]))
                 inner_states[0] = states[at]
                 inner_reactions = np.zeros((parts + 1, len(e.held)))
-                kept = [x.copy() for x in (v, a, G, past)]
+                kept = [x.copy() for x in (v, a, G, *history)]
                 march_steps(
                     axes, 0, parts, 0, h / parts, STRONGLY_DAMPED, tolerance, inner_states, v, a, G, mass, drag,
-                    grid.tables, active, parameters, grid.memory, past, applied_forces(problem, grid, inner), e,
-                    inner_offsets, inner_reactions, info,
+                    grid.tables, active, parameters, history, applied_forces(problem, grid, inner), e, inner_offsets,
+                    inner_reactions, log[:0], info,
                 )  # fmt: skip
                 if info[FAILED_STEP] < 0:
                     states[failed], reactions[failed] = inner_states[-1], inner_reactions[-1]
+                    if len(log):
+                        note(axes, history, log[failed])
                     at = smooth = failed
                     split += 1
                     break
                 info[FAILED_STEP] = -1
-                for x, before in zip((v, a, G, past), kept, strict=True):
+                for x, before in zip((v, a, G, *history), kept, strict=True):
                     x[:] = before
             else:
                 stopped = "step"
@@ -249,10 +305,61 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
             break
         first = last
     states[reached + 1 :] = states[reached]
+    log[reached + 1 :] = log[reached : reached + 1]
     return March(
-        grid, times, states, velocity, tuple(forces), reached, stopped, rho, split,
-        float(largest_strain(axes, states, grid.tables)), float(info[LEFT]),
+        grid, times, states, velocity, tuple(forces), history, log, reached, stopped, rho, split,
+        float(largest_strain(axes, states, grid.tables)), float(info[LEFT]), float(info[DEEPEST]),
     )  # fmt: skip
+
+
+def _lean_on_anchors(
+    problem: Problem, grid: Grid, v: Floats, a: Floats, mass: Floats, e: Elimination, G: Floats, history: History
+) -> Floats:
+    """Put the anchors of a lying cable where friction holds it back from the acceleration `a` that it would else take.
+
+    With anchors right under it the cable would run into the stick, and swing past it. Returns the acceleration that is
+    left, and adds the friction to G, both (n_u, nc).
+    """
+    assert problem.friction is not None
+    stick, _, limit = problem.friction.parameters()
+    index = grid.tables.body_first[:, None] + np.arange(4)
+    acceleration, velocity = (np.einsum("pi,pid->pd", grid.tables.body_b0, x[index]) for x in (a, v))
+    pull = problem.scene.cable.linear_density * acceleration / limit
+    pull = pull / np.maximum(np.linalg.norm(pull, axis=1, keepdims=True), 1.0)
+    speed = np.linalg.norm(velocity, axis=1, keepdims=True)
+    moves = speed > SLIP_SPEED  # friction on what slides is in `a` and G already
+    history.slide[:] = history.slide - stick * np.where(moves, velocity / np.maximum(speed, SLIP_SPEED), pull)
+    pull = np.where(moves, 0.0, pull)
+    force = np.zeros_like(a)
+    weights = limit * grid.tables.body_w[:, None] * grid.tables.body_b0
+    np.add.at(force, index, weights[:, :, None] * pull[:, None, :])
+    G += force
+    return a + constrained_mass_solve(problem.nc, mass, e, np.zeros(len(e.held)), -force)
+
+
+def _lean_on_table(problem: Problem, grid: Grid, a: Floats, history: History) -> None:
+    """Put the anchors of what rests on a table in space where friction holds it back, as `_lean_on_anchors` does."""
+    assert problem.friction is not None
+    assert problem.table is not None
+    fall = -float(problem.weight()[2]) / problem.scene.cable.linear_density
+    if not fall > 0.0 or not problem.table.friction > 0.0:
+        return
+    index = grid.tables.contact_first[:, None] + np.arange(4)
+    acceleration = np.einsum("pi,pid->pd", grid.tables.contact_b0, a[index])[:, :2]
+    pull = acceleration / (problem.table.friction * fall)
+    pull /= np.maximum(np.linalg.norm(pull, axis=1, keepdims=True), 1.0)
+    rests = history.stick[:, 5] - problem.table.height < _RESTS * problem.scene.cable.diameter
+    history.stick[:, :2] -= problem.friction.parameters()[0] * pull * rests[:, None]
+
+
+def _empty_log(problem: Problem, grid: Grid, times: int) -> Floats:
+    """Return room for frames and memory of a motion, (0, 0, 0) where it keeps none."""
+    kept = (problem.twist, problem.bending_memory, problem.twist_memory, problem.stretch_memory)
+    if all(effect is None for effect in kept):
+        return np.zeros((0, 0, 0))
+    columns = PAST + 3 if problem.twist is not None else 1
+    rows = len(grid.tables.curvature_w) + (len(grid.tables.axial_w) if problem.stretch_memory is not None else 0)
+    return np.zeros((times, rows, columns))
 
 
 def _to_ends_of_steps(reactions: Floats, lag: float) -> None:
@@ -273,6 +380,52 @@ def times_mass(mass: Floats, v: Floats) -> Floats:
         out[:-o] += mass[:-o, o, None] * v[o:]
         out[o:] += mass[:-o, o, None] * v[:-o]
     return out
+
+
+def refined(motion: March, knots_t: Floats, tolerance: float) -> tuple[Floats, March]:
+    """Return time knots, more where the time spline misses the motion by more than `tolerance` [m], and what to fit.
+
+    Where a cable strikes something its velocity jumps, and a spline without knots there goes on into the obstacle, or
+    swings past its states. There the states half-way through the steps are added to the motion, and knots beside them.
+    """
+    for _ in range(_REFINEMENTS):
+        missed = _missed(motion, knots_t)
+        breaks = np.unique(knots_t)
+        span = np.clip(np.searchsorted(breaks, motion.times, side="right") - 1, 0, len(breaks) - 2)
+        new = []
+        for k in np.unique(span[missed > tolerance]):
+            inside = motion.times[(motion.times > breaks[k] + 1e-12) & (motion.times < breaks[k + 1] - 1e-12)]
+            if len(inside) > 1:
+                new.append(inside[len(inside) // 2])
+        between = _halved(motion, knots_t, tolerance)
+        if not new and between is motion:
+            break
+        knots_t = np.sort(np.concatenate([knots_t, new]))
+        motion = between
+    return knots_t, motion
+
+
+def _missed(motion: March, knots_t: Floats) -> Floats:
+    """Return by how much the time spline misses each state (steps + 1,) [m]."""
+    fitted = np.tensordot(design_matrix(knots_t, motion.times), fit(motion, knots_t), axes=1)
+    return np.asarray(np.abs(fitted - motion.states)[..., :3].max(axis=(1, 2)))
+
+
+def _halved(motion: March, knots_t: Floats, tolerance: float) -> March:
+    """Return the motion with states half-way through those steps where the spline leaves the chord of the states."""
+    times, states = motion.times, motion.states
+    middle = 0.5 * (times[1:] + times[:-1])
+    chord = 0.5 * (states[1:] + states[:-1])
+    fitted = np.tensordot(design_matrix(knots_t, middle), fit(motion, knots_t), axes=1)
+    away = np.abs(fitted - chord)[..., :3].max(axis=(1, 2))
+    split = np.flatnonzero((away > tolerance) & (np.diff(times) > 0.2 * np.median(np.diff(times))))
+    if len(split) == 0:
+        return motion
+    return replace(
+        motion,
+        times=np.insert(times, split + 1, middle[split]),
+        states=np.insert(states, split + 1, chord[split], axis=0),
+    )
 
 
 def fit(motion: March, knots_t: Floats) -> Floats:

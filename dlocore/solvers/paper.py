@@ -9,13 +9,14 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.discretisation import Grid, Starts, applied_forces, close_grasps
+from dlocore.discretisation import applied_forces
 from dlocore.errors import SceneError
-from dlocore.kernels.assembly import NO_RATES, assemble, multiply_scalar_band
+from dlocore.holding import Starts, close_grasps
+from dlocore.kernels.assembly import NO_RATES, History, assemble, history_at, multiply_scalar_band
 from dlocore.kernels.basis import basis_rows
 from dlocore.kernels.leastsquares import band_to_dense, states_at
 from dlocore.problem import Problem
-from dlocore.solvers.march import closed_grasps
+from dlocore.solvers.march import March, closed_grasps
 from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.spacetime import WindowSolver, windows_of
 
@@ -27,7 +28,7 @@ LARGEST_NET = 600  # control points: the least squares is dense, as printed
 
 def solve_as_printed(
     problem: Problem,
-    grid: Grid,
+    motion: March,
     knots_t: Floats,
     delta: float,
     monitor: Monitor,
@@ -42,6 +43,7 @@ def solve_as_printed(
         SceneError: the motion has jumps inside, or the net is too large for a dense least squares.
         Cancelled: the caller asked to stop.
     """
+    grid = motion.grid
     windows = windows_of(problem, knots_t)
     if len(windows) > 1:
         allowed = '"march" or "spacetime" where grasps open, close or jump in mid-motion'
@@ -54,17 +56,27 @@ def solve_as_printed(
     starts: Starts = {}
     close_grasps(problem, grid, grasps, starts, None)
     window = WindowSolver(
-        problem, grid, windows[0], grasps, starts, grid.velocity, problem.stretch.axial_stiffness, monitor
+        problem,
+        grid,
+        windows[0],
+        grasps,
+        starts,
+        grid.start,
+        grid.velocity,
+        motion,
+        problem.stretch.axial_stiffness,
+        monitor,
     )
     times = np.linspace(0.0, problem.horizon, n_u * n_t + 1)[1:]
     first, table = basis_rows(knots_t, times, 2)
     applied = applied_forces(problem, grid, times)
+    histories = motion.behind(times)
     control = window.constrain(np.tile(grid.start, (n_t, 1, 1)))
     Z = np.array([window.expand(row)[2].ravel() for row in np.eye(window.free)]).T
     update = np.inf
     for _ in range(MAX_ITERATIONS):
         monitor.check()
-        J, R = _equations(window, control, first, table, applied, Z)
+        J, R = _equations(window, control, first, table, applied, Z, histories)
         if not np.isfinite(J).all():
             break
         x = np.asarray(np.linalg.lstsq(J, -R, rcond=None)[0], dtype=np.float64)
@@ -78,7 +90,13 @@ def solve_as_printed(
 
 
 def _equations(
-    window: WindowSolver, control: Floats, first: NDArray[np.int64], table: Floats, applied: Floats, Z: Floats
+    window: WindowSolver,
+    control: Floats,
+    first: NDArray[np.int64],
+    table: Floats,
+    applied: Floats,
+    Z: Floats,
+    histories: History,
 ) -> tuple[Floats, Floats]:
     """Return the stacked regression matrix (eq. 21, 23) in the free unknowns and the residuals at the iterate."""
     n_t, n_u, nc = control.shape
@@ -90,7 +108,7 @@ def _equations(
     R = np.empty(len(first) * free)
     for k in range(len(first)):
         states_at(first[k], table[k], control, state)
-        laws = (window.active, window.parameters, window.grid.memory, window.grid.memory, NO_RATES)
+        laws = (window.active, window.parameters, history_at(histories, k), NO_RATES)
         assemble(window.axes, state[0], state[1], window.grid.tables, *laws, (1.0, 0.0, 1.0), f, K)
         band_to_dense(K, dense)
         multiply_scalar_band(window.mass, state[2], 1.0, f)

@@ -11,7 +11,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.discretisation import Grid, Starts, applied_forces, close_grasps, hold
+from dlocore.discretisation import applied_forces
+from dlocore.grid import Grid
+from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.banded import expand_vector, factor_columns, place_held
 from dlocore.kernels.banded import solve as solve_factored
 from dlocore.kernels.basis import GAUSS_2, basis_rows
@@ -87,13 +89,14 @@ class WindowSolver:
         window: Window,
         grasps: list[Grasp],
         starts: Starts,
+        start: Floats,
         velocity: Floats,
+        motion: March,
         axial_stiffness: float,
         monitor: Monitor,
     ) -> None:
         self.problem, self.grid, self.window, self.monitor = problem, grid, window, monitor
-        self.nc = problem.plane.dimensions
-        self.axes = tuple(range(self.nc))
+        self.nc, self.axes = problem.nc, problem.axes
         spans = np.flatnonzero(np.diff(window.knots))
         half = 0.5 * np.diff(window.knots)[spans]
         self.times = (window.knots[spans][:, None] + half[:, None] * (1 + GAUSS_2[0])).ravel()
@@ -106,7 +109,8 @@ class WindowSolver:
         self.drag = grid.tables.mass * problem.drag_coefficient()
         self.applied = applied_forces(problem, grid, self.times)
         fine = np.linspace(window.begin, window.end, 6 * len(spans) + 1)
-        self.held = hold(problem, grid, grasps, fine, starts)
+        self.histories = motion.behind(self.times)
+        self.held = hold(problem, grid, grasps, fine, starts, start)
         e = self.held.elimination
         rates = velocity.reshape(-1)[e.held].copy()
         for k in range(len(e.held)):
@@ -138,7 +142,7 @@ class WindowSolver:
             self.monitor.check()
             value += normal_equations(
                 self.axes, control, self.first, self.table, self.weights, self.span, self.mass, self.drag,
-                self.grid.tables, self.active, self.parameters, self.grid.memory, self.applied, self.held.elimination,
+                self.grid.tables, self.active, self.parameters, self.histories, self.applied, self.held.elimination,
                 geometric, A, right, forces, tangent, begin, min(begin + points, len(self.times)),
             )  # fmt: skip
         weight = 12.0 * self.problem.mass_density() / self.span**2 + 2.0 * self.problem.drag_coefficient() / self.span
@@ -212,11 +216,11 @@ def solve(problem: Problem, motion: March, knots_t: Floats, delta: float, monito
         span = (window.end - window.begin) / (len(window.knots) - 7)
         stiffness = bounded_axial_stiffness(problem, tension, span)
         if i > 0:
-            near = hold(problem, grid, grasps, window.begin + 1e-6 * np.arange(3.0), starts)
+            near = hold(problem, grid, grasps, window.begin + 1e-6 * np.arange(3.0), starts, q)
             rate = (4 * near.offsets[1] - 3 * near.offsets[0] - near.offsets[2]) / 2e-6
             mass = times_mass(grid.tables.mass, v)
-            v = constrained_mass_solve(problem.plane.dimensions, grid.tables.mass, near.elimination, rate, mass)
-        solver = WindowSolver(problem, grid, window, grasps, starts, v, stiffness, monitor)
+            v = constrained_mass_solve(problem.nc, grid.tables.mass, near.elimination, rate, mass)
+        solver = WindowSolver(problem, grid, window, grasps, starts, q, v, motion, stiffness, monitor)
         control = guess[i]
         control[0] = q
         control[1] = q + v * (window.knots[4] - window.knots[1]) / 3

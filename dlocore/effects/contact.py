@@ -1,0 +1,72 @@
+"""Contact with a table or an obstacle: a normal force per length that grows with the depth (docs/model.md eq. 21).
+
+    N = k phi(d) - c phi'(d) n.v >= 0,   phi = d^2/(2 w) for d < w, d - w/2 beyond,
+
+where d is the depth of the cable's surface in the obstacle. The stiffness k is numerical: it is raised until the
+deepest point of the motion is less than `DEEPEST` of the diameter inside. c makes the contact critically damped, so
+that a cable that falls on a table stays there.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from dlocore.effects.base import Effect, Site
+from dlocore.kernels.compile import law
+
+DEEPEST = 0.02  # of the diameter
+PASSAGE = 0.005  # of the diameter: the depth w at which the stiffness is whole
+
+
+def critical_damping(stiffness: float, linear_density: float) -> float:
+    """Return the damping 2 sqrt(k mu) [N s/m^2] with which contact does not bounce."""
+    return 2.0 * float(np.sqrt(stiffness * linear_density))
+
+
+@dataclass(frozen=True)
+class Contact(Effect):
+    """Radius of the cable [m], stiffness k [N/m^2] and linear density mu [kg/m]."""
+
+    name: ClassVar[str] = "obstacles"
+    site: ClassVar[Site] = "contact"
+    radius: float
+    stiffness: float
+    linear_density: float
+
+    def parameters(self) -> tuple[float, ...]:
+        """Return (radius, k, w, c)."""
+        return (self.radius, self.stiffness, self._width, critical_damping(self.stiffness, self.linear_density))
+
+    @property
+    def _width(self) -> float:
+        return 2.0 * PASSAGE * self.radius
+
+    def depth_under(self, load: float) -> float:
+        """Return the depth [m] at which contact bears a load per length [N/m]."""
+        soft = 0.5 * self.stiffness * self._width
+        return float(np.sqrt(load / soft)) * self._width if load < soft else load / self.stiffness + 0.5 * self._width
+
+
+@dataclass(frozen=True)
+class TableContact(Effect):
+    """Height of the table in the solve's coordinates [m], and its coefficient of friction."""
+
+    name: ClassVar[str] = "table"
+    site: ClassVar[Site] = "contact"
+    height: float
+    friction: float
+
+    def parameters(self) -> tuple[float, ...]:
+        """Return (height, mu)."""
+        return (self.height, self.friction)
+
+
+@law
+def pressure(k: float, w: float, depth: float) -> tuple[float, float]:
+    """Return k phi(depth) [N/m] and its derivative [N/m^2]."""
+    if depth <= 0.0:
+        return 0.0, 0.0
+    if depth < w:
+        return 0.5 * k * depth * depth / w, k * depth / w
+    return k * (depth - 0.5 * w), k

@@ -1,0 +1,37 @@
+"""Twist: energy density GJ/2 (tau - tau_0)^2 [J/m] of the twist rate tau of the sections (paper eq. 8).
+
+tau = theta' against a frame without twist (docs/model.md eq. 19). The solve's fourth coordinate is not theta but
+theta times the polar radius of gyration of the section, D/sqrt(8) for a solid round one: a length, whose inertia per
+length is that of the other coordinates.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from dlocore.effects.base import Effect, Site
+from dlocore.kernels.compile import law
+
+
+@dataclass(frozen=True)
+class Twist(Effect):
+    """Torsional stiffness GJ [N m^2] and diameter D [m]."""
+
+    name: ClassVar[str] = "twist"
+    site: ClassVar[Site] = "twist"
+    torsional_stiffness: float
+    diameter: float
+
+    @property
+    def radius(self) -> float:
+        """Polar radius of gyration of the section [m]."""
+        return self.diameter / 8.0**0.5
+
+    def parameters(self) -> tuple[float, ...]:
+        """Return (GJ, 1/radius)."""
+        return (self.torsional_stiffness, 1.0 / self.radius)
+
+
+@law
+def torque(GJ: float, tau: float, memory: float) -> tuple[float, float]:
+    """Return T = GJ (tau - tau_0) and dT/dtau = GJ."""
+    return GJ * (tau - memory), GJ

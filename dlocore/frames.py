@@ -1,0 +1,119 @@
+"""Frames of the sections over a whole motion: the angle theta of the answer, directors, and what is remembered.
+
+A solve measures theta against frames that are carried along in time at each point of the cable; the answer gives it
+against a frame without twist along the cable, so that theta' is the twist rate (docs/model.md eq. 19).
+"""
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.discretisation import start_director
+from dlocore.grid import Grid
+from dlocore.kernels.march import fit_time
+from dlocore.kernels.twisted import twist_rates
+from dlocore.prediction import MaterialMotion
+from dlocore.problem import Problem
+from dlocore.spline import SplineSurface, design_matrix
+from dlocore.transport import transported
+
+Floats = NDArray[np.float64]
+
+MATERIAL_TIMES = 33  # at most, at which the memory of a motion is kept
+
+
+def free_of_frames(problem: Problem, grid: Grid, states: Floats, frames: Floats) -> Floats:
+    """Return the states (k, n_u, nc) with theta against a frame without twist along the cable.
+
+    Args:
+        states: control points in the solve's coordinates (k, n_u, nc).
+        frames: the frames that their theta refers to (k, points, >= 16), see `kernels/twisted.py`.
+    """
+    if problem.twist is None:
+        return states
+    tau = np.empty((len(states), len(grid.tables.curvature_w)))
+    _, parameters = problem.law_table()
+    twist_rates(np.ascontiguousarray(states), grid.tables, parameters, np.ascontiguousarray(frames), tau)
+    root = np.sqrt(grid.tables.curvature_w)[:, None]
+    slopes = np.zeros((len(root), grid.n_u))
+    np.put_along_axis(slopes, grid.tables.curvature_first[:, None] + np.arange(4), grid.tables.curvature_b1, axis=1)
+    free = states.copy()
+    right = problem.twist.radius * tau - states[:, :1, 3] * slopes[:, 0]
+    free[:, 1:, 3] = right * root[:, 0] @ np.linalg.pinv(root * slopes[:, 1:]).T
+    return free
+
+
+def free_control(problem: Problem, grid: Grid, knots_t: Floats, control: Floats, times: Floats, log: Floats) -> Floats:
+    """Return control points (n_t, n_u, nc) of a motion with theta against a frame without twist along the cable.
+
+    Args:
+        control: (n_t, n_u, nc), with theta against frames carried in time.
+        times: (k,) [s].
+        log: those frames at the times (k, points, >= 16).
+    """
+    if problem.twist is None:
+        return control
+    over = design_matrix(knots_t, times)
+    states = free_of_frames(problem, grid, np.tensordot(over, control, axes=1), log)
+    rate = 3.0 * (control[1, :, 3] - control[0, :, 3]) / (knots_t[4] - knots_t[1])
+    out = control.copy()
+    out[:, :, 3] = fit_time(knots_t, times, np.ascontiguousarray(states[:, :, 3]), np.ascontiguousarray(rate))
+    return out
+
+
+def carried(director: Floats, tangents: Floats) -> Floats:
+    """Return the unit vectors (k, 3) into which `director` turns as the unit tangents (k, 3) do, without spin."""
+    out = np.empty_like(tangents)
+    d, before = director, tangents[0]
+    for k, t in enumerate(tangents):
+        d = transported(before, t, d)
+        d = d - t * (t @ d)
+        d /= np.linalg.norm(d)
+        out[k], before = d, t
+    return out
+
+
+def unit(x: Floats) -> Floats:
+    """Return the vectors (..., 3) scaled to length one."""
+    return x / np.linalg.norm(x, axis=-1, keepdims=True)
+
+
+def material_of(
+    problem: Problem, grid: Grid, times: Floats, states: Floats, memory: Floats, axial: Floats
+) -> MaterialMotion:
+    """Return what the sections remember over a motion.
+
+    Args:
+        times: (k,) [s].
+        states: (k, n_u, nc).
+        memory: (k, points, 1 in the plane or 3).
+        axial: stress-free axial strain (k, axial points).
+    """
+    kept = np.unique(np.linspace(0, len(times) - 1, MATERIAL_TIMES).round().astype(int))
+    slopes = np.stack([grid.at(q, 0.0, 1)[: problem.plane.dimensions] for q in states])
+    tangents = unit(problem.plane.world_vectors(slopes))
+    if problem.nc == 2:
+        normal = np.cross(problem.plane.axes[0], problem.plane.axes[1])
+        directors = np.cross(normal, tangents[kept])
+        sections = np.zeros((len(kept), memory.shape[1], 3))
+        sections[..., 0] = memory[kept, :, 0]
+        natural = np.zeros((memory.shape[1], 3))
+        natural[:, 0] = grid.history.memory[:, 1]
+    else:
+        directors = carried(start_director(problem), tangents)[kept]
+        sections, natural = memory[kept], grid.history.memory[:, 3:]
+    u = np.array(grid.tables.curvature_u)
+    stretch = np.array([np.interp(u, grid.tables.axial_u, row) for row in axial[kept]])
+    return MaterialMotion(
+        times=times[kept], director=directors, u=u, memory=sections,
+        stretch=stretch, natural=np.array(natural),
+    )  # fmt: skip
+
+
+def directors(problem: Problem, surface: SplineSurface, times: Floats) -> Floats:
+    """Return the directors (k, 3) of the section at u = 0, where its theta is zero, at `times` (k,) [s]."""
+    spans = np.unique(surface.knots_t)
+    fine = np.unique(np.concatenate([np.linspace(a, b, 9) for a, b in pairwise(spans)] + [times]))
+    tangents = unit(surface([0.0], fine, du=1)[:, 0, :3])
+    return carried(start_director(problem), tangents)[np.searchsorted(fine, times)]

@@ -1,0 +1,242 @@
+"""Assembly of contact and friction, in the plane and in space.
+
+Contact acts at nodes as close as the cable is thick. The distance to an obstacle grows at most as fast as one goes
+along the cable, so from a node that is far away the next ones are skipped. `stick` (nodes, 6) holds the anchor of the
+friction and the position at the last step, `slide` (body points, 2) the anchor of a cable that lies on the table.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from dlocore.effects.base import Symmetric, Vector
+from dlocore.effects.contact import pressure
+from dlocore.effects.distance import signed_distance
+from dlocore.effects.friction import friction
+from dlocore.effects.laws import CONTACT, COUNT, FRICTION, TABLE
+from dlocore.kernels.basis import row_of
+from dlocore.kernels.compile import kernel, law
+
+_UP = (0.0, 0.0, 1.0)
+_ANY = (0.0, 0.0, 0.0)
+_FLAT = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_SLACK = 0.9  # of the distance that is skipped: a strained cable is longer
+
+
+@law
+def _point(nc: int, q: Any, k: int, b: tuple[float, float, float, float]) -> Vector:
+    x = b[0] * q[k, 0] + b[1] * q[k + 1, 0] + b[2] * q[k + 2, 0] + b[3] * q[k + 3, 0]
+    y = b[0] * q[k, 1] + b[1] * q[k + 1, 1] + b[2] * q[k + 2, 1] + b[3] * q[k + 3, 1]
+    z = 0.0
+    if nc > 2:
+        z = b[0] * q[k, 2] + b[1] * q[k + 1, 2] + b[2] * q[k + 2, 2] + b[3] * q[k + 3, 2]
+    return x, y, z
+
+
+@law
+def _gap(p: Any, i: int, x: Vector) -> tuple[float, Vector, Symmetric, float]:
+    """Return the gap of contact i at x (below COUNT: the table), its gradient and Hessian, and the friction there."""
+    if i < COUNT:
+        return x[2] - p[TABLE, 0], _UP, _FLAT, p[TABLE, 1]
+    d, n, H = signed_distance(p, i, x)
+    return d - p[CONTACT, 0], n, H, p[i, 16]
+
+
+@law
+def _add(nc: int, K: Any, k: int, b: Any, w: float, H: Symmetric) -> None:
+    """Add w b_i b_j H to the blocks of control points k to k + 3."""
+    for j in range(4):
+        for i in range(j, 4):
+            s = w * b[i] * b[j]
+            column, offset = nc * (k + j), nc * (i - j)
+            K[column, offset] += s * H[0]
+            K[column, offset + 1] += s * H[3]
+            K[column + 1, offset] += s * H[1]
+            if i > j:
+                K[column + 1, offset - 1] += s * H[3]
+            if nc > 2:
+                K[column, offset + 2] += s * H[4]
+                K[column + 1, offset + 1] += s * H[5]
+                K[column + 2, offset] += s * H[2]
+                if i > j:
+                    K[column + 2, offset - 2] += s * H[4]
+                    K[column + 2, offset - 1] += s * H[5]
+
+
+@law
+def _spread(nc: int, f: Any, k: int, b: Any, w: float, force: Vector) -> None:
+    for i in range(4):
+        f[k + i, 0] -= w * b[i] * force[0]
+        f[k + i, 1] -= w * b[i] * force[1]
+        if nc > 2:
+            f[k + i, 2] -= w * b[i] * force[2]
+
+
+@law
+def _mixed(a: float, A: Symmetric, b: float, B: Symmetric) -> Symmetric:
+    return (
+        a * A[0] + b * B[0], a * A[1] + b * B[1], a * A[2] + b * B[2],
+        a * A[3] + b * B[3], a * A[4] + b * B[4], a * A[5] + b * B[5],
+    )  # fmt: skip
+
+
+@kernel
+def contact(
+    nc: int, q: Any, v: Any, tables: Any, active: Any, p: Any, stick: Any, h: float, scales: Any, tangent: bool, f: Any,
+    K: Any,
+) -> None:  # fmt: skip
+    """Subtract the forces, and add the tangents, of contact with table and obstacles and of friction on them."""
+    elastic, viscous, geometric = scales
+    firsts, b0, weights, places = tables.contact_first, tables.contact_b0, tables.contact_w, tables.contact_u
+    k_n, width, damping = p[CONTACT, 1], p[CONTACT, 2], p[CONTACT, 3]
+    reach = 0.0  # up to where nothing can touch
+    begin = COUNT - 1 if active[TABLE] else COUNT
+    for n in range(len(weights)):
+        if places[n] < reach:
+            continue
+        k, w = firsts[n], weights[n]
+        b = row_of(b0, n)
+        x = _point(nc, q, k, b)
+        nearest = np.inf
+        for i in range(begin, len(p)):
+            gap, normal, bend, mu = _gap(p, i, x)
+            nearest = min(nearest, gap)
+            if gap >= 0.0:
+                continue
+            u = _point(nc, v, k, b)
+            N, stiffness = pressure(k_n, width, -gap)
+            ratio = damping * stiffness / k_n
+            approach = u[0] * normal[0] + u[1] * normal[1] + u[2] * normal[2]
+            if N - ratio * approach <= 0.0:
+                continue
+            total = N - ratio * approach
+            _spread(nc, f, k, b, w, (total * normal[0], total * normal[1], total * normal[2]))
+            if tangent:
+                s = elastic * stiffness + viscous * ratio
+                nn = (
+                    normal[0] * normal[0], normal[1] * normal[1], normal[2] * normal[2],
+                    normal[0] * normal[1], normal[0] * normal[2], normal[1] * normal[2],
+                )  # fmt: skip
+                _add(nc, K, k, b, w, _mixed(s, nn, -geometric * total, bend))
+            if active[FRICTION] and mu > 0.0:
+                limit = mu * N
+                if h != 0.0:
+                    before, _, _, _ = _gap(p, i, (stick[n, 3], stick[n, 4], stick[n, 5]))
+                    if before < 0.0:  # else it touches anew, and no earlier force is known
+                        limit = mu * pressure(k_n, width, -before)[0]
+                slip = (x[0] - stick[n, 0], x[1] - stick[n, 1], x[2] - stick[n, 2])
+                force, S, V = friction(limit, normal, slip, u, p[FRICTION, 0], p[FRICTION, 1], h != 0.0)
+                _spread(nc, f, k, b, w, force)
+                if tangent:
+                    _add(nc, K, k, b, w, _mixed(elastic, S, viscous, V))
+        reach = places[n] + _SLACK * nearest
+
+
+@kernel
+def energy(nc: int, q: Any, tables: Any, active: Any, p: Any) -> float:
+    """Return the potential of the contact [J]."""
+    total = 0.0
+    k, w = p[CONTACT, 1], p[CONTACT, 2]
+    for n in range(len(tables.contact_w)):
+        x = _point(nc, q, tables.contact_first[n], row_of(tables.contact_b0, n))
+        for i in range(COUNT - 1 if active[TABLE] else COUNT, len(p)):
+            d = -_gap(p, i, x)[0]
+            if d > w:
+                total += tables.contact_w[n] * k * (0.5 * d * (d - w) + w * w / 6.0)
+            elif d > 0.0:
+                total += tables.contact_w[n] * k * d * d * d / (6.0 * w)
+    return total
+
+
+@kernel
+def strikes(nc: int, q0: Any, q1: Any, tables: Any, active: Any, p: Any) -> float:
+    """Return how far a node has come towards what it newly touches [m], the largest; 0 where nothing is new."""
+    most = 0.0
+    reach = 0.0
+    for n in range(len(tables.contact_w)):
+        if tables.contact_u[n] < reach:
+            continue
+        k, b = tables.contact_first[n], row_of(tables.contact_b0, n)
+        x = _point(nc, q1, k, b)
+        nearest = np.inf
+        for i in range(COUNT - 1 if active[TABLE] else COUNT, len(p)):
+            gap = _gap(p, i, x)[0]
+            nearest = min(nearest, gap)
+            if gap < 0.0:
+                before = _gap(p, i, _point(nc, q0, k, b))[0]
+                if before > 0.0:
+                    most = max(most, before - gap)
+        reach = tables.contact_u[n] + _SLACK * nearest
+    return most
+
+
+@kernel
+def remember(nc: int, q: Any, tables: Any, active: Any, p: Any, stick: Any, loose: bool) -> float:
+    """Drag the anchors of the friction behind q, note its positions, and return the largest depth [m].
+
+    Where the cable is `loose`, as at the start, the anchors are put under it.
+    """
+    deepest = 0.0
+    reach = 0.0
+    begin = COUNT - 1 if active[TABLE] else COUNT
+    for n in range(len(tables.contact_w)):
+        x = _point(nc, q, tables.contact_first[n], row_of(tables.contact_b0, n))
+        depth, normal = 0.0, _ANY
+        if tables.contact_u[n] >= reach:
+            nearest = np.inf
+            for i in range(begin, len(p)):
+                gap, gradient, _, mu = _gap(p, i, x)
+                nearest = min(nearest, gap)
+                if -gap > depth and mu > 0.0:
+                    depth, normal = -gap, gradient
+            deepest = max(deepest, -nearest)
+            reach = tables.contact_u[n] + _SLACK * nearest
+        if len(stick) == 0:
+            continue
+        if depth > 0.0 and not loose:
+            a = (x[0] - stick[n, 0], x[1] - stick[n, 1], x[2] - stick[n, 2])
+            along = a[0] * normal[0] + a[1] * normal[1] + a[2] * normal[2]
+            s = (a[0] - along * normal[0], a[1] - along * normal[1], a[2] - along * normal[2])
+            size = np.sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2])
+            kept = 1.0 if size <= p[FRICTION, 0] else p[FRICTION, 0] / size
+            for d in range(3):
+                stick[n, d] = x[d] - kept * s[d]
+        else:
+            for d in range(3):
+                stick[n, d] = x[d]
+        for d in range(3):
+            stick[n, 3 + d] = x[d]
+    return deepest
+
+
+@kernel
+def lying(
+    nc: int, q: Any, v: Any, tables: Any, p: Any, slide: Any, h: float, scales: Any, tangent: bool, f: Any, K: Any
+) -> None:
+    """Subtract the friction, and add its tangents, of a cable that lies on the table and moves in its plane."""
+    elastic, viscous, _ = scales
+    limit = p[FRICTION, 2]
+    for n in range(len(tables.body_w)):
+        k, w = tables.body_first[n], tables.body_w[n]
+        b = row_of(tables.body_b0, n)
+        u = _point(nc, v, k, b)
+        slip = _ANY
+        if h != 0.0:
+            x = _point(nc, q, k, b)
+            slip = (x[0] - slide[n, 0], x[1] - slide[n, 1], 0.0)
+        force, S, V = friction(limit, _UP, slip, u, p[FRICTION, 0], p[FRICTION, 1], h != 0.0)
+        _spread(nc, f, k, b, w, force)
+        if tangent:
+            _add(nc, K, k, b, w, _mixed(elastic, S, viscous, V))
+
+
+@kernel
+def drag_anchors(nc: int, q: Any, tables: Any, p: Any, slide: Any, loose: bool) -> None:
+    """Drag the anchors of a lying cable behind q; put them under it where it is `loose`, as at the start."""
+    for n in range(len(slide)):
+        x = _point(nc, q, tables.body_first[n], row_of(tables.body_b0, n))
+        a, b = x[0] - slide[n, 0], x[1] - slide[n, 1]
+        size = np.sqrt(a * a + b * b)
+        kept = 0.0 if loose else 1.0 if size <= p[FRICTION, 0] else p[FRICTION, 0] / size
+        slide[n, 0] = x[0] - kept * a
+        slide[n, 1] = x[1] - kept * b

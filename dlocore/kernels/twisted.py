@@ -1,0 +1,277 @@
+"""Assembly in space with twist: the fourth coordinate is theta times the polar radius of gyration of the section.
+
+At every curvature point a frame without spin is kept: `past` (points, 16) holds the tangent t0 of the last step, its
+derivative k0 along the cable, a director across it, the twist rate of these frames along the cable, and the strain
+(two curvatures in the frame of the sections, twist rate) of the two last steps. A state is measured against the frame
+that the smallest rotation carries from t0 to its tangent: nothing is singular where the cable is straight, and theta
+counts turns without end (docs/model.md eq. 19).
+"""
+
+from typing import Any
+
+import numpy as np
+
+from dlocore.effects.base import Vector
+from dlocore.effects.laws import (
+    DAMPING,
+    TWIST,
+    TWIST_DAMPING,
+    curvature_energy,
+    curvature_memory,
+    curvature_stress,
+    twist_energy,
+    twist_memory,
+    twist_stress,
+)
+from dlocore.kernels.basis import basis, find_span, row_of
+from dlocore.kernels.compile import kernel, law
+from dlocore.kernels.space import combine, vector
+from dlocore.kernels.strain import space_curvature, transport, twist_increment
+
+TANGENT, BEND, DIRECTOR, FRAME, LAST, BEFORE = 0, 3, 6, 9, 10, 13  # columns of `past`
+TWIST_RATE = LAST + 2
+PAST = 16
+_STEPS = 8  # of the transport along the cable between two curvature points
+
+
+@law
+def _angle(q: Any, k: int, b: tuple[float, float, float, float]) -> float:
+    return b[0] * q[k, 3] + b[1] * q[k + 1, 3] + b[2] * q[k + 2, 3] + b[3] * q[k + 3, 3]
+
+
+@law
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@law
+def _directors(t0: Vector, t: Vector, director: Vector, theta: float) -> tuple[Vector, Vector]:
+    """Return the two directors of a section turned by theta against the carried frame."""
+    d = transport(t0, t, director)
+    e = (t[1] * d[2] - t[2] * d[1], t[2] * d[0] - t[0] * d[2], t[0] * d[1] - t[1] * d[0])
+    c, s = np.cos(theta), np.sin(theta)
+    return (
+        (c * d[0] + s * e[0], c * d[1] + s * e[1], c * d[2] + s * e[2]),
+        (c * e[0] - s * d[0], c * e[1] - s * d[1], c * e[2] - s * d[2]),
+    )
+
+
+@law
+def _strain(q: Any, tables: Any, past: Any, n: int, inverse: float) -> tuple[Vector, Vector, Vector]:
+    """Return (k1, k2, tau) of a curvature point, its tangent and its curvature vector."""
+    k = tables.curvature_first[n]
+    b1 = row_of(tables.curvature_b1, n)
+    _, _, t, kappa = space_curvature(combine(q, k, b1), combine(q, k, row_of(tables.curvature_b2, n)))
+    t0 = vector(past, n, TANGENT)
+    theta = inverse * _angle(q, k, row_of(tables.body_b0, n))
+    m1, m2 = _directors(t0, t, vector(past, n, DIRECTOR), theta)
+    tau = inverse * _angle(q, k, b1) + past[n, FRAME] + twist_increment(t0, vector(past, n, BEND), t, kappa)[0]
+    return (_dot(kappa, m1), _dot(kappa, m2), tau), t, kappa
+
+
+@kernel
+def curvature(
+    q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any, tangent: bool,
+    f: Any, K: Any,
+) -> None:  # fmt: skip
+    """Add the forces and tangents of curvature and twist.
+
+    E_a is the derivative of strain a = (k1, k2, tau) by a control point (x, y, z, fourth); in x, y, z it is
+    across A_a + along B_a, with `across` and `along` those of `space.curvature`. The material part of the tangent is
+    E' S E. The geometric part is that at the carried frame: what the carrying adds vanishes with the step.
+    """
+    elastic, viscous, geometric = scales
+    if viscous != 0.0 and rates[0] != 0.0:
+        viscous = rates[0]
+    firsts, b1, b2, weights = tables.curvature_first, tables.curvature_b1, tables.curvature_b2, tables.curvature_w
+    inverse = p[TWIST, 1]
+    damped = active[DAMPING] or active[TWIST_DAMPING]
+    E = np.empty((3, 16))
+    SE = np.empty((3, 16))
+    A = np.empty((3, 3))
+    B = np.empty((3, 3))
+    for n in range(len(weights)):
+        k, w = firsts[n], weights[n]
+        a, b, c = row_of(tables.body_b0, n), row_of(b1, n), row_of(b2, n)
+        first = combine(q, k, b)
+        second = combine(q, k, c)
+        length, h, t, kappa = space_curvature(first, second)
+        t0 = vector(past, n, TANGENT)
+        m1, m2 = _directors(t0, t, vector(past, n, DIRECTOR), inverse * _angle(q, k, a))
+        increment, spin, by_t = twist_increment(t0, vector(past, n, BEND), t, kappa)
+        k1, k2 = _dot(kappa, m1), _dot(kappa, m2)
+        tau = inverse * _angle(q, k, b) + past[n, FRAME] + increment
+        tangential, turned = _dot(by_t, t), _dot(spin, kappa)
+        for j in range(4):
+            across, along = (c[j] - h * b[j] / length) / length, b[j] / length
+            for d in range(3):
+                E[0, 4 * j + d] = across * m1[d] + along * (k2 * spin[d] - k1 * t[d])
+                E[1, 4 * j + d] = across * m2[d] - along * (k1 * spin[d] + k2 * t[d])
+                E[2, 4 * j + d] = across * spin[d] + along * (by_t[d] - (tangential + turned) * t[d])
+            E[0, 4 * j + 3] = inverse * a[j] * k2
+            E[1, 4 * j + 3] = -inverse * a[j] * k1
+            E[2, 4 * j + 3] = inverse * b[j]
+        rate = (0.0, 0.0, 0.0)
+        if damped and rates[0] != 0.0:
+            rate = (
+                rates[0] * k1 + rates[1] * past[n, LAST] + rates[2] * past[n, BEFORE],
+                rates[0] * k2 + rates[1] * past[n, LAST + 1] + rates[2] * past[n, BEFORE + 1],
+                rates[0] * tau + rates[1] * past[n, LAST + 2] + rates[2] * past[n, BEFORE + 2],
+            )
+        elif damped:
+            r0, r1, r2 = 0.0, 0.0, 0.0
+            for j in range(4):
+                for d in range(4):
+                    r0 += E[0, 4 * j + d] * v[k + j, d]
+                    r1 += E[1, 4 * j + d] * v[k + j, d]
+                    r2 += E[2, 4 * j + d] * v[k + j, d]
+            rate = (r0, r1, r2)
+        moment, stiffness, viscosity = curvature_stress(
+            active, p, (k1, k2, 0.0), (rate[0], rate[1], 0.0), (memory[n, 0], memory[n, 1], 0.0),
+            (memory[n, 3], memory[n, 4], 0.0), (past[n, LAST], past[n, LAST + 1], 0.0), rates[3],
+        )  # fmt: skip
+        T, twist_stiffness, twist_viscosity = twist_stress(
+            active, p, tau, rate[2], memory[n, 2], memory[n, 5], past[n, LAST + 2], rates[3]
+        )
+        M1, M2 = moment[0], moment[1]
+        for j in range(4):
+            for d in range(4):
+                f[k + j, d] += w * (M1 * E[0, 4 * j + d] + M2 * E[1, 4 * j + d] + T * E[2, 4 * j + d])
+        if not tangent:
+            continue
+        S11 = w * (elastic * stiffness[0] + viscous * viscosity[0])
+        S22 = w * (elastic * stiffness[1] + viscous * viscosity[1])
+        S12 = w * (elastic * stiffness[3] + viscous * viscosity[3])
+        S33 = w * (elastic * twist_stiffness + viscous * twist_viscosity)
+        for j in range(16):
+            SE[0, j] = S11 * E[0, j] + S12 * E[1, j]
+            SE[1, j] = S12 * E[0, j] + S22 * E[1, j]
+            SE[2, j] = S33 * E[2, j]
+        for j in range(16):
+            column = 4 * k + j
+            for i in range(j, 16):
+                K[column, i - j] += E[0, i] * SE[0, j] + E[1, i] * SE[1, j] + E[2, i] * SE[2, j]
+        if geometric == 0.0:
+            continue
+        M = (M1 * m1[0] + M2 * m2[0], M1 * m1[1] + M2 * m2[1], M1 * m1[2] + M2 * m2[2])
+        N = (M1 * m2[0] - M2 * m1[0], M1 * m2[1] - M2 * m1[1], M1 * m2[2] - M2 * m1[2])  # t x M
+        dot = M1 * k1 + M2 * k2
+        along_N = _dot(N, kappa)
+        scale = w * geometric / (length * length)
+        kb = (
+            t[1] * kappa[2] - t[2] * kappa[1],
+            t[2] * kappa[0] - t[0] * kappa[2],
+            t[0] * kappa[1] - t[1] * kappa[0],
+        )
+        for d in range(3):
+            for e in range(3):
+                Mt = M[d] * t[e] + t[d] * M[e]
+                A[d, e] = -scale * Mt
+                B[d, e] = scale * (3.0 * dot * t[d] * t[e] + 2.0 * h / length * Mt)
+                B[d, e] -= scale * 0.5 * (M[d] * kappa[e] + kappa[d] * M[e])
+                B[d, e] -= scale * T * 1.5 * (kb[d] * t[e] + t[d] * kb[e])
+            B[d, d] -= scale * dot
+        half = 0.5 * scale * T
+        cross = (  # of t, times half the torque
+            (0.0, -half * t[2], half * t[1]),
+            (half * t[2], 0.0, -half * t[0]),
+            (-half * t[1], half * t[0], 0.0),
+        )
+        turn = w * geometric * inverse
+        for j in range(4):
+            for i in range(j, 4):
+                both = b[i] * b[j]
+                mixed = b[i] * c[j] + c[i] * b[j]
+                skew = b[i] * c[j] - c[i] * b[j]
+                column, offset = 4 * (k + j), 4 * (i - j)
+                for e in range(3):
+                    for d in range(e if i == j else 0, 3):
+                        K[column + e, offset + d - e] += both * B[d, e] + mixed * A[d, e] + skew * cross[d][e]
+                # between theta of i and x, y, z of j, and the other way
+                across, along = (c[j] - h * b[j] / length) / length, b[j] / length
+                if i > j:
+                    for e in range(3):
+                        K[column + e, offset + 3 - e] += turn * a[i] * (across * N[e] - along * along_N * t[e])
+                across, along = (c[i] - h * b[i] / length) / length, b[i] / length
+                if i > j:
+                    for d in range(3):
+                        K[column + 3, offset + d - 3] += turn * a[j] * (across * N[d] - along * along_N * t[d])
+                else:
+                    for e in range(3):
+                        K[column + e, 3 - e] += turn * a[i] * (across * N[e] - along * along_N * t[e])
+                K[column + 3, offset] -= turn * inverse * dot * a[i] * a[j]
+
+
+@kernel
+def remember(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h: float) -> None:
+    """Carry the frames to q, note its strain, and let what yielded in a step h become memory."""
+    inverse = p[TWIST, 1]
+    for n in range(len(past)):
+        strain, t, kappa = _strain(q, tables, past, n, inverse)
+        last = vector(past, n, LAST)
+        free, _ = curvature_memory(
+            active, p, (strain[0], strain[1], 0.0), (memory[n, 0], memory[n, 1], 0.0),
+            (memory[n, 3], memory[n, 4], 0.0), (last[0], last[1], 0.0), h,
+        )  # fmt: skip
+        memory[n, 0], memory[n, 1] = free[0], free[1]
+        memory[n, 2], _ = twist_memory(active, p, strain[2], memory[n, 2], memory[n, 5], last[2], h)
+        t0 = vector(past, n, TANGENT)
+        past[n, FRAME] += twist_increment(t0, vector(past, n, BEND), t, kappa)[0]
+        director = transport(t0, t, vector(past, n, DIRECTOR))
+        for d in range(3):
+            past[n, BEFORE + d] = past[n, LAST + d]
+            past[n, LAST + d] = strain[d]
+            past[n, TANGENT + d] = t[d]
+            past[n, BEND + d] = kappa[d]
+            past[n, DIRECTOR + d] = director[d]
+
+
+@kernel
+def energy(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any) -> float:
+    """Return the stored energy of curvature and twist [J]."""
+    total = 0.0
+    for n in range(len(tables.curvature_w)):
+        strain, _, _ = _strain(q, tables, past, n, p[TWIST, 1])
+        free = (memory[n, 0], memory[n, 1], 0.0)
+        total += tables.curvature_w[n] * (
+            curvature_energy(active, p, (strain[0], strain[1], 0.0), free)
+            + twist_energy(active, p, strain[2], memory[n, 2])
+        )
+    return total
+
+
+@kernel
+def twist_rates(states: Any, tables: Any, p: Any, frames: Any, out: Any) -> None:
+    """Write the twist rate (k, points) [rad/m] of the states (k, n, 4) measured against `frames` (k, points, >= 16)."""
+    for s in range(len(states)):
+        for n in range(out.shape[1]):
+            out[s, n] = _strain(states[s], tables, frames[s], n, p[TWIST, 1])[0][2]
+
+
+@kernel
+def start_frames(knots: Any, q: Any, tables: Any, director: Any, past: Any) -> None:
+    """Write frames without twist along the cable q (n, >= 3) to `past` (points, 16), from `director` (3,) at u = 0."""
+    row = np.empty((3, 4))
+    before = 0.0
+    u = 0.0
+    basis(knots, 3, 0.0, 2, row)
+    t0 = space_curvature(combine(q, 0, row_of(row, 1)), combine(q, 0, row_of(row, 2)))[2]
+    along = director[0] * t0[0] + director[1] * t0[1] + director[2] * t0[2]
+    x = (director[0] - along * t0[0], director[1] - along * t0[1], director[2] - along * t0[2])
+    size = np.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
+    d0 = (x[0] / size, x[1] / size, x[2] / size)
+    for n in range(len(past)):
+        for step in range(1, _STEPS + 1):
+            u = before + (tables.curvature_u[n] - before) * step / _STEPS
+            span = find_span(knots, u)
+            basis(knots, span, u, 2, row)
+            _, _, t, kappa = space_curvature(combine(q, span - 3, row_of(row, 1)), combine(q, span - 3, row_of(row, 2)))
+            d0 = transport(t0, t, d0)
+            t0 = t
+            if step == _STEPS:
+                for d in range(3):
+                    past[n, TANGENT + d] = t[d]
+                    past[n, BEND + d] = kappa[d]
+                    past[n, DIRECTOR + d] = d0[d]
+                past[n, FRAME] = 0.0
+        before = tables.curvature_u[n]

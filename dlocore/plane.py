@@ -1,0 +1,197 @@
+"""The plane of a motion: whether two coordinates describe it, and whether the cable stays on the table."""
+
+from dataclasses import dataclass, replace
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.paths import Move, Waypoints
+from dlocore.scene import Scene
+from dlocore.shape import StartCurve
+
+Floats = NDArray[np.float64]
+
+FLATNESS = 1e-9  # of the length: a start and a motion this close to a plane are planar
+TABLE_TOLERANCE = 0.005  # [m]: points seen this close to the table lie on it
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """Coordinates of the solve: x = axes (r - origin).
+
+    Attributes:
+        axes: (nc, 3), orthonormal rows; nc = 2 in the plane, 3 in space.
+        origin: (3,) [m].
+        reason: why the scene is planar or not, in words.
+    """
+
+    axes: Floats
+    origin: Floats
+    reason: str
+
+    @property
+    def dimensions(self) -> int:
+        """Number of coordinates, 2 or 3."""
+        return len(self.axes)
+
+    def points(self, r: Floats) -> Floats:
+        """Return plane coordinates (..., nc) of the points r (..., 3) [m]."""
+        return (r - self.origin) @ self.axes.T
+
+    def vectors(self, v: Floats) -> Floats:
+        """Return components (..., nc) of the vectors v (..., 3)."""
+        return v @ self.axes.T
+
+    def world(self, x: Floats) -> Floats:
+        """Return the points r (..., 3) [m] of plane coordinates x (..., nc)."""
+        return self.origin + x @ self.axes
+
+    def world_vectors(self, x: Floats) -> Floats:
+        """Return the vectors (..., 3) of components x (..., nc)."""
+        return x @ self.axes
+
+
+def natural_points(scene: Scene) -> Floats | None:
+    """Return the points (n, 3) [m] of a given natural shape, whose plane is that of the cable's bends, or None."""
+    rest = scene.cable.rest_shape
+    if isinstance(rest, str):
+        return None
+    points = cast(Floats, rest)
+    return np.column_stack([points, np.zeros(len(points))]) if points.shape[1] == 2 else points
+
+
+def is_straight(start: StartCurve) -> bool:
+    """Tell whether the start is straight."""
+    chord = start.control_points - start.control_points[0]
+    return float(np.linalg.svd(chord, compute_uv=False)[1]) <= FLATNESS * float(np.abs(chord).max())
+
+
+def off_the_table(scene: Scene, start: StartCurve, met: tuple[int, ...]) -> str:
+    """Return why the cable leaves the table or does more than slide on it, or "" where it lies there all the time."""
+    table, environment = scene.environment.table, scene.environment
+    assert table is not None
+    if scene.effects.get("table", "auto") == "on":
+        return "contact with the table is switched on in the scene"
+    if scene.effects.get("twist", "auto") == "on":
+        return "twist is switched on in the scene"
+    off = float(np.abs(start.control_points[:, 2] - table.height).max())
+    if not off <= TABLE_TOLERANCE:
+        return f"the cable starts up to {off:.3g} m above it"
+    if cast(Floats, environment.gravity)[2] > 0:
+        return "gravity lifts the cable off it"
+    if start.velocity is not None and np.any(np.abs(start.velocity.control_points[:, 2]) > 1e-9):
+        return "the cable starts with a velocity off its plane"
+    for grasp in scene.grasps:
+        path = grasp.path
+        if isinstance(path, Move) and cast(Floats, path.displacement)[2] != 0:
+            return "a grasp lifts the cable off it"
+        if isinstance(path, Waypoints) and np.ptp(cast(Floats, path.positions)[:, 2]) > 0:
+            return "a grasp lifts the cable off it"
+        turns = path.rotation_at(np.linspace(0, path.duration, 9)) if path.duration else None
+        if turns is not None and np.abs(turns[:, 2, :2]).max() > 1e-9:
+            return "a grasp turns the cable off its plane"
+    for load in scene.loads:
+        if np.any(np.atleast_2d(cast(Floats, load.force))[:, 2] > 0):
+            return "a load lifts the cable off it"
+    for i in met:
+        if not environment.obstacles[i].upright_at(table.height, 0.5 * scene.cable.diameter):
+            return f"obstacles[{i}] has no upright walls where the cable lies"
+    natural = natural_points(scene)
+    if natural is not None and not np.ptp(natural[:, 2]) <= TABLE_TOLERANCE:
+        return "the stress-free shape is not flat"
+    if start.theta is not None:
+        return "the cable is twisted"
+    if start.material is not None and np.abs(_remembered_bends(start)[:, 2]).max() > FLATNESS:
+        return "the cable remembers bends that are not flat"
+    return ""
+
+
+def lay_on_table(scene: Scene, start: StartCurve) -> StartCurve:
+    """Return the start at the table's height."""
+    table = scene.environment.table
+    assert table is not None
+    flat = start.control_points.copy()
+    flat[:, 2] = table.height
+    return replace(start, control_points=flat)
+
+
+def find_plane(scene: Scene, start: StartCurve, on_table: bool, met: bool) -> Plane:
+    """Decide between two and three coordinates from everything that could move the cable out of a plane."""
+    origin = start.control_points[0]
+    if met and not on_table:
+        return Plane(np.eye(3), origin, "obstacles are not in the plane of the motion")
+    if scene.environment.table is not None and not on_table and scene.effects.get("table", "auto") != "off":
+        return Plane(np.eye(3), origin, "the cable does not stay on the table")
+    if scene.effects.get("twist", "auto") == "on":
+        return Plane(np.eye(3), origin, "twist is asked for")
+    if start.theta is not None and scene.effects.get("twist", "auto") != "off":
+        return Plane(np.eye(3), origin, "the start is twisted")
+    if on_table:
+        return Plane(np.eye(3)[:2], origin, "the cable lies on the table and moves in its plane")
+    length = scene.cable.length
+    spread = [(start.control_points - origin) / length]
+    if start.velocity is not None:
+        spread.append(start.velocity.control_points / max(1e-9, np.abs(start.velocity.control_points).max()))
+    for grasp in scene.grasps:
+        if isinstance(grasp.path, Move):
+            spread.append(cast(Floats, grasp.path.displacement)[None] / length)
+        if isinstance(grasp.path, Waypoints):
+            positions = cast(Floats, grasp.path.positions)
+            spread.append((positions - positions[0]) / length)
+            spread.append((positions[:1] - start(grasp.u)) / length)
+    gravity = cast(Floats, scene.environment.gravity)
+    if np.any(gravity != 0) and scene.effects.get("gravity", "auto") != "off":
+        spread.append(gravity[None] / np.linalg.norm(gravity))
+    for load in scene.loads:
+        force = np.atleast_2d(cast(Floats, load.force))
+        spread.append(force / max(1e-300, np.abs(force).max()))
+    natural = natural_points(scene)
+    if natural is not None:
+        spread.append((natural - natural[0]) / length)
+    if start.material is not None:
+        spread.append(_remembered_bends(start))
+    vectors = np.concatenate(spread)
+    _, sizes, principal = np.linalg.svd(np.concatenate([vectors, np.zeros((2, 3))]), full_matrices=False)
+    collinear = not sizes[1] > FLATNESS * sizes[0]
+    normal = _unit_across(principal[0]) if collinear else principal[2]
+    off_plane = float(np.abs(vectors @ normal).max())
+    if not off_plane <= FLATNESS * max(1.0, np.abs(vectors).max()):
+        return Plane(np.eye(3), origin, "start, motion and forces do not lie in one plane")
+    flat_turns = True
+    for grasp in scene.grasps:
+        turns = grasp.path.rotation_at(np.linspace(0, grasp.path.duration, 33)) if grasp.path.duration else None
+        if turns is not None and np.abs(turns @ normal - normal).max() > 1e-9:
+            flat_turns = False
+    if not flat_turns:
+        return Plane(np.eye(3), origin, "a grasp turns the cable out of the plane of its motion")
+    normal = normal * (1.0 if normal[np.argmax(np.abs(normal))] > 0 else -1.0)
+    first = _unit_across(normal)
+    second = np.cross(normal, first)
+    return Plane(np.array([first, second]), origin, "start, motion and forces lie in one plane")
+
+
+def _remembered_bends(start: StartCurve) -> Floats:
+    """Return vectors (k, 3) along which the sections' memory bends the cable; an off-plane one where it is twisted."""
+    material = start.material
+    assert material is not None
+    memory = cast(Floats, material.memory)
+    scale = float(np.abs(memory).max())
+    if scale == 0.0:
+        return np.zeros((1, 3))
+    if np.abs(memory[:, 2]).max() > FLATNESS * scale:
+        return np.eye(3)
+    # a flat curve carries its frame flat: all its bends lie in its plane where those at u = 0 do
+    tangent = start(0.0, 1)[0] / np.linalg.norm(start(0.0, 1)[0])
+    first = cast(Floats, material.director)
+    second = np.cross(tangent, first)
+    _, sizes, principal = np.linalg.svd(memory[:, :2] / scale, full_matrices=False)
+    bends = np.array([d[0] * first + d[1] * second for d in principal])
+    return bends if sizes[1] > FLATNESS * sizes[0] else bends[:1]
+
+
+def _unit_across(normal: Floats) -> Floats:
+    """Return a unit vector in the plane of `normal`: the world axis nearest to it, x before y before z."""
+    axis = np.eye(3)[int(np.argmin(np.round(np.abs(normal), 9)))]
+    across = axis - normal * (axis @ normal)
+    return across / np.linalg.norm(across)

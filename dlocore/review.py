@@ -1,0 +1,227 @@
+"""What a solved motion says about the effects that were left out: which of them it calls for, and how much they matter.
+
+An effect that is left out by `auto` and shows in the result is switched on, and the solve goes on with it. One that is
+switched off in the scene stays off, and the answer says what that does.
+"""
+
+from collections.abc import Callable
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.effects import laws
+from dlocore.effects.damping import Damping
+from dlocore.effects.distance import distances
+from dlocore.effects.selfcontact import CLOSE as CLOSE_STRANDS
+from dlocore.effects.selfcontact import nearest_strands
+from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, largest_curvature
+from dlocore.kernels.banded import expand_vector, factor, reduce_matrix, reduce_vector
+from dlocore.kernels.banded import solve as solve_factored
+from dlocore.kernels.twisted import TWIST_RATE
+from dlocore.problem import Problem
+from dlocore.report import WindowForces
+from dlocore.solvers.ladder import CREDIBLE_STRAIN, Level
+from dlocore.solvers.march import times_mass
+from dlocore.spline import design_matrix
+
+Floats = NDArray[np.float64]
+
+CLOSE = 0.01  # of the length: a cable that comes this near to an obstacle left out calls for it
+MATTERS = 0.001  # of the length: what a neglected effect may move the cable before it is worth a word
+_LOOKS = 5  # states of each stretch of a motion at which neglected forces are weighed
+
+
+def called_for(level: Level) -> dict[str, str]:
+    """Return the effects that `auto` has left out and the motion calls for, with the reason for each."""
+    problem, found = level.problem, {}
+    switch = problem.scene.effects.get
+    if not problem.choices["plasticity"].active and switch("plasticity", "auto") == "auto":
+        found.update(_yields(level))
+    if not problem.choices["obstacles"].active and switch("obstacles", "auto") == "auto":
+        found.update(_touches(level))
+    credible = not level.motion.stopped and level.motion.largest_strain <= CREDIBLE_STRAIN
+    # a strand that lies on the table can be crossed by another on top of it
+    if (
+        credible
+        and not problem.on_table
+        and not problem.choices["self_contact"].active
+        and switch("self_contact", "auto") == "auto"
+    ):
+        found.update(_meets_itself(level))
+    if problem.inertia is None and switch("inertia", "auto") == "auto":
+        moved = neglected(level)
+        if moved > MATTERS * problem.scene.cable.length:
+            found["inertia"] = f"without it a first solve is {moved * 1e3:.2g} mm off"
+    return found
+
+
+def objections(level: Level) -> list[str]:
+    """Return what the effects that the scene switches off would have done, in words; those that matter only."""
+    problem, found = level.problem, []
+    off = {name for name, value in problem.scene.effects.items() if value == "off"}
+    for name, test in (("plasticity", _yields), ("obstacles", _touches), ("self_contact", _meets_itself)):
+        if name in off:
+            found += [f"{name} is off, though {reason}" for reason in test(level).values()]
+    if problem.on_table and not problem.choices["self_contact"].active and "self_contact" not in off:
+        crossings = _meets_itself(level).values()
+        found += [
+            f"{reason}: one lies over the other; effects.self_contact on keeps them apart" for reason in crossings
+        ]
+    clamps = sum(g.hold == "clamp" for g in problem.scene.grasps)
+    if "twist" in off and problem.plane.dimensions == 3 and clamps > 1:
+        found.append("twist is off, though two grasps hold the orientation of the sections")
+    allowed = MATTERS * problem.scene.cable.length
+    for name, force in _forces(problem).items():
+        if name in off:
+            moved = _response(level, force)
+            if moved > allowed:
+                found.append(f"{name} is off, though it would move the cable by about {moved * 1e3:.2g} mm")
+    return found
+
+
+def neglected(level: Level) -> float:
+    """Return how far the effects that `auto` has left out would have moved the cable, at most, about [m]."""
+    problem = level.problem
+    if problem.inertia is not None or problem.scene.effects.get("inertia", "auto") != "auto":
+        return 0.0
+    return _response(level, _forces(problem)["inertia"])
+
+
+def _yields(level: Level) -> dict[str, str]:
+    problem, cable = level.problem, level.problem.scene.cable
+    grid, states = level.motion.grid, level.motion.states
+    if cable.yield_strain is not None:
+        most = float(largest_curvature(problem.axes, states, grid.tables, grid.history.memory))
+        threshold = 2.0 * cable.yield_strain / cable.diameter
+        if most > threshold:
+            return {"plasticity": f"the motion bends the cable by {most:.3g}/m, and it yields at {threshold:.3g}/m"}
+    if cable.yield_twist is not None and problem.twist is not None:
+        most = float(np.abs(level.motion.frames[:, :, TWIST_RATE]).max())
+        threshold = 2.0 * cable.yield_twist / cable.diameter
+        if most > threshold:
+            return {"plasticity": f"the motion twists it by {most:.3g} rad/m, and it yields at {threshold:.3g} rad/m"}
+    if cable.yield_stretch is not None and level.motion.largest_strain > cable.yield_stretch:
+        strain = level.motion.largest_strain
+        return {
+            "plasticity": f"the motion strains the cable by {strain:.2g}, and it yields at {cable.yield_stretch:.2g}"
+        }
+    return {}
+
+
+def _touches(level: Level) -> dict[str, str]:
+    problem = level.problem
+    left_out = [o for o in problem.scene.environment.obstacles if o not in problem.obstacles]
+    if not left_out:
+        return {}
+    motion = level.motion
+    u = np.linspace(0.0, problem.scene.cable.length, 65)
+    points = np.einsum("ui,kid->kud", design_matrix(motion.grid.knots, u), motion.states)
+    world = problem.plane.world(points[..., : problem.plane.dimensions]).reshape(-1, 3)
+    rows = np.array([o.row() for o in left_out])
+    gap = float(distances(rows, np.ascontiguousarray(world)).min()) - 0.5 * problem.scene.cable.diameter
+    if gap > CLOSE * problem.scene.cable.length:
+        return {}
+    what = f"comes within {gap * 1e3:.2g} mm of" if gap > 0 else "passes through"
+    return {"obstacles": f"the motion {what} an obstacle"}
+
+
+def _meets_itself(level: Level) -> dict[str, str]:
+    problem, motion = level.problem, level.motion
+    diameter = problem.scene.cable.diameter
+    dimensions = problem.plane.dimensions
+    apart = nearest_strands(motion.grid.knots, motion.states, dimensions, diameter, CLOSE_STRANDS * diameter)
+    if not np.isfinite(apart):
+        return {}
+    meet = f"come within {apart * 1e3:.2g} mm of each other" if apart > 0.05 * diameter else "cross"
+    return {"self_contact": f"two strands {meet}"}
+
+
+Force = Callable[[Floats, Floats, Floats, Level], Floats]
+
+
+def _forces(problem: Problem) -> dict[str, Force]:
+    """Return, for each effect that is a force on the motion at hand, its generalised forces (n_u, nc) [N]."""
+    scene = problem.scene
+    density = scene.cable.linear_density
+
+    def inertia(q: Floats, v: Floats, a: Floats, level: Level) -> Floats:
+        return density * times_mass(level.motion.grid.tables.mass, a)
+
+    def drag(q: Floats, v: Floats, a: Floats, level: Level) -> Floats:
+        speed = float(np.linalg.norm(v, axis=1).max())
+        drag = scene.environment.drag + scene.environment.drag_quadratic * speed
+        return drag * times_mass(level.motion.grid.tables.mass, v)
+
+    def gravity(q: Floats, v: Floats, a: Floats, level: Level) -> Floats:
+        pull = cast(Floats, scene.environment.gravity)
+        weight = problem.rates(density * pull) * (0.0 if problem.on_table else 1.0)
+        return np.asarray(level.motion.grid.tables.weight[:, None] * weight)
+
+    def damping(q: Floats, v: Floats, a: Floats, level: Level) -> Floats:
+        active, parameters = problem.law_table()
+        law = Damping(scene.cable.bending_damping, scene.cable.length, problem.twist is not None)
+        with_damping, table = active * 0, parameters.copy()
+        with_damping[laws.DAMPING], with_damping[laws.TWIST] = 1, active[laws.TWIST]
+        table[laws.DAMPING, :2] = law.parameters()
+        table[[laws.STRETCH, laws.TWIST], 0] = 0.0
+        f = np.empty_like(q)
+        grid = level.motion.grid
+        assemble(
+            problem.axes, q, v, grid.tables, with_damping, table, grid.history, NO_RATES, (0.0, 0.0, 0.0), f,
+            np.empty((1, 1)),
+        )  # fmt: skip
+        return f
+
+    def friction(q: Floats, v: Floats, a: Floats, level: Level) -> Floats:
+        table = scene.environment.table
+        if table is None or not problem.on_table:
+            return np.zeros_like(q)
+        load = table.friction * density * abs(float(cast(Floats, scene.environment.gravity)[2]))
+        speed = np.linalg.norm(v, axis=1, keepdims=True)
+        return load * times_mass(level.motion.grid.tables.mass, v / np.maximum(speed, 1e-3))
+
+    return {"inertia": inertia, "drag": drag, "gravity": gravity, "damping": damping, "friction": friction}
+
+
+def _response(level: Level, force: Force) -> float:
+    """Return the largest displacement [m] of a control point that a force which was left out would cause, about.
+
+    It is (K+ + 2/T^2 M + 1/T C)^-1 f at a few states of the motion: its static displacement where the cable is held
+    stiffly, and that of a free body after the time T of the motion where it isn't.
+    """
+    most = 0.0
+    for window in level.motion.forces:
+        most = max(most, _response_in(level, window, force))
+    return most
+
+
+def _response_in(level: Level, window: WindowForces, force: Force) -> float:
+    problem, grid = level.problem, level.motion.grid
+    nc, e = problem.nc, window.held.elimination
+    size, horizon = grid.n_u * nc, problem.horizon
+    free = size - len(e.held)
+    active, parameters = problem.law_table()
+    mass = problem.scene.cable.linear_density
+    K, A = np.empty((size, 4 * nc)), np.empty((free, 4 * nc))
+    f, x, change = np.empty((grid.n_u, nc)), np.empty(free), np.empty(size)
+    h = np.diff(window.times)
+    most = 0.0
+    for k in np.unique(np.linspace(1, len(window.times) - 2, _LOOKS).round().astype(int)):
+        if not 0 < k < len(h):
+            continue
+        q = window.states[k]
+        v = (window.states[k + 1] - window.states[k - 1]) / (h[k] + h[k - 1])
+        a = 2.0 * ((window.states[k + 1] - q) / h[k] - (q - window.states[k - 1]) / h[k - 1]) / (h[k] + h[k - 1])
+        history = grid.history
+        assemble(problem.axes, q, v, grid.tables, active, parameters, history, NO_RATES, (1.0, 0.0, 0.0), f, K)
+        add_scalar_band(nc, grid.tables.mass, 2.0 * mass / horizon**2 + problem.drag_coefficient() / horizon, K)
+        reduce_matrix(e, K, A)
+        reduce_vector(e, np.ascontiguousarray(force(q, v, a, level)).ravel(), x)
+        if factor(A) >= 0:
+            continue
+        solve_factored(A, x)
+        expand_vector(e, x, change)
+        moved = change.reshape(-1, nc)[:, : problem.plane.dimensions]
+        most = max(most, float(np.linalg.norm(moved, axis=1).max()))
+    return most
