@@ -1,16 +1,16 @@
 """A run as stored: request, response document, and the nets of control points; and the surface as .npz."""
 
 import io
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.machine import machine_line
-from app.schemas import PredictionRequest, to_scene
-from dlocore import ControlPoints, Iteration, Prediction, Scene, SplineSurface
+from app.schemas import Motion, PredictionRequest, to_scene
+from dlocore import ControlPoints, Iteration, Material, MaterialMotion, Prediction, Scene, SplineSurface
 
 Floats = NDArray[np.float64]
 SCALARS = ("update", "residual", "energy", "wall_time", "damping", "step_length")  # of an iteration
@@ -24,6 +24,7 @@ class Run:
         request: the request.
         document: the response.
         surface: the predicted surface.
+        material: what the sections of the cable remember over the motion, if anything.
         iterations: the iterates.
         start: the start shape where it was given by control points, also as the end of another run.
         machine: what it was solved on.
@@ -32,6 +33,7 @@ class Run:
     request: dict[str, Any]
     document: dict[str, Any]
     surface: SplineSurface
+    material: MaterialMotion | None
     iterations: tuple[Iteration, ...]
     start: ControlPoints | None
     machine: str
@@ -41,28 +43,19 @@ class Run:
         """Return a run that was just solved here."""
         shape = prediction.scene.shape
         start = shape if isinstance(shape, ControlPoints) else None
-        return Run(request, document, prediction.surface, prediction.iterations, start, machine_line())
+        return Run(
+            request, document, prediction.surface, prediction.material, prediction.iterations, start, machine_line()
+        )
 
     @cached_property
     def scene(self) -> Scene:
         """The scene that was solved; it needs no other run, even where it continued from one."""
-        request = self.request
-        if request["shape"]["kind"] == "prediction":
-            request = {**request, "shape": _as_request(self.start)}
-        return to_scene(PredictionRequest.model_validate(request), lambda id: None)
-
-
-def _as_request(start: ControlPoints | None) -> dict[str, Any]:
-    if start is None:
-        raise ValueError("The run was stored without the shape it continued from")
-    shape: dict[str, Any] = {"kind": "control_points", "settle": start.settle}
-    shape["control_points"] = cast(Floats, start.control_points).tolist()
-    if start.knots is not None:
-        shape["knots"] = cast(Floats, start.knots).tolist()
-    if start.velocity is not None:
-        velocity = cast(Floats, start.velocity).tolist()
-        shape["velocity"] = {"kind": "control_points", "control_points": velocity}
-    return shape
+        if self.request["shape"]["kind"] != "prediction":
+            return to_scene(PredictionRequest.model_validate(self.request), lambda id: None)
+        if self.start is None:
+            raise ValueError("The run was stored without the shape it continued from")
+        elsewhere = {**self.request, "shape": {"kind": "straight"}}
+        return replace(to_scene(PredictionRequest.model_validate(elsewhere), lambda id: None), shape=self.start)
 
 
 def pack(prediction: Prediction) -> bytes:
@@ -70,8 +63,9 @@ def pack(prediction: Prediction) -> bytes:
     arrays: dict[str, Any] = {"machine": np.array(machine_line())}
     shape = prediction.scene.shape
     if isinstance(shape, ControlPoints):
-        given = {name: value for name, value in vars(shape).items() if value is not None}
-        arrays |= {f"start_{name}": np.asarray(value) for name, value in given.items()}
+        arrays |= _named("start_", replace(shape, material=None))
+        arrays |= _named("remembered_", shape.material)
+    arrays |= _named("material_", prediction.material)
     surfaces = [prediction.surface, *(iteration.surface for iteration in prediction.iterations)]
     for k, surface in enumerate(surfaces):
         arrays[f"control_points_{k}"] = surface.control_points
@@ -82,15 +76,39 @@ def pack(prediction: Prediction) -> bytes:
     return _npz(arrays)
 
 
+def _named(prefix: str, part: object) -> dict[str, Any]:
+    """Return what is given of a part, which may be None, as arrays whose names begin with `prefix`."""
+    given = {} if part is None else vars(part)
+    return {f"{prefix}{name}": np.asarray(value) for name, value in given.items() if value is not None}
+
+
+def _part(prefix: str, arrays: Any) -> dict[str, Any]:
+    """Return the arrays of an .npz whose names begin with `prefix`, without it."""
+    return {name.removeprefix(prefix): arrays[name] for name in arrays.files if name.startswith(prefix)}
+
+
+def _surface(arrays: Any, k: int) -> SplineSurface:
+    return SplineSurface(arrays[f"control_points_{k}"], arrays[f"knots_u_{k}"], arrays[f"knots_t_{k}"])
+
+
+def _motion(arrays: Any) -> Motion:
+    material = _part("material_", arrays)
+    return Motion(_surface(arrays, 0), MaterialMotion(**material) if material else None)
+
+
+def unpack_motion(nets: bytes) -> Motion:
+    """Return the motion of the run whose nets these are."""
+    with np.load(io.BytesIO(nets), allow_pickle=False) as arrays:
+        return _motion(arrays)
+
+
 def unpack(request: dict[str, Any], document: dict[str, Any], nets: bytes) -> Run:
     """Return the run that was stored as these parts."""
     with np.load(io.BytesIO(nets), allow_pickle=False) as arrays:
-        surfaces = [
-            SplineSurface(arrays[f"control_points_{k}"], arrays[f"knots_u_{k}"], arrays[f"knots_t_{k}"])
-            for k in range(len(document["iterations"]) + 1)
-        ]
+        motion = _motion(arrays)
+        iterates = [_surface(arrays, k + 1) for k in range(len(document["iterations"]))]
         scalars = {name: arrays[name] for name in SCALARS}
-        start = {name.removeprefix("start_"): arrays[name] for name in arrays.files if name.startswith("start_")}
+        start, remembered = _part("start_", arrays), _part("remembered_", arrays)
         machine = str(arrays["machine"]) if "machine" in arrays.files else "unknown"  # stored before it was noted
     iterations = tuple(
         Iteration(
@@ -98,20 +116,24 @@ def unpack(request: dict[str, Any], document: dict[str, Any], nets: bytes) -> Ru
             **{name: float(values[k]) for name, values in scalars.items()},
             n_u=shown["n_u"],
             n_t=shown["n_t"],
-            surface=surfaces[k + 1],
+            surface=iterates[k],
             note=shown["note"],
         )
         for k, shown in enumerate(document["iterations"])
     )
-    shape = ControlPoints(**{**start, "settle": bool(start["settle"])}) if start else None
-    return Run(request, document, surfaces[0], iterations, shape, machine)
+    shape = None
+    if start:
+        material = Material(**remembered) if remembered else None
+        shape = ControlPoints(**{**start, "settle": bool(start["settle"])}, material=material)
+    return Run(request, document, motion.surface, motion.material, iterations, shape, machine)
 
 
-def surface_npz(document: dict[str, Any]) -> bytes:
-    """Return the surface, the spline and the reactions of a response document as .npz.
+def surface_npz(document: dict[str, Any], material: MaterialMotion | None) -> bytes:
+    """Return the surface, the spline and the reactions of a response document, and the material, as .npz.
 
     Arrays: `u` (k_u,), `t` (k_t,), `positions` (k_t, k_u, 3), `twist` (k_t, k_u), `control_points` (n_t, n_u, 4),
-    `knots_u`, `knots_t`, `degree`, `grasp_u` (g,), `reaction` and `moment` (g, k_t, 3); SI units.
+    `knots_u`, `knots_t`, `degree`, `grasp_u` (g,), `reaction` and `moment` (g, k_t, 3); where the cable remembers,
+    `material_` and each field of `MaterialMotion`; SI units.
     """
     surface, grasps = document["surface"], document["grasps"]
     times = len(surface["t"])
@@ -123,6 +145,7 @@ def surface_npz(document: dict[str, Any]) -> bytes:
             "grasp_u": np.array([grasp["u"] for grasp in grasps], dtype=float),
             "reaction": np.array([grasp["reaction"] for grasp in grasps], dtype=float).reshape(-1, times, 3),
             "moment": np.array([grasp["moment"] for grasp in grasps], dtype=float).reshape(-1, times, 3),
+            **_named("material_", material),
         }
     )
 

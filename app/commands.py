@@ -75,7 +75,7 @@ def predict(scene: str, *, npz: str | None, json: str | None, rrd: str | None) -
     if npz is not None:
         from app.archive import surface_npz
 
-        _write(npz, surface_npz(document))
+        _write(npz, surface_npz(document, prediction.material))
     if json is not None:
         _write(json, orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY))
     if rrd is not None:
@@ -153,7 +153,7 @@ def _solve(request: PredictionRequest) -> Prediction:
     from dlocore import warm_up
 
     def stored(id: str) -> Any:
-        return RunStore(_settings()).surface(id)
+        return RunStore(_settings()).motion(id)
 
     with tqdm(desc="solving", unit=" iterations", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
 

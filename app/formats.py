@@ -9,6 +9,7 @@ from fastapi import Response
 
 from app.archive import surface_npz
 from app.problems import ProblemError
+from dlocore import MaterialMotion
 
 JSON = "application/json"
 NPZ = "application/x-npz"
@@ -69,16 +70,25 @@ def as_msgpack(document: bytes) -> bytes:
     return packed
 
 
-def as_npz(document: bytes) -> bytes:
-    """Return the arrays of a prediction's JSON document as .npz."""
-    return surface_npz(orjson.loads(document))
+def as_npz(document: bytes, material: MaterialMotion | None) -> bytes:
+    """Return the arrays of a prediction's JSON document, and of its material, as .npz."""
+    return surface_npz(orjson.loads(document), material)
 
 
-_ENCODERS: dict[str, Callable[[bytes], bytes]] = {NPZ: as_npz, MSGPACK: as_msgpack}
+async def prediction_response(
+    document: bytes, form: str, material: Callable[[], MaterialMotion | None], status: int = 200
+) -> Response:
+    """Return a prediction as a response of the media type `form`, one of `FORMS`.
 
+    Args:
+        document: its JSON document.
+        form: the media type.
+        material: finds what the sections of the cable remember; called in a thread where the form holds it.
+        status: of the response.
+    """
 
-async def prediction_response(document: bytes, form: str, status: int = 200) -> Response:
-    """Return a prediction's JSON document as a response of the media type `form`, one of `FORMS`."""
-    encode = _ENCODERS.get(form)
-    content = document if encode is None else await anyio.to_thread.run_sync(encode, document)
+    def encoded() -> bytes:
+        return as_npz(document, material()) if form == NPZ else as_msgpack(document)
+
+    content = document if form == JSON else await anyio.to_thread.run_sync(encoded)
     return Response(content, status, {"Vary": "Accept"}, form)

@@ -10,6 +10,7 @@ import anyio
 from app.problems import ProblemError, document_of
 from app.runs import new_id
 from app.schemas.response import job_links, now
+from dlocore import MaterialMotion
 
 State = Literal["queued", "running", "done", "failed", "cancelled"]
 MAX_FINISHED = 256  # jobs remembered after their end, where no stored run stands for them
@@ -28,6 +29,7 @@ class Job:
         state: how far it is.
         iterations: the documents of the iterations so far.
         document: the answer as JSON, where it was not stored.
+        material: what the sections of the cable remember, where it was not stored.
         problem: why there is none.
         beyond_limit: whether the answer is the best iterate within the time limit of the service.
         cancelled: set by `cancel`.
@@ -40,12 +42,19 @@ class Job:
     state: State = "queued"
     iterations: list[dict[str, Any]] = field(default_factory=list)
     document: bytes | None = None
+    material: MaterialMotion | None = None
     problem: ProblemError | None = None
     beyond_limit: bool = False
     cancelled: Event = field(default_factory=Event)
     finished: anyio.Event = field(default_factory=anyio.Event)
     scope: anyio.CancelScope = field(default_factory=anyio.CancelScope)
     _changed: anyio.Event = field(default_factory=anyio.Event)
+
+    @property
+    def size(self) -> int:
+        """Bytes of its answer, as far as it is kept here."""
+        arrays = () if self.material is None else vars(self.material).values()
+        return len(self.document or b"") + sum(array.nbytes for array in arrays)
 
     def cancel(self) -> None:
         """Stop it: at once while it waits, at the solver's next check while it runs."""
@@ -118,10 +127,10 @@ class Jobs:
         """Remember a job; forget the oldest finished ones beyond the caps."""
         self._jobs[job.id] = job
         finished = [kept for kept in self._jobs.values() if kept.finished.is_set()]
-        total = sum(len(kept.document or b"") for kept in finished)
+        total = sum(kept.size for kept in finished)
         while len(finished) > MAX_FINISHED or total > MAX_BYTES:
             oldest = finished.pop(0)
-            total -= len(oldest.document or b"")
+            total -= oldest.size
             del self._jobs[oldest.id]
 
     def get(self, id: str) -> Job | None:

@@ -14,12 +14,13 @@ from typing import Any
 
 import orjson
 
-from app.archive import Run, pack, unpack
+from app.archive import Run, pack, unpack, unpack_motion
 from app.leftovers import claim
 from app.recording import write_recording
+from app.schemas import Motion
 from app.schemas.response import from_prediction
 from app.settings import Settings
-from dlocore import Prediction, SplineSurface
+from dlocore import Prediction
 
 _ID = re.compile(r"[0-9a-f]{28}")
 REQUEST, DOCUMENT, NETS, SUMMARY, RECORDING = "scene.json", "prediction.json", "nets.npz", "summary.json", "run.rrd"
@@ -197,10 +198,10 @@ class RunStore:
         request, document, nets = (part or b"" for part in parts)
         return unpack(orjson.loads(request), orjson.loads(document), nets)
 
-    def surface(self, id: str) -> SplineSurface | None:
-        """Return the surface of a run, or None where there is no such run."""
-        run = self.load(id)
-        return None if run is None else run.surface
+    def motion(self, id: str) -> Motion | None:
+        """Return the motion of a run, or None where there is no such run."""
+        nets = self._read(id, NETS)
+        return None if nets is None else unpack_motion(nets)
 
     def recording(self, id: str) -> bytes | None:
         """Return the recording (.rrd) of a run, written when first asked for; None where there is no such run."""

@@ -23,7 +23,7 @@ from app.schemas import PredictionRequest, from_prediction, to_scene
 from app.schemas.response import iteration_document
 from app.settings import Settings
 from app.worker import Worker
-from dlocore import Iteration, Prediction, Scene, SceneError, warm_up
+from dlocore import Iteration, MaterialMotion, Prediction, Scene, SceneError, warm_up
 
 _log = logging.getLogger("dlo")
 
@@ -104,7 +104,7 @@ class Service:
             ProblemError: 429 or 503.
         """
         self.check_ready()
-        scene = await anyio.to_thread.run_sync(to_scene, request, self.runs.surface)
+        scene = await anyio.to_thread.run_sync(to_scene, request, self.runs.motion)
         self.worker.admit()
         assert self._tasks is not None
         job = Job(store)
@@ -123,6 +123,7 @@ class Service:
                 if job.store:
                     self.jobs.forget(job.id)  # the stored run stands for it
                 else:
+                    job.material = await anyio.to_thread.run_sync(lambda: prediction.material)
                     job.document = document
                 job.end("done")
         except Exception as error:
@@ -191,6 +192,19 @@ class Service:
         """
         job = job or self.jobs.get(id)
         return job.document if job is not None and job.document is not None else self.runs.document(id)
+
+    def material(self, id: str, job: Job | None = None) -> MaterialMotion | None:
+        """Return what the sections of the cable remember in the answer `id`, if anything; for any thread.
+
+        Args:
+            id: of a run, stored or not.
+            job: that of the run, where it is known.
+        """
+        job = job or self.jobs.get(id)
+        if job is not None and job.document is not None:
+            return job.material
+        motion = self.runs.motion(id)
+        return None if motion is None else motion.material
 
 
 def service_of(request: Request) -> Service:

@@ -1,4 +1,4 @@
-"""The predicted motion on its own timeline: the cable, its grasps, the forces of the grippers, the energies."""
+"""The predicted motion on its own timeline: cable, grasps, obstacles, the forces of the grippers, the energies."""
 
 from typing import TYPE_CHECKING
 
@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.archive import Run
+from app.recording.obstacles import obstacle_chunks
 from app.recording.style import (
     BLUE,
     ENERGIES,
@@ -48,9 +49,10 @@ def motion_chunks(run: Run) -> "list[Chunk]":
         chunk("/motion/cable", times, rr.LineStrips3D.columns(strips=positions)),
         chunk("/motion/cable", [], cable),
     ]
+    chunks += obstacle_chunks(run.scene.environment.obstacles, "/motion/obstacles")
     for k in range(len(run.document["grasps"])):
         chunks += _grasp(run, k, shown, thick)
-    for name, values in energies(run.scene, run.surface, surface["t"]).items():
+    for name, values in energies(run.scene, run.surface, surface["t"], run.material).items():
         entity = f"/over_time/energy/{name}"
         chunks += [line_style(entity, f"{name} [J]", ENERGIES.get(name, GREY)), scalars(entity, times, values)]
     return chunks

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.archive import Run
+from app.recording.obstacles import obstacle_chunks
 from app.recording.style import (
     BLUE,
     EFFECTS,
@@ -90,8 +91,8 @@ def _balances(run: Run, drawn: NDArray[np.intp]) -> list[Line]:
     kept: dict[str, Floats] = {}
     for k in drawn:
         surface = run.iterations[k].surface
-        forces = effect_forces(run.scene, surface, np.linspace(0.0, surface.horizon, FORCE_TIMES))
-        terms = energies(run.scene, surface, [0.0, surface.horizon])
+        forces = effect_forces(run.scene, surface, np.linspace(0.0, surface.horizon, FORCE_TIMES), run.material)
+        terms = energies(run.scene, surface, [0.0, surface.horizon], run.material)
         values = {f"/forces/{name}": force for name, force in forces.items()}
         values |= {f"/energy/{name}": float(energy[-1]) for name, energy in terms.items()}
         for entity, value in values.items():
@@ -121,6 +122,7 @@ def _iterates(run: Run, drawn: NDArray[np.intp]) -> "list[Chunk]":
     style = rr.LineStrips3D.columns(colors=time_ramp(), radii=[thin] * STRIPS).partition([STRIPS])
     dots = rr.Points3D.columns(positions=np.concatenate(points)).partition([len(net) for net in points])
     return [
+        *obstacle_chunks(run.scene.environment.obstacles, "/iterate/obstacles"),
         chunk("/iterate/shape", indexes, strips),
         chunk("/iterate/shape", [], style),
         chunk("/iterate/net", indexes, dots),

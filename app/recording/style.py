@@ -1,4 +1,4 @@
-"""What the parts of a recording share: names, colours (Okabe-Ito, one an effect), and how chunks are made."""
+"""What the parts of a recording share: names, colours (Okabe-Ito or darker, one an effect), and how chunks are made."""
 
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
@@ -25,6 +25,7 @@ PURPLE: Colour = (204, 121, 167)
 SKY: Colour = (86, 180, 233)
 YELLOW: Colour = (240, 228, 66)
 GREY: Colour = (150, 150, 150)
+OBSTACLE: Colour = (118, 186, 166)  # green, lightened: solids are shaded
 EFFECTS = {
     "inertia": BLUE,
     "damping": PURPLE,
@@ -33,8 +34,12 @@ EFFECTS = {
     "stretch": VERMILION,
     "bend": ORANGE,
     "twist": YELLOW,
+    "plasticity": (143, 85, 117),
+    "table": (0, 80, 125),
+    "friction": (149, 66, 0),
+    "obstacles": OBSTACLE,
 }
-ENERGIES = {"kinetic": BLUE, "bend": ORANGE, "stretch": VERMILION, "gravity": GREEN}
+ENERGIES = {"kinetic": BLUE, "bend": ORANGE, "stretch": VERMILION, "gravity": GREEN, "twist": YELLOW}
 EARLY, LATE = np.array([178, 214, 240.0]), np.array([0, 70, 140.0])  # ends of the ramp over the time of a motion
 
 

@@ -17,12 +17,16 @@ router = APIRouter(prefix="/v1/predictions/{id}", tags=["predictions"])
     "/surface.npz",
     response_class=Response,
     summary="The surface for NumPy",
-    responses=described.a_file("Arrays of the surface, the spline and the reactions.", NPZ),
+    responses=described.a_file("Arrays of the surface, the spline, the reactions, and what the cable remembers.", NPZ),
 )
 async def surface(id: str, service: TheService) -> Response:
-    """Return `u`, `t`, `positions`, `twist`, the spline, and the reactions of the grasps."""
+    """Return `u`, `t`, `positions`, `twist`, the spline, the reactions of the grasps, and what the cable remembers."""
     document = await part(service, service.document, id)
-    return _file(await anyio.to_thread.run_sync(as_npz, document), NPZ, f"{id}.npz")
+
+    def npz() -> bytes:
+        return as_npz(document, service.material(id))
+
+    return _file(await anyio.to_thread.run_sync(npz), NPZ, f"{id}.npz")
 
 
 @router.get(

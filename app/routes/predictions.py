@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable
 from datetime import datetime
+from functools import partial
 from typing import Annotated, Any, Literal
 
 import anyio
@@ -96,7 +97,8 @@ async def _answer(job: Job, service: Service, form: str) -> Response:
         limit = service.settings.time_limit
         detail = f"The solve reached the limit of {limit:g} s; the best iterate so far is kept. {message}"
         raise ProblemError(504, "time-limit", detail, prediction=address)
-    return await prediction_response(document, form, 201 if job.store else 200)
+    material = partial(service.material, job.id, job)
+    return await prediction_response(document, form, material, 201 if job.store else 200)
 
 
 def _state(job: Job, status: int = 200) -> Response:
@@ -168,7 +170,7 @@ async def read(id: str, request: Request, service: TheService) -> Response:
     form = negotiated(request.headers.get("accept"), FORMS)
     document = await anyio.to_thread.run_sync(service.document, id)
     if document is not None:
-        return await prediction_response(document, form)
+        return await prediction_response(document, form, partial(service.material, id))
     job = service.jobs.get(id)
     if job is None:
         raise no_run(id)

@@ -1,15 +1,15 @@
 """The JSON contract: what goes in, what comes out, and the way to and from the solver's data."""
 
-from app.schemas.convert import StoredSurface, to_scene
+from app.schemas.convert import Motion, to_scene
 from app.schemas.request import EXAMPLES, PredictionRequest
 from app.schemas.response import PredictionList, PredictionResponse, from_prediction, problem_document
 
 __all__ = [
     "EXAMPLES",
+    "Motion",
     "PredictionList",
     "PredictionRequest",
     "PredictionResponse",
-    "StoredSurface",
     "from_prediction",
     "problem_document",
     "to_scene",

@@ -18,6 +18,11 @@ def _positive(what: str, unit: str, example: float, most: float = 1e15) -> Any:
     return Field(default=None, gt=0.0, le=most, description=f"{what} [{unit}].", examples=[example])
 
 
+def _yield(what: str, example: float) -> Any:
+    description = f"{what}; absent: elastic. Needs `memory_rate`."
+    return Field(default=None, gt=0.0, le=10.0, description=description, examples=[example])
+
+
 class CableModel(Model):
     """A cable of round section. `length`, `diameter` and `linear_density` are required unless `preset` gives them.
 
@@ -44,11 +49,26 @@ class CableModel(Model):
     torsional_damping: Number = Field(
         default=0.0, ge=0.0, description="Internal damping on the rate of twist [N m^2 s].", examples=[0.0]
     )
-    yield_strain: Number | None = Field(
-        default=None, gt=0.0, description="Strain at which the cable yields, eps_M; absent: elastic.", examples=[0.01]
+    yield_strain: Number | None = _yield(
+        "Bending strain of the outermost fibre at which the cable yields, eps_M: the curvature 2 eps_M/D", 0.01
     )
+    yield_twist: Number | None = _yield(
+        "Shear of the outermost fibre at which the cable yields in twist: the twist rate 2 eps_M/D", 0.02
+    )
+    yield_stretch: Number | None = _yield("Axial strain at which the cable yields", 0.005)
     memory_rate: Number | None = Field(
-        default=None, gt=0.0, description="Rate of the plastic memory, k_eps [1/s]; absent: elastic.", examples=[50.0]
+        default=None,
+        gt=0.0,
+        le=1e9,
+        description="Rate at which a strain beyond yield is remembered, k_eps [1/s]; given with a yield strain only.",
+        examples=[50.0],
+    )
+    hardening: Number = Field(
+        default=0.1,
+        ge=0.0,
+        le=1.0,
+        description="Share of the remembered strain that resists further yield, 0 (the paper's law) to 1.",
+        examples=[0.1],
     )
     rest_shape: RestShape = Field(
         default="straight",

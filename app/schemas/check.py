@@ -9,12 +9,12 @@ from dlocore import SceneError
 from dlocore.errors import within
 
 
-def scene_errors(request: PredictionRequest, stored: convert.StoredSurface) -> list[SceneError]:
+def scene_errors(request: PredictionRequest, stored: convert.StoredMotion) -> list[SceneError]:
     """Return what is wrong with each part of a request; faults of parts that contradict each other come last.
 
     Args:
         request: the valid request.
-        stored: finds the surface that a shape of kind "prediction" continues from.
+        stored: finds the motion that a shape of kind "prediction" continues from.
     """
     found: dict[str, SceneError] = {}
     parts: list[Callable[[], object]] = [*_parts(request, stored), partial(convert.to_scene, request, stored)]
@@ -26,7 +26,7 @@ def scene_errors(request: PredictionRequest, stored: convert.StoredSurface) -> l
     return list(found.values())
 
 
-def _parts(request: PredictionRequest, stored: convert.StoredSurface) -> Iterable[Callable[[], object]]:
+def _parts(request: PredictionRequest, stored: convert.StoredMotion) -> Iterable[Callable[[], object]]:
     def cable() -> object:
         with within("cable"):
             return convert.cable_of(request.cable)
@@ -44,5 +44,7 @@ def _parts(request: PredictionRequest, stored: convert.StoredSurface) -> Iterabl
         yield partial(convert.grasp_of, i, primitive)
     for i, load in enumerate(request.loads):
         yield partial(convert.load_of, i, load)
+    for i, obstacle in enumerate(request.environment.obstacles):
+        yield partial(convert.obstacle_of, i, obstacle)
     yield partial(convert.environment_of, request.environment)
     yield partial(convert.quality_of, request.quality)

@@ -1,10 +1,10 @@
 """From a valid request to the solver's scene."""
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.schemas.cable import CableModel
 from app.schemas.primitives import ForceOverTime, LoadModel, MovePath, PrimitiveModel, StillPath, WaypointsPath
@@ -16,42 +16,56 @@ from app.schemas.shape import (
     PredictionShape,
     StraightShape,
 )
-from app.schemas.surroundings import EnvironmentModel, QualityModel
+from app.schemas.surroundings import EnvironmentModel, ObstacleModel, QualityModel
 from dlocore import (
+    Box,
     Cable,
+    Capsule,
     ControlPoints,
+    Cylinder,
     Environment,
     Grasp,
     Load,
+    MaterialMotion,
     Move,
     Points,
     Quality,
     Scene,
     SceneError,
+    Sphere,
     SplineSurface,
     Still,
     Straight,
     Table,
     Waypoints,
+    continued,
 )
 from dlocore.errors import within
+from dlocore.obstacles import Obstacle
 from dlocore.paths import Path
 from dlocore.scene import Shape
-from dlocore.spline import design_matrix
-
-# Finds the surface of a stored prediction by its id; None where there is no such prediction.
-StoredSurface = Callable[[str], SplineSurface | None]
 
 
-def to_scene(request: PredictionRequest, stored: StoredSurface) -> Scene:
+class Motion(NamedTuple):
+    """A predicted motion: its surface, and what the sections of the cable remember (None: nothing)."""
+
+    surface: SplineSurface
+    material: MaterialMotion | None
+
+
+# Finds the motion of a stored prediction by its id; None where there is no such prediction.
+StoredMotion = Callable[[str], Motion | None]
+
+
+def to_scene(request: PredictionRequest, stored: StoredMotion) -> Scene:
     """Return the scene that `request` describes.
 
     Args:
         request: the valid request.
-        stored: finds the surface that a shape of kind "prediction" continues from.
+        stored: finds the motion that a shape of kind "prediction" continues from.
 
     Raises:
-        SceneError: the scene is impossible or asks for what is not modelled; its field is the path in the request.
+        SceneError: the scene is impossible; its field is the path in the request.
     """
     with within("cable"):
         cable = cable_of(request.cable)
@@ -81,7 +95,7 @@ def cable_of(model: CableModel) -> Cable:
     return Cable(**values)
 
 
-def shape_of(request: PredictionRequest, cable: Cable, stored: StoredSurface) -> Shape:
+def shape_of(request: PredictionRequest, cable: Cable, stored: StoredMotion) -> Shape:
     """Return the start shape of the solver, or raise SceneError."""
     model = request.shape
     if isinstance(model, PredictionShape):
@@ -120,33 +134,22 @@ def _velocity(value: Any, kind: str) -> Any:
         return value.points
     for i, row in enumerate(value.control_points):
         if len(row) == 4 and row[3] != 0.0:
-            raise SceneError(f"velocity.control_points[{i}][3]", row[3], "0", "Twist is not modelled yet")
+            raise SceneError(f"velocity.control_points[{i}][3]", row[3], "0", "The twist starts at rest")
     return [row[:3] for row in value.control_points]
 
 
-def _continued(model: PredictionShape, cable: Cable, stored: StoredSurface) -> ControlPoints:
-    surface = stored(model.id)
-    if surface is None:
+def _continued(model: PredictionShape, cable: Cable, stored: StoredMotion) -> ControlPoints:
+    motion = stored(model.id)
+    if motion is None:
         raise SceneError("shape.id", model.id, "the id of a stored prediction", "There is no such prediction")
+    surface = motion.surface
     if not abs(surface.length - cable.length) <= 1e-9 * cable.length:
         reason = "A continued cable keeps its length"
         raise SceneError("cable.length", cable.length, f"{surface.length:g} [m], as in that prediction", reason)
-    t = surface.horizon if model.t is None else model.t
-    if not t <= surface.horizon:
-        raise SceneError("shape.t", t, f"0 to the end of that prediction, {surface.horizon:g} [s]")
+    if model.t is not None and not model.t <= surface.horizon:
+        raise SceneError("shape.t", model.t, f"0 to the end of that prediction, {surface.horizon:g} [s]")
     with within("shape"):
-        return ControlPoints(
-            control_points=_at(surface, t, 0),
-            knots=surface.knots_u,
-            settle=model.settle,
-            velocity=_at(surface, t, 1)[:, :3],
-        )
-
-
-def _at(surface: SplineSurface, t: float, derivative: int) -> NDArray[np.float64]:
-    """Return the control points along the cable of the surface, or of its derivative, at time `t`; (n_u, 4)."""
-    row = design_matrix(surface.knots_t, [t], derivative)[0]
-    return np.einsum("j,jic->ic", row, surface.control_points)
+        return replace(continued(surface, motion.material, model.t), settle=model.settle)
 
 
 def grasp_of(i: int, model: PrimitiveModel) -> Grasp:
@@ -190,14 +193,24 @@ def environment_of(model: EnvironmentModel) -> Environment:
     if model.table is not None:
         with within("environment.table"):
             table = Table(height=model.table.height, friction=model.table.friction)
+    obstacles = tuple(obstacle_of(i, obstacle) for i, obstacle in enumerate(model.obstacles))
     with within("environment"):
         return Environment(
             gravity=model.gravity,
             drag=model.drag,
             drag_quadratic=model.drag_quadratic,
             table=table,
-            obstacles=tuple(model.obstacles),
+            obstacles=obstacles,
         )
+
+
+_OBSTACLES: dict[str, type[Obstacle]] = {"sphere": Sphere, "capsule": Capsule, "cylinder": Cylinder, "box": Box}
+
+
+def obstacle_of(i: int, model: ObstacleModel) -> Obstacle:
+    """Return the obstacle `i` of the solver, or raise SceneError."""
+    with within(f"environment.obstacles[{i}]"):
+        return _OBSTACLES[model.kind](**model.model_dump(exclude={"kind"}))
 
 
 def quality_of(model: str | QualityModel) -> Quality:

@@ -145,14 +145,12 @@ def _holding(hold: str) -> dict[str, Any]:
 
 
 TWO_GRIPPERS = _holding("tangent")
-_CLAMPS = "Clamps hold the twist, which is not modelled yet: refused by name."
 EXAMPLES: dict[str, Example] = {
     "paper": {"summary": "The paper's Fig. 1: a straight cable on a table, one grasp", "value": PAPER},
     "two-grippers": {"summary": "A hanging cable between two grippers", "value": TWO_GRIPPERS},
-    "two-clamps": {"summary": "The same with clamps", "description": _CLAMPS, "value": _HANGING},
+    "two-clamps": {"summary": "The same with clamps, which hold the twist too", "value": _HANGING},
     "friction": {
         "summary": "A bent cable on a table with friction, an obstacle and plasticity",
-        "description": "Friction, obstacles and plasticity are not modelled yet: refused by name.",
         "value": _FRICTION,
     },
 }

@@ -24,7 +24,9 @@ class SurfaceModel(BaseModel):
     positions: list[list[list[float]]] = Field(
         description="Positions [t][u][3] [m].", examples=[[[[0.0, 0.0, 0.0], [0.01, 0.0, 0.0]]]]
     )
-    twist: list[list[float]] = Field(description="Twist angles [t][u] [rad].", examples=[[[0.0, 0.0]]])
+    twist: list[list[float]] = Field(
+        description="Angles of the sections against a frame without twist [t][u] [rad].", examples=[[[0.0, 0.0]]]
+    )
 
 
 class GraspModel(BaseModel):

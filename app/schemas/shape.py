@@ -25,7 +25,9 @@ class ControlVelocities(Model):
 
     kind: Literal["control_points"]
     control_points: list[ControlPoint] = Field(
-        min_length=4, description="[m/s, m/s, m/s], and the twist rate [rad/s].", examples=[[[0, 0.1, 0]] * 4]
+        min_length=4,
+        description="[m/s, m/s, m/s]; a fourth number must be 0: the twist starts at rest.",
+        examples=[[[0, 0.1, 0]] * 4],
     )
 
 
@@ -86,7 +88,10 @@ class ControlPointsShape(Model):
     control_points: list[ControlPoint] = Field(
         min_length=4,
         max_length=2000,
-        description="Control points [m, m, m] or [m, m, m, rad].",
+        description=(
+            "Control points [m, m, m] or [m, m, m, rad]; the fourth is the angle of the sections against a frame "
+            "without twist."
+        ),
         examples=[[[0, 0, 0], [0.3, 0, 0], [0.7, 0, 0], [1, 0, 0]]],
     )
     knots: list[Number] | None = Field(
@@ -99,7 +104,7 @@ class ControlPointsShape(Model):
 
 
 class PredictionShape(Model):
-    """Continue from a stored prediction, with its shape and velocity."""
+    """Continue from a stored prediction, with its shape, velocity and twist, and what the cable remembers."""
 
     kind: Literal["prediction"]
     id: str = Field(description="Id of a stored prediction.", examples=["0193b1f5a2c07f3e9d1c5b6a7e8f"])

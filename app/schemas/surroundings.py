@@ -5,9 +5,13 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from app.schemas.base import BY_FORM, OBJECT, TEXT, Count, Model, Number, Vector
+from dlocore.scene import MAX_OBSTACLES
 
 Switch = Literal["auto", "on", "off"]
 Length = Annotated[Number, Field(gt=0.0, le=1e4)]
+Friction = Annotated[
+    Number, Field(ge=0.0, le=10.0, description="Coefficient of Coulomb friction; absent: none.", examples=[0.3])
+]
 
 
 class TableModel(Model):
@@ -20,17 +24,20 @@ class TableModel(Model):
         description="Height of the centreline of a cable lying on it [m]: the surface plus half the diameter.",
         examples=[0.0],
     )
-    friction: Number = Field(default=0.0, ge=0.0, le=10.0, description="Coefficient of friction.", examples=[0.0])
+    friction: Friction = 0.0
 
 
 class Cylinder(Model):
-    """A solid cylinder."""
+    """A solid cylinder with flat ends."""
 
     kind: Literal["cylinder"]
     center: Vector = Field(description="Centre [m].", examples=[[0.55, 0.2, 0]])
-    axis: Vector = Field(description="Direction of its axis.", examples=[[0, 0, 1]])
+    axis: Vector = Field(
+        default=[0.0, 0.0, 1.0], description="Direction of its axis; any length but zero.", examples=[[0, 0, 1]]
+    )
     radius: Length = Field(description="Radius [m].", examples=[0.02])
     height: Length = Field(description="Length along the axis [m].", examples=[0.1])
+    friction: Friction = 0.0
 
 
 class Box(Model):
@@ -44,6 +51,7 @@ class Box(Model):
     orientation: Annotated[list[Number], Field(min_length=4, max_length=4)] | None = Field(
         default=None, description="Unit quaternion (w, x, y, z); absent: axis-aligned.", examples=[[1, 0, 0, 0]]
     )
+    friction: Friction = 0.0
 
 
 class Sphere(Model):
@@ -52,6 +60,7 @@ class Sphere(Model):
     kind: Literal["sphere"]
     center: Vector = Field(description="Centre [m].", examples=[[0.5, 0.2, 0.05]])
     radius: Length = Field(description="Radius [m].", examples=[0.05])
+    friction: Friction = 0.0
 
 
 class Capsule(Model):
@@ -61,6 +70,7 @@ class Capsule(Model):
     start: Vector = Field(description="One end of the segment [m].", examples=[[0.5, 0, 0]])
     end: Vector = Field(description="Its other end [m].", examples=[[0.5, 0.2, 0]])
     radius: Length = Field(description="Radius [m].", examples=[0.02])
+    friction: Friction = 0.0
 
 
 ObstacleModel = Annotated[Cylinder | Box | Sphere | Capsule, Field(discriminator="kind")]
@@ -78,7 +88,9 @@ class EnvironmentModel(Model):
     )
     table: TableModel | None = Field(default=None, description="A table, or null.")
     obstacles: list[ObstacleModel] = Field(
-        default=[], max_length=1000, description="Solid obstacles by their true surfaces; the cable adds its radius."
+        default=[],
+        max_length=MAX_OBSTACLES,
+        description="Solid obstacles by their true surfaces; the cable touches them with its radius.",
     )
 
 
@@ -87,14 +99,14 @@ class EffectsModel(Model):
 
     inertia: Switch = Field(default="auto", description="Inertia of the cable.", examples=["auto"])
     drag: Switch = Field(default="auto", description="Drag of the surrounding air or liquid.", examples=["auto"])
-    damping: Switch = Field(default="auto", description="Internal damping of bending.", examples=["auto"])
+    damping: Switch = Field(default="auto", description="Internal damping of bending and twist.", examples=["auto"])
     gravity: Switch = Field(default="auto", description="Weight.", examples=["auto"])
     stretch: Switch = Field(default="auto", description="Axial stretch, which holds the length.", examples=["auto"])
     bend: Switch = Field(default="auto", description="Bending stiffness.", examples=["auto"])
     twist: Switch = Field(default="auto", description="Twist and its stiffness.", examples=["auto"])
-    plasticity: Switch = Field(default="auto", description="Yield and memory of the shape.", examples=["auto"])
+    plasticity: Switch = Field(default="auto", description="Yield and the memory of it.", examples=["auto"])
     table: Switch = Field(default="auto", description="Contact with the table.", examples=["auto"])
-    friction: Switch = Field(default="auto", description="Friction on the table.", examples=["auto"])
+    friction: Switch = Field(default="auto", description="Friction on the table and on obstacles.", examples=["auto"])
     obstacles: Switch = Field(default="auto", description="Contact with obstacles.", examples=["auto"])
     self_contact: Switch = Field(default="auto", description="Contact of the cable with itself.", examples=["auto"])
 

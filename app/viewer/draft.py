@@ -8,12 +8,29 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
-from dlocore import PRESETS, Cable, Environment, Grasp, Move, Quality, Scene, Still, Straight, Table
+from dlocore import (
+    PRESETS,
+    Box,
+    Cable,
+    Capsule,
+    Cylinder,
+    Environment,
+    Grasp,
+    Move,
+    Quality,
+    Scene,
+    Sphere,
+    Still,
+    Straight,
+    Table,
+)
+from dlocore.obstacles import Obstacle
 
 REACH_SHARE = 0.9  # of the cable between two grippers, when the target is brought near
 GRAVITY = (0.0, 0.0, -9.81)
 PROFILE: Literal["minimum_jerk"] = "minimum_jerk"
 QualityMode = Literal["automatic", "target error", "grid"]
+ObstacleKind = Literal["none", "cylinder", "box", "sphere", "capsule"]
 Vector = tuple[float, float, float]
 
 
@@ -44,6 +61,35 @@ class GraspDraft:
 
     u: float
     displacement: Vector | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ObstacleDraft:
+    """An obstacle of a fixed size at (x, y) [m] on the table, or none.
+
+    Round ones are sunk to half their height, so that the cable meets them where they are widest.
+    """
+
+    kind: ObstacleKind = "none"
+    x: float = 0.55
+    y: float = 0.2
+
+    def json(self, height: float) -> dict[str, Any] | None:
+        """Return it as in the contract, for a cable that lies at `height` [m]."""
+        x, y = self.x, self.y
+        bodies: dict[str, dict[str, Any]] = {
+            "cylinder": {"center": [x, y, height + 0.05], "axis": [0.0, 0.0, 1.0], "radius": 0.03, "height": 0.12},
+            "box": {"center": [x, y, height + 0.03], "size": [0.1, 0.06, 0.08]},
+            "sphere": {"center": [x, y, height], "radius": 0.04},
+            "capsule": {"start": [x - 0.08, y, height], "end": [x + 0.08, y, height], "radius": 0.025},
+        }
+        return {"kind": self.kind, **bodies[self.kind]} if self.kind in bodies else None
+
+    def solid(self, height: float) -> Obstacle | None:
+        """Return it for the solver, for a cable that lies at `height` [m]."""
+        types: dict[str, type[Obstacle]] = {"cylinder": Cylinder, "box": Box, "sphere": Sphere, "capsule": Capsule}
+        body = self.json(height)
+        return None if body is None else types[body.pop("kind")](**body)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,6 +124,7 @@ class Draft:
         duration: of every move [s].
         drag: linear, per unit length [N s/m^2].
         table_height: of the centreline of a cable lying on it [m].
+        table_friction: coefficient of friction.
     """
 
     cable: CableDraft
@@ -85,6 +132,8 @@ class Draft:
     duration: float = 1.6
     drag: float = 0.05
     table_height: float = 0.0
+    table_friction: float = 0.0
+    obstacle: ObstacleDraft = field(default_factory=ObstacleDraft)
     quality: QualityDraft = field(default_factory=QualityDraft)
 
     @property
@@ -115,6 +164,14 @@ class Draft:
         shrink = min(1.0, reach / max(math.hypot(x - end, y), 1e-9))
         return self.with_target(end + shrink * (x - end), shrink * y)
 
+    def with_obstacle(self, **changes: Any) -> "Draft":
+        """Change fields of the obstacle; a new one asks for automatic quality: few fixed grids resolve a contact."""
+        obstacle = replace(self.obstacle, **changes)
+        new = obstacle.kind not in ("none", self.obstacle.kind)
+        return replace(
+            self, obstacle=obstacle, quality=replace(self.quality, mode="automatic") if new else self.quality
+        )
+
     @property
     def end_is_held(self) -> bool:
         """Whether a second gripper holds the end."""
@@ -134,9 +191,18 @@ class Draft:
             cable=Cable(**self.cable.values()),
             shape=Straight(start=(0.0, 0.0, self.table_height), direction=(1.0, 0.0, 0.0)),
             grasps=tuple(self._grasp(grasp) for grasp in self.grasps),
-            environment=Environment(gravity=GRAVITY, drag=self.drag, table=Table(height=self.table_height)),
+            environment=self._environment(),
             horizon=self.duration,
             quality=self.quality.quality() if quality is None else quality,
+        )
+
+    def _environment(self) -> Environment:
+        obstacle = self.obstacle.solid(self.table_height)
+        return Environment(
+            gravity=GRAVITY,
+            drag=self.drag,
+            table=Table(height=self.table_height, friction=self.table_friction),
+            obstacles=() if obstacle is None else (obstacle,),
         )
 
     def _grasp(self, grasp: GraspDraft) -> Grasp:
@@ -146,6 +212,7 @@ class Draft:
 
     def json(self) -> dict[str, Any]:
         """Return the scene as the JSON that `POST /v1/predictions` takes."""
+        obstacle = self.obstacle.json(self.table_height)
         return {
             "cable": self.cable.values(),
             "shape": {"kind": "straight", "start": [0.0, 0.0, self.table_height], "direction": [1.0, 0.0, 0.0]},
@@ -153,7 +220,8 @@ class Draft:
             "environment": {
                 "gravity": list(GRAVITY),
                 "drag": self.drag,
-                "table": {"height": self.table_height, "friction": 0.0},
+                "table": {"height": self.table_height, "friction": self.table_friction},
+                "obstacles": [] if obstacle is None else [obstacle],
             },
             "horizon": self.duration,
             "quality": self.quality.json(),

@@ -6,7 +6,7 @@ from typing import Any, get_args
 
 from viser import GuiApi, GuiEvent
 
-from app.viewer.draft import CableDraft, Draft, QualityDraft, QualityMode
+from app.viewer.draft import CableDraft, Draft, ObstacleKind, QualityDraft, QualityMode
 from dlocore import PRESETS
 
 OnEdit = Callable[[Draft], None]
@@ -109,6 +109,33 @@ class CableForm(Form):
         show_value(self._density, round(1e3 * cable.linear_density, 6))
         show_value(self._stiffness, round(1e3 * cable.bending_stiffness, 6))
         show_value(self._drag, draft.drag)
+
+
+class SurroundingsForm(Form):
+    """What the cable lies on, and what stands in its way."""
+
+    def __init__(self, gui: GuiApi, draft: Draft, on_edit: OnEdit) -> None:
+        super().__init__(draft, on_edit)
+        obstacle = draft.obstacle
+        with gui.add_folder("Table and obstacle"):
+            self._friction = gui.add_number("Table friction", draft.table_friction, min=0.0, max=2.0, step=0.05)
+            self._kind = gui.add_dropdown("Obstacle", get_args(ObstacleKind), initial_value=obstacle.kind)
+            self._place = gui.add_vector2(
+                "Obstacle x, y [m]", (obstacle.x, obstacle.y), min=(-REACH, -REACH), max=(REACH, REACH), step=0.01
+            )
+        self._bind(self._friction, lambda d: replace(d, table_friction=self._friction.value))
+        self._bind(self._kind, lambda d: d.with_obstacle(kind=self._kind.value))
+        self._bind(self._place, lambda d: d.with_obstacle(x=self._place.value[0], y=self._place.value[1]))
+
+    def take(self, draft: Draft) -> None:
+        """Show `draft`."""
+        self._draft = draft
+        obstacle = draft.obstacle
+        show_value(self._friction, draft.table_friction)
+        show_value(self._kind, obstacle.kind)
+        show_value(self._place, (round(obstacle.x, 4), round(obstacle.y, 4)))
+        if self._place.visible != (obstacle.kind != "none"):
+            self._place.visible = obstacle.kind != "none"
 
 
 class QualityForm(Form):

@@ -15,6 +15,7 @@ BRAND = (46, 107, 214)
 STEEL = (128, 138, 154)
 WARNING = (222, 72, 50)
 REACTION = (213, 94, 0)
+OBSTACLE = (84, 152, 134)  # Okabe-Ito's bluish green, calmed down by grey
 _RAMP = np.array(
     [(46, 107, 214), (108, 92, 224), (178, 80, 200), (228, 92, 142), (247, 133, 86), (248, 184, 72)], dtype=float
 )
@@ -73,12 +74,17 @@ def _speed(surface: SplineSurface, u: Floats, t: Floats) -> Floats:
     return np.linalg.norm(surface(u, t, dt=1)[..., :3], axis=-1)
 
 
+def _twist(surface: SplineSurface, u: Floats, t: Floats) -> Floats:
+    return surface(u, t, du=1)[..., 3]
+
+
 QUANTITIES = {
     quantity.name: quantity
     for quantity in (
         Quantity("time", "s", _time),
         Quantity("curvature", "1/m", SplineSurface.curvature),
         Quantity("speed", "m/s", _speed),
+        Quantity("twist", "rad/m", _twist, signed=True),
         Quantity("axial strain", "µm/m", SplineSurface.axial_strain, signed=True, scale=1e6),
     )
 }

@@ -9,7 +9,7 @@ from viser import ClientHandle, GuiEvent, uplot
 
 from app.viewer import report
 from app.viewer.draft import Draft
-from app.viewer.forms import CableForm, GraspForm, QualityForm, show_value
+from app.viewer.forms import CableForm, GraspForm, QualityForm, SurroundingsForm, show_value
 from app.viewer.palette import QUANTITIES, ColourScale
 from app.viewer.picture import SURFACE_STYLES, Look
 from app.viewer.playback import Playback
@@ -60,6 +60,7 @@ class Panel:
         with tabs.add_tab("Scene", viser.Icon.ADJUSTMENTS_HORIZONTAL):
             self._grasp = GraspForm(self._gui, draft, on_edit)
             self._cable = CableForm(self._gui, draft, on_edit)
+            self._surroundings = SurroundingsForm(self._gui, draft, on_edit)
             self._quality = QualityForm(self._gui, draft, on_edit)
         with tabs.add_tab("View", viser.Icon.EYE):
             self._add_view()
@@ -67,7 +68,7 @@ class Panel:
             self._add_result()
         with tabs.add_tab("Share", viser.Icon.SHARE):
             self._add_share(on_keep, on_download)
-        self._forms = (self._grasp, self._cable, self._quality)
+        self._forms = (self._grasp, self._cable, self._surroundings, self._quality)
         self.take_draft(draft)
 
     def _add_timeline(self) -> None:

@@ -1,4 +1,4 @@
-"""What stands in the 3D scene: table, cable, space-time surface, ghosts, grippers with their paths and reactions."""
+"""What stands in the 3D scene: table, obstacles, cable, space-time surface, ghosts, grippers, paths and reactions."""
 
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -10,6 +10,7 @@ from viser import ClientHandle
 from app.viewer import geometry
 from app.viewer.draft import Draft
 from app.viewer.grippers import GripperPicture
+from app.viewer.obstacles import ObstaclesPicture
 from app.viewer.palette import QUANTITIES, STEEL, ColourScale, Quantity, colour
 from dlocore import Prediction
 
@@ -61,6 +62,7 @@ class Picture:
             )
             for k in range(STRIPS)
         ]
+        self._obstacles = ObstaclesPicture(self._scene)
         self._add_table(draft)
 
     def _add_table(self, draft: Draft) -> None:
@@ -93,6 +95,7 @@ class Picture:
         self._drawn_for = draft
         for gripper, grasp in zip(self._grippers, prediction.grasps, strict=True):
             gripper.take(prediction, grasp)
+        self._obstacles.show(prediction.scene.environment.obstacles)
         self._draw_strips()
         self._draw_ghosts()
         self.pose(min(self._time, prediction.surface.horizon))
