@@ -17,7 +17,14 @@ WAYPOINTS = put(
     {"kind": "waypoints", "times": [0, 0.5, 1], "positions": [[0.25, 0, 0], [0.25, 0.1, 0], [0.25, 0.2, 0]]},
 )
 LOADED = put(PAPER, "loads", [{"u": 1.0, "force": {"times": [0, 1], "values": [[0, 0, 0], [0, 0.1, 0]]}}])
-OBSTACLE = {"kind": "cylinder", "center": [0.5, 0.2, 0], "axis": [0, 0, 1], "radius": 0.02, "height": 0.1}
+OBSTACLES: list[dict[str, Any]] = [
+    {"kind": "cylinder", "center": [0.5, 0.9, 0], "axis": [0, 0, 1], "radius": 0.02, "height": 0.1, "friction": 0.3},
+    {"kind": "box", "center": [0.7, 0.9, 0], "size": [0.1, 0.1, 0.1], "orientation": [1, 0, 0, 0]},
+    {"kind": "sphere", "center": [0.9, 0.9, 0], "radius": 0.02},
+    {"kind": "capsule", "start": [1.1, 0.9, 0], "end": [1.2, 0.9, 0], "radius": 0.02},
+]
+OBSTRUCTED = put(PAPER, "environment.obstacles", OBSTACLES)
+NET = put(PAPER, "shape", {"kind": "control_points", "control_points": [[x, 0, 0, 0] for x in (0, 0.3, 0.7, 1)]})
 
 # scene, path of the change, new value, the field that the answer names
 CASES: list[tuple[dict[str, Any], str, Any, str]] = [
@@ -84,6 +91,15 @@ CASES: list[tuple[dict[str, Any], str, Any, str]] = [
     (PAPER, "output.samples_t", 1, "output.samples_t"),
     (PAPER, "output.samples_u", 10**6, "output.samples_u"),
     (PAPER, "shape.direction", [0, 0, 0], "shape.direction"),
+    (PAPER, "cable.torsional_damping", -1, "cable.torsional_damping"),
+    (PAPER, "cable.yield_strain", 0, "cable.yield_strain"),
+    (PAPER, "cable.memory_rate", -1, "cable.memory_rate"),
+    (PAPER, "cable.hardening", 1.5, "cable.hardening"),
+    (PAPER, "environment.table.friction", -0.1, "environment.table.friction"),
+    (OBSTRUCTED, "environment.obstacles.0.radius", -0.02, "environment.obstacles[0].radius"),
+    (OBSTRUCTED, "environment.obstacles.0.friction", 11, "environment.obstacles[0].friction"),
+    (OBSTRUCTED, "environment.obstacles.1.size", [0.1, 0, 0.1], "environment.obstacles[1].size[1]"),
+    (PAPER, "environment.obstacles", OBSTACLES[:1] * 101, "environment.obstacles"),
     # not a choice
     (PAPER, "shape.kind", "circle", "shape.kind"),
     (PAPER, "shape.kind", 3, "shape.kind"),
@@ -97,6 +113,7 @@ CASES: list[tuple[dict[str, Any], str, Any, str]] = [
     (PAPER, "cable.preset", "spaghetti", "cable.preset"),
     (PAPER, "cable.rest_shape", "bent", "cable.rest_shape"),
     (PAPER, "environment.obstacles", [{"kind": "cone"}], "environment.obstacles[0].kind"),
+    (OBSTRUCTED, "environment.obstacles.2.height", 0.1, "environment.obstacles[2].height"),
     # no such field
     (PAPER, "solver", "fast", "solver"),
     (PAPER, "cable.colour", "red", "cable.colour"),
@@ -124,13 +141,20 @@ CASES: list[tuple[dict[str, Any], str, Any, str]] = [
     (PAPER, "shape", {"kind": "prediction", "id": "../../etc/passwd"}, "shape.id"),
     (PAPER, "shape", {"kind": "prediction", "id": "0" * 28}, "shape.id"),
     (PAPER, "effects", {"stretch": "off"}, "effects.stretch"),
-    # not modelled yet: refused by name
-    (PAPER, "cable.yield_strain", 0.01, "cable.yield_strain"),
-    (PAPER, "cable.torsional_damping", 0.01, "cable.torsional_damping"),
-    (PAPER, "environment.table.friction", 0.3, "environment.table.friction"),
-    (PAPER, "environment.obstacles", [OBSTACLE], "environment.obstacles"),
-    (PAPER, "primitives.0.hold", "clamp", "primitives[0].hold"),
-    (PAPER, "effects", {"twist": "on"}, "effects.twist"),
+    (PAPER, "cable.memory_rate", 50.0, "cable.yield_strain"),
+    (PAPER, "cable.yield_strain", 0.01, "cable.memory_rate"),
+    (PAPER, "cable.yield_twist", 0.01, "cable.memory_rate"),
+    (PAPER, "cable.yield_stretch", 0.01, "cable.memory_rate"),
+    (OBSTRUCTED, "environment.obstacles.0.axis", [0, 0, 0], "environment.obstacles[0].axis"),
+    (OBSTRUCTED, "environment.obstacles.1.orientation", [2, 0, 0, 0], "environment.obstacles[1].orientation"),
+    (OBSTRUCTED, "environment.obstacles.3.end", [1.1, 0.9, 0], "environment.obstacles[3].end"),
+    (
+        NET,
+        "shape.velocity",
+        {"kind": "control_points", "control_points": [[0, 0, 0, 0]] * 3 + [[0, 0, 0, 0.1]]},
+        "shape.velocity.control_points[3][3]",
+    ),
+    # only the solver knows that it has no such method
     (PAPER, "quality", {"method": "reference"}, "quality.method"),
 ]
 
@@ -160,7 +184,7 @@ def test_a_wrong_field_is_named_with_what_is_allowed(
     assert problem["detail"] == f"{field}: {error['message']}"
 
 
-@pytest.mark.parametrize("scene", [PAPER, HANGING, POINTS, WAYPOINTS, LOADED], ids=range(5))
+@pytest.mark.parametrize("scene", [PAPER, HANGING, POINTS, WAYPOINTS, LOADED, OBSTRUCTED, NET], ids=range(7))
 def test_the_scenes_that_the_cases_are_made_of_are_right(client: TestClient, scene: dict[str, Any]) -> None:
     assert client.post("/v1/predictions", json=scene).status_code == 201
 

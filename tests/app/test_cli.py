@@ -48,7 +48,7 @@ def test_a_scene_is_read_from_standard_input(
         ("cable.length", -1, "cable.length"),
         ("primitives.0.u", 3.0, "primitives[0].u"),
         ("environment.drag", float("nan"), "environment.drag"),
-        ("primitives.0.hold", "clamp", "primitives[0].hold"),
+        ("cable.memory_rate", 50.0, "cable.yield_strain"),
         ("shape.kind", "circle", "shape.kind"),
         ("shape", {"kind": "prediction", "id": "0" * 28}, "shape.id"),
     ],

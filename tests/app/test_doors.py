@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from fastapi.testclient import TestClient
 
 from app.schemas import EXAMPLES, PredictionRequest, PredictionResponse, to_scene
@@ -145,11 +146,69 @@ def test_two_grippers_hold_a_hanging_cable(client: TestClient) -> None:
     assert [grasp["u"] for grasp in document["grasps"]] == [0.0, 1.0]
 
 
-def test_a_contract_scene_beyond_the_model_is_refused_by_name(client: TestClient) -> None:
-    for name, field in (("two-grippers-hanging", "primitives[0].hold"), ("table-with-friction", "cable.yield_strain")):
-        problem = client.post("/v1/predictions", json=contract_scene(name)).json()
-        assert [error["field"] for error in problem["errors"]] == [field]
-        assert "not modelled yet" in problem["detail"]
+@pytest.fixture(scope="module", params=["paper-fig1", "table-with-friction", "two-grippers-hanging"])
+def contract_answer(client: TestClient, request: pytest.FixtureRequest) -> tuple[dict[str, Any], dict[str, Any]]:
+    """A scene of the contract and its answer."""
+    scene = contract_scene(request.param)
+    response = client.post("/v1/predictions", json=scene)
+    assert response.status_code == 201, response.text
+    return scene, response.json()
+
+
+def test_every_scene_of_the_contract_is_answered(contract_answer: tuple[dict[str, Any], dict[str, Any]]) -> None:
+    scene, document = contract_answer
+    PredictionResponse.model_validate(document, strict=True)
+    assert document["status"] == "converged", document["message"]
+    active = {effect["name"] for effect in document["effects"] if effect["active"]}
+    called_for = {
+        "twist": any(primitive["hold"] == "clamp" for primitive in scene["primitives"]),
+        "plasticity": "yield_strain" in scene["cable"],
+        "friction": (scene["environment"]["table"] or {}).get("friction", 0.0) > 0.0,
+        "obstacles": bool(scene["environment"].get("obstacles")),
+    }
+    assert {name for name, is_called_for in called_for.items() if is_called_for} <= active
+
+
+def test_no_cable_of_the_contract_runs_through_an_obstacle(
+    contract_answer: tuple[dict[str, Any], dict[str, Any]],
+) -> None:
+    scene, document = contract_answer
+    positions = np.array(document["surface"]["positions"])
+    for post in scene["environment"].get("obstacles", []):
+        assert (post["kind"], post["axis"]) == ("cylinder", [0, 0, 1])
+        nearest = np.linalg.norm(positions[..., :2] - post["center"][:2], axis=-1).min()
+        # the contact is a stiff penalty: it gives way by a small part of the cable's radius
+        assert nearest > post["radius"] + 0.45 * scene["cable"]["diameter"]
+
+
+def test_clamps_are_turned_back_by_moments_along_the_cable(client: TestClient) -> None:
+    turned = {"kind": "move", "displacement": [0, 0, 0], "rotation": [1.0, 0, 0], "duration": 1.0}
+    scene = paper_scene(
+        primitives=[{"u": 0.0, "hold": "clamp", "path": {"kind": "still"}}, {"u": 1.0, "hold": "clamp", "path": turned}]
+    )
+    scene = put(put(scene, "environment.table", None), "environment.gravity", [0, 0, 0])
+    response = client.post("/v1/predictions", json=scene)
+    assert response.status_code == 201, response.text
+    document = response.json()
+    twist = np.array(document["surface"]["twist"])
+    # a straight cable without weight shares the turn of 1 rad evenly over its length of 1 m
+    np.testing.assert_allclose(twist[-1] - twist[-1, 0], document["surface"]["u"], rtol=0, atol=1e-3)
+    moments = [grasp["moment"][-1][0] for grasp in document["grasps"]]
+    GJ = scene["cable"]["torsional_stiffness"]
+    np.testing.assert_allclose(moments, [-GJ, GJ], rtol=1e-2)  # GJ times 1 rad/m, to 1 % of the auto quality
+
+
+def test_npz_holds_what_the_cable_remembers_stored_or_not(client: TestClient) -> None:
+    scene, headers = contract_scene("table-with-friction"), {"accept": "application/x-npz"}
+    stored = client.post("/v1/predictions", json=scene, headers=headers)
+    by_link = client.get(f"{stored.headers['location']}/surface.npz")
+    unstored = client.post("/v1/predictions?store=false", json=scene, headers=headers)
+    prediction = predict(to_scene(PredictionRequest.model_validate(scene), nothing_stored))
+    assert prediction.material is not None
+    for response in (stored, by_link, unstored):
+        npz = arrays(response.content)
+        for name, expected in vars(prediction.material).items():
+            np.testing.assert_allclose(npz[f"material_{name}"], expected, **SAME)
 
 
 def test_the_examples_of_the_docs_are_those_of_the_contract() -> None:

@@ -32,13 +32,16 @@ def test_what_is_explained_is_what_is_then_done(client: TestClient) -> None:
 def test_everything_that_is_wrong_is_named_at_once(client: TestClient) -> None:
     scene = put(paper_scene(), "cable.diameter", 0.9)
     scene = put(scene, "primitives.0.path.rotation", [0, 0, 1])
-    scene = put(scene, "environment.table.friction", 0.3)
+    post = {"kind": "cylinder", "center": [0.5, 0.9, 0], "axis": [0, 0, 0], "radius": 0.02, "height": 0.1}
+    ball = {"kind": "capsule", "start": [0.5, 0.9, 0], "end": [0.5, 0.9, 0], "radius": 0.02}
+    scene = put(scene, "environment.obstacles", [post, ball])
     scene = put(scene, "quality", {"n_u": 9})
     problem = the_problem(client.post(EXPLAIN, json=scene), 422)
     assert {error["field"] for error in problem["errors"]} == {
         "cable.diameter",
         "primitives[0].path.rotation",
-        "environment.table.friction",
+        "environment.obstacles[0].axis",
+        "environment.obstacles[1].end",
         "quality.n_t",
     }
 

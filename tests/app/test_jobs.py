@@ -152,11 +152,13 @@ def test_a_direct_prediction_is_followed_to_its_end(client: TestClient) -> None:
     names = [name for name, _, _ in events]
     count = names.count("iteration")
     assert count >= 2
-    assert names == ["state", "state", *["iteration"] * count, "done"]
-    assert [event[2]["state"] for event in events[:2]] == ["queued", "running"]
-    assert [event[1] for event in events[2:]] == [str(i) for i in range(count + 1)]
+    first = names.index("iteration")
+    assert names == [*["state"] * first, *["iteration"] * count, "done"]
+    # a quick worker has begun before the answer does
+    assert [event[2]["state"] for event in events[:first]] in (["queued", "running"], ["running"])
+    assert [event[1] for event in events[first:]] == [str(i) for i in range(count + 1)]
     document = events[-1][2]
-    assert [data for _, _, data in events[2:-1]] == document["iterations"]
+    assert [data for _, _, data in events[first:-1]] == document["iterations"]
     assert client.get(response.headers["location"]).json() == document
 
 
@@ -164,7 +166,7 @@ def test_who_comes_late_gets_the_same_events_first(client: TestClient) -> None:
     direct = client.post("/v1/predictions", json=paper_scene(), headers=EVENTS)
     address = f"{direct.headers['location']}/events"
     events = parsed(client.get(address, headers=EVENTS).text)
-    assert events[1:] == parsed(direct.text)[2:]
+    assert events[1:] == [event for event in parsed(direct.text) if event[0] != "state"]
     assert events[0][2]["state"] == "done"
     resumed = parsed(client.get(address, headers={**EVENTS, "last-event-id": "0"}).text)
     assert resumed[1:] == events[2:]

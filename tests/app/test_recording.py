@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
+from scipy.spatial.transform import Rotation
 
 pytest.importorskip("rerun")
 import rerun as rr
@@ -15,6 +16,7 @@ from app.archive import Run
 from app.machine import machine_line
 from app.service import Service
 from dlocore import effect_forces, energies
+from tests.app.conftest import paper_scene, put
 
 LOGS = ("update", "residual")
 ENTITIES = {
@@ -190,6 +192,42 @@ def test_solve_and_motion_are_on_timelines_of_their_own(chunks: list[Any]) -> No
         if not chunk.is_static:
             solve = not chunk.entity_path.startswith(("/motion", "/over_time"))
             assert set(chunk.timeline_names) == ({"iteration", "solver_time"} if solve else {"motion"})
+
+
+@pytest.fixture(scope="module")
+def obstructed(client: TestClient, tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
+    obstacles = [
+        {"kind": "sphere", "center": [0.9, 0.9, 0], "radius": 0.02},
+        {"kind": "capsule", "start": [1.1, 0.9, 0], "end": [1.1, 0.9, 0.3], "radius": 0.02},
+        {"kind": "cylinder", "center": [0.5, 0.9, 0], "axis": [1, 0, 0], "radius": 0.02, "height": 0.1},
+        {"kind": "box", "center": [0.7, 0.9, 0], "size": [0.1, 0.2, 0.3], "orientation": [0, 0, 0, 1]},
+    ]
+    document = client.post("/v1/predictions", json=put(paper_scene(), "environment.obstacles", obstacles)).json()
+    path = tmp_path_factory.mktemp("rrd") / "run.rrd"
+    path.write_bytes(client.get(document["links"]["recording"]).content)
+    return list(rr.chunk.RrdReader(path).stream().to_chunks())
+
+
+@pytest.mark.parametrize("origin", ["/iterate", "/motion"])
+def test_obstacles_are_solids_that_stay(obstructed: list[Any], origin: str) -> None:
+    drawn = {}
+    for chunk in obstructed:
+        if chunk.entity_path.startswith(f"{origin}/obstacles/"):
+            assert chunk.is_static
+            batch = chunk.to_record_batch().to_pydict()
+            number = int(chunk.entity_path.rsplit("/", 1)[1])
+            drawn[number] = {name.rsplit(":", 1)[1]: values[0][0] for name, values in batch.items() if ":" in name}
+    assert set(drawn) == {0, 1, 2, 3}
+    same = {"abs": 1e-6}  # single precision
+    assert drawn[0]["half_sizes"] == pytest.approx([0.02] * 3, **same)
+    assert drawn[0]["centers"] == pytest.approx([0.9, 0.9, 0.0], **same)
+    assert drawn[1]["translations"] == pytest.approx([1.1, 0.9, 0.0], **same)  # its start; it extends along its z
+    assert drawn[1]["lengths"] == pytest.approx(0.3, **same)
+    assert drawn[2]["lengths"] == pytest.approx(0.1, **same)
+    along = Rotation.from_quat(drawn[2]["quaternions"]).apply([0.0, 0.0, 1.0])  # xyzw, as rerun has them too
+    assert along == pytest.approx([1.0, 0.0, 0.0], **same)
+    assert drawn[3]["half_sizes"] == pytest.approx([0.05, 0.1, 0.15], **same)
+    assert np.abs(drawn[3]["quaternions"]) == pytest.approx([0.0, 0.0, 1.0, 0.0], **same)  # half a turn about z
 
 
 def test_a_recording_is_written_once_and_kept(client: TestClient, answer: dict[str, Any]) -> None:

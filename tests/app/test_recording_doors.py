@@ -51,7 +51,7 @@ def content(path: Path, *, clock: bool = True) -> dict[str, Any]:
 
 
 def solved(scene: dict[str, Any], kept: RunStore) -> Prediction:
-    return predict(to_scene(PredictionRequest.model_validate(scene), kept.surface))
+    return predict(to_scene(PredictionRequest.model_validate(scene), kept.motion))
 
 
 def test_a_stored_run_gives_the_recording_of_the_solve_itself(tmp_path: Path) -> None:
@@ -90,7 +90,7 @@ def test_a_run_that_continues_another_keeps_its_recording_without_it(tmp_path: P
     assert run is not None
     times = np.linspace(0.0, run.surface.horizon, 5)
     for name, expected in energies(prediction.scene, prediction.surface, times).items():
-        np.testing.assert_array_equal(energies(run.scene, run.surface, times)[name], expected)
+        np.testing.assert_array_equal(energies(run.scene, run.surface, times, run.material)[name], expected)
     assert kept.recording(second)
 
 

@@ -1,9 +1,11 @@
 """Stored runs: whole or not at all, found again, listed newest first, the oldest evicted first."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import orjson
 import pytest
 from fastapi.testclient import TestClient
@@ -13,7 +15,7 @@ from app.main import create_app
 from app.runs import RunStore
 from app.schemas import PredictionRequest, to_scene
 from app.settings import Settings
-from dlocore import Prediction, predict
+from dlocore import ControlPoints, MaterialMotion, Prediction, predict
 from tests.app.conftest import paper_scene, start
 
 
@@ -66,6 +68,68 @@ def test_what_is_loaded_is_what_was_saved(tmp_path: Path, prediction: Prediction
         assert {k: v for k, v in vars(read).items() if k != "surface"} == {
             k: v for k, v in vars(kept).items() if k != "surface"
         }
+
+
+def remembering(prediction: Prediction) -> Prediction:
+    """Return a prediction whose cable remembers something, where it does not."""
+    random = np.random.default_rng(1)
+    times, u = np.linspace(0.0, prediction.surface.horizon, 7), np.linspace(0.0, prediction.surface.length, 9)
+    material = MaterialMotion(
+        times=times,
+        director=np.tile([0.0, 0.0, 1.0], (7, 1)),
+        u=u,
+        memory=random.normal(size=(7, 9, 3)),
+        stretch=random.normal(size=(7, 9)),
+        natural=random.normal(size=(9, 3)),
+    )
+    return replace(prediction, report_material=lambda: material)
+
+
+def assert_same_fields(one: Any, other: Any) -> None:
+    assert vars(one).keys() == vars(other).keys()
+    for name, value in vars(one).items():
+        np.testing.assert_array_equal(value, vars(other)[name], err_msg=name)
+
+
+def test_what_the_cable_remembers_is_stored_and_goes_on(tmp_path: Path, prediction: Prediction) -> None:
+    prediction = remembering(prediction)
+    target, (id,) = fill(tmp_path, prediction, 1)
+    run = target.load(id)
+    assert run is not None
+    assert_same_fields(run.material, prediction.material)
+    request = paper_scene(shape={"kind": "prediction", "id": id, "t": 0.7})
+    follow = to_scene(PredictionRequest.model_validate(request), target.motion)
+    expected = prediction.shape_at(0.7)
+    assert isinstance(follow.shape, ControlPoints)
+    assert_same_fields(follow.shape.material, expected.material)
+    np.testing.assert_array_equal(follow.shape.control_points, expected.control_points)
+    np.testing.assert_array_equal(follow.shape.velocity, expected.velocity)
+
+
+def test_a_run_that_went_on_knows_its_scene_without_the_one_before(tmp_path: Path, prediction: Prediction) -> None:
+    target, (first,) = fill(tmp_path, remembering(prediction), 1)
+    request = paper_scene(shape={"kind": "prediction", "id": first, "t": 0.7, "settle": True})
+    scene = to_scene(PredictionRequest.model_validate(request), target.motion)
+    second = target.save(request, replace(prediction, scene=scene))
+    assert target.delete(first)
+    run = target.load(second)
+    assert run is not None
+    assert isinstance(run.scene.shape, ControlPoints)
+    assert run.scene.shape.settle
+    assert_same_fields(run.scene.shape.material, scene.shape.material)
+    np.testing.assert_array_equal(run.scene.shape.control_points, scene.shape.control_points)
+
+
+def test_a_run_that_was_stored_without_its_memory_still_loads(tmp_path: Path, prediction: Prediction) -> None:
+    target, (id,) = fill(tmp_path, prediction, 1)  # an elastic, straight cable remembers nothing
+    nets = tmp_path / "runs" / id / runs.NETS
+    with np.load(nets) as arrays:
+        assert not [name for name in arrays.files if name.startswith(("material_", "remembered_"))]
+    run, motion = target.load(id), target.motion(id)
+    assert run is not None
+    assert motion is not None
+    assert run.material is None
+    assert motion.material is None
 
 
 def test_runs_are_listed_newest_first_in_pages(tmp_path: Path, prediction: Prediction) -> None:

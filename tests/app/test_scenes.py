@@ -7,8 +7,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.schemas import PredictionRequest, to_scene
-from dlocore import PRESETS, ControlPoints, Points, Scene, SceneError
-from tests.app.conftest import paper_scene, put
+from dlocore import PRESETS, Box, Cable, Capsule, ControlPoints, Cylinder, Points, Scene, Sphere, Table
+from tests.app.conftest import contract_scene, paper_scene, put
 
 POINTS = [[0.02, 0.01], [0.3, 0.05], [0.6, 0.02], [0.9, 0.0]]
 
@@ -102,9 +102,66 @@ def test_a_time_after_the_stored_prediction_is_refused(client: TestClient, answe
     assert "1.6" in problem["errors"][0]["allowed"]
 
 
-def test_an_unmodelled_part_is_refused_by_the_solver_not_by_the_schema() -> None:
-    obstacle = {"kind": "capsule", "start": [0.5, 0, 0], "end": [0.5, 0.2, 0], "radius": 0.02}
-    request = put(paper_scene(), "environment.obstacles", [obstacle])
-    parsed = PredictionRequest.model_validate(request)
-    with pytest.raises(SceneError, match="not modelled yet"):
-        to_scene(parsed, lambda id: None)
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({"kind": "sphere", "center": [0.5, 0.2, 0], "radius": 0.05}, Sphere(center=(0.5, 0.2, 0), radius=0.05)),
+        (
+            {"kind": "capsule", "start": [0.5, 0, 0], "end": [0.5, 0.2, 0], "radius": 0.02, "friction": 0.4},
+            Capsule(start=(0.5, 0, 0), end=(0.5, 0.2, 0), radius=0.02, friction=0.4),
+        ),
+        (
+            {"kind": "cylinder", "center": [0.5, 0, 0], "axis": [1, 1, 0], "radius": 0.02, "height": 0.1},
+            Cylinder(center=(0.5, 0, 0), axis=(1, 1, 0), radius=0.02, height=0.1),
+        ),
+        (
+            {"kind": "cylinder", "center": [0.5, 0, 0], "radius": 0.02, "height": 0.1},
+            Cylinder(center=(0.5, 0, 0), radius=0.02, height=0.1),
+        ),
+        (
+            {"kind": "box", "center": [0, 0, 1], "size": [0.1, 0.2, 0.3], "orientation": [0.6, 0, 0.8, 0]},
+            Box(center=(0, 0, 1), size=(0.1, 0.2, 0.3), orientation=(0.6, 0, 0.8, 0)),
+        ),
+    ],
+    ids=["sphere", "capsule", "cylinder", "upright cylinder", "box"],
+)
+def test_an_obstacle_is_that_of_the_solver(given: dict[str, Any], expected: Any) -> None:
+    (obstacle,) = scene_of(put(paper_scene(), "environment.obstacles", [given])).environment.obstacles
+    assert type(obstacle) is type(expected)
+    np.testing.assert_array_equal(obstacle.row(), expected.row())
+
+
+def test_a_cable_yields_and_remembers_as_it_is_given() -> None:
+    values = {
+        "yield_strain": 0.01,
+        "yield_twist": 0.02,
+        "yield_stretch": 0.005,
+        "memory_rate": 50.0,
+        "hardening": 0.2,
+        "torsional_damping": 1e-4,
+    }
+    cable = scene_of(paper_scene(cable={"preset": "paper", **values})).cable
+    assert {name: getattr(cable, name) for name in values} == values
+    assert scene_of(paper_scene()).cable.memory_rate is None
+    assert scene_of(paper_scene()).cable.hardening == Cable.preset("paper").hardening
+
+
+@pytest.mark.parametrize("name", ["paper-fig1", "table-with-friction", "two-grippers-hanging"])
+def test_the_scenes_of_the_contract_are_taken_whole(name: str) -> None:
+    request = contract_scene(name)
+    scene = scene_of(request)
+    assert [grasp.hold for grasp in scene.grasps] == [primitive["hold"] for primitive in request["primitives"]]
+    assert scene.cable.yield_strain == request["cable"].get("yield_strain")
+    assert scene.cable.memory_rate == request["cable"].get("memory_rate")
+    table = request["environment"]["table"]
+    assert (scene.environment.table is None) == (table is None)
+    if table is not None:
+        assert scene.environment.table == Table(**table)
+    assert len(scene.environment.obstacles) == len(request["environment"].get("obstacles", []))
+
+
+def test_the_fourth_column_of_control_points_turns_the_sections() -> None:
+    net = [[x, 0, 0, angle] for x, angle in zip((0, 0.3, 0.7, 1), (0, 0.1, 0.4, 0.9), strict=True)]
+    shape = scene_of(paper_scene(shape={"kind": "control_points", "control_points": net})).shape
+    assert isinstance(shape, ControlPoints)
+    np.testing.assert_array_equal(shape.control_points, net)

@@ -51,15 +51,22 @@ def screenshot(page: Page) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB"), dtype=int)
 
 
-def drawn(page: Page, *expected: tuple[tuple[int, int, int], Region, int]) -> np.ndarray:
-    """Wait until every colour fills its region with its least number of pixels; return the picture."""
+def drawn(page: Page, *expected: tuple[tuple[int, int, int], Region, int], words: tuple[int, float]) -> np.ndarray:
+    """Wait until every colour fills its region with its least number of pixels, and dark pixels WORDS; return the picture.
+
+    `words` gives the least and the most number of dark pixels: what a page shows is there only when what the page
+    before showed is gone.
+    """
     give_up = time.monotonic() + PATIENCE
     while True:
         picture = screenshot(page)
         found = [coloured(picture, colour, region) for colour, region, _ in expected]
-        if all(count >= least for count, (_, _, least) in zip(found, expected, strict=True)):
+        letters = dark(picture, WORDS)
+        if words[0] <= letters <= words[1] and all(
+            count >= least for count, (_, _, least) in zip(found, expected, strict=True)
+        ):
             return picture
-        assert time.monotonic() < give_up, f"the viewer does not show the recording: {found} pixels"
+        assert time.monotonic() < give_up, f"the viewer does not show the recording: {found} pixels, {letters} of words"
         page.wait_for_timeout(500)
 
 
@@ -72,11 +79,9 @@ def test_the_link_of_an_answer_opens_its_recording(service, witness):
     halfway = tuple(time_ramp()[4].tolist())
     net, shape = (ORANGE, SHAPES, 200), (halfway, SHAPES, 500)
     update, residual = (BLUE, PLOTS, 300), (VERMILION, PLOTS, 300)
-    picture = drawn(page, net, shape, update, residual)
-    words = dark(picture, WORDS)
-    assert words > 2000  # the report
+    report = drawn(page, net, shape, update, residual, words=(2000, np.inf))
     page.mouse.click(*MOTION_TAB)
-    picture = drawn(page, (ORANGE, MOTION, 100), (VERMILION, MOTION, 100))  # the grasp's path, the reactions along it
-    assert dark(picture, WORDS) < words / 2  # the report is on the other tab
+    path, reactions = (ORANGE, MOTION, 100), (VERMILION, MOTION, 100)  # of the grasp; along its path
+    drawn(page, path, reactions, words=(0, dark(report, WORDS) / 2))  # the report is on the other tab
     here = urlsplit(service.address).netloc
     assert {host for host in answered if host} == {here}  # what else the viewer asks for, the page's policy refuses

@@ -12,7 +12,7 @@ from dlocore.effects.bend import Bend
 from dlocore.effects.damping import EPSILON, Damping
 from dlocore.effects.drag import QuadraticDrag
 from dlocore.effects.stretch import Stretch
-from dlocore.kernels.assembly import NO_RATES, assemble, remember, stored_energy
+from dlocore.kernels.assembly import NO_RATES, History, assemble, remember, stored_energy
 from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, Tables, build_tables, graded_knots
 from dlocore.spline import design_matrix
 
@@ -38,15 +38,14 @@ class Body:
     tables: Tables
     active: NDArray[np.int64]
     parameters: Floats
-    memory: Floats
-    past: Floats
-    rates: tuple[float, float, float] = NO_RATES
+    history: History
+    rates: tuple[float, float, float, float] = NO_RATES
 
     def after(self, h: float, *steps: Floats) -> "Body":
         """Return this body with the rate of curvature by backward differences of step h from the two last `steps`."""
         for q in steps:
-            remember(tuple(range(self.nc)), q, self.tables, self.past)
-        return replace(self, rates=(1.5 / h, -2.0 / h, 0.5 / h))
+            remember(tuple(range(self.nc)), q, self.tables, self.active, self.parameters, self.history, 0.0, False)
+        return replace(self, rates=(1.5 / h, -2.0 / h, 0.5 / h, h))
 
     def forces(self, q: Floats, v: Floats) -> Floats:
         f = np.empty_like(q)
@@ -66,10 +65,10 @@ class Body:
 
     def energy(self, q: Floats) -> float:
         axes = tuple(range(self.nc))
-        return float(stored_energy(axes, q, self.tables, self.active, self.parameters, self.memory))
+        return float(stored_energy(axes, q, self.tables, self.active, self.parameters, self.history))
 
     def _state(self, q: Floats, v: Floats) -> tuple:
-        laws_at = (self.tables, self.active, self.parameters, self.memory, self.past, self.rates)
+        laws_at = (self.tables, self.active, self.parameters, self.history, self.rates)
         return tuple(range(self.nc)), q, v, *laws_at
 
 
@@ -78,18 +77,19 @@ def body(name: str, nc: int, n_u: int = N_U, rest: float = 0.0) -> Body:
     feature = np.array([0.3])
     one = np.ones(1, np.int64)
     knots = graded_knots(n_u, LENGTH, feature, one, np.array([0.6]), np.array([0.02]))
-    tables = build_tables(knots, True, True, *GAUSS_2, *GAUSS_3, *GAUSS_4)
+    tables = build_tables(knots, True, True, *GAUSS_2, *GAUSS_3, *GAUSS_4, np.inf)
     active, parameters = np.zeros(laws.COUNT, np.int64), np.zeros((laws.COUNT, laws.PARAMETERS))
     chosen = list(LAWS) if name == "all" else [name.removesuffix(" with memory")]
     for row, effect in (LAWS[c] for c in chosen):
         active[row] = 1
         values = effect.parameters()
         parameters[row, : len(values)] = values
-    memory = np.zeros((len(tables.curvature_w), 1 if nc == 2 else 3))
+    memory = np.zeros((len(tables.curvature_w), 2 if nc == 2 else 6))
     if name.endswith("memory") and nc == 2:
         memory[:] = rest or 3.0
     past = np.zeros((len(memory), 2 if nc == 2 else 9))
-    return Body(nc, knots, tables, active, parameters, memory, past)
+    history = History(memory, past, np.zeros((len(tables.axial_w), 2)), np.zeros((0, 6)), np.zeros((0, 2)))
+    return Body(nc, knots, tables, active, parameters, history)
 
 
 def bent(nc: int, n_u: int = N_U, seed: int = 7) -> tuple[Floats, Floats]:

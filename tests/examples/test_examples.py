@@ -10,6 +10,7 @@ import pytest
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 PICTURES = {
+    "bend_around_a_peg.py": ("peg.png", ["peg.png"]),
     "paper_figures.py": ("", ["paper-fig1.png", "paper-fig2.png"]),
     "point_cloud.py": ("cloud.png", ["cloud.png"]),
     "two_grippers.py": ("grippers.png", ["grippers.png"]),

@@ -18,7 +18,9 @@ def energy(prediction: Prediction, t: Floats) -> Floats:
     surface, problem = prediction.surface, pose(prediction.scene)
     grid = make_grid(problem, len(surface.knots_u) - 4)
     states = np.einsum("kj,jid->kid", design_matrix(surface.knots_t, t), surface.control_points[..., :3])
-    elastic = [elastic_energy(problem, grid, np.ascontiguousarray(problem.plane.points(q))) for q in states]
+    elastic = [
+        elastic_energy(problem, grid, np.ascontiguousarray(problem.plane.points(q)), grid.history) for q in states
+    ]
     u, w = along(surface)
     v = surface(u, t, dt=1)[..., :3]
     kinetic = 0.5 * MU * np.einsum("u,kud->k", w, v * v)

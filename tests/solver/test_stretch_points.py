@@ -7,7 +7,8 @@ import pytest
 
 from benchmarks.rod import converged
 from dlocore import Environment, Grasp, Move, Scene, Straight, predict
-from dlocore.discretisation import Grid, make_grid
+from dlocore.discretisation import make_grid
+from dlocore.grid import Grid
 from dlocore.problem import pose
 from tests.solver.scenes import Floats, cable, march, rms, samples
 

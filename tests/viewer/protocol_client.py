@@ -101,6 +101,8 @@ class SceneClient:
                 self.nodes.setdefault(name, {}).update(message["updates"])
             elif kind == "GuiUpdateMessage":
                 self.controls[message["uuid"]].update(message["updates"])
+            elif kind == "RemoveSceneNodeMessage":
+                self.nodes.pop(name, None)
             elif kind == "SetPositionMessage":
                 self.positions[name] = message["position"]
             elif kind == "SetSceneNodeVisibilityMessage":

@@ -131,6 +131,8 @@ def test_an_impossible_target_is_said_and_the_last_good_prediction_stays(service
         ("Density [g/m]", 70.0, ("cable", "linear_density"), 0.07),
         ("EI [10⁻³ N m²]", 3.0, ("cable", "bending_stiffness"), 0.003),
         ("Drag [N s/m²]", 0.2, ("environment", "drag"), 0.2),
+        ("Table friction", 0.3, ("environment", "table", "friction"), 0.3),
+        ("Obstacle", "capsule", ("environment", "obstacles", 0, "kind"), "capsule"),
         ("Ask for", "automatic", ("quality",), "auto"),
         ("Points along n_u", 11, ("quality", "n_u"), 11),
         ("Points in time n_t", 17, ("quality", "n_t"), 17),
@@ -185,7 +187,7 @@ def test_playback_moves_the_cable_at_30_frames_a_second_or_more(service):
         assert len(shapes) >= 30
 
 
-@pytest.mark.parametrize("colour", ["time", "curvature", "speed", "axial strain"])
+@pytest.mark.parametrize("colour", ["time", "curvature", "speed", "twist", "axial strain"])
 def test_the_cable_can_be_coloured_by_each_quantity(service, colour):
     with connected(service) as client:
         client.set("Colour", colour)
@@ -194,7 +196,8 @@ def test_the_cable_can_be_coloured_by_each_quantity(service, colour):
         client.set("Time [s]", 1.2)
         client.listen(0.3)
         colours = client.nodes["/cable"]["batched_colors"].reshape(-1, 3)
-        assert (len(np.unique(colours, axis=0)) > 5) == (colour != "time")  # all points of a shape share one time
+        # all points of a shape share one time, and a motion in the plane twists none of them
+        assert (len(np.unique(colours, axis=0)) > 5) == (colour not in ("time", "twist"))
 
 
 def test_the_surface_can_be_raised_and_hidden(service):
@@ -264,3 +267,25 @@ def test_a_wrong_protocol_version_ends_the_connection(service):
     with connect(service.socket, subprotocols=["viser-v0.0.1"], proxy=None) as socket, pytest.raises(ConnectionClosed):
         socket.recv(timeout=5)
     assert SUBPROTOCOL.startswith("viser-v")
+
+
+@pytest.mark.parametrize(("kind", "height"), [("cylinder", 0.05), ("box", 0.03), ("sphere", 0.0), ("capsule", 0.0)])
+def test_an_obstacle_is_drawn_where_it_stands_and_taken_away(service, kind, height):
+    with connected(service) as client:
+        client.set("Obstacle x, y [m]", [0.6, -0.3])
+        client.set("Obstacle", kind)
+        client.wait_for(lambda: "/obstacle/0" in client.nodes)
+        assert client.positions["/obstacle/0"] == pytest.approx([0.6, -0.3, height])
+        assert client.control("Ask for")[1]["value"] == "automatic"  # a fixed grid would be too coarse for a contact
+        client.set("Obstacle", "none")
+        client.wait_for(lambda: "/obstacle/0" not in client.nodes)
+
+
+def test_a_cable_is_drawn_around_an_obstacle_in_its_way(service):
+    with connected(service) as client:
+        before = client.final_shape.copy()
+        client.set("Obstacle x, y [m]", before[24, :2].tolist())  # where the cable would come to lie
+        client.set("Obstacle", "cylinder")
+        client.wait_for(lambda: "march" in client.card and "Preview" not in client.card)
+        x, y, _ = client.positions["/obstacle/0"]
+        assert np.hypot(client.final_shape[:, 0] - x, client.final_shape[:, 1] - y).min() > 0.03  # m: its radius

@@ -1,0 +1,149 @@
+"""The choice of effects: what is left out does not matter, what matters is switched on, and what is off is told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.catalogue import catalogue
+from dlocore import (
+    Cable,
+    Cylinder,
+    Environment,
+    Grasp,
+    Move,
+    Points,
+    Prediction,
+    Quality,
+    Scene,
+    Straight,
+    Table,
+    plan,
+    predict,
+)
+from dlocore.scene import EFFECTS
+from tests.solver.scenes import apart, cable
+
+ALL_ON = dict.fromkeys(EFFECTS, "on")
+QUICK = [
+    "paper case at a quarter",
+    "slow turn of a gripper on a smooth table",
+    "weightless swing with quadratic drag",
+    "short cable pulled slowly over a rough table",
+    "sloping table that the cable slides down",
+    "dragged against a peg",
+    "pegs far from the motion",
+    "hung by one end and carried sideways",
+    "clamped hanging cable with one end moved",
+    "barely stressed plastic cable",
+]
+SIDE = Move(displacement=(0.0, 0.3, 0.0), duration=1.5)
+
+
+def effect(prediction: Prediction, name: str) -> tuple[bool, str]:
+    found = next(e for e in prediction.effects if e.name == name)
+    return found.active, found.reason
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", QUICK)
+def test_what_is_left_out_moves_the_cable_by_less_than_a_hundredth_of_its_length(name):
+    scene = catalogue()[name]
+    chosen, full = predict(scene), predict(replace(scene, effects=ALL_ON))
+    assert apart(chosen.surface, full.surface).max() < 0.01 * scene.cable.length
+    assert chosen.accuracy.dimensions <= full.accuracy.dimensions
+
+
+def test_the_catalogue_has_scenes_of_every_effect():
+    scenes = catalogue()
+    assert len(scenes) >= 40
+    planned = [{e.name for e in plan(scene).effects if e.active} for scene in scenes.values()]
+    called_for_later = {"plasticity"}
+    assert set().union(*planned) >= set(EFFECTS) - called_for_later
+
+
+def test_plasticity_is_switched_on_by_a_motion_that_yields_only():
+    def bent(strain: float) -> Prediction:
+        plastic = cable(yield_strain=strain, memory_rate=20.0)
+        return predict(Scene(cable=plastic, shape=Straight(), grasps=(Grasp(u=0.3, path=SIDE),)))
+
+    active, reason = effect(bent(0.002), "plasticity")
+    assert active
+    assert "yields at" in reason
+    elastic = bent(0.5)
+    assert not effect(elastic, "plasticity")[0]
+    assert elastic.material is None
+
+
+def test_an_obstacle_out_of_reach_is_called_for_by_a_motion_that_comes_to_it():
+    # a cable held at one end falls from the horizontal and swings against a bar below
+    bar = Cylinder(center=(0.0, 0.0, -0.7), axis=(0.0, 1.0, 0.0), radius=0.05, height=0.3)
+    falls = Scene(
+        cable=cable(bending_damping=1e-3),
+        shape=Straight(),
+        grasps=(Grasp(u=0.0),),
+        environment=Environment(drag=0.3, obstacles=(bar,)),
+        horizon=1.5,
+        quality=Quality(n_u=17, n_t=73),
+    )
+    assert not {e.name: e.active for e in plan(falls).effects}["obstacles"]
+    found = predict(falls)
+    active, reason = effect(found, "obstacles")
+    assert active
+    assert "an obstacle" in reason
+    # and the cable does not swing through it, as it does without
+    u, t = np.linspace(0.0, 1.0, 201), np.linspace(0.0, 1.5, 151)
+
+    def nearest(motion: Prediction) -> float:
+        r = motion.surface.positions(u, t)
+        return float(np.linalg.norm(r[..., [0, 2]] - (0.0, -0.7), axis=-1).min()) - 0.05 - 0.0025
+
+    assert nearest(predict(replace(falls, effects={"obstacles": "off"}))) < -0.02
+    assert nearest(found) > -0.25 * 0.005  # a given grid has its own time knots: a quarter of a diameter
+
+
+def test_a_slow_motion_goes_through_equilibria_and_the_estimate_counts_what_that_leaves_out():
+    sag = np.linspace(0.0, 0.7, 25)
+    points = np.column_stack([sag, 0 * sag, -0.32 * (1 - (2 * sag / 0.7 - 1) ** 2)])
+    lift = Move(displacement=(-0.2, 0.0, 0.1), duration=90.0)
+    slow = Scene(
+        cable=cable(),
+        shape=Points(points=points, settle=True),
+        grasps=(Grasp(u=0.0), Grasp(u=1.0, path=lift)),
+        quality=Quality(target_error=5e-3),
+    )
+    found = predict(slow)
+    active, reason = effect(found, "inertia")
+    assert not active
+    assert "slow" in reason
+    assert found.accuracy.neglected > 0.0
+    full = predict(replace(slow, effects={"inertia": "on"}))
+    assert effect(full, "inertia")[0]
+    assert full.accuracy.neglected == 0.0
+    assert apart(found.surface, full.surface).max() < 5e-3
+
+
+@pytest.mark.parametrize("name", ["gravity", "drag", "inertia"])
+def test_an_effect_that_is_off_and_matters_is_obeyed_and_told(name):
+    hanging = Scene(
+        cable=cable(),
+        shape=Straight(direction=(0.3, 0.0, -1.0)),
+        grasps=(Grasp(u=0.0, path=SIDE),),
+        environment=Environment(drag=0.5),
+        effects={name: "off"},
+        quality=Quality(target_error=5e-3),
+    )
+    found = predict(hanging)
+    assert effect(found, name) == (False, "switched off in the scene")
+    assert f"{name} is off" in found.message
+
+
+def test_what_is_off_and_does_not_matter_is_not_mentioned():
+    still = Scene(
+        cable=Cable.preset("paper"),
+        shape=Straight(),
+        grasps=(Grasp(u=0.5, path=Move(displacement=(0.0, 0.0, 0.0), duration=1.0)),),
+        environment=Environment(drag=0.1, table=Table()),
+        effects={"drag": "off"},
+    )
+    assert "off" not in predict(still).message

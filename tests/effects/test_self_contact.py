@@ -1,0 +1,403 @@
+"""The cable does not pass through itself, and feels nothing of itself while its strands are apart."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from dlocore import Cable, Environment, Grasp, Move, Points, Prediction, Quality, Scene, Straight, Table, predict
+from dlocore.discretisation import make_grid
+from dlocore.effects import laws
+from dlocore.effects.selfcontact import APART, nearest_strands
+from dlocore.grid import Grid
+from dlocore.holding import Starts, close_grasps, hold
+from dlocore.kernels.banded import Elimination, factor, reduce_matrix, solve
+from dlocore.kernels.selfcontact import clear_way, factor_wide, press, solve_wide, widen
+from dlocore.problem import Problem, pose
+from dlocore.solvers.march import closed_grasps
+
+Floats = NDArray[np.float64]
+DIAMETER = 0.005  # [m]
+WEIGHTLESS = (0.0, 0.0, 0.0)
+DIMENSIONS = pytest.mark.parametrize("nc", [2, 3, 4], ids=["plane", "space", "twist"])
+
+
+def lengths(points: Floats) -> Floats:
+    """Return the arc lengths (k,) [m] of points (k, 3) from the first."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
+def overhand_knot(tail: float = 0.15) -> Floats:
+    """Return points (161, 3) [m] of an open trefoil with straight tails, (t^3 - 3t, t^4 - 4t^2, t^5/5 - 2t)."""
+    t = np.linspace(-2.0, 2.0, 161)
+    curve = 0.03 * np.column_stack([t**3 - 3 * t, t**4 - 4 * t**2, 0.5 * (t**5 / 5 - 2 * t)])
+    first, last = curve[0] - curve[1], curve[-1] - curve[-2]
+    s = np.linspace(0.0, tail, 30)[1:, None]
+    points = np.concatenate(
+        [curve[0] + s[::-1] * first / np.linalg.norm(first), curve, curve[-1] + s * last / np.linalg.norm(last)]
+    )
+    along = lengths(points)
+    even = np.linspace(0.0, along[-1], 161)
+    return np.column_stack([np.interp(even, along, points[:, d]) for d in range(3)])
+
+
+def knot_scene(effect: str, twist: str = "auto") -> Scene:
+    """Return the scene of a loose overhand knot that two grippers pull tight.
+
+    Without twist it starts as a straight cable bent to a knot, with it free of stress.
+    """
+    points = overhand_knot()
+    length = float(lengths(points)[-1])
+    cable = Cable(
+        length=length,
+        diameter=DIAMETER,
+        linear_density=0.05,
+        bending_stiffness=1e-3,
+        bending_damping=1e-4,
+        rest_shape="straight" if twist == "off" else "initial",
+    )
+    pulls = [Move(displacement=(side * 0.18, 0.0, 0.0), duration=2.0) for side in (-1, 1)]
+    return Scene(
+        cable=cable,
+        shape=Points(points=points),
+        grasps=(Grasp(u=0.0, path=pulls[0]), Grasp(u=length, path=pulls[1])),
+        environment=Environment(gravity=WEIGHTLESS, drag=0.5),
+        horizon=2.5,
+        effects={"self_contact": effect, "twist": twist},
+        quality=Quality(n_u=49, n_t=61, method="march", estimate=False),
+    )
+
+
+def fold_scene(effect: str, planar: bool, duration: float) -> Scene:
+    """Return the scene of a U whose one leg a gripper moves 16 cm across the other, whose end is held."""
+    turn = np.linspace(-np.pi / 2, np.pi / 2, 41)
+    leg = np.linspace(-0.35, 0.0, 41)[:-1]
+    points = np.concatenate(
+        [
+            np.column_stack([leg, np.full(40, -0.04)]),
+            0.04 * np.column_stack([np.cos(turn), np.sin(turn)]),
+            np.column_stack([leg[::-1], np.full(40, 0.04)]),
+        ]
+    )
+    out = 0.0 if planar else 0.002  # [m] out of the plane, in which the legs would else meet exactly
+    points = np.column_stack([points, out * np.sin(np.linspace(0.0, 9.0, len(points)))])
+    length = float(lengths(points)[-1])
+    cable = Cable(length=length, diameter=DIAMETER, linear_density=0.05, bending_stiffness=1e-3, bending_damping=1e-4)
+    across = Move(displacement=(0.0, 0.16, 0.0), duration=duration)
+    around = Environment(drag=0.3, table=Table()) if planar else Environment(gravity=WEIGHTLESS, drag=0.3)
+    return Scene(
+        cable=cable,
+        shape=Points(points=points),
+        grasps=(Grasp(u=0.2, path=across), Grasp(u=length, hold="tangent")),
+        environment=around,
+        horizon=1.25 * duration,
+        effects={"self_contact": effect, "twist": "off"},
+        quality=Quality(n_u=33, n_t=121, method="march", estimate=False),  # knots enough to follow a strike
+    )
+
+
+def strands_apart(prediction: Prediction, k_t: int = 121) -> Floats:
+    """Return at k_t times the smallest distance of two strands in diameters, from points an eighth of one apart.
+
+    Between such points strands that cross come nearer by less than (1/16)^2, 0.4 %, of a diameter.
+    """
+    surface = prediction.surface
+    u = np.linspace(0.0, surface.length, 1 + round(8 * surface.length / DIAMETER))
+    strands = np.abs(u[:, None] - u[None]) > APART * DIAMETER
+    apart = []
+    for x in surface.positions(u, np.linspace(0.0, surface.horizon, k_t)):
+        square = (x * x).sum(axis=1)
+        distance = square[:, None] + square[None] - 2.0 * x @ x.T
+        apart.append(float(np.sqrt(max(0.0, distance[strands].min()))) / DIAMETER)
+    return np.array(apart)
+
+
+# Contact may be DEEPEST = 3 % deep; chords between nodes a diameter apart and the drawing of closest points to the
+# middles of segments (1.2 %) take the rest.
+NEAREST = 0.95
+
+
+def test_an_overhand_knot_pulled_tight_does_not_pass_through_itself() -> None:
+    prediction = predict(knot_scene("on"))
+    assert prediction.status == "converged", prediction.message
+    assert strands_apart(prediction).min() >= NEAREST
+    # the ends are where an unknotted cable would be nearly straight: the knot is what holds it
+    assert strands_apart(prediction)[-1] < 1.05
+
+
+def test_without_the_effect_the_knot_falls_apart() -> None:
+    apart = strands_apart(predict(knot_scene("off")))
+    assert apart.min() < 0.3, "strands pass through each other, so that the scene tests what it says"
+
+
+@pytest.mark.parametrize("duration", [1.0, 0.3], ids=["slow", "fast"])
+@pytest.mark.parametrize("planar", [True, False], ids=["plane", "space"])
+def test_a_leg_pushed_across_the_other_does_not_pass_through_it(planar: bool, duration: float) -> None:
+    prediction = predict(fold_scene("on", planar, duration))
+    assert prediction.status == "converged", prediction.message
+    assert prediction.accuracy.dimensions == (2 if planar else 3)
+    assert strands_apart(prediction).min() >= NEAREST
+    assert strands_apart(predict(fold_scene("off", planar, duration))).min() < 0.3, "it would without the effect"
+
+
+@pytest.mark.parametrize("table", [Table(), None], ids=["plane", "space"])
+def test_strands_apart_feel_nothing(table: Table | None) -> None:
+    scene = Scene(
+        cable=Cable.preset("paper"),
+        shape=Straight(),
+        grasps=(Grasp(u=0.25, path=Move(displacement=(0.0, 0.5, 0.1 * (table is None)), duration=1.6)),),
+        environment=Environment(drag=0.05, table=table),
+        quality=Quality(n_u=13, n_t=19, method="march", estimate=False),
+    )
+    motions = [predict(replace(scene, effects={"self_contact": switch})) for switch in ("on", "off")]
+    assert [e.active for m in motions for e in m.effects if e.name == "self_contact"] == [True, False]
+    # the same steps with the same numbers: no tolerance
+    assert np.array_equal(motions[0].surface.control_points, motions[1].surface.control_points)
+
+
+# --- the law
+
+
+class Tangle:
+    """A cable whose strands lie on each other in random ways, with the compiled law's parameters."""
+
+    def __init__(self, nc: int, seed: int) -> None:
+        random = np.random.default_rng(seed)
+        scene = knot_scene("on", "on" if nc == 4 else "off") if nc > 2 else fold_scene("on", True, 1.0)
+        self.problem: Problem = pose(scene)
+        assert self.problem.nc == nc
+        self.grid: Grid = make_grid(self.problem, 33)
+        self.parameters = self.problem.law_table()[1]
+        self.parameters[laws.SELF_CONTACT, 0] = 0.02 if nc > 2 else 0.085  # [m]: so thick that many pairs touch
+        self.parameters[laws.SELF_CONTACT, 4] = 0.1  # [m], least distance along the cable
+        self.q = self.grid.start + random.normal(0.0, 1e-3, self.grid.start.shape)
+        self.still = np.zeros_like(self.q)
+
+    def press(self, q: Floats, v: Floats | None = None) -> tuple[Floats, Floats, NDArray[np.int64], int]:
+        """Return the forces, the nodes, the pairs and their number."""
+        f = np.zeros_like(q)
+        x = np.empty((len(self.grid.tables.contact_w), min(q.shape[1], 3)))
+        room = np.empty((4, 2), np.int64)
+        v = self.still if v is None else v
+        found, count, _ = press(q, v, self.grid.tables, self.parameters, x, room, f)
+        return f, x, found, count
+
+    def elimination(self) -> Elimination:
+        """Return the elimination of what the scene's grasps hold."""
+        grasps, starts = closed_grasps(self.problem, 0.0, 0.1), Starts()
+        close_grasps(self.problem, self.grid, grasps, starts, None)
+        return hold(self.problem, self.grid, grasps, np.zeros(1), starts, self.grid.start).elimination
+
+    def tangent(
+        self, e: Elimination, band: Floats, scales: tuple[float, float, float] = (1.0, 0.0, 1.0)
+    ) -> tuple[Floats, NDArray[np.int64]]:
+        """Return the widened tangent above its diagonal and the ends of its rows."""
+        _, x, found, count = self.press(self.q)
+        assert count > 20
+        S = np.empty((len(band), len(band)))
+        end = np.empty(len(band), np.int64)
+        widen(self.q.shape[1], self.still, self.grid.tables, self.parameters, x, found, count, scales, e, band, end, S)
+        return S, end
+
+
+NOTHING = Elimination(
+    np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0)
+)
+
+
+@DIMENSIONS
+def test_forces_balance_and_turn_nothing(nc: int) -> None:
+    tangle = Tangle(nc, 1)
+    f, _, _, count = tangle.press(tangle.q, np.random.default_rng(2).normal(0.0, 0.1, tangle.q.shape))
+    assert count > 20
+    # sums over 33 control points of forces: rounding
+    assert np.abs(f.sum(axis=0)).max() <= 1e-12 * np.abs(f).max() * len(f)
+    d = min(nc, 3)
+    q, g = np.zeros((len(f), 3)), np.zeros((len(f), 3))
+    q[:, :d], g[:, :d] = tangle.q[:, :d], f[:, :d]
+    torque = np.cross(q, g).sum(axis=0)
+    assert np.abs(torque).max() <= 1e-12 * np.abs(f).max() * len(f)
+
+
+@DIMENSIONS
+def test_the_tangent_is_the_derivative_of_the_forces(nc: int) -> None:
+    tangle = Tangle(nc, 3)
+    size = tangle.q.size
+    e = NOTHING._replace(index=np.arange(size))
+    S, _ = tangle.tangent(e, np.zeros((size, 4 * nc)))
+    K = np.triu(S) + np.triu(S, 1).T
+    random = np.random.default_rng(4)
+    for _ in range(4):
+        way = random.normal(0.0, 1.0, tangle.q.shape)
+        step = 1e-8  # [m]: the passage of the law, 25 micrometres wide, is thousands of steps
+        slope = (tangle.press(tangle.q + step * way)[0] - tangle.press(tangle.q - step * way)[0]) / (2 * step)
+        # differences of forces of 1 by steps of 1e-8: rounding 1e-7; a pair that enters in between adds to it
+        assert np.abs(K @ way.ravel() - slope.ravel()).max() <= 1e-5 * np.abs(slope).max()
+
+
+@DIMENSIONS
+def test_the_tangent_by_velocity_is_the_derivative_of_the_damping(nc: int) -> None:
+    tangle = Tangle(nc, 5)
+    size = tangle.q.size
+    S, _ = tangle.tangent(NOTHING._replace(index=np.arange(size)), np.zeros((size, 4 * nc)), (0.0, 1.0, 0.0))
+    C = np.triu(S) + np.triu(S, 1).T
+    v = 1e-6 * np.random.default_rng(6).normal(0.0, 1.0, tangle.q.shape)  # so slow that no pair lets go
+    change = tangle.press(tangle.q, v)[0] - tangle.press(tangle.q)[0]
+    # linear in so small a velocity: what is left is the rounding of the whole forces
+    forces = np.abs(tangle.press(tangle.q)[0]).max()
+    assert np.abs(change).max() > 1e-9 * forces
+    assert np.abs(C @ v.ravel() - change.ravel()).max() <= 1e-14 * forces
+
+
+@DIMENSIONS
+def test_the_wide_solve_is_the_dense_one(nc: int) -> None:
+    tangle = Tangle(nc, 7)
+    random = np.random.default_rng(8)
+    e = tangle.elimination()
+    n, width = tangle.q.size, 4 * nc
+    band = np.zeros((n, width))
+    for o in range(width):
+        band[: n - o, o] = random.normal(0.0, 1.0, n - o)
+    band[:, 0] += 2.0 * width  # diagonally dominant
+    band *= 1e3
+    reduced = np.empty((n - len(e.held), width))
+    reduce_matrix(e, band, reduced)
+    S, end = tangle.tangent(e, reduced, (1.0, 0.0, 0.0))
+    # the reduced matrix densely, Z' (B + K) Z
+    Z = np.zeros((n, len(reduced)))
+    for i in range(n):
+        if e.index[i] >= 0:
+            Z[i, e.index[i]] = 1.0
+        else:
+            for s in range(e.start[-1 - e.index[i]], e.start[-e.index[i]]):
+                Z[i, e.index[e.dof[s]]] += e.coefficient[s]
+    full, _ = tangle.tangent(NOTHING._replace(index=np.arange(n)), band, (1.0, 0.0, 0.0))
+    dense = Z.T @ (np.triu(full) + np.triu(full, 1).T) @ Z
+    scale = np.abs(dense).max()
+    # sums of some hundred products: rounding
+    assert np.abs(np.triu(dense) - np.triu(S)).max() <= 1e-13 * scale
+    b = random.normal(0.0, 1.0, len(reduced))
+    x = b.copy()
+    assert factor_wide(S, end) == -1
+    solve_wide(S, end, x)
+    # the matrix is well conditioned but for contact 1e4 times stiffer than the band
+    assert np.abs(dense @ x - b).max() <= 1e-10
+    assert np.abs(x - np.linalg.solve(dense, b)).max() <= 1e-8 * np.abs(x).max()
+
+
+def test_a_tangent_without_pairs_is_the_band() -> None:
+    random = np.random.default_rng(9)
+    tangle = Tangle(3, 9)
+    e = tangle.elimination()
+    band = random.normal(0.0, 1.0, (tangle.q.size - len(e.held), 12))
+    band[:, 0] += 24.0
+    for o in range(12):
+        band[len(band) - o :, o] = 0.0
+    _, x, found, _ = tangle.press(tangle.q)
+    S, end = np.empty((len(band), len(band))), np.empty(len(band), np.int64)
+    tables, scales = tangle.grid.tables, (1.0, 0.0, 1.0)
+    widen(3, tangle.still, tables, tangle.parameters, x, found, 0, scales, e, band, end, S)
+    a, b = np.ones(len(band)), np.ones(len(band))
+    assert factor_wide(S, end) == -1
+    solve_wide(S, end, a)
+    factor(band)
+    solve(band, b)
+    assert np.abs(a - b).max() <= 1e-13, "two orders of the same sums"
+
+
+@DIMENSIONS
+def test_forces_turn_with_the_cable(nc: int) -> None:
+    tangle = Tangle(nc, 10)
+    d = min(nc, 3)
+    turn = Rotation.from_rotvec([0.0, 0.0, 1.1] if nc == 2 else [0.4, -0.7, 1.1]).as_matrix()[:d, :d]
+    turn = turn @ np.diag([-1.0, *np.ones(d - 1)])  # and a reflection
+    moved = tangle.q.copy()
+    moved[:, :d] = tangle.q[:, :d] @ turn.T + 0.3
+    f, g = tangle.press(tangle.q)[0], tangle.press(moved)[0]
+    # positions are rounded to 1e-16 m, and forces change by 1e-10 of themselves over it at a stiffness of 1e6 N/m
+    assert np.abs(f[:, :d] @ turn.T - g[:, :d]).max() <= 1e-9 * np.abs(f).max()
+
+
+# --- strands on their way
+
+
+@pytest.mark.parametrize("nd", [2, 3])
+def test_strands_on_their_way_stop_before_they_pass(nd: int) -> None:
+    random = np.random.default_rng(11)
+    u = np.linspace(0.0, 0.4, 81)
+    separation = 4.0 * DIAMETER
+    for _ in range(50):
+        # two straight strands, the second far along the cable, thrown through the first
+        across = random.uniform(0.3, 2.8)
+        first = np.column_stack([np.linspace(-0.1, 0.1, 40), np.zeros(40), np.zeros(40)])
+        second = np.column_stack([np.cos(across) * first[:, 0], np.sin(across) * first[:, 0], np.full(40, 0.01)])
+        if nd == 2:
+            second = first[::-1] + np.array([0.0, 0.02, 0.0])
+        far = np.array([[0.5, 0.5, 0.5]])
+        before = np.concatenate([first, far, second])[:, :nd]
+        move = np.array([random.uniform(-0.02, 0.02), -0.05, 0.0] if nd == 2 else [0.0, 0.0, -0.05])
+        after = before.copy()
+        after[41:] += move[:nd]
+        # the first segment of the cable that leads from one strand to the other is far away
+        _, share = clear_way(before, after, u, DIAMETER, separation, np.empty((1, 2), np.int64))
+        assert 0.0 < share < 1.0
+        gap = 0.02 if nd == 2 else 0.01
+        left = gap - 0.05 * share
+        # it stops within a tenth of where the gap is half a diameter
+        assert 0.4 * DIAMETER <= left <= 0.51 * DIAMETER
+
+
+def test_the_smallest_distance_of_strands_is_found() -> None:
+    random = np.random.default_rng(12)
+    knots = np.concatenate([[0.0] * 3, np.linspace(0.0, 1.0, 18), [1.0] * 3])
+    greville = (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3
+    from scipy.interpolate import BSpline
+
+    u = np.linspace(0.0, 1.0, 2001)
+    for _ in range(20):
+        wild = np.cumsum(random.normal(0.0, 1.0, (len(greville), 3)), axis=0)
+        wild *= 1.0 / lengths(BSpline(knots, wild, 3)(u))[-1]
+        x = BSpline(knots, wild, 3)(u)
+        strands = np.abs(u[:, None] - u[None]) > 0.2
+        true = np.sqrt(((x[:, None] - x[None]) ** 2).sum(axis=-1)[strands].min())
+        found = nearest_strands(knots, wild[None], 3, 0.05, 0.19)
+        if true > 0.19:
+            assert found == np.inf or found > 0.18
+        else:
+            # the cable is uneven here, so that nodes 0.05 of its coordinate apart miss some of it
+            assert found == pytest.approx(true, abs=0.02)
+
+
+# --- the choice
+
+
+def near_start(apart: float) -> Scene:
+    """Return the planar U with legs `apart` [m]."""
+    scene = fold_scene("auto", True, 1.0)
+    points = np.array(scene.shape.points)  # type: ignore[union-attr]
+    points *= apart / 0.08
+    cable = replace(scene.cable, length=float(lengths(points)[-1]), axial_stiffness=None)
+    held = (Grasp(u=0.0), Grasp(u=cable.length))
+    free = Environment(gravity=WEIGHTLESS, drag=0.3)
+    return replace(
+        scene, cable=cable, shape=Points(points=points), grasps=held, environment=free, effects={"self_contact": "auto"}
+    )
+
+
+def test_strands_that_start_close_are_kept_apart_without_asking() -> None:
+    close, far = pose(near_start(1.8 * DIAMETER)), pose(near_start(0.08))
+    assert close.choices["self_contact"].active
+    assert "strands of the start" in close.choices["self_contact"].reason
+    assert not far.choices["self_contact"].active
+    assert far.self_contact is None
+    off = pose(replace(near_start(1.8 * DIAMETER), effects={"self_contact": "off"}))
+    assert off.self_contact is None
+
+
+def test_on_a_table_strands_may_lie_over_each_other_and_the_message_says_so() -> None:
+    lies = replace(near_start(1.8 * DIAMETER), environment=Environment(drag=0.3, table=Table()))
+    assert pose(lies).self_contact is None
+    crossing = fold_scene("auto", True, 1.0)
+    assert "one lies over the other" in predict(crossing).message
