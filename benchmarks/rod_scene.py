@@ -79,7 +79,7 @@ def start_of(scene: Scene, grid: Floats) -> Start:
     if isinstance(shape, Points):
         raise ValueError("the explicit rod takes no Points as start: give Straight or ControlPoints")
     if isinstance(shape, ControlPoints):
-        control = np.asarray(shape.control_points)
+        control = np.asarray(shape.control_points)[:, :3]
         knots = uniform_knots(len(control), length) if shape.knots is None else np.asarray(shape.knots)
         positions, slopes = design_matrix(knots, grid) @ control, design_matrix(knots, grid, 1) @ control
     else:
