@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.grid import Grid
-from dlocore.kernels.banded import Elimination
+from dlocore.kernels.banded import Elimination, elimination
 from dlocore.problem import Problem
 from dlocore.scene import Grasp
 from dlocore.transport import transported
@@ -105,13 +105,17 @@ def hold(problem: Problem, grid: Grid, grasps: list[Grasp], t: Floats, starts: S
         turned_pivots = _pivots(B, [])
         turned_inverse, turned_follow = _solved_for(B, turned_pivots)
         offsets = np.concatenate([offsets, angles @ turned_inverse.T], axis=1)
-    elimination = _elimination(grid.n_u, problem.nc, dimensions, pivots, follow, turned_pivots, turned_follow)
-    return Held(tuple(grasps), elimination, offsets, tuple(rows), inverse, turned, turned_inverse)
+    held = elimination(
+        grid.n_u, problem.nc, dimensions, np.array(pivots, np.int64), follow, np.array(turned_pivots, np.int64),
+        turned_follow,
+    )  # fmt: skip
+    return Held(tuple(grasps), held, offsets, tuple(rows), inverse, turned, turned_inverse)
 
 
 def _solved_for(A: Floats, pivots: list[int]) -> tuple[Floats, Floats]:
     """Return the inverse of the pivot block of the rows A, and how the pivots follow the other control points."""
-    inverse = np.asarray(np.linalg.inv(A[:, pivots]), dtype=np.float64)
+    block = A[:, pivots]
+    inverse = 1.0 / block if len(pivots) == 1 else np.asarray(np.linalg.inv(block), dtype=np.float64)
     follow = -inverse @ A
     follow[:, pivots] = 0.0
     return inverse, follow
@@ -152,25 +156,3 @@ def _pivots(A: Floats, first: list[int]) -> list[int]:
                 work[r] -= work[r, p] / work[s, p] * work[s]
         pivots[r] = int(np.argmax(np.abs(work[r])))
     return pivots
-
-
-def _elimination(
-    n_u: int, nc: int, dimensions: int, pivots: list[int], follow: Floats, turned: list[int], turned_follow: Floats
-) -> Elimination:
-    """Return the elimination of the centreline's `pivots` in each dimension, and of those of the fourth coordinate."""
-    places = [(k, row, d) for k, row in zip(pivots, follow, strict=True) for d in range(dimensions)]
-    places += [(k, row, 3) for k, row in zip(turned, turned_follow, strict=True)]
-    held = np.array([k * nc + d for k, _, d in places], dtype=np.int64)
-    index = np.zeros(n_u * nc, np.int64)
-    index[held] = -1 - np.arange(len(held))
-    free = np.flatnonzero(index == 0)
-    index[free] = np.arange(len(free))
-    start = [0]
-    dof: list[int] = []
-    coefficient: list[float] = []
-    for _, row, d in places:
-        columns = np.flatnonzero(np.abs(row) > 1e-14)
-        dof += [int(c) * nc + d for c in columns]
-        coefficient += [float(row[c]) for c in columns]
-        start.append(len(dof))
-    return Elimination(index, held, np.array(start, np.int64), np.array(dof, np.int64), np.array(coefficient, float))

@@ -11,6 +11,7 @@ from scipy.linalg import solveh_banded
 
 from dlocore.errors import SceneError
 from dlocore.fit import MAX_SPANS, check_length, fit_points
+from dlocore.kernels.basis import spline_values
 from dlocore.scene import ControlPoints, Material, Points, Shape, Straight
 from dlocore.smoothing import normal_equations, smooth
 from dlocore.spline import DEGREE, uniform_knots
@@ -30,8 +31,9 @@ class SplineCurve:
     control_points: Floats
 
     def __call__(self, u: ArrayLike, derivative: int = 0) -> Floats:
-        """Return the value or a derivative at `u` (k,) [m]; (k, 3)."""
-        return BSpline(self.knots, self.control_points, DEGREE)(np.atleast_1d(u), derivative)
+        """Return the value or a derivative, of order up to 3, at `u` (k,) [m]; (k, 3)."""
+        at = np.atleast_1d(np.asarray(u, dtype=np.float64))
+        return np.asarray(spline_values(_plain(self.knots), _plain(self.control_points), _plain(at), derivative))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -54,6 +56,11 @@ class StartCurve(SplineCurve):
     length_given: float = 0.0
     theta: SplineCurve | None = None
     material: Material | None = None
+
+
+def _plain(x: Floats) -> Floats:
+    """Return x, or a copy of it, as an array of the one kind that the kernels are compiled for."""
+    return x if x.flags.c_contiguous and x.flags.writeable else np.array(x, order="C")
 
 
 def start_curve(shape: Shape, length: float) -> StartCurve:

@@ -12,7 +12,10 @@ DEGREE = 3
 
 def uniform_knots(n: int, end: float) -> Floats:
     """Return clamped uniform cubic knots for `n` control points on [0, end]; (n + 4,)."""
-    return np.concatenate([np.zeros(3), np.linspace(0.0, end, n - 2), np.full(3, end)])
+    knots = np.zeros(n + DEGREE + 1)
+    knots[DEGREE : n + 1] = np.linspace(0.0, end, n - 2)
+    knots[n + 1 :] = end
+    return knots
 
 
 def design_matrix(knots: Floats, x: ArrayLike, derivative: int = 0) -> Floats:

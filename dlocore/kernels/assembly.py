@@ -212,6 +212,14 @@ def multiply_scalar_band(band: Any, x: Any, scale: float, out: Any) -> None:
 
 
 @kernel
+def times_scalar_band(band: Any, x: Any) -> Any:
+    """Return B x (n, nc) for the symmetric banded B (n, 4), which acts alike on every coordinate."""
+    out = np.zeros_like(x)
+    multiply_scalar_band(band, x, 1.0, out)
+    return out
+
+
+@kernel
 def add_scalar_band(nc: int, band: Any, scale: float, K: Any) -> None:
     """Add scale * B to K (n nc, 4 nc) for the symmetric banded B (n, 4), which acts alike on every coordinate."""
     for i in range(len(band)):

@@ -5,6 +5,8 @@ A symmetric matrix of half-bandwidth m is stored by column below its diagonal: A
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from dlocore.kernels.compile import kernel
 
 
@@ -55,6 +57,7 @@ class Elimination(NamedTuple):
         start: (m + 1,) where the terms of the k-th held one begin.
         dof: terms' degrees of freedom (all free).
         coefficient: terms' coefficients.
+        width: columns of the reduced band: what follows others couples them beyond the band.
     """
 
     index: Any
@@ -62,6 +65,63 @@ class Elimination(NamedTuple):
     start: Any
     dof: Any
     coefficient: Any
+    width: int
+
+
+@kernel
+def elimination(n: int, nc: int, dimensions: int, pivots: Any, follow: Any, turned: Any, turned_follow: Any) -> Any:
+    """Return the `Elimination` of held control points among n.
+
+    Args:
+        n, nc: control points, and coordinates of each.
+        dimensions: of the centreline, 2 or 3.
+        pivots: (rows,) control points that are held in each dimension.
+        follow: (rows, n) how they follow the others, 0 for the pivots themselves.
+        turned, turned_follow: the same for the fourth coordinate.
+    """
+    count = len(pivots) * dimensions + len(turned)
+    held = np.empty(count, np.int64)
+    start = np.zeros(count + 1, np.int64)
+    dof = np.empty(count * n, np.int64)
+    coefficient = np.empty(count * n)
+    terms = 0
+    for k in range(count):
+        row, d = k // dimensions, k % dimensions
+        if row >= len(pivots):
+            row, d = k - len(pivots) * dimensions, 3
+        pivot = pivots[row] if d < 3 else turned[row]
+        held[k] = pivot * nc + d
+        for column in range(n):
+            value = follow[row, column] if d < 3 else turned_follow[row, column]
+            if abs(value) > 1e-14:
+                dof[terms], coefficient[terms] = column * nc + d, value
+                terms += 1
+        start[k + 1] = terms
+    index = np.zeros(n * nc, np.int64)
+    for k in range(count):
+        index[held[k]] = -1 - k
+    free = 0
+    for i in range(n * nc):
+        if index[i] == 0:
+            index[i] = free
+            free += 1
+    e = Elimination(index, held, start, dof[:terms].copy(), coefficient[:terms].copy(), 4 * nc)
+    width = 4 * nc
+    for k in range(count):
+        for i in range(max(0, held[k] - 4 * nc + 1), min(n * nc, held[k] + 4 * nc)):
+            a, b = _terms(e, i)
+            for s in range(start[k], start[k + 1]):
+                for r in range(a, b):
+                    row = index[i] if index[i] >= 0 else index[dof[r]]
+                    width = max(width, abs(row - index[dof[s]]) + 1)
+    return Elimination(index, held, start, dof[:terms].copy(), coefficient[:terms].copy(), width)
+
+
+@kernel
+def _terms(e: Any, i: int) -> Any:
+    """Return the range of the terms of a degree of freedom: of one that is free, itself."""
+    k = e.index[i]
+    return (0, 1) if k >= 0 else (e.start[-1 - k], e.start[-k])
 
 
 @kernel
@@ -102,12 +162,17 @@ def place_held(e: Any, offset: Any, q: Any) -> None:
 
 @kernel
 def reduce_matrix(e: Any, A: Any, out: Any) -> None:
-    """Write Z' A Z of the banded A (n nc, width) to the banded out (free, width)."""
+    """Write Z' A Z of the banded A (n nc, 4 nc) to the banded out (free, e.width)."""
     n, width = A.shape
     out[:] = 0.0
     for j in range(n):
         b = e.index[j]
-        for o in range(min(width, n - j)):
+        last = min(width, n - j)
+        if b >= 0 and e.index[j + last - 1] == b + last - 1:  # nothing held below: the column stays whole
+            for o in range(last):
+                out[b, o] += A[j, o]
+            continue
+        for o in range(last):
             value = A[j, o]
             a = e.index[j + o]
             if a >= 0 and b >= 0:
@@ -120,8 +185,8 @@ def reduce_matrix(e: Any, A: Any, out: Any) -> None:
 def _distribute(e: Any, i: int, j: int, value: float, out: Any) -> None:
     """Add the entry A[i, j] = A[j, i] = value, of which one or both degrees of freedom are held."""
     a, b = e.index[i], e.index[j]
-    a0, a1 = (0, 1) if a >= 0 else (e.start[-1 - a], e.start[-a])
-    b0, b1 = (0, 1) if b >= 0 else (e.start[-1 - b], e.start[-b])
+    a0, a1 = _terms(e, i)
+    b0, b1 = _terms(e, j)
     for s in range(a0, a1):
         row = a if a >= 0 else e.index[e.dof[s]]
         scale = value if a >= 0 else value * e.coefficient[s]

@@ -80,6 +80,18 @@ def basis_rows(knots: Any, x: Any, order: int) -> Any:
 
 
 @kernel
+def spline_values(knots: Any, control: Any, u: Any, derivative: int) -> Any:
+    """Return the value, or a derivative, (len(u), m) of the spline with control points (n, m) at the points `u`."""
+    first, table = basis_rows(knots, u, derivative)
+    out = np.zeros((len(u), control.shape[1]))
+    for p in range(len(u)):
+        for i in range(4):
+            for d in range(control.shape[1]):
+                out[p, d] += table[p, derivative, i] * control[first[p] + i, d]
+    return out
+
+
+@kernel
 def graded_knots(n: int, length: float, features: Any, multiplicity: Any, power: Any, width: Any) -> Any:
     """Return clamped knots for `n` control points on [0, length] with knots at, and graded towards, the features.
 

@@ -18,6 +18,8 @@ _PLAIN_ITERATIONS = 8  # Newton iterations before a step is done again with a li
 _ROBUST_ITERATIONS = 60
 _STRIKE = 0.02  # [m/s]: a node that comes faster to what it touches would bounce, by an amount that steps decide
 _DULL = 3  # steps by backward Euler, of which the cable does not bounce
+_CAUTION = 4.0  # times the contraction that the first update of an earlier step showed
+_MEASURE = 8  # of so many steps one measures it anew
 _LINE_SEARCH = 12  # looks along a step
 
 
@@ -36,7 +38,7 @@ def constrained_mass_solve(nc: int, mass: Any, e: Any, held: Any, right: Any) ->
     full = np.zeros((n * nc, 4 * nc))
     add_scalar_band(nc, mass, 1.0, full)
     free = n * nc - len(e.held)
-    reduced = np.empty((free, 4 * nc))
+    reduced = np.empty((free, e.width))
     reduce_matrix(e, full, reduced)
     y = np.empty(free)
     reduce_vector(e, rest.ravel(), y)
@@ -98,7 +100,7 @@ def march_steps(
     free = size - len(e.held)
     largest = 10.0 * np.sum(tables.weight)  # an update of ten lengths is divergence
     K = np.empty((size, 4 * nc))
-    A = np.empty((free, 4 * nc))
+    A = np.empty((free, e.width))
     f = np.empty((n, nc))
     R = np.empty((n, nc))
     weighted = np.empty((n, nc))
@@ -117,6 +119,7 @@ def march_steps(
     row_end = np.empty(free if tight else 0, np.int64)
     S = np.empty((free if tight else 0, free if tight else 0))
     pairs, wide, depth, share = 0, False, 0.0, 1.0
+    first_contraction, first_update = 1.0, 1.0  # of the first update of a step, as last measured
     for k in range(start + 1, stop + 1):
         load = applied[min(k, len(applied) - 1)]
         q0 = Q[k - 1]
@@ -136,12 +139,13 @@ def march_steps(
             carry = 0.0 if late else 0.5 / beta - 1.0
             gm = 1.0 if late else gamma
             inertia = (1.0 - al_m) * ta
-            # predict: quadratic, since after a cubic prediction the iteration ends a fifth sooner, but before the
-            # forces of the stiff stretch modes, and with them the reactions, are right
+            # predict
             for i in range(n):
                 for d in range(nc):
                     if robust:
                         q1[i, d] = q0[i, d]
+                    elif k - begin > 3:
+                        q1[i, d] = 4.0 * (q0[i, d] + Q[k - 3, i, d]) - 6.0 * Q[k - 2, i, d] - Q[k - 4, i, d]
                     elif k - begin > 2:
                         q1[i, d] = 3.0 * q0[i, d] - 3.0 * Q[k - 2, i, d] + Q[k - 3, i, d]
                     else:
@@ -246,8 +250,15 @@ def march_steps(
                         v1[i, d] += tv * s
                         a1[i, d] += ta * s
                 # with contraction c the error left after this update is c/(1-c) of it
-                contraction = min(update / previous, 1.0) if it > 0 else 0.5
+                if it > 0:
+                    contraction = min(update / previous, 1.0)
+                else:  # as that of a first update lately was; of Newton's method it is in proportion to the update
+                    contraction = min(_CAUTION * first_contraction * max(1.0, update / first_update), 0.5)
                 left = update * min(1.0, contraction / (1.0 - contraction + 1e-300))
+                if it == 0 and k % _MEASURE == 0:
+                    left = update
+                if it == 1 and not exact and not tight:
+                    first_contraction, first_update = contraction, previous
                 if left <= tolerance and length == 1.0:
                     info[LEFT] = max(info[LEFT], left)
                     converged = True

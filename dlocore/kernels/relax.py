@@ -63,7 +63,7 @@ def relax(
     size = n * nc
     free = size - len(e.held)
     K = np.empty((size, 4 * nc))
-    A = np.empty((free, 4 * nc))
+    A = np.empty((free, e.width))
     f = np.empty((n, nc))
     still = np.zeros((n, nc))
     w = np.empty((n, nc))

@@ -25,6 +25,7 @@ from dlocore.kernels.compile import kernel, law
 _DRAWN = 0.05  # eps
 _SLACK = 0.9  # of a distance that is skipped along the cable: a strained cable is longer
 _TOO_NEAR = 0.5  # of the diameter: no step brings strands from farther away nearer than this
+_LOOK = 1e-3  # diameters: the least way between two looks at a gap
 _WINDOW = 8  # control points of a segment, at most
 _ROOM = 4096  # reduced entries of a pair, at most: held control points may follow many free ones
 
@@ -388,6 +389,8 @@ def clear_way(x0: Any, x1: Any, u: Any, diameter: float, separation: float, foun
             fastest = max(fastest, np.sqrt(_dot(move, move)))
         if fastest == 0.0:
             continue
+        if not fastest < np.inf:
+            return found, 0.0
         least = near
         z = 0.0
         while z < share:
@@ -404,7 +407,7 @@ def clear_way(x0: Any, x1: Any, u: Any, diameter: float, separation: float, foun
                 share = z
                 break
             # a look at least so far ahead that the gap changes by a tenth of what is kept
-            z += max(gap - least, 0.1 * least) / fastest
+            z += max(gap - least, 0.1 * least, _LOOK * diameter) / fastest
     return found, share
 
 

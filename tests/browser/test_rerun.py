@@ -52,7 +52,7 @@ def screenshot(page: Page) -> np.ndarray:
 
 
 def drawn(page: Page, *expected: tuple[tuple[int, int, int], Region, int], words: tuple[int, float]) -> np.ndarray:
-    """Wait until every colour fills its region with its least number of pixels, and dark pixels WORDS; return the picture.
+    """Wait until every colour fills its region with its least number of pixels; return the picture.
 
     `words` gives the least and the most number of dark pixels: what a page shows is there only when what the page
     before showed is gone.

@@ -203,7 +203,7 @@ class Tangle:
 
 
 NOTHING = Elimination(
-    np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0)
+    np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0), 0
 )
 
 
@@ -262,7 +262,7 @@ def test_the_wide_solve_is_the_dense_one(nc: int) -> None:
         band[: n - o, o] = random.normal(0.0, 1.0, n - o)
     band[:, 0] += 2.0 * width  # diagonally dominant
     band *= 1e3
-    reduced = np.empty((n - len(e.held), width))
+    reduced = np.empty((n - len(e.held), e.width))
     reduce_matrix(e, band, reduced)
     S, end = tangle.tangent(e, reduced, (1.0, 0.0, 0.0))
     # the reduced matrix densely, Z' (B + K) Z
