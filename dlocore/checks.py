@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.effects.distance import distances
+from dlocore.effects.selfcontact import nearest_strands
 from dlocore.errors import SceneError
 from dlocore.paths import Move, Still, Waypoints
 from dlocore.plane import TABLE_TOLERANCE
@@ -15,6 +16,8 @@ from dlocore.shape import StartCurve
 Floats = NDArray[np.float64]
 
 GRASP_TOLERANCE = 0.010  # [m]: of the first waypoint from the cable
+
+CROSSING = 0.05  # of the diameter: strands of a start that are nearer pass through each other
 
 
 def check_waypoints(scene: Scene, start: StartCurve) -> None:
@@ -75,6 +78,17 @@ def check_above(scene: Scene, start: StartCurve) -> None:
             raise SceneError(
                 f"primitives[{i}].path", f"{below:.3g} m below", f"a path above {table.height:g} m", reason
             )
+
+
+def check_apart(scene: Scene, start: StartCurve) -> None:
+    """Refuse a start in which a strand lies inside another: contact could not tell to which side it belongs."""
+    diameter, control = scene.cable.diameter, np.ascontiguousarray(start.control_points)
+    if len(control) <= 4:
+        return
+    apart = nearest_strands(start.knots, control[None], 3, diameter, diameter)
+    if not apart >= CROSSING * diameter:
+        allowed = f"strands at least {CROSSING * diameter:.2g} m apart, or effects.self_contact off"
+        raise SceneError("shape", f"two strands {apart:.2g} m apart", allowed, "The start passes through itself")
 
 
 def check_outside(scene: Scene, start: StartCurve, met: tuple[int, ...]) -> None:

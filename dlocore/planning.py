@@ -9,7 +9,7 @@ from dlocore.prediction import EffectReport
 from dlocore.problem import pose
 from dlocore.report import planned_effects
 from dlocore.scene import Scene
-from dlocore.solvers.ladder import FINER, given_steps, stretched
+from dlocore.solvers.ladder import FINER, Size, given_steps, stretched
 from dlocore.solvers.march import smallest_n_t
 
 # Medians measured on one 2-core cloud machine of 2026; they tell the order of the time it takes.
@@ -63,9 +63,9 @@ def plan(scene: Scene) -> Plan:
         for name, given, least in (("n_u", n_u, smallest_n_u(problem)), ("n_t", n_t, smallest_n_t(problem))):
             if given < least:
                 raise SceneError(f"quality.{name}", given, f"at least {least} in this scene")
-        marches = [(n_u, n_t, steps)]
+        marches = [Size(n_u, n_t, steps)]
         if quality.estimate:
-            marches.append((round(FINER * n_u), round(FINER * n_t), round(FINER * steps)))
+            marches.append(Size(round(FINER * n_u), round(FINER * n_t), round(FINER * steps)))
     dimensions = problem.plane.dimensions
     expected = _SETUP + sum(_MARCH[problem.nc] * size * count for size, _, count in marches)
     if method != "march":

@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.checks import check_above, check_outside, check_reach, check_waypoints
+from dlocore.checks import check_above, check_apart, check_outside, check_reach, check_waypoints
 from dlocore.effects import laws
 from dlocore.effects.base import Effect
 from dlocore.effects.bend import Bend
@@ -224,6 +224,8 @@ def pose(scene: Scene, called_for: Mapping[str, str] | None = None) -> Problem:
     plane = find_plane(scene, start, on_table, bool(met))
     bent = _is_bent(scene, start)
     choices = choose(scene, start, plane.dimensions, on_table, leaves, met, bent, called_for)
+    if choices["self_contact"].active:
+        check_apart(scene, start)
     if plane.dimensions == 3 and not choices["twist"].active:
         for name, wanted in (("cable.rest_shape", bent), ("effects.plasticity", choices["plasticity"].active)):
             if wanted:

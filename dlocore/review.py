@@ -15,14 +15,13 @@ from dlocore.effects.damping import Damping
 from dlocore.effects.distance import distances
 from dlocore.effects.selfcontact import CLOSE as CLOSE_STRANDS
 from dlocore.effects.selfcontact import nearest_strands
-from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, largest_curvature
+from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, largest_curvature, times_scalar_band
 from dlocore.kernels.banded import expand_vector, factor, reduce_matrix, reduce_vector
 from dlocore.kernels.banded import solve as solve_factored
 from dlocore.kernels.twisted import TWIST_RATE
 from dlocore.problem import Problem
 from dlocore.report import WindowForces
 from dlocore.solvers.ladder import CREDIBLE_STRAIN, Level
-from dlocore.solvers.march import times_mass
 from dlocore.spline import design_matrix
 
 Floats = NDArray[np.float64]
@@ -146,12 +145,12 @@ def _forces(problem: Problem) -> dict[str, Force]:
     density = scene.cable.linear_density
 
     def inertia(q: Floats, v: Floats, a: Floats, level: Level) -> Floats:
-        return density * times_mass(level.motion.grid.tables.mass, a)
+        return density * times_scalar_band(level.motion.grid.tables.mass, a)
 
     def drag(q: Floats, v: Floats, a: Floats, level: Level) -> Floats:
         speed = float(np.linalg.norm(v, axis=1).max())
         drag = scene.environment.drag + scene.environment.drag_quadratic * speed
-        return drag * times_mass(level.motion.grid.tables.mass, v)
+        return drag * times_scalar_band(level.motion.grid.tables.mass, v)
 
     def gravity(q: Floats, v: Floats, a: Floats, level: Level) -> Floats:
         pull = cast(Floats, scene.environment.gravity)
@@ -179,7 +178,7 @@ def _forces(problem: Problem) -> dict[str, Force]:
             return np.zeros_like(q)
         load = table.friction * density * abs(float(cast(Floats, scene.environment.gravity)[2]))
         speed = np.linalg.norm(v, axis=1, keepdims=True)
-        return load * times_mass(level.motion.grid.tables.mass, v / np.maximum(speed, 1e-3))
+        return load * times_scalar_band(level.motion.grid.tables.mass, v / np.maximum(speed, 1e-3))
 
     return {"inertia": inertia, "drag": drag, "gravity": gravity, "damping": damping, "friction": friction}
 
@@ -203,7 +202,7 @@ def _response_in(level: Level, window: WindowForces, force: Force) -> float:
     free = size - len(e.held)
     active, parameters = problem.law_table()
     mass = problem.scene.cable.linear_density
-    K, A = np.empty((size, 4 * nc)), np.empty((free, 4 * nc))
+    K, A = np.empty((size, 4 * nc)), np.empty((free, e.width))
     f, x, change = np.empty((grid.n_u, nc)), np.empty(free), np.empty(size)
     h = np.diff(window.times)
     most = 0.0

@@ -1,6 +1,7 @@
 """March on finer and finer grids until two of them agree."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,30 +10,29 @@ from dlocore.discretisation import smallest_n_u
 from dlocore.effects.contact import DEEPEST
 from dlocore.kernels.basis import basis_rows
 from dlocore.problem import Problem, stiffer
-from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, fit, march, refined, smallest_n_t, time_knots
+from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, fit, march, missed, refined, smallest_n_t, time_knots
 from dlocore.solvers.monitor import Monitor
 from dlocore.statics import start_grid
 
 Floats = NDArray[np.float64]
 
-# (n_u, n_t, steps) of a motion of about two seconds of one metre
+# (n_u, n_t, steps) of a motion of about two seconds of one metre, before it is refined in one direction only
 LEVELS = (
     (9, 13, 48),
     (13, 19, 72),
     (17, 25, 96),
     (25, 37, 144),
     (33, 49, 192),
-    (49, 73, 288),
-    (65, 97, 384),
-    (97, 145, 576),
 )
 CREDIBLE_STRAIN = 0.02  # axial: a march that stretches the cable more is tried again with strong damping
 _STIFFER = 5  # times that contact is made stiffer on one grid
 _MISSED = 0.01  # of the diameter: what the time spline may miss of a motion with contact
+_MOST_OF_THE_TIME = 0.95
 _STIFFENING = 10.0  # at most each time
 _YIELDING = 0.8  # of the depth, at most, is left by a stiffer contact where it is one of stiffness
 FINER = 1.5  # times n_u, n_t and the steps of a given grid: the march that its error is estimated with
-ACCEPT = 0.75  # of the target: a refinement that moved the surface less is believed
+_CHANGE_COUNTS = 0.75  # share of a refinement's change that may be left: benchmarks.estimate
+ACCEPT = 0.55  # of the target: an answer with a smaller estimated error is believed
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +45,7 @@ class Level:
         motion: the march.
         knots_t: (n_t + 4,) [s].
         control: (n_t, n_u, nc) [m].
+        missed: what the time spline misses of the march [m], but for moments such as a start that springs away.
         change: largest distance to the level before [m], infinite at the first.
         note: what was found on it, in words.
     """
@@ -54,18 +55,27 @@ class Level:
     motion: March
     knots_t: Floats
     control: Floats
+    missed: float
     change: float
     note: str = ""
 
 
-def stretched(problem: Problem, level: int) -> tuple[int, int, int]:
-    """Return (n_u, n_t, steps) of a level for the horizon and the features of a problem."""
+class Size(NamedTuple):
+    """Size of a grid: control points along the cable and in time, and steps of the march."""
+
+    n_u: int
+    n_t: int
+    steps: int
+
+
+def stretched(problem: Problem, level: int) -> Size:
+    """Return the size of a level for the horizon and the features of a problem."""
     n_u, n_t, steps = LEVELS[level]
     natural = 2.0 * np.sqrt(problem.scene.cable.length)  # [s]: about the period of a cable that swings
     factor = float(np.clip(problem.horizon / natural, 1.0, 64.0))
     n_u = max(n_u, smallest_n_u(problem) + 2 * level)
     n_t = max(round(n_t * factor), smallest_n_t(problem) + 4 * (level + 1))
-    return n_u, n_t, max(round(steps * factor), 3 * n_t)
+    return Size(n_u, n_t, max(round(steps * factor), 3 * n_t))
 
 
 def given_steps(n_t: int) -> int:
@@ -125,19 +135,20 @@ def run_level(
     if free_knots and (problem.contact is not None or motion.deepest > 0.0):
         knots_t, smooth = refined(motion, knots_t, _MISSED * problem.scene.cable.diameter)
     control = fit(smooth, knots_t)
+    off = float(np.quantile(missed(motion, knots_t, control), _MOST_OF_THE_TIME))
     if booked:
         monitor.phase("fit")
-    return Level(posed, problem, motion, knots_t, control, np.inf)
+    return Level(posed, problem, motion, knots_t, control, off, np.inf)
 
 
 def extrapolated(change: float, before: float) -> float:
     """Return the error [m] that the last two changes of a refinement point to.
 
-    The last change is the error of the level before, mostly far above that of the last. Where changes shrink by less
+    The last change is the error of the level before, mostly well above that of the last. Where changes shrink by less
     than half from level to level, the sum of those to come is larger: change c/(1 - c), c = change/before, at most 0.9.
     """
     contraction = min(change / before, 0.9) if np.isfinite(before) and before > 0 else 0.0
-    return change * max(1.0, contraction / (1.0 - contraction))
+    return _CHANGE_COUNTS * change * max(1.0, contraction / (1.0 - contraction))
 
 
 def sample(level: Level, u: Floats, t: Floats) -> Floats:
@@ -157,7 +168,7 @@ def _matrix(knots: Floats, x: Floats) -> Floats:
 def distance(a: Level, b: Level, problem: Problem) -> float:
     """Return the largest distance between the surfaces of two levels [m]."""
     u = np.linspace(0.0, problem.scene.cable.length, 33)
-    t = np.linspace(0.0, problem.horizon, 17)
+    t = np.linspace(0.0, problem.horizon, 33)
     nc = problem.nc
     away = (sample(a, u, t) - sample(b, u, t)).reshape(-1, nc)[:, : problem.plane.dimensions]
     return float(np.sqrt((away * away).sum(axis=1).max()))

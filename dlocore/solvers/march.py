@@ -10,9 +10,9 @@ from dlocore.discretisation import applied_forces
 from dlocore.effects.friction import SLIP_SPEED
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
-from dlocore.kernels.assembly import History, largest_strain, note
+from dlocore.kernels.assembly import History, largest_strain, note, times_scalar_band
 from dlocore.kernels.banded import Elimination
-from dlocore.kernels.basis import graded_knots
+from dlocore.kernels.basis import basis_rows, graded_knots
 from dlocore.kernels.march import (
     DEEPEST,
     FAILED_STEP,
@@ -221,7 +221,7 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
         held = hold(problem, grid, grasps, np.concatenate([near_times, times[first : last + 1]]), starts, states[first])
         near, e = held.offsets[:3], held.elimination
         rate = (4 * near[1] - 3 * near[0] - near[2]) / (2e-3 * h)
-        v = constrained_mass_solve(nc, unit_mass, e, rate, times_mass(unit_mass, v))
+        v = constrained_mass_solve(nc, unit_mass, e, rate, times_scalar_band(unit_mass, v))
         if first == 0:
             velocity = v.copy()
         load = applied[min(first, len(applied) - 1)]
@@ -253,7 +253,7 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
         offsets = np.zeros((len(times), len(e.held)))
         offsets[first : last + 1] = held.offsets[3:]
         reactions = np.zeros((len(times), len(e.held)))
-        reactions[first] = (times_mass(mass, a) + G).reshape(-1)[e.held]
+        reactions[first] = (times_scalar_band(mass, a) + G).reshape(-1)[e.held]
         at, smooth = first, first  # the step reached, and the first of the smooth stretch that it lies in
         while at < last and not stopped:
             try:
@@ -373,15 +373,6 @@ def _to_ends_of_steps(reactions: Floats, lag: float) -> None:
         reactions[-1] += lag * rate[-1]
 
 
-def times_mass(mass: Floats, v: Floats) -> Floats:
-    """Return M v (n_u, nc) for the scalar band `mass` (n_u, 4)."""
-    out = mass[:, 0, None] * v
-    for o in range(1, 4):
-        out[:-o] += mass[:-o, o, None] * v[o:]
-        out[o:] += mass[:-o, o, None] * v[:-o]
-    return out
-
-
 def refined(motion: March, knots_t: Floats, tolerance: float) -> tuple[Floats, March]:
     """Return time knots, more where the time spline misses the motion by more than `tolerance` [m], and what to fit.
 
@@ -389,15 +380,15 @@ def refined(motion: March, knots_t: Floats, tolerance: float) -> tuple[Floats, M
     swings past its states. There the states half-way through the steps are added to the motion, and knots beside them.
     """
     for _ in range(_REFINEMENTS):
-        missed = _missed(motion, knots_t)
+        off = missed(motion, knots_t, fit(motion, knots_t))
+        between = _halved(motion, knots_t, tolerance)
         breaks = np.unique(knots_t)
         span = np.clip(np.searchsorted(breaks, motion.times, side="right") - 1, 0, len(breaks) - 2)
         new = []
-        for k in np.unique(span[missed > tolerance]):
+        for k in np.unique(span[off > tolerance]):
             inside = motion.times[(motion.times > breaks[k] + 1e-12) & (motion.times < breaks[k + 1] - 1e-12)]
             if len(inside) > 1:
                 new.append(inside[len(inside) // 2])
-        between = _halved(motion, knots_t, tolerance)
         if not new and between is motion:
             break
         knots_t = np.sort(np.concatenate([knots_t, new]))
@@ -405,9 +396,10 @@ def refined(motion: March, knots_t: Floats, tolerance: float) -> tuple[Floats, M
     return knots_t, motion
 
 
-def _missed(motion: March, knots_t: Floats) -> Floats:
-    """Return by how much the time spline misses each state (steps + 1,) [m]."""
-    fitted = np.tensordot(design_matrix(knots_t, motion.times), fit(motion, knots_t), axes=1)
+def missed(motion: March, knots_t: Floats, control: Floats) -> Floats:
+    """Return by how much the time spline of `control` (n_t, n_u, nc) misses each state (steps + 1,) [m]."""
+    first, table = basis_rows(knots_t, motion.times, 0)
+    fitted = np.einsum("ki,kind->knd", table[:, 0], control[first[:, None] + np.arange(4)])
     return np.asarray(np.abs(fitted - motion.states)[..., :3].max(axis=(1, 2)))
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from dlocore.discretisation import applied_forces
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
+from dlocore.kernels.assembly import times_scalar_band
 from dlocore.kernels.banded import expand_vector, factor_columns, place_held
 from dlocore.kernels.banded import solve as solve_factored
 from dlocore.kernels.basis import GAUSS_2, basis_rows
@@ -22,7 +23,7 @@ from dlocore.kernels.march import constrained_mass_solve, fit_time
 from dlocore.problem import Problem
 from dlocore.report import WindowForces
 from dlocore.scene import Grasp
-from dlocore.solvers.march import March, closed_grasps, events_of, times_mass
+from dlocore.solvers.march import March, closed_grasps, events_of
 from dlocore.solvers.monitor import Monitor
 
 Floats = NDArray[np.float64]
@@ -218,7 +219,7 @@ def solve(problem: Problem, motion: March, knots_t: Floats, delta: float, monito
         if i > 0:
             near = hold(problem, grid, grasps, window.begin + 1e-6 * np.arange(3.0), starts, q)
             rate = (4 * near.offsets[1] - 3 * near.offsets[0] - near.offsets[2]) / 2e-6
-            mass = times_mass(grid.tables.mass, v)
+            mass = times_scalar_band(grid.tables.mass, v)
             v = constrained_mass_solve(problem.nc, grid.tables.mass, near.elimination, rate, mass)
         solver = WindowSolver(problem, grid, window, grasps, starts, q, v, motion, stiffness, monitor)
         control = guess[i]

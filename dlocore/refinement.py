@@ -1,0 +1,208 @@
+"""Marches refined until two of them agree: the whole grid first, then the direction that still errs."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from dlocore.discretisation import smallest_n_u
+from dlocore.prediction import Status
+from dlocore.problem import Problem, pose
+from dlocore.progress import record_level
+from dlocore.review import called_for
+from dlocore.scene import Quality
+from dlocore.solvers.ladder import ACCEPT, LEVELS, Level, Size, distance, extrapolated, run_level, stretched
+from dlocore.solvers.march import RHO, STRONGLY_DAMPED, smallest_n_t
+from dlocore.solvers.monitor import Monitor, TimeIsUp
+
+AUTO_TARGET = 2e-3  # of the length: the target error of quality "auto"
+ROUGH = 0.05  # of the length: two grids that differ more are in no order yet: the next is marched with strong damping
+TOO_DEEP = 0.25  # of the diameter, in the table, an obstacle or itself
+TORN = 0.2  # axial strain: no cable of this kind follows
+FOLDED = 0.4  # of |r'| between the points that watch over the length: less is a fold that no energy sees
+_LOOKS = 12  # states of a motion that are searched for folds
+MOST_WORK = 2e6  # control points times steps of one march
+MISSED_COUNTS = 3.0  # what the time spline misses of its march, times this, is the least that the error may be
+_MOST_POINTS = 220  # along the cable
+_FINER = {"space": 1.5, "time": 2.0}
+_FAILURES = 3  # refinements in time of a march that found no equilibrium
+
+
+class Outcome(NamedTuple):
+    """A level of refinement, what to say of it, and its estimated error [m]."""
+
+    level: Level
+    status: Status
+    message: str
+    estimate: float | None
+
+
+def march_level(
+    problem: Problem,
+    size: Size,
+    monitor: Monitor,
+    rho: float = RHO,
+    free_knots: bool = False,
+    rough: bool = False,
+    known: Level | None = None,
+) -> Level:
+    """March on one grid; where the motion calls for effects that were left out, again with them.
+
+    On a `rough` grid, which another follows, strands that meet may do so because of the grid. A march of this grid that
+    is `known` is not done again.
+    """
+    called = dict(problem.called_for)
+    while True:
+        if free_knots:
+            size = Size(max(size.n_u, smallest_n_u(problem)), max(size.n_t, smallest_n_t(problem)), size.steps)
+        level = known or run_level(problem, *size, monitor, rho=rho, free_knots=free_knots)
+        known = None
+        new = {} if level.motion.stopped == "time" else called_for(level)
+        if rough:
+            new.pop("self_contact", None)
+        if not new:
+            return level
+        record_level(problem, replace(level, note=f"calls for {', '.join(new)}"), monitor)
+        called |= new
+        problem = pose(problem.scene, called)
+
+
+def climb(problem: Problem, quality: Quality, monitor: Monitor) -> Outcome:
+    """March on finer and finer grids until two agree within the target, or the time budget is used.
+
+    The first few refine space and time together, which is what most motions need. What is left errs mostly in one of
+    them: a cable that is let go vibrates faster than it is curved, a loop that tightens is curved more than it is fast.
+    So from there on each grid is finer in one direction, that whose last refinement moved the surface most, and the
+    error is the sum of both. It is at least what the time spline misses of its march: a cable that trembles faster than
+    two grids can show looks alike on both. A march that finds no equilibrium is tried with more steps before it is
+    given up.
+    """
+    target = quality.target_error or AUTO_TARGET * problem.scene.cable.length
+    budget = quality.time_budget or np.inf
+    best: Level | None = None
+    estimate = np.inf
+    rho = RHO
+    size, direction = stretched(problem, 0), "both"
+    changes: dict[str, tuple[float, float]] = {}  # how far the two last refinements of a direction moved the surface
+    number = failures = 0
+    while size.n_u <= _MOST_POINTS and size.n_u * size.steps <= MOST_WORK:
+        began = monitor.elapsed()
+        try:
+            if best is not None:
+                monitor.check()
+            level = march_level(problem, size, monitor, rho, free_knots=True, rough=True)
+            if best is not None and level.posed is problem:
+                level = replace(level, change=distance(best, level, problem))
+                if level.change <= ROUGH * problem.scene.cable.length:  # so strands do not meet because of the grid
+                    level = march_level(problem, size, monitor, rho, free_knots=True, known=level)
+            if level.posed is not problem:
+                best, changes = None, {}  # another motion: the grid before says nothing about it
+            problem = level.posed  # a rough grid may have needed contact that is too stiff for a fine one
+        except TimeIsUp:
+            break
+        if best is not None:
+            if level.motion.stopped and not best.motion.stopped:
+                failures += 1
+                if failures <= _FAILURES and level.motion.stopped != "time" and quality.time_budget is None:
+                    record_level(problem, level, monitor)
+                    size = _finer(size, "time")
+                    continue
+                status, message = march_status(problem, level)
+                return Outcome(best, status, f"A finer grid was not finished: {message}", _finite(best.change))
+            changes[direction] = level.change, changes.get(direction, (np.inf, np.inf))[0]
+            estimate = max(_error(changes), MISSED_COUNTS * level.missed)
+            rho = STRONGLY_DAMPED if level.change > ROUGH * problem.scene.cable.length else RHO
+        record_level(problem, level, monitor)
+        best = level
+        status, message = march_status(problem, level)
+        moved = f"the last refinement moved the surface by {level.change * 1e3:.2g} mm"
+        if level.motion.stopped == "time":
+            return Outcome(level, status, message, None)
+        if estimate <= ACCEPT * target and quality.time_budget is None:
+            agreed = f"Two grids agree to {level.change * 1e3:.2g} mm, target {target * 1e3:.2g} mm."
+            return Outcome(level, status, agreed if status == "converged" else message, estimate)
+        if 2.5 * (monitor.elapsed() - began) > budget - monitor.elapsed():
+            if number == 0:
+                return Outcome(level, "time_limit", f"{budget * 1e3:.3g} ms allow one grid, unchecked.", None)
+            return Outcome(level, status, f"The best grid in {budget * 1e3:.3g} ms; {moved}.", estimate)
+        number += 1
+        if number < len(LEVELS):
+            size = stretched(problem, number)
+        else:
+            direction = "time" if MISSED_COUNTS * level.missed > _error(changes) else _worst(changes)
+            size = _finer(size, direction)
+    assert best is not None
+    status, message = march_status(problem, best)
+    moved = f"the last refinement moved the surface by {best.change * 1e3:.3g} mm, target {target * 1e3:.3g} mm"
+    advice = "Allow a larger target_error, more time or a shorter motion."
+    if status == "converged" and estimate <= target:
+        message = f"Two grids agree to {best.change * 1e3:.2g} mm, target {target * 1e3:.2g} mm."
+    elif status == "converged" and monitor.remaining() <= 0:
+        status, message = "time_limit", f"The time limit passed; {moved}. {advice}"
+    elif status == "converged":
+        status, message = "max_iterations", f"No finer grid; {moved}. {advice}"
+    return Outcome(best, status, message, _finite(estimate))
+
+
+def _finer(size: Size, direction: str) -> Size:
+    ratio = _FINER[direction]
+    if direction == "space":
+        return size._replace(n_u=round(ratio * size.n_u))
+    return size._replace(n_t=round(ratio * size.n_t), steps=round(ratio * size.steps))
+
+
+def _worst(changes: Mapping[str, tuple[float, float]]) -> str:
+    """Return the direction to refine: time, then space, then that which erred more."""
+    unknown = [direction for direction in ("time", "space") if direction not in changes]
+    return unknown[0] if unknown else max(_FINER, key=lambda direction: extrapolated(*changes[direction]))
+
+
+def _error(changes: Mapping[str, tuple[float, float]]) -> float:
+    """Return the error [m] that the changes point to: of the whole grid, or of both directions once both are known."""
+    if all(direction in changes for direction in _FINER):
+        return float(sum(extrapolated(*changes[direction]) for direction in _FINER))
+    return extrapolated(*changes["both"]) if "both" in changes else np.inf
+
+
+def _finite(x: float) -> float | None:
+    return x if np.isfinite(x) else None
+
+
+def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
+    """Return the status of a march, and what it says, in words."""
+    motion = level.motion
+    if not motion.stopped and motion.largest_strain > TORN:
+        strain = f"The motion strains the cable along itself by {motion.largest_strain:.0%}, which no cable follows."
+        advice = "Bring the grasps no farther apart than the cable between them, or make the motion slower."
+        push = "A straight cable pushed along itself has no side to buckle to: start it slightly bent."
+        return "stalled", f"{strain} {advice} {push}"
+    least, most = _slopes(level)
+    if not motion.stopped and not (least >= FOLDED and most <= 2.0 - FOLDED):
+        seen = f"|r'| is {least:.2g} to {most:.2g} within a span"
+        return "stalled", f"The cable is folded finer than its control points can show: {seen}. Take more of them."
+    deep = motion.deepest / problem.scene.cable.diameter
+    if not motion.stopped and deep > TOO_DEEP:
+        pushed = f"The cable is pressed {deep:.0%} of its diameter into the table, an obstacle or itself."
+        return "stalled", f"{pushed} Take finer grids, or a motion that does not jam it."
+    if not motion.stopped:
+        split = f", {motion.split} of them in smaller steps" if motion.split else ""
+        return "converged", f"Every time step found its equilibrium{split}."
+    reached = motion.times[motion.reached]
+    rest = f"The surface stands still after {reached:.4g} s of {problem.horizon:.4g} s."
+    if motion.stopped == "time":
+        return "time_limit", f"The time limit passed. {rest} Allow more time or a coarser grid."
+    return (
+        "stalled",
+        f"A time step found no equilibrium. {rest} Allow more control points, or a slower or smoother motion.",
+    )
+
+
+def _slopes(level: Level) -> tuple[float, float]:
+    """Return the smallest and the largest |r'| at the curvature points of some states of a motion."""
+    tables, states = level.motion.grid.tables, level.motion.states
+    some = states[:: max(1, len(states) // _LOOKS), :, : level.problem.plane.dimensions]
+    around = some[:, tables.curvature_first[:, None] + np.arange(4)]
+    slope = np.matmul(tables.curvature_b1[:, None, :], around)
+    square = (slope * slope).sum(axis=-1)
+    return float(np.sqrt(square.min())), float(np.sqrt(square.max()))
