@@ -1,19 +1,11 @@
 """The landing page and its files, at every address that nothing else answers."""
 
-from pathlib import Path
-
 from fastapi import FastAPI
 from fastapi.staticfiles import StaticFiles
 from starlette.routing import Match, Mount
 from starlette.types import Scope
 
-_PACKAGE = Path(__file__).parent.parent
-
-
-def static_dir() -> Path:
-    """Return the directory of the pages: beside the package in a checkout, inside it when installed."""
-    root = _PACKAGE.parent
-    return root / "static" if (root / "pyproject.toml").is_file() else _PACKAGE / "static"
+from app.assets import static_dir
 
 
 class _Pages(Mount):
