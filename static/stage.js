@@ -1,0 +1,50 @@
+// The live scene: shown once the service can solve, with the chosen example.
+
+import { isDark } from "./appearance.js";
+
+const RETRY = 2000; // ms
+const scene = document.getElementById("scene");
+const waiting = document.getElementById("waiting");
+const full = document.getElementById("full");
+let example = null;
+let awake = false;
+
+function address(dark) {
+  const query = [example === null ? "" : `example=${encodeURIComponent(example)}`, dark ? "darkMode" : ""];
+  const asked = query.filter((part) => part !== "").join("&");
+  return asked === "" ? "/scene/" : `/scene/?${asked}`;
+}
+
+export function showScene(name = example) {
+  example = name;
+  full.href = address(isDark());
+  if (awake) scene.src = full.href;
+}
+
+async function state() {
+  try {
+    const answer = await fetch("/ready");
+    if (answer.ok) return "ready";
+    return answer.status === 503 ? "compiling" : "refused";
+  } catch {
+    return "silent";
+  }
+}
+
+const SAID = {
+  compiling: "The solver is being compiled for this machine. That takes about a minute, once; this page then comes alive by itself.",
+  refused: "The service does not let this page in. Open it with its token: /?token=…",
+  silent: "The service does not answer. This page tries again by itself.",
+};
+
+/** Wait until the service can solve, saying so meanwhile; then show the scene. */
+export async function whenReady() {
+  for (let now = await state(); now !== "ready"; now = await state()) {
+    waiting.hidden = false;
+    waiting.textContent = SAID[now];
+    await new Promise((resolve) => { window.setTimeout(resolve, RETRY); });
+  }
+  waiting.hidden = true;
+  awake = true;
+  showScene();
+}
