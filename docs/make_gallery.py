@@ -118,8 +118,8 @@ def picture(example: Example, motion: Prediction) -> str:
         )
     drawn = "\n".join(parts)
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" fill="none" stroke-linecap="round" '
-        f'stroke-linejoin="round">\n{drawn}\n</svg>\n'
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" '
+        f'fill="none" stroke-linecap="round" stroke-linejoin="round">\n{drawn}\n</svg>\n'
     )
 
 
