@@ -1,4 +1,4 @@
-"""The ready scenes of the gallery: files in ``static/gallery``, the same for the page, the 3D scene and the API."""
+"""The ready scenes: files in ``static/gallery``, in the order of ``static/gallery.json``; the same for page and API."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -7,8 +7,6 @@ import orjson
 
 from app.assets import static_dir
 from app.schemas import PredictionRequest
-
-_INDEX = "index.json"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,10 +34,9 @@ class Example:
 @cache
 def examples() -> dict[str, Example]:
     """Return the ready scenes by name, in the order of the gallery."""
-    folder = static_dir() / "gallery"
     found = {}
-    for entry in orjson.loads((folder / _INDEX).read_bytes()):
-        document = (folder / f"{entry['name']}.json").read_bytes()
+    for entry in orjson.loads((static_dir() / "gallery.json").read_bytes()):
+        document = (static_dir() / "gallery" / f"{entry['name']}.json").read_bytes()
         request = PredictionRequest.model_validate_json(document)
         found[entry["name"]] = Example(
             name=entry["name"], description=entry["description"], document=document, request=request

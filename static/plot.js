@@ -49,7 +49,7 @@ function logScale(values, from, to) {
   return { place, ticks };
 }
 
-/** Draw `points` ({method, x [ms], y [mm], best}), the fastest first, into `box`; `words` tells one of them. */
+/** Draw `points` ({method, x [ms], y [mm], best, converged}), the fastest first, into `box`; `words` tells one of them. */
 export function drawPlot(box, points, words) {
   const width = Math.max(280, box.clientWidth);
   const height = Math.round(Math.min(440, Math.max(280, 0.5 * width)));
@@ -76,7 +76,10 @@ export function drawPlot(box, points, words) {
   const best = points.filter((point) => point.best).map((point) => `${x.place(point.x)},${y.place(point.y)}`);
   const front = svg("polyline", { points: best.join(" "), class: "front" });
   const signs = svg("g", {});
-  for (const point of points) signs.append(sign(point.method, x.place(point.x), y.place(point.y), point.best ? 5.5 : 4.5, point.best ? "best" : ""));
+  for (const point of points) {
+    const rank = point.best ? "best" : point.converged === false ? "failed" : "";
+    signs.append(sign(point.method, x.place(point.x), y.place(point.y), point.best ? 5.5 : 4.5, rank));
+  }
   const ring = svg("circle", { r: 11, class: "ring", visibility: "hidden" });
   const drawing = svg("svg", { viewBox: `0 0 ${width} ${height}`, width, height, "aria-hidden": "true" }, grid, front, signs, ring);
   const tip = make("div", { className: "tip", hidden: true });
@@ -112,12 +115,14 @@ export function drawPlot(box, points, words) {
 
 /** What is reached: the quickest solves within 1 and 0.1 mm, or the best one. */
 export function finding(points) {
+  const solved = points.filter((point) => point.converged !== false);
   const said = [1, 0.1].flatMap((error) => {
-    const within = points.filter((point) => point.y <= error).map((point) => point.x);
+    const within = solved.filter((point) => point.y <= error).map((point) => point.x);
     return within.length === 0 ? [] : [`within ${error} mm in ${short(Math.min(...within))} ms`];
   });
+  if (solved.length === 0) return "No solve converged";
   if (said.length === 0) {
-    const [best] = [...points].sort((one, other) => one.y - other.y);
+    const [best] = [...solved].sort((one, other) => one.y - other.y);
     said.push(`within ${short(best.y)} mm in ${short(best.x)} ms`);
   }
   const sentence = said.join(", ");

@@ -10,7 +10,7 @@ from app.gallery import examples
 from tests.app.conftest import ROOT
 
 JSON = {"Content-Type": "application/json"}
-NAMES = [entry["name"] for entry in json.loads((ROOT / "static" / "gallery" / "index.json").read_text())]
+NAMES = [entry["name"] for entry in json.loads((ROOT / "static" / "gallery.json").read_text())]
 
 
 def listed(client: TestClient) -> dict[str, dict[str, Any]]:
@@ -21,7 +21,7 @@ def listed(client: TestClient) -> dict[str, dict[str, Any]]:
 
 def test_every_scene_of_the_gallery_is_listed_in_its_order_and_none_lies_about_unlisted(client: TestClient) -> None:
     assert list(listed(client)) == NAMES
-    files = {file.stem for file in (ROOT / "static" / "gallery").glob("*.json")} - {"index"}
+    files = {file.stem for file in (ROOT / "static" / "gallery").glob("*.json")}
     assert files == set(NAMES)
 
 

@@ -26,6 +26,7 @@ CALIBRATION = {
     ],
     "front": [1, 2, 0],
 }
+CALIBRATED = re.compile(r"/v1/calibration\?")
 BLUE = "rgb(0, 114, 178)"  # Okabe-Ito's, of the march
 
 
@@ -45,7 +46,7 @@ def open_page(
 
 def with_calibration(page: Page) -> None:
     """Let the page read `CALIBRATION`: measuring one takes minutes."""
-    page.route("**/v1/calibration", lambda route: route.fulfill(json=CALIBRATION))
+    page.route(CALIBRATED, lambda route: route.fulfill(json=CALIBRATION))
 
 
 def is_measured(service) -> bool:
@@ -124,10 +125,52 @@ def test_the_page_says_that_the_solver_is_compiled_and_comes_alive_by_itself(ser
 
 
 def test_a_machine_that_is_not_measured_is_told_how_to(service, witness):
-    witness.page.route("**/v1/calibration", lambda route: route.fulfill(status=404))
+    witness.page.route(CALIBRATED, lambda route: route.fulfill(status=404, json={"type": "urn:dlo:problem:not-found"}))
     page = open_page(witness, service)
     expect(page.locator("#plot-note")).to_contain_text("dlo calibrate")
     expect(page.locator("#plot-figure")).to_be_hidden()
+    expect(page.locator("#measure")).to_be_hidden()  # there is nothing that could measure
+
+
+def test_the_button_measures_and_shows_what_comes_of_it(service, witness):
+    page = witness.page
+    measured = []
+    event = 'id: {0}\nevent: progress\ndata: {{"number": {0}, "done": {0}, "total": 2, "what": "part {0}"}}\n\n'
+    course = event.format(0) + event.format(1) + "id: 2\nevent: done\ndata: {}\n\n"
+
+    def answer(route: Route) -> None:
+        if measured:
+            route.fulfill(json=CALIBRATION)
+        else:
+            route.fulfill(status=404, json={"type": "urn:dlo:problem:not-calibrated"})
+
+    def take_up(route: Route) -> None:
+        measured.append(route.request.method)
+        route.fulfill(status=202, json={})
+
+    page.route(CALIBRATED, answer)
+    page.route("**/v1/calibration", take_up)
+    page.route("**/v1/calibration/events", lambda route: route.fulfill(body=course, content_type="text/event-stream"))
+    open_page(witness, service)
+    page.get_by_role("button", name="Measure this machine").click()
+    expect(page.locator("#plot .sign")).to_have_count(len(CALIBRATION["points"]))
+    expect(page.locator("#measure button")).to_be_enabled()
+    expect(page.locator("#measure progress")).to_be_hidden()
+    assert measured == ["POST"]
+
+
+def test_the_plot_tells_motions_in_the_plane_from_those_in_space(service, witness):
+    page = witness.page
+    in_space = {**CALIBRATION, "points": CALIBRATION["points"][:3], "front": [1, 2, 0]}
+
+    def answer(route: Route) -> None:
+        route.fulfill(json=in_space if "dimensions=3" in route.request.url else CALIBRATION)
+
+    page.route(CALIBRATED, answer)
+    open_page(witness, service)
+    expect(page.locator("#plot .sign")).to_have_count(5)
+    page.get_by_label("in space").check()
+    expect(page.locator("#plot .sign")).to_have_count(3)
 
 
 def test_the_plot_shows_the_measurements_of_the_service_where_there_are_any(service, witness):
@@ -157,7 +200,7 @@ def test_the_table_tells_the_same_as_the_plot(service, witness):
     page = open_page(witness, service)
     page.get_by_text("The same as a table").click()
     rows = [row.split("\t") for row in page.locator("#plot-table tbody tr").all_inner_texts()]
-    assert [[row[0], *row[2:]] for row in rows] == [
+    assert rows == [
         ["march", "9", "13", "1", "3", "yes"],
         ["march", "17", "25", "10", "0.3", "yes"],
         ["spacetime", "9", "13", "10", "3", ""],
