@@ -92,10 +92,11 @@ def picture(example: Example, motion: Prediction) -> str:
     parts = [f'<rect width="{WIDTH}" height="{HEIGHT}" fill="none"/>']
     if scene.environment.table is not None:
         parts += table(view, scene.environment.table.height)
+    veil = 0.2 if scene.environment.table is not None else 0.11  # in space the strips lie over each other
     for k in range(STRIPS):
         band = view(np.vstack([swept[k], swept[k + 1][::-1]]))
         parts.append(
-            f'<path d="{path(band, close=True)}" fill="{css(colour((k + 0.5) / STRIPS))}" fill-opacity="0.2"/>'
+            f'<path d="{path(band, close=True)}" fill="{css(colour((k + 0.5) / STRIPS))}" fill-opacity="{veil}"/>'
         )
     for grasp in scene.grasps:
         held = surface.positions([grasp.u], held_times(grasp, surface.horizon))[:, 0]
