@@ -70,7 +70,7 @@ def show(page: Page, address: str) -> None:
 
 def settle(page: Page) -> None:
     """Wait until everything is drawn, without the client's note that no graphics card draws it."""
-    for frame in page.frames:
+    for frame in (frame for frame in page.frames if "/scene/" in frame.url):  # the page itself takes no such styles
         frame.add_style_tag(content="[class*='Notification'] { display: none !important; }")
     page.wait_for_timeout(WAIT)
 

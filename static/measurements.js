@@ -68,6 +68,7 @@ function present(calibration) {
     .sort((one, other) => one.x - other.x);
   if (points.length === 0) return;
   figure.hidden = false;
+  button.textContent = "Measure again";
   document.getElementById("plot-finding").textContent = finding(points);
   const machine = Object.entries(calibration.machine).map(([name, value]) => `${name} ${value}`).join(", ");
   const measured = new Date(calibration.measured_at).toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
