@@ -12,8 +12,7 @@ export function make(tag, properties = {}, ...children) {
 
 /** Two significant digits below 10, whole numbers above. */
 export function short(value) {
-  if (value >= 10) return String(Math.round(value));
-  return value >= 0.001 ? String(Number(value.toPrecision(2))) : value.toExponential(0).replace("e-", " × 10⁻");
+  return String(value >= 10 ? Math.round(value) : Number(value.toPrecision(2)));
 }
 
 export function withUnit(value, unit) {
