@@ -20,12 +20,10 @@ function row(run) {
   const named = run.name === "" ? make("span", { className: "muted" }, "no name") : run.name;
   const error = run.error_estimate === null ? null : run.error_estimate * 1e3;
   const status = make("span", { className: `status ${run.status}` }, STATUS[run.status] ?? run.status);
-  const links = [
-    make("a", { href: run.links.viewer, "aria-label": `Recording of ${run.id}` }, "recording"),
-    make("a", { href: run.links.scene, "aria-label": `Scene of ${run.id}` }, "scene"),
-    make("a", { href: run.links.self, "aria-label": `Answer of ${run.id}` }, "JSON"),
-  ];
-  return make("tr", {}, cell(when(run.created)), cell(named, "name"), cell(status), cell(run.method),
+  const time = when(run.created);
+  const link = (href, text) => make("a", { href, "aria-label": `${text} of ${run.name || time.textContent}` }, text);
+  const links = [link(run.links.viewer, "recording"), link(run.links.scene, "scene"), link(run.links.self, "JSON")];
+  return make("tr", {}, cell(time), cell(named, "name"), cell(status), cell(run.method),
     cell(withUnit(run.wall_time * 1e3, "ms"), "number"), cell(withUnit(error, "mm"), "number"), cell(links, "links"));
 }
 

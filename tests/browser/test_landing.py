@@ -240,8 +240,8 @@ def test_a_new_run_appears_with_its_status_time_error_and_recording(service, wit
     expect(row).to_contain_text(run["accuracy"]["method"])
     assert re.search(r"\d ms", row.inner_text())
     assert re.search(r"\d mm", row.inner_text())
-    assert row.get_by_role("link", name="Recording").get_attribute("href") == run["links"]["viewer"]
-    assert row.get_by_role("link", name="Scene").get_attribute("href") == run["links"]["scene"]
+    assert row.get_by_role("link", name="recording of Seen on the page").get_attribute("href") == run["links"]["viewer"]
+    assert row.get_by_role("link", name="scene of Seen on the page").get_attribute("href") == run["links"]["scene"]
 
 
 # --- for everyone ---
