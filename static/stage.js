@@ -3,6 +3,11 @@
 import { isDark } from "./appearance.js";
 
 const RETRY = 2000; // ms
+const COMPILING = "urn:dlo:problem:not-ready";
+const SAID = {
+  compiling: "The solver is being compiled for this machine. That takes a minute or two, once; this page then comes alive by itself.",
+  silent: "The service does not answer. This page tries again by itself.",
+};
 const scene = document.getElementById("scene");
 const waiting = document.getElementById("waiting");
 const full = document.getElementById("full");
@@ -25,17 +30,11 @@ async function state() {
   try {
     const answer = await fetch("/ready");
     if (answer.ok) return "ready";
-    return answer.status === 503 ? "compiling" : "refused";
+    return (await answer.json()).type === COMPILING ? "compiling" : "silent";
   } catch {
     return "silent";
   }
 }
-
-const SAID = {
-  compiling: "The solver is being compiled for this machine. That takes about a minute, once; this page then comes alive by itself.",
-  refused: "The service does not let this page in. Open it with its token: /?token=…",
-  silent: "The service does not answer. This page tries again by itself.",
-};
 
 /** Wait until the service can solve, saying so meanwhile; then show the scene. */
 export async function whenReady() {

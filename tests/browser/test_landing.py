@@ -109,7 +109,7 @@ def test_the_page_says_that_the_solver_is_compiled_and_comes_alive_by_itself(ser
     def at_first_not_ready(route: Route) -> None:
         asked.append(route)
         if len(asked) < 3:
-            route.fulfill(status=503)
+            route.fulfill(status=503, json={"type": "urn:dlo:problem:not-ready"})
         else:
             route.continue_()
 
