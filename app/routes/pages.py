@@ -1,19 +1,40 @@
 """The landing page and its files, at every address that nothing else answers."""
 
-from pathlib import Path
+import os
 
 from fastapi import FastAPI
 from fastapi.staticfiles import StaticFiles
+from starlette.responses import Response
 from starlette.routing import Match, Mount
 from starlette.types import Scope
 
-_PACKAGE = Path(__file__).parent.parent
+from app.assets import static_dir
+
+POLICY = "; ".join(
+    [
+        "default-src 'none'",
+        "script-src 'self'",
+        "style-src 'self'",
+        "img-src 'self'",
+        "connect-src 'self'",
+        "frame-src 'self'",
+        "base-uri 'none'",
+        "form-action 'none'",
+        "frame-ancestors 'self'",
+    ]
+)
 
 
-def static_dir() -> Path:
-    """Return the directory of the pages: beside the package in a checkout, inside it when installed."""
-    root = _PACKAGE.parent
-    return root / "static" if (root / "pyproject.toml").is_file() else _PACKAGE / "static"
+class _Files(StaticFiles):
+    """The files with a content security policy of their own, stricter than what the API's documentation needs."""
+
+    def file_response(
+        self, full_path: str | os.PathLike[str], stat_result: os.stat_result, scope: Scope, status_code: int = 200
+    ) -> Response:
+        response = super().file_response(full_path, stat_result, scope, status_code)
+        response.headers["Content-Security-Policy"] = POLICY
+        response.headers["Cache-Control"] = "no-cache"  # asked anew by its tag: parts of two versions don't mix
+        return response
 
 
 class _Pages(Mount):
@@ -27,4 +48,4 @@ class _Pages(Mount):
 
 def add_pages(app: FastAPI) -> None:
     """Serve the pages at /; to be called after every other route is there."""
-    app.router.routes.append(_Pages("/", StaticFiles(directory=static_dir(), html=True, check_dir=False), name="pages"))
+    app.router.routes.append(_Pages("/", _Files(directory=static_dir(), html=True, check_dir=False), name="pages"))

@@ -1,9 +1,4 @@
 import io
-import json
-import re
-import subprocess
-import sys
-from urllib.parse import urlsplit
 
 import httpx
 import numpy as np
@@ -55,68 +50,6 @@ def canvas(page: Page) -> np.ndarray:
     box = page.locator("canvas").first.bounding_box()
     assert box is not None
     return np.asarray(Image.open(io.BytesIO(page.screenshot(clip=box))).convert("RGB"), dtype=int)
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_the_landing_page_shows_the_scene_and_asks_no_other_host(service, witness, scheme):
-    page = witness.page
-    page.emulate_media(color_scheme=scheme)
-    page.goto(service.address)
-    expect(page.get_by_role("heading", level=1)).to_be_visible()
-    scene = page.frame_locator("#scene")
-    expect(scene.locator('[data-status="converged"]')).to_be_visible()
-    expect(page.locator("#runs-note, #runs-table table").locator("visible=true")).not_to_have_text("Loading …")
-    dark = scene.locator("html[data-mantine-color-scheme='dark']").count() == 1
-    assert dark == (scheme == "dark")
-    assert witness.errors == []
-    assert witness.hosts == {urlsplit(service.address).netloc}
-
-
-def test_the_landing_page_fits_a_phone(service, witness):
-    page = witness.page
-    page.set_viewport_size({"width": 375, "height": 740})
-    page.goto(service.address)
-    expect(page.frame_locator("#scene").locator("canvas").first).to_be_visible()
-    assert page.evaluate("document.documentElement.scrollWidth") <= 375
-
-
-def test_the_landing_page_can_be_walked_through_by_keyboard(service, witness):
-    page = witness.page
-    page.goto(service.address)
-    page.keyboard.press("Tab")
-    assert page.evaluate("document.activeElement.textContent") == "Skip the scene"
-    page.keyboard.press("Enter")
-    page.keyboard.press("Tab")
-    assert page.evaluate("document.activeElement.dataset.copy") == "curl"
-
-
-def test_the_examples_on_the_landing_page_work(service, witness, tmp_path):
-    page = witness.page
-    page.goto(service.address)
-    python, curl = page.locator("#python").inner_text(), page.locator("#curl").inner_text()
-    script = tmp_path / "example.py"
-    script.write_text(f"import sys; sys.path.insert(0, {str(service.root)!r})\n{python}\nprint(q.shape)")
-    printed = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True).stdout
-    assert "(33, 101, 4)" in printed
-    body = re.search(r"-d '(.*)'", curl, re.DOTALL)
-    address = re.search(r"http\S+", curl)
-    assert body is not None
-    assert address is not None
-    answer = httpx.post(address[0], json=json.loads(body[1]))
-    assert answer.json()["status"] == "converged"
-
-
-def test_a_kept_run_appears_on_the_landing_page_with_its_recording(service, witness):
-    page = witness.page
-    page.goto(service.address)
-    scene = page.frame_locator("#scene")
-    scene.locator('[data-status="converged"]').wait_for()
-    scene.get_by_role("tab", name="Share").click()
-    scene.get_by_role("button", name="Keep this run").click()
-    run_id = scene.locator("[data-run]").get_attribute("data-run")
-    row = page.locator("#runs-table tbody tr").filter(has=page.locator(f'a[href="/v1/predictions/{run_id}"]'))
-    expect(row).to_be_visible()
-    assert row.get_by_role("link", name="recording").get_attribute("href") == f"/v1/predictions/{run_id}/viewer"
 
 
 def test_dragging_the_gizmo_changes_the_prediction_to_that_of_the_python_api(service, witness):

@@ -1,0 +1,11 @@
+"""Where the files of the pages are."""
+
+from pathlib import Path
+
+_PACKAGE = Path(__file__).parent
+
+
+def static_dir() -> Path:
+    """Return the directory of the pages: beside the package in a checkout, inside it when installed."""
+    root = _PACKAGE.parent
+    return root / "static" if (root / "pyproject.toml").is_file() else _PACKAGE / "static"

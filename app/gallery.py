@@ -1,0 +1,44 @@
+"""The ready scenes: files in ``static/gallery``, in the order of ``static/gallery.json``; the same for page and API."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import orjson
+
+from app.assets import static_dir
+from app.schemas import PredictionRequest
+
+
+@dataclass(frozen=True, kw_only=True)
+class Example:
+    """A ready scene.
+
+    Attributes:
+        name: in addresses, e.g. ``paper-25``.
+        description: what is to be seen, one sentence.
+        document: the scene as JSON, as it is in its file.
+        request: the same, read.
+    """
+
+    name: str
+    description: str
+    document: bytes
+    request: PredictionRequest
+
+    @property
+    def title(self) -> str:
+        """What the run is called in lists."""
+        return self.request.name
+
+
+@cache
+def examples() -> dict[str, Example]:
+    """Return the ready scenes by name, in the order of the gallery."""
+    found = {}
+    for entry in orjson.loads((static_dir() / "gallery.json").read_bytes()):
+        document = (static_dir() / "gallery" / f"{entry['name']}.json").read_bytes()
+        request = PredictionRequest.model_validate_json(document)
+        found[entry["name"]] = Example(
+            name=entry["name"], description=entry["description"], document=document, request=request
+        )
+    return found

@@ -1,0 +1,28 @@
+// Elements and numbers, as every part of the page shows them.
+
+export function make(tag, properties = {}, ...children) {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(properties)) {
+    if (name in element) element[name] = value;
+    else element.setAttribute(name, value);
+  }
+  element.append(...children);
+  return element;
+}
+
+/** Two significant digits below 10, whole numbers above. */
+export function short(value) {
+  return String(value >= 10 ? Math.round(value) : Number(value.toPrecision(2)));
+}
+
+export function withUnit(value, unit) {
+  return value === null || value === undefined ? "–" : `${short(value)} ${unit}`;
+}
+
+/** The JSON at an address; null where there is none. */
+export async function read(address) {
+  const answer = await fetch(address, { headers: { Accept: "application/json" } });
+  if (answer.status === 404) return null;
+  if (!answer.ok) throw new Error(`${address}: ${answer.status}`);
+  return answer.json();
+}

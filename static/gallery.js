@@ -1,0 +1,58 @@
+// The gallery: a card for each ready scene, which opens it in the live scene.
+
+import { make, read } from "./dom.js";
+import { showScene } from "./stage.js";
+
+const list = document.getElementById("gallery-list");
+const note = document.getElementById("gallery-note");
+const caption = document.getElementById("caption");
+const curl = document.getElementById("example-curl");
+const stage = document.getElementById("stage");
+
+function curlLine(example) {
+  const origin = window.location.origin;
+  return `curl -s ${origin}${example.links.self} |\n  curl -s ${origin}/v1/predictions -H 'Content-Type: application/json' -d @-`;
+}
+
+function choose(example) {
+  for (const card of list.querySelectorAll("a[data-example]")) {
+    if (card.dataset.example === example.name) card.setAttribute("aria-current", "true");
+    else card.removeAttribute("aria-current");
+  }
+  caption.textContent = `${example.title}. ${example.description}`;
+  curl.textContent = curlLine(example);
+  showScene(example.name);
+}
+
+function card(example) {
+  const open = make(
+    "a",
+    { href: `/?example=${example.name}`, className: "open", "data-example": example.name },
+    make("img", { src: example.links.picture, alt: "", width: 320, height: 200 }),
+    make("strong", {}, example.title),
+    make("span", {}, example.description),
+  );
+  open.addEventListener("click", (event) => {
+    if (event.ctrlKey || event.metaKey || event.shiftKey) return; // a tab of its own
+    event.preventDefault();
+    window.history.replaceState(null, "", open.getAttribute("href"));
+    choose(example);
+    stage.scrollIntoView({ block: "nearest" });
+  });
+  const json = make("a", { href: example.links.self, className: "json", "aria-label": `${example.title}, as JSON` }, "JSON");
+  return make("li", { className: "card" }, open, json);
+}
+
+export async function showGallery() {
+  const asked = new URLSearchParams(window.location.search).get("example");
+  try {
+    const { examples } = await read("/v1/examples");
+    list.replaceChildren(...examples.map(card));
+    note.hidden = true;
+    const chosen = examples.find((example) => example.name === asked);
+    if (chosen !== undefined) choose(chosen);
+    else curl.textContent = curlLine(examples[0]);
+  } catch {
+    note.textContent = "The gallery can't be read just now.";
+  }
+}
