@@ -1,0 +1,136 @@
+"""The tables and the plot of a comparison, from its trials."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.peers.cases import Case
+from benchmarks.peers.search import TOLERANCES, Trial, best
+
+OURS = ("dlocore march", "dlocore spacetime")  # the ratios are to the faster of the two
+FINE = np.geomspace(2e-2, 1e-4, 24)  # [m]: tolerances of the plot's curves
+COLOURS = {  # Okabe-Ito
+    "dlocore march": "#0072B2",
+    "dlocore spacetime": "#56B4E9",
+    "dlocore target_error": "#009E73",
+    "explicit rod": "#D55E00",
+    "MuJoCo chain": "#E69F00",
+    "MuJoCo flex": "#CC79A7",
+    "PyElastica": "#000000",
+}
+
+
+class Results:
+    """All trials of all peers, and the repeated measurements of the winners."""
+
+    def __init__(self, cases: Iterable[Case], names: Iterable[str]) -> None:
+        self.families = {case.name: case.family for case in cases}
+        self.names = list(names)
+        self.trials: list[Trial] = []
+        self.winners: dict[tuple[str, str, float], Trial] = {}
+        self.impossible: set[tuple[str, str]] = set()  # (case, peer)
+
+    def seconds(self, case: str, peer: str, tolerance: float) -> float:
+        """Return the median time [s] of a peer's best setting; infinity where the tolerance was not reached."""
+        winner = self.winners.get((case, peer, tolerance))
+        return np.inf if winner is None else winner.seconds
+
+    def ours(self, case: str, tolerance: float) -> float:
+        """Return the faster of the project's two methods [s]."""
+        return min(self.seconds(case, name, tolerance) for name in OURS)
+
+    def cell(self, cases: list[str], peer: str, tolerance: float) -> str:
+        """Return the median time over some cases with the median of the ratios to ours, or why there is none."""
+        if all((case, peer) in self.impossible for case in cases):
+            return "cannot"
+        times = [self.seconds(case, peer, tolerance) for case in cases]
+        missing = int(np.sum(~np.isfinite(times)))
+        if missing:
+            return "not reached" if len(cases) == 1 else f"not reached ({missing} of {len(cases)})"
+        ratios = [t / self.ours(case, tolerance) for case, t in zip(cases, times, strict=True)]
+        return f"{1e3 * float(np.median(times)):.3g} ms ({float(np.median(ratios)):.2g}x)"
+
+    def table(self, *, families: bool) -> str:
+        """Return a Markdown table: a row a tolerance of every case, or of every family of cases."""
+        rows = ["| case | mm | " + " | ".join(self.names) + " |", "|" + "---|" * (len(self.names) + 2)]
+        groups: dict[str, list[str]] = {}
+        for case, family in self.families.items():
+            groups.setdefault(family if families else case, []).append(case)
+        for name, cases in groups.items():
+            for tolerance in TOLERANCES:
+                cells = [self.cell(cases, peer, tolerance) for peer in self.names]
+                rows.append(f"| {name} | {1e3 * tolerance:g} | " + " | ".join(cells) + " |")
+        return "\n".join(rows)
+
+    def wins(self) -> list[str]:
+        """Return a line for every peer that is faster than ours somewhere, and where."""
+        lines = []
+        for peer in self.names:
+            if peer.startswith("dlocore"):
+                continue
+            faster = [
+                (case, tolerance)
+                for case in self.families
+                for tolerance in TOLERANCES
+                if self.seconds(case, peer, tolerance) < self.ours(case, tolerance)
+            ]
+            places = len(self.families) * len(TOLERANCES)
+            where = "; ".join(f"{case} at {1e3 * tol:g} mm" for case, tol in faster)
+            lines.append(
+                f"{peer} is faster than dlocore in {len(faster)} of {places}" + (f": {where}" if faster else "")
+            )
+        return lines
+
+    def curve(self, cases: list[str], peer: str) -> np.ndarray:
+        """Return the median time [s] over some cases for the tolerances `FINE`; NaN where one is not reached."""
+        times = np.full((len(cases), len(FINE)), np.nan)
+        for i, case in enumerate(cases):
+            mine = [t for t in self.trials if t.case == case and t.peer == peer]
+            for j, tolerance in enumerate(FINE):
+                found = best(mine, float(tolerance))
+                times[i, j] = np.nan if found is None else found.seconds
+        return np.median(times, axis=0)
+
+    def plot(self, file: Path, caption: str) -> None:
+        """Draw the work-precision diagram: one panel a kind of case, one curve a peer."""
+        import matplotlib
+
+        matplotlib.use("Agg")
+        import matplotlib.pyplot as plt
+
+        plane = [case for case, family in self.families.items() if family.startswith("plane")]
+        panels: dict[str, list[str]] = {f"plane, median of {len(plane)} cases": plane} if plane else {}
+        panels |= {case: [case] for case in self.families if case not in plane}
+        figure, axes = plt.subplots(1, len(panels), figsize=(4.4 * len(panels), 4.6), sharey=True, squeeze=False)
+        for axis, (title, cases) in zip(axes[0], panels.items(), strict=True):
+            for peer in self.names:
+                style: dict[str, Any] = {"color": COLOURS[peer], "label": peer, "linewidth": 1.8}
+                if peer == "dlocore target_error":
+                    style |= {"linestyle": "--"}
+                axis.plot(1e3 * FINE, 1e3 * self.curve(cases, peer), **style)
+            axis.set(title=title, xlabel="largest error over the motion [mm]", xscale="log", yscale="log")
+            axis.invert_xaxis()
+            axis.grid(which="major", alpha=0.4)
+            axis.grid(which="minor", alpha=0.12)
+        axes[0, 0].set_ylabel("processor time [ms]")
+        axes[0, 0].legend(fontsize=8, loc="upper left")
+        figure.suptitle(self.headline(), fontsize=11)
+        figure.text(0.5, 0.005, caption, ha="center", fontsize=7)
+        figure.tight_layout(rect=(0, 0.03, 1, 1))
+        file.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(file, dpi=110)
+        plt.close(figure)
+
+    def headline(self) -> str:
+        """Return what the comparison found, in one line: the median ratio of each peer where both reached."""
+        parts = []
+        for peer in self.names:
+            if peer.startswith("dlocore"):
+                continue
+            ratios = [self.seconds(c, peer, tol) / self.ours(c, tol) for c in self.families for tol in TOLERANCES]
+            known = [r for r in ratios if np.isfinite(r)]
+            if known:
+                parts.append(f"{peer} {np.median(known):.2g}x")
+        return "Time at equal error, median against dlocore: " + ", ".join(parts)
