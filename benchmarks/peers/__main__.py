@@ -1,6 +1,6 @@
 """Other simulators on the same cases in the same run: `python -m benchmarks.peers [--json FILE] [--plot FILE]`.
 
-Needs `pip install dlo[peers]` for MuJoCo and PyElastica; what is not installed is left out and said so. Every peer's
+Needs `pip install .[peers]` for MuJoCo and PyElastica; what is not installed is left out and said so. Every peer's
 settings are searched for the fastest that keep the largest error over the motion below 10, 3, 1 and 0.3 mm; the
 winners are timed again, medians of processor time, one thread, set-up apart. docs/peers.md tells how each is set up.
 """
@@ -32,8 +32,8 @@ PEERS: tuple[tuple[Peer, str], ...] = (  # with the package each needs
     (Spline("spacetime", 4.0), "numpy"),
     (Asked(), "numpy"),
     (ExplicitRod(), "numpy"),
-    (Chain(), "mujoco"),
-    (Flex(), "mujoco"),
+    (Chain(), "mujoco-core"),
+    (Flex(), "mujoco-core"),
     (Cosserat(), "pyelastica"),
 )
 
@@ -89,7 +89,7 @@ def main() -> None:
     peers = [peer for peer, package in PEERS if versions[package] is not None]
     for peer, package in PEERS:
         if versions[package] is None:
-            print(f"{peer.name} is left out: {package} is not installed (pip install dlo[peers])")
+            print(f"{peer.name} is left out: {package} is not installed (pip install .[peers])")
     warm_up()
     results = Results([], [peer.name for peer in peers])
     cases = []

@@ -5,6 +5,7 @@ no larger than the tolerance needs, and the extrapolation (4 fine - coarse)/3 of
 """
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import cast
 
 import numpy as np
@@ -12,8 +13,8 @@ import numpy as np
 from benchmarks.peers.cases import SAMPLES_T, Case, Floats
 from benchmarks.peers.explicit_kernel import march_plane, march_space
 from benchmarks.peers.search import Setting, Value
-from benchmarks.rod_scene import Start, material_grid, plane_of, start_of
-from dlocore import Scene
+from benchmarks.rod_scene import start_of
+from dlocore import Scene, Straight
 
 ELEMENTS = (8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 80, 96, 128, 160, 200, 256)
 SOFTNESS = (1 / 32, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)  # of the axial stiffness: the step grows as its root falls
@@ -59,42 +60,60 @@ def simulated(scene: Scene, elements: int, axial: float = 1.0, count: int = SAMP
         axial: factor on the cable's axial stiffness.
         count: number of times.
     """
-    grid = material_grid(scene, elements)
-    return grid, _march(scene, grid, start_of(scene, grid), axial, count)
+    grid = _grid(scene, elements)
+    return grid, _march(scene, grid, _start(scene, grid), axial, count)
 
 
 def extrapolated(scene: Scene, elements: int, axial: float = 1.0, count: int = SAMPLES_T) -> tuple[Floats, Floats]:
     """Return (4 fine - coarse)/3 of `elements` and half as many, at the nodes of the coarse one."""
-    grid = material_grid(scene, elements // 2)
+    grid = _grid(scene, elements // 2)
     fine = np.empty(2 * len(grid) - 1)
     fine[::2], fine[1::2] = grid, 0.5 * (grid[1:] + grid[:-1])
-    start = start_of(scene, fine)
-    every = Start(start.positions[::2], start.velocities[::2], start.directions[::2])
-    coarse = _march(scene, grid, every, axial, count)
+    start = _start(scene, fine)
+    coarse = _march(scene, grid, start[::2], axial, count)
     return grid, (4.0 * _march(scene, fine, start, axial, count)[:, ::2] - coarse) / 3.0
 
 
-def _march(scene: Scene, grid: Floats, start: Start, factor: float, count: int) -> Floats:
+def _grid(scene: Scene, elements: int) -> Floats:
+    """Return about `elements` + 1 nodes [m], evenly spaced between the grasps, each of which is a node."""
+    length = scene.cable.length
+    breaks = sorted({0.0, length, *(g.u for g in scene.grasps)})
+    counts = [max(1, round((b - a) * elements / length)) for a, b in pairwise(breaks)]
+    parts = [a + (b - a) / n * np.arange(n) for (a, b), n in zip(pairwise(breaks), counts, strict=True)]
+    return np.concatenate([*parts, [length]])
+
+
+def _start(scene: Scene, grid: Floats) -> Floats:
+    """Return the start at the nodes (n, 3) [m]."""
+    shape = scene.shape
+    if not isinstance(shape, Straight):
+        return start_of(scene, grid).positions
+    along = np.asarray(shape.direction)
+    return np.asarray(shape.start) + grid[:, None] * (along / np.sqrt(along @ along))
+
+
+def _march(scene: Scene, grid: Floats, start: Floats, factor: float, count: int) -> Floats:
     cable, horizon = scene.cable, float(scene.horizon or 0.0)
-    axes = list(plane_of(scene, start))
+    gravity = np.asarray(scene.environment.gravity)
+    held = np.array([np.argmin(np.abs(grid - g.u)) for g in scene.grasps], dtype=np.int64)
+    t = np.linspace(0.0, horizon, count)
+    times = np.concatenate([t, t - PEEK, t + PEEK])
+    paths = np.empty((len(times), len(held), 3))
+    for c, grasp in enumerate(scene.grasps):
+        paths[:, c] = grasp.path.at(times, start[held[c]])
+    path, before, after = paths[:count], paths[count : 2 * count], paths[2 * count :]
+    slope = (after - before) / (2.0 * PEEK)
+    slope[0] = slope[-1] = 0.0  # paths start and end at rest, where the difference is one-sided
+    axes = _moving(start, paths, gravity)
     axial, bending = factor * cast(float, cable.axial_stiffness), cast(float, cable.bending_stiffness)
     h = np.diff(grid)
     cells = 0.5 * (np.append(h, 0.0) + np.append(0.0, h))
     short = h.min()
     fastest = np.sqrt((4.0 * axial / short**2 + 16.0 * bending / short**4) / cable.linear_density)
     steps = int(np.ceil(horizon / (count - 1) / (SAFETY * 2.0 / fastest)))
-    t = np.linspace(0.0, horizon, count)
-    held = np.array([np.argmin(np.abs(grid - g.u)) for g in scene.grasps], dtype=np.int64)
-    origins = [start.positions[node] for node in held]
-    path = np.stack([g.path.at(t, o)[:, axes] for g, o in zip(scene.grasps, origins, strict=True)], axis=1)
-    around = np.concatenate([t - PEEK, t + PEEK])
-    near = np.stack([g.path.at(around, o)[:, axes] for g, o in zip(scene.grasps, origins, strict=True)], axis=1)
-    slope = (near[count:] - near[:count]) / (2.0 * PEEK)
-    slope[0] = slope[-1] = 0.0  # paths start and end at rest, where the difference is one-sided
     out = np.empty((count, len(axes), len(grid)))
-    gravity = np.asarray(scene.environment.gravity)[axes]
     (march_plane if len(axes) == 2 else march_space)(
-        np.ascontiguousarray(start.positions[:, axes].T),
+        np.ascontiguousarray(start[:, axes].T),
         horizon / (count - 1) / steps,
         steps,
         h,
@@ -103,13 +122,22 @@ def _march(scene: Scene, grid: Floats, start: Start, factor: float, count: int) 
         bending,
         cable.linear_density,
         scene.environment.drag,
-        gravity,
+        gravity[axes],
         held,
-        path,
-        slope,
+        np.ascontiguousarray(path[..., axes]),
+        np.ascontiguousarray(slope[..., axes]),
         out,
     )
     positions = np.empty((count, len(grid), 3))
-    positions[:] = start.positions[0]
+    positions[:] = start[0]
     positions[..., axes] = out.transpose(0, 2, 1)
     return positions
+
+
+def _moving(positions: Floats, paths: Floats, gravity: Floats) -> list[int]:
+    """Return the coordinates that move: two where start (n, 3), paths (k, held, 3) and gravity leave one out."""
+    for axis in (2, 1, 0):
+        reached = np.append(paths[..., axis], positions[:, axis])
+        if gravity[axis] == 0.0 and reached.max() - reached.min() < 1e-12:
+            return [a for a in range(3) if a != axis]
+    return [0, 1, 2]
