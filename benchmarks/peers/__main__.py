@@ -28,8 +28,8 @@ from benchmarks.peers.search import TOLERANCES, Peer, best, measure, search
 from dlocore import warm_up
 
 PEERS: tuple[tuple[Peer, str], ...] = (  # with the package each needs
-    (Spline("march", 4.0), "numpy"),
-    (Spline("spacetime", 4.0), "numpy"),
+    (Spline("march", 8.0), "numpy"),
+    (Spline("spacetime", 16.0), "numpy"),
     (Asked(), "numpy"),
     (ExplicitRod(), "numpy"),
     (Chain(), "mujoco-core"),

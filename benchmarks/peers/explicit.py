@@ -26,7 +26,7 @@ class ExplicitRod:
     """The tuned explicit rod, alone or extrapolated."""
 
     name = "explicit rod"
-    budget = 4.0
+    budget = 8.0
 
     def knobs(self, case: Case) -> dict[str, tuple[Value, ...]]:
         """Return numbers of elements, axial stiffnesses and whether to extrapolate; no twist."""
