@@ -15,19 +15,22 @@ from benchmarks.peers.mujoco_steps import COUNTS, STEPS, Followers, advance, car
 from benchmarks.peers.search import Setting, Value
 from benchmarks.rod_scene import plane_of
 
+STRETCHES = 100.0  # [N]: with 64 N stretching moves the planar cases by up to 0.5 mm, with 640 N by 0.03 mm
 THICK = 1.0 / 8.0  # of a link's length: half the sides of its equivalent box, for a drag torque near c l^3/12
 
 
 class Chain:
-    """The chain; its links are rigid along themselves too, which moves these cables by less than 0.1 mm."""
+    """The chain of rigid links, for cables that stretch enough to notice also of links on axial springs."""
 
     name = "MuJoCo chain"
     budget = 20.0
 
     def knobs(self, case: Case) -> dict[str, tuple[Value, ...]]:
-        """Return integrators, numbers of links, and steps in each of 32 intervals."""
+        """Return integrators, link kinds, numbers of links, and steps in each of 32 intervals."""
+        stretches = cast(float, case.scene.cable.axial_stiffness) < STRETCHES
         return {
             "integrator": ("discrete", "RK4", "Euler"),
+            "links": ("rigid", "springs") if stretches else ("rigid",),
             "elements": even_counts(case, COUNTS),
             "steps": STEPS,
         }
@@ -77,7 +80,7 @@ class _Recorder:
 def _document(case: Case, frame: Frame, setting: Setting, flat: bool) -> str:
     """Return the model: links named by their edge, those after the root first, then those before it."""
     cable = case.scene.cable
-    EI = cast(float, cable.bending_stiffness)
+    EI, EA = cast(float, cable.bending_stiffness), cast(float, cable.axial_stiffness)
     edges = len(frame.nodes) - 1
     h = cable.length / edges
     mass = cable.linear_density * h
@@ -87,8 +90,11 @@ def _document(case: Case, frame: Frame, setting: Setting, flat: bool) -> str:
     turn = '<joint type="hinge" axis="0 0 1" ' if flat else '<joint type="ball" '
 
     def link(edge: int, side: int, place: float, stiffness: float) -> str:
+        # what stretches is the step to a link's far neighbour: the two at the root have none
+        springs = setting["links"] == "springs" and place != 0.0
+        slide = f'<joint type="slide" axis="{side} 0 0" stiffness="{EA / h:.12g}"/>' if springs else ""
         return (
-            f'<body name="link{edge}" pos="{place:.12g} 0 0">{turn}stiffness="{stiffness:.12g}"/>'
+            f'<body name="link{edge}" pos="{place:.12g} 0 0">{slide}{turn}stiffness="{stiffness:.12g}"/>'
             f'<inertial pos="{0.5 * side * h:.12g} 0 0" mass="{mass:.12g}" diaginertia="{inertia}"/>'
         )
 

@@ -1,16 +1,16 @@
 """The tables and the plot of a comparison, from its trials."""
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.peers.cases import Case
 from benchmarks.peers.search import TOLERANCES, Trial, best
 
 OURS = ("dlocore march", "dlocore spacetime")  # the ratios are to the faster of the two
 FINE = np.geomspace(2e-2, 1e-4, 24)  # [m]: tolerances of the plot's curves
+SHORT = 1e-4  # [s]: a set-up below it is none
+MARKS = ("<!-- results -->", "<!-- end of results -->")
 COLOURS = {  # Okabe-Ito
     "dlocore march": "#0072B2",
     "dlocore spacetime": "#56B4E9",
@@ -23,14 +23,25 @@ COLOURS = {  # Okabe-Ito
 
 
 class Results:
-    """All trials of all peers, and the repeated measurements of the winners."""
+    """What a comparison found, as it is stored: all trials of all peers, and the repeated timings of the winners."""
 
-    def __init__(self, cases: Iterable[Case], names: Iterable[str]) -> None:
-        self.families = {case.name: case.family for case in cases}
-        self.names = list(names)
-        self.trials: list[Trial] = []
+    def __init__(self, content: dict[str, Any]) -> None:
+        self.families: dict[str, str] = {case["name"]: case["family"] for case in content["cases"]}
+        self.names: list[str] = content["peers"]
+        self.trials = [Trial(**_read(t)) for t in content["trials"]]
         self.winners: dict[tuple[str, str, float], Trial] = {}
-        self.impossible: set[tuple[str, str]] = set()  # (case, peer)
+        for stored in content["winners"]:
+            trial = Trial(**_read({k: v for k, v in stored.items() if k != "tolerance"}))
+            self.winners[trial.case, trial.peer, stored["tolerance"]] = trial
+        tried = {(t.case, t.peer) for t in self.trials}
+        self.impossible = {(c, p) for c in self.families for p in self.names if (c, p) not in tried}
+        packages = ", ".join(f"{name} {found}" for name, found in content["versions"].items() if found)
+        machine = content["machine"]
+        self.machine = (
+            f"{machine['processor']}, Python {machine['Python']}, {packages}, commit {machine['commit']}, "
+            f"budget {content['budget']:g}"
+        )
+        self.checks = _checks(content["cases"])
 
     def seconds(self, case: str, peer: str, tolerance: float) -> float:
         """Return the median time [s] of a peer's best setting; infinity where the tolerance was not reached."""
@@ -44,7 +55,7 @@ class Results:
     def cell(self, cases: list[str], peer: str, tolerance: float) -> str:
         """Return the median time over some cases with the median of the ratios to ours, or why there is none."""
         if all((case, peer) in self.impossible for case in cases):
-            return "cannot"
+            return "left out"
         times = [self.seconds(case, peer, tolerance) for case in cases]
         missing = int(np.sum(~np.isfinite(times)))
         if missing:
@@ -93,7 +104,33 @@ class Results:
                 times[i, j] = np.nan if found is None else found.seconds
         return np.median(times, axis=0)
 
-    def plot(self, file: Path, caption: str) -> None:
+    def setups(self) -> str:
+        """Return the median set-up time of every peer's winners that has one."""
+        parts = []
+        for peer in self.names:
+            times = [t.setup for (_, name, _), t in self.winners.items() if name == peer]
+            if times and np.median(times) > SHORT:
+                parts.append(f"{peer} {1e3 * float(np.median(times)):.2g} ms")
+        return "Set-up apart, medians: " + ", ".join(parts) + "." if parts else "No peer has a set-up of its own."
+
+    def text(self) -> str:
+        """Return the tables and what they say, in Markdown, for the page of the documentation."""
+        return "\n\n".join(
+            [
+                self.table(families=True),
+                "\n".join(f"- {line}." for line in self.wins()),
+                f"{self.setups()} {self.checks} {self.machine}.",
+            ]
+        )
+
+    def publish(self, page: Path, picture: Path) -> None:
+        """Write the picture, and the tables between the marks of a page of the documentation."""
+        before, rest = page.read_text().split(MARKS[0])
+        after = rest.split(MARKS[1])[1]
+        page.write_text(f"{before}{MARKS[0]}\n\n{self.text()}\n\n{MARKS[1]}{after}")
+        self.plot(picture)
+
+    def plot(self, file: Path) -> None:
         """Draw the work-precision diagram: one panel a kind of case, one curve a peer."""
         import matplotlib
 
@@ -117,7 +154,7 @@ class Results:
         axes[0, 0].set_ylabel("processor time [ms]")
         axes[0, 0].legend(fontsize=8, loc="upper left")
         figure.suptitle(self.headline(), fontsize=11)
-        figure.text(0.5, 0.005, caption, ha="center", fontsize=7)
+        figure.text(0.5, 0.005, f"python -m benchmarks.peers; {self.machine}", ha="center", fontsize=7)
         figure.tight_layout(rect=(0, 0.03, 1, 1))
         file.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(file, dpi=110)
@@ -134,3 +171,23 @@ class Results:
             if known:
                 parts.append(f"{peer} {np.median(known):.2g}x")
         return "Time at equal error, median against dlocore: " + ", ".join(parts)
+
+
+def _checks(cases: list[dict[str, Any]]) -> str:
+    """Return what the references are worth, and what it matters that some peers do not stretch."""
+    moved, apart = (1e3 * max(case[name] for case in cases) for name in ("uncertainty", "check"))
+    text = f"The last refinement moved the references by at most {moved:.2g} mm, "
+    text += f"and a fine march is within {apart:.2g} mm of them."
+    stretches: dict[str, float] = {}
+    for case in cases:
+        if case["stretch"] is not None:
+            stretches[case["family"]] = max(case["stretch"], stretches.get(case["family"], 0.0))
+    if stretches:
+        listed = ", ".join(f"{1e3 * most:.2g} mm ({family})" for family, most in stretches.items())
+        text += f" A cable that does not stretch moves otherwise by up to {listed}."
+    return text
+
+
+def _read(stored: dict[str, Any]) -> dict[str, Any]:
+    """Return a stored trial with infinity where an error is missing: JSON has none."""
+    return {k: np.inf if v is None else v for k, v in stored.items()}
