@@ -77,22 +77,19 @@ class Results:
         return "\n".join(rows)
 
     def wins(self) -> list[str]:
-        """Return a line for every peer that is faster than ours somewhere, and where."""
+        """Return a line for every peer: in how many cases it is faster than ours, and at which tolerances."""
         lines = []
         for peer in self.names:
             if peer.startswith("dlocore"):
                 continue
-            faster = [
-                (case, tolerance)
-                for case in self.families
+            counts = [
+                sum(self.seconds(case, peer, tolerance) < self.ours(case, tolerance) for case in self.families)
                 for tolerance in TOLERANCES
-                if self.seconds(case, peer, tolerance) < self.ours(case, tolerance)
             ]
             places = len(self.families) * len(TOLERANCES)
-            where = "; ".join(f"{case} at {1e3 * tol:g} mm" for case, tol in faster)
-            lines.append(
-                f"{peer} is faster than dlocore in {len(faster)} of {places}" + (f": {where}" if faster else "")
-            )
+            where = ", ".join(f"{n} at {1e3 * tol:g} mm" for n, tol in zip(counts, TOLERANCES, strict=True) if n)
+            count = f"{peer} is faster than dlocore in {sum(counts)} of {places}"
+            lines.append(f"{count}: {where}" if where else count)
         return lines
 
     def curve(self, cases: list[str], peer: str) -> np.ndarray:
@@ -172,8 +169,11 @@ class Results:
                 continue
             ratios = [self.seconds(case, peer, HEADLINE) / self.ours(case, HEADLINE) for case in self.families]
             known = [r for r in ratios if np.isfinite(r)]
-            parts.append(f"{peer} {np.median(known):.2g}" if known else f"{peer} never")
-        return f"Time for {1e3 * HEADLINE:g} mm over dlocore's, median of the cases reached:\n" + ", ".join(parts)
+            parts.append(f"{peer} {np.median(known):.2g} ({len(known)})" if known else f"{peer} never")
+        return (
+            f"Time for {1e3 * HEADLINE:g} mm over dlocore's, median of those of {len(self.families)} cases that it reaches (how many):\n"
+            + ", ".join(parts)
+        )
 
 
 def _checks(cases: list[dict[str, Any]]) -> str:

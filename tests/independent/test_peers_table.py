@@ -46,7 +46,7 @@ def test_a_cell_is_the_median_time_with_the_median_ratio_or_says_what_is_missing
 
 def test_where_a_peer_is_faster_the_text_says_so():
     text = results().text()
-    assert "MuJoCo chain is faster than dlocore in 3 of 8: plane, first at 10 mm" in text
+    assert "MuJoCo chain is faster than dlocore in 3 of 8: 1 at 10 mm, 1 at 3 mm, 1 at 1 mm" in text
     assert "PyElastica is faster than dlocore in 0 of 8" in text
 
 
