@@ -42,6 +42,11 @@ class Results:
             f"{machine['processor']}, Python {machine['Python']}, {packages}, commit {machine['commit']}, "
             f"budget {content['budget']:g}"
         )
+        self.hurry = (
+            f" The searches had {content['budget']:g} of their time, so *not reached* often says no more than that."
+            if content["budget"] < 1.0
+            else ""
+        )
         self.checks = _checks(content["cases"])
 
     def seconds(self, case: str, peer: str, tolerance: float) -> float:
@@ -117,7 +122,7 @@ class Results:
             [
                 self.table(families=True),
                 "\n".join(f"- {line}." for line in self.wins()),
-                f"{self.setups()} {self.checks} {self.machine}.",
+                f"{self.setups()} {self.checks}{self.hurry} {self.machine}.",
             ]
         )
 
@@ -170,10 +175,8 @@ class Results:
             ratios = [self.seconds(case, peer, HEADLINE) / self.ours(case, HEADLINE) for case in self.families]
             known = [r for r in ratios if np.isfinite(r)]
             parts.append(f"{peer} {np.median(known):.2g} ({len(known)})" if known else f"{peer} never")
-        return (
-            f"Time for {1e3 * HEADLINE:g} mm over dlocore's, median of those of {len(self.families)} cases that it reaches (how many):\n"
-            + ", ".join(parts)
-        )
+        reached = f"median of those of {len(self.families)} cases that it reaches (how many)"
+        return f"Time for {1e3 * HEADLINE:g} mm over dlocore's, {reached}:\n" + ", ".join(parts)
 
 
 def _checks(cases: list[dict[str, Any]]) -> str:
