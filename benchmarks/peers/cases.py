@@ -72,11 +72,6 @@ class Case:
         """Material coordinates (101,) [m] at which motions are compared."""
         return np.linspace(0.0, self.scene.cable.length, SAMPLES_U)
 
-    def error(self, positions: Floats) -> float:
-        """Return the largest distance [m] of sampled positions (33, 101, 3) [m] to the truth; infinity for NaN."""
-        away = np.linalg.norm(positions - self.truth, axis=-1)
-        return float(away.max()) if np.isfinite(away).all() else np.inf
-
     def of_nodes(self, nodes: Floats, positions: Floats) -> Floats:
         """Return (33, 101, 3) [m] of positions (33, n, 3) [m] at nodes (n,) [m], each grasp being a node."""
         return rod.sample(self.scene, nodes, positions, self.places)
