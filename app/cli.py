@@ -1,4 +1,4 @@
-"""The command line: ``dlo serve``, ``dlo predict``, ``dlo warmup``."""
+"""The command line: ``dlo serve``, ``dlo predict``, ``dlo calibrate``, ``dlo warmup``."""
 
 import argparse
 import sys
@@ -40,6 +40,15 @@ def parser() -> argparse.ArgumentParser:
     predict.add_argument("--json", metavar="OUT.json", help='write the whole answer, "-" for standard output')
     predict.add_argument("--rrd", metavar="OUT.rrd", help="write a recording for rerun, and its layout as OUT.rbl")
     predict.set_defaults(run=lambda o: commands.predict(o.scene, npz=o.output, json=o.json, rrd=o.rrd))
+
+    calibrate = subcommands.add_parser(
+        "calibrate",
+        help="measure what accuracy costs in time on this machine",
+        description="Measure errors and times of both methods on this machine and keep them in the data directory.",
+    )
+    calibrate.add_argument("--repeats", type=int, default=5, help="timed calls of each solve, at most (default 5)")
+    calibrate.add_argument("--json", metavar="OUT.json", help="write them to this file instead")
+    calibrate.set_defaults(run=lambda o: commands.calibrate(repeats=o.repeats, json=o.json))
 
     warmup = subcommands.add_parser(
         "warmup", help="compile the solver", description="Compile the solver now, so that the first solve is fast."

@@ -84,6 +84,32 @@ def predict(scene: str, *, npz: str | None, json: str | None, rrd: str | None) -
     return 0 if prediction.status == "converged" else NOT_CONVERGED
 
 
+def calibrate(*, repeats: int, json: str | None) -> int:
+    """Measure this machine, keep the result, and print it."""
+    from tqdm import tqdm
+
+    from dlocore import calibration
+
+    if repeats < 1:
+        raise CommandError(f"--repeats: got {repeats}. Allowed: at least 1.")
+    path = _settings().data_dir / calibration.FILE if json is None else Path(json)
+    with tqdm(desc="calibrating", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
+
+        def show(done: int, total: int, what: str) -> None:
+            bar.total = total
+            bar.set_postfix_str(what)
+            bar.update(done - bar.n)
+
+        found = calibration.measure(repeats=repeats, on_progress=show)
+    try:
+        found.save(path)
+    except OSError as error:
+        raise CommandError(f"can't write {path}: {error.strerror}", exit_code=1) from None
+    print(calibration.table(found))
+    print(f"kept in {path}", file=sys.stderr)
+    return 0
+
+
 def warmup() -> int:
     """Compile the solver."""
     from dlocore import warm_up

@@ -52,7 +52,7 @@ async def _follow(job: Job, service: Service, seen: int, emit: Emit) -> None:
         elif isinstance(news, str):
             await emit(_state(job.id, news))
         else:
-            await emit(_event("iteration", orjson.dumps(news), news["number"]))
+            await emit(_event(job.EVENT, orjson.dumps(news), news["number"]))
     document = await anyio.to_thread.run_sync(service.document, job.id, job) if job.state == "done" else None
     if document is not None:
         await emit(_event("done", document, len(job.iterations)))
