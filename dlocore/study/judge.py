@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from dlocore.front import predict
 from dlocore.prediction import Prediction, Status
 from dlocore.scene import Quality, Scene
+from dlocore.study.timing import clock
 
 Floats = NDArray[np.float64]
 
@@ -40,18 +41,26 @@ def positions_of(prediction: Prediction) -> Floats:
     return np.ascontiguousarray(prediction.surface.sample(*SAMPLES)[2][..., :3])
 
 
-def finest_march(scene: Scene, *, still: float = STILL, cancelled: Callable[[], bool] | None = None) -> Truth:
+def finest_march(
+    scene: Scene,
+    *,
+    still: float = STILL,
+    patience: float = np.inf,
+    cancelled: Callable[[], bool] | None = None,
+) -> Truth:
     """March on finer and finer grids until a refinement moves the motion by less than `still` of the length.
 
     Args:
         scene: whose motion; its quality is not regarded.
         still: where to stop, as a part of the cable's length.
+        patience: no finer grid once the marches have taken so long [s].
         cancelled: asked within the solves; where it returns True they stop.
 
     Raises:
         SceneError: the scene can't be solved.
         Cancelled: `cancelled` returned True.
     """
+    began = clock()
     before: Floats | None = None
     moved = np.inf
     for n_u, n_t in GRIDS:
@@ -61,6 +70,8 @@ def finest_march(scene: Scene, *, still: float = STILL, cancelled: Callable[[], 
         if before is not None:
             moved = float(np.linalg.norm(positions - before, axis=-1).max())
         if moved < still * scene.cable.length and prediction.status == "converged":
+            break
+        if clock() - began > patience:
             break
         before = positions
     return Truth(positions=positions, moved=moved, n_u=n_u, n_t=n_t, status=prediction.status)
