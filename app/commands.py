@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from app.fields import BadField, bad_fields
 from app.schemas import PredictionRequest, from_prediction, to_scene
 from app.settings import Settings
-from dlocore import Iteration, Prediction, SceneError
+from dlocore import Iteration, Prediction, Scene, SceneError
 
 BAD_INPUT, NOT_CONVERGED = 2, 3
 
@@ -171,15 +171,25 @@ def _words(fields: list[BadField]) -> str:
     return "\n     ".join(lines)
 
 
+def read_scene(file: str) -> Scene:
+    """Return the scene of a JSON file, "-" for standard input."""
+    try:
+        return to_scene(_request(_read(file)), _stored)
+    except SceneError as error:
+        raise CommandError(_words([BadField.from_scene_error(error)])) from None
+
+
+def _stored(id: str) -> Any:
+    from app.runs import RunStore
+
+    return RunStore(_settings()).motion(id)
+
+
 def _solve(request: PredictionRequest) -> Prediction:
     from tqdm import tqdm
 
-    from app.runs import RunStore
     from dlocore import predict as solve
     from dlocore import warm_up
-
-    def stored(id: str) -> Any:
-        return RunStore(_settings()).motion(id)
 
     with tqdm(desc="solving", unit=" iterations", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
 
@@ -188,7 +198,7 @@ def _solve(request: PredictionRequest) -> Prediction:
             bar.update()
 
         try:
-            scene = to_scene(request, stored)
+            scene = to_scene(request, _stored)
             warm_up()  # so that the reported time is that of the solve
             return solve(scene, on_iteration=show)
         except SceneError as error:

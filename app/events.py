@@ -70,6 +70,11 @@ def of_document(document: bytes, seen: int = 0) -> Response:
     return Response(b"".join(pieces), media_type=EVENTS, headers=_HEADERS)
 
 
+def of_finished(id: str, document: bytes) -> Response:
+    """Return the events of a measurement that ended in an earlier life of the service."""
+    return Response(_state(id, "done") + _event("done", document), media_type=EVENTS, headers=_HEADERS)
+
+
 def seen_before(last_event_id: str | None) -> int:
     """Return how many iterations a client has seen by its ``Last-Event-ID``; 0 where that makes no sense."""
     given = (last_event_id or "").strip()

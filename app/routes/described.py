@@ -14,6 +14,7 @@ PREFER = (
 _BINARY = {"schema": {"type": "string", "format": "binary"}}
 _PREDICTION = {"$ref": "#/components/schemas/PredictionResponse"}
 _JOB = {"$ref": "#/components/schemas/JobResponse"}
+_MEASUREMENT = {"$ref": "#/components/schemas/MeasurementResponse"}
 _EVENTS = {
     "itemSchema": {
         "type": "object",
@@ -86,7 +87,6 @@ FOLLOW: Responses = {
     **failures(401, 404, 406),
 }
 
-_MEASUREMENT = {"$ref": "#/components/schemas/MeasurementResponse"}
 _PROGRESS = {
     "itemSchema": {
         "type": "object",
@@ -107,6 +107,17 @@ MEASURE: Responses = {
         "headers": _location("the result, once it is measured"),
     },
     **failures(401, 406, 503),
+}
+STUDY: Responses = {**MEASURE, **failures(413, 415, 422, 429)}
+READ_STUDY: Responses = {
+    202: {"description": "It has no result: not yet, or not any more.", "content": {JSON: {"schema": _MEASUREMENT}}},
+    **failures(401, 404, 406),
+}
+REMOVE_STUDY: Responses = {
+    200: {"description": "It was under way and is cancelled.", "content": {JSON: {"schema": _MEASUREMENT}}},
+    202: {"description": "It stops soon.", "content": {JSON: {"schema": _MEASUREMENT}}},
+    204: {"description": "It is removed."},
+    **failures(401, 404),
 }
 STOP: Responses = {
     200: {"description": "It was under way and is cancelled.", "content": {JSON: {"schema": _MEASUREMENT}}},

@@ -12,7 +12,8 @@ from dlocore.scene import Environment, Grasp, Hold, Points, Scene, Straight, Tab
 GRASPS = (0.0, 0.25, 0.5, 0.8)  # [m] of the paper's case
 
 
-def _cord(**changes: float) -> Cable:
+def plain_cord(**changes: float) -> Cable:
+    """Return the cable of the paper's case, with the given fields replaced."""
     values = {"length": 1.0, "diameter": 0.005, "linear_density": 0.05, "bending_stiffness": 1e-3}
     return Cable(**(values | changes))
 
@@ -20,7 +21,7 @@ def _cord(**changes: float) -> Cable:
 def paper_case(grasp: float, **table: float) -> Scene:
     """Return the paper's case: a straight cable on a table that a gripper at `grasp` [m] moves sideways."""
     return Scene(
-        cable=_cord(),
+        cable=plain_cord(),
         shape=Straight(),
         grasps=(Grasp(u=grasp, path=Move(displacement=(0.0, 0.5, 0.0), duration=1.6)),),
         environment=Environment(drag=0.05, table=Table(**table)),
@@ -34,7 +35,7 @@ def hanging(hold: Hold = "point") -> Scene:
     arc = radius * np.column_stack([np.sin(angle) - np.sin(angle[0]), 0 * angle, np.cos(angle[0]) - np.cos(angle)])
     end = Move(displacement=(-0.2, 0.2, 0.1), duration=1.0)
     return Scene(
-        cable=_cord(torsional_stiffness=1e-3),
+        cable=plain_cord(torsional_stiffness=1e-3),
         shape=Points(points=arc, settle=True),
         grasps=(Grasp(u=0.0, hold=hold), Grasp(u=1.0, hold=hold, path=end)),
         environment=Environment(drag=0.1),
@@ -54,6 +55,6 @@ def effect_scenes() -> dict[str, Scene]:
     return {
         "friction": paper_case(0.25, friction=0.1),
         "obstacles": replace(plain, environment=replace(plain.environment, obstacles=(peg,))),
-        "plasticity": replace(plain, cable=_cord(yield_strain=0.004, memory_rate=50.0)),
+        "plasticity": replace(plain, cable=plain_cord(yield_strain=0.004, memory_rate=50.0)),
         "self_contact": replace(plain, effects={"self_contact": "on"}),
     }
