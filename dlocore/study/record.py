@@ -81,7 +81,7 @@ class Scaled:
         variable: "n_u", "n_t", "horizon" or "grasps".
         value: of it; the horizon in s.
         method: how it was solved.
-        wall_time: the median of the repeats, of an iteration where the method iterates [s].
+        wall_time: the median of the repeats; of an iteration alone where the method iterates [s].
         spread: half the width that holds half of the repeats [s].
     """
 

@@ -119,22 +119,21 @@ class _Measuring:
 
     def scaling(self) -> tuple[Scaled, ...]:
         """Measure the cost against the size of a problem."""
-        found = []
+        found: list[Scaled] = []
+        marches: dict[tuple[str, float], float] = {}  # measured before the solves that begin with them
         for size in self._sizes:
             method = size.scene.quality.method
             self.next(f"cost against {size.variable} = {size.value:g}: {method}")
             prediction, times = self._solved(size.scene)
-            # how many iterations a solve takes is no matter of its size
-            count = len(prediction.iterations) if method == "spacetime" else 1
-            found.append(
-                Scaled(
-                    variable=size.variable,
-                    value=float(size.value),
-                    method=method,
-                    wall_time=times.median / count,
-                    spread=times.spread / count,
-                )
-            )
+            key = (size.variable, float(size.value))
+            count, before = 1, 0.0
+            if method == "march":
+                marches[key] = times.median
+            else:  # how many iterations a solve takes is no matter of its size
+                count, before = len(prediction.iterations), marches[key]
+            if times.median > before:
+                time, spread = (times.median - before) / count, times.spread / count
+                found.append(Scaled(variable=key[0], value=key[1], method=method, wall_time=time, spread=spread))
         return tuple(found)
 
     def effects(self) -> tuple[EffectCost, ...]:

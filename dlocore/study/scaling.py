@@ -7,14 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from dlocore.obstacles import Cylinder
-from dlocore.paths import Move, Still, Waypoints
-from dlocore.scene import Environment, Grasp, Method, Quality, Scene, Straight, Switch, Table
+from dlocore.paths import Move, Waypoints
+from dlocore.scene import Environment, Grasp, Method, Points, Quality, Scene, Straight, Switch, Table
 from dlocore.study.scenes import hanging, paper_case, plain_cord
 
-N_U = (9, 13, 17, 25, 33, 49)
-N_T = (13, 25, 49, 97)
-HORIZONS = (2.0, 4.0, 8.0, 16.0)  # [s]
-GRASPS = (1, 2, 4, 8)
+N_U = (9, 13, 17, 25, 33, 49, 65, 97, 129)
+N_T = (13, 25, 49, 97, 193, 385)
+HORIZONS = (2.0, 4.0, 8.0, 16.0, 32.0)  # [s]
+GRASPS = (1, 2, 4, 8, 16)
 _EFFECT_GRID = {"n_u": 17, "n_t": 25}
 
 
@@ -37,11 +37,13 @@ def _swung(horizon: float) -> Scene:
 
 
 def _held(count: int) -> Scene:
-    """Return the paper's case with further grippers that hold the cable where it starts, evenly spaced."""
-    plain = paper_case(0.0)
-    grasps = [Grasp(u=u, path=Still()) for u in np.linspace(0.2, 1.0, 8)[-count + 1 :]] if count > 1 else []
-    moved = Grasp(u=0.0, path=Move(displacement=(0.0, 0.05, 0.0), duration=1.6))
-    return replace(plain, grasps=(moved, *grasps))
+    """Return a bent cable on a table that `count` grippers, evenly spaced, move sideways together."""
+    angle = np.linspace(0.0, 1.0, 41)  # [rad]: bent, each part between two grippers is slack
+    arc = np.column_stack([np.sin(angle), 1.0 - np.cos(angle)])
+    path = Move(displacement=(0.0, 0.3, 0.0), duration=1.6)
+    grasps = tuple(Grasp(u=float(u), path=path) for u in np.linspace(0.0, 1.0, count))
+    around = Environment(drag=0.05, table=Table())
+    return Scene(cable=plain_cord(), shape=Points(points=arc), grasps=grasps, environment=around)
 
 
 def sizes() -> Iterator[Size]:
@@ -52,7 +54,7 @@ def sizes() -> Iterator[Size]:
 
     methods: tuple[Method, ...] = ("march", "spacetime")
     for method in methods:
-        most = 33 if method == "spacetime" else 49
+        most = 49 if method == "spacetime" else 129
         for n_u in N_U:
             if n_u <= most:
                 yield Size("n_u", n_u, asked(paper_case(0.25), method, n_u, 25))
@@ -61,7 +63,7 @@ def sizes() -> Iterator[Size]:
         for horizon in HORIZONS:
             yield Size("horizon", horizon, asked(_swung(horizon), method, 13, round(12 * horizon) + 3))
         for count in GRASPS:
-            yield Size("grasps", count, asked(_held(count), method, 25, 25))
+            yield Size("grasps", count, asked(_held(count), method, 33, 25))
 
 
 def effect_pairs() -> Iterator[tuple[str, Scene, Scene]]:

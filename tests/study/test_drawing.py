@@ -8,7 +8,7 @@ pytest.importorskip("matplotlib")
 
 from matplotlib.figure import Figure
 
-from dlocore.study import drawing
+from dlocore.study import accuracy_plots, cost_plots, drawing
 from dlocore.study.record import EffectCost, Run, Scaled, Step, Study
 
 
@@ -38,7 +38,14 @@ def study(**parts: object) -> Study:
 
 
 @pytest.mark.parametrize(
-    "draw", [drawing.work_precision, drawing.convergence, drawing.phases, drawing.effect_costs, drawing.scaling]
+    "draw",
+    [
+        accuracy_plots.work_precision,
+        accuracy_plots.convergence,
+        cost_plots.phases,
+        cost_plots.effect_costs,
+        cost_plots.scaling,
+    ],
 )
 def test_every_axis_has_a_quantity_with_its_unit_and_a_title(draw: object) -> None:
     figure: Figure = draw(study())  # type: ignore[operator]
@@ -50,13 +57,13 @@ def test_every_axis_has_a_quantity_with_its_unit_and_a_title(draw: object) -> No
 
 
 def test_the_title_names_the_fastest_way_to_a_millimetre() -> None:
-    (axes,) = drawing.work_precision(study()).axes
+    (axes,) = accuracy_plots.work_precision(study()).axes
     # 0.1/n^2 m: 0.35 mm at n = 17 in 1e-5 17^2 s = 2.9 ms, which 9 (1.2 mm) does not reach
     assert "1 mm in 2.9 ms by march" in axes.get_title()
 
 
 def test_the_exponents_in_the_titles_are_those_of_the_data() -> None:
-    assert all("1.50 (march)" in axes.get_title() for axes in drawing.scaling(study()).axes)
+    assert all("1.50 (march)" in axes.get_title() for axes in cost_plots.scaling(study()).axes)
 
 
 def test_only_what_was_measured_is_drawn(tmp_path: Path) -> None:
@@ -68,7 +75,7 @@ def test_only_what_was_measured_is_drawn(tmp_path: Path) -> None:
 
 def test_runs_that_did_not_converge_are_on_no_front() -> None:
     lost = study(runs=tuple(run("march", n, 1e-3, 1e-3, status="stalled") for n in (9, 17)))
-    (axes,) = drawing.work_precision(lost).axes
+    (axes,) = accuracy_plots.work_precision(lost).axes
     assert "nothing converged" in axes.get_title()
-    (axes,) = drawing.convergence(study(runs=(run("spacetime", 9, 1e-3, 1.0, status="max_iterations"),))).axes
+    (axes,) = accuracy_plots.convergence(study(runs=(run("spacetime", 9, 1e-3, 1.0, status="max_iterations"),))).axes
     assert "0 of 1" in axes.get_title()

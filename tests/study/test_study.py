@@ -177,13 +177,16 @@ def test_a_study_stops_when_asked() -> None:
 
 
 def test_sizes_and_effects_are_solvable_and_differ_in_what_they_say() -> None:
-    first = {}
+    least_and_most = {}
     for size in sizes():
         key = (size.variable, size.scene.quality.method)
-        first.setdefault(key, size)
-    assert len(first) == 8
-    for size in first.values():
-        assert predict(size.scene).status == "converged", size.variable
+        least_and_most[key] = (least_and_most.get(key, (size,))[0], size)
+    assert len(least_and_most) == 8
+    for least, most in least_and_most.values():
+        assert least.value < most.value
+        assert predict(least.scene).status == "converged", least
+        march = replace(most.scene, quality=replace(most.scene.quality, method="march"))
+        assert predict(march).status == "converged", most
     for effect, present, absent in effect_pairs():
         made = [{e.name for e in predict(scene).effects if e.active} for scene in (present, absent)]
         assert effect in made[0], effect
