@@ -93,7 +93,7 @@ class StudyRun(BaseModel):
     repeats: int = Field(description="Timed calls.", examples=[5])
     error: float = Field(description="Largest distance to the truth [m].", examples=[1.4e-3])
     rms: float = Field(description="Root mean square distance to the truth [m].", examples=[4e-4])
-    truth_error: float = Field(description="About the error of the truth itself [m].", examples=[1e-5])
+    truth_error: float | None = Field(description="About the error of the truth itself [m].", examples=[1e-5])
     estimate: float | None = Field(description="The error that the prediction states [m].", examples=[1.9e-3])
     iterations: list[StepModel] = Field(description="How the solve went.")
     phases: dict[str, float] = Field(description="Time by phase [s].", examples=[{"march": 0.001}])

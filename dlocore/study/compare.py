@@ -89,6 +89,8 @@ def _time(run: Run, old: Run) -> list[Change]:
 
 
 def _error(run: Run, old: Run) -> list[Change]:
+    if run.truth_error is None or old.truth_error is None:
+        return []
     most, least = max(run.error, old.error), min(run.error, old.error)
     if most <= LESS_ACCURATE * least or most - least <= run.truth_error + old.truth_error:
         return []

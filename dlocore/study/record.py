@@ -40,7 +40,7 @@ class Run:
         repeats: timed calls.
         error: largest distance to the truth over cable and time [m].
         rms: root mean square distance [m].
-        truth_error: about the error of the truth itself [m].
+        truth_error: about the error of the truth itself [m]; None where nothing tells.
         estimate: the error that the prediction states [m].
         iterations: how the solve went.
         phases: time by phase [s].
@@ -61,7 +61,7 @@ class Run:
     repeats: int
     error: float
     rms: float
-    truth_error: float
+    truth_error: float | None
     estimate: float | None
     iterations: tuple[Step, ...]
     phases: Mapping[str, float]

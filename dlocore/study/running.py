@@ -168,7 +168,7 @@ def _run(case: Case, prediction: Prediction, times: Times, truth: Truth) -> Run:
         repeats=times.repeats,
         error=float(away.max()),
         rms=float(np.sqrt((away**2).mean())),
-        truth_error=_finite(truth.moved) or 0.0,
+        truth_error=_finite(truth.moved),
         estimate=accuracy.error_estimate,
         iterations=tuple(steps),
         phases=dict(accuracy.phases),

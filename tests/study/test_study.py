@@ -118,7 +118,9 @@ def test_slower_and_less_accurate_runs_are_told_and_noise_is_not(measured: Study
     assert compare(changed(blurred, time=1.3), blurred).changes == (), "within the spread"
     worse = compare(changed(sharp, error=1.5), sharp).worse
     # but where the truth itself is too uncertain to tell
-    assert len(worse) == sum(0.5 * run.error > 2 * run.truth_error for run in sharp.runs) > 0
+    assert len(worse) == sum(0.5 * run.error > 2 * (run.truth_error or 0.0) for run in sharp.runs) > 0
+    unsure = replace(sharp, runs=tuple(replace(run, truth_error=None) for run in sharp.runs))
+    assert compare(changed(unsure, error=1.5), unsure).changes == ()
     assert {change.quantity for change in worse} == {"error"}
     lost = replace(sharp, runs=tuple(replace(run, status="stalled") for run in sharp.runs))
     assert {change.quantity for change in compare(lost, sharp).worse} == {"status"}
