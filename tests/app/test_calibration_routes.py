@@ -1,4 +1,4 @@
-"""The calibration over HTTP: none at first, measured on request, followed, stopped, read."""
+"""The calibration over HTTP and on the command line: none at first, measured on request, followed, stopped, read."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -6,9 +6,11 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
+from app import cli
 from app.main import create_app
 from app.schemas.calibration import CalibrationResponse, MeasurementResponse
 from app.settings import Settings
+from dlocore import calibration
 from dlocore.study import calibrating
 from tests.app.conftest import paper_scene, start
 from tests.app.test_bad_requests import the_problem
@@ -83,3 +85,19 @@ def test_the_stored_one_is_there_after_a_restart(fresh: TestClient, tmp_path: Pa
     data = fresh.app.state.service.settings.data_dir  # type: ignore[attr-defined]
     with TestClient(create_app(Settings(data_dir=data))) as client:
         assert client.get(ADDRESS).json()["points"]
+
+
+def test_the_command_keeps_what_it_measured_where_the_service_reads_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("DLO_DATA_DIR", str(tmp_path))
+    monkeypatch.setattr(calibrating, "GRIDS", {"march": ((9, 13), (13, 19)), "spacetime": ((9, 13),)})
+    assert cli.main(["calibrate", "--repeats", "1"]) == 0
+    printed = capsys.readouterr()
+    assert "march         9   13" in printed.out
+    assert str(tmp_path / "calibration.json") in printed.err
+    stored = calibration.load()
+    assert stored is not None
+    assert len(stored.points) == 2 * 3
+    assert cli.main(["calibrate", "--repeats", "0"]) == 2
+    assert "--repeats" in capsys.readouterr().err
