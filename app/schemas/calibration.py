@@ -32,7 +32,9 @@ class CalibrationResponse(BaseModel):
     version: str = Field(description="Version of the program that was measured.", examples=["0.1.0"])
     measured_at: str = Field(description="When, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00Z"])
     duration: float = Field(description="How long the measurement took [s].", examples=[24.3])
-    current: bool = Field(description="Whether machine and program are still those that were measured.")
+    current: bool = Field(
+        description="Whether machine and program are still those that were measured.", examples=[True]
+    )
     dimensions: int = Field(
         description="Of the motions: 2 in the plane (the paper's four grasps), 3 in space (a hanging cable).",
         examples=[2],

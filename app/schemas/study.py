@@ -103,7 +103,7 @@ class StudyRun(BaseModel):
 class ScaledModel(BaseModel):
     """The time of a solve at one size of a problem."""
 
-    variable: Literal["n_u", "n_t", "horizon", "grasps"] = Field(description="What is varied.")
+    variable: Literal["n_u", "n_t", "horizon", "grasps"] = Field(description="What is varied.", examples=["n_u"])
     value: float = Field(description="Its value.", examples=[25])
     method: str = Field(description="How it was solved.", examples=["march"])
     wall_time: float = Field(description="Time of a march, or of an iteration [s].", examples=[0.003])
@@ -129,7 +129,7 @@ class StudyResponse(BaseModel):
     duration: float = Field(description="How long it took [s].", examples=[42.0])
     judge: str = Field(description="What the errors are distances to.", examples=["march"])
     runs: list[StudyRun] = Field(description="What was measured.")
-    refused: list[str] = Field(description="Runs that the solver does not take, and why.")
+    refused: list[str] = Field(description="Runs that the solver does not take, and why.", examples=[[]])
     scaling: list[ScaledModel] = Field(description="Cost against the size of a problem.")
     effects: list[EffectCostModel] = Field(description="Cost by effect.")
 
