@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.machine import machine_line
 from app.schemas import Motion, PredictionRequest, to_scene
 from dlocore import ControlPoints, Iteration, Material, MaterialMotion, Prediction, Scene, SplineSurface
+from dlocore.machine import machine_line
 
 Floats = NDArray[np.float64]
 SCALARS = ("update", "residual", "energy", "wall_time", "damping", "step_length")  # of an iteration

@@ -1,10 +1,10 @@
-"""The command line: ``dlo serve``, ``dlo predict``, ``dlo warmup``."""
+"""The command line: ``dlo serve``, ``dlo predict``, ``dlo calibrate``, ``dlo study``, ``dlo warmup``."""
 
 import argparse
 import sys
 from collections.abc import Sequence
 
-from app import commands
+from app import commands, study_command
 
 _DESCRIPTION = "Predict how a cable moves when grippers move it."
 _EPILOG = """examples:
@@ -12,9 +12,18 @@ _EPILOG = """examples:
   dlo predict scene.json -o out.npz     the surface as NumPy arrays
   dlo predict scene.json --json -       the whole answer, as the API gives it
   dlo predict scene.json --rrd out.rrd  a recording for rerun: iterations and motion
+  dlo calibrate                         what accuracy costs in time on this machine
+  dlo study -o now.json --plots plots   the same in full, with plots
 
 Settings come from the environment, e.g. DLO_PORT=9000, DLO_DATA_DIR=/srv/dlo, DLO_WORKERS=4."""
 _EXIT = """exit codes: 0 converged; 2 bad input, named on stderr; 3 not converged (the output is still written)"""
+
+_STUDY = """examples:
+  dlo study -o now.json --plots plots             the standard study, drawn
+  dlo study -o now.json --compare before.json     what became slower or less accurate since
+  dlo study scene.json --n-u 9 13 --n-t 13 19 25  one scene on six grids
+
+exit codes: 0 done; 2 bad input; 4 with --compare: something changed for the worse"""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -41,11 +50,46 @@ def parser() -> argparse.ArgumentParser:
     predict.add_argument("--rrd", metavar="OUT.rrd", help="write a recording for rerun, and its layout as OUT.rbl")
     predict.set_defaults(run=lambda o: commands.predict(o.scene, npz=o.output, json=o.json, rrd=o.rrd))
 
+    calibrate = subcommands.add_parser(
+        "calibrate",
+        help="measure what accuracy costs in time on this machine",
+        description="Measure errors and times of both methods on this machine and keep them in the data directory.",
+    )
+    calibrate.add_argument("--repeats", type=int, default=5, help="timed calls of each solve, at most (default 5)")
+    calibrate.add_argument("--json", metavar="OUT.json", help="write them to this file instead")
+    calibrate.set_defaults(run=lambda o: commands.calibrate(repeats=o.repeats, json=o.json))
+
+    _add_study(subcommands)
+
     warmup = subcommands.add_parser(
         "warmup", help="compile the solver", description="Compile the solver now, so that the first solve is fast."
     )
     warmup.set_defaults(run=lambda options: commands.warmup())
     return top
+
+
+def _add_study(subcommands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    study = subcommands.add_parser(
+        "study",
+        help="measure what accuracy costs in time, draw it, compare it with an earlier study",
+        description="Run scenes over grids, thresholds, methods and sets of effects, and measure time and true error.",
+        epilog=_STUDY,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    study.add_argument("scenes", nargs="*", help="scenes as JSON; absent: the paper's four grasps, a hanging cable")
+    study.add_argument("-o", "--output", metavar="OUT.json", help="write the study, to be compared with later")
+    study.add_argument("--plots", metavar="FOLDER", help="draw it there (needs matplotlib, the extra `plots`)")
+    study.add_argument("--compare", metavar="OLD.json", help="tell what became slower or less accurate; exit code 4")
+    study.add_argument("--grids", nargs="+", metavar="NUxNT", help="grids, e.g. 9x13 17x25")
+    study.add_argument("--n-u", nargs="+", type=int, metavar="N", help="with --n-t: every n_u with every n_t")
+    study.add_argument("--n-t", nargs="+", type=int, metavar="N", help="with --n-u: every n_u with every n_t")
+    study.add_argument("--deltas", nargs="+", type=float, metavar="M", help="thresholds on the update [m]")
+    study.add_argument("--methods", nargs="+", metavar="NAME", help="march, spacetime, paper")
+    study.add_argument("--effects", nargs="+", metavar="SET", help="sets of effects: auto, all, or twist=off,drag=on")
+    study.add_argument("--parts", nargs="+", metavar="PART", help="runs, scaling, effects; absent: all")
+    study.add_argument("--repeats", type=int, default=5, help="timed calls of each solve, at most (default 5)")
+    study.add_argument("--estimate", action="store_true", help="estimate the errors in the solves, too")
+    study.set_defaults(run=lambda o: study_command.study(o))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from app.fields import BadField, bad_fields
 from app.schemas import PredictionRequest, from_prediction, to_scene
 from app.settings import Settings
-from dlocore import Iteration, Prediction, SceneError
+from dlocore import Iteration, Prediction, Scene, SceneError
 
 BAD_INPUT, NOT_CONVERGED = 2, 3
 
@@ -84,6 +84,32 @@ def predict(scene: str, *, npz: str | None, json: str | None, rrd: str | None) -
     return 0 if prediction.status == "converged" else NOT_CONVERGED
 
 
+def calibrate(*, repeats: int, json: str | None) -> int:
+    """Measure this machine, keep the result, and print it."""
+    from tqdm import tqdm
+
+    from dlocore import calibration
+
+    if repeats < 1:
+        raise CommandError(f"--repeats: got {repeats}. Allowed: at least 1.")
+    path = _settings().data_dir / calibration.FILE if json is None else Path(json)
+    with tqdm(desc="calibrating", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
+
+        def show(done: int, total: int, what: str) -> None:
+            bar.total = total
+            bar.set_postfix_str(what)
+            bar.update(done - bar.n)
+
+        found = calibration.measure(repeats=repeats, on_progress=show)
+    try:
+        found.save(path)
+    except OSError as error:
+        raise CommandError(f"can't write {path}: {error.strerror}", exit_code=1) from None
+    print(calibration.table(found))
+    print(f"kept in {path}", file=sys.stderr)
+    return 0
+
+
 def warmup() -> int:
     """Compile the solver."""
     from dlocore import warm_up
@@ -145,15 +171,25 @@ def _words(fields: list[BadField]) -> str:
     return "\n     ".join(lines)
 
 
+def read_scene(file: str) -> Scene:
+    """Return the scene of a JSON file, "-" for standard input."""
+    try:
+        return to_scene(_request(_read(file)), _stored)
+    except SceneError as error:
+        raise CommandError(_words([BadField.from_scene_error(error)])) from None
+
+
+def _stored(id: str) -> Any:
+    from app.runs import RunStore
+
+    return RunStore(_settings()).motion(id)
+
+
 def _solve(request: PredictionRequest) -> Prediction:
     from tqdm import tqdm
 
-    from app.runs import RunStore
     from dlocore import predict as solve
     from dlocore import warm_up
-
-    def stored(id: str) -> Any:
-        return RunStore(_settings()).motion(id)
 
     with tqdm(desc="solving", unit=" iterations", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
 
@@ -162,7 +198,7 @@ def _solve(request: PredictionRequest) -> Prediction:
             bar.update()
 
         try:
-            scene = to_scene(request, stored)
+            scene = to_scene(request, _stored)
             warm_up()  # so that the reported time is that of the solve
             return solve(scene, on_iteration=show)
         except SceneError as error:

@@ -52,7 +52,7 @@ async def _follow(job: Job, service: Service, seen: int, emit: Emit) -> None:
         elif isinstance(news, str):
             await emit(_state(job.id, news))
         else:
-            await emit(_event("iteration", orjson.dumps(news), news["number"]))
+            await emit(_event(job.EVENT, orjson.dumps(news), news["number"]))
     document = await anyio.to_thread.run_sync(service.document, job.id, job) if job.state == "done" else None
     if document is not None:
         await emit(_event("done", document, len(job.iterations)))
@@ -68,6 +68,11 @@ def of_document(document: bytes, seen: int = 0) -> Response:
     pieces += [_event("iteration", orjson.dumps(shown), shown["number"]) for shown in answer["iterations"][seen:]]
     pieces.append(_event("done", document, len(answer["iterations"])))
     return Response(b"".join(pieces), media_type=EVENTS, headers=_HEADERS)
+
+
+def of_finished(id: str, document: bytes) -> Response:
+    """Return the events of a measurement that ended in an earlier life of the service."""
+    return Response(_state(id, "done") + _event("done", document), media_type=EVENTS, headers=_HEADERS)
 
 
 def seen_before(last_event_id: str | None) -> int:

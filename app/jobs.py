@@ -3,7 +3,7 @@
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from threading import Event
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import anyio
 
@@ -35,6 +35,8 @@ class Job:
         cancelled: set by `cancel`.
         finished: set at the end.
     """
+
+    EVENT: ClassVar[str] = "iteration"  # the name of an item of `iterations` among the events
 
     store: bool
     id: str = field(default_factory=new_id)

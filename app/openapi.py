@@ -6,6 +6,7 @@ from fastapi import FastAPI
 from pydantic import BaseModel
 
 from app.schemas.batch import BatchLine
+from app.schemas.calibration import MeasurementResponse
 from app.schemas.response import JobResponse, PredictionResponse, ProblemDocument, problem_document
 
 _REFERENCE = "#/components/schemas/{model}"
@@ -19,7 +20,7 @@ def install(app: FastAPI) -> None:
         if app.openapi_schema is None:
             document = described()
             schemas = document.setdefault("components", {}).setdefault("schemas", {})
-            for model in (PredictionResponse, JobResponse, BatchLine, ProblemDocument):
+            for model in (PredictionResponse, JobResponse, BatchLine, MeasurementResponse, ProblemDocument):
                 schemas.update(_schemas(model))
             for path in document["paths"].values():
                 for operation in path.values():

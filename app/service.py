@@ -16,6 +16,7 @@ from fastapi import Depends, Request
 
 from app.jobs import Job, Jobs
 from app.logs import RUN
+from app.measurements import Measurement, Measurements, Work
 from app.metrics import Metrics
 from app.problems import ProblemError, problem_of
 from app.runs import RunStore
@@ -38,6 +39,7 @@ class Service:
         worker: the worker threads.
         metrics: what is counted.
         jobs: predictions that no stored run stands for.
+        measurements: calibrations and studies under way.
         ready: whether the solver is compiled.
     """
 
@@ -46,6 +48,7 @@ class Service:
     worker: Worker
     metrics: Metrics
     jobs: Jobs = field(default_factory=Jobs)
+    measurements: Measurements = field(default_factory=Measurements)
     ready: bool = field(default=False)
     _tasks: TaskGroup | None = field(init=False, default=None)
 
@@ -79,6 +82,7 @@ class Service:
         if self.worker.admitted:
             _log.warning("cancelling what is still under way", extra={"requests": self.worker.admitted})
         self.jobs.cancel_all()
+        self.measurements.cancel_all()
         self.worker.cancel_all()
         with anyio.move_on_after(1.0):  # of the 0.1 s that a solve takes to notice
             await self.worker.idle()
@@ -136,6 +140,23 @@ class Service:
         if not job.finished.is_set():  # its scope was cancelled while it waited
             self.metrics.ended("cancelled", scene.quality.method)
             job.end("cancelled", ProblemError(503, "cancelled", "The solve was cancelled."))
+
+    def measure(self, kind: str, id: str, work: Work) -> Measurement:
+        """Take up a measurement, which gives way to predictions, and return it as it is waiting.
+
+        Args:
+            kind: what it is, the collection in its address.
+            id: its id.
+            work: measures in a thread and returns the answer as JSON.
+
+        Raises:
+            ProblemError: 503, the service is not ready or stops.
+        """
+        self.check_ready()
+        assert self._tasks is not None
+        measurement = self.measurements.add(kind, id)
+        self._tasks.start_soon(self.measurements.run, measurement, work, lambda: self.worker.admitted > 0)
+        return measurement
 
     async def _solved(self, job: Job, scene: Scene) -> Prediction:
         loop = asyncio.get_running_loop()

@@ -1,22 +1,12 @@
 """Settings of the service, from environment variables that begin with ``DLO_``."""
 
-import os
 from pathlib import Path
 from typing import Literal
 
 from pydantic import Field, SecretStr, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
-
-def default_data_dir() -> Path:
-    """Return the user's data directory for this program: ``$XDG_DATA_HOME/dlo``, else ``~/.local/share/dlo``."""
-    base = os.environ.get("XDG_DATA_HOME", "")
-    return (Path(base) if Path(base).is_absolute() else Path.home() / ".local" / "share") / "dlo"
-
-
-def usable_cores() -> int:
-    """Return how many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+from dlocore.machine import usable_cores, user_data_dir
 
 
 class Settings(BaseSettings):
@@ -26,7 +16,7 @@ class Settings(BaseSettings):
 
     host: str = Field(default="127.0.0.1", description="Address to listen on; loopback unless you say otherwise.")
     port: int = Field(default=8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one.")
-    data_dir: Path = Field(default_factory=default_data_dir, description="Directory of the stored runs.")
+    data_dir: Path = Field(default_factory=user_data_dir, description="Directory of the stored runs.")
     max_body_bytes: int = Field(default=10_000_000, ge=1_000, description="Largest request body [bytes].")
     workers: int = Field(default_factory=usable_cores, ge=1, le=1024, description="Solves that run at once.")
     queue_size: int = Field(default=64, ge=0, le=100_000, description="Solves that may wait for a worker.")

@@ -3,7 +3,7 @@
 import subprocess
 from pathlib import Path
 
-from app import machine as here
+from dlocore import machine as here
 
 
 def machine() -> dict[str, str]:

@@ -14,6 +14,7 @@ PREFER = (
 _BINARY = {"schema": {"type": "string", "format": "binary"}}
 _PREDICTION = {"$ref": "#/components/schemas/PredictionResponse"}
 _JOB = {"$ref": "#/components/schemas/JobResponse"}
+_MEASUREMENT = {"$ref": "#/components/schemas/MeasurementResponse"}
 _EVENTS = {
     "itemSchema": {
         "type": "object",
@@ -28,7 +29,7 @@ _EVENTS = {
 }
 _FAILURES = {
     401: "The service needs a bearer token.",
-    404: "There is no such run.",
+    404: "There is no such thing here, or not yet.",
     406: "None of the accepted media types is there.",
     409: "The prediction has no answer (yet), or is not stored.",
     413: "The body is too large.",
@@ -83,6 +84,48 @@ DELETE: Responses = {
 FOLLOW: Responses = {
     200: {"description": "The events.", "content": {EVENTS: _EVENTS}},
     204: {"description": "Nothing comes after the given event."},
+    **failures(401, 404, 406),
+}
+
+_PROGRESS = {
+    "itemSchema": {
+        "type": "object",
+        "properties": {
+            "event": {"enum": ["state", "progress", "done", "error"]},
+            "id": {"type": "string", "description": "Number of the event, but for `state`.", "examples": ["0"]},
+            "data": {"type": "string", "contentMediaType": JSON, "description": "JSON in one line."},
+        },
+        "required": ["event", "data"],
+    },
+    "example": 'id: 0\nevent: progress\ndata: {"number":0,"done":0,"total":99,"what":"compiling"}\n\n',
+}
+MEASURE: Responses = {
+    200: {"description": "Its progress as server-sent events.", "content": {EVENTS: _PROGRESS}},
+    202: {
+        "description": "Taken up.",
+        "content": {JSON: {"schema": _MEASUREMENT}},
+        "headers": _location("the result, once it is measured"),
+    },
+    **failures(401, 406, 503),
+}
+STUDY: Responses = {**MEASURE, **failures(413, 415, 422, 429)}
+READ_STUDY: Responses = {
+    202: {"description": "It has no result: not yet, or not any more.", "content": {JSON: {"schema": _MEASUREMENT}}},
+    **failures(401, 404, 406),
+}
+REMOVE_STUDY: Responses = {
+    200: {"description": "It was under way and is cancelled.", "content": {JSON: {"schema": _MEASUREMENT}}},
+    202: {"description": "It stops soon.", "content": {JSON: {"schema": _MEASUREMENT}}},
+    204: {"description": "It is removed."},
+    **failures(401, 404),
+}
+STOP: Responses = {
+    200: {"description": "It was under way and is cancelled.", "content": {JSON: {"schema": _MEASUREMENT}}},
+    202: {"description": "It stops soon.", "content": {JSON: {"schema": _MEASUREMENT}}},
+    **failures(401, 404),
+}
+PROGRESS: Responses = {
+    200: {"description": "The events.", "content": {EVENTS: _PROGRESS}},
     **failures(401, 404, 406),
 }
 

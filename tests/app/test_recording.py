@@ -13,9 +13,9 @@ pytest.importorskip("rerun")
 import rerun as rr
 
 from app.archive import Run
-from app.machine import machine_line
 from app.service import Service
 from dlocore import effect_forces, energies
+from dlocore.machine import machine_line
 from tests.app.conftest import paper_scene, put
 
 LOGS = ("update", "residual")

@@ -1,14 +1,24 @@
-"""What this program runs on."""
+"""What this program runs on, and where it keeps a user's data."""
 
+import os
 import platform
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
-from app.settings import usable_cores
-
 _PACKAGES = ("numpy", "scipy", "numba")
 _BARE = ("processor", "system")  # they name themselves
+
+
+def usable_cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def user_data_dir() -> Path:
+    """Return the user's data directory for this program: ``$XDG_DATA_HOME/dlo``, else ``~/.local/share/dlo``."""
+    base = os.environ.get("XDG_DATA_HOME", "")
+    return (Path(base) if Path(base).is_absolute() else Path.home() / ".local" / "share") / "dlo"
 
 
 @cache

@@ -1,0 +1,160 @@
+"""Measurements under way: calibrations and studies. They take long, run one at a time, and give way to predictions."""
+
+import asyncio
+import contextlib
+import logging
+import os
+import sys
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import anyio
+
+from app.jobs import MAX_FINISHED, Job
+from app.problems import ProblemError, document_of, problem_of
+from dlocore import Cancelled
+
+_log = logging.getLogger("dlo")
+
+Tell = Callable[[int, int, str], None]
+Work = Callable[[Tell, Callable[[], bool]], bytes]  # (progress, cancelled) -> the answer
+_NICE = 10  # how much a measurement's thread stands back
+_WAY = 5.0  # s that one part of a measurement waits for predictions, at most: it is to end at last
+_LOOK = 0.02  # s between two looks whether predictions run
+
+
+@dataclass(eq=False, kw_only=True)
+class Measurement(Job):
+    """A calibration or a study from the request to its end; `iterations` are the documents of its progress.
+
+    Attributes:
+        kind: what it is, the collection in its address.
+    """
+
+    EVENT: ClassVar[str] = "progress"
+
+    kind: str
+
+    @property
+    def address(self) -> str:
+        """Where its answer is."""
+        return "/v1/calibration" if self.kind == "calibration" else f"/v1/{self.kind}/{self.id}"
+
+    def summary(self) -> dict[str, Any]:
+        """Return its state as a document."""
+        return {
+            "id": self.id,
+            "created": self.created,
+            "state": self.state,
+            "progress": self.iterations[-1] if self.iterations else None,
+            "problem": None if self.problem is None else document_of(self.problem),
+            "links": {"self": self.address, "events": f"{self.address}/events"},
+        }
+
+
+class Measurements:
+    """The measurements under way, and the last ones that ended. Use it from the event loop."""
+
+    def __init__(self) -> None:
+        self._kept: dict[str, Measurement] = {}
+        self._one_at_a_time = anyio.Lock()
+
+    def add(self, kind: str, id: str) -> Measurement:
+        """Return a new measurement; forget the oldest finished ones beyond the cap."""
+        finished = [kept for kept in self._kept.values() if kept.finished.is_set()]
+        for oldest in finished[: max(0, len(finished) - MAX_FINISHED)]:
+            del self._kept[oldest.id]
+        measurement = Measurement(store=True, id=id, kind=kind)
+        self._kept[id] = measurement
+        return measurement
+
+    def get(self, id: str) -> Measurement | None:
+        """Return a measurement, or None."""
+        return self._kept.get(id)
+
+    def forget(self, id: str) -> bool:
+        """Forget a measurement; return whether it was there."""
+        return self._kept.pop(id, None) is not None
+
+    def last(self, kind: str) -> Measurement | None:
+        """Return the last measurement of a kind, or None."""
+        return next((kept for kept in reversed(self._kept.values()) if kept.kind == kind), None)
+
+    def under_way(self, kind: str) -> list[Measurement]:
+        """Return those of a kind that run or wait."""
+        return [kept for kept in self._kept.values() if kept.kind == kind and not kept.finished.is_set()]
+
+    def cancel_all(self) -> None:
+        """Cancel what is under way."""
+        for measurement in self._kept.values():
+            if not measurement.finished.is_set():
+                measurement.cancel()
+
+    async def run(self, measurement: Measurement, work: Work, busy: Callable[[], bool]) -> None:
+        """Measure when it is its turn, and note the progress and the end.
+
+        Args:
+            measurement: what is noted on.
+            work: measures; called in a thread of its own.
+            busy: whether predictions run or wait; asked from that thread.
+        """
+        loop = asyncio.get_running_loop()
+        cancelled = measurement.cancelled
+
+        def tell(done: int, total: int, what: str) -> None:
+            give_up = time.monotonic() + _WAY
+            while busy() and time.monotonic() < give_up and not cancelled.wait(_LOOK):
+                pass
+            news = {"done": done, "total": total, "what": what}
+            loop.call_soon_threadsafe(lambda: measurement.add({"number": len(measurement.iterations), **news}))
+
+        try:
+            with measurement.scope:
+                async with self._one_at_a_time:
+                    measurement.begin()
+                    measurement.document = await _in_thread(lambda: work(tell, cancelled.is_set))
+                    measurement.end("done")
+        except Cancelled:
+            measurement.end("cancelled", _cancelled())
+        except Exception as error:
+            problem = problem_of(error)
+            if problem.status == 500:
+                _log.error("the measurement failed", exc_info=error)
+            measurement.end("failed", problem)
+        if not measurement.finished.is_set():  # its scope was cancelled while it waited
+            measurement.end("cancelled", _cancelled())
+
+
+def _cancelled() -> ProblemError:
+    return ProblemError(503, "cancelled", "The measurement was cancelled.")
+
+
+async def _in_thread(call: Callable[[], bytes]) -> bytes:
+    """Return what `call` returns in a thread of its own, which stands back behind all others where the system can."""
+    loop = asyncio.get_running_loop()
+    outcome: asyncio.Future[bytes] = loop.create_future()
+
+    def settle(answer: bytes | None, error: BaseException | None) -> None:
+        if outcome.cancelled():
+            return
+        if error is not None:
+            outcome.set_exception(error)
+        else:
+            outcome.set_result(answer or b"")
+
+    def run() -> None:
+        if sys.platform == "linux":  # elsewhere it would be the whole process that stands back
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICE)
+        answer, failure = None, None
+        try:
+            answer = call()
+        except BaseException as error:
+            failure = error
+        with contextlib.suppress(RuntimeError):  # the service has stopped meanwhile
+            loop.call_soon_threadsafe(settle, answer, failure)
+
+    threading.Thread(target=run, name="measurement", daemon=True).start()
+    return await outcome

@@ -1,0 +1,126 @@
+"""``/v1/calibration``: what accuracy costs in time on the machine of the service.
+
+It is measured when someone asks for it, not at the first start: it takes tens of seconds of a core, of which the first
+requests would feel a part, and what it measures while others compile is worth little.
+"""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import anyio
+import anyio.to_thread
+import orjson
+from fastapi import APIRouter, Header, Query, Request
+from fastapi.responses import Response
+
+from app import events
+from app.formats import EVENTS, JSON, negotiated
+from app.measurements import Tell
+from app.problems import ProblemError
+from app.routes import described
+from app.routes.body import JsonRoute
+from app.runs import new_id
+from app.schemas.calibration import CalibrationResponse
+from app.service import Service, TheService
+from dlocore import calibration
+from dlocore.calibration import Calibration
+
+router = APIRouter(prefix="/v1/calibration", tags=["calibration"], route_class=JsonRoute)
+KIND = "calibration"
+CANCEL_TIME = 1.0  # s to wait for a cancelled measurement to stop
+
+
+def path_of(service: Service) -> Path:
+    """Return the file of the calibration."""
+    return service.settings.data_dir / calibration.FILE
+
+
+def document_of(found: Calibration, dimensions: int) -> dict[str, Any]:
+    """Return a calibration's points of one kind of motion, and which of them are worth their time."""
+    points = found.of_dimensions(dimensions)
+    return {
+        "machine": found.machine,
+        "version": found.version,
+        "measured_at": found.measured_at,
+        "duration": found.duration,
+        "current": found.current,
+        "dimensions": dimensions,
+        "points": [{name: value for name, value in vars(p).items() if name != "dimensions"} for p in points],
+        "front": calibration.front_of(points),
+    }
+
+
+@router.get(
+    "",
+    response_model=CalibrationResponse,
+    summary="Read what accuracy costs in time on this machine",
+    responses=described.failures(401, 404, 406, 422),
+)
+async def read(
+    request: Request,
+    service: TheService,
+    dimensions: Annotated[
+        Literal["2", "3"], Query(description="Motions in the plane, 2, or in space, 3.", examples=["2"])
+    ] = "2",
+) -> Response:
+    """Return error and time of both methods over grids, and the Pareto front; 404 until it has been measured."""
+    negotiated(request.headers.get("accept"), (JSON,))
+    found = await anyio.to_thread.run_sync(calibration.load, path_of(service))
+    if found is None:
+        detail = "This machine has not been calibrated. POST /v1/calibration, or run: dlo calibrate."
+        raise ProblemError(404, "not-calibrated", detail)
+    return Response(orjson.dumps(document_of(found, int(dimensions))), media_type=JSON)
+
+
+@router.post("", status_code=202, response_class=Response, summary="Calibrate", responses=described.MEASURE)
+async def measure(request: Request, service: TheService) -> Response:
+    """Measure this machine in the background, some tens of seconds; predictions go first.
+
+    Where a calibration is under way already, that one is answered. With `Accept: text/event-stream` the answer is its
+    progress; closing the connection does not stop it, `DELETE` does.
+    """
+    form = negotiated(request.headers.get("accept"), (JSON, EVENTS))
+    running = service.measurements.under_way(KIND)
+
+    def work(tell: Tell, cancelled: Any) -> bytes:
+        found = calibration.measure(on_progress=tell, cancelled=cancelled)
+        found.save(path_of(service))
+        return orjson.dumps(document_of(found, 2))
+
+    job = running[0] if running else service.measure(KIND, new_id(), work)
+    response = events.of_job(job, service) if form == EVENTS else _state(job.summary(), 202)
+    response.headers["Location"] = job.address
+    return response
+
+
+@router.delete("", response_class=Response, summary="Stop calibrating", responses=described.STOP)
+async def stop(service: TheService) -> Response:
+    """Stop the calibration that is under way; what was measured before stays."""
+    running = service.measurements.under_way(KIND)
+    if not running:
+        raise ProblemError(404, "not-calibrating", "No calibration is under way.")
+    job = running[0]
+    job.cancel()
+    with anyio.move_on_after(CANCEL_TIME):
+        await job.finished.wait()
+    return _state(job.summary(), 200 if job.finished.is_set() else 202)
+
+
+@router.get("/events", response_class=Response, summary="Follow a calibration", responses=described.PROGRESS)
+async def follow(
+    request: Request,
+    service: TheService,
+    last_event_id: Annotated[
+        str | None, Header(description="Number of the last event seen, to go on after it.", examples=["3"])
+    ] = None,
+) -> Response:
+    """Give the course of the last calibration as server-sent events: `state`, `progress`, and `done` or `error`."""
+    negotiated(request.headers.get("accept"), (EVENTS,))
+    job = service.measurements.last(KIND)
+    if job is None:
+        raise ProblemError(404, "not-calibrating", "No calibration is under way.")
+    return events.of_job(job, service, events.seen_before(last_event_id))
+
+
+def _state(document: dict[str, Any], status: int) -> Response:
+    return Response(orjson.dumps(document), status, media_type=JSON)

@@ -1,0 +1,162 @@
+"""``/v1/studies``: measure what accuracy costs in time, follow it, read it, stop it."""
+
+from collections.abc import Callable
+from typing import Annotated, Any, cast
+
+import anyio
+import anyio.to_thread
+import orjson
+from fastapi import APIRouter, Body, Header, Request
+from fastapi.responses import Response
+
+from app import events
+from app.formats import EVENTS, JSON, negotiated
+from app.measurements import Tell
+from app.problems import ProblemError
+from app.routes import described
+from app.routes.body import JsonRoute
+from app.routes.calibration import CANCEL_TIME
+from app.runs import new_id
+from app.schemas import to_scene
+from app.schemas.study import STUDY_EXAMPLES, StudyList, StudyRequest, StudyResponse
+from app.service import Service, TheService
+from app.studies import StudyStore
+from dlocore import Scene
+from dlocore.errors import within
+from dlocore.scene import Switch
+from dlocore.study.plan import Plan
+from dlocore.study.record import to_document
+from dlocore.study.running import run_study
+
+router = APIRouter(prefix="/v1/studies", tags=["studies"], route_class=JsonRoute)
+KIND = "studies"
+MOST_WAITING = 4  # studies that run or wait: each may take minutes
+
+
+def store_of(service: Service) -> StudyStore:
+    """Return the stored studies of a service."""
+    return StudyStore(service.settings.data_dir)
+
+
+@router.post("", status_code=202, response_class=Response, summary="Run a study", responses=described.STUDY)
+async def study(
+    request: Request, wanted: Annotated[StudyRequest, Body(openapi_examples=STUDY_EXAMPLES)], service: TheService
+) -> Response:
+    """Measure time and true error of every scene on every grid, in the background; predictions go first.
+
+    Studies run one after the other and are stored. With `Accept: text/event-stream` the answer is the progress; closing
+    the connection does not stop the study, `DELETE` does.
+    """
+    form = negotiated(request.headers.get("accept"), (JSON, EVENTS))
+    service.check_ready()
+    plan = await anyio.to_thread.run_sync(_plan, wanted, service)
+    if len(service.measurements.under_way(KIND)) >= MOST_WAITING:
+        detail = f"{MOST_WAITING} studies run or wait, as many as allowed."
+        raise ProblemError(429, "queue-full", detail, headers={"Retry-After": "60"})
+    id, store = new_id(), store_of(service)
+
+    def work(tell: Tell, cancelled: Callable[[], bool]) -> bytes:
+        measured = run_study(plan, on_progress=tell, cancelled=cancelled, deadline=service.settings.time_limit)
+        document = orjson.dumps({"id": id, **to_document(measured)})
+        store.save(id, document)
+        return document
+
+    job = service.measure(KIND, id, work)
+    response = events.of_job(job, service) if form == EVENTS else _state(job.summary(), 202)
+    response.headers["Location"] = job.address
+    return response
+
+
+def _plan(wanted: StudyRequest, service: Service) -> Plan:
+    asked: dict[str, Any] = {
+        "grids": tuple((grid.n_u, grid.n_t) for grid in wanted.grids),
+        "methods": tuple(dict.fromkeys(wanted.methods)),
+        "deltas": tuple(dict.fromkeys(wanted.deltas)),
+        "repeats": wanted.repeats,
+        "estimate": wanted.estimate,
+        "parts": tuple(dict.fromkeys(wanted.parts)),
+    }
+    if wanted.scenes is not None:
+        scenes: dict[str, Scene] = {}
+        for name, scene in wanted.scenes.items():
+            with within(f"scenes.{name}"):
+                scenes[name] = to_scene(scene, service.runs.motion)
+        asked["scenes"] = scenes
+    if wanted.effects is not None:
+        asked["effects"] = {
+            name: cast(dict[str, Switch], switches.model_dump(exclude_unset=True))
+            for name, switches in wanted.effects.items()
+        }
+    return Plan(**asked)
+
+
+@router.get("", response_model=StudyList, summary="List the studies", responses=described.failures(401, 406))
+async def listed(request: Request, service: TheService) -> Response:
+    """List the stored studies, newest first."""
+    negotiated(request.headers.get("accept"), (JSON,))
+    found = await anyio.to_thread.run_sync(store_of(service).listed)
+    return Response(orjson.dumps({"studies": found}), media_type=JSON)
+
+
+@router.get("/{id}", response_model=StudyResponse, summary="Read a study", responses=described.READ_STUDY)
+async def read(id: str, request: Request, service: TheService) -> Response:
+    """Return the study; 202 with its state while it runs or waits, and where it has failed."""
+    negotiated(request.headers.get("accept"), (JSON,))
+    document = await anyio.to_thread.run_sync(store_of(service).document, id)
+    if document is not None:
+        return Response(document, media_type=JSON)
+    job = service.measurements.get(id)
+    if job is None or job.kind != KIND:
+        raise _no_study(id)
+    return _state(job.summary(), 202)
+
+
+@router.delete(
+    "/{id}",
+    status_code=204,
+    response_class=Response,
+    summary="Stop a study, or remove it",
+    responses=described.REMOVE_STUDY,
+)
+async def remove(id: str, service: TheService) -> Response:
+    """Stop the study where it runs or waits (200, or 202 while it still stops); else remove it (204)."""
+    job = service.measurements.get(id)
+    mine = job is not None and job.kind == KIND
+    if mine and job is not None and not job.finished.is_set():
+        job.cancel()
+        with anyio.move_on_after(CANCEL_TIME):
+            await job.finished.wait()
+        if job.state != "done":
+            return _state(job.summary(), 200 if job.finished.is_set() else 202)
+    known = mine and service.measurements.forget(id)
+    if not await anyio.to_thread.run_sync(store_of(service).delete, id) and not known:
+        raise _no_study(id)
+    return Response(status_code=204)
+
+
+@router.get("/{id}/events", response_class=Response, summary="Follow a study", responses=described.PROGRESS)
+async def follow(
+    id: str,
+    request: Request,
+    service: TheService,
+    last_event_id: Annotated[
+        str | None, Header(description="Number of the last event seen, to go on after it.", examples=["3"])
+    ] = None,
+) -> Response:
+    """Give the course of a study as server-sent events: `state`, `progress`, and `done` or `error`."""
+    negotiated(request.headers.get("accept"), (EVENTS,))
+    job = service.measurements.get(id)
+    if job is not None and job.kind == KIND:
+        return events.of_job(job, service, events.seen_before(last_event_id))
+    document = await anyio.to_thread.run_sync(store_of(service).document, id)
+    if document is None:
+        raise _no_study(id)
+    return events.of_finished(id, document)
+
+
+def _no_study(id: str) -> ProblemError:
+    return ProblemError(404, "no-such-study", f"There is no study {id[:64]!r}; it may have been removed.")
+
+
+def _state(document: dict[str, Any], status: int) -> Response:
+    return Response(orjson.dumps(document), status, media_type=JSON)

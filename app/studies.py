@@ -1,0 +1,57 @@
+"""Stored studies: one JSON file each, written whole or not at all, capped in number."""
+
+import re
+import threading
+from pathlib import Path
+from typing import Any
+
+_ID = re.compile(r"[0-9a-f]{28}")
+MAX_STUDIES = 100  # the oldest go first
+
+
+class StudyStore:
+    """The stored studies of a data directory; safe to call from any thread."""
+
+    def __init__(self, data_dir: Path) -> None:
+        self._root = data_dir / "studies"
+        self._lock = threading.Lock()
+
+    def save(self, id: str, document: bytes) -> None:
+        """Store the document of a study."""
+        with self._lock:
+            self._root.mkdir(parents=True, exist_ok=True)
+            unfinished = self._root / f".{id}"
+            unfinished.write_bytes(document)
+            unfinished.replace(self._file(id))
+            for file in sorted(self._files(), reverse=True)[MAX_STUDIES:]:
+                file.unlink(missing_ok=True)
+
+    def document(self, id: str) -> bytes | None:
+        """Return the document of a study, or None where there is none."""
+        if not _ID.fullmatch(id):
+            return None
+        try:
+            return self._file(id).read_bytes()
+        except FileNotFoundError:
+            return None
+
+    def delete(self, id: str) -> bool:
+        """Remove a study; return whether it was there."""
+        if not _ID.fullmatch(id):
+            return False
+        try:
+            self._file(id).unlink()
+        except FileNotFoundError:
+            return False
+        return True
+
+    def listed(self) -> list[dict[str, Any]]:
+        """Return the stored studies, newest first."""
+        files = sorted(self._files(), reverse=True)
+        return [{"id": f.stem, "size": f.stat().st_size, "self": f"/v1/studies/{f.stem}"} for f in files]
+
+    def _file(self, id: str) -> Path:
+        return self._root / f"{id}.json"
+
+    def _files(self) -> list[Path]:
+        return [file for file in self._root.glob("*.json") if _ID.fullmatch(file.stem)]

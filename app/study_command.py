@@ -1,0 +1,137 @@
+"""What ``dlo study`` does."""
+
+import argparse
+import os
+import re
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast
+
+from app.commands import CommandError, read_scene
+from dlocore import Scene, SceneError
+from dlocore.scene import EFFECTS, Switch
+
+WORSE = 4  # exit code: the comparison found changes for the worse
+_GRID = re.compile(r"(\d+)[x×](\d+)")
+
+
+def study(options: argparse.Namespace) -> int:
+    """Run a study, write and draw it, compare it with an earlier one, and say what came out."""
+    os.environ.setdefault("OMP_NUM_THREADS", "1")  # threads of a linear algebra library would blur the times
+    from tqdm import tqdm
+
+    from dlocore.study import record
+    from dlocore.study.compare import compare, words
+    from dlocore.study.plan import Plan
+    from dlocore.study.running import run_study
+
+    before = None if options.compare is None else _earlier(options.compare)
+    if options.plots is not None:
+        _check_matplotlib()
+    try:
+        plan = Plan(**_asked(options))
+    except SceneError as error:
+        raise CommandError(str(error)) from None
+    with tqdm(desc="measuring", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
+
+        def show(done: int, total: int, what: str) -> None:
+            bar.total = total
+            bar.set_postfix_str(what)
+            bar.update(done - bar.n)
+
+        measured = run_study(plan, on_progress=show)
+    print(_table(measured))
+    try:
+        if options.output is not None:
+            record.save(measured, Path(options.output))
+        if options.plots is not None:
+            from dlocore.study.drawing import draw_all
+
+            for file in draw_all(measured, Path(options.plots)):
+                print(f"drew {file}", file=sys.stderr)
+    except OSError as error:
+        raise CommandError(f"can't write {error.filename}: {error.strerror}", exit_code=1) from None
+    if before is None:
+        return 0
+    comparison = compare(measured, before)
+    print(f"\ncompared with {options.compare}, measured at {before.measured_at}\n{words(comparison)}")
+    return WORSE if comparison.worse else 0
+
+
+def _earlier(path: str) -> Any:
+    from dlocore.study import record
+
+    try:
+        return record.load(Path(path))
+    except OSError as error:
+        raise CommandError(f"can't read {path}: {error.strerror}") from None
+    except record.StudyError as error:
+        raise CommandError(f"{path}: {error}") from None
+
+
+def _check_matplotlib() -> None:
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError:
+        raise CommandError("--plots needs matplotlib: pip install 'dlo[plots]'", exit_code=1) from None
+
+
+def _asked(options: argparse.Namespace) -> dict[str, Any]:
+    """Return what the options ask of a study; what they leave out is the study's own default."""
+    asked: dict[str, Any] = {"repeats": options.repeats, "estimate": options.estimate}
+    if options.scenes:
+        asked["scenes"] = _scenes(options.scenes)
+    grids = _grids(options.grids, options.n_u, options.n_t)
+    if grids is not None:
+        asked["grids"] = grids
+    for name in ("deltas", "methods", "parts"):
+        if getattr(options, name) is not None:
+            asked[name] = tuple(getattr(options, name))
+    if options.effects is not None:
+        asked["effects"] = {given: _switches(given) for given in options.effects}
+    return asked
+
+
+def _scenes(files: list[str]) -> dict[str, Scene]:
+    scenes: dict[str, Scene] = {}
+    for file in files:
+        name = Path(file).stem
+        scenes[name if name not in scenes else file] = read_scene(file)
+    return scenes
+
+
+def _grids(grids: list[str] | None, n_u: list[int] | None, n_t: list[int] | None) -> tuple[tuple[int, int], ...] | None:
+    if (n_u is None) != (n_t is None) or (grids is not None and n_u is not None):
+        raise CommandError("give --grids, or --n-u and --n-t together")
+    if n_u is not None and n_t is not None:
+        return tuple((u, t) for u in n_u for t in n_t)
+    if grids is None:
+        return None
+    found = [_GRID.fullmatch(grid) for grid in grids]
+    for given, match in zip(grids, found, strict=True):
+        if match is None:
+            raise CommandError(f"--grids: got {given!r}. Allowed: n_u and n_t as in 9x13.")
+    return tuple((int(match[1]), int(match[2])) for match in found if match is not None)
+
+
+def _switches(given: str) -> Mapping[str, Switch]:
+    """Return the switches of a set of effects as it is written on the command line."""
+    if given == "auto":
+        return {}
+    if given == "all":
+        return cast(dict[str, Switch], dict.fromkeys(EFFECTS, "on"))
+    pairs = [part.partition("=") for part in given.split(",")]
+    if not all(sign for _, sign, _ in pairs):
+        raise CommandError(f"--effects: got {given!r}. Allowed: auto, all, or switches as in twist=off,drag=on.")
+    return cast(dict[str, Switch], {name: value for name, _, value in pairs})
+
+
+def _table(measured: Any) -> str:
+    lines = [f"{'scene':32} {'effects':10} {'method':10} {'grid':>9} {'time [ms]':>11} {'error [mm]':>11}  status"]
+    for run in measured.runs:
+        grid = f"{run.n_u} x {run.n_t}"
+        times = f"{1e3 * run.wall_time:11.3g} {1e3 * run.error:11.3g}"
+        lines.append(f"{run.scene[:32]:32} {run.effects[:10]:10} {run.method:10} {grid:>9} {times}  {run.status}")
+    lines += [f"not measured: {refused}" for refused in measured.refused]
+    return "\n".join(lines)

@@ -1,0 +1,186 @@
+"""The calibration of a machine: what accuracy costs in time on it, measured once and stored.
+
+Times are those of one solve on a core of its own. Errors are the largest distances, over the cable and the time, to a
+march refined until it stands still.
+"""
+
+import json
+import os
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dlocore.cost import Cost, Rates, pareto_front
+from dlocore.machine import machine, user_data_dir
+
+FORMAT = 1
+FILE = "calibration.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measured:
+    """A method on one grid, over the calibration's scenes of one kind of motion.
+
+    Attributes:
+        dimensions: 2 in the plane (the paper's case, four grasps), 3 in space (a cable between two grippers).
+        method: "march" or "spacetime".
+        n_u, n_t: control points along the cable and in time.
+        steps: time steps of the march.
+        wall_time: time of a solve without error estimate [s], the median over repeats and scenes.
+        spread: half the width that holds half of the repeats [s], the largest of the scenes.
+        error: largest distance to the converged motion [m], the largest of the scenes.
+        iterations: of the least squares, the largest of the scenes; 0 for a march.
+        converged: whether every scene did.
+    """
+
+    dimensions: int
+    method: str
+    n_u: int
+    n_t: int
+    steps: int
+    wall_time: float
+    spread: float
+    error: float
+    iterations: int
+    converged: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Calibration:
+    """What accuracy costs in time on a machine.
+
+    Attributes:
+        machine: processor, cores, system, versions.
+        version: that of this package.
+        source: a mark of the program text that was measured.
+        measured_at: when, ISO 8601 in UTC.
+        duration: how long the measurement took [s].
+        points: what was measured.
+        cost: the model of the time of a solve.
+    """
+
+    machine: dict[str, str]
+    version: str
+    source: str
+    measured_at: str
+    duration: float
+    points: tuple[Measured, ...]
+    cost: Cost
+
+    @property
+    def current(self) -> bool:
+        """Whether it was measured on this machine and with this program."""
+        return self.machine == machine() and self.source == source_mark()
+
+    def of_dimensions(self, dimensions: int) -> tuple[Measured, ...]:
+        """Return the points of motions in the plane, 2, or in space, 3."""
+        return tuple(p for p in self.points if p.dimensions == dimensions)
+
+    def save(self, path: Path | None = None) -> Path:
+        """Write it whole or not at all, to the user's data directory by default, and return where."""
+        path = path or default_path()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        unfinished = path.with_name(f".{path.name}-{os.getpid()}")
+        unfinished.write_text(json.dumps(to_document(self), indent=1))
+        unfinished.replace(path)
+        return path
+
+
+def front_of(points: tuple[Measured, ...]) -> list[int]:
+    """Return the indices of the points that no other one beats in both time and error, fastest first."""
+    return pareto_front([p.wall_time for p in points], [p.error if p.converged else np.nan for p in points])
+
+
+def default_path() -> Path:
+    """Return where the calibration of this user lies: ``calibration.json`` in the data directory of the service."""
+    given = os.environ.get("DLO_DATA_DIR")
+    return (Path(given).expanduser() if given else user_data_dir()) / FILE
+
+
+def measure(
+    *,
+    repeats: int = 5,
+    on_progress: Callable[[int, int, str], None] = lambda done, total, what: None,
+    cancelled: Callable[[], bool] = lambda: False,
+) -> Calibration:
+    """Measure this machine; it takes some tens of seconds of one core.
+
+    Args:
+        repeats: timed calls of each solve, at most.
+        on_progress: called before each part with how many are done, how many there are, and what comes.
+        cancelled: asked before each part; where it returns True the measurement stops.
+
+    Raises:
+        Cancelled: `cancelled` returned True.
+    """
+    from dlocore.study import calibrating  # the solver, which it measures, is slow to import
+
+    return calibrating.measure(repeats=repeats, on_progress=on_progress, cancelled=cancelled)
+
+
+def load(path: Path | None = None) -> Calibration | None:
+    """Return the stored calibration; None where there is none, or only one of another form.
+
+    Args:
+        path: its file; that of the user's data directory by default.
+    """
+    try:
+        return from_document(json.loads((path or default_path()).read_text()))
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def table(calibration: Calibration) -> str:
+    """Return the measured points as text; a star marks those that no other one beats in both time and error."""
+    lines = [f"{'':2}{'method':10} {'n_u':>4} {'n_t':>4} {'time [ms]':>10} {'error [mm]':>11}"]
+    for dimensions, title in ((2, "in the plane: the paper's case, four grasps"), (3, "in space: a hanging cable")):
+        points = calibration.of_dimensions(dimensions)
+        front = set(front_of(points))
+        lines.append(title)
+        for i, p in enumerate(points):
+            mark = "*" if i in front else ""
+            times = f"{1e3 * p.wall_time:10.3g} {1e3 * p.error:11.3g}"
+            lines.append(f"{mark:2}{p.method:10} {p.n_u:4} {p.n_t:4} {times}" + ("" if p.converged else "  not solved"))
+    return "\n".join(lines)
+
+
+def to_document(calibration: Calibration) -> dict[str, Any]:
+    """Return a calibration as data for JSON."""
+    document = asdict(calibration)
+    document["cost"]["rates"] = {str(nc): asdict(rates) for nc, rates in calibration.cost.rates.items()}
+    return {"format": FORMAT, **document}
+
+
+def from_document(document: dict[str, Any]) -> Calibration:
+    """Return the calibration that `to_document` gave.
+
+    Raises:
+        ValueError, KeyError, TypeError: it is of another form.
+    """
+    if document["format"] != FORMAT:
+        raise ValueError(f"format: got {document['format']!r}. Allowed: {FORMAT}.")
+    cost = document["cost"]
+    rates = {int(nc): Rates(**values) for nc, values in cost["rates"].items()}
+    return Calibration(
+        machine=document["machine"],
+        version=document["version"],
+        source=document["source"],
+        measured_at=document["measured_at"],
+        duration=document["duration"],
+        points=tuple(Measured(**point) for point in document["points"]),
+        cost=Cost(**(cost | {"rates": rates})),
+    )
+
+
+def source_mark() -> str:
+    """Return 12 digits that change with the text of this package: a calibration is of one program."""
+    digest = sha256()
+    root = Path(__file__).parent
+    for file in sorted(root.rglob("*.py")):
+        if "study" not in file.relative_to(root).parts:
+            digest.update(file.read_bytes())
+    return digest.hexdigest()[:12]

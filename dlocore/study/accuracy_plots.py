@@ -1,0 +1,135 @@
+"""Draw what a study measured of accuracy: error against time, and the convergence of the iterations."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from dlocore.cost import pareto_front
+from dlocore.study.record import Run, Study
+from dlocore.study.style import COLOURS, MARKS, new_figure, write_decimals
+
+_GRIDS = ("#56B4E9", "#0072B2", "#009E73", "#E69F00", "#D55E00", "#CC79A7", "#000000")
+
+
+def work_precision(study: Study) -> Figure:
+    """Draw error against time, in the plane and in space: one curve a method, the front, and a slope."""
+    kinds = sorted({run.dimensions for run in study.runs})
+    figure, panels = new_figure(6.2 * len(kinds), 5.0, 1, len(kinds))
+    for axes, dimensions in zip(panels, kinds, strict=True):
+        runs = [run for run in study.runs if run.dimensions == dimensions and run.error > 0]
+        points = _work_precision_panel(axes, runs)
+        _front(axes, points)
+        scenes = len({run.scene for run in runs})
+        where = "in the plane" if dimensions == 2 else "in space"
+        axes.set_title(f"{where}, {scenes} scene{'s' if scenes > 1 else ''}: {_finding(points)}")
+        axes.set(xscale="log", yscale="log", xlabel="time of a solve [ms]", ylabel="largest error [mm]")
+        write_decimals(axes)
+        axes.grid(alpha=0.25, which="both", linewidth=0.5)
+        axes.legend(fontsize=8)
+    return figure
+
+
+Point = tuple[float, float, str, str]  # time [ms], error [mm], method, grid
+
+
+def _work_precision_panel(axes: Axes, runs: Sequence[Run]) -> list[Point]:
+    """Draw every run faintly and the geometric mean over the scenes strongly; return the means of what was solved."""
+    points: list[Point] = []
+    for method in dict.fromkeys(run.method for run in runs):
+        colour, mark = COLOURS[method], MARKS[method]
+        mine = [run for run in runs if run.method == method]
+        good = [run for run in mine if run.status == "converged"]
+        for run in mine:
+            axes.errorbar(
+                1e3 * run.wall_time, 1e3 * run.error, xerr=1e3 * min(run.spread, 0.9 * run.wall_time), fmt=mark,
+                markersize=3.5, color=colour, alpha=0.3, elinewidth=1,
+                markerfacecolor=colour if run.status == "converged" else "none",
+            )  # fmt: skip
+        curve = []
+        for grid in sorted({(run.n_u, run.n_t) for run in good}):
+            group = [run for run in good if (run.n_u, run.n_t) == grid]
+            if len({run.scene for run in group}) < len({run.scene for run in mine}):
+                continue  # a mean over other scenes than its neighbours'
+            time, error = (
+                float(np.exp(np.mean(np.log([1e3 * getattr(run, name) for run in group]))))
+                for name in ("wall_time", "error")
+            )
+            curve.append((time, error, method, f"{grid[0]} × {grid[1]}"))
+        axes.plot(*zip(*[p[:2] for p in curve], strict=True), mark + "-", color=colour, label=method) if curve else None
+        if len(curve) < len(mine):
+            axes.plot([], [], mark, color=colour, alpha=0.3, markersize=3.5, label=f"{method}, each scene")
+        points += curve
+    return points
+
+
+def _front(axes: Axes, points: list[Point]) -> None:
+    """Mark the Pareto front with the grids on it, and draw the slope that halving every spacing would give."""
+    if not points:
+        return
+    times, errors = np.array([p[0] for p in points]), np.array([p[1] for p in points])
+    front = pareto_front(times, errors)
+    axes.plot(times[front], errors[front], color="#666666", linewidth=7, alpha=0.22, zorder=0, label="Pareto front")
+    for k, i in enumerate(front):
+        if k % max(1, len(front) // 5) == 0 or k == len(front) - 1:
+            axes.annotate(points[i][3], (times[i], errors[i]), (6, 5), textcoords="offset points", fontsize=8)
+    first, below = times[front[0]], 0.5 * float(np.min(errors[front] * times[front] ** 2))
+    x = first * np.array([1.0, min(4.0, max(1.5, times[front[-1]] / first))])
+    axes.plot(x, below * x**-2.0, ":", color="black", linewidth=1.2, label="error ∝ time$^{-2}$")
+    axes.margins(x=0.12)
+
+
+def _finding(points: list[Point]) -> str:
+    """Return what the front says: the method that is on it, and the fastest way to a millimetre."""
+    if not points:
+        return "nothing converged"
+    good = [p for p in points if p[1] <= 1.0]
+    if not good:
+        best = min(points, key=lambda p: p[1])
+        return f"at best {best[1]:.2g} mm, in {best[0]:.2g} ms by {best[2]}"
+    fastest = min(good)
+    return f"1 mm in {fastest[0]:.2g} ms by {fastest[2]}"
+
+
+def convergence(study: Study) -> Figure:
+    """Draw the update against the iteration, by scene and grid: the paper's Fig. 2."""
+    methods = [m for m in dict.fromkeys(run.method for run in study.runs) if m != "march"]
+    figure, panels = new_figure(6.8 * len(methods), 4.8, 1, len(methods))
+    for axes, method in zip(panels, methods, strict=True):
+        runs = [run for run in study.runs if run.method == method]
+        grids = sorted({(run.n_u, run.n_t) for run in runs})
+        scenes = list(dict.fromkeys(run.scene for run in runs))
+        styles: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (1, 3)), (0, (5, 5)))
+        for run in runs:
+            updates = [step.update if step.update is not None else np.nan for step in run.iterations]
+            colour = _GRIDS[grids.index((run.n_u, run.n_t)) % len(_GRIDS)]
+            style = styles[scenes.index(run.scene) % len(styles)]
+            axes.semilogy(
+                range(1, len(updates) + 1),
+                updates,
+                marker="o",
+                markersize=3,
+                color=colour,
+                linestyle=style,
+                linewidth=1.2,
+            )
+        for k, (n_u, n_t) in enumerate(grids):
+            axes.plot([], [], "o-", color=_GRIDS[k % len(_GRIDS)], label=f"{n_u} × {n_t}")
+        if len(scenes) <= len(styles):
+            for scene, style in zip(scenes, styles, strict=False):
+                axes.plot([], [], color="black", linestyle=style, linewidth=1.2, label=scene)
+        for delta in sorted({run.delta for run in runs}):
+            axes.axhline(delta, color="grey", linewidth=1)
+            axes.annotate(f"δ = {delta:g} m", (1.0, delta), (-2, 3), xycoords=("axes fraction", "data"),
+                          textcoords="offset points", ha="right", fontsize=8, color="grey")  # fmt: skip
+        counts = [len(run.iterations) for run in runs if run.status == "converged"]
+        range_ = f"in {min(counts)} to {max(counts)} iterations (median {np.median(counts):g})" if counts else ""
+        axes.set_title(f"{method}: {len(counts)} of {len(runs)} solves converge {range_}")
+        axes.set(xlabel="iteration", ylabel="norm of the control-point update [m]")
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        axes.grid(alpha=0.25)
+        axes.legend(fontsize=7.5, ncols=2, handlelength=3.5)
+    return figure

@@ -1,0 +1,190 @@
+"""Measure a machine: errors and times of both methods over grids, and what coordinates, effects and estimates add."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+
+import numpy as np
+
+from dlocore.calibration import Calibration, Measured, source_mark
+from dlocore.cost import Cost, Sample, fitted_rates
+from dlocore.errors import Cancelled
+from dlocore.front import predict, warm_up
+from dlocore.machine import machine
+from dlocore.prediction import Prediction
+from dlocore.scene import Method, Quality, Scene
+from dlocore.study.judge import Truth, finest_march, largest_error
+from dlocore.study.scenes import accuracy_scenes, effect_scenes, hanging, paper_case
+from dlocore.study.timing import Times, timed
+
+Grid = tuple[int, int]
+OnProgress = Callable[[int, int, str], None]
+
+GRIDS: dict[Method, tuple[Grid, ...]] = {
+    "march": ((7, 11), (9, 13), (11, 17), (13, 19), (17, 25), (21, 31), (25, 37), (33, 49), (49, 73)),
+    "spacetime": ((7, 11), (9, 13), (13, 19), (17, 25), (25, 37)),
+}
+_TWIST_GRIDS: dict[Method, tuple[Grid, ...]] = {
+    "march": ((9, 13), (17, 25), (33, 49)),
+    "spacetime": ((9, 13), (17, 25)),
+}
+_EFFECT_GRIDS: tuple[Grid, ...] = ((13, 19), (25, 37))
+_ESTIMATE_GRIDS: tuple[Grid, ...] = ((9, 13), (17, 25))
+_PATIENCE = 0.4  # [s] for the repeats of one solve
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Run:
+    """One solve, repeated: of what, on which grid, and what came of it."""
+
+    dimensions: int
+    method: Method
+    grid: Grid
+    prediction: Prediction
+    times: Times
+    error: float
+
+    def sample(self, coordinates: int) -> Sample:
+        return Sample(
+            coordinates=coordinates,
+            n_u=self.grid[0],
+            n_t=self.grid[1],
+            steps=self.prediction.accuracy.steps,
+            iterations=0 if self.method == "march" else len(self.prediction.iterations),
+            wall_time=self.times.median,
+        )
+
+
+@dataclass
+class _Course:
+    """How far the measurement is; `next` tells of the next part, and stops where that is asked for."""
+
+    total: int
+    repeats: int
+    on_progress: OnProgress
+    cancelled: Callable[[], bool]
+    done: int = field(default=0)
+
+    def next(self, what: str) -> None:
+        if self.cancelled():
+            raise Cancelled("The calibration was cancelled.")
+        self.on_progress(self.done, self.total, what)
+        self.done += 1
+
+    def run(self, name: str, scene: Scene, method: Method, grid: Grid, truth: Truth | None = None, **on: bool) -> _Run:
+        """Solve a scene on one grid, without an error estimate unless `estimate` is on."""
+        self.next(f"{name}: {method}, {grid[0]} x {grid[1]}")
+        quality = Quality(n_u=grid[0], n_t=grid[1], method=method, estimate=on.get("estimate", False))
+        asked = replace(scene, quality=quality)
+        prediction, times = timed(lambda: predict(asked, cancelled=self.cancelled), self.repeats, _PATIENCE)
+        return _Run(
+            dimensions=prediction.accuracy.dimensions,
+            method=method,
+            grid=grid,
+            prediction=prediction,
+            times=times,
+            error=np.nan if truth is None else largest_error(prediction, truth),
+        )
+
+
+def measure(*, repeats: int, on_progress: OnProgress, cancelled: Callable[[], bool]) -> Calibration:
+    """Measure this machine; see `dlocore.calibration.measure`."""
+    began = time.perf_counter()
+    scenes, effects = accuracy_scenes(), effect_scenes()
+    grids = sum(len(g) for g in GRIDS.values())
+    parts = len(scenes) * (1 + grids) + sum(len(g) for g in _TWIST_GRIDS.values())
+    parts += (1 + len(effects)) * len(_EFFECT_GRIDS) + 4 * len(_ESTIMATE_GRIDS)
+    course = _Course(parts + 1, repeats, on_progress, cancelled)
+    course.next("compiling")
+    warm_up()
+    runs = []
+    for name, scene in scenes.items():
+        course.next(f"{name}: the converged motion")
+        truth = finest_march(scene, cancelled=cancelled)
+        runs += [course.run(name, scene, method, grid, truth) for method in GRIDS for grid in GRIDS[method]]
+    twisted = hanging("clamp")
+    samples = [run.sample(run.dimensions) for run in runs]
+    for method, some in _TWIST_GRIDS.items():
+        samples += [course.run("clamped", twisted, method, grid).sample(4) for grid in some]
+    cost = Cost(rates=fitted_rates(samples), effects=_effects(course, effects), estimates=_estimates(course))
+    on_progress(course.total, course.total, "done")
+    return Calibration(
+        machine=machine(),
+        version=_version(),
+        source=source_mark(),
+        measured_at=datetime.now(UTC).isoformat(timespec="seconds").replace("+00:00", "Z"),
+        duration=time.perf_counter() - began,
+        points=tuple(_points(runs)),
+        cost=replace(cost, deviation=_deviation(cost, samples)),
+    )
+
+
+def _points(runs: list[_Run]) -> list[Measured]:
+    """Return one point for each kind of motion, method and grid: median time and largest error over its scenes."""
+    groups: dict[tuple[int, Method, Grid], list[_Run]] = {}
+    for run in runs:
+        groups.setdefault((run.dimensions, run.method, run.grid), []).append(run)
+    return [
+        Measured(
+            dimensions=dimensions,
+            method=method,
+            n_u=grid[0],
+            n_t=grid[1],
+            steps=max(run.prediction.accuracy.steps for run in group),
+            wall_time=float(np.median([run.times.median for run in group])),
+            spread=max(run.times.spread for run in group),
+            error=max(run.error for run in group),
+            iterations=0 if method == "march" else max(len(run.prediction.iterations) for run in group),
+            converged=all(run.prediction.status == "converged" for run in group),
+        )
+        for (dimensions, method, grid), group in groups.items()
+    ]
+
+
+def _effects(course: _Course, scenes: dict[str, Scene]) -> dict[str, float]:
+    """Return how many times as long the marches of the same motion take with each effect."""
+
+    def times(name: str, scene: Scene) -> list[float]:
+        return [course.run(name, scene, "march", grid).times.median for grid in _EFFECT_GRIDS]
+
+    plain = times("without further effects", paper_case(0.25))
+    return {name: max(1.0, _ratio(times(name, scene), plain)) for name, scene in scenes.items()}
+
+
+def _estimates(course: _Course) -> dict[str, float]:
+    """Return by method how many times as long a solve takes with an error estimate."""
+    found = {}
+    for method in GRIDS:
+        bare, estimated = (
+            [
+                course.run("error estimate", paper_case(0.25), method, grid, estimate=on).times.median
+                for grid in _ESTIMATE_GRIDS
+            ]
+            for on in (False, True)
+        )
+        found[str(method)] = max(1.0, _ratio(estimated, bare))
+    return found
+
+
+def _ratio(times: list[float], others: list[float]) -> float:
+    """Return the geometric mean of the ratios of two rows of times."""
+    return float(np.exp(np.mean(np.log(times) - np.log(others))))
+
+
+def _deviation(cost: Cost, samples: list[Sample]) -> dict[str, float]:
+    """Return by method the median factor between modelled and measured times, whichever is larger."""
+    factors: dict[str, list[float]] = {"march": [], "spacetime": []}
+    for s in samples:
+        method = "spacetime" if s.iterations else "march"
+        model = cost.time(method, s.n_u, s.n_t, s.steps, coordinates=s.coordinates, estimate=False)
+        factors[method].append(max(model / s.wall_time, s.wall_time / model))
+    return {method: float(np.median(found)) for method, found in factors.items()}
+
+
+def _version() -> str:
+    try:
+        return version("dlo")
+    except PackageNotFoundError:  # run from a checkout
+        return "0"

@@ -1,0 +1,82 @@
+"""Truth to measure errors against: a march refined until it stands still."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.front import predict
+from dlocore.prediction import Prediction, Status
+from dlocore.scene import Quality, Scene
+from dlocore.study.timing import clock
+
+Floats = NDArray[np.float64]
+
+SAMPLES = (101, 33)  # along the cable and in time, at which surfaces are compared
+GRIDS = ((33, 65), (49, 97), (65, 129), (97, 193), (129, 257), (129, 385), (129, 513))  # (n_u, n_t)
+STILL = 2e-5  # of the length: a refinement that moves the motion by less is the last
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Truth:
+    """A converged motion.
+
+    Attributes:
+        positions: (n_t, n_u, 3) [m], evenly spaced in time and along the cable.
+        moved: by how much the last refinement moved it [m]: about its own error.
+        n_u, n_t: the finest grid.
+        status: that of the finest march.
+    """
+
+    positions: Floats
+    moved: float
+    n_u: int
+    n_t: int
+    status: Status
+
+
+def positions_of(prediction: Prediction) -> Floats:
+    """Return the surface of a prediction at the points where surfaces are compared (n_t, n_u, 3) [m]."""
+    return np.ascontiguousarray(prediction.surface.sample(*SAMPLES)[2][..., :3])
+
+
+def finest_march(
+    scene: Scene,
+    *,
+    still: float = STILL,
+    patience: float = np.inf,
+    cancelled: Callable[[], bool] | None = None,
+) -> Truth:
+    """March on finer and finer grids until a refinement moves the motion by less than `still` of the length.
+
+    Args:
+        scene: whose motion; its quality is not regarded.
+        still: where to stop, as a part of the cable's length.
+        patience: no finer grid once the marches have taken so long [s].
+        cancelled: asked within the solves; where it returns True they stop.
+
+    Raises:
+        SceneError: the scene can't be solved.
+        Cancelled: `cancelled` returned True.
+    """
+    began = clock()
+    before: Floats | None = None
+    moved = np.inf
+    for n_u, n_t in GRIDS:
+        quality = Quality(n_u=n_u, n_t=n_t, method="march", estimate=False)
+        prediction = predict(replace(scene, quality=quality), cancelled=cancelled)
+        positions = positions_of(prediction)
+        if before is not None:
+            moved = float(np.linalg.norm(positions - before, axis=-1).max())
+        if moved < still * scene.cable.length and prediction.status == "converged":
+            break
+        if clock() - began > patience:
+            break
+        before = positions
+    return Truth(positions=positions, moved=moved, n_u=n_u, n_t=n_t, status=prediction.status)
+
+
+def largest_error(prediction: Prediction, truth: Truth) -> float:
+    """Return the largest distance of a prediction to the truth, over the cable and the time [m]."""
+    return float(np.linalg.norm(positions_of(prediction) - truth.positions, axis=-1).max())

@@ -1,0 +1,179 @@
+"""What a study measured, as frozen data and as JSON."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from dlocore.errors import DloError
+
+FORMAT = 1
+Part = Literal["runs", "scaling", "effects"]
+PARTS: tuple[Part, ...] = ("runs", "scaling", "effects")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """One iteration of a solve: norm of the update [m] (None: not finite), residual, time since the start [s]."""
+
+    update: float | None
+    residual: float | None
+    wall_time: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """One scene by one method on one grid, repeated.
+
+    Attributes:
+        scene: its name.
+        effects: name of the set of effects.
+        method: how it was solved.
+        n_u, n_t: control points along the cable and in time.
+        delta: threshold on the update [m].
+        dimensions: of the motion.
+        steps: time steps of the march.
+        status: of the prediction.
+        wall_time: of one solve on a core of its own, the median of the repeats [s].
+        spread: half the width that holds half of the repeats [s].
+        repeats: timed calls.
+        error: largest distance to the truth over cable and time [m].
+        rms: root mean square distance [m].
+        truth_error: about the error of the truth itself [m]; None where nothing tells.
+        estimate: the error that the prediction states [m].
+        iterations: how the solve went.
+        phases: time by phase [s].
+        active: the effects that were simulated.
+    """
+
+    scene: str
+    effects: str
+    method: str
+    n_u: int
+    n_t: int
+    delta: float
+    dimensions: int
+    steps: int
+    status: str
+    wall_time: float
+    spread: float
+    repeats: int
+    error: float
+    rms: float
+    truth_error: float | None
+    estimate: float | None
+    iterations: tuple[Step, ...]
+    phases: Mapping[str, float]
+    active: tuple[str, ...]
+
+    @property
+    def key(self) -> tuple[str, str, str, int, int, float]:
+        """What tells it from the other runs of a study."""
+        return self.scene, self.effects, self.method, self.n_u, self.n_t, self.delta
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scaled:
+    """The time of a solve at one value of what its cost is measured against.
+
+    Attributes:
+        variable: "n_u", "n_t", "horizon" or "grasps".
+        value: of it; the horizon in s.
+        method: how it was solved.
+        wall_time: the median of the repeats; of an iteration alone where the method iterates [s].
+        spread: half the width that holds half of the repeats [s].
+    """
+
+    variable: str
+    value: float
+    method: str
+    wall_time: float
+    spread: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class EffectCost:
+    """The time of a march with an effect and without it, on a scene that has it [s]."""
+
+    effect: str
+    present: float
+    absent: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """What a study measured.
+
+    Attributes:
+        machine: processor, cores, system, versions.
+        source: a mark of the program text that was measured.
+        measured_at: when, ISO 8601 in UTC.
+        duration: how long it took [s].
+        judge: what the errors are distances to.
+        runs: scenes over grids, thresholds, methods and sets of effects.
+        refused: runs that the solver does not take, and why.
+        scaling: cost against the size of a problem.
+        effects: cost by effect.
+    """
+
+    machine: Mapping[str, str]
+    source: str
+    measured_at: str
+    duration: float
+    judge: str
+    runs: tuple[Run, ...]
+    refused: tuple[str, ...] = ()
+    scaling: tuple[Scaled, ...] = ()
+    effects: tuple[EffectCost, ...] = field(default=())
+
+
+class StudyError(DloError, ValueError):
+    """A file that holds no study."""
+
+
+def to_document(study: Study) -> dict[str, Any]:
+    """Return a study as data for JSON."""
+    return {"format": FORMAT, **asdict(study)}
+
+
+def from_document(document: Any) -> Study:
+    """Return the study that `to_document` gave.
+
+    Raises:
+        StudyError: it is no study, or one of another form.
+    """
+    try:
+        if document["format"] != FORMAT:
+            raise StudyError(f"format: got {document['format']!r}. Allowed: {FORMAT}.")
+        parts = {name: value for name, value in document.items() if name not in ("format", "id")}
+        parts["runs"] = tuple(_run(run) for run in parts["runs"])
+        parts["refused"] = tuple(parts["refused"])
+        parts["scaling"] = tuple(Scaled(**row) for row in parts["scaling"])
+        parts["effects"] = tuple(EffectCost(**row) for row in parts["effects"])
+        return Study(**parts)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise StudyError(f"This is no study: {error}.") from None
+
+
+def _run(values: dict[str, Any]) -> Run:
+    steps = tuple(Step(**step) for step in values["iterations"])
+    return Run(**{**values, "iterations": steps, "active": tuple(values["active"])})
+
+
+def save(study: Study, path: Path) -> None:
+    """Write a study as JSON."""
+    path.write_text(json.dumps(to_document(study), indent=1))
+
+
+def load(path: Path) -> Study:
+    """Read a study.
+
+    Raises:
+        OSError: the file can't be read.
+        StudyError: it holds no study.
+    """
+    try:
+        return from_document(json.loads(path.read_text()))
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise StudyError(f"This is no JSON: {error}.") from None

@@ -1,0 +1,40 @@
+"""The time of a solve."""
+
+import time
+from collections.abc import Callable
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+
+Answer = TypeVar("Answer")
+
+# A solve runs in one thread: the processor time of this thread is the time that it takes on a core of its own, whatever
+# else the machine does. Where the clock of a thread is coarse, the time that passes has to do.
+_FINE = 1e-6  # [s]
+clock = time.thread_time if time.get_clock_info("thread_time").resolution <= _FINE else time.perf_counter
+
+
+class Times(NamedTuple):
+    """Times of repeated calls [s]: their median, the half width that holds half of them, and how many they are."""
+
+    median: float
+    spread: float
+    repeats: int
+
+
+def timed(call: Callable[[], Answer], repeats: int, patience: float = np.inf) -> tuple[Answer, Times]:
+    """Return the last answer of `call` and its times; the first of several calls, which fills caches, is not counted.
+
+    Args:
+        call: what is measured.
+        repeats: how often, at least 1.
+        patience: no further repeats after so much time in all [s].
+    """
+    taken: list[float] = []
+    while len(taken) <= repeats and (len(taken) < 2 or sum(taken) < patience):
+        began = clock()
+        answer = call()
+        taken.append(clock() - began)
+    counted = np.array(taken[1:])
+    median = float(np.median(counted))
+    return answer, Times(median, float(np.median(np.abs(counted - median))), len(counted))

@@ -1,0 +1,129 @@
+"""Studies over HTTP: taken up, followed, stopped, stored, read; and on the command line."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from app import cli
+from app.schemas.calibration import MeasurementResponse
+from app.schemas.study import StudyResponse
+from dlocore.study import record
+from tests.app.conftest import SCENES, paper_scene
+from tests.app.test_bad_requests import the_problem
+from tests.app.test_jobs import parsed
+
+ADDRESS = "/v1/studies"
+QUICK = {
+    "scenes": {"a quarter": paper_scene()},
+    "grids": [{"n_u": 9, "n_t": 13}, {"n_u": 13, "n_t": 19}],
+    "methods": ["march"],
+    "repeats": 1,
+}
+LONG = {"repeats": 100}
+
+
+def test_a_study_is_followed_to_its_end_and_then_read(client: TestClient) -> None:
+    response = client.post(ADDRESS, json=QUICK, headers={"accept": "text/event-stream"})
+    assert response.status_code == 200
+    events = parsed(response.text)
+    assert [kind for kind, _, _ in events if kind != "progress"] == ["state", "state", "done"][-len(events) :]
+    news = [data for kind, _, data in events if kind == "progress"]
+    assert news[-1]["done"] == news[-1]["total"]
+    address = response.headers["location"]
+    document = client.get(address).json()
+    assert document == events[-1][2]
+    StudyResponse.model_validate(document, strict=True)
+    assert [(run["n_u"], run["method"]) for run in document["runs"]] == [(9, "march"), (13, "march")]
+    assert document["runs"][0]["error"] > document["runs"][1]["error"] > 0
+    assert {"id": document["id"], "self": address}.items() <= client.get(ADDRESS).json()["studies"][0].items()
+    assert client.delete(address).status_code == 204
+    the_problem(client.get(address), 404)
+    the_problem(client.delete(address), 404)
+    the_problem(client.get(f"{address}/events"), 404)
+
+
+def test_a_study_under_way_is_read_as_its_state_and_can_be_stopped(client: TestClient) -> None:
+    taken = client.post(ADDRESS, json=LONG)
+    assert taken.status_code == 202
+    MeasurementResponse.model_validate(taken.json(), strict=True)
+    address = taken.headers["location"]
+    assert client.get(address).status_code == 202
+    waiting = client.post(ADDRESS, json=LONG)
+    assert client.delete(waiting.headers["location"]).json()["state"] == "cancelled"
+    assert client.delete(address).status_code in (200, 202)
+    assert parsed(client.get(f"{address}/events").text)[-1][2]["type"] == "urn:dlo:problem:cancelled"
+    assert client.get(address).json()["state"] == "cancelled"
+
+
+def test_effects_are_compared_and_impossible_scenes_are_refused_by_name(client: TestClient) -> None:
+    sets = {"chosen": {}, "no drag": {"drag": "off"}}
+    response = client.post(ADDRESS, json={**QUICK, "effects": sets}, headers={"accept": "text/event-stream"})
+    runs = parsed(response.text)[-1][2]["runs"]
+    assert {(run["effects"], "drag" in run["active"]) for run in runs} == {("chosen", True), ("no drag", False)}
+    far = paper_scene(primitives=[{**paper_scene()["primitives"][0], "u": 1.5}])
+    problem = the_problem(client.post(ADDRESS, json={"scenes": {"far": far}}), 422)
+    assert problem["errors"][0]["field"] == "scenes.far.primitives[0].u"
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"grids": []}, {"grids": [{"n_u": 3, "n_t": 13}]}, {"repeats": 0}, {"methods": ["guess"]}, {"judge": 1}]
+)
+def test_a_wrong_study_is_refused(client: TestClient, wrong: dict[str, Any]) -> None:
+    the_problem(client.post(ADDRESS, json=wrong), 422)
+
+
+@pytest.mark.parametrize("id", ["0" * 28, "..", "x"])
+def test_an_id_that_is_none_is_not_found(client: TestClient, id: str) -> None:
+    assert client.get(f"{ADDRESS}/{id}").status_code == 404
+
+
+def command(*arguments: str) -> int:
+    quick = ["--grids", "9x13", "13x19", "--methods", "march", "--parts", "runs", "--repeats", "1"]
+    return cli.main(["study", str(SCENES / "paper-fig1.json"), *quick, *arguments])
+
+
+def test_the_command_measures_writes_draws_and_compares(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    first = tmp_path / "first.json"
+    assert command("-o", str(first)) == 0
+    assert "paper-fig1" in capsys.readouterr().out
+    study = json.loads(first.read_text())
+    for run in study["runs"]:
+        run["error"] /= 2  # it was better then
+    before = tmp_path / "before.json"
+    before.write_text(json.dumps(study))
+    assert command("--compare", str(before), "--plots", str(tmp_path / "plots")) == 4
+    printed = capsys.readouterr().out
+    assert "2 runs compared" in printed
+    assert "worse  error" in printed
+    pytest.importorskip("matplotlib")
+    assert {file.name for file in (tmp_path / "plots").iterdir()} == {"work-precision.png", "phases.png"}
+
+
+def test_a_study_of_the_service_can_be_compared_on_the_command_line(client: TestClient, tmp_path: Path) -> None:
+    response = client.post(ADDRESS, json=QUICK, headers={"accept": "text/event-stream"})
+    document = client.get(response.headers["location"]).content
+    (tmp_path / "study.json").write_bytes(document)
+    assert len(record.load(tmp_path / "study.json").runs) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["--grids", "9by13"], "9by13"),
+        (["--n-u", "9"], "--n-t"),
+        (["--methods", "guess"], "guess"),
+        (["--effects", "drag"], "drag=on"),
+        (["--effects", "wind=on"], "wind"),
+        (["--repeats", "0"], "repeats"),
+        (["--compare", "nowhere.json"], "nowhere.json"),
+        (["nowhere.json"], "nowhere.json"),
+    ],
+)
+def test_a_wrong_command_says_what_is_wrong(
+    arguments: list[str], word: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["study", *arguments]) == 2
+    assert word in capsys.readouterr().err

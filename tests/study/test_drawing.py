@@ -1,0 +1,81 @@
+"""The plots of a study: each says what it shows, in units, with a finding as its title."""
+
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("matplotlib")
+
+from matplotlib.figure import Figure
+
+from dlocore.study import accuracy_plots, cost_plots, drawing
+from dlocore.study.record import EffectCost, Run, Scaled, Step, Study
+
+
+def run(method: str, n_u: int, time: float, error: float, **changes: object) -> Run:
+    values = {
+        "scene": "a scene", "effects": "auto", "method": method, "n_u": n_u, "n_t": 2 * n_u, "delta": 1e-5,
+        "dimensions": 2, "steps": 64, "status": "converged", "wall_time": time, "spread": 0.1 * time, "repeats": 5,
+        "error": error, "rms": error / 3, "truth_error": 1e-6, "estimate": None,
+        "iterations": tuple(Step(update=u, residual=1e-3, wall_time=time) for u in (None, 1e-6)),
+        "phases": {"setup": 0.1 * time, "march": 0.9 * time}, "active": ("bend",),
+    }  # fmt: skip
+    return Run(**(values | changes))  # type: ignore[arg-type]
+
+
+def study(**parts: object) -> Study:
+    runs = [run(m, n, c * n**2, 0.1 / n**2) for m, c in (("march", 1e-5), ("spacetime", 1e-4)) for n in (9, 17, 33)]
+    values = {
+        "machine": {"processor": "a processor", "Python": "3.11"}, "source": "0" * 12,
+        "measured_at": "2026-01-31T12:00:00Z", "duration": 1.0, "judge": "march", "runs": tuple(runs),
+        "scaling": tuple(
+            Scaled(variable=v, value=x, method="march", wall_time=1e-3 * x**1.5, spread=1e-5)
+            for v in ("n_u", "n_t", "horizon", "grasps") for x in (2.0, 4.0, 8.0, 16.0)
+        ),
+        "effects": (EffectCost(effect="drag", present=2e-3, absent=1e-3),),
+    }  # fmt: skip
+    return Study(**(values | parts))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        accuracy_plots.work_precision,
+        accuracy_plots.convergence,
+        cost_plots.phases,
+        cost_plots.effect_costs,
+        cost_plots.scaling,
+    ],
+)
+def test_every_axis_has_a_quantity_with_its_unit_and_a_title(draw: object) -> None:
+    figure: Figure = draw(study())  # type: ignore[operator]
+    for axes in figure.axes:
+        assert axes.get_title()
+        for label in (axes.get_xlabel(), axes.get_ylabel()):
+            assert not label or "[" in label or label == "iteration"
+        assert axes.get_xlabel()
+
+
+def test_the_title_names_the_fastest_way_to_a_millimetre() -> None:
+    (axes,) = accuracy_plots.work_precision(study()).axes
+    # 0.1/n^2 m: 0.35 mm at n = 17 in 1e-5 17^2 s = 2.9 ms, which 9 (1.2 mm) does not reach
+    assert "1 mm in 2.9 ms by march" in axes.get_title()
+
+
+def test_the_exponents_in_the_titles_are_those_of_the_data() -> None:
+    assert all("1.50 (march)" in axes.get_title() for axes in cost_plots.scaling(study()).axes)
+
+
+def test_only_what_was_measured_is_drawn(tmp_path: Path) -> None:
+    files = drawing.draw_all(study(scaling=(), effects=()), tmp_path / "plots")
+    assert [file.name for file in files] == ["work-precision.png", "convergence.png", "phases.png"]
+    assert all(file.read_bytes().startswith(b"\x89PNG") for file in files)
+    assert not drawing.draw_all(study(scaling=(), effects=(), runs=()), tmp_path)
+
+
+def test_runs_that_did_not_converge_are_on_no_front() -> None:
+    lost = study(runs=tuple(run("march", n, 1e-3, 1e-3, status="stalled") for n in (9, 17)))
+    (axes,) = accuracy_plots.work_precision(lost).axes
+    assert "nothing converged" in axes.get_title()
+    (axes,) = accuracy_plots.convergence(study(runs=(run("spacetime", 9, 1e-3, 1.0, status="max_iterations"),))).axes
+    assert "0 of 1" in axes.get_title()

@@ -1,0 +1,210 @@
+"""Studies: what they measure, that they are read again, and what a comparison tells."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dlocore import Cancelled, Quality, SceneError, predict
+from dlocore.study import record
+from dlocore.study.compare import compare, words
+from dlocore.study.judge import finest_march, largest_error
+from dlocore.study.plan import Plan
+from dlocore.study.record import EffectCost, Scaled, Study
+from dlocore.study.running import run_study
+from dlocore.study.scaling import effect_pairs, sizes
+from dlocore.study.scenes import accuracy_scenes, hanging, paper_case
+from dlocore.study.timing import timed
+
+GRIDS = ((9, 13), (13, 19), (17, 25))
+
+
+@pytest.fixture(scope="module")
+def measured() -> Study:
+    """Two grasps on three grids by both methods, without twist and as chosen, with two thresholds."""
+    scenes = {"at the end": paper_case(0.0), "at a quarter": paper_case(0.25)}
+    sets = {"auto": {}, "no drag": {"drag": "off"}}
+    return run_study(
+        Plan(scenes=scenes, grids=GRIDS, deltas=(1e-3, 1e-6), effects=sets, repeats=2, parts=("runs",))  # type: ignore[arg-type]
+    )
+
+
+def test_every_combination_is_measured_once(measured: Study) -> None:
+    # a march has no threshold, so that it is measured for one of the two
+    assert len(measured.runs) == 2 * 2 * len(GRIDS) * (1 + 2)
+    assert len({run.key for run in measured.runs}) == len(measured.runs)
+    assert all(run.repeats == 2 and run.wall_time > 0 and run.spread >= 0 for run in measured.runs)
+    assert {("drag" in run.active) == (run.effects == "auto") for run in measured.runs} == {True}
+
+
+def test_errors_are_those_of_the_predictions_and_fall_with_the_grid(measured: Study) -> None:
+    scene = paper_case(0.25)
+    truth = finest_march(scene)
+    prediction = predict(replace(scene, quality=Quality(n_u=9, n_t=13, method="march", estimate=False)))
+    run = next(r for r in measured.runs if r.key[:5] == ("at a quarter", "auto", "march", 9, 13))
+    # both are computed alike; a solve does not depend on what was solved before
+    assert run.error == pytest.approx(largest_error(prediction, truth), rel=1e-9)
+    assert run.rms < run.error
+    for name in ("at the end", "at a quarter"):
+        errors = [r.error for r in measured.runs if r.key[:3] == (name, "auto", "march")]
+        assert errors == sorted(errors, reverse=True)
+        assert errors[0] > 3 * errors[-1]  # spacings halved, at least second order: a factor of 4, less a margin
+
+
+def test_a_truth_moves_less_than_the_errors_it_judges() -> None:
+    truth = finest_march(hanging())
+    assert truth.status == "converged"
+    assert truth.moved < 2e-5  # the length is 1 m, and it stops at 2e-5 of it
+    finer = predict(replace(hanging(), quality=Quality(n_u=129, n_t=385, method="march", estimate=False)))
+    assert largest_error(finer, truth) < 5 * truth.moved  # what is left falls at least by half with each refinement
+
+
+def test_a_smaller_threshold_takes_more_iterations_down_to_it(measured: Study) -> None:
+    for loose, tight in zip(
+        [r for r in measured.runs if r.method == "spacetime" and r.delta == 1e-3],
+        [r for r in measured.runs if r.method == "spacetime" and r.delta == 1e-6],
+        strict=True,
+    ):
+        assert loose.key[:5] == tight.key[:5]
+        assert len(loose.iterations) <= len(tight.iterations)
+        last = tight.iterations[-1].update
+        assert last is not None
+        assert tight.status != "converged" or last < 1e-6
+
+
+def test_a_study_is_read_as_it_was_written(measured: Study, tmp_path: Path) -> None:
+    whole = replace(
+        measured,
+        scaling=(Scaled(variable="n_u", value=9.0, method="march", wall_time=1e-3, spread=1e-5),),
+        effects=(EffectCost(effect="drag", present=2e-3, absent=1e-3),),
+    )
+    record.save(whole, tmp_path / "study.json")
+    assert record.load(tmp_path / "study.json") == whole
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": 7}', '{"format": 1, "runs": 3}'])
+def test_what_is_no_study_is_refused_in_words(text: str, tmp_path: Path) -> None:
+    (tmp_path / "no.json").write_text(text)
+    with pytest.raises(record.StudyError, match=r"\w"):
+        record.load(tmp_path / "no.json")
+
+
+def changed(study: Study, **by: float) -> Study:
+    runs = tuple(
+        replace(run, wall_time=by.get("time", 1.0) * run.wall_time, error=by.get("error", 1.0) * run.error)
+        for run in study.runs
+    )
+    return replace(study, runs=runs)
+
+
+def test_a_study_compared_with_itself_shows_no_change(measured: Study) -> None:
+    comparison = compare(measured, measured)
+    assert comparison.compared == len(measured.runs)
+    assert comparison.changes == ()
+
+
+def test_slower_and_less_accurate_runs_are_told_and_noise_is_not(measured: Study) -> None:
+    sharp = replace(measured, runs=tuple(replace(run, spread=0.001 * run.wall_time) for run in measured.runs))
+    slower = compare(changed(sharp, time=1.3), sharp)
+    assert len(slower.worse) == len(sharp.runs)
+    assert all(change.quantity == "time" for change in slower.worse)
+    assert "1.30 x" in words(slower)
+    faster = compare(sharp, changed(sharp, time=1.3))
+    assert not faster.worse
+    assert len(faster.changes) == len(sharp.runs)
+    assert compare(changed(sharp, time=1.1), sharp).changes == (), "within what two measurements differ by"
+    blurred = replace(measured, runs=tuple(replace(run, spread=0.1 * run.wall_time) for run in measured.runs))
+    assert compare(changed(blurred, time=1.3), blurred).changes == (), "within the spread"
+    worse = compare(changed(sharp, error=1.5), sharp).worse
+    # but where the truth itself is too uncertain to tell
+    assert len(worse) == sum(0.5 * run.error > 2 * (run.truth_error or 0.0) for run in sharp.runs) > 0
+    unsure = replace(sharp, runs=tuple(replace(run, truth_error=None) for run in sharp.runs))
+    assert compare(changed(unsure, error=1.5), unsure).changes == ()
+    assert {change.quantity for change in worse} == {"error"}
+    lost = replace(sharp, runs=tuple(replace(run, status="stalled") for run in sharp.runs))
+    assert {change.quantity for change in compare(lost, sharp).worse} == {"status"}
+
+
+def test_times_of_another_machine_are_not_compared(measured: Study) -> None:
+    elsewhere = replace(changed(measured, time=9.0), machine={**measured.machine, "processor": "another"})
+    comparison = compare(elsewhere, measured)
+    assert not comparison.same_machine
+    assert comparison.changes == ()
+    assert "another machine" in words(comparison)
+
+
+def test_a_grid_without_room_is_noted_and_the_rest_is_measured() -> None:
+    grasps = paper_case(0.25).grasps
+    crowded = replace(paper_case(0.25), grasps=tuple(replace(grasps[0], u=u) for u in (0.2, 0.3, 0.4, 0.5, 0.6)))
+    study = run_study(
+        Plan(scenes={"crowded": crowded}, grids=((7, 13), (17, 25)), methods=("march",), repeats=1, parts=("runs",))
+    )
+    assert [(run.n_u, run.n_t) for run in study.runs] == [(17, 25)]
+    assert len(study.refused) == 1
+    assert "quality.n_u" in study.refused[0]
+
+
+@pytest.mark.parametrize(
+    ("asked", "field"),
+    [
+        ({"repeats": 0}, "repeats"),
+        ({"repeats": 1000}, "repeats"),
+        ({"grids": ((3, 13),)}, "n_u"),
+        ({"grids": ()}, "grids"),
+        ({"deltas": (1.0,)}, "delta"),
+        ({"methods": ("guess",)}, "methods"),
+        ({"effects": {"odd": {"wind": "on"}}}, "effects"),
+        ({"effects": {"odd": {"drag": "maybe"}}}, "effects.drag"),
+        ({"parts": ("all",)}, "parts"),
+        ({"judge": "me"}, "judge"),
+        ({"grids": tuple((n, 13) for n in range(5, 129)), "deltas": tuple(np.geomspace(1e-9, 1e-3, 20))}, "scenes"),
+    ],
+)
+def test_what_is_not_allowed_is_named(asked: dict[str, object], field: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        Plan(**asked)  # type: ignore[arg-type]
+    assert caught.value.field == field
+
+
+def test_a_study_stops_when_asked() -> None:
+    news: list[int] = []
+    with pytest.raises(Cancelled):
+        run_study(
+            Plan(parts=("runs",)),
+            on_progress=lambda done, total, what: news.append(done),
+            cancelled=lambda: len(news) >= 2,
+        )
+    assert len(news) == 2
+
+
+def test_sizes_and_effects_are_solvable_and_differ_in_what_they_say() -> None:
+    least_and_most = {}
+    for size in sizes():
+        key = (size.variable, size.scene.quality.method)
+        least_and_most[key] = (least_and_most.get(key, (size,))[0], size)
+    assert len(least_and_most) == 8
+    for least, most in least_and_most.values():
+        assert least.value < most.value
+        assert predict(least.scene).status == "converged", least
+        march = replace(most.scene, quality=replace(most.scene.quality, method="march"))
+        assert predict(march).status == "converged", most
+    for effect, present, absent in effect_pairs():
+        made = [{e.name for e in predict(scene).effects if e.active} for scene in (present, absent)]
+        assert effect in made[0], effect
+        assert effect not in made[1], effect
+
+
+def test_the_first_call_is_not_counted_and_patience_ends_the_repeats() -> None:
+    calls: list[int] = []
+    answer, times = timed(lambda: calls.append(1) or len(calls), 4)
+    assert answer == 5
+    assert times.repeats == 4
+    calls.clear()
+    assert timed(lambda: calls.append(1), 50, patience=0.0)[1].repeats == 1
+
+
+def test_the_standard_scenes_move_in_the_plane_and_in_space() -> None:
+    quality = Quality(n_u=9, n_t=13, method="march", estimate=False)
+    found = [predict(replace(s, quality=quality)).accuracy.dimensions for s in accuracy_scenes().values()]
+    assert found == [2, 2, 2, 2, 3]
