@@ -1,21 +1,23 @@
-"""What stands in the 3D scene: table, obstacles, cable, space-time surface, ghosts, grippers, paths and reactions."""
+"""What stands in the 3D scene: table, obstacles, cable, space-time surface, ghosts, grippers, contacts."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from viser import ClientHandle
+from viser import SceneApi
 
 from app.viewer import geometry
-from app.viewer.draft import Draft
+from app.viewer.contacts import contact_points
 from app.viewer.grippers import GripperPicture
+from app.viewer.ground import Ground
 from app.viewer.obstacles import ObstaclesPicture
-from app.viewer.palette import QUANTITIES, STEEL, ColourScale, Quantity, colour
+from app.viewer.palette import CONTACT, QUANTITIES, STEEL, ColourScale, Quantity, colour
 from dlocore import Prediction
 
 Floats = NDArray[np.float64]
-SurfaceStyle = Literal["on the table", "raised with time", "hidden"]
+SurfaceStyle = Literal["where it moved", "raised with time", "hidden"]
 SURFACE_STYLES: tuple[SurfaceStyle, ...] = get_args(SurfaceStyle)
 
 CABLE_SEGMENTS = 120
@@ -25,6 +27,9 @@ STRIP_COLUMNS = 49  # points along the cable
 GHOSTS = 9
 GHOST_COLUMNS = 65
 LIFT = 0.45  # height of the raised surface, of the cable's length
+GRAB_SEGMENTS = 30
+GRAB_RADIUS = 0.014  # of the cable's length: the invisible hull in which a click counts as one on the cable
+CONTACT_SIZE = 1.7  # of the cable's diameter
 
 
 @dataclass(frozen=True)
@@ -32,23 +37,38 @@ class Look:
     """How the prediction is shown."""
 
     quantity: Quantity = QUANTITIES["time"]
-    surface: SurfaceStyle = "on the table"
+    surface: SurfaceStyle = "where it moved"
     ghosts: bool = True
+    reactions: bool = True
+    contacts: bool = True
+
+
+@dataclass(frozen=True)
+class Clicks:
+    """What is called when something in the picture is clicked: the cable at u [m], or the gripper of a number."""
+
+    cable: Callable[[float], None]
+    gripper: Callable[[int], None]
 
 
 class Picture:
-    """The scene nodes of one client; every method runs on the viewer's event loop."""
+    """The scene nodes of one client; every method runs on the viewer's event loop.
 
-    def __init__(self, client: ClientHandle, draft: Draft) -> None:
-        self._client = client
-        self._scene = client.scene
+    Args:
+        scene: where they go.
+        clicks: whom to tell of clicks; None: nothing can be clicked.
+    """
+
+    def __init__(self, scene: SceneApi, clicks: Clicks | None = None) -> None:
+        self._scene = scene
+        self._clicks = clicks
         self._look = Look()
         self._prediction: Prediction | None = None
         self._scale: ColourScale | None = None
         self._time = 0.0
-        self._u = np.linspace(0.0, draft.cable.length, CABLE_SEGMENTS + 1)
+        self._selected = 0
+        self._size: tuple[float, float, int] | None = None  # length, diameter, grippers of what is drawn
         self._grippers: list[GripperPicture] = []
-        self._drawn_for: Draft | None = None
         self._strips = [
             self._scene.add_mesh_simple(
                 f"/surface/{k}",
@@ -63,94 +83,120 @@ class Picture:
             for k in range(STRIPS)
         ]
         self._obstacles = ObstaclesPicture(self._scene)
-        self._add_table(draft)
+        self._ground = Ground(self._scene)
 
-    def _add_table(self, draft: Draft) -> None:
-        """Draw the table: its surface lies half a diameter below the centreline of a cable lying on it."""
-        self._table = self._scene.add_grid(
-            "/table",
-            width=5.0,
-            height=5.0,
-            position=(0.5, 0.0, draft.table_height - 0.5 * draft.cable.diameter - 1e-3),
-            cell_size=0.1,
-            cell_thickness=0.6,
-            cell_color=STEEL,
-            section_size=0.5,
-            section_thickness=0.9,
-            section_color=STEEL,
-            plane_color=STEEL,
-            plane_opacity=0.10,
-            shadow_opacity=0.34,
-            fade_distance=2.4,
-            fade_strength=1.2,
-            fade_from="origin",
-        )
-
-    def show(self, draft: Draft, prediction: Prediction) -> ColourScale:
-        """Draw a new prediction of `draft`; return the scale of the colours."""
+    def show(self, prediction: Prediction, selected: int) -> ColourScale:
+        """Draw a new prediction, and mark the gripper in hand; return the scale of the colours."""
         self._prediction = prediction
-        self._scale = ColourScale.of(self._look.quantity, prediction.surface)
-        if self._drawn_for is None or self._drawn_for.cable != draft.cable or len(self._grippers) != len(draft.grasps):
-            self._rebuild(draft)
-        self._drawn_for = draft
-        for gripper, grasp in zip(self._grippers, prediction.grasps, strict=True):
-            gripper.take(prediction, grasp)
+        self._scale = ColourScale.of(self._look.quantity, prediction)
+        cable = prediction.scene.cable
+        size = (cable.length, cable.diameter, len(prediction.grasps))
+        if size != self._size:
+            self._rebuild(*size)
+        self._size = size
+        forces = [np.linalg.norm(grasp.reaction, axis=1).max(initial=0.0) for grasp in prediction.grasps]
+        for number, gripper in enumerate(self._grippers):
+            gripper.take(prediction, number, max(float(max(forces)), 1e-12))
+        self.select(selected)
         self._obstacles.show(prediction.scene.environment.obstacles)
+        self._ground.show(prediction)
         self._draw_strips()
         self._draw_ghosts()
         self.pose(min(self._time, prediction.surface.horizon))
         return self._scale
 
-    def _rebuild(self, draft: Draft) -> None:
+    def select(self, number: int) -> None:
+        """Mark the gripper in hand."""
+        self._selected = number
+        for k, gripper in enumerate(self._grippers):
+            gripper.mark(k == number and self._clicks is not None)
+
+    def _rebuild(self, length: float, diameter: float, grippers: int) -> None:
         """Make the nodes anew whose size depends on the cable or on the number of grippers."""
-        diameter, length = draft.cable.diameter, draft.cable.length
         self._u = np.linspace(0.0, length, CABLE_SEGMENTS + 1)
-        straight = np.column_stack([self._u, np.zeros_like(self._u), np.zeros_like(self._u)])
-        centres, wxyz = geometry.segment_poses(straight)
-        vertices, faces = geometry.capsule(0.5 * diameter, length / CABLE_SEGMENTS)
-        self._cable = self._scene.add_batched_meshes_simple(
-            "/cable",
-            vertices,
-            faces,
-            batched_wxyzs=wxyz,
-            batched_positions=centres,
-            batched_colors=np.full((CABLE_SEGMENTS, 3), STEEL, dtype=np.uint8),
-            lod="off",
-        )
+        self._cable = self._chain("/cable", 0.5 * diameter, length, CABLE_SEGMENTS)
         self._ghosts = self._scene.add_line_segments(
             "/ghosts",
             np.zeros((GHOSTS * (GHOST_COLUMNS - 1), 2, 3)),
             np.zeros((GHOSTS * (GHOST_COLUMNS - 1), 2, 3), dtype=np.uint8),
             thickness=0.45 * diameter,
         )
+        self._marks = self._scene.add_point_cloud(
+            "/contacts", np.zeros((1, 3)), CONTACT, point_size=CONTACT_SIZE * diameter, point_shape="circle"
+        )
+        self._marks.visible = False
         for gripper in self._grippers:
             gripper.remove()
-        self._grippers = [GripperPicture(self._scene, k, diameter, length) for k in range(len(draft.grasps))]
-        self._table.position = np.array([0.5 * length, 0.0, draft.table_height - 0.5 * diameter - 1e-3])
+        click = None if self._clicks is None else self._clicks.gripper
+        self._grippers = [GripperPicture(self._scene, k, diameter, length, click) for k in range(grippers)]
+        if self._clicks is not None:
+            self._add_hull(length, self._clicks.cable)
+
+    def _add_hull(self, length: float, on_click: Callable[[float], None]) -> None:
+        """Add an invisible hull around the cable, thick enough to be clicked."""
+        self._hull = self._chain("/grab", GRAB_RADIUS * length, length, GRAB_SEGMENTS, opacity=0.0)
+
+        @self._hull.on_click
+        async def _clicked(event: Any) -> None:
+            if event.instance_index is not None:
+                on_click((event.instance_index + 0.5) / GRAB_SEGMENTS * length)
+
+    def _chain(self, name: str, radius: float, length: float, count: int, opacity: float | None = None) -> Any:
+        straight = np.column_stack([np.linspace(0.0, length, count + 1), np.zeros((count + 1, 2))])
+        centres, wxyz = geometry.segment_poses(straight)
+        vertices, faces = geometry.capsule(radius, length / count)
+        visible = opacity is None
+        return self._scene.add_batched_meshes_simple(
+            name,
+            vertices,
+            faces,
+            batched_wxyzs=wxyz,
+            batched_positions=centres,
+            batched_colors=np.full((count, 3), STEEL, dtype=np.uint8),
+            opacity=opacity,
+            lod="off",
+            cast_shadow=visible,
+            receive_shadow=visible,
+        )
 
     def restyle(self, look: Look) -> ColourScale | None:
         """Show the same prediction in another way; return the scale of the colours, if there is a prediction."""
         self._look = look
         if self._prediction is None:
             return None
-        self._scale = ColourScale.of(look.quantity, self._prediction.surface)
+        self._scale = ColourScale.of(look.quantity, self._prediction)
         self._draw_strips()
         self._draw_ghosts()
         self.pose(self._time)
         return self._scale
 
     def pose(self, time: float) -> None:
-        """Show the cable and its grippers at `time` [s]."""
+        """Show the cable, its grippers and its contacts at `time` [s]."""
         self._time = time
         if self._prediction is None or self._scale is None:
             return
         surface, t = self._prediction.surface, np.array([time])
-        centres, wxyz = geometry.segment_poses(surface.positions(self._u, t)[0])
+        points = surface.positions(self._u, t)[0]
+        centres, wxyz = geometry.segment_poses(points)
         self._cable.batched_positions = centres.astype(np.float32)
         self._cable.batched_wxyzs = wxyz.astype(np.float32)
-        self._cable.batched_colors = self._scale.colours(surface, 0.5 * (self._u[1:] + self._u[:-1]), t)[0]
+        self._cable.batched_colors = self._scale.colours(self._prediction, 0.5 * (self._u[1:] + self._u[:-1]), t)[0]
+        if self._clicks is not None:
+            centres, wxyz = geometry.segment_poses(points[:: CABLE_SEGMENTS // GRAB_SEGMENTS])
+            self._hull.batched_positions = centres.astype(np.float32)
+            self._hull.batched_wxyzs = wxyz.astype(np.float32)
         for gripper in self._grippers:
+            gripper.show_reactions(self._look.reactions)
             gripper.pose(time)
+        self._mark_contacts(points)
+
+    def _mark_contacts(self, points: Floats) -> None:
+        assert self._prediction is not None
+        touching = contact_points(self._prediction, points) if self._look.contacts else points[:0]
+        if len(touching):
+            self._marks.points = touching.astype(np.float32)
+        if self._marks.visible != bool(len(touching)):
+            self._marks.visible = bool(len(touching))
 
     def _height(self, t: Floats) -> Floats:
         """Height at which the instants `t` are drawn above where they happen [m]."""
@@ -186,6 +232,6 @@ class Picture:
         u = np.linspace(0.0, surface.length, GHOST_COLUMNS)
         points = surface.positions(u, t)
         points[..., 2] += self._height(t)[:, None]
-        colours = self._scale.colours(surface, u, t)
+        colours = self._scale.colours(self._prediction, u, t)
         self._ghosts.points = np.concatenate([geometry.segments(row) for row in points]).astype(np.float32)
         self._ghosts.colors = np.concatenate([np.stack([row[:-1], row[1:]], axis=1) for row in colours])

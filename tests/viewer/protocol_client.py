@@ -1,8 +1,10 @@
 """A viewer client without a browser: the protocol of the scene's websocket, spoken by hand."""
 
+import json
 import time
 from collections.abc import Callable
 from typing import Any
+from uuid import uuid4
 
 import msgspec.msgpack
 import numpy as np
@@ -10,6 +12,7 @@ import viser
 import zstandard
 from websockets.sync.client import ClientConnection, connect
 
+IDENTITY = (1.0, 0.0, 0.0, 0.0)
 SUBPROTOCOL = f"viser-v{viser.__version__}"
 
 
@@ -139,10 +142,65 @@ class SceneClient:
         """The HTML of the element that contains `mark`; empty if there is none."""
         return next((c["content"] for c in self.controls.values() if mark in c.get("content", "")), "")
 
-    def drag(self, phase: str, x: float = 0.0, y: float = 0.0) -> None:
+    @property
+    def document(self) -> dict[str, Any]:
+        """The scene as it would be downloaded now."""
+        self.downloads.clear()
+        self.press("Download scene.json")
+        return json.loads(self.wait_for(lambda: self.downloads.get("scene.json")))
+
+    def refined(self) -> None:
+        """Wait until the picture shows a prediction at the asked quality."""
+        self.wait_for(lambda: "control points" in self.card and "Preview" not in self.card)
+
+    def upload(self, label: str, name: str, content: bytes) -> None:
+        """Open a file by the button with this label."""
+        transfer = str(uuid4())
+        self.send(
+            type="FileTransferStartUpload",
+            source_component_uuid=self.control(label)[0],
+            transfer_uuid=transfer,
+            filename=name,
+            mime_type="application/octet-stream",
+            part_count=1,
+            size_bytes=len(content),
+        )
+        self.send(
+            type="FileTransferPart",
+            source_component_uuid=self.control(label)[0],
+            transfer_uuid=transfer,
+            part_index=0,
+            content=content,
+        )
+
+    def click(self, name: str, instance: int) -> None:
+        """Click on an instance of a node of the picture."""
+        pointer = {"ray_origin": [0.0, 0.0, 1.0], "ray_direction": [0.0, 0.0, -1.0], "screen_pos": [0.5, 0.5]}
+        owner = self.owners[name]
+        self.send(
+            type="SceneNodeClickMessage", name=name, instance_index=instance, modifier=None, owner=owner, **pointer
+        )
+
+    def drag_node(self, phase: str, name: str, instance: int, end: list[float]) -> None:
+        """Start, move or end a drag of an instance of a node; `end` is on the plane that faces the camera [m]."""
+        self.send(
+            type="SceneNodeDragMessage",
+            phase=phase,
+            name=name,
+            instance_index=instance,
+            start_position=end,
+            start_screen_pos=[0.5, 0.5],
+            end_position=end,
+            end_screen_pos=[0.5, 0.5],
+            button="left",
+            modifier=None,
+            owner=self.owners[name],
+        )
+
+    def drag(self, phase: str, x: float = 0.0, y: float = 0.0, z: float = 0.0, wxyz: Any = IDENTITY) -> None:
         """Start, move or end a drag of the target."""
         kind = {"start": "DragStart", "update": "Update", "end": "DragEnd"}[phase]
-        pose = {"wxyz": [1.0, 0.0, 0.0, 0.0], "position": [x, y, 0.0]} if phase == "update" else {}
+        pose = {"wxyz": [float(x) for x in wxyz], "position": [x, y, z]} if phase == "update" else {}
         self.send(type=f"TransformControls{kind}Message", name="/target", owner=self.owners["/target"], **pose)
 
     @property
@@ -154,3 +212,14 @@ class SceneClient:
     def cable(self) -> np.ndarray:
         """Centres of the drawn cable's segments; (segments, 3) [m]."""
         return self.nodes["/cable"]["batched_positions"].reshape(-1, 3)
+
+
+def connected(service: Any, example: str = "", **options: Any) -> SceneClient:
+    """Return a client that sees its first prediction, of a ready scene or of the paper's case."""
+    client = SceneClient(f"{service.socket}/{example}" if example else service.socket, **options)
+    client.wait_for(lambda: "control points" in client.card and "/cable" in client.nodes)
+    return client
+
+
+def NOTHING_STORED(_id: str) -> None:  # noqa: N802 - a constant, as far as scenes are concerned
+    """Find no stored motion."""
