@@ -40,7 +40,7 @@ def playback_page(prediction: Prediction, look: Look, camera: Pose, *, fov: floa
         server.initial_camera.fov = fov
         picture = Picture(server.scene)
         picture.restyle(look)
-        picture.show(prediction, 0)
+        picture.show(prediction)
         serializer = server.get_scene_serializer()
         horizon = prediction.surface.horizon
         frames = int(np.clip(np.ceil(FRAMES * horizon / speed), 2, MOST_FRAMES))

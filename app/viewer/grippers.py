@@ -1,8 +1,5 @@
 """A gripper in the scene: its body, the path of the point it holds, and the force it gives."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi
@@ -14,6 +11,7 @@ from dlocore import Grasp, GraspReaction, Prediction
 Floats = NDArray[np.float64]
 DASHES = 24
 ARROW_LENGTH = 0.22  # of the largest reaction of all grippers, as a fraction of the cable's length
+REACH = (0.03, 0.12)  # of the cable's length: the part of the body that is clearly above the cable
 SMALLEST_ARROW = 0.02  # shorter ones, as a fraction of the longest, are not drawn
 
 
@@ -25,17 +23,12 @@ class GripperPicture:
         number: of the gripper.
         cable_diameter: [m].
         cable_length: [m].
-        on_click: called with the number when it is clicked; None: it can't be.
+
+    Attributes:
+        body: points along its axis, by which it is clicked (k, 3) [m]; none while it is open.
     """
 
-    def __init__(
-        self,
-        scene: SceneApi,
-        number: int,
-        cable_diameter: float,
-        cable_length: float,
-        on_click: Callable[[int], None] | None,
-    ) -> None:
+    def __init__(self, scene: SceneApi, number: int, cable_diameter: float, cable_length: float) -> None:
         vertices, faces = geometry.gripper(cable_diameter, cable_length)
         self._arrow_length = ARROW_LENGTH * cable_length
         self._lift = np.array([0.0, 0.0, 0.6 * cable_diameter])
@@ -65,11 +58,8 @@ class GripperPicture:
         self._held: tuple[Grasp, GraspReaction] | None = None
         self._newtons = 1.0
         self._reactions = True
-        if on_click is not None:
-
-            @self._body.on_click
-            async def _clicked(_event: Any) -> None:
-                on_click(number)
+        self._reach = np.linspace(REACH[0], REACH[1], 5) * cable_length
+        self.body = np.zeros((0, 3))
 
     def take(self, prediction: Prediction, number: int, newtons: float) -> None:
         """Belong to a grasp of a new prediction, in which the largest reaction of all is `newtons` [N]."""
@@ -101,7 +91,9 @@ class GripperPicture:
         point = surface.positions([grasp.u], [time])[0, 0]
         along = surface([grasp.u], [time], du=1)[0, 0, :3]
         self._body.batched_positions = point[None].astype(np.float32)
-        self._body.batched_wxyzs = geometry.quaternion(self._axes(grasp, time, along))[None].astype(np.float32)
+        axes = self._axes(grasp, time, along)
+        self._body.batched_wxyzs = geometry.quaternion(axes)[None].astype(np.float32)
+        self.body = point + np.outer(self._reach, axes[:, 2]) if closed else np.zeros((0, 3))
         force = np.array([np.interp(time, given.times, given.reaction[:, axis]) for axis in range(3)])
         share = float(np.linalg.norm(force)) / self._newtons
         visible = self._reactions and closed and share > SMALLEST_ARROW

@@ -1,8 +1,7 @@
 """What stands in the 3D scene: table, obstacles, cable, space-time surface, ghosts, grippers, contacts."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +13,7 @@ from app.viewer.grippers import GripperPicture
 from app.viewer.ground import Ground
 from app.viewer.obstacles import ObstaclesPicture
 from app.viewer.palette import CONTACT, QUANTITIES, STEEL, ColourScale, Quantity, colour
+from app.viewer.picking import CableClick, GripperClick, picked
 from dlocore import Prediction
 
 Floats = NDArray[np.float64]
@@ -27,8 +27,6 @@ STRIP_COLUMNS = 49  # points along the cable
 GHOSTS = 9
 GHOST_COLUMNS = 65
 LIFT = 0.45  # height of the raised surface, of the cable's length
-GRAB_SEGMENTS = 30
-GRAB_RADIUS = 0.014  # of the cable's length: the invisible hull in which a click counts as one on the cable
 CONTACT_SIZE = 1.7  # of the cable's diameter
 
 
@@ -43,30 +41,20 @@ class Look:
     contacts: bool = True
 
 
-@dataclass(frozen=True)
-class Clicks:
-    """What is called when something in the picture is clicked: the cable at u [m], or the gripper of a number."""
-
-    cable: Callable[[float], None]
-    gripper: Callable[[int], None]
-
-
 class Picture:
     """The scene nodes of one client; every method runs on the viewer's event loop.
 
     Args:
         scene: where they go.
-        clicks: whom to tell of clicks; None: nothing can be clicked.
     """
 
-    def __init__(self, scene: SceneApi, clicks: Clicks | None = None) -> None:
+    def __init__(self, scene: SceneApi) -> None:
         self._scene = scene
-        self._clicks = clicks
         self._look = Look()
         self._prediction: Prediction | None = None
         self._scale: ColourScale | None = None
         self._time = 0.0
-        self._selected = 0
+        self._points = np.zeros((CABLE_SEGMENTS + 1, 3))
         self._size: tuple[float, float, int] | None = None  # length, diameter, grippers of what is drawn
         self._grippers: list[GripperPicture] = []
         self._strips = [
@@ -85,8 +73,8 @@ class Picture:
         self._obstacles = ObstaclesPicture(self._scene)
         self._ground = Ground(self._scene)
 
-    def show(self, prediction: Prediction, selected: int) -> ColourScale:
-        """Draw a new prediction, and mark the gripper in hand; return the scale of the colours."""
+    def show(self, prediction: Prediction, selected: int | None = None) -> ColourScale:
+        """Draw a new prediction, and mark the gripper in hand, if any; return the scale of the colours."""
         self._prediction = prediction
         self._scale = ColourScale.of(self._look.quantity, prediction)
         cable = prediction.scene.cable
@@ -105,16 +93,33 @@ class Picture:
         self.pose(min(self._time, prediction.surface.horizon))
         return self._scale
 
-    def select(self, number: int) -> None:
-        """Mark the gripper in hand."""
-        self._selected = number
+    def select(self, number: int | None) -> None:
+        """Mark the gripper in hand, if any."""
         for k, gripper in enumerate(self._grippers):
-            gripper.mark(k == number and self._clicks is not None)
+            gripper.mark(k == number)
+
+    def picked(self, origin: Floats, direction: Floats) -> CableClick | GripperClick | None:
+        """Return what is seen from `origin` (3,) [m] in `direction` (3,): a gripper, a place on the cable, nothing."""
+        if self._prediction is None:
+            return None
+        bodies = [gripper.body for gripper in self._grippers]
+        return picked(origin, direction, self._points, self._prediction.surface.length, bodies)
 
     def _rebuild(self, length: float, diameter: float, grippers: int) -> None:
         """Make the nodes anew whose size depends on the cable or on the number of grippers."""
         self._u = np.linspace(0.0, length, CABLE_SEGMENTS + 1)
-        self._cable = self._chain("/cable", 0.5 * diameter, length, CABLE_SEGMENTS)
+        straight = np.column_stack([self._u, np.zeros((len(self._u), 2))])
+        centres, wxyz = geometry.segment_poses(straight)
+        vertices, faces = geometry.capsule(0.5 * diameter, length / CABLE_SEGMENTS)
+        self._cable = self._scene.add_batched_meshes_simple(
+            "/cable",
+            vertices,
+            faces,
+            batched_wxyzs=wxyz,
+            batched_positions=centres,
+            batched_colors=np.full((CABLE_SEGMENTS, 3), STEEL, dtype=np.uint8),
+            lod="off",
+        )
         self._ghosts = self._scene.add_line_segments(
             "/ghosts",
             np.zeros((GHOSTS * (GHOST_COLUMNS - 1), 2, 3)),
@@ -127,37 +132,7 @@ class Picture:
         self._marks.visible = False
         for gripper in self._grippers:
             gripper.remove()
-        click = None if self._clicks is None else self._clicks.gripper
-        self._grippers = [GripperPicture(self._scene, k, diameter, length, click) for k in range(grippers)]
-        if self._clicks is not None:
-            self._add_hull(length, self._clicks.cable)
-
-    def _add_hull(self, length: float, on_click: Callable[[float], None]) -> None:
-        """Add an invisible hull around the cable, thick enough to be clicked."""
-        self._hull = self._chain("/grab", GRAB_RADIUS * length, length, GRAB_SEGMENTS, opacity=0.0)
-
-        @self._hull.on_click
-        async def _clicked(event: Any) -> None:
-            if event.instance_index is not None:
-                on_click((event.instance_index + 0.5) / GRAB_SEGMENTS * length)
-
-    def _chain(self, name: str, radius: float, length: float, count: int, opacity: float | None = None) -> Any:
-        straight = np.column_stack([np.linspace(0.0, length, count + 1), np.zeros((count + 1, 2))])
-        centres, wxyz = geometry.segment_poses(straight)
-        vertices, faces = geometry.capsule(radius, length / count)
-        visible = opacity is None
-        return self._scene.add_batched_meshes_simple(
-            name,
-            vertices,
-            faces,
-            batched_wxyzs=wxyz,
-            batched_positions=centres,
-            batched_colors=np.full((count, 3), STEEL, dtype=np.uint8),
-            opacity=opacity,
-            lod="off",
-            cast_shadow=visible,
-            receive_shadow=visible,
-        )
+        self._grippers = [GripperPicture(self._scene, k, diameter, length) for k in range(grippers)]
 
     def restyle(self, look: Look) -> ColourScale | None:
         """Show the same prediction in another way; return the scale of the colours, if there is a prediction."""
@@ -176,15 +151,11 @@ class Picture:
         if self._prediction is None or self._scale is None:
             return
         surface, t = self._prediction.surface, np.array([time])
-        points = surface.positions(self._u, t)[0]
+        points = self._points = surface.positions(self._u, t)[0]
         centres, wxyz = geometry.segment_poses(points)
         self._cable.batched_positions = centres.astype(np.float32)
         self._cable.batched_wxyzs = wxyz.astype(np.float32)
         self._cable.batched_colors = self._scale.colours(self._prediction, 0.5 * (self._u[1:] + self._u[:-1]), t)[0]
-        if self._clicks is not None:
-            centres, wxyz = geometry.segment_poses(points[:: CABLE_SEGMENTS // GRAB_SEGMENTS])
-            self._hull.batched_positions = centres.astype(np.float32)
-            self._hull.batched_wxyzs = wxyz.astype(np.float32)
         for gripper in self._grippers:
             gripper.show_reactions(self._look.reactions)
             gripper.pose(time)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from viser import ClientHandle
+from viser import ClientHandle, SceneClickEvent
 
 from app.schemas import Motion
 from app.viewer import grips, uploads
@@ -19,7 +19,8 @@ from app.viewer.export import playback_page, png
 from app.viewer.gizmo import Gizmo
 from app.viewer.palette import BRAND
 from app.viewer.panel import Actions, Panel
-from app.viewer.picture import Clicks, Look, Picture
+from app.viewer.picking import GripperClick
+from app.viewer.picture import Look, Picture
 from app.viewer.playback import Playback
 from app.viewer.shape_editor import ShapeEditor
 from app.viewer.shapes import straightened, with_points
@@ -29,6 +30,7 @@ from dlocore import Prediction, SceneError
 FRAME = 1 / 40  # s
 PANEL_FRAMES = 3  # pictures for one update of the timeline: redrawing the panel is what costs the browser most
 PATIENCE = 0.8  # s without an answer, after which the panel says that one is under way
+AFTER_DRAG = 0.4  # s, in which a click is the end of a drag
 QUIET = 0.2  # s without an edit, after which the hand counts as still
 PICTURE_SIZE = (1080, 1920)  # px, height and width of a saved picture
 PICTURE_WAIT = 20.0  # s, for the browser to draw it
@@ -83,7 +85,11 @@ class Session:
         self._busy_timer: asyncio.TimerHandle | None = None
         self._playback = Playback()
         self._set_up()
-        self._picture = Picture(client.scene, Clicks(cable=self._cable_clicked, gripper=self._gripper_clicked))
+        self._picture = Picture(client.scene)
+        self._released_at = -np.inf
+
+        # the type asks for a plain function, which viser would call on another thread
+        client.scene.on_click()(self._clicked)  # type: ignore[arg-type]
         self._gizmo = Gizmo(client.scene, self._begin_drag, self._drag, self._end_drag)
         self._shape = ShapeEditor(client, self._shape_dragged)
         self._panel = Panel(
@@ -158,21 +164,25 @@ class Session:
 
     def _end_drag(self) -> None:
         self._dragging = False
+        self._released_at = self._loop.time()
         self._refine()
         self._playback.play()
 
     def _origin(self) -> np.ndarray:
         return grips.origin(self._draft, self._start, None if self._latest is None else self._latest.surface)
 
-    def _cable_clicked(self, u: float) -> None:
-        """Let the gripper in hand hold the cable where it was clicked; without one, add one there."""
+    async def _clicked(self, event: SceneClickEvent) -> None:
+        """Take the clicked gripper in hand, or let the one in hand hold the cable where it was clicked."""
+        if self._dragging or self._shape.active or self._loop.time() - self._released_at < AFTER_DRAG:
+            return
+        found = self._picture.picked(np.array(event.ray_origin), np.array(event.ray_direction))
         draft = self._draft
-        if grips.gripper(draft) is None:
-            draft = grips.added(draft, self._start)
-        self.edit(grips.changed(draft, "u", round(u, 4)))
-
-    def _gripper_clicked(self, number: int) -> None:
-        self.edit(grips.selected(self._draft, number))
+        if isinstance(found, GripperClick):
+            self.edit(grips.selected(draft, found.number))
+        elif found is not None:
+            if grips.gripper(draft) is None:
+                draft = grips.added(draft, self._start)
+            self.edit(grips.changed(draft, "u", round(found.u, 4)))
 
     def _edit_shape(self, wanted: bool) -> None:
         """Show the beads of the start shape, or take them away."""

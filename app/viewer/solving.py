@@ -114,7 +114,8 @@ class SolverThread:
             if not self._closed:
                 self._deliver(Outcome(job=job, prediction=prediction, costs=dict(costs)))
 
-        measure_costs(prediction, job.superseded.is_set, on_cost)
+        # not `superseded`: the service sets that event itself when its solve has ended
+        measure_costs(prediction, lambda: self._closed or self._newest is not None, on_cost)
 
     def _solve(self, job: Job) -> Outcome | None:
         try:

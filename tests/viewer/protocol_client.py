@@ -173,12 +173,16 @@ class SceneClient:
             content=content,
         )
 
-    def click(self, name: str, instance: int) -> None:
-        """Click on an instance of a node of the picture."""
-        pointer = {"ray_origin": [0.0, 0.0, 1.0], "ray_direction": [0.0, 0.0, -1.0], "screen_pos": [0.5, 0.5]}
-        owner = self.owners[name]
+    def click(self, point: Any) -> None:
+        """Click on what lies at a point (3,) [m], seen from above it."""
+        eye = [float(point[0]), float(point[1]), float(point[2]) + 2.0]
         self.send(
-            type="SceneNodeClickMessage", name=name, instance_index=instance, modifier=None, owner=owner, **pointer
+            type="ScenePointerMessage",
+            event_type="click",
+            ray_origin=eye,
+            ray_direction=[0.0, 0.0, -1.0],
+            screen_pos=[[0.5, 0.5]],
+            modifier=None,
         )
 
     def drag_node(self, phase: str, name: str, instance: int, end: list[float]) -> None:

@@ -113,7 +113,7 @@ def test_what_each_effect_costs_is_measured_when_asked_for(service):
         client.refined()
         client.press("Measure what each costs")
         # the march without an effect is compiled the first time
-        client.wait_for(lambda: " ms.</b>" in client.html('data-effect="drag"'), timeout=120)
+        client.wait_for(lambda: " ms.</b>" in client.html('data-effect="inertia"'), timeout=60)
 
 
 def test_an_obstacle_is_drawn_where_it_stands_and_taken_away(service):
@@ -161,7 +161,10 @@ def test_grippers_are_added_selected_and_removed(service):
         client.wait_for(lambda: "/gripper/1" in client.nodes)
         assert client.control("Gripper")[1]["value"] == "2 at 1 m"
         assert [p["u"] for p in client.document["primitives"]] == [0.25, 1.0]
-        client.click("/gripper/0", 0)
+        client.press("Pause")
+        client.set("Time [s]", 0.0)
+        client.wait_for(lambda: abs(client.cable[30, 1]) < 1e-6)
+        client.click(client.cable[30])  # the gripper stands above it
         client.wait_for(lambda: client.control("Gripper")[1]["value"] == "1 at 0.25 m")
         client.set("Grippers", "Remove")
         client.wait_for(lambda: "/gripper/1" not in client.nodes)
@@ -174,15 +177,19 @@ def test_a_cable_without_any_gripper_lies_still_and_gets_one_where_it_is_clicked
         client.set("Grippers", "Remove")
         client.wait_for(lambda: "/gripper/0" not in client.nodes)
         assert np.ptp(client.final_shape[:, 1]) < 1e-3  # m: nothing moves it
-        client.click("/grab", 9)
+        client.click((0.3, 0.0, 0.0))
         client.wait_for(lambda: "/gripper/0" in client.nodes)
-        assert client.document["primitives"][0]["u"] == pytest.approx(9.5 / 30, abs=1e-4)  # rounded to 0.1 mm
+        assert client.document["primitives"][0]["u"] == pytest.approx(0.3, abs=1 / 240)  # half a segment
 
 
 def test_a_click_on_the_cable_takes_hold_of_it_there(service):
     with connected(service) as client:
-        client.click("/grab", 20)
-        client.wait_for(lambda: client.control("Grasp u [m]")[1]["value"] == pytest.approx(20.5 / 30, abs=1e-4))
+        client.press("Pause")
+        client.set("Time [s]", 0.0)
+        client.wait_for(lambda: abs(client.cable[30, 1]) < 1e-6)
+        client.click((0.7, 0.2, 0.0))  # beside it: nothing happens
+        client.click((0.7, 0.005, 0.0))
+        client.wait_for(lambda: client.control("Grasp u [m]")[1]["value"] == pytest.approx(0.7, abs=1 / 240))
 
 
 def test_the_target_can_be_dragged_in_height_and_turned(service):
