@@ -90,7 +90,9 @@ def _csv(content: bytes) -> Floats:
         if len(row) not in (2, 3) or (rows and len(row) != len(rows[0])):
             raise SceneError(f"file, line {number}", line, "2 or 3 numbers [m], as many in every line")
         rows.append(row)
-    return np.array(rows, dtype=float).reshape(len(rows), -1)
+    if not rows:
+        raise SceneError("file", "no row of numbers", "rows of 2 or 3 numbers, the points [m]")
+    return np.array(rows, dtype=float)
 
 
 def _arrays(content: bytes) -> Floats:

@@ -50,7 +50,8 @@ class SceneClient:
         self.owners: dict[str, str] = {}
         self.controls: dict[str, dict[str, Any]] = {}
         self.downloads: dict[str, bytes] = {}
-        self._transfers: dict[str, str] = {}
+        self._transfers: dict[str, tuple[str, int]] = {}
+        self._parts: dict[str, dict[int, bytes]] = {}
         self.frames = 0
         self.send(
             type="ViewerCameraMessage",
@@ -111,15 +112,24 @@ class SceneClient:
             elif kind == "SetSceneNodeVisibilityMessage":
                 self.visible[name] = message["visible"]
             elif kind == "FileTransferStartDownload":
-                self._transfers[message["transfer_uuid"]] = message["filename"]
+                self._transfers[message["transfer_uuid"]] = (message["filename"], message["part_count"])
             elif kind == "FileTransferPart":
-                self.downloads[self._transfers[message["transfer_uuid"]]] = bytes(message["content"])
+                self._take_part(message)
             elif kind.startswith("Gui") and "props" in message:
                 value = {"value": message["value"]} if "value" in message else {}
                 self.controls[message["uuid"]] = {"kind": kind, **message["props"], **value}
             elif "props" in message and name:
                 self.nodes[name] = dict(message["props"])
                 self.owners[name] = message.get("owner", "")
+
+    def _take_part(self, message: dict[str, Any]) -> None:
+        """Add a part of a download, which is there once it is whole."""
+        uuid = message["transfer_uuid"]
+        parts = self._parts.setdefault(uuid, {})
+        parts[message["part_index"]] = bytes(message["content"])
+        filename, count = self._transfers[uuid]
+        if len(parts) == count:
+            self.downloads[filename] = b"".join(parts[k] for k in range(count))
 
     def control(self, label: str) -> tuple[str, dict[str, Any]]:
         """Return the id and the state of the control with this label."""
@@ -141,6 +151,10 @@ class SceneClient:
     def html(self, mark: str) -> str:
         """The HTML of the element that contains `mark`; empty if there is none."""
         return next((c["content"] for c in self.controls.values() if mark in c.get("content", "")), "")
+
+    def markdown(self, mark: str) -> str:
+        """The Markdown of the element that contains `mark`; empty if there is none."""
+        return next((c["_markdown"] for c in self.controls.values() if mark in c.get("_markdown", "")), "")
 
     @property
     def document(self) -> dict[str, Any]:
