@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from urllib.parse import quote, urlencode, urlsplit
+from urllib.parse import urlencode, urlsplit
 
 import viser
 from fastapi import FastAPI, Request, Response, WebSocket
@@ -64,13 +64,20 @@ class Upstream:
         port: where it listens on the loopback address.
         key: proves to it that a connection came through the gateway.
         allowed_origins: origins let in besides that of the page's own host.
-        is_full: says whether as many scenes are open as may be.
+        open_scenes: says how many scenes are open.
+        most_scenes: that may be.
     """
 
     port: int
     key: str
     allowed_origins: frozenset[str]
-    is_full: Callable[[], bool]
+    open_scenes: Callable[[], int]
+    most_scenes: int
+
+    @property
+    def is_full(self) -> bool:
+        """Whether as many scenes are open as may be."""
+        return self.open_scenes() >= self.most_scenes
 
 
 def origin_is_allowed(origin: str | None, host: str, allowed: Collection[str]) -> bool:
@@ -104,7 +111,7 @@ def add_gateway(app: FastAPI) -> None:
         upstream = _upstream(request.app)
         if upstream is None:
             return _notice("The scene is not running", "The service is stopping, or has not started yet.", 503)
-        if upstream.is_full():
+        if upstream.is_full:
             words = "As many scenes are open as this service allows. Close another tab, or try again later."
             return _notice("All scenes are taken", words, 503)
         return Response(client, media_type="text/html; charset=utf-8", headers=PAGE_HEADERS)
@@ -115,13 +122,15 @@ def add_gateway(app: FastAPI) -> None:
         name = query.pop("example", None)
         if name is None:
             return page(request)
-        path = f"/scene/{quote(name, safe='')}/"
+        if example(name) is None:
+            return _unknown()
+        path = f"/scene/{name}/"
         return RedirectResponse(path + (f"?{urlencode(query)}" if query else ""))
 
     @app.get("/scene/{name}/", include_in_schema=False)
     async def example_page(name: str, request: Request) -> Response:
         if example(name) is None:
-            return _notice("There is no such scene", f"The ready scenes are: {', '.join(example_names())}.", 404)
+            return _unknown()
         return page(request)
 
     @app.websocket("/scene")
@@ -134,7 +143,7 @@ def add_gateway(app: FastAPI) -> None:
 
     async def serve(socket: WebSocket, name: str) -> None:
         upstream = _upstream(socket.app)
-        if upstream is None or upstream.is_full() or (name and example(name) is None):
+        if upstream is None or upstream.is_full or (name and example(name) is None):
             await socket.close(TRY_AGAIN_LATER)
             return
         if not origin_is_allowed(
@@ -143,6 +152,10 @@ def add_gateway(app: FastAPI) -> None:
             await socket.close(POLICY_VIOLATION)
             return
         await _pass_on(socket, upstream, name)
+
+
+def _unknown() -> Response:
+    return _notice("There is no such scene", f"The ready scenes are: {', '.join(example_names())}.", 404)
 
 
 def _notice(title: str, words: str, status: int) -> Response:

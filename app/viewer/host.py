@@ -45,10 +45,6 @@ class SceneHost:
         """The port it listens on."""
         return self._server.get_port()
 
-    def is_full(self) -> bool:
-        """Whether as many sessions are open as may be."""
-        return len(self.sessions) >= self._most
-
     def stop(self) -> None:
         """Close all sessions and stop listening."""
         for session in list(self.sessions.values()):
@@ -66,7 +62,7 @@ class SceneHost:
         if not hmac.compare_digest(headers.get(KEY_HEADER, "").encode(), self.key.encode()):
             await connection.close()  # not through the gateway, which checks origins
             return
-        if self.is_full():
+        if len(self.sessions) >= self._most:
             await connection.close()  # two came in at once for the last place
             return
         self.sessions[client.client_id] = Session(
@@ -86,7 +82,11 @@ async def hosting(app: FastAPI, service: Service) -> AsyncIterator[SceneHost]:
     shared = Shared(service.runs, ServiceSolver(service, asyncio.get_running_loop()))
     host = await anyio.to_thread.run_sync(SceneHost, shared, settings.max_scenes)
     app.state.viewer_upstream = Upstream(
-        port=host.port, key=host.key, allowed_origins=frozenset(settings.allowed_origins), is_full=host.is_full
+        port=host.port,
+        key=host.key,
+        allowed_origins=frozenset(settings.allowed_origins),
+        open_scenes=lambda: len(host.sessions),
+        most_scenes=settings.max_scenes,
     )
     try:
         yield host

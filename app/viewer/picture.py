@@ -22,6 +22,7 @@ SURFACE_STYLES: tuple[SurfaceStyle, ...] = get_args(SurfaceStyle)
 
 CABLE_SEGMENTS = 120
 STRIPS = 8
+STRIP_COLOURS = [colour((k + 0.5) / STRIPS) for k in range(STRIPS)]
 STRIP_ROWS = 4  # times in a strip
 STRIP_COLUMNS = 49  # points along the cable
 GHOSTS = 9
@@ -62,7 +63,7 @@ class Picture:
                 f"/surface/{k}",
                 np.zeros((STRIP_ROWS * STRIP_COLUMNS, 3)),
                 geometry.strip_faces(STRIP_ROWS, STRIP_COLUMNS),
-                color=colour((k + 0.5) / STRIPS),
+                color=STRIP_COLOURS[k],
                 opacity=0.34,
                 side="double",
                 cast_shadow=False,
@@ -73,8 +74,8 @@ class Picture:
         self._obstacles = ObstaclesPicture(self._scene)
         self._ground = Ground(self._scene)
 
-    def show(self, prediction: Prediction, selected: int | None = None) -> ColourScale:
-        """Draw a new prediction, and mark the gripper in hand, if any; return the scale of the colours."""
+    def show(self, prediction: Prediction, time: float = 0.0, selected: int | None = None) -> ColourScale:
+        """Draw a new prediction at `time` [s], and mark the gripper in hand; return the scale of the colours."""
         self._prediction = prediction
         self._scale = ColourScale.of(self._look.quantity, prediction)
         cable = prediction.scene.cable
@@ -90,7 +91,7 @@ class Picture:
         self._ground.show(prediction)
         self._draw_strips()
         self._draw_ghosts()
-        self.pose(min(self._time, prediction.surface.horizon))
+        self.pose(time)
         return self._scale
 
     def select(self, number: int | None) -> None:
@@ -189,7 +190,7 @@ class Picture:
                 # strips that lie on each other must not be coplanar: later ones a little higher, all below the cable
                 rows[..., 2] -= radius * (1.0 - 0.9 * k / STRIPS)
             strip.vertices = rows.reshape(-1, 3).astype(np.float32)
-            strip.color = colour((k + 0.5) / STRIPS) if self._look.quantity.name == "time" else STEEL
+            strip.color = STRIP_COLOURS[k] if self._look.quantity.name == "time" else STEEL
             strip.visible = self._look.surface != "hidden"
 
     def _draw_ghosts(self) -> None:

@@ -298,8 +298,7 @@ class Session:
         self._playback.set_horizon(prediction.surface.horizon)
         if self._dragging and not self._shape.held:
             self._playback.seek(self._playback.horizon)
-        scale = self._picture.show(prediction, self._draft.selected)
-        self._picture.pose(self._playback.time)
+        scale = self._picture.show(prediction, self._playback.time, self._draft.selected)
         self._panel.take_prediction(outcome.job.draft, prediction, scale, preview=preview)
         self._gizmo.warn("")
         if not preview:

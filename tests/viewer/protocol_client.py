@@ -1,5 +1,6 @@
 """A viewer client without a browser: the protocol of the scene's websocket, spoken by hand."""
 
+import contextlib
 import json
 import time
 from collections.abc import Callable
@@ -86,6 +87,11 @@ class SceneClient:
             except TimeoutError:
                 continue
         return value
+
+    def take_one(self, seconds: float) -> None:
+        """Take in the next frame, if it comes in time."""
+        with contextlib.suppress(TimeoutError):
+            self._take(self.socket.recv(timeout=seconds))
 
     def listen(self, seconds: float) -> None:
         """Take in messages for a while."""

@@ -4,9 +4,7 @@ import time
 import httpx
 import numpy as np
 import pytest
-from protocol_client import NOTHING_STORED, SUBPROTOCOL, SceneClient, connected
-from websockets.exceptions import ConnectionClosed, InvalidStatus
-from websockets.sync.client import connect
+from protocol_client import NOTHING_STORED, connected
 
 from app.viewer.draft import start_draft
 from dlocore import predict
@@ -56,10 +54,14 @@ def test_the_newest_target_wins_over_a_flood_of_older_ones(service):
         for k in range(400):
             client.drag("update", 0.25, 0.1 + 0.001 * k)
         client.drag("update", 0.25, -0.3)
-        began = time.monotonic()
-        client.wait_for(lambda: abs(client.final_shape[12, 1] + 0.3) < 2e-3)
-        # 400 queued solves of several ms each would take longer
-        assert time.monotonic() - began < 2.0
+        shapes = []
+
+        def reached():
+            shapes.append(client.final_shape[12, 1])
+            return abs(shapes[-1] + 0.3) < 2e-3
+
+        client.wait_for(reached)
+        assert len(set(shapes)) < 200  # queued up, all 401 targets would have been solved and drawn
         client.drag("end")
 
 
@@ -172,46 +174,3 @@ def test_a_kept_run_is_stored_with_its_scene(service):
         assert httpx.get(f"{base}/recording.rrd").content[:4] == b"RRF2"
         curl = next(c["_markdown"] for c in client.controls.values() if "curl -s" in c.get("_markdown", ""))
         assert f"curl -s {service.address}/v1/predictions " in curl
-
-
-def test_a_foreign_origin_is_refused(service):
-    with pytest.raises(InvalidStatus) as refusal:
-        SceneClient(service.socket, origin="https://evil.example")
-    assert refusal.value.response.status_code == 403
-
-
-@pytest.mark.parametrize("origin", ["same", "https://friend.example"])
-def test_its_own_and_an_allowed_origin_are_let_in(service, origin):
-    connected(service, origin=service.address if origin == "same" else origin).socket.close()
-
-
-def test_the_inner_port_opens_no_scene(service):
-    port = service.app.state.viewer_upstream.port
-    with pytest.raises((ConnectionClosed, AssertionError)), SceneClient(f"ws://127.0.0.1:{port}") as client:
-        client.wait_for(lambda: "/cable" in client.nodes, timeout=5)
-    assert "/cable" not in client.nodes
-
-
-def test_nobody_can_make_the_scene_publish_itself(service):
-    with connected(service) as client:
-        client.send(type="ShareUrlRequest")
-        client.listen(0.3)
-        assert service.app.state.viewer_upstream is not None
-        server = service.app.state.viewer_upstream
-        assert server.port
-        client.drag("start")  # the connection still works
-        client.drag("end")
-
-
-def test_the_page_allows_nothing_from_other_hosts(service):
-    page = httpx.get(f"{service.address}/scene/")
-    policy = page.headers["content-security-policy"]
-    assert "default-src 'self'" in policy
-    assert "http" not in policy
-    assert "frame-ancestors 'self'" in policy
-
-
-def test_a_wrong_protocol_version_ends_the_connection(service):
-    with connect(service.socket, subprotocols=["viser-v0.0.1"], proxy=None) as socket, pytest.raises(ConnectionClosed):
-        socket.recv(timeout=5)
-    assert SUBPROTOCOL.startswith("viser-v")
