@@ -16,6 +16,7 @@ _CARD = (
 )
 _GOOD = "rgba(46, 107, 214, 0.10)"
 _DOUBT = "rgba(235, 150, 30, 0.16)"
+EARLIER = 30  # solves that are shown beside the present one
 _BAD = "rgba(222, 72, 50, 0.16)"
 _WORDS = {
     "converged": "Converged",
@@ -144,7 +145,7 @@ def accuracy_plot(prediction: Prediction, earlier: list[tuple[float, float]]) ->
     if accuracy.error_estimate and accuracy.wall_time > 0:
         here = (1e3 * accuracy.wall_time, 1e3 * accuracy.error_estimate)
         series.append(plots.Series(name="this solve", points=[here], colour=plots.ORANGE, size=5.0))
-        earlier.append(here)
+        earlier[:] = [*earlier, here][-EARLIER:]
     return plots.plot("time [ms]", "error [mm]", series, log_x=True, mark="accuracy")
 
 

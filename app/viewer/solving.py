@@ -126,6 +126,7 @@ class SolverThread:
             prediction = self._solver.refine(scene, job.superseded)
             if job.kind == "refined":
                 return Outcome(job=job, prediction=prediction)
+            self._deliver(Outcome(job=job, prediction=prediction))
             self._measure(job, prediction)
             return None
         except Cancelled:
