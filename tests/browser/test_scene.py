@@ -7,7 +7,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Locator, Page, expect
 from test_browser import canvas, on_screen, open_scene
 
 from app.viewer.examples import example, example_names
@@ -21,6 +21,12 @@ ARC = {
     "primitives": [{"u": 0.0, "path": {"kind": "move", "displacement": [0.1, 0.2, 0.0], "duration": 1.0}}],
     "environment": {"table": {"height": 0.0, "friction": 0.2}},
 }
+
+
+def field(page: Page, label: str) -> Locator:
+    """Return the text field beside a label of the panel."""
+    boxes = "[self::textarea or (self::input and not(@type = 'hidden' or @type = 'range'))]"
+    return page.get_by_text(label, exact=True).locator(f"xpath=following::*{boxes}[1]")
 
 
 def downloaded(page: Page, button: str) -> Path:
@@ -38,7 +44,7 @@ def test_a_scene_is_loaded_from_a_file_and_saved_again(service, witness, tmp_pat
     with page.expect_file_chooser() as choosing:
         page.get_by_role("button", name="Open a file").click()
     choosing.value.set_files(file)
-    expect(page.get_by_role("textbox", name="Name")).to_have_value(NAME)
+    expect(field(page, "Name")).to_have_value(NAME)
     expect(page.locator('[data-status="converged"]')).to_be_visible()
     assert json.loads(downloaded(page, "Download scene.json").read_bytes()) == ARC
     assert witness.errors == []
@@ -48,10 +54,12 @@ def test_a_saved_playback_plays_offline_and_asks_nobody(service, witness):
     page = open_scene(witness, service)
     page.get_by_role("tab", name="Share").click()
     file = downloaded(page, "Save playback.html")
-    context = page.context.browser.new_context(viewport={"width": 500, "height": 400}, offline=True)
+    context = page.context.browser.new_context(viewport={"width": 400, "height": 300}, offline=True)
+    page.close()  # two pictures at once are much for a renderer without a GPU
     asked: list[str] = []
     errors: list[str] = []
     offline = context.new_page()
+    offline.set_default_timeout(60_000)
     offline.on("request", lambda request: asked.append(request.url))
     offline.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
     page_file = file.with_suffix(".html")
@@ -85,7 +93,7 @@ def test_a_click_on_the_cable_takes_hold_of_it_there(service, witness):
     time = page.locator("input[type=text]").first
     time.fill("0")
     time.press("Enter")
-    grasp = page.get_by_text("Grasp u [m]").locator("xpath=ancestor::*[.//input][1]").locator("input[type=text]")
+    grasp = field(page, "Grasp u [m]")
     expect(grasp).to_have_value("0.25")
     page.mouse.click(*on_screen(page, 0.7, 0.0))
     expect(grasp).not_to_have_value("0.25")
