@@ -2,21 +2,17 @@
 
 import asyncio
 import contextlib
-import json
-import logging
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 from viser import ClientHandle, SceneClickEvent
 
-from app.schemas import Motion
 from app.viewer import grips, uploads
 from app.viewer.camera import FIELD_OF_VIEW, PHONE, extent, start_pose
 from app.viewer.draft import Draft, start_draft
 from app.viewer.examples import example
-from app.viewer.export import playback_page, png
 from app.viewer.gizmo import Gizmo
+from app.viewer.outbox import Outbox, Runs
 from app.viewer.palette import BRAND
 from app.viewer.panel import Actions, Panel
 from app.viewer.picking import GripperClick
@@ -32,19 +28,6 @@ PANEL_FRAMES = 3  # pictures for one update of the timeline: redrawing the panel
 PATIENCE = 0.8  # s without an answer, after which the panel says that one is under way
 AFTER_DRAG = 0.4  # s, in which a click is the end of a drag
 QUIET = 0.2  # s without an edit, after which the hand counts as still
-PICTURE_SIZE = (1080, 1920)  # px, height and width of a saved picture
-PICTURE_WAIT = 20.0  # s, for the browser to draw it
-_log = logging.getLogger(__name__)
-
-
-class Runs(Protocol):
-    """Where runs are stored."""
-
-    def save(self, scene_json: dict[str, Any], prediction: Prediction, *, name: str = "") -> str:
-        """Store a run; return its id."""
-
-    def motion(self, id: str) -> Motion | None:
-        """Return the motion of a stored run."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +68,7 @@ class Session:
         self._busy_timer: asyncio.TimerHandle | None = None
         self._playback = Playback()
         self._set_up()
+        self._outbox = Outbox(client, shared.runs)
         self._picture = Picture(client.scene)
         self._released_at = -np.inf
 
@@ -360,48 +344,18 @@ class Session:
             self._replace(Draft.of(document))
 
     def _download(self) -> None:
-        """Send the scene to the browser as the file that the API and the command line read."""
-        content = json.dumps(self._draft.document, indent=2).encode()
-        self._client.send_file_download("scene.json", content, save_immediately=True)
+        self._outbox.scene(self._draft)
 
     async def _save_playback(self) -> None:
-        """Save what plays as a page that opens offline."""
-        if self._latest is None:
-            return
-        camera = (np.array(self._client.camera.position), np.array(self._client.camera.look_at))
-        page = await asyncio.to_thread(
-            playback_page,
-            self._latest,
-            self._look,
-            camera,
-            fov=self._client.camera.fov,
-            speed=self._playback.speed,
-        )
-        self._client.send_file_download("cable.html", page, save_immediately=True)
+        if self._latest is not None:
+            await self._outbox.playback(self._latest, self._look, self._playback.speed)
 
     async def _save_picture(self) -> None:
-        """Have the browser draw the scene larger than it is on the screen, without the panel, and save it."""
-        height, width = PICTURE_SIZE
-        try:
-            picture = await asyncio.to_thread(
-                self._client.get_render, height, width, transport_format="png", timeout=PICTURE_WAIT
-            )
-        except (TimeoutError, RuntimeError) as error:
-            self._client.add_notification("No picture", str(error), color="red")
-            return
-        content = await asyncio.to_thread(png, picture)
-        self._client.send_file_download("cable.png", content, save_immediately=True)
+        await self._outbox.picture()
 
     async def _keep(self) -> None:
-        """Store the last refined prediction with its scene and link to it."""
-        if self._shown is None or self._shown[0].document != self._draft.document:
-            return
-        draft, prediction = self._shown
-        name = draft.get(("name",), "")
-        try:
-            run_id = await asyncio.to_thread(self._shared.runs.save, draft.document, prediction, name=name)
-        except Exception:
-            _log.exception("the run could not be stored")
-            self._client.add_notification("Not kept", "The run could not be stored; the log says why.", color="red")
-            return
-        self._panel.show_kept(run_id)
+        """Store the last refined prediction with its scene, and link to it, unless the scene was edited since."""
+        if self._shown is not None and self._shown[0].document == self._draft.document:
+            run_id = await self._outbox.keep(*self._shown)
+            if run_id is not None:
+                self._panel.show_kept(run_id)
