@@ -46,7 +46,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         service = Service.of(settings)
         app.state.service = service
-        async with viewer.running(app, settings, service.runs), service.running():
+        async with viewer.running(app, service), service.running():
             yield
 
     app = FastAPIOffline(title="dlo", version=_version(), description=_ABOUT, lifespan=lifespan, redoc_url=None)

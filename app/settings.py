@@ -32,6 +32,7 @@ class Settings(BaseSettings):
         default=5.0, ge=0.0, le=3600.0, description="Time for running solves to finish when the service stops [s]."
     )
     log_format: Literal["json", "text"] = Field(default="json", description="Form of the log on standard error.")
+    max_scenes: int = Field(default=16, ge=1, le=1000, description="Tabs of the 3D scene that may be open at once.")
     max_runs: int = Field(default=1000, ge=1, description="Stored runs kept; the oldest go first.")
     max_run_bytes: int = Field(default=2_000_000_000, ge=1_000_000, description="Bytes of stored runs kept.")
 

@@ -26,24 +26,52 @@ def chromium() -> str:
 
 
 def scene(browser: Browser, address: str) -> None:
-    """Draw the scene alone, in dark, with the target somewhere else and the cable near the end of its motion."""
-    page = browser.new_page(viewport={"width": 1280, "height": 760})
-    page.goto(f"{address}/scene/?darkMode")
-    page.wait_for_selector('[data-status="converged"]', timeout=FIRST_SOLVE)
-    target = page.get_by_text("Target x, y [m]").locator("xpath=ancestor::*[.//input][1]").locator("input")
+    """Draw the scene alone: the paper's case with another target, in dark; and three ready scenes."""
+    page = opened(browser, f"{address}/scene/?darkMode")
+    target = page.get_by_text("Target [m]").locator("xpath=ancestor::*[.//input][1]").locator("input")
     for box, value in ((target.nth(0), "0.42"), (target.nth(1), "0.48")):
         box.fill(value)
         box.press("Enter")
         page.wait_for_timeout(500)
+    drawn(page, "1.05", "Quality", "scene.png")
+    page = opened(browser, f"{address}/scene/?example=two-grippers")
+    drawn(page, "0.7", "Scene", "scene-two-grippers.png")
+    page = opened(browser, f"{address}/scene/?example=twist-buckles&darkMode")
+    choose(page, "Colour", "twist")
+    drawn(page, "1.7", "View", "scene-twist.png")
+    page = opened(browser, f"{address}/scene/?example=peg-with-friction")
+    page.get_by_role("tab", name="Effects").click()
+    page.get_by_role("button", name="Measure what each costs").click()
+    page.locator("[data-effect=obstacles]").get_by_text("It ").wait_for(timeout=FIRST_SOLVE)
+    choose(page, "Colour", "curvature")
+    drawn(page, "1.4", "Effects", "scene-peg.png")
+
+
+def opened(browser: Browser, url: str) -> Page:
+    """Open a scene and wait for its first prediction."""
+    page = browser.new_page(viewport={"width": 1280, "height": 800})
+    page.goto(url)
+    page.wait_for_selector('[data-status="converged"]', timeout=FIRST_SOLVE)
+    return page
+
+
+def choose(page: Page, label: str, option: str) -> None:
+    """Choose an option of the view."""
+    page.get_by_role("tab", name="View").click()
+    page.get_by_role("combobox", name=label).click()
+    page.get_by_role("option", name=option).click()
+
+
+def drawn(page: Page, time: str, tab: str, file: str) -> None:
+    """Draw a scene at a time [s], with a tab of its panel open."""
     page.get_by_role("button", name="Pause").click()
-    time = page.locator("input[type=text]").first
-    time.click()
-    time.press("Control+a")
-    page.keyboard.type("1.05")
-    time.press("Tab")
-    page.get_by_role("tab", name="Result").click()
+    box = page.locator("input[type=text]").first
+    box.fill(time)
+    box.press("Enter")
+    page.get_by_role("tab", name=tab).click()
     settle(page)
-    page.screenshot(path=HERE / "scene.png")
+    page.screenshot(path=HERE / file)
+    page.close()
 
 
 def landing(browser: Browser, address: str) -> None:

@@ -5,10 +5,9 @@ from collections.abc import AsyncIterator
 
 from fastapi import FastAPI
 
-from app.settings import Settings
+from app.service import Service
 from app.viewer.gateway import add_gateway
 from app.viewer.host import SceneHost, hosting
-from app.viewer.session import Runs
 
 
 def add_routes(app: FastAPI) -> None:
@@ -17,9 +16,9 @@ def add_routes(app: FastAPI) -> None:
 
 
 @contextlib.asynccontextmanager
-async def running(app: FastAPI, settings: Settings, runs: Runs) -> AsyncIterator[SceneHost]:
+async def running(app: FastAPI, service: Service) -> AsyncIterator[SceneHost]:
     """Run the scene while the context lasts; for the application's lifespan."""
-    async with hosting(app, settings.allowed_origins, runs) as host:
+    async with hosting(app, service) as host:
         yield host
 
 

@@ -3,28 +3,55 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from app.viewer.draft import Draft
+from dlocore.shape import StartCurve
+
 Floats = NDArray[np.float64]
 FIELD_OF_VIEW = 0.7  # rad, vertical
-DISTANCE = 1.75  # from the middle, of the cable's length
-WIDE = 1.2  # picture at least that much wider than high: the whole cable is in it from `DISTANCE`
+DISTANCE = 2.5  # from the middle, of the radius of what is to be seen
+SMALLEST = 0.2  # of the cable's length: half the room that is seen at least, to drag a target in
+WIDE = 1.35  # picture at least that much wider than high: a wide scene is in it from `DISTANCE`
 PANEL = 320  # px that the docked panel takes
 PHONE = 576  # px: a page no wider has its panel in a sheet over the lower part of the picture
 SHEET = 0.6  # of the picture's height, that the sheet covers
-VIEW = np.array([0.0, 0.66, -0.75])  # from the camera to what it looks at
+FROM_ABOVE = np.array([0.0, 0.66, -0.75])  # from the camera to what it looks at: a table
+FROM_THE_SIDE = np.array([0.28, 0.90, -0.34])  # a cable that hangs
 
 
-def start_pose(length: float, page_width: int, page_height: int) -> tuple[Floats, Floats]:
-    """Return the camera's position and the point it looks at [m], for a cable along x from the origin.
+def extent(draft: Draft, start: StartCurve) -> Floats:
+    """Return points (n, 3) [m] that are to be seen: the start of the cable, and where its grippers take it.
+
+    A small motion gets room around it to drag a target in.
+    """
+    curve = start(np.linspace(0.0, draft.length, 33))
+    middle = 0.5 * (curve.min(axis=0) + curve.max(axis=0))
+    room = SMALLEST * draft.length * np.array([1.0, 1.0, 0.0])
+    points = [curve, middle[None] - room, middle[None] + room]
+    for primitive in draft.primitives:
+        path = primitive["path"]
+        if path["kind"] == "move":
+            points.append(start(primitive["u"]) + np.array(path["displacement"], dtype=float))
+        elif path["kind"] == "waypoints":
+            points.append(np.array(path["positions"], dtype=float))
+    return np.concatenate(points)
+
+
+def start_pose(points: Floats, page_width: int, page_height: int, *, on_table: bool) -> tuple[Floats, Floats]:
+    """Return the camera's position and the point it looks at [m].
 
     Args:
-        length: of the cable [m].
+        points: what is to be seen (n, 3) [m].
         page_width: of the whole page [px], the panel included.
         page_height: of the whole page [px].
+        on_table: whether there is a table, best seen from above.
     """
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = 0.5 * (low + high)
     phone = page_width <= PHONE
+    view = FROM_ABOVE if on_table else FROM_THE_SIDE
+    view = view / np.linalg.norm(view)
     aspect = max(page_width if phone else page_width - PANEL, 1) / max(page_height, 1)
-    distance = DISTANCE * length * max(1.0, WIDE / aspect)
-    middle = np.array([0.5 * length, 0.2 * length, 0.0])
-    if phone:  # look at a nearer point of the table, so that the cable comes to lie above the sheet
-        middle[1] -= SHEET * np.tan(0.5 * FIELD_OF_VIEW) * distance / -VIEW[2]
-    return middle - distance * VIEW, middle
+    distance = DISTANCE * 0.5 * float(np.linalg.norm(high - low)) * max(1.0, WIDE / aspect)
+    if phone:  # look at a nearer point, so that the cable comes to lie above the sheet
+        middle = middle - SHEET * np.tan(0.5 * FIELD_OF_VIEW) * distance * np.array([0.0, 1.0, 0.0])
+    return middle - distance * view, middle

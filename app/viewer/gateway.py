@@ -7,17 +7,21 @@ are refused: viser itself checks none.
 import asyncio
 import contextlib
 import re
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
-from urllib.parse import urlsplit
+from urllib.parse import urlencode, urlsplit
 
 import viser
 from fastapi import FastAPI, Request, Response, WebSocket
+from starlette.responses import RedirectResponse
 from starlette.websockets import WebSocketDisconnect
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.typing import Subprotocol
+
+from app.viewer.examples import example, example_names
 
 CLIENT_PAGE = Path(viser.__file__).parent / "client" / "build" / "index.html"
 CONTENT_SECURITY_POLICY = "; ".join(
@@ -48,6 +52,7 @@ GOING_AWAY = 1001
 
 KEY_HEADER = "X-Scene-Key"
 ADDRESS_HEADER = "X-Scene-Address"
+EXAMPLE_HEADER = "X-Scene-Example"
 _HOST = re.compile(r"[A-Za-z0-9.\-_]+(:[0-9]{1,5})?|\[[0-9a-fA-F:.]+\](:[0-9]{1,5})?")
 
 
@@ -59,11 +64,20 @@ class Upstream:
         port: where it listens on the loopback address.
         key: proves to it that a connection came through the gateway.
         allowed_origins: origins let in besides that of the page's own host.
+        open_scenes: says how many scenes are open.
+        most_scenes: that may be.
     """
 
     port: int
     key: str
     allowed_origins: frozenset[str]
+    open_scenes: Callable[[], int]
+    most_scenes: int
+
+    @property
+    def is_full(self) -> bool:
+        """Whether as many scenes are open as may be."""
+        return self.open_scenes() >= self.most_scenes
 
 
 def origin_is_allowed(origin: str | None, host: str, allowed: Collection[str]) -> bool:
@@ -85,19 +99,51 @@ def address(socket: WebSocket) -> str:
 
 
 def add_gateway(app: FastAPI) -> None:
-    """Add `GET /scene/` and the websocket `/scene`; without a viser server they say so."""
-    page = CLIENT_PAGE.read_bytes()
+    """Add `GET /scene/` and the websocket `/scene`, alone and followed by the name of a ready scene.
+
+    The client takes the address of its websocket from that of its page, without the query: so the name of the scene
+    goes into the path, and `?example=` leads there. Without a viser server, and where as many scenes are open as may
+    be, the pages say so.
+    """
+    client = CLIENT_PAGE.read_bytes()
+
+    def page(request: Request) -> Response:
+        upstream = _upstream(request.app)
+        if upstream is None:
+            return _notice("The scene is not running", "The service is stopping, or has not started yet.", 503)
+        if upstream.is_full:
+            words = "As many scenes are open as this service allows. Close another tab, or try again later."
+            return _notice("All scenes are taken", words, 503)
+        return Response(client, media_type="text/html; charset=utf-8", headers=PAGE_HEADERS)
 
     @app.get("/scene/", include_in_schema=False)
     async def scene_page(request: Request) -> Response:
-        if _upstream(request.app) is None:
-            return Response("The scene is not running.", status_code=503, media_type="text/plain")
-        return Response(page, media_type="text/html; charset=utf-8", headers=PAGE_HEADERS)
+        query = dict(request.query_params)
+        name = query.pop("example", None)
+        if name is None:
+            return page(request)
+        if example(name) is None:
+            return _unknown()
+        path = f"/scene/{name}/"
+        return RedirectResponse(path + (f"?{urlencode(query)}" if query else ""))
+
+    @app.get("/scene/{name}/", include_in_schema=False)
+    async def example_page(name: str, request: Request) -> Response:
+        if example(name) is None:
+            return _unknown()
+        return page(request)
 
     @app.websocket("/scene")
     async def scene_socket(socket: WebSocket) -> None:
+        await serve(socket, "")
+
+    @app.websocket("/scene/{name}")
+    async def example_socket(socket: WebSocket, name: str) -> None:
+        await serve(socket, name)
+
+    async def serve(socket: WebSocket, name: str) -> None:
         upstream = _upstream(socket.app)
-        if upstream is None:
+        if upstream is None or upstream.is_full or (name and example(name) is None):
             await socket.close(TRY_AGAIN_LATER)
             return
         if not origin_is_allowed(
@@ -105,21 +151,36 @@ def add_gateway(app: FastAPI) -> None:
         ):
             await socket.close(POLICY_VIOLATION)
             return
-        await _pass_on(socket, upstream)
+        await _pass_on(socket, upstream, name)
+
+
+def _unknown() -> Response:
+    return _notice("There is no such scene", f"The ready scenes are: {', '.join(example_names())}.", 404)
+
+
+def _notice(title: str, words: str, status: int) -> Response:
+    """Return a page that says why there is no scene."""
+    text = (
+        '<!doctype html><html lang="en"><meta charset="utf-8"><meta name="color-scheme" content="light dark">'
+        f"<title>{escape(title)}</title><body style='font: 1rem/1.5 system-ui; max-width: 32rem; margin: 4rem auto; "
+        f"padding: 0 1rem'><h1 style='font-size: 1.3rem'>{escape(title)}</h1><p>{escape(words)}</p>"
+        "<p><a href='/scene/'>Open the scene</a> · <a href='/' target='_top'>Start page</a></p></body></html>"
+    )
+    return Response(text, status_code=status, media_type="text/html; charset=utf-8", headers=PAGE_HEADERS)
 
 
 def _upstream(app: FastAPI) -> Upstream | None:
     return getattr(app.state, "viewer_upstream", None)
 
 
-async def _pass_on(socket: WebSocket, upstream: Upstream) -> None:
-    """Connect `socket` with the viser server until either side closes."""
+async def _pass_on(socket: WebSocket, upstream: Upstream, name: str) -> None:
+    """Connect `socket` with the viser server, to open the ready scene `name`, until either side closes."""
     protocols = [Subprotocol(name) for name in socket.scope.get("subprotocols", [])]
     try:
         inner = await connect(
             f"ws://127.0.0.1:{upstream.port}",
             subprotocols=protocols or None,
-            additional_headers={KEY_HEADER: upstream.key, ADDRESS_HEADER: address(socket)},
+            additional_headers={KEY_HEADER: upstream.key, ADDRESS_HEADER: address(socket), EXAMPLE_HEADER: name},
             compression=None,
             max_size=None,
             proxy=None,

@@ -2,6 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 Floats = NDArray[np.float64]
 Faces = NDArray[np.uint32]
@@ -26,10 +27,26 @@ def segment_poses(points: Floats) -> tuple[Floats, Floats]:
     return 0.5 * (points[1:] + points[:-1]), wxyz
 
 
-def yaw(direction: Floats) -> Floats:
-    """Return the quaternion wxyz that turns x about z towards the horizontal part of `direction` (3,)."""
-    angle = np.arctan2(direction[1], direction[0])
-    return np.array([np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2)])
+def upright(direction: Floats, approach: Floats | None = None) -> Floats:
+    """Return axes (3, 3), in columns, with x along `direction` (3,) and z as near to `approach` as possible.
+
+    Args:
+        direction: of the cable where it is held.
+        approach: where the gripper's stem points; upwards where absent, or where the cable itself goes there.
+    """
+    x = direction / max(float(np.linalg.norm(direction)), 1e-12)
+    z = np.array([0.0, 0.0, 1.0]) if approach is None else approach
+    across = z - (z @ x) * x
+    if float(np.linalg.norm(across)) < 1e-3:
+        side = np.array([0.0, 1.0, 0.0])
+        across = side - (side @ x) * x
+    z = across / np.linalg.norm(across)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def quaternion(axes: Floats) -> Floats:
+    """Return the quaternion wxyz (4,) of axes (3, 3) in columns."""
+    return np.roll(Rotation.from_matrix(axes).as_quat(), 1)
 
 
 def cylinder(radius: float, sides: int = 14) -> Mesh:
@@ -81,9 +98,12 @@ def joined(*meshes: Mesh) -> Mesh:
     return np.concatenate([vertices for vertices, _ in meshes]), np.concatenate(faces).astype(np.uint32)
 
 
-def gripper(cable_diameter: float) -> Mesh:
-    """Return a parallel gripper around the origin: its fingers lie at both sides (y) of a cable along x."""
-    half = 0.5 * cable_diameter
+def gripper(cable_diameter: float, scale: float = 1.0) -> Mesh:
+    """Return a parallel gripper around the origin: its fingers lie at both sides (y) of a cable along x.
+
+    Its fingers are 52 mm long, times `scale`.
+    """
+    half = 0.5 * cable_diameter / scale
     finger, reach, width = 0.006, 0.052, 0.020
     fingers = [
         box((width, finger, reach), (0.0, side * (half + 0.5 * finger), 0.5 * reach - half)) for side in (-1.0, 1.0)
@@ -91,7 +111,8 @@ def gripper(cable_diameter: float) -> Mesh:
     palm = box((1.3 * width, 2 * half + 5 * finger, 0.018), (0.0, 0.0, reach + 0.009 - half))
     vertices, faces = cylinder(0.009)
     stem = (vertices * (1.0, 1.0, 0.05) + (0.0, 0.0, reach + 0.043 - half), faces)
-    return joined(*fingers, palm, stem)
+    vertices, faces = joined(*fingers, palm, stem)
+    return scale * vertices, faces
 
 
 def strip_faces(rows: int, columns: int) -> Faces:

@@ -5,20 +5,31 @@ from numpy.typing import NDArray
 from viser import SceneApi
 
 from app.viewer import geometry
-from app.viewer.palette import REACTION, STEEL, linear
-from dlocore import GraspReaction, Prediction, SplineSurface
+from app.viewer.palette import BRAND, REACTION, STEEL, linear
+from dlocore import Grasp, GraspReaction, Prediction
 
 Floats = NDArray[np.float64]
 DASHES = 24
-ARROW_LENGTH = 0.22  # of the largest reaction, as a fraction of the cable's length
+ARROW_LENGTH = 0.22  # of the largest reaction of all grippers, as a fraction of the cable's length
+REACH = (0.03, 0.12)  # of the cable's length: the part of the body that is clearly above the cable
 SMALLEST_ARROW = 0.02  # shorter ones, as a fraction of the longest, are not drawn
 
 
 class GripperPicture:
-    """The nodes of one gripper."""
+    """The nodes of one gripper.
+
+    Args:
+        scene: where they go.
+        number: of the gripper.
+        cable_diameter: [m].
+        cable_length: [m].
+
+    Attributes:
+        body: points along its axis, by which it is clicked (k, 3) [m]; none while it is open.
+    """
 
     def __init__(self, scene: SceneApi, number: int, cable_diameter: float, cable_length: float) -> None:
-        vertices, faces = geometry.gripper(cable_diameter)
+        vertices, faces = geometry.gripper(cable_diameter, cable_length)
         self._arrow_length = ARROW_LENGTH * cable_length
         self._lift = np.array([0.0, 0.0, 0.6 * cable_diameter])
         # a batch of one: its pose then reaches the browser the same way as the cable's, and they are drawn in step
@@ -43,33 +54,60 @@ class GripperPicture:
             head_length=0.030 * cable_length,
             visible=False,
         )
-        self._surface: SplineSurface | None = None
-        self._grasp: GraspReaction | None = None
+        self._prediction: Prediction | None = None
+        self._held: tuple[Grasp, GraspReaction] | None = None
         self._newtons = 1.0
+        self._reactions = True
+        self._reach = np.linspace(REACH[0], REACH[1], 5) * cable_length
+        self.body = np.zeros((0, 3))
 
-    def take(self, prediction: Prediction, grasp: GraspReaction) -> None:
-        """Belong to `grasp` of a new prediction."""
-        self._surface, self._grasp = prediction.surface, grasp
-        self._newtons = max(float(np.linalg.norm(grasp.reaction, axis=1).max(initial=0.0)), 1e-12)
-        t = np.linspace(0.0, prediction.surface.horizon, 2 * DASHES)
-        track = prediction.surface.positions([grasp.u], t)[:, 0] + self._lift
+    def take(self, prediction: Prediction, number: int, newtons: float) -> None:
+        """Belong to a grasp of a new prediction, in which the largest reaction of all is `newtons` [N]."""
+        self._prediction, self._newtons = prediction, newtons
+        self._held = (prediction.scene.grasps[number], prediction.grasps[number])
+        grasp, horizon = self._held[0], prediction.surface.horizon
+        closes, opens = min(grasp.start, horizon), min(grasp.release_time or horizon, horizon)
+        track = prediction.surface.positions([grasp.u], np.linspace(closes, opens, 2 * DASHES))[:, 0] + self._lift
         self._path.points = track.reshape(DASHES, 2, 3).astype(np.float32)
         self._path.visible = bool(np.ptp(track, axis=0).max() > 1e-6)
 
+    def mark(self, selected: bool) -> None:
+        """Show whether it is the one in hand."""
+        self._body.batched_colors = linear(np.array(BRAND if selected else STEEL))
+
+    def show_reactions(self, shown: bool) -> None:
+        """Draw the reaction's arrow, or not."""
+        self._reactions = shown
+
     def pose(self, time: float) -> None:
-        """Show body and reaction at `time` [s]."""
-        if self._surface is None or self._grasp is None:
+        """Show body and reaction at `time` [s]; an open gripper is not shown."""
+        if self._prediction is None or self._held is None:
             return
-        grasp = self._grasp
-        point = self._surface.positions([grasp.u], [time])[0, 0]
-        along = self._surface([grasp.u], [time], du=1)[0, 0, :3]
+        grasp, given = self._held
+        closed = grasp.start <= time and (grasp.release_time is None or time <= grasp.release_time)
+        if self._body.visible != closed:
+            self._body.visible = closed
+        surface = self._prediction.surface
+        point = surface.positions([grasp.u], [time])[0, 0]
+        along = surface([grasp.u], [time], du=1)[0, 0, :3]
         self._body.batched_positions = point[None].astype(np.float32)
-        self._body.batched_wxyzs = geometry.yaw(along)[None].astype(np.float32)
-        force = np.array([np.interp(time, grasp.times, grasp.reaction[:, axis]) for axis in range(3)])
+        axes = self._axes(grasp, time, along)
+        self._body.batched_wxyzs = geometry.quaternion(axes)[None].astype(np.float32)
+        self.body = point + np.outer(self._reach, axes[:, 2]) if closed else np.zeros((0, 3))
+        force = np.array([np.interp(time, given.times, given.reaction[:, axis]) for axis in range(3)])
         share = float(np.linalg.norm(force)) / self._newtons
-        self._arrow.visible = share > SMALLEST_ARROW
+        visible = self._reactions and closed and share > SMALLEST_ARROW
+        if self._arrow.visible != visible:
+            self._arrow.visible = visible
         start = point + self._lift
         self._arrow.points = np.array([[start, start + force / self._newtons * self._arrow_length]], dtype=np.float32)
+
+    def _axes(self, grasp: Grasp, time: float, along: Floats) -> Floats:
+        """Return the axes (3, 3) of the body: along the cable, and turned with the path where it turns."""
+        turned = grasp.path.rotation_at(np.array([max(time - grasp.start, 0.0)]))
+        if turned is None:
+            return geometry.upright(along)
+        return geometry.upright(along, turned[0] @ geometry.upright(turned[0].T @ along)[:, 2])
 
     def remove(self) -> None:
         """Take the nodes out of the scene."""

@@ -1,44 +1,38 @@
 """The viser server inside the service: started with it, stopped with it, one session a connected client."""
 
+import asyncio
 import contextlib
 import hmac
 import secrets
-from collections.abc import AsyncIterator, Collection, Iterator
+from collections.abc import AsyncIterator
 
 import anyio
 import anyio.to_thread
-import rich
 import viser
 from fastapi import FastAPI
 from viser import ClientHandle, _messages
 
-from app.viewer.gateway import ADDRESS_HEADER, KEY_HEADER, Upstream
-from app.viewer.session import Runs, Session
-
-
-@contextlib.contextmanager
-def _quiet_console() -> Iterator[None]:
-    """Keep viser from announcing its inner port, which is not for people to open."""
-    console = rich.get_console()
-    before, console.quiet = console.quiet, True
-    try:
-        yield
-    finally:
-        console.quiet = before
+from app.service import Service
+from app.viewer.gateway import ADDRESS_HEADER, EXAMPLE_HEADER, KEY_HEADER, Upstream
+from app.viewer.quiet import quiet_console
+from app.viewer.session import Session, Shared
+from app.viewer.solver import ServiceSolver
 
 
 class SceneHost:
     """A viser server on the loopback address with a session for each client.
 
     Args:
-        runs: where sessions store runs.
+        shared: what all sessions work with.
+        most: sessions that may be open at once.
     """
 
-    def __init__(self, runs: Runs) -> None:
-        self._runs = runs
+    def __init__(self, shared: Shared, most: int) -> None:
+        self._shared = shared
+        self._most = most
         self.key = secrets.token_urlsafe(32)
         self.sessions: dict[int, Session] = {}
-        with _quiet_console():
+        with quiet_console():
             self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         # any client could otherwise ask viser to publish itself on the internet
         for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
@@ -56,7 +50,7 @@ class SceneHost:
         for session in list(self.sessions.values()):
             session.close()
         self.sessions.clear()
-        with _quiet_console():
+        with quiet_console():
             self._server.stop()
 
     async def _open(self, client: ClientHandle) -> None:
@@ -68,7 +62,12 @@ class SceneHost:
         if not hmac.compare_digest(headers.get(KEY_HEADER, "").encode(), self.key.encode()):
             await connection.close()  # not through the gateway, which checks origins
             return
-        self.sessions[client.client_id] = Session(client, self._runs, headers.get(ADDRESS_HEADER, ""))
+        if len(self.sessions) >= self._most:
+            await connection.close()  # two came in at once for the last place
+            return
+        self.sessions[client.client_id] = Session(
+            client, self._shared, headers.get(ADDRESS_HEADER, ""), headers.get(EXAMPLE_HEADER, "")
+        )
 
     async def _close(self, client: ClientHandle) -> None:
         session = self.sessions.pop(client.client_id, None)
@@ -77,10 +76,18 @@ class SceneHost:
 
 
 @contextlib.asynccontextmanager
-async def hosting(app: FastAPI, allowed_origins: Collection[str], runs: Runs) -> AsyncIterator[SceneHost]:
+async def hosting(app: FastAPI, service: Service) -> AsyncIterator[SceneHost]:
     """Run a viser server behind the gateway of `app` while the context lasts."""
-    host = await anyio.to_thread.run_sync(SceneHost, runs)
-    app.state.viewer_upstream = Upstream(port=host.port, key=host.key, allowed_origins=frozenset(allowed_origins))
+    settings = service.settings
+    shared = Shared(service.runs, ServiceSolver(service, asyncio.get_running_loop()))
+    host = await anyio.to_thread.run_sync(SceneHost, shared, settings.max_scenes)
+    app.state.viewer_upstream = Upstream(
+        port=host.port,
+        key=host.key,
+        allowed_origins=frozenset(settings.allowed_origins),
+        open_scenes=lambda: len(host.sessions),
+        most_scenes=settings.max_scenes,
+    )
     try:
         yield host
     finally:

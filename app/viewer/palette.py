@@ -2,11 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore import SplineSurface
+from dlocore import Prediction
 
 Floats = NDArray[np.float64]
 Colours = NDArray[np.uint8]
@@ -16,15 +17,21 @@ STEEL = (128, 138, 154)
 WARNING = (222, 72, 50)
 REACTION = (213, 94, 0)
 OBSTACLE = (84, 152, 134)  # Okabe-Ito's bluish green, calmed down by grey
+CONTACT = (230, 159, 0)
+# from blue to amber, ever lighter, in about even steps of what the eye tells apart
 _RAMP = np.array(
-    [(46, 107, 214), (108, 92, 224), (178, 80, 200), (228, 92, 142), (247, 133, 86), (248, 184, 72)], dtype=float
+    [(46, 82, 190), (96, 84, 212), (150, 82, 206), (203, 88, 172), (236, 113, 118), (248, 150, 84), (248, 196, 88)],
+    dtype=float,
 )
+# between Okabe-Ito's blue and vermilion, lightest at zero
+_DIVERGING = np.array([(0, 92, 160), (64, 148, 205), (205, 210, 214), (232, 138, 72), (200, 76, 0)], dtype=float)
 
 
-def ramp(values: Floats) -> Colours:
-    """Return the colours of `values` (n,), 0 to 1, from blue to amber; (n, 3)."""
-    x = np.clip(np.nan_to_num(values), 0.0, 1.0) * (len(_RAMP) - 1)
-    channels = [np.interp(x, np.arange(len(_RAMP)), _RAMP[:, channel]) for channel in range(3)]
+def ramp(values: Floats, *, signed: bool = False) -> Colours:
+    """Return the colours of `values` (n,), 0 to 1; (n, 3). Where they are signed, 0.5 stands for zero."""
+    stops = _DIVERGING if signed else _RAMP
+    x = np.clip(np.nan_to_num(values), 0.0, 1.0) * (len(stops) - 1)
+    channels = [np.interp(x, np.arange(len(stops)), stops[:, channel]) for channel in range(3)]
     return np.rint(np.stack(channels, axis=-1)).astype(np.uint8)
 
 
@@ -41,9 +48,9 @@ def colour(value: float) -> tuple[int, int, int]:
     return int(r), int(g), int(b)
 
 
-def css_ramp() -> str:
+def css_ramp(*, signed: bool = False) -> str:
     """Return the ramp as a CSS gradient."""
-    stops = ", ".join(f"rgb({int(r)} {int(g)} {int(b)})" for r, g, b in _RAMP)
+    stops = ", ".join(f"rgb({int(r)} {int(g)} {int(b)})" for r, g, b in (_DIVERGING if signed else _RAMP))
     return f"linear-gradient(90deg, {stops})"
 
 
@@ -54,38 +61,52 @@ class Quantity:
     Attributes:
         name: as on the panel.
         unit: of the values.
-        values: surface, u (k_u,) [m], t (k_t,) [s] -> (k_t, k_u).
+        values: prediction, u (k_u,) [m], t (k_t,) [s] -> (k_t, k_u).
         signed: whether the scale is symmetric about zero.
         scale: factor from the values to the unit.
     """
 
     name: str
     unit: str
-    values: Callable[[SplineSurface, Floats, Floats], Floats]
+    values: Callable[[Prediction, Floats, Floats], Floats]
     signed: bool = False
     scale: float = 1.0
 
 
-def _time(_surface: SplineSurface, u: Floats, t: Floats) -> Floats:
+def _time(_prediction: Prediction, u: Floats, t: Floats) -> Floats:
     return np.repeat(t[:, None], len(u), axis=1)
 
 
-def _speed(surface: SplineSurface, u: Floats, t: Floats) -> Floats:
-    return np.linalg.norm(surface(u, t, dt=1)[..., :3], axis=-1)
+def _curvature(prediction: Prediction, u: Floats, t: Floats) -> Floats:
+    return prediction.surface.curvature(u, t)
 
 
-def _twist(surface: SplineSurface, u: Floats, t: Floats) -> Floats:
-    return surface(u, t, du=1)[..., 3]
+def _speed(prediction: Prediction, u: Floats, t: Floats) -> Floats:
+    return np.linalg.norm(prediction.surface(u, t, dt=1)[..., :3], axis=-1)
+
+
+def _twist(prediction: Prediction, u: Floats, t: Floats) -> Floats:
+    return prediction.surface.twist_rate(u, t)
+
+
+def _strain(prediction: Prediction, u: Floats, t: Floats) -> Floats:
+    return prediction.surface.axial_strain(u, t)
+
+
+def _tension(prediction: Prediction, u: Floats, t: Floats) -> Floats:
+    """Return the axial force by which the cable passes the grippers' reactions on [N]."""
+    return cast(float, prediction.scene.cable.axial_stiffness) * prediction.surface.axial_strain(u, t)
 
 
 QUANTITIES = {
     quantity.name: quantity
     for quantity in (
         Quantity("time", "s", _time),
-        Quantity("curvature", "1/m", SplineSurface.curvature),
+        Quantity("curvature", "1/m", _curvature),
         Quantity("speed", "m/s", _speed),
         Quantity("twist", "rad/m", _twist, signed=True),
-        Quantity("axial strain", "µm/m", SplineSurface.axial_strain, signed=True, scale=1e6),
+        Quantity("axial strain", "µm/m", _strain, signed=True, scale=1e6),
+        Quantity("reaction", "N, tension", _tension, signed=True),
     )
 }
 
@@ -99,14 +120,14 @@ class ColourScale:
     high: float
 
     @staticmethod
-    def of(quantity: Quantity, surface: SplineSurface) -> "ColourScale":
+    def of(quantity: Quantity, prediction: Prediction) -> "ColourScale":
         """Span the whole prediction: from zero, or symmetric about it, to the largest value."""
-        u = np.linspace(0.0, surface.length, 61)
-        t = np.linspace(0.0, surface.horizon, 25)
-        largest = max(float(np.abs(quantity.values(surface, u, t)).max()), 1e-12)
+        u = np.linspace(0.0, prediction.surface.length, 61)
+        t = np.linspace(0.0, prediction.surface.horizon, 25)
+        largest = max(float(np.abs(quantity.values(prediction, u, t)).max()), 1e-12)
         return ColourScale(quantity, -largest if quantity.signed else 0.0, largest)
 
-    def colours(self, surface: SplineSurface, u: Floats, t: Floats) -> Colours:
+    def colours(self, prediction: Prediction, u: Floats, t: Floats) -> Colours:
         """Return the colours of instances or vertices at `u` (k_u,) and `t` (k_t,); (k_t, k_u, 3), linear."""
-        values = self.quantity.values(surface, u, t)
-        return linear(ramp((values - self.low) / (self.high - self.low)))
+        values = self.quantity.values(prediction, u, t)
+        return linear(ramp((values - self.low) / (self.high - self.low), signed=self.quantity.signed))

@@ -1,23 +1,61 @@
 """The control panel: what a person sets, and what the last solve was worth."""
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 import viser
-from viser import ClientHandle, GuiEvent, uplot
+from viser import ClientHandle, GuiEvent
 
 from app.viewer import report
 from app.viewer.draft import Draft
-from app.viewer.forms import CableForm, GraspForm, QualityForm, SurroundingsForm, show_value
+from app.viewer.examples import example_names
+from app.viewer.forms import CableForm, EffectsForm, GripperForm, QualityForm, SurroundingsForm, show_value
 from app.viewer.palette import QUANTITIES, ColourScale
 from app.viewer.picture import SURFACE_STYLES, Look
 from app.viewer.playback import Playback
-from dlocore import Prediction
+from app.viewer.shapes import with_settling
+from dlocore import Prediction, SplineSurface
+from dlocore.shape import StartCurve
 
 SPEEDS = {"¼×": 0.25, "½×": 0.5, "1×": 1.0, "2×": 2.0}
-SLIDER_STEP = 0.01  # s
-PLOT_HEIGHT = 190  # px
+SLIDER_STEPS = 160  # of the timeline
+CHOOSE = "choose …"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Actions:
+    """What the panel has done.
+
+    Attributes:
+        edit: take over an edited draft.
+        look: draw the picture in another way.
+        seek: draw the time at which the playback stands.
+        keep: store the run.
+        download: send the scene as a file.
+        open_file: open a file of this name and content.
+        open_example: open the ready scene of this name.
+        save_playback: send the playback as a page.
+        save_picture: send a picture.
+        measure_costs: measure what the effects cost.
+        edit_shape: show the beads of the start shape, or not.
+        straighten: start straight.
+        reset_camera: look at the whole scene again.
+    """
+
+    edit: Callable[[Draft], None]
+    look: Callable[[Look], None]
+    seek: Callable[[], None]
+    keep: Callable[[], Awaitable[None]]
+    download: Callable[[], None]
+    open_file: Callable[[str, bytes], Awaitable[None]]
+    open_example: Callable[[str], None]
+    save_playback: Callable[[], Awaitable[None]]
+    save_picture: Callable[[], Awaitable[None]]
+    measure_costs: Callable[[], None]
+    edit_shape: Callable[[bool], None]
+    straighten: Callable[[], None]
+    reset_camera: Callable[[], None]
 
 
 class Panel:
@@ -26,54 +64,53 @@ class Panel:
     Args:
         client: whose panel it is.
         draft: the scene to start with.
+        start: its start curve.
         playback: the clock of the animation.
         address: of the service, for the shell line.
-        on_edit: called with the edited draft.
-        on_look: called when the picture's options change.
-        on_seek: called when the timeline was moved or play was pressed.
-        on_keep: called when the run is to be kept.
-        on_download: called when the scene is wanted as a file.
+        actions: what its controls do.
+        ready: whether the solver is compiled.
     """
 
     def __init__(
         self,
         client: ClientHandle,
         draft: Draft,
+        start: StartCurve,
         playback: Playback,
         address: str,
+        actions: Actions,
         *,
-        on_edit: Callable[[Draft], None],
-        on_look: Callable[[Look], None],
-        on_seek: Callable[[], None],
-        on_keep: Callable[[], Awaitable[None]],
-        on_download: Callable[[], None],
+        ready: bool,
     ) -> None:
         self._gui = client.gui
         self._playback = playback
-        self._on_seek = on_seek
-        self._on_look = on_look
+        self._actions = actions
         self._address = address
-        self._status = self._gui.add_html(report.waiting_card())
+        self._earlier: list[tuple[float, float]] = []
+        self._status = self._gui.add_html(report.waiting_card(ready=ready))
         self._add_timeline()
         self._legend = self._gui.add_html("")
         tabs = self._gui.add_tab_group()
-        with tabs.add_tab("Scene", viser.Icon.ADJUSTMENTS_HORIZONTAL):
-            self._grasp = GraspForm(self._gui, draft, on_edit)
-            self._cable = CableForm(self._gui, draft, on_edit)
-            self._surroundings = SurroundingsForm(self._gui, draft, on_edit)
-            self._quality = QualityForm(self._gui, draft, on_edit)
-        with tabs.add_tab("View", viser.Icon.EYE):
-            self._add_view()
-        with tabs.add_tab("Result", viser.Icon.CHART_LINE):
+        with tabs.add_tab("Scene"):
+            self._gripper = GripperForm(self._gui, draft, start, actions.edit)
+            self._add_start()
+            self._cable = CableForm(self._gui, draft, actions.edit)
+            self._surroundings = SurroundingsForm(self._gui, draft, actions.edit)
+        with tabs.add_tab("Effects"):
+            self._add_effects(draft)
+        with tabs.add_tab("Quality"):
+            self._quality = QualityForm(self._gui, draft, actions.edit)
             self._add_result()
-        with tabs.add_tab("Share", viser.Icon.SHARE):
-            self._add_share(on_keep, on_download)
-        self._forms = (self._grasp, self._cable, self._surroundings, self._quality)
-        self.take_draft(draft)
+        with tabs.add_tab("View"):
+            self._add_view()
+        with tabs.add_tab("Share"):
+            self._add_share()
+        self._forms = (self._gripper, self._cable, self._surroundings, self._effects, self._quality)
+        self._draft = draft
 
     def _add_timeline(self) -> None:
         self._slider = self._gui.add_slider(
-            "Time [s]", min=0.0, max=self._playback.horizon, step=SLIDER_STEP, initial_value=0.0
+            "Time [s]", min=0.0, max=self._playback.horizon, step=0.01, initial_value=0.0
         )
         self._play = self._gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
         self._speed = self._gui.add_dropdown("Speed", tuple(SPEEDS), initial_value="1×")
@@ -84,7 +121,7 @@ class Panel:
                 self._playback.pause()
                 self._playback.seek(self._slider.value)
                 self._label_button()
-                self._on_seek()
+                self._actions.seek()
 
         @self._play.on_click
         async def _toggle(_event: GuiEvent[Any]) -> None:
@@ -107,7 +144,7 @@ class Panel:
         else:
             self._playback.play()
         self._label_button()
-        self._on_seek()
+        self._actions.seek()
 
     def _label_button(self) -> None:
         playing = self._playback.playing
@@ -120,79 +157,177 @@ class Panel:
         if (self._play.label == "Pause") != self._playback.playing:
             self._label_button()
 
+    def _add_start(self) -> None:
+        with self._gui.add_folder("Start shape", expand_by_default=False):
+            self._editing = self._gui.add_checkbox("Drag its points", initial_value=False)
+            self._settle = self._gui.add_checkbox(
+                "Let it settle first", initial_value=False, hint="It comes to rest under its grippers before they move"
+            )
+            straighten = self._gui.add_button("Make it straight", color="gray")
+            self._add_file_button("Open points …", "Points [m] in order along the cable: CSV, JSON, .npz or .npy")
+
+        @self._editing.on_update
+        async def _edit(event: GuiEvent[Any]) -> None:
+            if event.client is not None:
+                self._actions.edit_shape(self._editing.value)
+
+        @self._settle.on_update
+        async def _settled(event: GuiEvent[Any]) -> None:
+            if event.client is not None:
+                self._actions.edit(with_settling(self._draft, self._settle.value))
+
+        @straighten.on_click
+        async def _straight(_event: GuiEvent[Any]) -> None:
+            self._actions.straighten()
+
+    def _add_file_button(self, label: str, hint: str) -> None:
+        button = self._gui.add_upload_button(label, hint=hint, icon=viser.Icon.FOLDER_OPEN, color="gray")
+
+        @button.on_upload
+        async def _uploaded(_event: GuiEvent[Any]) -> None:
+            await self._actions.open_file(button.value.name, button.value.content)
+
+    def _add_effects(self, draft: Draft) -> None:
+        measure = self._gui.add_button(
+            "Measure what each costs", icon=viser.Icon.CLOCK, hint="Solves again with each effect switched"
+        )
+        self._effects = EffectsForm(self._gui, draft, self._actions.edit)
+
+        @measure.on_click
+        async def _measure(_event: GuiEvent[Any]) -> None:
+            self._actions.measure_costs()
+
     def _add_view(self) -> None:
         colour = self._gui.add_dropdown("Colour", tuple(QUANTITIES), initial_value="time")
-        surface = self._gui.add_dropdown("Surface", SURFACE_STYLES, initial_value="on the table")
+        surface = self._gui.add_dropdown("Surface", SURFACE_STYLES)
         ghosts = self._gui.add_checkbox("Shapes at intervals", initial_value=True)
+        reactions = self._gui.add_checkbox("Forces of the grippers", initial_value=True)
+        contacts = self._gui.add_checkbox("Contacts", initial_value=True)
         looping = self._gui.add_checkbox("Repeat", initial_value=self._playback.looping)
+        reset = self._gui.add_button("Show the whole scene", icon=viser.Icon.MAXIMIZE, color="gray")
 
         async def restyle(_event: GuiEvent[Any]) -> None:
-            self._on_look(Look(quantity=QUANTITIES[colour.value], surface=surface.value, ghosts=ghosts.value))
+            self._actions.look(
+                Look(
+                    quantity=QUANTITIES[colour.value],
+                    surface=surface.value,
+                    ghosts=ghosts.value,
+                    reactions=reactions.value,
+                    contacts=contacts.value,
+                )
+            )
 
-        for control in (colour, surface, ghosts):
+        for control in (colour, surface, ghosts, reactions, contacts):
             control.on_update(restyle)
 
         @looping.on_update
         async def _looping(_event: GuiEvent[Any]) -> None:
             self._playback.looping = looping.value
 
-    def _add_result(self) -> None:
-        self._plot = self._gui.add_uplot(
-            (np.zeros(2), np.zeros(2), np.zeros(2)),
-            (
-                uplot.Series(label="iteration"),
-                uplot.Series(label="log10 update [m]", stroke="#2e6bd6", width=2, points={"show": True, "size": 6}),
-                uplot.Series(label="log10 residual [m]", stroke="#d55e00", width=2, points={"show": True, "size": 6}),
-            ),
-            title="Convergence",
-            scales={"x": uplot.Scale(time=False), "y": uplot.Scale(auto=True)},
-            height=PLOT_HEIGHT,
-        )
-        with self._gui.add_folder("Force of the grippers"):
-            self._grippers = self._gui.add_html("")
-        with self._gui.add_folder("Effects"):
-            self._effects = self._gui.add_html("")
+        @reset.on_click
+        async def _reset(_event: GuiEvent[Any]) -> None:
+            self._actions.reset_camera()
 
-    def _add_share(self, on_keep: Callable[[], Awaitable[None]], on_download: Callable[[], None]) -> None:
+    def _add_result(self) -> None:
+        with self._gui.add_folder("Accuracy and time"):
+            self._accuracy = self._gui.add_html("")
+        with self._gui.add_folder("Convergence of this solve"):
+            self._convergence = self._gui.add_html("")
+            self._message = self._gui.add_html("")
+        with self._gui.add_folder("Largest force of the grippers"):
+            self._forces = self._gui.add_html("")
+
+    def _add_share(self) -> None:
+        actions = self._actions
+        self._name = self._gui.add_text("Name", "", hint="What to call the run in lists")
         self._keep = self._gui.add_button("Keep this run", icon=viser.Icon.BOOKMARK, disabled=True)
         self._links = self._gui.add_html("")
-        download = self._gui.add_button("Download scene.json", icon=viser.Icon.DOWNLOAD, color="gray")
+        with self._gui.add_folder("Scene"):
+            download = self._gui.add_button("Download scene.json", icon=viser.Icon.DOWNLOAD, color="gray")
+            self._add_file_button("Open a file …", "A scene as JSON, or points: JSON, CSV, .npz or .npy")
+            self._file = self._gui.add_html("")
+            names = example_names()
+            if names:
+                self._add_examples(names)
+        with self._gui.add_folder("Take it away"):
+            playback = self._gui.add_button("Save playback.html", icon=viser.Icon.MOVIE, color="gray")
+            picture = self._gui.add_button("Save picture.png", icon=viser.Icon.PHOTO, color="gray")
         with self._gui.add_folder("The same from a shell"):
             self._curl = self._gui.add_markdown("")
         with self._gui.add_folder("Scene as JSON", expand_by_default=False):
             self._json = self._gui.add_markdown("")
 
+        @self._name.on_update
+        async def _named(event: GuiEvent[Any]) -> None:
+            if event.client is not None:
+                actions.edit(self._draft.put(("name",), self._name.value[:200] or None))
+
         @self._keep.on_click
         async def _kept(_event: GuiEvent[Any]) -> None:
-            await on_keep()
+            await actions.keep()
 
         @download.on_click
         async def _download(_event: GuiEvent[Any]) -> None:
-            on_download()
+            actions.download()
+
+        @playback.on_click
+        async def _playback(_event: GuiEvent[Any]) -> None:
+            await actions.save_playback()
+
+        @picture.on_click
+        async def _picture(_event: GuiEvent[Any]) -> None:
+            await actions.save_picture()
+
+    def _add_examples(self, names: tuple[str, ...]) -> None:
+        chosen = self._gui.add_dropdown("Example", (CHOOSE, *names))
+
+        @chosen.on_update
+        async def _chosen(event: GuiEvent[Any]) -> None:
+            if event.client is not None and chosen.value != CHOOSE:
+                self._actions.open_example(chosen.value)
+
+    def follow(self, start: StartCurve, shown: SplineSurface | None) -> None:
+        """Measure targets from another start and prediction."""
+        self._gripper.follow(start, shown)
 
     def take_draft(self, draft: Draft) -> None:
         """Show the numbers of an edited draft in all controls."""
+        self._draft = draft
         for form in self._forms:
             form.take(draft)
-        self._playback.set_horizon(draft.duration)
+        show_value(self._settle, bool(draft.get(("shape", "settle"))))
+        show_value(self._name, draft.get(("name",), ""))
+
+    def show_editing(self, editing: bool) -> None:
+        """Show whether the start shape is being dragged."""
+        show_value(self._editing, editing)
 
     def take_prediction(self, draft: Draft, prediction: Prediction, scale: ColourScale, *, preview: bool) -> None:
         """Show a new prediction; a preview leaves out what nobody reads while dragging."""
         self._status.content = report.status_card(prediction, preview=preview)
-        self._playback.set_horizon(prediction.surface.horizon)
         if self._slider.max != self._playback.horizon:
             self._slider.max = self._playback.horizon
+            self._slider.step = self._playback.horizon / SLIDER_STEPS
         self.show_time()
         if preview:
             return
         self.take_scale(scale)
-        self._effects.content = report.effects_list(prediction)
-        self._grippers.content = report.grippers_list(prediction)
-        self._plot.data = report.convergence(prediction)
-        document = draft.json()
-        self._json.content = report.json_block(document)
-        self._curl.content = report.curl_block(self._address, document)
+        self._effects.show(prediction.effects, {})
+        self._forces.content = report.grippers_list(prediction)
+        self._accuracy.content = report.accuracy_plot(prediction, self._earlier)
+        self._convergence.content = report.convergence(prediction)
+        self._message.content = report.message(prediction)
+        self._json.content = report.json_block(draft.document)
+        self._curl.content = report.curl_block(self._address, draft.document)
         self._keep.disabled = False
+
+    def take_wait(self) -> None:
+        """Say that a solve is under way."""
+        self._status.content = report.waiting_card(ready=True)
+
+    def take_costs(self, prediction: Prediction, costs: Mapping[str, float]) -> None:
+        """Show what the effects cost [s]."""
+        self._effects.show(prediction.effects, costs)
 
     def take_problem(self, problem: str, details: str) -> None:
         """Say why there is no prediction of the edited scene."""
@@ -203,10 +338,15 @@ class Panel:
         """Show the legend of the colours."""
         self._legend.content = report.legend(scale)
 
+    def say_file(self, text: str, *, good: bool) -> None:
+        """Say what became of a file that was opened."""
+        self._file.content = report.note(text, good=good)
+
     def show_kept(self, run_id: str) -> None:
         """Link to the stored run."""
         self._links.content = report.run_links(run_id)
 
     def clear_kept(self) -> None:
         """Take the link away, since the shown run is no longer the stored one."""
-        self._links.content = ""
+        if self._links.content:
+            self._links.content = ""

@@ -1,21 +1,22 @@
 """A prediction in plain words and small pieces of HTML for the panel; every inserted text is escaped."""
 
 import json
+import shlex
 from html import escape
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.viewer import plots
 from app.viewer.palette import ColourScale, css_ramp
-from dlocore import Prediction
+from dlocore import EffectReport, Prediction
 
-Floats = NDArray[np.float64]
 _CARD = (
     "margin: 0 0.75rem 0.6rem; padding: 0.55rem 0.7rem; border-radius: 0.5rem; font-size: 0.8rem; line-height: 1.35;"
 )
 _GOOD = "rgba(46, 107, 214, 0.10)"
 _DOUBT = "rgba(235, 150, 30, 0.16)"
+EARLIER = 30  # solves that are shown beside the present one
 _BAD = "rgba(222, 72, 50, 0.16)"
 _WORDS = {
     "converged": "Converged",
@@ -42,7 +43,7 @@ def millimetres(metres: float | None) -> str:
 def status_card(prediction: Prediction, *, preview: bool) -> str:
     """Return the state of the last solve: status, time and error large, the rest small."""
     accuracy = prediction.accuracy
-    ground = _GOOD if prediction.status == "converged" else _DOUBT
+    ground = _GOOD if preview or prediction.status == "converged" else _DOUBT
     state = "Preview" if preview else _WORDS[prediction.status]
     numbers = [
         (state, "status"),
@@ -56,7 +57,7 @@ def status_card(prediction: Prediction, *, preview: bool) -> str:
     )
     steps = f"{len(prediction.iterations)} iterations" if len(prediction.iterations) != 1 else "1 iteration"
     detail = f"{accuracy.method}, {accuracy.n_u} × {accuracy.n_t} control points, {steps}, {accuracy.dimensions}D"
-    advice = "" if prediction.status == "converged" else f"<div>{escape(prediction.message)}</div>"
+    advice = "" if preview or prediction.status == "converged" else f"<div>{escape(prediction.message)}</div>"
     return (
         f'<div style="{_CARD} background: {ground};" data-status="{escape(prediction.status)}">'
         f'<div style="display: flex; justify-content: space-between; gap: 0.6rem;">{cells}</div>{advice}'
@@ -74,9 +75,14 @@ def problem_card(problem: str, details: str) -> str:
     )
 
 
-def waiting_card() -> str:
-    """Return what to show before the first prediction."""
-    return f'<div style="{_CARD} background: {_GOOD};" data-status="waiting">Solving the first scene …</div>'
+def waiting_card(*, ready: bool) -> str:
+    """Return what to show while a prediction is awaited, from a solver that is `ready` or being compiled."""
+    words = "Solving …" if ready else "The solver is being compiled, once …"
+    more = "The first scene with other effects than before takes some seconds more."
+    return (
+        f'<div style="{_CARD} background: {_GOOD};" data-status="waiting"><b>{words}</b>'
+        f'<div style="opacity: 0.75; margin-top: 0.3rem;">{more}</div></div>'
+    )
 
 
 def legend(scale: ColourScale) -> str:
@@ -85,23 +91,25 @@ def legend(scale: ColourScale) -> str:
     low, high = (f"{value * quantity.scale:.3g}" for value in (scale.low, scale.high))
     return (
         f'<div style="margin: 0 0.75rem 0.6rem; font-size: 0.75rem;">'
-        f'<div style="height: 0.5rem; border-radius: 0.25rem; background: {css_ramp()};"></div>'
+        f'<div style="height: 0.5rem; border-radius: 0.25rem; background: {css_ramp(signed=quantity.signed)};"></div>'
         f'<div style="display: flex; justify-content: space-between; opacity: 0.8;"><span>{low}</span>'
         f"<span>{escape(quantity.name)} [{escape(quantity.unit)}]</span><span>{high}</span></div></div>"
     )
 
 
-def effects_list(prediction: Prediction) -> str:
-    """Return the effects, active ones first, each with the reason."""
-    rows = []
-    for effect in sorted(prediction.effects, key=lambda effect: not effect.active):
-        size = "" if effect.magnitude is None else f" · {effect.magnitude:.2g} {escape(effect.unit)}"
-        mark, opacity = ("●", 1.0) if effect.active else ("○", 0.6)
-        rows.append(
-            f'<div style="opacity: {opacity}; margin-bottom: 0.35rem;">{mark} <b>{escape(effect.name)}</b>{size}'
-            f'<div style="opacity: 0.75; padding-left: 1rem;">{escape(effect.reason)}</div></div>'
-        )
-    return f'<div style="margin: 0.4rem 0.75rem; font-size: 0.78rem; line-height: 1.3;">{"".join(rows)}</div>'
+def effect_note(effect: EffectReport, cost: float | None) -> str:
+    """Return whether an effect is simulated, why, how large it is, and how it changes the time of a solve [s]."""
+    size = "" if effect.magnitude is None else f" · {effect.magnitude:.2g} {escape(effect.unit)}"
+    mark, opacity = ("●", 1.0) if effect.active else ("○", 0.6)
+    price = ""
+    if cost is not None:
+        verb = "costs" if cost >= 0 else "saves"
+        price = f" <b>It {verb} {escape(milliseconds(abs(cost)))}.</b>"
+    state = "active" if effect.active else "not active"
+    return (
+        f'<div style="opacity: {opacity}; margin: -0.35rem 0.75rem 0.5rem; font-size: 0.75rem; line-height: 1.3;" '
+        f'data-effect="{escape(effect.name, quote=True)}">{mark} {state}{size}: {escape(effect.reason)}.{price}</div>'
+    )
 
 
 def grippers_list(prediction: Prediction) -> str:
@@ -114,17 +122,42 @@ def grippers_list(prediction: Prediction) -> str:
     return f'<div style="margin: 0.4rem 0.75rem; font-size: 0.78rem; line-height: 1.5;">{"".join(rows)}</div>'
 
 
-def convergence(prediction: Prediction) -> tuple[Floats, Floats, Floats]:
-    """Return iteration numbers and the decimal logarithms of update and residual, where both are positive."""
-    rows = [
-        (float(i.number), np.log10(i.update), np.log10(i.residual))
-        for i in prediction.iterations
-        if np.isfinite([i.update, i.residual]).all() and i.update > 0 and i.residual > 0
-    ]
-    if not rows:
-        rows = [(0.0, 0.0, 0.0)]
-    numbers, updates, residuals = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
-    return numbers, updates, residuals
+def convergence(prediction: Prediction) -> str:
+    """Return the plot of update and residual by iteration (the paper's Fig. 2), as far as they are positive."""
+    names = (("update [m]", "update", plots.BLUE), ("residual [m]", "residual", plots.ORANGE))
+    if prediction.accuracy.method == "paper":
+        names = (names[0], ("residual [N]", "residual", plots.ORANGE))
+    series = []
+    for name, field, colour in names:
+        values = [(float(i.number), float(getattr(i, field))) for i in prediction.iterations]
+        points = [(number, value) for number, value in values if np.isfinite(value) and value > 0]
+        series.append(plots.Series(name=name, points=points, colour=colour))
+    return plots.plot("iteration", "update, residual", series, log_x=False, mark="convergence")
+
+
+def accuracy_plot(prediction: Prediction, earlier: list[tuple[float, float]]) -> str:
+    """Return the plot of error against time, with the present solve as a dot, and add it to those `earlier`."""
+    series = []
+    if earlier:
+        grey = "rgba(128, 138, 154, 0.7)"
+        series.append(plots.Series(name="earlier here", points=tuple(earlier), colour=grey, line=False))
+    accuracy = prediction.accuracy
+    if accuracy.error_estimate and accuracy.wall_time > 0:
+        here = (1e3 * accuracy.wall_time, 1e3 * accuracy.error_estimate)
+        series.append(plots.Series(name="this solve", points=[here], colour=plots.ORANGE, size=5.0))
+        earlier[:] = [*earlier, here][-EARLIER:]
+    return plots.plot("time [ms]", "error [mm]", series, log_x=True, mark="accuracy")
+
+
+def message(prediction: Prediction) -> str:
+    """Return what the solver says about its answer."""
+    return note(prediction.message, good=True)
+
+
+def note(text: str, *, good: bool) -> str:
+    """Return a small paragraph; one of bad news stands out."""
+    ground = "" if good else f" background: {_BAD}; border-radius: 0.4rem; padding: 0.4rem 0.6rem;"
+    return f'<div style="margin: 0.2rem 0.75rem; font-size: 0.78rem; line-height: 1.35;{ground}">{escape(text)}</div>'
 
 
 def json_block(document: dict[str, Any]) -> str:
@@ -135,7 +168,7 @@ def json_block(document: dict[str, Any]) -> str:
 def curl_block(address: str, document: dict[str, Any]) -> str:
     """Return the shell line that asks the service at `address` for the prediction, as a Markdown code block."""
     body = json.dumps(document, separators=(",", ":"))
-    return f"```sh\ncurl -s {address}/v1/predictions -H 'Content-Type: application/json' -d '{body}'\n```"
+    return f"```sh\ncurl -s {address}/v1/predictions -H 'Content-Type: application/json' -d {shlex.quote(body)}\n```"
 
 
 def run_links(run_id: str) -> str:

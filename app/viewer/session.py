@@ -2,35 +2,45 @@
 
 import asyncio
 import contextlib
-import json
-import logging
-from typing import Any, Protocol
+from dataclasses import dataclass
 
 import numpy as np
-from viser import ClientHandle, TransformControlsEvent
+from viser import ClientHandle, SceneClickEvent
 
-from app.viewer.camera import FIELD_OF_VIEW, PHONE, start_pose
+from app.viewer import grips, uploads
+from app.viewer.camera import FIELD_OF_VIEW, PHONE, extent, start_pose
 from app.viewer.draft import Draft, start_draft
+from app.viewer.examples import example
+from app.viewer.gizmo import Gizmo
+from app.viewer.outbox import Outbox, Runs
 from app.viewer.palette import BRAND
-from app.viewer.panel import Panel
+from app.viewer.panel import Actions, Panel
+from app.viewer.picking import GripperClick
 from app.viewer.picture import Look, Picture
 from app.viewer.playback import Playback
-from app.viewer.solving import Outcome, SolverThread
-from dlocore import Prediction
+from app.viewer.shape_editor import ShapeEditor
+from app.viewer.shapes import straightened, with_points
+from app.viewer.solving import Kind, Outcome, Solver, SolverThread
+from dlocore import Prediction, SceneError
 
 FRAME = 1 / 40  # s
 PANEL_FRAMES = 3  # pictures for one update of the timeline: redrawing the panel is what costs the browser most
+PATIENCE = 0.8  # s without an answer, after which the panel says that one is under way
+AFTER_DRAG = 0.4  # s, in which a click is the end of a drag
 QUIET = 0.2  # s without an edit, after which the hand counts as still
-GIZMO_SIZE = 0.16  # of the cable's length
-WARNING_HEIGHT = 0.06  # m above the target
-_log = logging.getLogger(__name__)
 
 
-class Runs(Protocol):
-    """Where runs are stored."""
+@dataclass(frozen=True)
+class Shared:
+    """What all tabs share.
 
-    def save(self, scene_json: dict[str, Any], prediction: Prediction) -> str:
-        """Store a run; return its id."""
+    Attributes:
+        runs: where runs are stored.
+        solver: solves their scenes.
+    """
+
+    runs: Runs
+    solver: Solver
 
 
 class Session:
@@ -38,80 +48,87 @@ class Session:
 
     Args:
         client: the client.
-        runs: where runs are stored.
+        shared: what all tabs share.
         address: at which the client sees the service.
+        opened: name of the ready scene to open; "": the paper's case.
     """
 
-    def __init__(self, client: ClientHandle, runs: Runs, address: str) -> None:
+    def __init__(self, client: ClientHandle, shared: Shared, address: str, opened: str) -> None:
         self._client = client
-        self._runs = runs
+        self._shared = shared
         self._loop = asyncio.get_running_loop()
-        self._draft = start_draft()
+        document = example(opened)
+        self._draft = start_draft() if document is None else Draft.of(document)
+        self._start = self._draft.start(shared.runs.motion)
         self._shown: tuple[Draft, Prediction] | None = None  # the last refined prediction
+        self._latest: Prediction | None = None
+        self._look = Look()
         self._dragging = False
         self._refine_timer: asyncio.TimerHandle | None = None
-        self._playback = Playback(horizon=self._draft.duration)
-        self._look_around()
-        self._picture = Picture(client, self._draft)
-        self._add_gizmo()
+        self._busy_timer: asyncio.TimerHandle | None = None
+        self._playback = Playback()
+        self._set_up()
+        self._outbox = Outbox(client, shared.runs)
+        self._picture = Picture(client.scene)
+        self._released_at = -np.inf
+
+        # the type asks for a plain function, which viser would call on another thread
+        client.scene.on_click()(self._clicked)  # type: ignore[arg-type]
+        self._gizmo = Gizmo(client.scene, self._begin_drag, self._drag, self._end_drag)
+        self._shape = ShapeEditor(client, self._shape_dragged)
         self._panel = Panel(
-            client,
-            self._draft,
-            self._playback,
-            address,
-            on_edit=self.edit,
-            on_look=self._restyle,
-            on_seek=self._draw_time,
-            on_keep=self._keep,
-            on_download=self._download,
+            client, self._draft, self._start, self._playback, address, self._actions(), ready=shared.solver.ready
         )
-        self._solver = SolverThread(self._deliver, f"viewer-solver-{client.client_id}")
-        self._solver.ask(self._draft, preview=False)
+        self._take_draft()
+        self._solver = SolverThread(shared.solver, self._deliver, f"viewer-solver-{client.client_id}")
+        self._ask("refined")
         self._animation = asyncio.create_task(self._animate())
+
+    def _actions(self) -> Actions:
+        return Actions(
+            edit=self.edit,
+            look=self._restyle,
+            seek=self._draw_time,
+            keep=self._keep,
+            download=self._download,
+            open_file=self._open_file,
+            open_example=self._open_example,
+            save_playback=self._save_playback,
+            save_picture=self._save_picture,
+            measure_costs=self._measure_costs,
+            edit_shape=self._edit_shape,
+            straighten=self._straighten,
+            reset_camera=self._reset_camera,
+        )
 
     def close(self) -> None:
         """Free the solver thread and the animation."""
         self._solver.close()
         self._animation.cancel()
-        if self._refine_timer is not None:
-            self._refine_timer.cancel()
+        for timer in (self._refine_timer, self._busy_timer):
+            if timer is not None:
+                timer.cancel()
 
-    def _look_around(self) -> None:
-        client, length = self._client, self._draft.cable.length
+    def _set_up(self) -> None:
+        client = self._client
         client.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=BRAND, control_width="medium")
         client.gui.set_panel_label("Cable")
         client.scene.set_up_direction("+z")
         if client.camera.image_width > PHONE:
             client.gui.main_panel.dock_right()
         client.camera.fov = FIELD_OF_VIEW
-        client.camera.position, client.camera.look_at = start_pose(
-            length, client.camera.image_width, client.camera.image_height
-        )
-        client.camera.max_orbit_distance = 20.0
+        self._reset_camera()
 
-    def _add_gizmo(self) -> None:
-        self._gizmo = self._client.scene.add_transform_controls(
-            "/target",
-            scale=GIZMO_SIZE * self._draft.cable.length,
-            line_width=3.0,
-            active_axes=(True, True, False),
-            disable_rotations=True,
-            depth_test=False,
-            position=self._draft.target,
-        )
-        self._hint = self._client.scene.add_label(
-            "/target_hint", "drag me", position=self._draft.target, anchor="top-left"
-        )
-        self._warning = self._client.scene.add_label("/warning", "", visible=False, anchor="bottom-center")
+    def _camera(self) -> tuple[np.ndarray, np.ndarray]:
+        camera = self._client.camera
+        points = extent(self._draft, self._start)
+        on_table = self._draft.get(("environment", "table")) is not None
+        return start_pose(points, camera.image_width, camera.image_height, on_table=on_table)
 
-        @self._gizmo.on_update
-        async def _dragged(event: TransformControlsEvent) -> None:
-            if event.phase == "start":
-                self._begin_drag()
-            elif event.phase == "update":
-                self.edit(self._draft.with_target(float(self._gizmo.position[0]), float(self._gizmo.position[1])))
-            else:
-                self._end_drag()
+    def _reset_camera(self) -> None:
+        camera = self._client.camera
+        camera.position, camera.look_at = self._camera()
+        camera.max_orbit_distance = 20.0 * self._draft.length
 
     def _begin_drag(self) -> None:
         """Show where the motion ends while the hand is on the target."""
@@ -120,33 +137,124 @@ class Session:
         self._playback.seek(self._playback.horizon)
         self._draw_time()
 
+    def _drag(self, position: np.ndarray, wxyz: np.ndarray) -> None:
+        begin = self._origin()
+        if not self._draft.in_space:  # the gizmo's height is single precision on the wire
+            position[2] = grips.target(self._draft, begin)[2]
+        draft = grips.with_target(self._draft, begin, position)
+        if grips.can_turn(draft):
+            draft = grips.with_turn(draft, grips.nearest_turn(wxyz, grips.turn(draft)))
+        self.edit(draft)
+
     def _end_drag(self) -> None:
         self._dragging = False
+        self._released_at = self._loop.time()
         self._refine()
         self._playback.play()
+
+    def _origin(self) -> np.ndarray:
+        return grips.origin(self._draft, self._start, None if self._latest is None else self._latest.surface)
+
+    async def _clicked(self, event: SceneClickEvent) -> None:
+        """Take the clicked gripper in hand, or let the one in hand hold the cable where it was clicked."""
+        if self._dragging or self._shape.active or self._loop.time() - self._released_at < AFTER_DRAG:
+            return
+        found = self._picture.picked(np.array(event.ray_origin), np.array(event.ray_direction))
+        draft = self._draft
+        if isinstance(found, GripperClick):
+            self.edit(grips.selected(draft, found.number))
+        elif found is not None:
+            if grips.gripper(draft) is None:
+                draft = grips.added(draft, self._start)
+            self.edit(grips.changed(draft, "u", round(found.u, 4)))
+
+    def _edit_shape(self, wanted: bool) -> None:
+        """Show the beads of the start shape, or take them away."""
+        with self._client.atomic():
+            if wanted:
+                self._playback.pause()
+                self._playback.seek(0.0)
+                self._shape.show(self._start, self._draft.length)
+            else:
+                self._shape.hide()
+                self._playback.play()
+            self._gizmo.show(visible=not wanted and grips.gripper(self._draft) is not None)
+        self._draw_time()
+
+    def _shape_dragged(self, points: np.ndarray, held: bool) -> None:
+        self._dragging = held
+        self.edit(with_points(self._draft, points))
+        if not held:
+            self._refine()
+
+    def _straighten(self) -> None:
+        self.edit(straightened(self._draft, self._start))
 
     def edit(self, draft: Draft) -> None:
         """Take over an edited draft: a preview at once, the asked quality as soon as the hand is still."""
         if draft == self._draft:
             return
-        if draft.target != self._draft.target:
-            self._hint.visible = False
+        solved_for = self._draft.document
+        moved = draft.shape_key() != self._draft.shape_key()
         self._draft = draft
-        with self._client.atomic():
-            self._panel.take_draft(draft)
-            self._panel.clear_kept()
-            if not self._dragging:
-                self._gizmo.position = np.array(draft.target)
-        self._solver.ask(draft, preview=True)
+        if moved:
+            self._take_start()
+        self._take_draft()
+        if draft.document == solved_for:  # another gripper in hand: nothing to solve
+            self._client.flush()
+            return
+        self._ask("preview")
         if self._refine_timer is not None:
             self._refine_timer.cancel()
         self._refine_timer = self._loop.call_later(QUIET, self._refine)
+
+    def _take_start(self) -> None:
+        """Take over the start curve of the draft; one that is impossible leaves the last good one."""
+        with contextlib.suppress(SceneError):
+            self._start = self._draft.start(self._shared.runs.motion)
+            self._shape.follow(self._start, self._draft.length)
+
+    def _take_draft(self) -> None:
+        draft = self._draft
+        with self._client.atomic():
+            self._panel.follow(self._start, None if self._latest is None else self._latest.surface)
+            self._panel.take_draft(draft)
+            self._panel.clear_kept()
+            self._picture.select(draft.selected)
+            self._shape.in_space = draft.in_space
+            if not self._dragging:
+                self._place_gizmo()
+
+    def _place_gizmo(self) -> None:
+        draft = self._draft
+        self._gizmo.show(visible=not self._shape.active and grips.gripper(draft) is not None)
+        self._gizmo.place(
+            grips.target(draft, self._origin()),
+            grips.turn(draft),
+            size=draft.length,
+            in_space=draft.in_space,
+            turns=grips.can_turn(draft),
+        )
 
     def _refine(self) -> None:
         if self._refine_timer is not None:
             self._refine_timer.cancel()
             self._refine_timer = None
-        self._solver.ask(self._draft, preview=False)
+        self._ask("refined")
+
+    def _measure_costs(self) -> None:
+        """Have the costs of the effects measured; an edit ends it."""
+        self._ask("costs")
+
+    def _ask(self, kind: Kind) -> None:
+        """Have the draft solved; where that takes longer than a blink, say that it is under way."""
+        self._solver.ask(self._draft, kind)
+        if self._busy_timer is None:
+            self._busy_timer = self._loop.call_later(PATIENCE, self._say_busy)
+
+    def _say_busy(self) -> None:
+        self._panel.take_wait()
+        self._client.flush()
 
     def _deliver(self, outcome: Outcome) -> None:
         """Hand an outcome from the solver thread to the event loop."""
@@ -154,30 +262,37 @@ class Session:
             self._loop.call_soon_threadsafe(self._take, outcome)
 
     def _take(self, outcome: Outcome) -> None:
+        if self._busy_timer is not None:
+            self._busy_timer.cancel()
+            self._busy_timer = None
         with self._client.atomic():
             if outcome.prediction is None:
                 self._panel.take_problem(outcome.problem, outcome.details)
-                self._warn(outcome.problem)
+                self._gizmo.warn(f"Not possible. {outcome.problem}.")
             else:
-                draft, preview = outcome.job.draft, outcome.job.preview
-                if self._dragging:
-                    self._playback.set_horizon(outcome.prediction.surface.horizon)
-                    self._playback.seek(self._playback.horizon)
-                scale = self._picture.show(draft, outcome.prediction)
-                self._picture.pose(self._playback.time)
-                self._panel.take_prediction(draft, outcome.prediction, scale, preview=preview)
-                self._warning.visible = False
-                if not preview:
-                    self._shown = (draft, outcome.prediction)
+                self._take_prediction(outcome, outcome.prediction)
         self._client.flush()
 
-    def _warn(self, problem: str) -> None:
-        x, y, z = self._draft.target
-        self._warning.text = f"Not possible. {problem}."
-        self._warning.position = (x, y, z + WARNING_HEIGHT)
-        self._warning.visible = True
+    def _take_prediction(self, outcome: Outcome, prediction: Prediction) -> None:
+        if outcome.costs is not None:
+            self._panel.take_costs(prediction, outcome.costs)
+            return
+        preview = outcome.job.kind == "preview"
+        self._latest = prediction
+        self._playback.set_horizon(prediction.surface.horizon)
+        if self._dragging and not self._shape.held:
+            self._playback.seek(self._playback.horizon)
+        scale = self._picture.show(prediction, self._playback.time, self._draft.selected)
+        self._panel.take_prediction(outcome.job.draft, prediction, scale, preview=preview)
+        self._gizmo.warn("")
+        if not preview:
+            self._shown = (outcome.job.draft, prediction)
+            self._panel.follow(self._start, prediction.surface)
+            if not self._dragging:
+                self._place_gizmo()
 
     def _restyle(self, look: Look) -> None:
+        self._look = look
         with self._client.atomic():
             scale = self._picture.restyle(look)
             if scale is not None:
@@ -204,20 +319,43 @@ class Session:
                 self._draw_time(panel=at_rest or frame % PANEL_FRAMES == 0)
             before = now
 
+    def _replace(self, draft: Draft) -> None:
+        """Show another scene from the beginning."""
+        self._shape.hide()
+        self._panel.show_editing(False)
+        self.edit(draft)
+        self._reset_camera()
+        self._playback.seek(0.0)
+        self._playback.play()
+
+    async def _open_file(self, name: str, content: bytes) -> None:
+        try:
+            draft = await asyncio.to_thread(uploads.opened, self._draft, name, content)
+        except SceneError as error:
+            self._client.add_notification(f"{name} was not opened", str(error), color="red", auto_close_seconds=12.0)
+            self._panel.say_file(f"{name} was not opened: {error}", good=False)
+            return
+        self._panel.say_file(f"{name} was opened.", good=True)
+        self._replace(draft)
+
+    def _open_example(self, name: str) -> None:
+        document = example(name)
+        if document is not None:
+            self._replace(Draft.of(document))
+
     def _download(self) -> None:
-        """Send the scene to the browser as the file that the API and the command line read."""
-        content = json.dumps(self._draft.json(), indent=2).encode()
-        self._client.send_file_download("scene.json", content, save_immediately=True)
+        self._outbox.scene(self._draft)
+
+    async def _save_playback(self) -> None:
+        if self._latest is not None:
+            await self._outbox.playback(self._latest, self._look, self._playback.speed)
+
+    async def _save_picture(self) -> None:
+        await self._outbox.picture()
 
     async def _keep(self) -> None:
-        """Store the last refined prediction with its scene and link to it."""
-        if self._shown is None or self._shown[0] != self._draft:
-            return
-        draft, prediction = self._shown
-        try:
-            run_id = await asyncio.to_thread(self._runs.save, draft.json(), prediction)
-        except Exception:
-            _log.exception("the run could not be stored")
-            self._client.add_notification("Not kept", "The run could not be stored; the log says why.", color="red")
-            return
-        self._panel.show_kept(run_id)
+        """Store the last refined prediction with its scene, and link to it, unless the scene was edited since."""
+        if self._shown is not None and self._shown[0].document == self._draft.document:
+            run_id = await self._outbox.keep(*self._shown)
+            if run_id is not None:
+                self._panel.show_kept(run_id)

@@ -2,26 +2,44 @@
 
 import logging
 import threading
-import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from typing import Literal, Protocol
 
-import dlocore
+from app.problems import ProblemError
+from app.viewer.costs import measure_costs
 from app.viewer.draft import Draft
-from dlocore import Cancelled, DloError, Prediction, Quality, SceneError
+from dlocore import Cancelled, DloError, Prediction, Quality, Scene, SceneError
 
-LONGEST_SOLVE = 20.0  # s, of a refined solve
 PREVIEW = Quality(time_budget=0.01)  # while the hand moves
+Kind = Literal["preview", "refined", "costs"]
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, kw_only=True)
+class Solver(Protocol):
+    """Solves scenes for the threads of all tabs."""
+
+    @property
+    def ready(self) -> bool:
+        """Whether the solver is compiled."""
+
+    def make(self, draft: Draft) -> Scene:
+        """Return the scene of a draft, or raise SceneError."""
+
+    def preview(self, scene: Scene, cancelled: Callable[[], bool]) -> Prediction:
+        """Solve at once, for at most a few ms."""
+
+    def refine(self, scene: Scene, cancelled: threading.Event) -> Prediction:
+        """Solve as one of the service's solves, when a worker is free."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Job:
-    """A draft to solve, as a quick preview or at the asked quality; `asked_at` as of `time.perf_counter()` [s]."""
+    """A draft to solve as a quick preview or at the asked quality, or whose effects' costs are to be measured."""
 
     draft: Draft
-    preview: bool
-    asked_at: float
+    kind: Kind
+    superseded: threading.Event = field(default_factory=threading.Event)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +50,7 @@ class Outcome:
     prediction: Prediction | None
     problem: str = ""
     details: str = ""
+    costs: dict[str, float] | None = None
 
 
 class SolverThread:
@@ -41,22 +60,27 @@ class SolverThread:
     way to a newer job at the solver's next check.
 
     Args:
+        solver: solves.
         deliver: called on the solver thread with every outcome.
         name: of the thread.
     """
 
-    def __init__(self, deliver: Callable[[Outcome], None], name: str) -> None:
+    def __init__(self, solver: Solver, deliver: Callable[[Outcome], None], name: str) -> None:
+        self._solver = solver
         self._deliver = deliver
         self._changed = threading.Condition()
         self._newest: Job | None = None
+        self._running: Job | None = None
         self._closed = False
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
-    def ask(self, draft: Draft, *, preview: bool) -> None:
+    def ask(self, draft: Draft, kind: Kind) -> None:
         """Solve `draft` next, instead of whatever was waiting."""
         with self._changed:
-            self._newest = Job(draft=draft, preview=preview, asked_at=time.perf_counter())
+            self._newest = Job(draft=draft, kind=kind)
+            if self._running is not None:
+                self._running.superseded.set()
             self._changed.notify()
 
     def close(self) -> None:
@@ -64,6 +88,8 @@ class SolverThread:
         with self._changed:
             self._closed = True
             self._newest = None
+            if self._running is not None:
+                self._running.superseded.set()
             self._changed.notify()
 
     def _run(self) -> None:
@@ -72,27 +98,46 @@ class SolverThread:
                 self._changed.wait_for(lambda: self._closed or self._newest is not None)
                 if self._closed:
                     return
-                job, self._newest = self._newest, None
-            assert job is not None
+                assert self._newest is not None
+                self._running, self._newest = self._newest, None
+                job = self._running
             outcome = self._solve(job)
             if outcome is not None and not self._closed:
                 self._deliver(outcome)
 
-    def _solve(self, job: Job) -> Outcome | None:
-        def cancelled() -> bool:
-            return self._closed or (not job.preview and self._newest is not None)
+    def _measure(self, job: Job, prediction: Prediction) -> None:
+        """Deliver what the effects cost, whenever one more of them is measured."""
+        costs: dict[str, float] = {}
 
+        def on_cost(name: str, cost: float) -> None:
+            costs[name] = cost
+            if not self._closed:
+                self._deliver(Outcome(job=job, prediction=prediction, costs=dict(costs)))
+
+        # not `superseded`: the service sets that event itself when its solve has ended
+        measure_costs(prediction, lambda: self._closed or self._newest is not None, on_cost)
+
+    def _solve(self, job: Job) -> Outcome | None:
         try:
-            scene = job.draft.scene(PREVIEW if job.preview else None)
-            prediction = dlocore.predict(scene, deadline=LONGEST_SOLVE, cancelled=cancelled)
+            scene = self._solver.make(job.draft)
+            if job.kind == "preview":
+                prediction = self._solver.preview(replace(scene, quality=PREVIEW), lambda: self._closed)
+                return Outcome(job=job, prediction=prediction)
+            prediction = self._solver.refine(scene, job.superseded)
+            if job.kind == "refined":
+                return Outcome(job=job, prediction=prediction)
+            self._deliver(Outcome(job=job, prediction=prediction))
+            self._measure(job, prediction)
+            return None
         except Cancelled:
             return None
         except SceneError as error:
             details = f"{error.field}: got {error.given}, allowed: {error.allowed}."
             return Outcome(job=job, prediction=None, problem=error.reason or error.field, details=details)
+        except ProblemError as error:
+            return None if error.kind == "cancelled" else Outcome(job=job, prediction=None, problem=error.detail)
         except DloError as error:
             return Outcome(job=job, prediction=None, problem=str(error))
         except Exception:
             _log.exception("the solver failed on %s", job.draft)
             return Outcome(job=job, prediction=None, problem="The solver failed on this scene; the log says why")
-        return Outcome(job=job, prediction=prediction)

@@ -7,8 +7,9 @@ from PIL import Image
 from playwright.sync_api import Frame, Page, expect
 
 from app.schemas import PredictionRequest, to_scene
-from app.viewer.camera import FIELD_OF_VIEW, start_pose
-from app.viewer.session import GIZMO_SIZE
+from app.viewer.camera import FIELD_OF_VIEW, extent, start_pose
+from app.viewer.draft import start_draft
+from app.viewer.gizmo import SIZE
 from dlocore import predict
 
 pytestmark = pytest.mark.browser
@@ -28,7 +29,9 @@ def on_screen(page: Page, x: float, y: float) -> tuple[float, float]:
     assert box is not None
     size = page.viewport_size
     assert size is not None
-    eye, centre = start_pose(1.0, size["width"], size["height"])
+    draft = start_draft()
+    seen = extent(draft, draft.start(lambda id: None))
+    eye, centre = start_pose(seen, size["width"], size["height"], on_table=True)
     forward = (centre - eye) / np.linalg.norm(centre - eye)
     right = np.cross(forward, [0, 0, 1])
     right /= np.linalg.norm(right)
@@ -54,7 +57,7 @@ def canvas(page: Page) -> np.ndarray:
 
 def test_dragging_the_gizmo_changes_the_prediction_to_that_of_the_python_api(service, witness):
     page = open_scene(witness, service)
-    offset = HANDLE * GIZMO_SIZE
+    offset = HANDLE * SIZE
     page.mouse.move(*on_screen(page, 0.25 + offset, 0.5 + offset))
     page.wait_for_timeout(500)  # the gizmo takes hold of what it saw hovered in an earlier frame
     page.mouse.down()
@@ -91,10 +94,12 @@ def test_playback_moves_the_cable_and_pause_holds_it(service, witness):
 
 def test_an_impossible_target_is_said_in_the_panel(service, witness):
     page = open_scene(witness, service)
-    page.get_by_label("Hold the far end").click()
-    page.wait_for_timeout(500)
-    box = page.get_by_text("Target x, y [m]").locator("xpath=ancestor::*[.//input][1]").locator("input").nth(1)
-    box.fill("0.9")
-    box.press("Enter")
+    page.get_by_role("button", name="Add").first.click()
+    expect(page.get_by_role("combobox", name="Gripper")).to_have_value("2 at 1 m")
+    page.get_by_role("combobox", name="Motion").click()
+    page.get_by_role("option", name="moves").click()
+    target = page.get_by_text("Target [m]").locator("xpath=ancestor::*[.//input][1]").locator("input").nth(1)
+    target.fill("0.9")
+    target.press("Enter")
     expect(page.locator('[data-status="impossible"]')).to_contain_text("farther apart than the cable between them")
     assert witness.errors == []

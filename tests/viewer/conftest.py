@@ -11,6 +11,8 @@ from fastapi import FastAPI
 from app.main import create_app
 from app.settings import Settings
 
+MOST_SCENES = 4
+
 
 @dataclass(frozen=True)
 class Service:
@@ -26,7 +28,9 @@ class Service:
 
 @pytest.fixture(scope="session")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
-    settings = Settings(data_dir=tmp_path_factory.mktemp("data"), allowed_origins=("https://friend.example",))
+    settings = Settings(
+        data_dir=tmp_path_factory.mktemp("data"), allowed_origins=("https://friend.example",), max_scenes=MOST_SCENES
+    )
     app = create_app(settings)
     server = uvicorn.Server(uvicorn.Config(app, port=0, log_level="warning", ws_per_message_deflate=False))
     thread = threading.Thread(target=server.run)

@@ -1,8 +1,11 @@
 """A viewer client without a browser: the protocol of the scene's websocket, spoken by hand."""
 
+import contextlib
+import json
 import time
 from collections.abc import Callable
 from typing import Any
+from uuid import uuid4
 
 import msgspec.msgpack
 import numpy as np
@@ -10,6 +13,7 @@ import viser
 import zstandard
 from websockets.sync.client import ClientConnection, connect
 
+IDENTITY = (1.0, 0.0, 0.0, 0.0)
 SUBPROTOCOL = f"viser-v{viser.__version__}"
 
 
@@ -47,7 +51,8 @@ class SceneClient:
         self.owners: dict[str, str] = {}
         self.controls: dict[str, dict[str, Any]] = {}
         self.downloads: dict[str, bytes] = {}
-        self._transfers: dict[str, str] = {}
+        self._transfers: dict[str, tuple[str, int]] = {}
+        self._parts: dict[str, dict[int, bytes]] = {}
         self.frames = 0
         self.send(
             type="ViewerCameraMessage",
@@ -83,6 +88,11 @@ class SceneClient:
                 continue
         return value
 
+    def take_one(self, seconds: float) -> None:
+        """Take in the next frame, if it comes in time."""
+        with contextlib.suppress(TimeoutError):
+            self._take(self.socket.recv(timeout=seconds))
+
     def listen(self, seconds: float) -> None:
         """Take in messages for a while."""
         give_up = time.monotonic() + seconds
@@ -108,15 +118,24 @@ class SceneClient:
             elif kind == "SetSceneNodeVisibilityMessage":
                 self.visible[name] = message["visible"]
             elif kind == "FileTransferStartDownload":
-                self._transfers[message["transfer_uuid"]] = message["filename"]
+                self._transfers[message["transfer_uuid"]] = (message["filename"], message["part_count"])
             elif kind == "FileTransferPart":
-                self.downloads[self._transfers[message["transfer_uuid"]]] = bytes(message["content"])
+                self._take_part(message)
             elif kind.startswith("Gui") and "props" in message:
                 value = {"value": message["value"]} if "value" in message else {}
                 self.controls[message["uuid"]] = {"kind": kind, **message["props"], **value}
             elif "props" in message and name:
                 self.nodes[name] = dict(message["props"])
                 self.owners[name] = message.get("owner", "")
+
+    def _take_part(self, message: dict[str, Any]) -> None:
+        """Add a part of a download, which is there once it is whole."""
+        uuid = message["transfer_uuid"]
+        parts = self._parts.setdefault(uuid, {})
+        parts[message["part_index"]] = bytes(message["content"])
+        filename, count = self._transfers[uuid]
+        if len(parts) == count:
+            self.downloads[filename] = b"".join(parts[k] for k in range(count))
 
     def control(self, label: str) -> tuple[str, dict[str, Any]]:
         """Return the id and the state of the control with this label."""
@@ -139,10 +158,73 @@ class SceneClient:
         """The HTML of the element that contains `mark`; empty if there is none."""
         return next((c["content"] for c in self.controls.values() if mark in c.get("content", "")), "")
 
-    def drag(self, phase: str, x: float = 0.0, y: float = 0.0) -> None:
+    def markdown(self, mark: str) -> str:
+        """The Markdown of the element that contains `mark`; empty if there is none."""
+        return next((c["_markdown"] for c in self.controls.values() if mark in c.get("_markdown", "")), "")
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The scene as it would be downloaded now."""
+        self.downloads.clear()
+        self.press("Download scene.json")
+        return json.loads(self.wait_for(lambda: self.downloads.get("scene.json")))
+
+    def refined(self) -> None:
+        """Wait until the picture shows a prediction at the asked quality."""
+        self.wait_for(lambda: "control points" in self.card and "Preview" not in self.card)
+
+    def upload(self, label: str, name: str, content: bytes) -> None:
+        """Open a file by the button with this label."""
+        transfer = str(uuid4())
+        self.send(
+            type="FileTransferStartUpload",
+            source_component_uuid=self.control(label)[0],
+            transfer_uuid=transfer,
+            filename=name,
+            mime_type="application/octet-stream",
+            part_count=1,
+            size_bytes=len(content),
+        )
+        self.send(
+            type="FileTransferPart",
+            source_component_uuid=self.control(label)[0],
+            transfer_uuid=transfer,
+            part_index=0,
+            content=content,
+        )
+
+    def click(self, point: Any) -> None:
+        """Click on what lies at a point (3,) [m], seen from above it."""
+        eye = [float(point[0]), float(point[1]), float(point[2]) + 2.0]
+        self.send(
+            type="ScenePointerMessage",
+            event_type="click",
+            ray_origin=eye,
+            ray_direction=[0.0, 0.0, -1.0],
+            screen_pos=[[0.5, 0.5]],
+            modifier=None,
+        )
+
+    def drag_node(self, phase: str, name: str, instance: int, end: list[float]) -> None:
+        """Start, move or end a drag of an instance of a node; `end` is on the plane that faces the camera [m]."""
+        self.send(
+            type="SceneNodeDragMessage",
+            phase=phase,
+            name=name,
+            instance_index=instance,
+            start_position=end,
+            start_screen_pos=[0.5, 0.5],
+            end_position=end,
+            end_screen_pos=[0.5, 0.5],
+            button="left",
+            modifier=None,
+            owner=self.owners[name],
+        )
+
+    def drag(self, phase: str, x: float = 0.0, y: float = 0.0, z: float = 0.0, wxyz: Any = IDENTITY) -> None:
         """Start, move or end a drag of the target."""
         kind = {"start": "DragStart", "update": "Update", "end": "DragEnd"}[phase]
-        pose = {"wxyz": [1.0, 0.0, 0.0, 0.0], "position": [x, y, 0.0]} if phase == "update" else {}
+        pose = {"wxyz": [float(x) for x in wxyz], "position": [x, y, z]} if phase == "update" else {}
         self.send(type=f"TransformControls{kind}Message", name="/target", owner=self.owners["/target"], **pose)
 
     @property
@@ -154,3 +236,14 @@ class SceneClient:
     def cable(self) -> np.ndarray:
         """Centres of the drawn cable's segments; (segments, 3) [m]."""
         return self.nodes["/cable"]["batched_positions"].reshape(-1, 3)
+
+
+def connected(service: Any, example: str = "", **options: Any) -> SceneClient:
+    """Return a client that sees its first prediction, of a ready scene or of the paper's case."""
+    client = SceneClient(f"{service.socket}/{example}" if example else service.socket, **options)
+    client.wait_for(lambda: "control points" in client.card and "/cable" in client.nodes)
+    return client
+
+
+def NOTHING_STORED(_id: str) -> None:  # noqa: N802 - a constant, as far as scenes are concerned
+    """Find no stored motion."""

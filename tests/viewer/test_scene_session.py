@@ -1,23 +1,13 @@
-import json
 import threading
 import time
 
 import httpx
 import numpy as np
 import pytest
-from protocol_client import SUBPROTOCOL, SceneClient
-from websockets.exceptions import ConnectionClosed, InvalidStatus
-from websockets.sync.client import connect
+from protocol_client import NOTHING_STORED, connected
 
-from app.schemas import PredictionRequest, to_scene
 from app.viewer.draft import start_draft
 from dlocore import predict
-
-
-def connected(service, **options) -> SceneClient:
-    client = SceneClient(service.socket, **options)
-    client.wait_for(lambda: 'data-status="converged"' in client.card and "/cable" in client.nodes)
-    return client
 
 
 def solver_threads() -> list[str]:
@@ -26,7 +16,7 @@ def solver_threads() -> list[str]:
 
 def test_a_new_client_sees_the_papers_case_predicted(service):
     with connected(service) as client:
-        expected = predict(start_draft().scene()).surface
+        expected = predict(start_draft().scene(NOTHING_STORED)).surface
         final = client.final_shape
         points = expected.positions(np.linspace(0, 1, 49), [1.6])[0]
         assert np.abs(final[:, :2] - points[:, :2]).max() < 1e-6  # single precision on the wire
@@ -40,8 +30,8 @@ def test_dragging_the_target_changes_the_prediction(service):
             client.drag("update", 0.25 - 0.01 * k, 0.5 - 0.02 * k)
             client.listen(0.05)
         client.drag("end")
-        draft = start_draft().with_target(0.16, 0.32)
-        points = predict(draft.scene()).surface.positions(np.linspace(0, 1, 49), [1.6])[0]
+        draft = start_draft().put(("primitives", 0, "path", "displacement"), [-0.09, 0.32, 0.0])
+        points = predict(draft.scene(NOTHING_STORED)).surface.positions(np.linspace(0, 1, 49), [1.6])[0]
         client.wait_for(lambda: np.abs(client.final_shape[:, :2] - points[:, :2]).max() < 1e-6)
         assert 'data-status="converged"' in client.card
         assert "Preview" not in client.card
@@ -64,10 +54,14 @@ def test_the_newest_target_wins_over_a_flood_of_older_ones(service):
         for k in range(400):
             client.drag("update", 0.25, 0.1 + 0.001 * k)
         client.drag("update", 0.25, -0.3)
-        began = time.monotonic()
-        client.wait_for(lambda: abs(client.final_shape[12, 1] + 0.3) < 2e-3)
-        # 400 queued solves of several ms each would take longer
-        assert time.monotonic() - began < 2.0
+        shapes = []
+
+        def reached():
+            shapes.append(client.final_shape[12, 1])
+            return abs(shapes[-1] + 0.3) < 2e-3
+
+        client.wait_for(reached)
+        assert len(set(shapes)) < 200  # queued up, all 401 targets would have been solved and drawn
         client.drag("end")
 
 
@@ -98,8 +92,9 @@ def test_a_closed_tab_frees_its_solver_thread(service):
 def test_an_impossible_target_is_said_and_the_last_good_prediction_stays(service, caplog):
     with connected(service) as client:
         client.set("Ask for", "automatic")
-        client.set("Hold the far end", True)
+        client.set("Grippers", "Add")
         client.wait_for(lambda: np.abs(client.final_shape[-1, :2] - (1, 0)).max() < 1e-6)
+        client.set("Gripper", "1 at 0.25 m")
         client.wait_for(lambda: "control points" in client.card and "Preview" not in client.card)
         client.listen(0.2)
         good = client.final_shape.copy()
@@ -118,56 +113,11 @@ def test_an_impossible_target_is_said_and_the_last_good_prediction_stays(service
     assert not [record for record in caplog.records if record.levelname == "ERROR"]
 
 
-@pytest.mark.parametrize(
-    ("label", "value", "path", "expected"),
-    [
-        ("Grasp u [m]", 0.5, ("primitives", 0, "u"), 0.5),
-        ("Target x, y [m]", [0.3, 0.4], ("primitives", 0, "path", "displacement"), [0.05, 0.4, 0.0]),
-        ("Duration [s]", 2.0, ("primitives", 0, "path", "duration"), 2.0),
-        ("Hold the far end", True, ("primitives", 1, "path", "kind"), "still"),
-        ("Preset", "black-wire", ("cable", "linear_density"), 0.0272),
-        ("Length [m]", 1.4, ("cable", "length"), 1.4),
-        ("Diameter [mm]", 8.0, ("cable", "diameter"), 0.008),
-        ("Density [g/m]", 70.0, ("cable", "linear_density"), 0.07),
-        ("EI [10⁻³ N m²]", 3.0, ("cable", "bending_stiffness"), 0.003),
-        ("Drag [N s/m²]", 0.2, ("environment", "drag"), 0.2),
-        ("Table friction", 0.3, ("environment", "table", "friction"), 0.3),
-        ("Obstacle", "capsule", ("environment", "obstacles", 0, "kind"), "capsule"),
-        ("Ask for", "automatic", ("quality",), "auto"),
-        ("Points along n_u", 11, ("quality", "n_u"), 11),
-        ("Points in time n_t", 17, ("quality", "n_t"), 17),
-    ],
-)
-def test_every_scene_control_changes_the_scene(service, label, value, path, expected):
-    with connected(service) as client:
-        client.set(label, value)
-        client.listen(0.1)
-        client.wait_for(lambda: "control points" in client.card and "Preview" not in client.card)
-        client.press("Download scene.json")
-        client.wait_for(lambda: "scene.json" in client.downloads)
-        node = json.loads(client.downloads["scene.json"])
-        to_scene(PredictionRequest.model_validate(node), lambda id: None)
-        for key in path:
-            node = node[key]
-        assert node == pytest.approx(expected) if not isinstance(expected, str) else node == expected
-
-
-def test_a_target_error_can_be_asked_for(service):
-    with connected(service) as client:
-        client.set("Ask for", "target error")
-        client.wait_for(lambda: client.control("Target error [mm]")[1]["visible"])
-        client.set("Target error [mm]", 0.5)
-        client.wait_for(lambda: "march" in client.card and "Preview" not in client.card)
-        client.press("Download scene.json")
-        client.wait_for(lambda: "scene.json" in client.downloads)
-        assert json.loads(client.downloads["scene.json"])["quality"] == {"target_error": pytest.approx(0.0005)}
-
-
 def test_the_timeline_moves_the_cable(service):
     with connected(service) as client:
         client.press("Pause")
         client.wait_for(lambda: any(c.get("label") == "Play" for c in client.controls.values()))
-        surface = predict(start_draft().scene()).surface
+        surface = predict(start_draft().scene(NOTHING_STORED)).surface
         u = np.linspace(0, 1, 121)
         for t in (0.4, 1.6):
             client.set("Time [s]", t)
@@ -187,7 +137,7 @@ def test_playback_moves_the_cable_at_30_frames_a_second_or_more(service):
         assert len(shapes) >= 30
 
 
-@pytest.mark.parametrize("colour", ["time", "curvature", "speed", "twist", "axial strain"])
+@pytest.mark.parametrize("colour", ["time", "curvature", "speed", "twist", "axial strain", "reaction"])
 def test_the_cable_can_be_coloured_by_each_quantity(service, colour):
     with connected(service) as client:
         client.set("Colour", colour)
@@ -217,75 +167,10 @@ def test_a_kept_run_is_stored_with_its_scene(service):
         run_id = html.split('data-run="')[1].split('"')[0]
         base = f"{service.address}/v1/predictions/{run_id}"
         stored, scene = httpx.get(base).json(), httpx.get(f"{base}/scene.json").json()
-        assert scene == start_draft().json()
+        assert scene == start_draft().document
         again = httpx.post(f"{service.address}/v1/predictions", json=scene).json()
         difference = np.subtract(stored["surface"]["positions"], again["surface"]["positions"])
         assert np.abs(difference).max() < 1e-9
         assert httpx.get(f"{base}/recording.rrd").content[:4] == b"RRF2"
         curl = next(c["_markdown"] for c in client.controls.values() if "curl -s" in c.get("_markdown", ""))
         assert f"curl -s {service.address}/v1/predictions " in curl
-
-
-def test_a_foreign_origin_is_refused(service):
-    with pytest.raises(InvalidStatus) as refusal:
-        SceneClient(service.socket, origin="https://evil.example")
-    assert refusal.value.response.status_code == 403
-
-
-@pytest.mark.parametrize("origin", ["same", "https://friend.example"])
-def test_its_own_and_an_allowed_origin_are_let_in(service, origin):
-    connected(service, origin=service.address if origin == "same" else origin).socket.close()
-
-
-def test_the_inner_port_opens_no_scene(service):
-    port = service.app.state.viewer_upstream.port
-    with pytest.raises((ConnectionClosed, AssertionError)), SceneClient(f"ws://127.0.0.1:{port}") as client:
-        client.wait_for(lambda: "/cable" in client.nodes, timeout=5)
-    assert "/cable" not in client.nodes
-
-
-def test_nobody_can_make_the_scene_publish_itself(service):
-    with connected(service) as client:
-        client.send(type="ShareUrlRequest")
-        client.listen(0.3)
-        assert service.app.state.viewer_upstream is not None
-        server = service.app.state.viewer_upstream
-        assert server.port
-        client.drag("start")  # the connection still works
-        client.drag("end")
-
-
-def test_the_page_allows_nothing_from_other_hosts(service):
-    page = httpx.get(f"{service.address}/scene/")
-    policy = page.headers["content-security-policy"]
-    assert "default-src 'self'" in policy
-    assert "http" not in policy
-    assert "frame-ancestors 'self'" in policy
-
-
-def test_a_wrong_protocol_version_ends_the_connection(service):
-    with connect(service.socket, subprotocols=["viser-v0.0.1"], proxy=None) as socket, pytest.raises(ConnectionClosed):
-        socket.recv(timeout=5)
-    assert SUBPROTOCOL.startswith("viser-v")
-
-
-@pytest.mark.parametrize(("kind", "height"), [("cylinder", 0.05), ("box", 0.03), ("sphere", 0.0), ("capsule", 0.0)])
-def test_an_obstacle_is_drawn_where_it_stands_and_taken_away(service, kind, height):
-    with connected(service) as client:
-        client.set("Obstacle x, y [m]", [0.6, -0.3])
-        client.set("Obstacle", kind)
-        client.wait_for(lambda: "/obstacle/0" in client.nodes)
-        assert client.positions["/obstacle/0"] == pytest.approx([0.6, -0.3, height])
-        assert client.control("Ask for")[1]["value"] == "automatic"  # a fixed grid would be too coarse for a contact
-        client.set("Obstacle", "none")
-        client.wait_for(lambda: "/obstacle/0" not in client.nodes)
-
-
-def test_a_cable_is_drawn_around_an_obstacle_in_its_way(service):
-    with connected(service) as client:
-        before = client.final_shape.copy()
-        client.set("Obstacle x, y [m]", before[24, :2].tolist())  # where the cable would come to lie
-        client.set("Obstacle", "cylinder")
-        client.wait_for(lambda: "march" in client.card and "Preview" not in client.card)
-        x, y, _ = client.positions["/obstacle/0"]
-        assert np.hypot(client.final_shape[:, 0] - x, client.final_shape[:, 1] - y).min() > 0.03  # m: its radius

@@ -1,0 +1,20 @@
+"""The controls that edit a draft, in the units people use: mm, g/m, 10⁻³ N m², degrees."""
+
+from app.viewer.forms.base import OnEdit, ShowsDraft, show_if, show_value
+from app.viewer.forms.cable import CableForm
+from app.viewer.forms.effects import EffectsForm
+from app.viewer.forms.gripper import GripperForm
+from app.viewer.forms.quality import QualityForm
+from app.viewer.forms.surroundings import SurroundingsForm
+
+__all__ = [
+    "CableForm",
+    "EffectsForm",
+    "GripperForm",
+    "OnEdit",
+    "QualityForm",
+    "ShowsDraft",
+    "SurroundingsForm",
+    "show_if",
+    "show_value",
+]

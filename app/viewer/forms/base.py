@@ -1,0 +1,48 @@
+"""What all forms share: controls that show a draft and change it."""
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from viser import GuiEvent
+
+from app.viewer.draft import Draft
+
+OnEdit = Callable[[Draft], None]
+
+
+def show_value(control: Any, value: Any) -> None:
+    """Let a control show `value`, unless it does."""
+    if control.value != value:
+        control.value = value
+
+
+def show_if(control: Any, visible: bool) -> None:
+    """Show or hide a control, unless it is so."""
+    if control.visible != visible:
+        control.visible = visible
+
+
+class Form:
+    """Controls that show a draft and change it; a change by the program is not taken for one by a person."""
+
+    def __init__(self, draft: Draft, on_edit: OnEdit) -> None:
+        self._draft = draft
+        self._on_edit = on_edit
+
+    def _bind(self, control: Any, change: Callable[[Draft], Draft]) -> None:
+        @control.on_update
+        async def _edited(event: GuiEvent[Any]) -> None:
+            if event.client is not None:
+                self._on_edit(change(self._draft))
+
+    def _on_click(self, button: Any, change: Callable[[Draft], Draft]) -> None:
+        @button.on_click
+        async def _clicked(_event: GuiEvent[Any]) -> None:
+            self._on_edit(change(self._draft))
+
+
+class ShowsDraft(Protocol):
+    """A form."""
+
+    def take(self, draft: Draft) -> None:
+        """Show `draft`."""

@@ -1,0 +1,108 @@
+"""The cable: its preset, its values, and what it remembers."""
+
+from typing import Any, Literal
+
+from viser import GuiApi
+
+from app.viewer.draft import Draft
+from app.viewer.forms.base import Form, OnEdit, show_if, show_value
+from app.viewer.shapes import scaled
+from dlocore import PRESETS, Cable, SceneError
+
+CUSTOM = "own values"
+Rest = Literal["straight", "initial", "as loaded"]
+PLASTIC_RATE = 50.0  # 1/s, of the memory, where a yield strain is set and no rate given
+
+
+class CableForm(Form):
+    """Edits the cable."""
+
+    def __init__(self, gui: GuiApi, draft: Draft, on_edit: OnEdit) -> None:
+        super().__init__(draft, on_edit)
+        with gui.add_folder("Cable"):
+            self._preset = gui.add_dropdown("Preset", (*PRESETS, CUSTOM))
+            self._length = gui.add_number("Length [m]", 1.0, min=0.05, max=1000.0, step=0.05)
+            self._diameter = gui.add_number("Diameter [mm]", 1.0, min=0.01, max=1e4, step=0.1)
+            self._density = gui.add_number("Density [g/m]", 1.0, min=0.01, max=1e7, step=0.1)
+            self._bending = gui.add_number("EI [10⁻³ N m²]", 1.0, min=1e-6, max=1e9, step=0.01)
+            with gui.add_folder("More of the cable", expand_by_default=False):
+                self._torsion = gui.add_number("GJ [10⁻³ N m²]", 1.0, min=1e-6, max=1e9, step=0.01)
+                self._stretch = gui.add_number("EA [N]", 1.0, min=1e-3, max=1e12, step=1.0)
+                self._damping = gui.add_number("Damping [10⁻³ N m² s]", 0.0, min=0.0, max=1e9, step=0.01)
+                self._yield = gui.add_number(
+                    "Yields at strain [%]", 0.0, min=0.0, max=1000.0, step=0.1, hint="Of its outermost fibre; 0: never"
+                )
+                self._rate = gui.add_number("Memory rate [1/s]", PLASTIC_RATE, min=1e-3, max=1e9, step=1.0)
+                self._rest = gui.add_dropdown(
+                    "Stress-free shape", ("straight", "initial", "as loaded"), hint="initial: that of its start"
+                )
+        self._bind(self._preset, self._with_preset)
+        self._bind(self._length, lambda d: scaled(d, float(self._length.value)))
+        self._bind(self._diameter, lambda d: self._with(d, "diameter", 1e-3 * self._diameter.value))
+        self._bind(self._density, lambda d: self._with(d, "linear_density", 1e-3 * self._density.value))
+        self._bind(self._bending, lambda d: self._with(d, "bending_stiffness", 1e-3 * self._bending.value))
+        self._bind(self._torsion, lambda d: self._with(d, "torsional_stiffness", 1e-3 * self._torsion.value))
+        self._bind(self._stretch, lambda d: self._with(d, "axial_stiffness", float(self._stretch.value)))
+        self._bind(self._damping, lambda d: self._with(d, "bending_damping", 1e-3 * self._damping.value))
+        self._bind(self._yield, lambda d: self._with_yield(d, 1e-2 * self._yield.value))
+        self._bind(self._rate, lambda d: self._with(d, "memory_rate", float(self._rate.value)))
+        self._bind(self._rest, self._with_rest)
+
+    @staticmethod
+    def _with(draft: Draft, name: str, value: float) -> Draft:
+        return draft.put(("cable", name), float(f"{value:.9g}"))
+
+    def _with_preset(self, draft: Draft) -> Draft:
+        name = self._preset.value
+        return draft if name == CUSTOM else draft.put(("cable",), {**PRESETS[name].values, "length": draft.length})
+
+    def _with_yield(self, draft: Draft, strain: float) -> Draft:
+        if strain <= 0.0:
+            return draft.put(("cable", "yield_strain"), None).put(("cable", "memory_rate"), None)
+        rate = draft.get(("cable", "memory_rate"), PLASTIC_RATE)
+        return self._with(draft, "yield_strain", strain).put(("cable", "memory_rate"), rate)
+
+    def _with_rest(self, draft: Draft) -> Draft:
+        wanted = self._rest.value
+        return draft if wanted == "as loaded" else draft.put(("cable", "rest_shape"), wanted)
+
+    def take(self, draft: Draft) -> None:
+        """Show `draft`, and the preset that it is, if it is one; numbers that make no cable stay as they were."""
+        self._draft = draft
+        try:
+            cable = draft.cable()
+        except SceneError:
+            return
+        show_value(self._preset, preset_of(draft.get(("cable",), {})))
+        show_value(self._length, cable.length)
+        show_value(self._diameter, _shown(1e3, cable.diameter))
+        show_value(self._density, _shown(1e3, cable.linear_density))
+        show_value(self._bending, _shown(1e3, cable.bending_stiffness))
+        show_value(self._torsion, _shown(1e3, cable.torsional_stiffness))
+        show_value(self._stretch, _shown(1.0, cable.axial_stiffness))
+        show_value(self._damping, _shown(1e3, cable.bending_damping))
+        show_value(self._yield, _shown(1e2, cable.yield_strain or 0.0))
+        show_value(self._rate, cable.memory_rate or PLASTIC_RATE)
+        show_if(self._rate, cable.memory_rate is not None)
+        self._take_rest(cable)
+
+    def _take_rest(self, cable: Cable) -> None:
+        rest: Rest = "as loaded"
+        if isinstance(cable.rest_shape, str):
+            rest = "initial" if cable.rest_shape == "initial" else "straight"
+        show_value(self._rest, rest)
+
+
+def _shown(scale: float, value: float | None) -> float:
+    return float(f"{scale * (value or 0.0):.7g}")
+
+
+def preset_of(cable: dict[str, Any]) -> str:
+    """Return the name of the preset that has the values of `cable`, whatever its length, or that they are its own."""
+    values = {name: value for name, value in cable.items() if name != "length"}
+    if set(values) == {"preset"}:
+        return str(values["preset"])
+    for name, preset in PRESETS.items():
+        if values == {key: value for key, value in preset.values.items() if key != "length"}:
+            return name
+    return CUSTOM

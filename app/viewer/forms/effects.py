@@ -1,0 +1,56 @@
+"""The effects: each on, off or automatic, whether it is simulated, why, and what it costs."""
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any, get_args
+
+from viser import GuiApi
+
+from app.viewer import report
+from app.viewer.draft import Draft
+from app.viewer.forms.base import Form, OnEdit, show_value
+from dlocore import EffectReport
+from dlocore.scene import EFFECTS, Switch
+
+SWITCHES: tuple[Switch, ...] = get_args(Switch)
+NEEDED = ("stretch",)  # can't be switched off: without it a cable has no length
+
+
+class EffectsForm(Form):
+    """Edits the switches of the effects, and shows what became of them."""
+
+    def __init__(self, gui: GuiApi, draft: Draft, on_edit: OnEdit) -> None:
+        super().__init__(draft, on_edit)
+        self._switches: dict[str, Any] = {}
+        self._notes: dict[str, Any] = {}
+        for name in EFFECTS:
+            options = tuple(option for option in SWITCHES if option != "off" or name not in NEEDED)
+            self._switches[name] = gui.add_dropdown(name.replace("_", " "), options)
+            self._notes[name] = gui.add_html("")
+            self._bind(self._switches[name], partial(self._with, name))
+
+    def _with(self, name: str, draft: Draft) -> Draft:
+        given = draft.get(("effects",), "auto")
+        switches = {} if isinstance(given, str) else {k: v for k, v in given.items() if v != "auto"}
+        switches.pop(name, None)
+        if self._switches[name].value != "auto":
+            switches[name] = self._switches[name].value
+        return draft.put(("effects",), switches or "auto")
+
+    def take(self, draft: Draft) -> None:
+        """Show `draft`."""
+        self._draft = draft
+        given = draft.get(("effects",), "auto")
+        for name, switch in self._switches.items():
+            show_value(switch, "auto" if isinstance(given, str) else given.get(name, "auto"))
+
+    def show(self, effects: tuple[EffectReport, ...], costs: Mapping[str, float]) -> None:
+        """Show what was simulated and why, and by how much an effect changes the time of a solve [s], where known."""
+        for effect in effects:
+            show_content(self._notes[effect.name], report.effect_note(effect, costs.get(effect.name)))
+
+
+def show_content(control: Any, content: str) -> None:
+    """Let an HTML control show `content`, unless it does."""
+    if control.content != content:
+        control.content = content

@@ -1,0 +1,129 @@
+"""The grippers: which one is in hand, where and how it holds the cable, and where it goes."""
+
+from dataclasses import replace
+from typing import Any, get_args
+
+import numpy as np
+from viser import GuiApi, GuiEvent
+
+from app.viewer import grips
+from app.viewer.draft import Draft
+from app.viewer.forms.base import Form, OnEdit, show_if, show_value
+from dlocore import SplineSurface
+from dlocore.shape import StartCurve
+
+NONE = "no gripper"
+HOLDS = {"its place": "point", "place and direction": "tangent", "place, direction and twist": "clamp"}
+FARTHEST = 1000.0  # m, of a target's coordinates
+
+
+class GripperForm(Form):
+    """Edits the gripper in hand.
+
+    Args:
+        gui: where the controls go.
+        draft: the scene to start with.
+        start: its start curve.
+        on_edit: called with the edited draft.
+    """
+
+    def __init__(self, gui: GuiApi, draft: Draft, start: StartCurve, on_edit: OnEdit) -> None:
+        super().__init__(draft, on_edit)
+        self._start = start
+        self._shown: SplineSurface | None = None
+        self._which = gui.add_dropdown("Gripper", self._names(draft), hint="Or click on a gripper in the picture")
+        self._buttons = gui.add_button_group("Grippers", ("Add", "Remove"), hint="A cable can have up to 32")
+        self._u = gui.add_slider(
+            "Grasp u [m]", min=0.0, max=1.0, step=0.005, initial_value=0.0, hint="Or click on the cable"
+        )
+        self._hold = gui.add_dropdown("Holds", tuple(HOLDS))
+        self._motion = gui.add_dropdown("Motion", get_args(grips.Motion))
+        self._target = gui.add_vector3(
+            "Target [m]", (0.0, 0.0, 0.0), min=(-FARTHEST,) * 3, max=(FARTHEST,) * 3, step=0.01
+        )
+        self._turn = gui.add_vector3("Turn [°]", (0.0, 0.0, 0.0), step=5.0, hint="Rotation vector, in the world's axes")
+        self._in_space = gui.add_checkbox("Drag in height too", initial_value=False)
+        self._duration = gui.add_slider("Duration [s]", min=0.1, max=10.0, step=0.05, initial_value=1.0)
+        with gui.add_folder("Timing", expand_by_default=False) as self._timing:
+            self._profile = gui.add_dropdown("Speed profile", grips.PROFILES)
+            self._closes = gui.add_number("Closes at [s]", 0.0, min=0.0, max=1e4, step=0.1)
+            self._opens = gui.add_number("Opens at [s]", 0.0, min=0.0, max=1e4, step=0.1, hint="0: it stays closed")
+            self._horizon = gui.add_number(
+                "Predict until [s]", 0.0, min=0.0, max=1e4, step=0.1, hint="0: until the last path ends"
+            )
+        self._bind_controls()
+
+    def _bind_controls(self) -> None:
+        @self._buttons.on_click
+        async def _pressed(_event: GuiEvent[Any]) -> None:
+            draft = self._draft
+            self._on_edit(grips.added(draft, self._start) if self._buttons.value == "Add" else grips.removed(draft))
+
+        self._bind(self._which, lambda d: grips.selected(d, self._names(d).index(self._which.value)))
+        self._bind(self._u, lambda d: grips.changed(d, "u", float(self._u.value)))
+        self._bind(self._hold, lambda d: grips.with_hold(d, HOLDS[self._hold.value]))
+        self._bind(self._motion, lambda d: grips.with_motion(d, self._motion.value))
+        self._bind(self._target, lambda d: grips.with_target(d, self._begin(d), np.array(self._target.value)))
+        self._bind(self._turn, lambda d: grips.with_turn(d, np.radians(self._turn.value)))
+        self._bind(self._in_space, lambda d: replace(d, in_space=self._in_space.value))
+        self._bind(self._duration, lambda d: grips.path_changed(d, "duration", float(self._duration.value)))
+        self._bind(self._profile, lambda d: grips.path_changed(d, "profile", self._profile.value))
+        self._bind(self._closes, lambda d: grips.changed(d, "grasp_time", float(self._closes.value) or None))
+        self._bind(self._opens, lambda d: grips.changed(d, "release_time", float(self._opens.value) or None))
+        self._bind(self._horizon, lambda d: d.put(("horizon",), float(self._horizon.value) or None))
+
+    @staticmethod
+    def _names(draft: Draft) -> tuple[str, ...]:
+        grippers = [f"{k + 1} at {primitive['u']:.3g} m" for k, primitive in enumerate(draft.primitives)]
+        return tuple(grippers) or (NONE,)
+
+    def _begin(self, draft: Draft) -> Any:
+        return grips.origin(draft, self._start, self._shown)
+
+    def follow(self, start: StartCurve, shown: SplineSurface | None) -> None:
+        """Measure targets from another start, and where grippers close later from another prediction."""
+        self._start, self._shown = start, shown
+
+    def take(self, draft: Draft) -> None:
+        """Show `draft`."""
+        self._draft = draft
+        names = self._names(draft)
+        if tuple(self._which.options) != names:
+            self._which.options = names
+        show_value(self._which, names[min(draft.selected, len(names) - 1)])
+        held = grips.gripper(draft)
+        path = {} if held is None else held["path"]
+        moves = path.get("kind") == "move"
+        for control in (self._u, self._hold, self._motion, self._closes, self._opens):
+            show_if(control, held is not None)
+        show_if(self._duration, moves)
+        show_if(self._profile, moves)
+        show_if(self._target, path.get("kind") in ("move", "waypoints"))
+        show_if(self._in_space, held is not None)
+        show_if(self._turn, grips.can_turn(draft))
+        show_value(self._horizon, float(draft.get(("horizon",), 0.0)))
+        if held is not None:
+            self._take_gripper(draft, held)
+
+    def _take_gripper(self, draft: Draft, held: dict[str, Any]) -> None:
+        if self._u.max != draft.length:
+            self._u.max = draft.length
+            self._u.step = 0.005 * draft.length
+        show_value(self._u, held["u"])
+        hold = held.get("hold", "point")
+        show_value(self._hold, next(words for words, name in HOLDS.items() if name == hold))
+        motion = grips.motion(draft)
+        options = ("moves", "stays", *(["follows waypoints"] if motion == "follows waypoints" else []))
+        if tuple(self._motion.options) != options:
+            self._motion.options = options
+        show_value(self._motion, motion)
+        show_value(self._target, tuple(round(float(x), 4) for x in grips.target(draft, self._begin(draft))))
+        show_value(self._turn, tuple(round(float(x), 2) for x in np.degrees(grips.turn(draft))))
+        show_value(self._in_space, draft.in_space)
+        duration = float(held["path"].get("duration", 1.0))
+        if duration > self._duration.max:
+            self._duration.max = duration
+        show_value(self._duration, duration)
+        show_value(self._profile, held["path"].get("profile", "minimum_jerk"))
+        show_value(self._closes, float(held.get("grasp_time") or 0.0))
+        show_value(self._opens, float(held.get("release_time") or 0.0))

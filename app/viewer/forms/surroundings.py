@@ -1,0 +1,118 @@
+"""What surrounds the cable: gravity, air, a table, obstacles."""
+
+from typing import Any
+
+import numpy as np
+from viser import GuiApi, GuiEvent
+
+from app.viewer import obstacle_edits as edits
+from app.viewer.draft import Draft
+from app.viewer.forms.base import Form, OnEdit, show_if, show_value
+
+NONE = "no obstacle"
+ADDED = {"Cylinder": "cylinder", "Box": "box", "Sphere": "sphere", "Capsule": "capsule"}
+FAR = 1e4  # m, of coordinates
+ENVIRONMENT = ("environment",)
+TABLE = ("environment", "table")
+
+
+class SurroundingsForm(Form):
+    """Edits the environment."""
+
+    def __init__(self, gui: GuiApi, draft: Draft, on_edit: OnEdit) -> None:
+        super().__init__(draft, on_edit)
+        self._chosen = 0
+        with gui.add_folder("Surroundings"):
+            self._table = gui.add_checkbox("Table", initial_value=True)
+            self._height = gui.add_number("Table height [m]", 0.0, min=-FAR, max=FAR, step=0.01)
+            self._friction = gui.add_number("Table friction", 0.0, min=0.0, max=10.0, step=0.05)
+            self._drag = gui.add_number("Drag [N s/m²]", 0.0, min=0.0, max=1e6, step=0.005)
+            with gui.add_folder("More of the surroundings", expand_by_default=False):
+                self._quadratic = gui.add_number("Drag [N s²/m³]", 0.0, min=0.0, max=1e6, step=0.005)
+                self._gravity = gui.add_vector3("Gravity [m/s²]", (0.0, 0.0, -9.81), step=0.1)
+        with gui.add_folder("Obstacles"):
+            self._add = gui.add_button_group("Add", tuple(ADDED))
+            self._which = gui.add_dropdown("Obstacle", (NONE,))
+            self._centre = gui.add_vector3("Centre [m]", (0.0, 0.0, 0.0), step=0.01)
+            self._radius = gui.add_number("Radius [mm]", 1.0, min=0.1, max=1e7, step=1.0)
+            self._size = gui.add_vector3("Size [mm]", (1.0, 1.0, 1.0), step=1.0)
+            self._long = gui.add_number("Length [mm]", 1.0, min=0.1, max=1e7, step=1.0)
+            self._rough = gui.add_number("Obstacle friction", 0.0, min=0.0, max=10.0, step=0.05)
+            self._remove = gui.add_button("Remove obstacle", color="gray")
+        self._bind_controls()
+
+    def _bind_controls(self) -> None:
+        self._bind(self._table, lambda d: self._with_table(d, self._table.value))
+        self._bind(self._height, lambda d: d.put((*TABLE, "height"), float(self._height.value)))
+        self._bind(self._friction, lambda d: d.put((*TABLE, "friction"), float(self._friction.value)))
+        self._bind(self._drag, lambda d: d.put((*ENVIRONMENT, "drag"), float(self._drag.value)))
+        self._bind(self._quadratic, lambda d: d.put((*ENVIRONMENT, "drag_quadratic"), float(self._quadratic.value)))
+        self._bind(self._gravity, lambda d: d.put((*ENVIRONMENT, "gravity"), [float(x) for x in self._gravity.value]))
+        self._bind(self._centre, lambda d: edits.moved(d, self._chosen, np.array(self._centre.value)))
+        self._bind(self._radius, lambda d: edits.changed(d, self._chosen, "radius", 1e-3 * self._radius.value))
+        self._bind(
+            self._size, lambda d: edits.changed(d, self._chosen, "size", [1e-3 * float(x) for x in self._size.value])
+        )
+        self._bind(self._long, lambda d: edits.lengthened(d, self._chosen, 1e-3 * self._long.value))
+        self._bind(self._rough, lambda d: edits.changed(d, self._chosen, "friction", float(self._rough.value)))
+
+        @self._add.on_click
+        async def _added(_event: GuiEvent[Any]) -> None:
+            self._chosen = len(edits.obstacles(self._draft))
+            self._on_edit(edits.added(self._draft, ADDED[self._add.value]))
+
+        @self._remove.on_click
+        async def _removed(_event: GuiEvent[Any]) -> None:
+            self._on_edit(edits.removed(self._draft, self._chosen))
+
+        @self._which.on_update
+        async def _chosen(event: GuiEvent[Any]) -> None:
+            if event.client is not None and self._which.value in self._names(self._draft):
+                self._chosen = self._names(self._draft).index(self._which.value)
+                self.take(self._draft)
+
+    @staticmethod
+    def _with_table(draft: Draft, wanted: bool) -> Draft:
+        return draft.put(TABLE, {"height": 0.0, "friction": 0.0} if wanted else None)
+
+    @staticmethod
+    def _names(draft: Draft) -> tuple[str, ...]:
+        return tuple(f"{k + 1}: {body['kind']}" for k, body in enumerate(edits.obstacles(draft))) or (NONE,)
+
+    def take(self, draft: Draft) -> None:
+        """Show `draft`."""
+        self._draft = draft
+        table = draft.get(TABLE)
+        show_value(self._table, table is not None)
+        show_if(self._height, table is not None)
+        show_if(self._friction, table is not None)
+        show_value(self._height, float(draft.get((*TABLE, "height"), 0.0)))
+        show_value(self._friction, float(draft.get((*TABLE, "friction"), 0.0)))
+        show_value(self._drag, float(draft.get((*ENVIRONMENT, "drag"), 0.0)))
+        show_value(self._quadratic, float(draft.get((*ENVIRONMENT, "drag_quadratic"), 0.0)))
+        x, y, z = draft.get((*ENVIRONMENT, "gravity"), (0.0, 0.0, -9.81))
+        show_value(self._gravity, (float(x), float(y), float(z)))
+        self._take_obstacle(draft)
+
+    def _take_obstacle(self, draft: Draft) -> None:
+        bodies, names = edits.obstacles(draft), self._names(draft)
+        self._chosen = max(0, min(self._chosen, len(bodies) - 1))
+        if tuple(self._which.options) != names:
+            self._which.options = names
+        show_value(self._which, names[self._chosen])
+        body = bodies[self._chosen] if bodies else {}
+        for control in (self._which, self._centre, self._rough, self._remove):
+            show_if(control, bool(bodies))
+        show_if(self._radius, "radius" in body)
+        show_if(self._size, "size" in body)
+        show_if(self._long, body.get("kind") in ("cylinder", "capsule"))
+        if not bodies:
+            return
+        show_value(self._centre, tuple(round(float(x), 4) for x in edits.centre(body)))
+        show_value(self._rough, float(body.get("friction", 0.0)))
+        if "radius" in body:
+            show_value(self._radius, round(1e3 * body["radius"], 4))
+        if "size" in body:
+            show_value(self._size, tuple(round(1e3 * float(x), 4) for x in body["size"]))
+        if body["kind"] in ("cylinder", "capsule"):
+            show_value(self._long, round(1e3 * edits.length(body), 4))

@@ -1,0 +1,193 @@
+"""Edits of the grippers of a draft: where they hold the cable, how, and where they go."""
+
+import math
+from dataclasses import replace
+from typing import Any, Literal, cast, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from app.viewer.draft import Draft
+from dlocore import SplineSurface
+from dlocore.paths import Profile
+from dlocore.scene import Hold
+from dlocore.shape import StartCurve
+
+Floats = NDArray[np.float64]
+Motion = Literal["moves", "stays", "follows waypoints"]
+HOLDS: tuple[Hold, ...] = get_args(Hold)
+PROFILES: tuple[Profile, ...] = get_args(Profile)
+DURATION = 1.5  # s, of a new motion
+REACH_SHARE = 0.9  # of the cable between two grippers, when a target is brought near
+_KINDS: dict[str, Motion] = {"move": "moves", "still": "stays", "waypoints": "follows waypoints"}
+
+
+def gripper(draft: Draft) -> dict[str, Any] | None:
+    """Return the gripper in hand, if there is one."""
+    return draft.primitives[draft.selected] if draft.selected < len(draft.primitives) else None
+
+
+def changed(draft: Draft, name: str, value: Any) -> Draft:
+    """Set a field of the gripper in hand; None takes it out."""
+    return draft if gripper(draft) is None else draft.put(("primitives", draft.selected, name), value)
+
+
+def path_changed(draft: Draft, name: str, value: Any) -> Draft:
+    """Set a field of the path of the gripper in hand; None takes it out."""
+    return draft if gripper(draft) is None else draft.put(("primitives", draft.selected, "path", name), value)
+
+
+def motion(draft: Draft) -> Motion:
+    """Return what the gripper in hand does."""
+    held = gripper(draft)
+    return "stays" if held is None else _KINDS[held["path"]["kind"]]
+
+
+def with_motion(draft: Draft, wanted: Motion) -> Draft:
+    """Let the gripper in hand move, by nothing yet, or stay; waypoints come from a file only."""
+    if gripper(draft) is None or wanted == motion(draft) or wanted == "follows waypoints":
+        return draft
+    path: dict[str, Any] = {"kind": "still"}
+    if wanted == "moves":
+        path = {"kind": "move", "displacement": [0.0, 0.0, 0.0], "duration": DURATION, "profile": "minimum_jerk"}
+    edited = changed(draft, "path", path)
+    return edited if wanted == "moves" else _with_horizon(edited)
+
+
+def _with_horizon(draft: Draft) -> Draft:
+    """Give the scene a horizon where no path has a duration any more."""
+    moves = any(primitive["path"]["kind"] != "still" for primitive in draft.primitives)
+    return draft if moves or draft.get(("horizon",)) is not None else draft.put(("horizon",), DURATION)
+
+
+def with_hold(draft: Draft, hold: str) -> Draft:
+    """Hold the position, the direction too, or the twist as well; a point can't turn."""
+    edited = changed(draft, "hold", hold)
+    if hold != "point":
+        return edited
+    return path_changed(path_changed(edited, "rotation", None), "orientations", None)
+
+
+def selected(draft: Draft, number: int) -> Draft:
+    """Take another gripper in hand."""
+    return replace(draft, selected=number) if 0 <= number < len(draft.primitives) else draft
+
+
+def added(draft: Draft, start: StartCurve) -> Draft:
+    """Add a gripper that stays, as far from the others as possible, and take it in hand.
+
+    Targets of others that the cable could no longer reach are brought near.
+    """
+    length, count = draft.length, len(draft.primitives)
+    places = np.linspace(0.0, length, 21)
+    others = np.array([primitive["u"] for primitive in draft.primitives])
+    farthest = np.abs(places[:, None] - others[None]).min(axis=1) if count else places
+    u = float(places[int(np.argmax(farthest))])
+    new = {"u": u, "hold": "point", "path": {"kind": "still"}}
+    edited = draft.put(("primitives",), [*draft.primitives, new])
+    for k in range(count):
+        edited = _in_reach(edited, k, u, start)
+    return _with_horizon(replace(edited, selected=count))
+
+
+def _in_reach(draft: Draft, k: int, u: float, start: StartCurve) -> Draft:
+    """Bring the target of gripper `k` near enough to the cable's point at `u`, held still, for the cable to follow."""
+    primitive = draft.primitives[k]
+    if primitive["path"]["kind"] != "move":
+        return draft
+    begin, fixed = start(primitive["u"])[0], start(u)[0]
+    target = begin + np.array(primitive["path"]["displacement"], dtype=float)
+    reach = REACH_SHARE * abs(u - primitive["u"])
+    distance = float(np.linalg.norm(target - fixed))
+    if distance <= reach:
+        return draft
+    near = fixed + (target - fixed) * reach / distance
+    return draft.put(("primitives", k, "path", "displacement"), _rounded(near - begin))
+
+
+def removed(draft: Draft) -> Draft:
+    """Take the gripper in hand away."""
+    rest = [primitive for k, primitive in enumerate(draft.primitives) if k != draft.selected]
+    return _with_horizon(replace(draft.put(("primitives",), rest), selected=max(0, min(draft.selected, len(rest) - 1))))
+
+
+def origin(draft: Draft, start: StartCurve, shown: SplineSurface | None) -> Floats:
+    """Return where the path of the gripper in hand begins, (3,) [m]: where the cable is when the gripper closes.
+
+    Args:
+        draft: the draft.
+        start: its start curve.
+        shown: the last prediction, which tells it for grippers that close later.
+    """
+    held = gripper(draft)
+    if held is None:
+        return start(0.5 * draft.length)[0]
+    closes = held.get("grasp_time") or 0.0
+    if closes > 0.0 and shown is not None and held["u"] <= shown.length:
+        return shown.positions([held["u"]], [min(closes, shown.horizon)])[0, 0]
+    return start(held["u"])[0]
+
+
+def target(draft: Draft, begin: Floats) -> Floats:
+    """Return where the gripper in hand ends, (3,) [m], if its path begins at `begin`."""
+    held = gripper(draft)
+    path = {"kind": "still"} if held is None else held["path"]
+    if path["kind"] == "move":
+        return begin + np.array(path["displacement"], dtype=float)
+    if path["kind"] == "waypoints":
+        return np.array(path["positions"][-1], dtype=float)
+    return begin
+
+
+def with_target(draft: Draft, begin: Floats, point: Floats) -> Draft:
+    """Let the gripper in hand end at `point` (3,) [m]; one that stayed begins to move."""
+    held = gripper(draft)
+    if held is None:
+        return draft
+    if held["path"]["kind"] == "waypoints":
+        last = len(held["path"]["positions"]) - 1
+        return draft.put(("primitives", draft.selected, "path", "positions", last), _rounded(point))
+    return path_changed(with_motion(draft, "moves"), "displacement", _rounded(np.asarray(point) - begin))
+
+
+def can_turn(draft: Draft) -> bool:
+    """Say whether the gripper in hand holds a direction that its path can turn."""
+    held = gripper(draft)
+    return held is not None and held.get("hold", "point") != "point" and held["path"]["kind"] != "waypoints"
+
+
+def turn(draft: Draft) -> Floats:
+    """Return the rotation vector of the gripper in hand (3,) [rad]."""
+    return np.array(draft.get(("primitives", draft.selected, "path", "rotation"), (0.0, 0.0, 0.0)), dtype=float)
+
+
+def with_turn(draft: Draft, rotation: Floats) -> Draft:
+    """Turn the gripper in hand by a rotation vector (3,) [rad]."""
+    if not can_turn(draft):
+        return draft
+    value = None if float(np.linalg.norm(rotation)) < 1e-9 else _rounded(rotation)
+    return path_changed(with_motion(draft, "moves"), "rotation", value)
+
+
+def nearest_turn(wxyz: Floats, before: Floats) -> Floats:
+    """Return the rotation vector (3,) [rad] of a quaternion that lies nearest to the one `before`.
+
+    A quaternion tells a turn only up to full ones, a gripper may be turned by several.
+    """
+    vector = Rotation.from_quat(np.roll(np.asarray(wxyz, dtype=float), -1)).as_rotvec()
+    angle = float(np.linalg.norm(vector))
+    if angle < 1e-9:
+        length = float(np.linalg.norm(before))
+        axis = before / length if length > math.pi else np.array([0.0, 0.0, 1.0])
+        angle = 0.0
+    else:
+        axis = vector / angle
+    full = 2.0 * math.pi * np.arange(-8, 9)[:, None]
+    choices = (angle + full) * axis
+    return cast(Floats, choices[int(np.argmin(np.linalg.norm(choices - before, axis=1)))])
+
+
+def _rounded(vector: Floats) -> list[float]:
+    """Return numbers for the document, to the micrometre or microradian: finer digits mean nothing to a reader."""
+    return [round(float(x), 6) + 0.0 for x in vector]

@@ -1,0 +1,78 @@
+"""What leaves a tab: its scene, its playback and its picture as files, its run into the store."""
+
+import asyncio
+import json
+import logging
+from typing import Any, Protocol
+
+import numpy as np
+from viser import ClientHandle
+
+from app.schemas import Motion
+from app.viewer.draft import Draft
+from app.viewer.export import playback_page, png
+from app.viewer.picture import Look
+from dlocore import Prediction
+
+PICTURE_SIZE = (1080, 1920)  # px, height and width of a saved picture
+PICTURE_WAIT = 20.0  # s, for the browser to draw it
+_log = logging.getLogger(__name__)
+
+
+class Runs(Protocol):
+    """Where runs are stored."""
+
+    def save(self, scene_json: dict[str, Any], prediction: Prediction, *, name: str = "") -> str:
+        """Store a run; return its id."""
+
+    def motion(self, id: str) -> Motion | None:
+        """Return the motion of a stored run."""
+
+
+class Outbox:
+    """Sends files to the browser of a client, and stores its runs.
+
+    Args:
+        client: the client.
+        runs: where runs are stored.
+    """
+
+    def __init__(self, client: ClientHandle, runs: Runs) -> None:
+        self._client = client
+        self._runs = runs
+
+    def scene(self, draft: Draft) -> None:
+        """Send the scene as the file that the API and the command line read."""
+        self._send("scene.json", json.dumps(draft.document, indent=2).encode())
+
+    async def playback(self, prediction: Prediction, look: Look, speed: float) -> None:
+        """Send a playback as a page that opens offline, seen as the client sees it now."""
+        camera = self._client.camera
+        pose = (np.array(camera.position), np.array(camera.look_at))
+        page = await asyncio.to_thread(playback_page, prediction, look, pose, fov=camera.fov, speed=speed)
+        self._send("cable.html", page)
+
+    async def picture(self) -> None:
+        """Have the browser draw the scene larger than it is on the screen, without the panel, and send that."""
+        height, width = PICTURE_SIZE
+        try:
+            picture = await asyncio.to_thread(
+                self._client.get_render, height, width, transport_format="png", timeout=PICTURE_WAIT
+            )
+        except (TimeoutError, RuntimeError) as error:
+            self._client.add_notification("No picture", str(error), color="red")
+            return
+        self._send("cable.png", await asyncio.to_thread(png, picture))
+
+    async def keep(self, draft: Draft, prediction: Prediction) -> str | None:
+        """Store a run and return its id; None where it can't be, which is said to the client and in the log."""
+        name = draft.get(("name",), "")
+        try:
+            return await asyncio.to_thread(self._runs.save, draft.document, prediction, name=name)
+        except Exception:
+            _log.exception("the run could not be stored")
+            self._client.add_notification("Not kept", "The run could not be stored; the log says why.", color="red")
+            return None
+
+    def _send(self, name: str, content: bytes) -> None:
+        self._client.send_file_download(name, content, save_immediately=True)

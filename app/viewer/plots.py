@@ -1,0 +1,134 @@
+"""Small plots for the panel, as SVG: they stay sharp, follow light and dark, and need nothing from elsewhere."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+
+WIDTH, HEIGHT = 300, 190
+LEFT, RIGHT, TOP, BOTTOM = 44, 14, 8, 34
+BLUE, ORANGE, GREEN = "#0072b2", "#d55e00", "#009e73"  # Okabe-Ito
+
+
+@dataclass(frozen=True, kw_only=True)
+class Series:
+    """Points of a plot.
+
+    Attributes:
+        name: in the legend.
+        points: (x, y) of each.
+        colour: CSS.
+        line: whether to join them.
+        size: radius of the dots [px].
+        titles: shown on hover, one for each point, or none.
+    """
+
+    name: str
+    points: Sequence[tuple[float, float]]
+    colour: str
+    line: bool = True
+    size: float = 2.5
+    titles: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class Axis:
+    """An axis from `low` to `high`, by decades where it is logarithmic."""
+
+    label: str
+    low: float
+    high: float
+    log: bool
+
+    @staticmethod
+    def of(label: str, values: Sequence[float], *, log: bool) -> "Axis":
+        """Return an axis that holds `values`: whole decades, or from the smallest to the largest."""
+        low, high = min(values), max(values)
+        if not log:
+            return Axis(label, low, max(high, low + 1.0), log)
+        first, last = math.floor(math.log10(low) + 1e-9), math.ceil(math.log10(high) - 1e-9)
+        return Axis(label, float(first), float(max(last, first + 1)), log)
+
+    def place(self, value: float) -> float:
+        """Return where a value lies, 0 to 1."""
+        return ((math.log10(value) if self.log else value) - self.low) / (self.high - self.low)
+
+    def ticks(self) -> list[tuple[float, str]]:
+        """Return the places, 0 to 1, and labels of at most seven ticks."""
+        step = max(1, math.ceil((self.high - self.low) / 6))
+        marks = np.arange(math.ceil(self.low), math.floor(self.high) + 1, step)
+        return [((k - self.low) / (self.high - self.low), self._text(int(k))) for k in marks]
+
+    def _text(self, k: int) -> str:
+        if not self.log:
+            return str(k)
+        if -2 <= k <= 3:
+            return f"{10.0**k:g}"
+        return f'10<tspan dy="-4" font-size="8">{k}</tspan>'
+
+
+def plot(x_label: str, y_label: str, series: Sequence[Series], *, log_x: bool, mark: str) -> str:
+    """Return an SVG with a logarithmic y axis, or "" where no series has points.
+
+    Args:
+        x_label: quantity and unit.
+        y_label: quantity and unit.
+        series: what to draw, in this order; every value on a logarithmic axis is positive.
+        log_x: whether the x axis is logarithmic too.
+        mark: name of the plot, for those who look for it in the page.
+    """
+    drawn = [one for one in series if one.points]
+    if not drawn:
+        return ""
+    x = Axis.of(x_label, [point[0] for one in drawn for point in one.points], log=log_x)
+    y = Axis.of(y_label, [point[1] for one in drawn for point in one.points], log=True)
+    parts = [*_frame(x, y), *(_series(one, x, y) for one in drawn)]
+    legend = "".join(
+        f'<span style="white-space: nowrap; margin-right: 0.7rem;"><span style="color: {one.colour};">●</span> '
+        f"{escape(one.name)}</span>"
+        for one in drawn
+        if one.name
+    )
+    return (
+        f'<div style="margin: 0.3rem 0.5rem;" data-plot="{escape(mark, quote=True)}">'
+        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(y_label)} against {escape(x_label)}" '
+        f'style="width: 100%; display: block;" font-size="10" fill="currentColor" stroke="none">{"".join(parts)}</svg>'
+        f'<div style="font-size: 0.72rem; padding-left: 0.4rem;">{legend}</div></div>'
+    )
+
+
+def _at(x: Axis, y: Axis, point: tuple[float, float]) -> tuple[float, float]:
+    across = LEFT + x.place(point[0]) * (WIDTH - LEFT - RIGHT)
+    down = HEIGHT - BOTTOM - y.place(point[1]) * (HEIGHT - TOP - BOTTOM)
+    return round(across, 1), round(down, 1)
+
+
+def _frame(x: Axis, y: Axis) -> list[str]:
+    right, bottom = WIDTH - RIGHT, HEIGHT - BOTTOM
+    parts = []
+    for place, text in x.ticks():
+        across = LEFT + place * (right - LEFT)
+        parts.append(f'<path d="M{across:.1f} {TOP}V{bottom}" stroke="currentColor" stroke-opacity="0.13"/>')
+        parts.append(f'<text x="{across:.1f}" y="{bottom + 13}" text-anchor="middle" opacity="0.75">{text}</text>')
+    for place, text in y.ticks():
+        down = bottom - place * (bottom - TOP)
+        parts.append(f'<path d="M{LEFT} {down:.1f}H{right}" stroke="currentColor" stroke-opacity="0.13"/>')
+        parts.append(f'<text x="{LEFT - 5}" y="{down + 3:.1f}" text-anchor="end" opacity="0.75">{text}</text>')
+    middle = 0.5 * (TOP + bottom)
+    parts.append(f'<text x="{0.5 * (LEFT + right)}" y="{HEIGHT - 5}" text-anchor="middle">{escape(x.label)}</text>')
+    parts.append(f'<text transform="translate(10 {middle}) rotate(-90)" text-anchor="middle">{escape(y.label)}</text>')
+    return parts
+
+
+def _series(one: Series, x: Axis, y: Axis) -> str:
+    places = [_at(x, y, point) for point in one.points]
+    text = ""
+    if one.line and len(places) > 1:
+        path = "M" + "L".join(f"{across} {down}" for across, down in places)
+        text = f'<path d="{path}" fill="none" stroke="{one.colour}" stroke-width="1.6"/>'
+    for k, (across, down) in enumerate(places):
+        title = f"<title>{escape(one.titles[k])}</title>" if k < len(one.titles) else ""
+        text += f'<circle cx="{across}" cy="{down}" r="{one.size}" fill="{one.colour}">{title}</circle>'
+    return text

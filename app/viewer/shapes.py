@@ -1,0 +1,100 @@
+"""Edits of the start shape of a draft: its points, its length."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.viewer.draft import Draft
+from dlocore.shape import StartCurve
+
+Floats = NDArray[np.float64]
+HANDLES = 13  # points that can be dragged
+STEP = 1e-5  # m, to which points are written into the document
+
+
+def handles(start: StartCurve, length: float) -> Floats:
+    """Return the points by which the start shape is dragged, evenly spaced along it; (HANDLES, 3) [m]."""
+    return start(np.linspace(0.0, length, HANDLES))
+
+
+def dragged(points: Floats, number: int, to: Floats) -> Floats:
+    """Move one point of a chain (n, 3) [m] and pull the others along, so that all its chords keep their lengths.
+
+    Each point follows its neighbour towards the dragged one, as the links of a chain do.
+    """
+    moved = points.copy()
+    chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    moved[number] = to
+    for k in range(number + 1, len(points)):
+        moved[k] = _at_distance(moved[k - 1], moved[k], chords[k - 1])
+    for k in range(number - 1, -1, -1):
+        moved[k] = _at_distance(moved[k + 1], moved[k], chords[k])
+    return moved
+
+
+def _at_distance(near: Floats, far: Floats, distance: float) -> Floats:
+    step = far - near
+    length = float(np.linalg.norm(step))
+    direction = step / length if length > 1e-12 else np.array([1.0, 0.0, 0.0])
+    return near + distance * direction
+
+
+def with_points(draft: Draft, points: Floats) -> Draft:
+    """Let the cable start along points in order (n, 3) [m]; one that was to settle still is."""
+    shape: dict[str, Any] = {"kind": "points", "points": _listed(points)}
+    if draft.get(("shape", "settle")):
+        shape["settle"] = True
+    return draft.put(("shape",), shape)
+
+
+def straightened(draft: Draft, start: StartCurve) -> Draft:
+    """Let the cable start straight, from where its end lies, along the line to its other end."""
+    begin, end = start([0.0, draft.length])
+    along = end - begin
+    if float(np.linalg.norm(along)) < 1e-6 * draft.length:
+        along = np.array([1.0, 0.0, 0.0])
+    direction = along / np.linalg.norm(along)
+    return draft.put(
+        ("shape",), {"kind": "straight", "start": _listed(begin[None])[0], "direction": _listed(direction[None])[0]}
+    )
+
+
+def with_settling(draft: Draft, settle: bool) -> Draft:
+    """Let the cable come to rest under its grippers before the motion, or not."""
+    return draft.put(("shape", "settle"), True if settle else None)
+
+
+def scaled(draft: Draft, length: float) -> Draft:
+    """Give the cable another length [m].
+
+    A straight one grows at its far end, with what holds it there; another shape grows in proportion about its first
+    point.
+    """
+    before = draft.length
+    share = length / before
+    edited = draft.put(("cable", "length"), length)
+    kind = draft.get(("shape", "kind"))
+    for k, primitive in enumerate(draft.primitives):
+        u = primitive["u"]
+        at_the_end = abs(u - before) <= 1e-9 * before
+        moved = length if at_the_end else u if kind == "straight" and u < length else u * share
+        edited = edited.put(("primitives", k, "u"), moved)
+    name = {"points": "points", "control_points": "control_points"}.get(kind)
+    if name is None:
+        return edited
+    rows = np.array(draft.get(("shape", name)), dtype=float)
+    width = min(rows.shape[1], 3)
+    rows[:, :width] = rows[0, :width] + share * (rows[:, :width] - rows[0, :width])
+    edited = edited.put(("shape", name), rows.tolist())
+    knots = draft.get(("shape", "knots"))
+    if knots is not None:
+        spaced = share * np.array(knots, dtype=float)
+        spaced[-4:] = length
+        edited = edited.put(("shape", "knots"), spaced.tolist())
+    return edited
+
+
+def _listed(points: Floats) -> list[list[float]]:
+    digits = round(-np.log10(STEP))
+    return [[round(float(x), digits) + 0.0 for x in row] for row in points]

@@ -1,0 +1,52 @@
+"""How the scenes of the tabs are solved: by the service's workers, and counted with its other solves."""
+
+import asyncio
+import threading
+from collections.abc import Callable
+
+import dlocore
+from app.service import Service
+from app.viewer.draft import Draft
+from dlocore import Prediction, Scene
+
+LONGEST_PREVIEW = 20.0  # s; its time budget is far below, which a solver still to be compiled can't keep
+
+
+def _nothing(*_: object) -> None:
+    pass
+
+
+class ServiceSolver:
+    """Solves scenes for the threads of all tabs.
+
+    A refined solve waits for a free worker as any request does. A preview does not: it takes about 10 ms, one a tab at
+    a time, and a hand that drags can't wait behind somebody's long solve.
+
+    Args:
+        service: the service.
+        loop: its event loop.
+    """
+
+    def __init__(self, service: Service, loop: asyncio.AbstractEventLoop) -> None:
+        self._service = service
+        self._loop = loop
+
+    @property
+    def ready(self) -> bool:
+        """Whether the solver is compiled."""
+        return self._service.ready
+
+    def make(self, draft: Draft) -> Scene:
+        """Return the scene of a draft, or raise SceneError."""
+        return draft.scene(self._service.runs.motion)
+
+    def preview(self, scene: Scene, cancelled: Callable[[], bool]) -> Prediction:
+        """Solve at once on the calling thread."""
+        prediction = dlocore.predict(scene, deadline=LONGEST_PREVIEW, cancelled=cancelled)
+        self._service.metrics.solved(prediction)
+        return prediction
+
+    def refine(self, scene: Scene, cancelled: threading.Event) -> Prediction:
+        """Solve as one of the service's solves; the calling thread waits."""
+        solve = self._service.solve(scene, cancelled, on_start=_nothing, on_iteration=_nothing)
+        return asyncio.run_coroutine_threadsafe(solve, self._loop).result()

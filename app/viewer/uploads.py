@@ -1,0 +1,129 @@
+"""Files that a person opens: a scene as JSON, or the points of a cable as JSON, CSV or NumPy arrays."""
+
+import io
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.viewer.draft import Draft
+from app.viewer.shapes import scaled, with_points
+from dlocore import SceneError
+from dlocore.cloud import fit_cloud
+from dlocore.errors import points_array
+from dlocore.fit import MAX_LENGTH_MISMATCH
+
+Floats = NDArray[np.float64]
+LARGEST = 10_000_000  # bytes
+MOST_POINTS = 2000  # that a document keeps; of more, a curve is fitted
+SAMPLES = 101  # of that curve
+_KINDS = "a .json scene, or points as .json, .csv, .txt, .npz or .npy"
+_ARRAYS = ("points", "positions", "control_points")
+
+
+def opened(draft: Draft, name: str, content: bytes) -> Draft:
+    """Return the draft that a file describes: its scene, or `draft` with the cable along its points.
+
+    Raises:
+        SceneError: the file is none that can be opened, or what it holds is no scene.
+    """
+    if len(content) > LARGEST:
+        raise SceneError("file", f"{len(content)} bytes", f"at most {LARGEST} bytes")
+    suffix = name.rsplit(".", 1)[-1].lower()
+    readers: dict[str, Callable[[bytes], Any]] = {
+        "json": _json,
+        "csv": _csv,
+        "txt": _csv,
+        "npz": _arrays,
+        "npy": _arrays,
+    }
+    if suffix not in readers:
+        raise SceneError("file", name, _KINDS)
+    found = readers[suffix](content)
+    if isinstance(found, dict):
+        scene = Draft.of(found) if _has_form(found) else Draft(document=found)
+        scene.request()  # raises where it is none
+        return Draft.of(found)
+    return _along(draft, points_array("points", found))
+
+
+def _has_form(found: dict[str, Any]) -> bool:
+    primitives = found.get("primitives", [])
+    return isinstance(primitives, list) and all(
+        isinstance(p, dict) and isinstance(p.get("path"), dict) and "kind" in p["path"] for p in primitives
+    )
+
+
+def _json(content: bytes) -> Any:
+    try:
+        found = json.loads(content.decode("utf-8-sig"))
+    except ValueError as error:
+        raise SceneError("file", f"text that ends JSON: {error}", "a scene, or points, as JSON in UTF-8") from None
+    if isinstance(found, dict) and "cable" in found:
+        return {key: value for key, value in found.items() if key != "output"}
+    if isinstance(found, dict) and "points" in found:
+        found = found["points"]
+    if isinstance(found, dict):
+        raise SceneError("file", ", ".join(list(found)[:6]) or "{}", 'a scene with "cable", or "points"')
+    return found
+
+
+def _csv(content: bytes) -> Floats:
+    """Return the rows of numbers of a text; a first row of words is its heading."""
+    try:
+        lines = [line.strip() for line in content.decode("utf-8-sig").splitlines()]
+    except UnicodeDecodeError:
+        raise SceneError("file", "bytes that are no text", "rows of 2 or 3 numbers [m], in UTF-8") from None
+    rows: list[list[float]] = []
+    for number, line in enumerate(lines, 1):
+        if not line or line.startswith("#"):
+            continue
+        cells = line.replace(";", " ").replace(",", " ").split()
+        try:
+            row = [float(cell) for cell in cells]
+        except ValueError:
+            if rows:
+                raise SceneError(f"file, line {number}", line, "2 or 3 numbers [m]") from None
+            continue
+        if len(row) not in (2, 3) or (rows and len(row) != len(rows[0])):
+            raise SceneError(f"file, line {number}", line, "2 or 3 numbers [m], as many in every line")
+        rows.append(row)
+    if not rows:
+        raise SceneError("file", "no row of numbers", "rows of 2 or 3 numbers, the points [m]")
+    return np.array(rows, dtype=float)
+
+
+def _arrays(content: bytes) -> Floats:
+    """Return the points of a NumPy file: its array `points`, the last of its `positions`, or its only array."""
+    try:
+        loaded = np.load(io.BytesIO(content), allow_pickle=False)
+        arrays = {"points": loaded} if isinstance(loaded, np.ndarray) else {key: loaded[key] for key in loaded.files}
+    except (ValueError, OSError, EOFError, KeyError) as error:
+        raise SceneError("file", str(error)[:80], "a file that numpy.save or numpy.savez wrote") from None
+    name = next((key for key in _ARRAYS if key in arrays), next(iter(arrays), "") if len(arrays) == 1 else "")
+    if not name:
+        raise SceneError("file", ", ".join(arrays) or "no array", "an array called points, (n, 2) or (n, 3) [m]")
+    found = np.asarray(arrays[name])
+    if found.ndim == 3 and len(found):  # a motion: where it ends
+        found = found[-1]
+    if found.dtype.kind not in "fiu" or found.ndim != 2 or found.shape[1] not in (2, 3, 4):
+        raise SceneError(f"file, {name}", f"{found.dtype} {found.shape}", "numbers, (n, 2) or (n, 3) [m]")
+    return np.asarray(found[:, : min(found.shape[1], 3)], dtype=float)
+
+
+def _along(draft: Draft, points: Floats) -> Draft:
+    """Let the cable start along points, in order or not; its length follows theirs where it differs too much."""
+    try:
+        fit = fit_cloud(points)
+    except SceneError:
+        fit = fit_cloud(points, ordered=False)
+        points = points[fit.order]
+    measured = float(fit.measured_length)
+    if len(points) > MOST_POINTS:
+        points = fit.curve(np.linspace(0.0, float(fit.curve.knots[-1]), SAMPLES))
+    edited = draft
+    if not abs(measured - draft.length) <= 0.5 * MAX_LENGTH_MISMATCH * draft.length:
+        edited = scaled(draft, round(measured, 6))
+    return with_points(edited, points)

@@ -1,0 +1,130 @@
+"""The 3D scene in a real browser: files, clicks, tabs beside each other, what is taken away from it."""
+
+import json
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+from PIL import Image
+from playwright.sync_api import Locator, Page, expect
+from test_browser import canvas, on_screen, open_scene
+
+from app.viewer.examples import example, example_names
+
+pytestmark = pytest.mark.browser
+NAME = "An arc"
+ARC = {
+    "name": NAME,
+    "cable": {"preset": "paper"},
+    "shape": {"kind": "points", "points": [[x, 0.3 * x * (1 - x), 0] for x in np.linspace(0.02, 0.98, 9)]},
+    "primitives": [{"u": 0.0, "path": {"kind": "move", "displacement": [0.1, 0.2, 0.0], "duration": 1.0}}],
+    "environment": {"table": {"height": 0.0, "friction": 0.2}},
+}
+
+
+def field(page: Page, label: str) -> Locator:
+    """Return the text field beside a label of the panel."""
+    boxes = "[self::textarea or (self::input and not(@type = 'hidden' or @type = 'range'))]"
+    return page.get_by_text(label, exact=True).locator(f"xpath=following::*{boxes}[1]")
+
+
+def downloaded(page: Page, button: str) -> Path:
+    """Press a button and return the file that the browser saves."""
+    with page.expect_download() as saving:
+        page.get_by_role("button", name=button).click()
+    return saving.value.path()
+
+
+def test_a_scene_is_loaded_from_a_file_and_saved_again(service, witness, tmp_path):
+    page = open_scene(witness, service)
+    page.get_by_role("tab", name="Share").click()
+    file = tmp_path / "arc.json"
+    file.write_text(json.dumps(ARC))
+    with page.expect_file_chooser() as choosing:
+        page.get_by_role("button", name="Open a file").click()
+    choosing.value.set_files(file)
+    expect(field(page, "Name")).to_have_value(NAME)
+    expect(page.locator('[data-status="converged"]')).to_be_visible()
+    assert json.loads(downloaded(page, "Download scene.json").read_bytes()) == ARC
+    assert witness.errors == []
+
+
+def test_a_saved_playback_plays_offline_and_asks_nobody(service, witness):
+    page = open_scene(witness, service)
+    page.get_by_role("tab", name="Share").click()
+    file = downloaded(page, "Save playback.html")
+    context = page.context.browser.new_context(viewport={"width": 400, "height": 300}, offline=True)
+    page.close()  # two pictures at once are much for a renderer without a GPU
+    asked: list[str] = []
+    errors: list[str] = []
+    offline = context.new_page()
+    offline.set_default_timeout(60_000)
+    offline.on("request", lambda request: asked.append(request.url))
+    offline.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+    page_file = file.with_suffix(".html")
+    file.rename(page_file)
+    offline.goto(page_file.as_uri())
+    expect(offline.locator("canvas").first).to_be_visible()
+    first = canvas(offline)
+    offline.wait_for_timeout(500)
+    give_up = 60
+    while (np.abs(canvas(offline) - first).max(axis=2) > 30).sum() < 100:
+        give_up -= 1
+        assert give_up, "nothing moves in the saved playback"
+        offline.wait_for_timeout(500)
+    context.close()
+    assert [url for url in asked if urlsplit(url).scheme not in ("file", "data", "blob")] == []
+    assert errors == []
+
+
+def test_a_picture_of_the_scene_is_saved_larger_than_it_is_on_the_screen(service, witness):
+    page = open_scene(witness, service)
+    page.get_by_role("tab", name="Share").click()
+    picture = Image.open(downloaded(page, "Save picture.png"))
+    assert picture.size == (1920, 1080)
+    assert np.asarray(picture.convert("L")).std() > 1.0  # something is drawn
+    assert witness.errors == []
+
+
+def test_a_click_on_the_cable_takes_hold_of_it_there(service, witness):
+    page = open_scene(witness, service)
+    page.get_by_role("button", name="Pause").click()
+    time = page.locator("input[type=text]").first
+    time.fill("0")
+    time.press("Enter")
+    grasp = field(page, "Grasp u [m]")
+    expect(grasp).to_have_value("0.25")
+    page.mouse.click(*on_screen(page, 0.7, 0.0))
+    expect(grasp).not_to_have_value("0.25")
+    assert abs(float(grasp.input_value()) - 0.7) < 0.02  # a pixel is about 2 mm
+    assert witness.errors == []
+
+
+def test_two_tabs_have_their_own_scenes(service, witness):
+    one = open_scene(witness, service)
+    other = one.context.new_page()
+    other.goto(f"{service.address}/scene/")
+    other.wait_for_selector('[data-status="converged"]')
+    for page, count in ((one, 2), (other, 1)):
+        if page is one:
+            page.bring_to_front()
+            page.get_by_role("button", name="Add").first.click()
+            expect(page.get_by_role("combobox", name="Gripper")).to_have_value("2 at 1 m")
+        page.bring_to_front()
+        page.get_by_role("tab", name="Share").click()
+        assert len(json.loads(downloaded(page, "Download scene.json").read_bytes())["primitives"]) == count
+    assert witness.errors == []
+
+
+@pytest.mark.skipif(not example_names(), reason="there is no gallery of ready scenes")
+def test_a_ready_scene_opens_by_its_address_and_asks_no_other_host(service, witness):
+    name = example_names()[0]
+    page = witness.page
+    page.goto(f"{service.address}/scene/?example={name}")
+    page.wait_for_selector('[data-status="converged"]')
+    page.get_by_role("tab", name="Share").click()
+    document = json.loads(downloaded(page, "Download scene.json").read_bytes())
+    assert document == example(name)
+    assert witness.errors == []
+    assert witness.hosts == {urlsplit(service.address).netloc}

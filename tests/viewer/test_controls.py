@@ -1,0 +1,209 @@
+"""Every control of the panel changes what it names, and the scene stays one that the API takes."""
+
+import itertools
+
+import numpy as np
+import pytest
+from protocol_client import NOTHING_STORED, SceneClient, connected
+
+from app.schemas import PredictionRequest, to_scene
+from dlocore.scene import EFFECTS
+
+
+def at(document, path):
+    """Return what lies at `path` of a document."""
+    for key in path:
+        document = document[key]
+    return document
+
+
+def checked(client: SceneClient) -> dict:
+    """Return the document of the scene, which the API must take."""
+    document = client.document
+    to_scene(PredictionRequest.model_validate(document), NOTHING_STORED)
+    return document
+
+
+GRIPPER = ("primitives", 0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "path", "expected"),
+    [
+        ({"Grasp u [m]": 0.5}, (*GRIPPER, "u"), 0.5),
+        ({"Holds": "place and direction"}, (*GRIPPER, "hold"), "tangent"),
+        ({"Holds": "place, direction and twist"}, (*GRIPPER, "hold"), "clamp"),
+        ({"Target [m]": [0.3, 0.4, 0.0]}, (*GRIPPER, "path", "displacement"), [0.05, 0.4, 0.0]),
+        (
+            {"Holds": "place and direction", "Turn [°]": [0.0, 0.0, 45.0]},
+            (*GRIPPER, "path", "rotation"),
+            [0.0, 0.0, np.pi / 4],
+        ),
+        ({"Duration [s]": 2.0}, (*GRIPPER, "path", "duration"), 2.0),
+        ({"Speed profile": "cubic"}, (*GRIPPER, "path", "profile"), "cubic"),
+        ({"Closes at [s]": 0.2}, (*GRIPPER, "grasp_time"), 0.2),
+        ({"Opens at [s]": 1.2}, (*GRIPPER, "release_time"), 1.2),
+        ({"Predict until [s]": 2.5}, ("horizon",), 2.5),
+        ({"Grippers": "Add"}, ("primitives", 1, "path", "kind"), "still"),
+        ({"Preset": "black-wire"}, ("cable", "linear_density"), 0.0272),
+        ({"Length [m]": 1.4}, ("cable", "length"), 1.4),
+        ({"Diameter [mm]": 8.0}, ("cable", "diameter"), 0.008),
+        ({"Density [g/m]": 70.0}, ("cable", "linear_density"), 0.07),
+        ({"EI [10⁻³ N m²]": 3.0}, ("cable", "bending_stiffness"), 0.003),
+        ({"GJ [10⁻³ N m²]": 2.0}, ("cable", "torsional_stiffness"), 0.002),
+        ({"EA [N]": 500.0}, ("cable", "axial_stiffness"), 500.0),
+        ({"Damping [10⁻³ N m² s]": 0.1}, ("cable", "bending_damping"), 1e-4),
+        ({"Yields at strain [%]": 1.0}, ("cable", "yield_strain"), 0.01),
+        ({"Yields at strain [%]": 1.0, "Memory rate [1/s]": 20.0}, ("cable", "memory_rate"), 20.0),
+        ({"Stress-free shape": "initial"}, ("cable", "rest_shape"), "initial"),
+        ({"Drag [N s/m²]": 0.2}, ("environment", "drag"), 0.2),
+        ({"Drag [N s²/m³]": 0.3}, ("environment", "drag_quadratic"), 0.3),
+        ({"Gravity [m/s²]": [0.0, 0.0, -1.62]}, ("environment", "gravity"), [0.0, 0.0, -1.62]),
+        ({"Table friction": 0.3}, ("environment", "table", "friction"), 0.3),
+        ({"Ask for": "automatic"}, ("quality",), "auto"),
+        ({"Ask for": "target error", "Target error [mm]": 0.5}, ("quality", "target_error"), 0.0005),
+        ({"Ask for": "time budget", "Time budget [ms]": 30.0}, ("quality", "time_budget"), 0.03),
+        ({"Points along n_u": 11}, ("quality", "n_u"), 11),
+        ({"Points in time n_t": 17}, ("quality", "n_t"), 17),
+        ({"Threshold δ": "10⁻⁶ m"}, ("quality", "delta"), 1e-6),
+        ({"Method": "march"}, ("quality", "method"), "march"),
+        ({"Name": "my run"}, ("name",), "my run"),
+        ({"Let it settle first": True}, ("shape", "settle"), True),
+        ({"Add": "Box", "Centre [m]": [0.9, 0.3, 0.1]}, ("environment", "obstacles", 0, "center"), [0.9, 0.3, 0.1]),
+        ({"Add": "Box", "Size [mm]": [50, 60, 70]}, ("environment", "obstacles", 0, "size"), [0.05, 0.06, 0.07]),
+        ({"Add": "Sphere", "Radius [mm]": 20.0}, ("environment", "obstacles", 0, "radius"), 0.02),
+        ({"Add": "Cylinder", "Length [mm]": 90.0}, ("environment", "obstacles", 0, "height"), 0.09),
+        ({"Add": "Capsule", "Obstacle friction": 0.2}, ("environment", "obstacles", 0, "friction"), 0.2),
+    ],
+)
+def test_every_scene_control_changes_the_scene(service, changes, path, expected):
+    with connected(service) as client:
+        for label, value in changes.items():
+            client.set(label, value)
+        document = client.wait_for(lambda: _reached(checked(client), path, expected))
+        assert _reached(document, path, expected)
+
+
+def _reached(document, path, expected):
+    try:
+        found = at(document, path)
+    except (KeyError, IndexError):
+        return None
+    same = found == expected if isinstance(expected, str) else found == pytest.approx(expected, abs=1e-6)
+    return document if same else None
+
+
+def test_every_effect_can_be_switched_and_says_whether_it_is_active_and_why(service):
+    with connected(service) as client:
+        client.refined()
+        for name in EFFECTS:
+            assert f'data-effect="{name}"' in client.html(f'data-effect="{name}"')
+        assert "● active" in client.html('data-effect="drag"')
+        client.set("drag", "off")
+        client.wait_for(lambda: "○ not active" in client.html('data-effect="drag"'))
+        assert "switched off in the scene" in client.html('data-effect="drag"')
+        assert client.document["effects"] == {"drag": "off"}
+        client.set("drag", "auto")
+        client.wait_for(lambda: "● active" in client.html('data-effect="drag"'))
+        assert client.document["effects"] == "auto"
+
+
+def test_what_each_effect_costs_is_measured_when_asked_for(service):
+    with connected(service) as client:
+        client.refined()
+        client.press("Measure what each costs")
+        # the march without an effect is compiled the first time
+        client.wait_for(lambda: " ms.</b>" in client.html('data-effect="inertia"'), timeout=60)
+
+
+def test_an_obstacle_is_drawn_where_it_stands_and_taken_away(service):
+    with connected(service) as client:
+        client.set("Add", "Box")
+        client.wait_for(lambda: "/obstacle/0" in client.nodes)
+        client.set("Centre [m]", [0.6, -0.3, 0.03])
+        client.wait_for(lambda: client.positions.get("/obstacle/0") == pytest.approx([0.6, -0.3, 0.03]))
+        assert client.control("Ask for")[1]["value"] == "automatic"  # a fixed grid would be too coarse for a contact
+        client.press("Remove obstacle")
+        client.wait_for(lambda: "/obstacle/0" not in client.nodes)
+
+
+def test_a_cable_is_drawn_around_an_obstacle_in_its_way_and_touches_it(service):
+    with connected(service) as client:
+        x, y = client.final_shape[24, :2].tolist()  # where the cable would come to lie
+        client.set("Add", "Cylinder")
+        client.set("Centre [m]", [x, y, 0.05])
+        client.wait_for(lambda: client.positions.get("/obstacle/0") == pytest.approx([x, y, 0.05]))
+        client.wait_for(lambda: "march" in client.card and "Preview" not in client.card)
+        distance = np.hypot(client.final_shape[:, 0] - x, client.final_shape[:, 1] - y)
+        assert distance.min() > 0.03  # m: the radius of the cylinder
+        client.press("Pause")
+        times = itertools.cycle(np.linspace(0.8, 1.6, 9))
+
+        def touches_at_the_next_time():
+            client.set("Time [s]", float(next(times)))
+            client.listen(0.1)
+            return client.visible.get("/contacts")
+
+        client.wait_for(touches_at_the_next_time)
+
+
+def test_a_cable_without_a_table_falls(service):
+    with connected(service) as client:
+        client.set("Ask for", "automatic")
+        client.set("Table", False)
+        client.wait_for(lambda: client.final_shape[:, 2].min() < -0.1)
+
+
+def test_grippers_are_added_selected_and_removed(service):
+    with connected(service) as client:
+        client.set("Ask for", "automatic")
+        client.set("Grippers", "Add")
+        client.wait_for(lambda: "/gripper/1" in client.nodes)
+        assert client.control("Gripper")[1]["value"] == "2 at 1 m"
+        assert [p["u"] for p in client.document["primitives"]] == [0.25, 1.0]
+        client.press("Pause")
+        client.set("Time [s]", 0.0)
+        client.wait_for(lambda: abs(client.cable[30, 1]) < 1e-6)
+        client.click(client.cable[30])  # the gripper stands above it
+        client.wait_for(lambda: client.control("Gripper")[1]["value"] == "1 at 0.25 m")
+        client.set("Grippers", "Remove")
+        client.wait_for(lambda: "/gripper/1" not in client.nodes)
+        assert [p["u"] for p in client.document["primitives"]] == [1.0]
+
+
+def test_a_cable_without_any_gripper_lies_still_and_gets_one_where_it_is_clicked(service):
+    with connected(service) as client:
+        client.set("Ask for", "automatic")
+        client.set("Grippers", "Remove")
+        client.wait_for(lambda: "/gripper/0" not in client.nodes)
+        assert np.ptp(client.final_shape[:, 1]) < 1e-3  # m: nothing moves it
+        client.click((0.3, 0.0, 0.0))
+        client.wait_for(lambda: "/gripper/0" in client.nodes)
+        assert client.document["primitives"][0]["u"] == pytest.approx(0.3, abs=1 / 240)  # half a segment
+
+
+def test_a_click_on_the_cable_takes_hold_of_it_there(service):
+    with connected(service) as client:
+        client.press("Pause")
+        client.set("Time [s]", 0.0)
+        client.wait_for(lambda: abs(client.cable[30, 1]) < 1e-6)
+        client.click((0.7, 0.2, 0.0))  # beside it: nothing happens
+        client.click((0.7, 0.005, 0.0))
+        client.wait_for(lambda: client.control("Grasp u [m]")[1]["value"] == pytest.approx(0.7, abs=1 / 240))
+
+
+def test_the_target_can_be_dragged_in_height_and_turned(service):
+    with connected(service) as client:
+        client.set("Ask for", "automatic")
+        client.set("Holds", "place and direction")
+        client.set("Drag in height too", True)
+        client.wait_for(lambda: client.nodes["/target"]["active_axes"] == [True, True, True])
+        client.wait_for(lambda: client.nodes["/target"]["disable_rotations"] is False)
+        half = np.pi / 12  # rad, of a turn by 30 degrees about z
+        client.drag("start")
+        client.drag("update", 0.3, 0.3, 0.1, (np.cos(half), 0.0, 0.0, np.sin(half)))
+        client.drag("end")
+        path = client.document["primitives"][0]["path"]
+        assert path["displacement"] == pytest.approx([0.05, 0.3, 0.1], abs=1e-6)
+        assert path["rotation"] == pytest.approx([0.0, 0.0, np.pi / 6], abs=1e-6)
+        client.wait_for(lambda: client.final_shape[:, 2].max() > 0.09)

@@ -1,0 +1,126 @@
+"""Edits of a draft, without a service: what a click, a turn, a new gripper and a number on the panel mean."""
+
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+from protocol_client import NOTHING_STORED
+from scipy.spatial.transform import Rotation
+
+from app.schemas.request import EXAMPLES
+from app.viewer import grips, plots
+from app.viewer.draft import Draft, start_draft
+from app.viewer.forms.cable import CUSTOM, preset_of
+from app.viewer.palette import ramp
+from app.viewer.picking import NEAR_CABLE, CableClick, GripperClick, picked
+from dlocore import PRESETS, SceneError
+
+CABLE = np.column_stack([np.linspace(0, 1, 121), np.zeros(121), np.zeros(121)])
+BODY = np.column_stack([np.full(5, 0.25), np.zeros(5), np.linspace(0.03, 0.12, 5)])
+EYE = np.array([0.3, -1.0, 1.0])
+
+
+def looked_at(point, bodies=()):
+    return picked(EYE, np.asarray(point) - EYE, CABLE, 1.0, list(bodies))
+
+
+def test_a_click_on_the_cable_tells_its_place():
+    assert looked_at((0.7, 0.0, 0.0)) == CableClick(pytest.approx(0.7, abs=1 / 240))  # half a step of the points
+
+
+def test_a_click_beside_the_cable_means_nothing():
+    far = 1.2 * NEAR_CABLE * np.linalg.norm(EYE - (0.3, 0.0, 0.0)) * np.array([0.0, 1.0, 1.0]) / np.sqrt(2)
+    assert looked_at(np.array([0.3, 0.0, 0.0]) + far) is None
+
+
+def test_a_click_on_a_gripper_is_not_one_on_the_cable_behind_it():
+    assert looked_at(BODY[2], [BODY + np.array([0.5, 0.0, 0.0]), BODY]) == GripperClick(1)
+
+
+def test_an_open_gripper_is_not_clicked():
+    assert looked_at(CABLE[30], [np.zeros((0, 3))]) == CableClick(0.25)
+
+
+def test_a_turn_that_goes_on_passes_half_and_full_turns_without_a_jump():
+    axis = np.array([0.0, 0.6, 0.8])
+    turn = np.zeros(3)
+    for angle in np.arange(0.0, 15.0, 0.5):
+        wxyz = np.roll(Rotation.from_rotvec(angle * axis).as_quat(), 1)
+        turn = grips.nearest_turn(wxyz, turn)
+        np.testing.assert_allclose(turn, angle * axis, rtol=0, atol=1e-12)  # rounding
+
+
+def test_a_target_is_where_it_was_put():
+    draft = start_draft()
+    begin = draft.start(NOTHING_STORED)(0.25)[0]
+    moved = grips.with_target(draft, begin, np.array([0.1, -0.2, 0.3]))
+    np.testing.assert_allclose(grips.target(moved, begin), (0.1, -0.2, 0.3), rtol=0, atol=1e-6)  # kept to 1 µm
+
+
+def test_the_last_waypoint_is_the_target_of_a_gripper_that_follows_some():
+    path = {"kind": "waypoints", "times": [0, 1], "positions": [[0.25, 0, 0], [0.25, 0.3, 0]]}
+    draft = Draft.of(start_draft().put(("primitives", 0, "path"), path).document)
+    moved = grips.with_target(draft, np.zeros(3), np.array([0.3, 0.2, 0.0]))
+    assert moved.primitives[0]["path"]["positions"] == [[0.25, 0, 0], [0.3, 0.2, 0.0]]
+    assert draft.primitives[0]["path"]["positions"][1] == [0.25, 0.3, 0]  # the draft before it is what it was
+
+
+def test_a_second_gripper_leaves_a_scene_that_the_cable_can_follow():
+    draft = start_draft()
+    scene = grips.added(draft, draft.start(NOTHING_STORED)).scene(NOTHING_STORED)
+    ends = [np.array([g.u, 0.0, 0.0]) + g.path.at(np.array([9.0]), np.zeros(3))[0] for g in scene.grasps]
+    assert [g.u for g in scene.grasps] == [0.25, 1.0]
+    assert np.linalg.norm(ends[1] - ends[0]) < 0.75  # m of cable between them
+
+
+def test_a_point_that_is_held_without_its_direction_does_not_turn():
+    draft = grips.with_turn(grips.with_hold(start_draft(), "tangent"), np.array([0.0, 0.0, 0.5]))
+    assert "rotation" in draft.primitives[0]["path"]
+    again = grips.with_hold(draft, "point")
+    assert "rotation" not in again.primitives[0]["path"]
+    again.scene(NOTHING_STORED)
+
+
+def test_a_number_that_is_not_allowed_is_named_with_what_is():
+    draft = start_draft().put(("cable", "diameter"), -1.0)
+    with pytest.raises(SceneError) as refused:
+        draft.scene(NOTHING_STORED)
+    assert refused.value.field == "cable.diameter"
+    assert refused.value.allowed
+
+
+@pytest.mark.parametrize("name", list(PRESETS))
+def test_a_preset_is_recognised_whatever_its_length(name):
+    assert preset_of({"preset": name, "length": 3.0}) == name
+    assert preset_of({**PRESETS[name].values, "length": 3.0}) == name
+    assert preset_of({**PRESETS[name].values, "diameter": 0.0123}) == CUSTOM
+
+
+@pytest.mark.parametrize("name", list(EXAMPLES))
+def test_the_first_gripper_that_moves_is_in_hand(name):
+    draft = Draft.of(EXAMPLES[name]["value"])
+    assert grips.motion(draft) == "moves"
+
+
+@pytest.mark.parametrize("signed", [False, True])
+def test_a_colour_ramp_grows_lighter_from_its_dark_ends(signed):
+    light = ramp(np.linspace(0, 1, 11), signed=signed) @ np.array([0.2126, 0.7152, 0.0722])
+    assert (np.diff(light[:6]) > 0).all()
+    assert (np.diff(light[5:]) > 0).all() if not signed else (np.diff(light[5:]) < 0).all()
+
+
+def test_a_plot_is_well_formed_whatever_its_words_and_lies_inside_its_frame():
+    points = [(0.5, 3e-7), (20.0, 40.0), (800.0, 2e-3)]
+    text = plots.plot(
+        "t <ms>", 'e & "d"', [plots.Series(name="<b>", points=points, colour="red")], log_x=True, mark="a"
+    )
+    tree = ET.fromstring(text)
+    dots = list(tree.iter("circle"))
+    assert len(dots) == 3
+    for dot in dots:
+        assert plots.LEFT <= float(dot.attrib["cx"]) <= plots.WIDTH - plots.RIGHT
+        assert plots.TOP <= float(dot.attrib["cy"]) <= plots.HEIGHT - plots.BOTTOM
+
+
+def test_nothing_to_plot_is_no_plot():
+    assert plots.plot("x", "y", [plots.Series(name="", points=[], colour="red")], log_x=False, mark="a") == ""

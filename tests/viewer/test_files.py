@@ -1,0 +1,159 @@
+"""Scenes and points are opened from files, edited by hand and taken away again."""
+
+import io
+import json
+
+import numpy as np
+import pytest
+from protocol_client import NOTHING_STORED, connected
+
+from app.schemas import PredictionRequest, to_scene
+from app.schemas.request import EXAMPLES, TWO_GRIPPERS
+from app.viewer import shapes, uploads
+from app.viewer.draft import Draft, start_draft
+from dlocore import SceneError
+
+ROUNDING = 1e-6  # m: shapes are drawn in single precision
+FITTED = 2e-3  # m: points are fitted within the noise that few points may have, docs/model.md
+ARC = np.column_stack([np.sin(np.linspace(0, 1, 21)), 1 - np.cos(np.linspace(0, 1, 21))])  # of 1 m
+
+
+def npz(**arrays) -> bytes:
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    return buffer.getvalue()
+
+
+def csv(points) -> bytes:
+    return "\n".join(["x,y", *(",".join(f"{x:.6f}" for x in row) for row in points)]).encode()
+
+
+@pytest.mark.parametrize("name", list(EXAMPLES))
+def test_every_example_of_the_api_comes_back_as_it_was_opened(service, name):
+    given = {key: part for key, part in EXAMPLES[name]["value"].items() if key != "output"}
+    with connected(service) as client:
+        client.upload("Open a file …", "scene.json", json.dumps(given).encode())
+        client.wait_for(lambda: "was opened" in client.html("scene.json"))
+        assert client.document == given
+
+
+def test_an_opened_scene_is_predicted_and_can_be_sent_to_the_api(service):
+    with connected(service) as client:
+        client.upload("Open a file …", "hanging.json", json.dumps(TWO_GRIPPERS).encode())
+        client.wait_for(lambda: "/gripper/1" in client.nodes and client.final_shape[:, 2].min() < -0.1, timeout=60)
+        to_scene(PredictionRequest.model_validate(client.document), NOTHING_STORED)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("points.csv", csv(ARC)),
+        ("points.txt", csv(ARC).replace(b",", b" ")),
+        ("points.json", json.dumps(ARC.tolist()).encode()),
+        ("named.json", json.dumps({"points": ARC.tolist()}).encode()),
+        ("points.npz", npz(points=ARC)),
+        ("motion.npz", npz(positions=np.array([0 * ARC, ARC]), u=np.arange(3))),
+    ],
+)
+def test_points_of_a_cable_become_its_start_shape(name, content):
+    draft = uploads.opened(start_draft(), name, content)
+    start = draft.start(NOTHING_STORED)
+    assert np.abs(start(np.linspace(0, 1, 21))[:, :2] - ARC).max() < FITTED
+    assert draft.length == 1.0
+
+
+def test_points_of_a_longer_cable_give_it_their_length():
+    draft = uploads.opened(start_draft(), "long.csv", csv(2.0 * ARC))
+    assert draft.length == pytest.approx(2.0, rel=1e-3)  # the measured length of a curve through 21 points
+    assert np.abs(draft.start(NOTHING_STORED)([2.0])[0, :2] - 2.0 * ARC[-1]).max() < 2 * FITTED
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("scene.xml", b"<scene/>", "a .json scene"),
+        ("scene.json", b"{", "JSON"),
+        ("scene.json", b'{"a": 1}', '"points"'),
+        ("scene.json", json.dumps({"cable": {"length": -1}, "shape": {"kind": "straight"}}).encode(), "cable.length"),
+        ("scene.json", json.dumps({"cable": {}, "shape": {}, "primitives": [3]}).encode(), "shape"),
+        ("points.csv", b"1,2\n3,4\nfive,6", "line 3"),
+        ("points.csv", b"1,2,3,4", "line 1"),
+        ("points.csv", b"", "points"),
+        ("points.csv", b"\xff\xfe\x00", "UTF-8"),
+        ("points.npz", b"no zip", "numpy.save"),
+        ("points.npz", npz(a=ARC, b=ARC), "points"),
+        ("points.npz", npz(points=np.array(["x"])), "numbers"),
+        ("points.csv", b"0,0\n0,0\n0,0\n0,0", "points"),
+    ],
+)
+def test_a_file_that_is_none_is_refused_in_words(name, content, words):
+    with pytest.raises(SceneError, match=words.replace(".", r"\.")):
+        uploads.opened(start_draft(), name, content)
+
+
+def test_a_refused_file_leaves_the_scene_as_it_was(service):
+    with connected(service) as client:
+        before = client.document
+        client.upload("Open a file …", "scene.json", b"{")
+        client.wait_for(lambda: "was not opened" in client.html("scene.json"))
+        assert client.document == before
+
+
+def test_a_dragged_bead_bends_the_start_shape_and_keeps_the_length_of_the_cable(service):
+    with connected(service) as client:
+        client.set("Drag its points", True)
+        client.wait_for(lambda: "/start_shape" in client.nodes)
+        end = [1.0, 0.0, 0.0]
+        client.drag_node("start", "/start_shape", shapes.HANDLES - 1, end)
+        client.drag_node("update", "/start_shape", shapes.HANDLES - 1, [0.9, -0.25, 0.0])
+        client.drag_node("end", "/start_shape", shapes.HANDLES - 1, [0.9, -0.25, 0.0])
+        document = client.wait_for(lambda: _bent(client.document))
+        points = np.array(document["shape"]["points"])
+        assert points[-1] == pytest.approx([0.9, -0.25, 0.0], abs=2e-5)  # points are written to 0.01 mm
+        assert np.linalg.norm(np.diff(points, axis=0), axis=1).sum() == pytest.approx(1.0, abs=1e-3)
+        client.refined()
+        client.set("Drag its points", False)
+        client.wait_for(lambda: "/start_shape" not in client.nodes)
+        client.press("Make it straight")
+        client.wait_for(lambda: client.document["shape"]["kind"] == "straight")
+
+
+def _bent(document):
+    return document if document["shape"]["kind"] == "points" else None
+
+
+def test_a_chain_of_points_keeps_its_chords_when_one_is_dragged():
+    points = shapes.handles(start_draft().start(NOTHING_STORED), 1.0)
+    moved = shapes.dragged(points, 4, np.array([0.2, 0.3, 0.1]))
+    chords = np.linalg.norm(np.diff(moved, axis=0), axis=1)
+    np.testing.assert_allclose(chords, 1.0 / (shapes.HANDLES - 1), rtol=0, atol=1e-12)  # rounding
+    np.testing.assert_array_equal(moved[4], [0.2, 0.3, 0.1])
+
+
+@pytest.mark.parametrize("name", list(EXAMPLES))
+def test_a_scene_can_be_given_another_length(name):
+    draft = Draft.of({key: part for key, part in EXAMPLES[name]["value"].items() if key != "output"})
+    before = draft.start(NOTHING_STORED)
+    longer = shapes.scaled(draft, 1.5 * draft.length)
+    scene = longer.scene(NOTHING_STORED)
+    assert scene.cable.length == pytest.approx(1.5 * draft.length)
+    given = [before(x * draft.length)[0] for x in (0.0, 1.0)]
+    after = [longer.start(NOTHING_STORED)(x * longer.length)[0] for x in (0.0, 1.0)]
+    assert np.linalg.norm(after[1] - after[0]) == pytest.approx(1.5 * np.linalg.norm(given[1] - given[0]), abs=FITTED)
+
+
+def test_the_shell_line_asks_for_the_scene_on_show(service):
+    with connected(service) as client:
+        client.set("Table friction", 0.3)
+        client.wait_for(lambda: '"friction":0.3' in client.markdown("curl -s"))
+        line = client.markdown("curl -s")
+        body = line.split(" -d '")[1].rsplit("'", 1)[0]
+        assert json.loads(body) == client.document
+
+
+def test_a_playback_is_saved_as_one_page_that_names_no_other_host(service):
+    with connected(service) as client:
+        client.press("Save playback.html")
+        page = client.wait_for(lambda: client.downloads.get("cable.html"), timeout=60)
+        assert page.startswith(b"<!")
+        assert b"__VISER_EMBED_DATA__" in page

@@ -1,0 +1,106 @@
+"""Who is let into the scene, how many at once, and what its page may do."""
+
+import time
+
+import httpx
+import pytest
+from conftest import MOST_SCENES
+from protocol_client import SUBPROTOCOL, SceneClient, connected
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+from app.viewer.examples import example_names
+
+
+def test_a_foreign_origin_is_refused(service):
+    with pytest.raises(InvalidStatus) as refusal:
+        SceneClient(service.socket, origin="https://evil.example")
+    assert refusal.value.response.status_code == 403
+
+
+@pytest.mark.parametrize("origin", ["same", "https://friend.example"])
+def test_its_own_and_an_allowed_origin_are_let_in(service, origin):
+    connected(service, origin=service.address if origin == "same" else origin).socket.close()
+
+
+def test_the_inner_port_opens_no_scene(service):
+    port = service.app.state.viewer_upstream.port
+    with pytest.raises((ConnectionClosed, AssertionError)), SceneClient(f"ws://127.0.0.1:{port}") as client:
+        client.wait_for(lambda: "/cable" in client.nodes, timeout=5)
+    assert "/cable" not in client.nodes
+
+
+def test_nobody_can_make_the_scene_publish_itself(service):
+    with connected(service) as client:
+        client.send(type="ShareUrlRequest")
+        client.listen(0.3)
+        assert service.app.state.viewer_upstream is not None
+        server = service.app.state.viewer_upstream
+        assert server.port
+        client.drag("start")  # the connection still works
+        client.drag("end")
+
+
+def test_the_page_allows_nothing_from_other_hosts(service):
+    page = httpx.get(f"{service.address}/scene/")
+    policy = page.headers["content-security-policy"]
+    assert "default-src 'self'" in policy
+    assert "http" not in policy
+    assert "frame-ancestors 'self'" in policy
+
+
+def test_a_wrong_protocol_version_ends_the_connection(service):
+    with connect(service.socket, subprotocols=["viser-v0.0.1"], proxy=None) as socket, pytest.raises(ConnectionClosed):
+        socket.recv(timeout=5)
+    assert SUBPROTOCOL.startswith("viser-v")
+
+
+def test_no_more_scenes_are_opened_than_allowed_and_a_page_says_so(service):
+    host = service.app.state.viewer_upstream
+    give_up = time.monotonic() + 10
+    while host.open_scenes():
+        assert time.monotonic() < give_up
+        time.sleep(0.02)
+    clients = [connected(service) for _ in range(MOST_SCENES)]
+    try:
+        page = httpx.get(f"{service.address}/scene/")
+        assert page.status_code == 503
+        assert "All scenes are taken" in page.text
+        with pytest.raises(InvalidStatus):
+            SceneClient(service.socket)
+    finally:
+        for client in clients:
+            client.socket.close()
+    give_up = time.monotonic() + 10
+    while httpx.get(f"{service.address}/scene/").status_code != 200:
+        assert time.monotonic() < give_up, "closed tabs still take places"
+        time.sleep(0.02)
+
+
+def test_the_address_of_an_example_leads_to_it(service):
+    for name in example_names():
+        answer = httpx.get(f"{service.address}/scene/", params={"example": name, "darkMode": ""})
+        assert answer.status_code == 307
+        assert answer.headers["location"] == f"/scene/{name}/?darkMode="
+        assert httpx.get(f"{service.address}/scene/{name}/").status_code == 200
+
+
+@pytest.mark.parametrize("name", ["nothing", "..", "%2e%2e", "a<b>", "paper-25.json"])
+def test_an_unknown_example_is_said_to_be_unknown(service, name):
+    page = httpx.get(f"{service.address}/scene/", params={"example": name}, follow_redirects=True)
+    assert page.status_code == 404
+    assert "<b>" not in page.text
+
+
+def test_solves_of_the_scene_are_counted_with_all_others(service):
+    def solves() -> float:
+        lines = httpx.get(f"{service.address}/metrics").text.splitlines()
+        return sum(float(line.split()[-1]) for line in lines if line.startswith("dlo_solves_total{"))
+
+    before = solves()
+    with connected(service) as client:
+        client.drag("start")
+        client.drag("update", 0.3, 0.3)
+        client.drag("end")
+        # the first one and a refined one; a drag as short as this may end before its preview is begun
+        client.wait_for(lambda: solves() >= before + 2)
