@@ -16,6 +16,7 @@ from app.viewer.picture import SURFACE_STYLES, Look
 from app.viewer.playback import Playback
 from app.viewer.shapes import with_settling
 from dlocore import Prediction, SplineSurface
+from dlocore.calibration import Measured
 from dlocore.shape import StartCurve
 
 SPEEDS = {"¼×": 0.25, "½×": 0.5, "1×": 1.0, "2×": 2.0}
@@ -302,8 +303,24 @@ class Panel:
         """Show whether the start shape is being dragged."""
         show_value(self._editing, editing)
 
-    def take_prediction(self, draft: Draft, prediction: Prediction, scale: ColourScale, *, preview: bool) -> None:
-        """Show a new prediction; a preview leaves out what nobody reads while dragging."""
+    def take_prediction(
+        self,
+        draft: Draft,
+        prediction: Prediction,
+        scale: ColourScale,
+        measured: tuple[Measured, ...],
+        *,
+        preview: bool,
+    ) -> None:
+        """Show a new prediction; a preview leaves out what nobody reads while dragging.
+
+        Args:
+            draft: what was predicted.
+            prediction: the prediction.
+            scale: of the colours.
+            measured: what this machine was calibrated to.
+            preview: whether it is one.
+        """
         self._status.content = report.status_card(prediction, preview=preview)
         if self._slider.max != self._playback.horizon:
             self._slider.max = self._playback.horizon
@@ -314,7 +331,7 @@ class Panel:
         self.take_scale(scale)
         self._effects.show(prediction.effects, {})
         self._forces.content = report.grippers_list(prediction)
-        self._accuracy.content = report.accuracy_plot(prediction, self._earlier)
+        self._accuracy.content = report.accuracy_plot(prediction, self._earlier, measured)
         self._convergence.content = report.convergence(prediction)
         self._message.content = report.message(prediction)
         self._json.content = report.json_block(draft.document)

@@ -10,12 +10,14 @@ import numpy as np
 from app.viewer import plots
 from app.viewer.palette import ColourScale, css_ramp
 from dlocore import EffectReport, Prediction
+from dlocore.calibration import Measured, front_of
 
 _CARD = (
     "margin: 0 0.75rem 0.6rem; padding: 0.55rem 0.7rem; border-radius: 0.5rem; font-size: 0.8rem; line-height: 1.35;"
 )
 _GOOD = "rgba(46, 107, 214, 0.10)"
 _DOUBT = "rgba(235, 150, 30, 0.16)"
+SMALLEST_ERROR = 1e-9  # m: a smaller one is none, and has no place on a logarithmic axis
 EARLIER = 30  # solves that are shown beside the present one
 _BAD = "rgba(222, 72, 50, 0.16)"
 _WORDS = {
@@ -135,18 +137,30 @@ def convergence(prediction: Prediction) -> str:
     return plots.plot("iteration", "update, residual", series, log_x=False, mark="convergence")
 
 
-def accuracy_plot(prediction: Prediction, earlier: list[tuple[float, float]]) -> str:
-    """Return the plot of error against time, with the present solve as a dot, and add it to those `earlier`."""
-    series = []
-    if earlier:
-        grey = "rgba(128, 138, 154, 0.7)"
-        series.append(plots.Series(name="earlier here", points=tuple(earlier), colour=grey, line=False))
+def accuracy_plot(prediction: Prediction, earlier: list[tuple[float, float]], measured: tuple[Measured, ...]) -> str:
+    """Return the plot of error against time, with the present solve as a dot, and add it to those `earlier`.
+
+    Args:
+        prediction: the present solve.
+        earlier: (time [ms], estimated error [mm]) of solves before it, the newest kept.
+        measured: what this machine was calibrated to.
+    """
+    grey = "rgba(128, 138, 154, 0.55)"
+    places = [(1e3 * p.wall_time, 1e3 * max(p.error, SMALLEST_ERROR)) for p in measured]
+    titles = [f"{p.method}, {p.n_u} x {p.n_t}" for p in measured]
+    front = sorted(places[k] for k in front_of(measured))
+    series = [
+        plots.Series(name="measured here", points=places, colour=grey, line=False, size=2.0, titles=titles),
+        plots.Series(name="the best of them", points=front, colour=plots.BLUE),
+        plots.Series(name="your solves", points=tuple(earlier), colour=plots.GREEN, line=False),
+    ]
     accuracy = prediction.accuracy
     if accuracy.error_estimate and accuracy.wall_time > 0:
         here = (1e3 * accuracy.wall_time, 1e3 * accuracy.error_estimate)
         series.append(plots.Series(name="this solve", points=[here], colour=plots.ORANGE, size=5.0))
         earlier[:] = [*earlier, here][-EARLIER:]
-    return plots.plot("time [ms]", "error [mm]", series, log_x=True, mark="accuracy")
+    hint = "" if measured else note("What accuracy costs on this machine is not measured yet: dlo calibrate", good=True)
+    return plots.plot("time [ms]", "error [mm]", series, log_x=True, mark="accuracy") + hint
 
 
 def message(prediction: Prediction) -> str:

@@ -283,7 +283,7 @@ class Session:
         if self._dragging and not self._shape.held:
             self._playback.seek(self._playback.horizon)
         scale = self._picture.show(prediction, self._playback.time, self._draft.selected)
-        self._panel.take_prediction(outcome.job.draft, prediction, scale, preview=preview)
+        self._panel.take_prediction(outcome.job.draft, prediction, scale, outcome.measured, preview=preview)
         self._gizmo.warn("")
         if not preview:
             self._shown = (outcome.job.draft, prediction)

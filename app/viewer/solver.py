@@ -7,7 +7,8 @@ from collections.abc import Callable
 import dlocore
 from app.service import Service
 from app.viewer.draft import Draft
-from dlocore import Prediction, Scene
+from dlocore import Prediction, Scene, calibration
+from dlocore.calibration import Measured
 
 LONGEST_PREVIEW = 20.0  # s; its time budget is far below, which a solver still to be compiled can't keep
 
@@ -39,6 +40,11 @@ class ServiceSolver:
     def make(self, draft: Draft) -> Scene:
         """Return the scene of a draft, or raise SceneError."""
         return draft.scene(self._service.runs.motion)
+
+    def measured(self, dimensions: int) -> tuple[Measured, ...]:
+        """Return what this machine was calibrated to, in the plane (2) or in space (3); nothing where it was not."""
+        found = calibration.load(self._service.settings.data_dir / calibration.FILE)
+        return () if found is None else found.of_dimensions(dimensions)
 
     def preview(self, scene: Scene, cancelled: Callable[[], bool]) -> Prediction:
         """Solve at once on the calling thread."""

@@ -10,6 +10,7 @@ from app.problems import ProblemError
 from app.viewer.costs import measure_costs
 from app.viewer.draft import Draft
 from dlocore import Cancelled, DloError, Prediction, Quality, Scene, SceneError
+from dlocore.calibration import Measured
 
 PREVIEW = Quality(time_budget=0.01)  # while the hand moves
 Kind = Literal["preview", "refined", "costs"]
@@ -25,6 +26,9 @@ class Solver(Protocol):
 
     def make(self, draft: Draft) -> Scene:
         """Return the scene of a draft, or raise SceneError."""
+
+    def measured(self, dimensions: int) -> tuple[Measured, ...]:
+        """Return what this machine was calibrated to, in the plane (2) or in space (3)."""
 
     def preview(self, scene: Scene, cancelled: Callable[[], bool]) -> Prediction:
         """Solve at once, for at most a few ms."""
@@ -44,13 +48,17 @@ class Job:
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What became of a job: a prediction, or why there is none: in words, and with field, value and allowed range."""
+    """What became of a job: a prediction, or why there is none: in words, and with field, value and allowed range.
+
+    `measured` is what this machine was calibrated to, for a refined prediction.
+    """
 
     job: Job
     prediction: Prediction | None
     problem: str = ""
     details: str = ""
     costs: dict[str, float] | None = None
+    measured: tuple[Measured, ...] = ()
 
 
 class SolverThread:
@@ -124,9 +132,11 @@ class SolverThread:
                 prediction = self._solver.preview(replace(scene, quality=PREVIEW), lambda: self._closed)
                 return Outcome(job=job, prediction=prediction)
             prediction = self._solver.refine(scene, job.superseded)
+            measured = self._solver.measured(prediction.accuracy.dimensions)
+            refined = Outcome(job=job, prediction=prediction, measured=measured)
             if job.kind == "refined":
-                return Outcome(job=job, prediction=prediction)
-            self._deliver(Outcome(job=job, prediction=prediction))
+                return refined
+            self._deliver(refined)
             self._measure(job, prediction)
             return None
         except Cancelled:

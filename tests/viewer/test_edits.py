@@ -8,12 +8,13 @@ from protocol_client import NOTHING_STORED
 from scipy.spatial.transform import Rotation
 
 from app.schemas.request import EXAMPLES
-from app.viewer import grips, plots
+from app.viewer import grips, plots, report
 from app.viewer.draft import Draft, start_draft
 from app.viewer.forms.cable import CUSTOM, preset_of
 from app.viewer.palette import ramp
 from app.viewer.picking import NEAR_CABLE, CableClick, GripperClick, picked
-from dlocore import PRESETS, SceneError
+from dlocore import PRESETS, SceneError, predict
+from dlocore.calibration import Measured
 
 CABLE = np.column_stack([np.linspace(0, 1, 121), np.zeros(121), np.zeros(121)])
 BODY = np.column_stack([np.full(5, 0.25), np.zeros(5), np.linspace(0.03, 0.12, 5)])
@@ -120,6 +121,19 @@ def test_a_plot_is_well_formed_whatever_its_words_and_lies_inside_its_frame():
     for dot in dots:
         assert plots.LEFT <= float(dot.attrib["cx"]) <= plots.WIDTH - plots.RIGHT
         assert plots.TOP <= float(dot.attrib["cy"]) <= plots.HEIGHT - plots.BOTTOM
+
+
+def test_the_present_solve_is_a_dot_among_what_the_machine_was_calibrated_to():
+    prediction = predict(start_draft().scene(NOTHING_STORED))
+    common = {"dimensions": 2, "method": "march", "n_t": 13, "steps": 48, "spread": 1e-4, "iterations": 0}
+    measured = tuple(
+        Measured(n_u=n, wall_time=time, error=error, converged=True, **common)
+        for n, time, error in ((7, 1e-3, 1e-2), (9, 2e-3, 1e-3), (8, 3e-3, 5e-3))
+    )
+    earlier: list[tuple[float, float]] = []
+    tree = ET.fromstring(report.accuracy_plot(prediction, earlier, measured))
+    assert len(list(tree.iter("circle"))) == 3 + 2 + 1  # all, the two that no other one beats, and the solve
+    assert earlier == [(1e3 * prediction.accuracy.wall_time, 1e3 * prediction.accuracy.error_estimate)]
 
 
 def test_nothing_to_plot_is_no_plot():
