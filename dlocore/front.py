@@ -56,6 +56,10 @@ def predict(
     problem = pose(scene)
     quality = scene.quality
     method = quality.method
+    if method == "reference":
+        from dlocore.reference.solve import reference  # its compiled code is for those who ask for it
+
+        return reference(problem, monitor)
     if method == "auto":
         method = automatic_method(problem)
     if method == "march":
