@@ -11,8 +11,8 @@ Integers = NDArray[np.int64]
 # places of numbers in `Body.law`
 EA, EI, GJ, BEND_DAMPING, TWIST_DAMPING, DRAG, DRAG_QUADRATIC = range(7)
 YIELD_BEND, YIELD_TWIST, YIELD_STRETCH, MEMORY_RATE, SOFTENED = range(7, 12)
-RADIUS, STIFFNESS, PASSAGE, CONTACT_DAMPING, STICK, LYING, GYRATION = range(12, 19)
-LAWS = 19
+RADIUS, STIFFNESS, PASSAGE, CONTACT_DAMPING, STICK, LYING, GYRATION, DENSITY = range(12, 20)
+LAWS = 20
 
 REAL, DIRECTION, CLAMP = range(3)  # kinds of edges: of the cable, or the direction that a gripper holds
 

@@ -15,6 +15,7 @@ from dlocore.reference.body import (
     BEND_DAMPING,
     CLAMP,
     CONTACT_DAMPING,
+    DENSITY,
     DRAG,
     DRAG_QUADRATIC,
     EA,
@@ -292,7 +293,7 @@ def add_contact(
     """
     law = body.law
     n, most, x, u = np.empty(3), np.zeros(3), np.empty(3), np.empty(3)
-    force, tangent, own = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
+    force, drawn, tangent, own = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     deepest = 0.0
     for p in range(len(body.point_edge)):
         e, s = body.point_edge[p], body.point_along[p]
@@ -323,9 +324,9 @@ def add_contact(
         if limit > 0.0:
             for i in range(3):
                 slipped[p, i] = anchor[p, i] + implicit * u[i]
-            rub(limit, most, slipped[p], law[STICK], u, own)
+            rub(limit, most, slipped[p], u, law[STICK], law[DENSITY], implicit, drawn, own)
             for i in range(3):
-                force[i] += u[i]
+                force[i] += drawn[i]
                 for j in range(3):
                     tangent[i, j] += own[i, j]
         else:

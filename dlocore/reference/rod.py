@@ -175,6 +175,7 @@ def _laws(problem: Problem, stiffening: float) -> Floats:
     law[places.STICK] = STICK * cable.diameter
     if problem.friction is not None:
         law[places.LYING] = problem.friction.lying
+    law[places.DENSITY] = cable.linear_density
     law[places.GYRATION] = cable.diameter / np.sqrt(8.0)
     return law
 

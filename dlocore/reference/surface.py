@@ -77,25 +77,38 @@ def press(stiffness: float, width: float, damping: float, depth: float, approach
 
 
 @compiled
-def rub(limit: float, n: Any, slip: Any, stick: float, force: Any, tangent: Any) -> None:
+def rub(
+    limit: float, n: Any, slip: Any, v: Any, stick: float, density: float, implicit: float, force: Any, tangent: Any
+) -> None:
     """Write Coulomb's friction against the slip (3,) from an anchor (eq. 22), and minus its derivative, (3,), (3, 3).
 
-    The slip is cut to `stick` [m] in place: there the anchor is dragged behind. It has no part along the normal n.
+    f = -mu N x/max(|x|, s_0) of x = s + lag v, so that what sticks does not swing about its anchor: the lag makes it
+    critically damped, and leaves the force of what slides as it is. The slip is cut to `stick` = s_0 [m] in place:
+    there the anchor is dragged behind. Neither slip nor speed counts along the normal n.
+
+    Args:
+        limit: mu N [N/m].
+        density: of the cable [kg/m].
+        implicit: by how much the slip follows the velocity v (3,) [s].
     """
+    lag = 2.0 * np.sqrt(density * stick / limit)
     along = slip[0] * n[0] + slip[1] * n[1] + slip[2] * n[2]
-    size = 0.0
+    speed = v[0] * n[0] + v[1] * n[1] + v[2] * n[2]
+    cut = size = 0.0
     for d in range(3):
         slip[d] -= along * n[d]
-        size += slip[d] * slip[d]
-    size = np.sqrt(size)
-    slides = size > stick
+        force[d] = slip[d] + lag * (v[d] - speed * n[d])
+        cut += slip[d] * slip[d]
+        size += force[d] * force[d]
+    cut, size = np.sqrt(cut), np.sqrt(size)
     scale = limit / max(size, stick)
+    slope = scale * (1.0 + lag / implicit)
     for i in range(3):
         for j in range(3):
-            tangent[i, j] = scale * ((1.0 if i == j else 0.0) - n[i] * n[j])
-            if slides:
-                tangent[i, j] -= scale * slip[i] * slip[j] / (size * size)
+            tangent[i, j] = slope * ((1.0 if i == j else 0.0) - n[i] * n[j])
+            if size > stick:
+                tangent[i, j] -= slope * force[i] * force[j] / (size * size)
     for d in range(3):
-        force[d] = -scale * slip[d]
-        if slides:
-            slip[d] *= stick / size
+        force[d] *= -scale
+        if cut > stick:
+            slip[d] *= stick / cut
