@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 FIRST_SPANS = 12  # in time
 MOST_SPANS = 400
-MOST_TIMES = 2000
+LEAST_TIMES, MOST_TIMES = 257, 2000  # at which a motion is fitted
 FIRM = 1e4  # weight of the first and the last instant, which the spline keeps
 MARGINS = 2  # samples that each span needs
 

@@ -39,6 +39,7 @@ FIRST = 1e-3  # of a window: its first step
 LAST = 1e-3  # of a step: what it would leave of a window is done with it
 SAFETY, SHRINK, GROW = 0.85, 0.2, 4.0  # of the choice of the next step
 FAILURE = 0.25  # of a step that found no solution: the next
+NOTES = 2000  # of a motion at most, between its events
 SHORTEST = 1e-9  # of the horizon: a step
 SETTLED = 1e-11  # of the length: a step downhill that ends the search for an equilibrium
 DOWNHILL = 400  # steps to an equilibrium
@@ -61,14 +62,15 @@ class Motion:
 
     Attributes:
         rod: the rod.
-        times: of the steps (k,) [s]; a time occurs twice where a gripper jumps.
+        times: of the steps that were noted (k,) [s]; an event occurs twice, as a gripper may jump there.
         states: the rod at those times.
         forces: of each grasp (grasps, k, 3) [N], zero while it is open.
         moments: the same [N m].
         deepest: largest depth in a surface [m].
         left: largest update that Newton's iterations left [m].
         stopped: why it ended early: "step" without a solution, "time" over; "" where it did not.
-        rejected: steps that were done again.
+        steps: how many it took.
+        rejected: how many were done again.
     """
 
     rod: Rod
@@ -79,6 +81,7 @@ class Motion:
     deepest: float
     left: float
     stopped: Stopped
+    steps: int
     rejected: int
 
 
@@ -108,7 +111,7 @@ class _Record:
         self.moments: list[Floats] = []
         self.beginnings: list[int] = []
         self.deepest = self.left = 0.0
-        self.rejected = 0
+        self.steps = self.rejected = 0
 
     def begin(self, link: Chain, state: State) -> None:
         """Note the state in which a window begins; what grippers give there is that of its first step."""
@@ -148,6 +151,7 @@ class _Record:
             deepest=self.deepest,
             left=self.left,
             stopped=stopped,
+            steps=self.steps,
             rejected=self.rejected,
         )
 
@@ -202,10 +206,12 @@ def _window(link: Chain, state: State, tolerance: float, watch: Watch, record: _
                 return None
             continue
         t = end if h == end - t else t + h
+        record.steps += 1
         record.deepest, record.left = max(record.deepest, told[2]), max(record.left, told[1])
         after.q[:, 3] = 0.0  # spin counts from the beginning of the step
         state = after
-        record.note(link, t, h, state, reaction, torque)
+        if t == end or t - record.times[-1] >= link.rod.problem.horizon / NOTES:
+            record.note(link, t, h, state, reaction, torque)
         h *= min(GROW, SAFETY * (tolerance / max(told[0], 1e-300)) ** (1.0 / SDIRK4.order))
     return state
 

@@ -18,13 +18,14 @@ Floats = NDArray[np.float64]
 ELEMENTS = 20  # of the coarsest rod
 LEVELS = 6  # of refinement: up to 640 elements
 LEAST = 3  # rods, of which two changes tell how fast they converge
-STEP = 3e-3  # of the target: the error of a step of the coarsest rod; a quarter of it with each refinement
+STEP = 1e-2  # of the target: the error of a step of the coarsest rod; a quarter of it with each refinement
 ORDERLY = (2.5, 8.0)  # change over next change, about 4: motions that converge with the second order
 SLOWEST = 1.5  # change over next change, below which nothing is said of the limit
 SLOW = 2.0  # times the last change: the estimate where nothing is said of the limit
 FOURTH = 15.0  # what is left of a change by an extrapolation of the fourth order
-DEEP = 0.02  # of the diameter: contact that lets the cable deeper is made stiffer
-STIFFER = (2.0, 8.0)  # at least and at most by these ratios
+DEEP = 0.02  # of the diameter: a motion that goes deeper into a surface is done again with stiffer contact
+STIFFER = (2.0, 30.0)  # at least and at most by these ratios
+STIFFEST = 1e5  # times the stiffness that bears the weight
 TIMES = 129  # at which motions are compared, besides events
 
 
@@ -97,6 +98,10 @@ def refine(problem: Problem, target: float, watch: Watch, on_level: Callable[[Pr
             return Refined(problem, tuple(levels), "time")
         if motion.stopped == "step" and levels:
             return Refined(problem, tuple(levels), "step")
+        deep = motion.deepest / problem.scene.cable.diameter
+        if deep > DEEP and stiffening < STIFFEST:
+            stiffening *= float(np.clip(2.0 * deep / DEEP, *STIFFER))
+            continue
         met = {} if motion.stopped else _met(problem, samples(motion))
         if met:
             problem, levels = pose(problem.scene, {**problem.called_for, **met}), []
@@ -109,9 +114,6 @@ def refine(problem: Problem, target: float, watch: Watch, on_level: Callable[[Pr
         if len(levels) >= LEAST and levels[-1].estimate <= target:
             ended = "agreed"
             break
-        deep = motion.deepest / problem.scene.cable.diameter
-        if deep > DEEP:
-            stiffening *= float(np.clip(deep / DEEP, *STIFFER))
     return Refined(problem, tuple(levels), ended)
 
 

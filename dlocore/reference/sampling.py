@@ -20,6 +20,8 @@ def between(times: Floats, x: Floats, v: Floats, t: Floats) -> Floats:
 
     Where a time occurs twice, the velocity jumps. Beyond the last time x stays.
     """
+    if len(times) == 1:
+        return np.repeat(x, len(t), axis=0)
     at = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 2)
     while (np.diff(times)[at] <= 0.0).any():
         at = np.where(np.diff(times)[at] <= 0.0, at - 1, at)

@@ -10,7 +10,7 @@ from dlocore.prediction import Accuracy, EffectReport, GraspReaction, Iteration,
 from dlocore.problem import Problem, pose
 from dlocore.reference.chain import chain, grip
 from dlocore.reference.energy import energies
-from dlocore.reference.fit import MOST_TIMES, Fit, fit
+from dlocore.reference.fit import LEAST_TIMES, MOST_TIMES, Fit, fit
 from dlocore.reference.refine import Level, Refined, refine
 from dlocore.reference.sampling import between, material_of
 from dlocore.scene import Scene
@@ -111,7 +111,7 @@ def reference(problem: Problem, monitor: Monitor) -> Prediction:
                 n_u=surface.control_points.shape[1],
                 n_t=len(surface.control_points),
                 surface=surface,
-                note=f"rod of {len(motion.rod.u) - 1} elements, {len(motion.times) - 1} steps",
+                note=f"rod of {len(motion.rod.u) - 1} elements, {motion.steps} steps",
             )
         )
 
@@ -126,14 +126,15 @@ def _surface(problem: Problem, refined: Refined, tolerance: float) -> Fit:
     """Return the spline through the answer of a refinement."""
     last = refined.levels[-1]
     taken = last.taken
-    times = np.unique(taken.times)
-    if len(times) > MOST_TIMES:
-        times = np.union1d(times[:: -(-len(times) // MOST_TIMES)], times[-1:])
-    if times[-1] < problem.horizon:  # it stands still where it could not go on
-        times = np.append(times, np.linspace(times[-1], problem.horizon, 9)[1:])
+    steps, first = np.unique(taken.times, return_index=True)
+    times = steps if len(steps) <= MOST_TIMES else np.union1d(steps[:: -(-len(steps) // MOST_TIMES)], steps[-1:])
+    # between long steps too, and to the horizon, where it stands still if it could not go on
+    times = np.union1d(times, np.linspace(0.0, problem.horizon, LEAST_TIMES))
     q = np.empty((len(times), len(refined.u), 4))
     q[..., :3] = refined.positions(times)
-    theta = between(taken.times, taken.theta, np.zeros_like(taken.theta), times)
+    theta = taken.theta[first]
+    if len(steps) > 1:
+        theta = between(steps, theta, np.gradient(theta, steps, axis=0), times)
     q[..., 3] = theta[:, ::2] if last.orderly else theta
     return fit(problem, refined.u, times, q, tolerance)
 
@@ -172,7 +173,7 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
             n_u=control.shape[1],
             n_t=len(control),
             delta=problem.scene.quality.delta,
-            steps=len(motion.times) - 1,
+            steps=motion.steps,
             dimensions=problem.plane.dimensions,
             dimensions_reason=problem.plane.reason,
             phases=dict(monitor.phases),

@@ -18,6 +18,7 @@ from dlocore.reference.compile import compiled
 from dlocore.reference.forces import add_contact, add_drag, add_edges, add_hinges, frames
 
 ITERATIONS = 12
+DOWNHILL = 40  # of a long step downhill, each with its own factors
 SHRINKS = 0.3  # of an update by the next: else the factors are too old
 DONE, FAILED = 0, 1
 
@@ -108,11 +109,11 @@ def take_step(
                 q[e, 3], v[e, 3] = 0.0, guide.spin[i, k]
         last = np.inf
         fresh, converged = False, False
-        mode = 1
-        for iteration in range(ITERATIONS):
+        for iteration in range(DOWNHILL if static else ITERATIONS):
             if not frames(body, state, q, after.t, after.a, b, lengths):
                 return FAILED
-            refactor = not factored
+            refactor = static or not factored
+            mode = 1
             while True:
                 for k in range(n):
                     for d in range(4):
@@ -163,7 +164,7 @@ def take_step(
                 if ratio < 1.0 and update * ratio / (1.0 - ratio) < tolerance:
                     converged = True
                 elif ratio > SHRINKS:
-                    if fresh and ratio > 2.0 and iteration > 3:
+                    if fresh and ratio > 2.0 and iteration > 3 and not static:
                         return FAILED
                     factored = False
             elif update < 1e-3 * tolerance:
