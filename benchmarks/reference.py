@@ -2,7 +2,7 @@
 
 Each scene is solved by `method="reference"` for a third of the target error, 0.1 % of the length, and by the march that
 `auto` takes for the target. The table holds the estimated error of the reference, the march's own estimate, the largest
-distance between the two anywhere, and their times. Scenes: the example requests under examples/, and those of the
+distance between the two anywhere, and their times. Scenes: the example requests of the API, and those of the
 catalogue that are named here, in the plane and in space, with every effect that the reference has.
 """
 
@@ -13,11 +13,12 @@ os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS
 import sys
 import time
 from dataclasses import replace
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from app.schemas import PredictionRequest, to_scene
+from app.schemas.request import EXAMPLES
 from benchmarks.catalogue import catalogue
 from benchmarks.machine import machine_line
 from dlocore import Prediction, Quality, Scene, predict
@@ -53,12 +54,13 @@ SCENES = (
 
 
 def examples() -> dict[str, Scene]:
-    """Return the scenes of the example requests, by the names of their files."""
-    paths = sorted((Path(__file__).parents[1] / "examples").glob("*.json"))
-    scenes = {}
-    for path in paths:
-        scenes[path.stem] = to_scene(PredictionRequest.model_validate_json(path.read_bytes()))
-    return scenes
+    """Return the scenes of the API's example requests, by name."""
+
+    def nothing_stored(run: str) -> Any:
+        raise LookupError(run)
+
+    requests = {name: PredictionRequest.model_validate(example["value"]) for name, example in EXAMPLES.items()}
+    return {f"example {name}": to_scene(request, nothing_stored) for name, request in requests.items()}
 
 
 def solved(scene: Scene, quality: Quality, deadline: float | None = None) -> tuple[Prediction, float]:
