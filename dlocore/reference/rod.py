@@ -21,7 +21,7 @@ Integers = NDArray[np.int64]
 SAME = 1e-9  # of the length: places nearer than this are one
 SINKS = 0.005  # of the diameter, under weight and the bending of a tenth of the length
 PASSAGE = 0.005  # of the diameter: the depth at which the stiffness of contact is whole
-STICK = 0.005  # of the diameter: by how much friction gives way before it holds
+STICK = 0.02  # of the diameter: by how much friction gives way before it holds
 STRAIGHTENING = 30  # steps of Newton's method towards edges of unit stretch
 MOST_POINTS = 8  # of contact in an edge
 
@@ -116,11 +116,11 @@ def nodes_of(problem: Problem, elements: int, halvings: int) -> Floats:
     return np.concatenate([[0.0], *pieces])
 
 
-def build(problem: Problem, u: Floats, stiffening: float = 1.0) -> Rod:
-    """Return the rod of a posed scene on nodes u (n,) [m], with contact stiffer by a ratio."""
+def build(problem: Problem, u: Floats, stiffening: float = 1.0, firmness: float = 1.0) -> Rod:
+    """Return the rod of a posed scene on nodes u (n,) [m], with contact stiffer, and friction firmer, by ratios."""
     planar = problem.plane.dimensions == 2
     axes = np.vstack([problem.plane.axes, np.cross(problem.plane.axes[0], problem.plane.axes[1])])[:3]
-    law = _laws(problem, stiffening)
+    law = _laws(problem, stiffening, firmness)
     gravity = np.zeros(3) if problem.gravity is None else axes @ problem.gravity.gravity
     points = _points(problem, u)
     edges = len(u) - 1
@@ -141,7 +141,7 @@ def build(problem: Problem, u: Floats, stiffening: float = 1.0) -> Rod:
     return _with_start(rod)
 
 
-def _laws(problem: Problem, stiffening: float) -> Floats:
+def _laws(problem: Problem, stiffening: float, firmness: float) -> Floats:
     scene, cable, around = problem.scene, problem.scene.cable, problem.scene.environment
     law = np.zeros(places.LAWS)
 
@@ -172,7 +172,7 @@ def _laws(problem: Problem, stiffening: float) -> Floats:
     law[places.STIFFNESS] = stiffening * load / (SINKS * cable.diameter)
     law[places.PASSAGE] = PASSAGE * cable.diameter
     law[places.CONTACT_DAMPING] = 2.0 * np.sqrt(law[places.STIFFNESS] * cable.linear_density)
-    law[places.STICK] = STICK * cable.diameter
+    law[places.STICK] = STICK * cable.diameter / firmness
     if problem.friction is not None:
         law[places.LYING] = problem.friction.lying
     law[places.DENSITY] = cable.linear_density

@@ -62,7 +62,7 @@ def test_friction_stops_a_sliding_cable_after_v2_over_2_mu_g():
     )
     found = motion(scene, 10, 1e-6)
     way = 0.8 / (2 * 0.3 * 9.81) * np.array([0.4, 0.8]) / np.sqrt(0.8)
-    stick = 0.005 * 0.01  # it holds within that
+    stick = 0.02 * 0.01  # it holds within that
     np.testing.assert_allclose(found.states[-1].x[0, :2] @ found.rod.axes[:2, :2], way, atol=3 * stick)
     np.testing.assert_allclose(found.states[-1].v, 0.0, atol=1e-6)
 
@@ -82,7 +82,7 @@ def test_a_cable_at_rest_on_a_table_sticks_under_a_force_below_mu_n(on):
     assert found.rod.planar == (not on)
     moved = samples(found).x[-1] - samples(found).x[0]
     # it gives way by less than the elastic slip of friction, and stretches by 4 P^2/(2 EA mu w) at most
-    assert np.abs(moved).max() < 0.005 * 0.01 + 2e-5
+    assert np.abs(moved).max() < 0.02 * 0.01 + 2e-5
     half = samples(found).positions(np.array([0.5]))[0]
     np.testing.assert_allclose(half, samples(found).x[-1], atol=2e-6)  # and stays there
     assert found.deepest < 0.01 * 0.01
