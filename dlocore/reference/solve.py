@@ -13,6 +13,7 @@ from dlocore.reference.energy import energies
 from dlocore.reference.fit import LEAST_TIMES, MOST_TIMES, Fit, fit
 from dlocore.reference.refine import Level, Refined, refine
 from dlocore.reference.sampling import between, material_of
+from dlocore.reference.strands import refuse_meeting
 from dlocore.scene import Scene
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import SplineSurface
@@ -58,6 +59,7 @@ def converged(scene: Scene, tolerance: float, *, times: ArrayLike | None = None)
     problem = pose(scene)
     refuse(problem)
     refined = refine(problem, tolerance, Monitor(), lambda problem, level: None)
+    refuse_meeting(refined)
     t = np.linspace(0.0, problem.horizon, 33) if times is None else np.asarray(times, dtype=float)
     elements = len(refined.levels[-1].taken.u) - 1
     return Converged(t, refined.u, refined.positions(t), refined.estimate, elements, refined.ended == "agreed")
@@ -116,6 +118,7 @@ def reference(problem: Problem, monitor: Monitor) -> Prediction:
         )
 
     refined = refine(problem, target, monitor, on_level)
+    refuse_meeting(refined)
     monitor.phase("simulation")
     fitted = _surface(refined.problem, refined, FITTED * target)
     monitor.phase("fit")

@@ -113,6 +113,25 @@ def test_what_it_does_not_simulate_is_refused_by_name(wrong, field):
     assert refused.value.field == field
 
 
+def test_strands_that_meet_are_refused_and_switched_off_pass():
+    phi = np.linspace(-0.6, 2 * np.pi + 0.6, 121)
+    loop = 0.1 * np.column_stack([np.sin(phi), -np.cos(phi), 0.05 * (phi - np.pi)])
+    length = float(np.linalg.norm(np.diff(loop, axis=0), axis=1).sum())
+    down = Move(displacement=(0.0, 0.0, -0.08), duration=0.4)
+    scene = Scene(
+        cable=cable(length=length, diameter=0.005),
+        shape=Points(points=loop),
+        grasps=(Grasp(u=0.0), Grasp(u=length, path=down)),
+        environment=Environment(gravity=(0, 0, 0), drag=0.2),
+        quality=Quality(method="reference", target_error=0.05),
+        effects={"self_contact": "off"},
+    )
+    assert predict(scene).status == "converged"
+    with pytest.raises(SceneError) as refused:
+        predict(replace(scene, effects={}))
+    assert refused.value.field == "effects.self_contact"
+
+
 @pytest.mark.parametrize("quality", [{"n_u": 9, "n_t": 13}, {"time_budget": 0.1}])
 def test_it_takes_no_grid_and_no_budget(quality):
     with pytest.raises(SceneError, match="reference"):
