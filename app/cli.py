@@ -3,8 +3,10 @@
 import argparse
 import sys
 from collections.abc import Sequence
+from typing import get_args
 
 from app import commands, study_command
+from dlocore.scene import Method
 
 _DESCRIPTION = "Predict how a cable moves when grippers move it."
 _EPILOG = """examples:
@@ -48,7 +50,12 @@ def parser() -> argparse.ArgumentParser:
     predict.add_argument("-o", "--output", metavar="OUT.npz", help="write the surface, spline and reactions")
     predict.add_argument("--json", metavar="OUT.json", help='write the whole answer, "-" for standard output')
     predict.add_argument("--rrd", metavar="OUT.rrd", help="write a recording for rerun, and its layout as OUT.rbl")
-    predict.set_defaults(run=lambda o: commands.predict(o.scene, npz=o.output, json=o.json, rrd=o.rrd))
+    predict.add_argument(
+        "--method",
+        choices=get_args(Method),
+        help="solve by this method instead of the scene's; reference keeps only its target_error, and takes seconds",
+    )
+    predict.set_defaults(run=lambda o: commands.predict(o.scene, npz=o.output, json=o.json, rrd=o.rrd, method=o.method))
 
     calibrate = subcommands.add_parser(
         "calibrate",

@@ -13,8 +13,10 @@ from pydantic import ValidationError
 
 from app.fields import BadField, bad_fields
 from app.schemas import PredictionRequest, from_prediction, to_scene
+from app.schemas.surroundings import QualityModel
 from app.settings import Settings
 from dlocore import Iteration, Prediction, Scene, SceneError
+from dlocore.scene import Method
 
 BAD_INPUT, NOT_CONVERGED = 2, 3
 
@@ -65,10 +67,13 @@ def _is_loopback(host: str) -> bool:
         return host == "localhost"
 
 
-def predict(scene: str, *, npz: str | None, json: str | None, rrd: str | None) -> int:
+def predict(scene: str, *, npz: str | None, json: str | None, rrd: str | None, method: Method | None = None) -> int:
     """Predict one scene, write what is asked for, and say how it went on stderr."""
     raw = _read(scene)
     request = _request(raw)
+    if method is not None:
+        request = _by(request, method)
+        raw = request.model_dump_json(exclude_unset=True).encode()
     prediction = _solve(request)
     document = from_prediction(prediction, "", request.output.samples_u, request.output.samples_t)
     del document["links"], document["id"], document["state"]
@@ -164,6 +169,14 @@ def _request(raw: bytes) -> PredictionRequest:
         return PredictionRequest.model_validate(body)
     except ValidationError as error:
         raise CommandError(_words(bad_fields(error.errors(), body))) from None
+
+
+def _by(request: PredictionRequest, method: Method) -> PredictionRequest:
+    """Return the request solved by another method; the reference has no grid and no time budget of its own."""
+    given = {} if isinstance(request.quality, str) else request.quality.model_dump(exclude_unset=True)
+    if method == "reference":
+        given = {name: value for name, value in given.items() if name == "target_error"}
+    return request.model_copy(update={"quality": QualityModel(**{**given, "method": method})})
 
 
 def _words(fields: list[BadField]) -> str:

@@ -17,6 +17,8 @@ _MARCH = {2: 9e-7, 3: 2.2e-6, 4: 3.1e-6}  # [s] per step and control point, by c
 _ITERATION = 2.5e-4  # [s] of the least squares
 _UNKNOWNS = 1.6e-9  # [s] per iteration, time span and cubed number of free coordinates
 _SETUP = 5e-4  # [s]
+_REFERENCE = {2: 2e-5, 3: 4e-5}  # [s] of the reference per step and element, by dimensions
+_RODS = ((20, 150), (40, 250), (80, 450))  # elements and steps of the rods that most scenes need
 _LEVEL = 1  # of refinement that most scenes end at
 _ITERATIONS = 8
 
@@ -29,8 +31,9 @@ class Plan:
         dimensions: 2 where the motion is planar, else 3.
         reason: why.
         effects: which effects it would simulate, and why; magnitudes are known only after solving.
-        method: "march", "spacetime" or "paper".
-        n_u, n_t, steps: the grid: as given, or the one at which most scenes meet their target.
+        method: "march", "spacetime", "paper" or "reference".
+        n_u, n_t, steps: the grid: as given, or the one at which most scenes meet their target; of the reference the
+            nodes and the steps of its finest rod.
         expected_time: about how long it would take here [s].
     """
 
@@ -67,8 +70,13 @@ def plan(scene: Scene) -> Plan:
         if quality.estimate:
             marches.append(Size(round(FINER * n_u), round(FINER * n_t), round(FINER * steps)))
     dimensions = problem.plane.dimensions
+    if method == "reference":
+        n_u, n_t, steps = _RODS[-1][0] + 1, _RODS[-1][1] + 1, _RODS[-1][1]
+        marches = []
     expected = _SETUP + sum(_MARCH[problem.nc] * size * count for size, _, count in marches)
-    if method != "march":
+    if method == "reference":
+        expected += _REFERENCE[dimensions] * sum(elements * count for elements, count in _RODS)
+    elif method != "march":
         expected += _ITERATIONS * (_ITERATION + _UNKNOWNS * n_t * (problem.nc * n_u) ** 3)
     return Plan(
         dimensions=dimensions,

@@ -17,7 +17,7 @@ from dlocore.paths import Move, Path, Still, Waypoints
 
 Floats = NDArray[np.float64]
 Hold = Literal["point", "tangent", "clamp"]
-Method = Literal["auto", "march", "spacetime", "paper"]
+Method = Literal["auto", "march", "spacetime", "paper", "reference"]
 Switch = Literal["auto", "on", "off"]
 
 EFFECTS = (
@@ -288,7 +288,8 @@ class Quality:
         n_u: control points along the cable, 5 to 129.
         n_t: control points in time, 5 to 513.
         delta: the paper's threshold on the norm of the control-point update, eq. (25) [m], 1e-10 to 1e-2.
-        method: "march", "spacetime", "paper", or "auto": `spacetime` where the grid is given, else `march`.
+        method: "march", "spacetime", "paper", "reference" (docs/reference.md), or "auto": `spacetime` where the grid is
+            given, else `march`.
         estimate: with a given grid, estimate the error by a second march on another grid; False saves its time.
     """
 
@@ -309,7 +310,7 @@ class Quality:
                 raise SceneError(name, value, f"an integer, 5 to {most}")
             object.__setattr__(self, name, int(value))
         object.__setattr__(self, "delta", number("delta", self.delta, at_least=1e-10, at_most=1e-2, unit="m"))
-        choice("method", self.method, ("auto", "march", "spacetime", "paper"))
+        choice("method", self.method, ("auto", "march", "spacetime", "paper", "reference"))
         if (self.n_u is None) != (self.n_t is None):
             missing = "n_u" if self.n_u is None else "n_t"
             raise SceneError(missing, None, "both n_u and n_t, or neither", "One of the two is missing")
@@ -328,6 +329,9 @@ class Quality:
             )
         if self.method in ("spacetime", "paper") and self.n_u is None:
             raise SceneError("method", self.method, "n_u and n_t given with it")
+        if self.method == "reference" and (self.n_u is not None or self.time_budget is not None):
+            name = "n_u" if self.n_u is not None else "time_budget"
+            raise SceneError(name, getattr(self, name), 'target_error or nothing with method "reference"')
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -154,8 +154,8 @@ CASES: list[tuple[dict[str, Any], str, Any, str]] = [
         {"kind": "control_points", "control_points": [[0, 0, 0, 0]] * 3 + [[0, 0, 0, 0.1]]},
         "shape.velocity.control_points[3][3]",
     ),
-    # only the solver knows that it has no such method
-    (PAPER, "quality", {"method": "reference"}, "quality.method"),
+    # the reference chooses its own rods and steps
+    (PAPER, "quality", {"method": "reference", "n_u": 9, "n_t": 13}, "quality.n_u"),
 ]
 
 

@@ -34,6 +34,13 @@ def test_a_converged_scene_exits_with_0_and_a_summary(tmp_path: Path, capsys: py
         assert npz["positions"].shape == (33, 101, 3)
 
 
+def test_another_method_takes_the_place_of_that_of_the_scene(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["predict", written(tmp_path, paper_scene()), "--method", "reference"]) == 0
+    assert "method   reference" in capsys.readouterr().err
+
+
 def test_a_scene_is_read_from_standard_input(
     monkeypatch: pytest.MonkeyPatch, capsysbinary: pytest.CaptureFixture[bytes]
 ) -> None:

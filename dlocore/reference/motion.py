@@ -1,0 +1,257 @@
+"""The motion of one rod, step by step: steps as long as their estimated error allows, windows between events."""
+
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.paths import Waypoints
+from dlocore.problem import Problem
+from dlocore.reference.body import State, Tableau
+from dlocore.reference.chain import Chain, Grip, chain, grip
+from dlocore.reference.rod import Memory, Rod, Snapshot
+from dlocore.reference.step import DONE, take_step
+from dlocore.solvers.monitor import TimeIsUp
+
+Floats = NDArray[np.float64]
+
+# Hairer and Wanner, Solving Ordinary Differential Equations II, table IV.6.5: order 4 with an error estimate of order 3
+SDIRK4 = Tableau(
+    coefficients=np.array(
+        [
+            [1 / 4, 0, 0, 0, 0],
+            [1 / 2, 1 / 4, 0, 0, 0],
+            [17 / 50, -1 / 25, 1 / 4, 0, 0],
+            [371 / 1360, -137 / 2720, 15 / 544, 1 / 4, 0],
+            [25 / 24, -49 / 48, 125 / 16, -85 / 12, 1 / 4],
+        ]
+    ),
+    times=np.array([1 / 4, 3 / 4, 11 / 20, 1 / 2, 1]),
+    error=np.array([-3 / 16, -27 / 32, 25 / 32, 0, 1 / 4]),
+    order=4,
+)
+BACKWARD_EULER = Tableau(np.ones((1, 1)), np.ones(1), np.zeros(1), 1)
+NEWTON = 1e-2  # of the tolerance of a step: what Newton's iteration leaves
+FIRST = 1e-3  # of a window: its first step
+LAST = 1e-3  # of a step: what it would leave of a window is done with it
+SAFETY, SHRINK, GROW = 0.85, 0.2, 4.0  # of the choice of the next step
+FAILURE = 0.25  # of a step that found no solution: the next
+NOTES = 2000  # of a motion at most, between its events
+SHORTEST = 1e-9  # of the horizon: a step
+SETTLED = 1e-11  # of the length: a step downhill that ends the search for an equilibrium
+DOWNHILL = 400  # steps to an equilibrium
+
+
+Stopped = Literal["", "step", "time"]
+
+
+class Watch(Protocol):
+    """What is asked between steps: it raises where the solve should end."""
+
+    def check(self) -> None:
+        """Raise where the solve should end."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A simulated motion.
+
+    Attributes:
+        rod: the rod.
+        times: of the steps that were noted (k,) [s]; an event occurs twice, as a gripper may jump there.
+        states: the rod at those times.
+        forces: of each grasp (grasps, k, 3) [N], zero while it is open.
+        moments: the same [N m].
+        deepest: largest depth in a surface [m].
+        left: largest update that Newton's iterations left [m].
+        stopped: why it ended early: "step" without a solution, "time" over; "" where it did not.
+        steps: how many it took.
+        rejected: how many were done again.
+    """
+
+    rod: Rod
+    times: Floats
+    states: tuple[Snapshot, ...]
+    forces: Floats
+    moments: Floats
+    deepest: float
+    left: float
+    stopped: Stopped
+    steps: int
+    rejected: int
+
+
+def events_of(problem: Problem) -> list[float]:
+    """Return the times [s] inside the horizon at which something given is not smooth, with its beginning and end."""
+    horizon = problem.horizon
+    found = set()
+    for g in problem.scene.grasps:
+        found |= {g.start, g.start + g.path.duration}
+        found |= set() if g.release_time is None else {g.release_time}
+        if isinstance(g.path, Waypoints):
+            found.add(g.start + float(np.asarray(g.path.times)[0]))
+    for load in problem.scene.loads:
+        found |= set() if load.times is None else {float(t) for t in np.asarray(load.times)}
+    inside = sorted(t for t in found if 1e-9 * horizon < t < (1.0 - 1e-9) * horizon)
+    return [0.0, *inside, horizon]
+
+
+class _Record:
+    """What a simulation notes as it goes."""
+
+    def __init__(self, rod: Rod) -> None:
+        self.rod = rod
+        self.times: list[float] = []
+        self.states: list[Snapshot] = []
+        self.forces: list[Floats] = []
+        self.moments: list[Floats] = []
+        self.beginnings: list[int] = []
+        self.deepest = self.left = 0.0
+        self.steps = self.rejected = 0
+
+    def begin(self, link: Chain, state: State) -> None:
+        """Note the state in which a window begins; what grippers give there is that of its first step."""
+        self.beginnings.append(len(self.times))
+        self.times.append(link.begin)
+        self.states.append(link.snapshot(state))
+        nothing = np.zeros((len(self.rod.problem.scene.grasps), 3))
+        self.forces.append(nothing)
+        self.moments.append(nothing)
+
+    def note(self, link: Chain, t: float, h: float, state: State, reaction: Floats, torque: Floats) -> None:
+        """Note the state at the end of a step h, and what the grippers give to the cable there."""
+        grasps = self.rod.problem.scene.grasps
+        force, moment = np.zeros((len(grasps), 3)), np.zeros((len(grasps), 3))
+        for k, held in enumerate(link.grips):
+            i = next(i for i, g in enumerate(grasps) if g is held.grasp)
+            nodes = link.node_of == held.node
+            inertia = link.body.mass[nodes, 0].sum() * link.acceleration(held, t, h)
+            force[i] = (reaction[nodes, :3].sum(axis=0) + inertia) @ self.rod.axes
+            moment[i] = torque[link.edge_of == -1 - k].sum(axis=0) @ self.rod.axes
+        self.times.append(t)
+        self.states.append(link.snapshot(state))
+        self.forces.append(force)
+        self.moments.append(moment)
+
+    def motion(self, stopped: Stopped) -> Motion:
+        """Return what was noted."""
+        for i in self.beginnings:
+            if i + 1 < len(self.forces):
+                self.forces[i], self.moments[i] = self.forces[i + 1], self.moments[i + 1]
+        return Motion(
+            rod=self.rod,
+            times=np.array(self.times),
+            states=tuple(self.states),
+            forces=np.array(self.forces).transpose(1, 0, 2),
+            moments=np.array(self.moments).transpose(1, 0, 2),
+            deepest=self.deepest,
+            left=self.left,
+            stopped=stopped,
+            steps=self.steps,
+            rejected=self.rejected,
+        )
+
+
+def simulate(rod: Rod, tolerance: float, watch: Watch) -> Motion:
+    """Simulate a rod from its start to the horizon, each step to an estimated error of `tolerance` [m].
+
+    Raises:
+        what `watch.check` raises, but for `TimeIsUp`.
+    """
+    problem = rod.problem
+    grasps = problem.scene.grasps
+    record = _Record(rod)
+    closed: dict[int, Grip] = {}
+    now = rod.start
+    if problem.scene.shape.settle:
+        with suppress(TimeIsUp):
+            now = settled(rod, watch)
+    for begin, end in pairwise(events_of(problem)):
+        middle = 0.5 * (begin + end)
+        hold = [i for i, g in enumerate(grasps) if g.start <= middle and (g.release_time or np.inf) > middle]
+        closed = {i: closed.get(i) or grip(rod, grasps[i], now) for i in hold}
+        link = chain(rod, tuple(closed.values()), begin, end)
+        state = link.state(now)
+        record.begin(link, state)
+        try:
+            ended = _window(link, state, tolerance, watch, record)
+        except TimeIsUp:
+            return record.motion("time")
+        if ended is None:
+            return record.motion("step")
+        now = link.snapshot(ended)
+    return record.motion("")
+
+
+def _window(link: Chain, state: State, tolerance: float, watch: Watch, record: _Record) -> State | None:
+    """Step through a window and return the state at its end, or None where a step finds no solution."""
+    t, end = link.begin, link.end
+    h = FIRST * (end - t)
+    told = np.zeros(3)
+    while t < end:
+        watch.check()
+        h = end - t if end - t < (1.0 + LAST) * h else h
+        after = State(*(np.zeros_like(x) for x in state))
+        reaction, torque = np.zeros_like(state.q), np.zeros_like(state.t)
+        guide = link.guide(t + h * SDIRK4.times)
+        flag = take_step(link.body, SDIRK4, h, False, state, guide, NEWTON * tolerance, after, reaction, torque, told)
+        if flag != DONE or not told[0] <= tolerance:
+            record.rejected += 1
+            h *= FAILURE if flag != DONE else max(SHRINK, SAFETY * (tolerance / told[0]) ** (1.0 / SDIRK4.order))
+            if h < SHORTEST * link.rod.problem.horizon:
+                return None
+            continue
+        t = end if h == end - t else t + h
+        record.steps += 1
+        record.deepest, record.left = max(record.deepest, told[2]), max(record.left, told[1])
+        after.q[:, 3] = 0.0  # spin counts from the beginning of the step
+        state = after
+        if t == end or t - record.times[-1] >= link.rod.problem.horizon / NOTES:
+            record.note(link, t, h, state, reaction, torque)
+        h *= min(GROW, SAFETY * (tolerance / max(told[0], 1e-300)) ** (1.0 / SDIRK4.order))
+    return state
+
+
+def settled(rod: Rod, watch: Watch) -> Snapshot:
+    """Return the rod in equilibrium under the grasps' first poses: backward Euler downhill, in ever longer steps.
+
+    The velocity is forgotten after each step, so that the rod goes where its energy falls.
+    """
+    length = rod.problem.scene.cable.length
+    held = tuple(grip(rod, g, rod.start) for g in rod.problem.scene.grasps if g.start == 0.0)
+    link = chain(rod, held, 0.0, rod.problem.horizon)
+    state = link.state(rod.start)
+    told = np.zeros(3)
+    h = 1e-2
+    for _ in range(DOWNHILL):
+        watch.check()
+        after = State(*(np.zeros_like(x) for x in state))
+        guide = link.guide(np.zeros(1))
+        for rate in (guide.velocity, guide.tangent_rate, guide.spin):
+            rate[:] = 0.0
+        flag = take_step(
+            link.body, BACKWARD_EULER, h, True, state, guide, 0.1 * SETTLED * length, after, np.zeros_like(state.q),
+            np.zeros_like(state.t), told,
+        )  # fmt: skip
+        if flag != DONE:
+            h *= 0.25
+            continue
+        moved = float(np.abs(after.q[:, :3] - state.q[:, :3]).max())
+        after.q[:, 3] = 0.0
+        after.v[:] = 0.0
+        state = after
+        if moved <= SETTLED * length and h >= 100.0:
+            break
+        h = min(2.0 * h, 1e3)
+    rest = link.snapshot(state)
+    return replace(
+        rest,
+        v=rod.start.v,
+        kept=Memory(rest.kept.turn, rod.start.kept.memory),
+        axial=rod.start.axial,
+        anchor=np.zeros_like(rest.anchor),
+    )

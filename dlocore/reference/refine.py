@@ -1,0 +1,159 @@
+"""Refinement: rods of ever more elements and ever shorter steps, until their motions agree."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.problem import Problem, pose
+from dlocore.reference.motion import Motion, Watch, events_of, simulate
+from dlocore.reference.rod import build, nodes_of, solid
+from dlocore.reference.sampling import Samples, samples
+from dlocore.reference.surface import gap
+
+Floats = NDArray[np.float64]
+
+ELEMENTS = 20  # of the coarsest rod
+LEVELS = 6  # of refinement: up to 640 elements
+LEAST = 3  # rods, of which two changes tell how fast they converge
+FIRMEST = 64.0  # times: friction holds within a quarter of the way with each refinement, up to here
+STEP = 1e-2  # of the target: the error of a step of the coarsest rod; a quarter of it with each refinement
+ORDERLY = (2.5, 8.0)  # change over next change, about 4: motions that converge with the second order
+SLOWEST = 1.5  # change over next change, below which nothing is said of the limit
+SLOW = 2.0  # times the last change: the estimate where nothing is said of the limit
+FOURTH = 15.0  # what is left of a change by an extrapolation of the fourth order
+DEEP = 0.02  # of the diameter: a motion that goes deeper into a surface is done again with stiffer contact
+STIFFER = (2.0, 30.0)  # at least and at most by these ratios
+STIFFEST = 1e5  # times the stiffness that bears the weight
+TIMES = 129  # at which motions are compared, besides events
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """A simulated rod.
+
+    Attributes:
+        motion: of the rod.
+        taken: the same in the world.
+        change: largest distance to the rod before, at the nodes of that [m]; infinite at the first.
+        estimate: estimated error of the answer with this rod as the finest [m]; infinite where nothing tells.
+        orderly: whether the last changes fall as the square of the spacing, so that extrapolation helps.
+    """
+
+    motion: Motion
+    taken: Samples
+    change: float
+    estimate: float
+    orderly: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """The outcome of a refinement: all levels, the posed scene, and what ended it.
+
+    Attributes:
+        problem: the posed scene, with the obstacles that the motion met.
+        levels: the rods, by rising number of elements.
+        ended: "agreed" within the target, "finest" rod, out of "time", or a "step" without solution.
+    """
+
+    problem: Problem
+    levels: tuple[Level, ...]
+    ended: Literal["agreed", "finest", "time", "step"]
+
+    @property
+    def estimate(self) -> float:
+        """Estimated error of the answer [m]."""
+        return self.levels[-1].estimate
+
+    @property
+    def u(self) -> Floats:
+        """Material coordinates (n,) [m] of the answer: those of the finest rod, or of the one before."""
+        return self.levels[-2 if self.levels[-1].orderly else -1].taken.u
+
+    def positions(self, t: Floats) -> Floats:
+        """Return the answer (m, n, 3) [m] at times t (m,) [s]: of the finest rod, extrapolated where that helps."""
+        last = self.levels[-1]
+        fine = last.taken.positions(t)
+        if not last.orderly:
+            return fine
+        return fine[:, ::2] + (fine[:, ::2] - self.levels[-2].taken.positions(t)) / 3.0
+
+
+def refine(problem: Problem, target: float, watch: Watch, on_level: Callable[[Problem, Level], None]) -> Refined:
+    """Simulate rods of ever more elements until the estimated error is at most `target` [m].
+
+    Raises:
+        what `watch.check` raises, but for its `TimeIsUp`.
+    """
+    levels: list[Level] = []
+    stiffening = 1.0
+    ended: Literal["agreed", "finest", "time", "step"] = "finest"
+    while len(levels) < LEVELS:
+        k = len(levels)
+        rod = build(problem, nodes_of(problem, ELEMENTS, k), stiffening, min(4.0**k, FIRMEST))
+        motion = simulate(rod, STEP * target * 0.25**k, watch)
+        if motion.stopped == "time" and levels:
+            return Refined(problem, tuple(levels), "time")
+        if motion.stopped == "step" and levels:
+            return Refined(problem, tuple(levels), "step")
+        deep = motion.deepest / problem.scene.cable.diameter
+        if deep > DEEP and stiffening < STIFFEST:
+            stiffening *= float(np.clip(2.0 * deep / DEEP, *STIFFER))
+            continue
+        met = {} if motion.stopped else _met(problem, samples(motion))
+        if met:
+            problem, levels = pose(problem.scene, {**problem.called_for, **met}), []
+            continue
+        levels.append(_compared(problem, levels, motion))
+        on_level(problem, levels[-1])
+        if motion.stopped:
+            ended = motion.stopped
+            break
+        if len(levels) >= LEAST and levels[-1].estimate <= target:
+            ended = "agreed"
+            break
+    return Refined(problem, tuple(levels), ended)
+
+
+def _compared(problem: Problem, levels: list[Level], motion: Motion) -> Level:
+    """Return a level, compared with those before it."""
+    taken = samples(motion)
+    if not levels:
+        return Level(motion, taken, np.inf, np.inf, False)
+    t = np.unique(np.concatenate([np.linspace(0.0, problem.horizon, TIMES), events_of(problem)]))
+    fine, coarse = taken.positions(t)[:, ::2], levels[-1].taken.positions(t)
+    change = _farthest(fine, coarse)
+    if len(levels) < LEAST - 1:
+        return Level(motion, taken, change, change, False)
+    before = levels[-1].change
+    orderly = ORDERLY[0] <= before / max(change, 1e-300) <= ORDERLY[1]
+    if orderly:
+        limit = fine + (fine - coarse) / 3.0
+        last = coarse[:, ::2] + (coarse[:, ::2] - levels[-2].taken.positions(t)) / 3.0
+        return Level(motion, taken, change, max(_farthest(limit[:, ::2], last), change / FOURTH), True)
+    ratio = before / max(change, 1e-300)
+    return Level(motion, taken, change, change / (ratio - 1.0) if ratio > SLOWEST else SLOW * change, False)
+
+
+def _farthest(a: Floats, b: Floats) -> float:
+    return float(np.linalg.norm(a - b, axis=-1).max())
+
+
+def _met(problem: Problem, taken: Samples) -> dict[str, str]:
+    """Return a call for obstacles, if the motion comes to one that was thought out of reach."""
+    obstacles = problem.scene.environment.obstacles
+    left_out = [o for o in obstacles if all(o is not other for other in problem.obstacles)]
+    if not left_out or problem.scene.effects.get("obstacles") == "off":
+        return {}
+    normal = np.empty(3)
+    some = taken.x[:: max(1, len(taken.x) // TIMES)].reshape(-1, 3)
+    radius = 0.5 * problem.scene.cable.diameter
+    for obstacle in left_out:
+        row = solid(obstacle, False)
+        near = some[np.linalg.norm(some - row[1:4], axis=1) < np.linalg.norm(row[13:16]) + row[16] + 4.0 * radius]
+        if any(gap(row, x, normal) < 2.0 * radius for x in near):
+            return {"obstacles": "the motion reaches one"}
+    return {}

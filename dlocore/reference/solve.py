@@ -1,0 +1,235 @@
+"""`method="reference"`: the refined motion of a discrete elastic rod as an ordinary prediction."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dlocore.errors import SceneError
+from dlocore.prediction import Accuracy, EffectReport, GraspReaction, Iteration, Prediction, Status
+from dlocore.problem import Problem, pose
+from dlocore.reference.chain import chain, grip
+from dlocore.reference.energy import energies
+from dlocore.reference.fit import LEAST_TIMES, MOST_TIMES, Fit, fit
+from dlocore.reference.refine import Level, Refined, refine
+from dlocore.reference.sampling import between, material_of
+from dlocore.reference.strands import refuse_meeting
+from dlocore.scene import Scene
+from dlocore.solvers.monitor import Monitor
+from dlocore.spline import SplineSurface
+
+Floats = NDArray[np.float64]
+
+TARGET = 1e-3  # of the length, where no target error is asked for
+FITTED = 0.05  # of the target: by how much the spline may miss the rods
+
+
+@dataclass(frozen=True, eq=False)
+class Converged:
+    """A converged motion at the nodes of a rod.
+
+    Attributes:
+        t: (k,) [s].
+        u: (n,) [m].
+        positions: (k, n, 3) [m].
+        error_estimate: estimated error of any position [m].
+        elements: of the finest rod.
+        tolerance_met: whether the estimate is below the tolerance.
+    """
+
+    t: Floats
+    u: Floats
+    positions: Floats
+    error_estimate: float
+    elements: int
+    tolerance_met: bool
+
+
+def converged(scene: Scene, tolerance: float, *, times: ArrayLike | None = None) -> Converged:
+    """Return the motion of a scene at the nodes of a rod, refined until its error is about `tolerance` [m].
+
+    Args:
+        scene: the scene.
+        tolerance: [m].
+        times: (k,) [s]; None: 33 evenly spaced ones.
+
+    Raises:
+        SceneError: the scene has an effect that the reference does not cover.
+    """
+    problem = pose(scene)
+    refuse(problem)
+    refined = refine(problem, tolerance, Monitor(), lambda problem, level: None)
+    refuse_meeting(refined)
+    t = np.linspace(0.0, problem.horizon, 33) if times is None else np.asarray(times, dtype=float)
+    elements = len(refined.levels[-1].taken.u) - 1
+    return Converged(t, refined.u, refined.positions(t), refined.estimate, elements, refined.ended == "agreed")
+
+
+def refuse(problem: Problem) -> None:
+    """Refuse what the reference does not simulate.
+
+    Raises:
+        SceneError: an effect that is switched on, or off, is not covered.
+    """
+    effects, cable = problem.scene.effects, problem.scene.cable
+    if effects.get("inertia") == "off":
+        reason = "The reference goes through the motion step by step"
+        raise SceneError("effects.inertia", "off", '"on" or "auto" with method "reference"', reason)
+    if problem.self_contact is not None:
+        reason = "The reference does not know of contact of the cable with itself"
+        raise SceneError(
+            "effects.self_contact", effects.get("self_contact", "auto"), '"off", or another method', reason
+        )
+    damped = cable.bending_damping > 0.0 and effects.get("damping") != "off"
+    if problem.plane.dimensions == 3 and effects.get("twist") == "off" and damped:
+        reason = "The sections of the reference always twist in space, and damping acts on bends as they see them"
+        raise SceneError("effects.twist", "off", '"on" or "auto" with method "reference"', reason)
+
+
+def reference(problem: Problem, monitor: Monitor) -> Prediction:
+    """Return the reference solution of a posed scene, refined to its `target_error` or 0.1 % of the length.
+
+    Raises:
+        SceneError: the scene has an effect that the reference does not cover.
+        Cancelled: the caller asked to stop.
+    """
+    refuse(problem)
+    target = problem.scene.quality.target_error or TARGET * problem.scene.cable.length
+
+    def on_level(posed: Problem, level: Level) -> None:
+        monitor.phase("simulation")
+        motion = level.motion
+        surface = _surface(posed, Refined(posed, (replace(level, orderly=False),), "finest"), FITTED * target).surface
+        monitor.phase("fit")
+        monitor.report(
+            Iteration(
+                number=len(monitor.iterations),
+                update=level.change,
+                residual=motion.left,
+                energy=_elastic_energy(level, len(motion.states) - 1),
+                wall_time=monitor.elapsed(),
+                damping=0.0,
+                step_length=1.0,
+                n_u=surface.control_points.shape[1],
+                n_t=len(surface.control_points),
+                surface=surface,
+                note=f"rod of {len(motion.rod.u) - 1} elements, {motion.steps} steps",
+            )
+        )
+
+    refined = refine(problem, target, monitor, on_level)
+    refuse_meeting(refined)
+    monitor.phase("simulation")
+    fitted = _surface(refined.problem, refined, FITTED * target)
+    monitor.phase("fit")
+    return _prediction(refined, fitted, target, monitor)
+
+
+def _surface(problem: Problem, refined: Refined, tolerance: float) -> Fit:
+    """Return the spline through the answer of a refinement."""
+    last = refined.levels[-1]
+    taken = last.taken
+    steps, first = np.unique(taken.times, return_index=True)
+    times = steps if len(steps) <= MOST_TIMES else np.union1d(steps[:: -(-len(steps) // MOST_TIMES)], steps[-1:])
+    # between long steps too, and to the horizon, where it stands still if it could not go on
+    times = np.union1d(times, np.linspace(0.0, problem.horizon, LEAST_TIMES))
+    q = np.empty((len(times), len(refined.u), 4))
+    q[..., :3] = refined.positions(times)
+    theta = taken.theta[first]
+    if len(steps) > 1:
+        theta = between(steps, theta, np.gradient(theta, steps, axis=0), times)
+    q[..., 3] = theta[:, ::2] if last.orderly else theta
+    return fit(problem, refined.u, times, q, tolerance)
+
+
+def _elastic_energy(level: Level, k: int) -> float:
+    """Return the elastic energy [J] at the step k of a motion."""
+    rod, now = level.motion.rod, level.motion.states[k]
+    t = float(level.motion.times[k])
+    held = [g for g in rod.problem.scene.grasps if g.start <= t and (g.release_time is None or t < g.release_time)]
+    grips = tuple(grip(rod, g, level.motion.states[int(np.searchsorted(level.motion.times, g.start))]) for g in held)
+    link = chain(rod, grips, t, t + 1.0)
+    return float(sum(energies(link.body, link.state(now))[1:]))
+
+
+def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) -> Prediction:
+    problem, last = refined.problem, refined.levels[-1]
+    motion = last.motion
+    estimate = refined.estimate + fitted.missed
+    status, message = _status(refined, target)
+    control = fitted.surface.control_points
+    return Prediction(
+        scene=problem.scene,
+        status=status,
+        message=message,
+        surface=fitted.surface,
+        grasps=tuple(
+            GraspReaction(g.u, motion.times, motion.forces[i], motion.moments[i])
+            for i, g in enumerate(problem.scene.grasps)
+        ),
+        iterations=tuple(monitor.iterations),
+        accuracy=Accuracy(
+            method="reference",
+            error_estimate=estimate if np.isfinite(estimate) else None,
+            neglected=0.0,
+            wall_time=monitor.elapsed(),
+            n_u=control.shape[1],
+            n_t=len(control),
+            delta=problem.scene.quality.delta,
+            steps=motion.steps,
+            dimensions=problem.plane.dimensions,
+            dimensions_reason=problem.plane.reason,
+            phases=dict(monitor.phases),
+        ),
+        start_energy=_elastic_energy(last, 0),
+        start_fit=problem.start.fit_rms,
+        report_effects=lambda surface: _effects(refined, surface),
+        report_material=lambda: material_of(motion, last.taken),
+    )
+
+
+def _status(refined: Refined, target: float) -> tuple[Status, str]:
+    last = refined.levels[-1]
+    motion = last.motion
+    count = len(motion.rod.u) - 1
+    moved = f"the last refinement, to {count} elements, moved it by {last.change * 1e3:.2g} mm"
+    if len(refined.levels) == 1:
+        moved = f"one rod of {count} elements, unchecked"
+    if motion.stopped:
+        moved = f"it stands still after {motion.times[-1]:.4g} s of {refined.problem.horizon:.4g} s"
+    if refined.ended == "agreed":
+        agreed = (
+            f"Rods of up to {count} elements agree to {refined.estimate * 1e3:.2g} mm, target {target * 1e3:.2g} mm."
+        )
+        return "converged", agreed
+    if refined.ended == "time":
+        return "time_limit", f"The time limit passed; {moved}. Allow more time or a larger target_error."
+    if refined.ended == "step":
+        return "stalled", f"A step found no solution; {moved}. Make the motion slower or smoother."
+    return "max_iterations", f"No finer rod; {moved}, target {target * 1e3:.2g} mm. Allow a larger target_error."
+
+
+def _effects(refined: Refined, surface: SplineSurface) -> tuple[EffectReport, ...]:
+    """Return what was simulated: all that the scene has and does not switch off."""
+    problem, motion = refined.problem, refined.levels[-1].motion
+    space = problem.plane.dimensions == 3
+    yields = problem.scene.cable.memory_rate is not None and problem.scene.effects.get("plasticity") != "off"
+    own = {
+        "inertia": (True, "the reference goes through the motion step by step"),
+        "twist": (space, "in space the sections of the reference always twist" if space else "the motion is planar"),
+        "plasticity": (yields, "the cable has a yield strain" if yields else problem.choices["plasticity"].reason),
+    }
+    if problem.choices["twist"].reason == "switched off in the scene":
+        del own["twist"]
+    found = []
+    for name, choice in problem.choices.items():
+        active, reason = own.get(name, (choice.active, choice.reason))
+        found.append(EffectReport(name, active, reason))
+    if problem.obstacles or problem.table is not None:
+        deep = EffectReport("contact", True, "", motion.deepest, "m")
+        name = "obstacles" if problem.obstacles else "table"
+        found = [
+            EffectReport(name, True, e.reason, deep.magnitude, "m, the largest depth") if e.name == name else e
+            for e in found
+        ]
+    return tuple(found)

@@ -1,0 +1,209 @@
+"""One step of a diagonally implicit Runge-Kutta method on a rod's equations, with an estimate of its error.
+
+Stage i of a step h has the unknown rates V and the coordinates q = q_n + h sum_j a_ij V_j, and solves
+
+    M (V - v_n - h sum_{j<i} a_ij A_j)/(h a_ii) + forces(q, V, t_n + c_i h) = 0
+
+by Newton's iteration on q, with one factorisation for as many stages as it serves. Strain memory and the anchors of
+friction are integrated by the same method, their implicit part in closed form.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from dlocore.reference.banded import factor, solve
+from dlocore.reference.body import CLAMP, GYRATION, MEMORY_RATE, REAL, State
+from dlocore.reference.compile import compiled
+from dlocore.reference.forces import add_contact, add_drag, add_edges, add_hinges, frames
+
+ITERATIONS = 12
+DOWNHILL = 40  # of a long step downhill, each with its own factors
+SHRINKS = 0.3  # of an update by the next: else the factors are too old
+DONE, FAILED = 0, 1
+
+
+@compiled
+def empty_state(body: Any) -> Any:
+    """Return room for a state of the chain."""
+    n, p = len(body.rest) + 1, len(body.point_edge)
+    return State(
+        np.zeros((n, 4)), np.zeros((n, 4)), np.zeros((n - 1, 3)), np.zeros((n - 1, 3)), np.zeros(n - 2),
+        np.zeros((n - 2, 3)), np.zeros(n - 1), np.zeros((p, 3)),
+    )  # fmt: skip
+
+
+@compiled
+def _scatter(body: Any, x: Any, out: Any) -> None:
+    """Write the free coordinates of x (n, 4), and zeros for the others, into out (n dims,)."""
+    for n in range(x.shape[0]):
+        for d in range(body.dims):
+            out[n * body.dims + d] = 0.0 if body.fixed[n, d] else x[n, d]
+
+
+@compiled
+def take_step(
+    body: Any, tableau: Any, h: float, static: bool, state: Any, guide: Any, tolerance: float, after: Any,
+    reaction: Any, torque: Any, told: Any,
+) -> int:  # fmt: skip
+    """Step from `state` to `after`; return DONE or FAILED.
+
+    Args:
+        body, tableau: the rod and the method.
+        h: step [s].
+        static: forget the velocity: the step then goes downhill, damped by inertia alone.
+        state: at the beginning.
+        guide: what is prescribed at the stages.
+        tolerance: of Newton's iteration [m].
+        after: the state at the end.
+        reaction: forces that hold the nodes in place at the end (n, 4), without the inertia of what is held [N].
+        torque: the moments that held directions take there (n - 1, 3) [N m].
+        told: receives the estimated error [m], the last update [m] and the largest depth in a surface [m].
+    """
+    n, dims = len(body.rest) + 1, body.dims
+    stages, hinges, edges, points = len(tableau.times), n - 2, n - 1, len(body.point_edge)
+    width = 5 if dims == 2 else 10
+    V, A = np.zeros((stages, n, 4)), np.zeros((stages, n, 4))
+    memory_rate, axial_rate = np.zeros((stages, hinges, 3)), np.zeros((stages, edges))
+    anchor_rate = np.zeros((stages, points, 3))
+    guess, pull = np.empty((n, 4)), np.empty((n, 4))
+    memory, axial, anchor = np.empty((hinges, 3)), np.empty(edges), np.empty((points, 3))
+    b, lengths, tangent_rate = np.zeros((edges, 3)), np.empty(edges), np.zeros((edges, 3))
+    R, K, dx = reaction, np.zeros((n * dims, width + 1)), np.empty(n * dims)
+    q, v, gyration = after.q, after.v, body.law[GYRATION]
+    factored = False
+    deepest = 0.0
+    for i in range(stages):
+        implicit = h * tableau.coefficients[i, i]
+        for k in range(n):
+            for d in range(4):
+                guess[k, d], pull[k, d] = state.q[k, d], 0.0 if static else state.v[k, d]
+        memory[:], axial[:], anchor[:] = state.memory, state.axial, state.anchor
+        for j in range(i):
+            weight = h * tableau.coefficients[i, j]
+            guess += weight * V[j]
+            pull += weight * A[j]
+            memory += weight * memory_rate[j]
+            axial += weight * axial_rate[j]
+            anchor += weight * anchor_rate[j]
+        # a start for Newton: the rate of the stage before, extrapolated by its acceleration
+        for k in range(n):
+            for d in range(4):
+                if i == 0:
+                    v[k, d] = pull[k, d]
+                else:
+                    v[k, d] = V[i - 1, k, d] + (tableau.times[i] - tableau.times[i - 1]) * h * A[i - 1, k, d]
+                q[k, d] = guess[k, d] + implicit * v[k, d]
+        for k in range(len(guide.nodes)):
+            for d in range(3):
+                q[guide.nodes[k], d] = guide.position[i, k, d]
+                v[guide.nodes[k], d] = guide.velocity[i, k, d]
+        for k in range(len(guide.edges)):
+            e = guide.edges[k]
+            for d in range(3):
+                after.t[e, d] = guide.tangent[i, k, d]
+                tangent_rate[e, d] = guide.tangent_rate[i, k, d]
+                if body.kind[e] == CLAMP:
+                    after.a[e, d] = guide.director[i, k, d]
+            if body.kind[e] == CLAMP:
+                q[e, 3], v[e, 3] = 0.0, guide.spin[i, k]
+        last = np.inf
+        fresh, converged = False, False
+        for iteration in range(DOWNHILL if static else ITERATIONS):
+            if not frames(body, state, q, after.t, after.a, b, lengths):
+                return FAILED
+            refactor = static or not factored
+            mode = 1
+            while True:
+                for k in range(n):
+                    for d in range(4):
+                        inertia = (v[k, d] - pull[k, d]) / implicit
+                        R[k, d] = 0.0 if body.fixed[k, d] else body.mass[k, d] * inertia
+                        if d < 3:
+                            R[k, d] -= body.weight[k, d] + guide.load[i, k, d]
+                torque[:] = 0.0
+                if refactor:
+                    K[:] = 0.0
+                    for k in range(n):
+                        for d in range(dims):
+                            free = not body.fixed[k, d]
+                            K[k * dims + d, 0] = body.mass[k, d] / (implicit * implicit) if free else 1.0
+                use = mode if refactor else 0
+                add_edges(
+                    body, axial, body.law[MEMORY_RATE] * implicit, after.t, lengths, after.axial, R, K, use,
+                )  # fmt: skip
+                add_hinges(
+                    body, v, state.turn, memory, implicit, after.t, after.a, b, lengths, tangent_rate, after.turn,
+                    after.memory, torque, R, K, use,
+                )  # fmt: skip
+                add_drag(body, v, implicit, R, K, use)
+                deepest = add_contact(body, q, v, anchor, implicit, after.anchor, R, K, use)
+                if not refactor:
+                    break
+                if factor(K):
+                    factored, fresh = True, True
+                    break
+                if mode == 2:
+                    return FAILED
+                mode = 2  # an unstable state: the definite part of the tangent
+            _scatter(body, R, dx)
+            solve(K, dx)
+            update = 0.0
+            for k in range(n):
+                for d in range(dims):
+                    change = dx[k * dims + d]
+                    q[k, d] -= change
+                    v[k, d] -= change / implicit
+                    update = max(update, abs(change) if d < 3 else gyration * abs(change))
+            if not np.isfinite(update):
+                return FAILED
+            if update == 0.0:
+                converged = True
+            elif iteration > 0:
+                ratio = update / last
+                if ratio < 1.0 and update * ratio / (1.0 - ratio) < tolerance:
+                    converged = True
+                elif ratio > SHRINKS:
+                    if fresh and ratio > 2.0 and iteration > 3 and not static:
+                        return FAILED
+                    factored = False
+            elif update < 1e-3 * tolerance:
+                converged = True
+            last = update
+            told[1] = update
+            if converged:
+                break
+        if not converged:
+            return FAILED
+        # what the last update changed: forces, memory and anchors of the very end of the stage
+        if not frames(body, state, q, after.t, after.a, b, lengths):
+            return FAILED
+        for k in range(n):
+            for d in range(4):
+                V[i, k, d] = v[k, d]
+                A[i, k, d] = 0.0 if body.fixed[k, d] else (v[k, d] - pull[k, d]) / implicit
+        for k in range(hinges):
+            for d in range(3):
+                memory_rate[i, k, d] = (after.memory[k, d] - memory[k, d]) / implicit
+        for e in range(edges):
+            if body.kind[e] == REAL:
+                axial_rate[i, e] = (after.axial[e] - axial[e]) / implicit
+        for k in range(points):
+            for d in range(3):
+                anchor_rate[i, k, d] = (after.anchor[k, d] - anchor[k, d]) / implicit
+    told[2] = deepest
+    # the error of the step, less what the tangent says is stiff and hence decays
+    error = np.zeros((n, 4))
+    implicit = h * tableau.coefficients[stages - 1, stages - 1]
+    for j in range(stages):
+        error += h * tableau.error[j] * V[j]
+    for k in range(n):
+        for d in range(4):
+            error[k, d] *= body.mass[k, d] / (implicit * implicit)
+    _scatter(body, error, dx)
+    solve(K, dx)
+    told[0] = 0.0
+    for k in range(n):
+        for d in range(dims):
+            told[0] = max(told[0], abs(dx[k * dims + d]) * (1.0 if d < 3 else gyration))
+    return DONE

@@ -1,0 +1,163 @@
+"""The reference as a method of `predict`: its error estimate, its answer, and how it ends early."""
+
+import ast
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dlocore.reference
+from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, SceneError, Straight, Table, predict
+from dlocore.errors import Cancelled
+from dlocore.reference.solve import converged
+from tests.reference.rods import cable
+
+GRASP = Grasp(u=0.25, path=Move(displacement=(0.0, 0.3, 0.0), duration=0.8))
+SCENE = Scene(
+    cable=cable(),
+    shape=Straight(),
+    grasps=(GRASP,),
+    environment=Environment(gravity=(0, 0, 0), drag=0.1),
+    quality=Quality(method="reference"),
+)
+
+
+def target(error):
+    return replace(SCENE, quality=Quality(method="reference", target_error=error))
+
+
+def test_it_shares_no_solver_code_with_what_it_judges():
+    allowed = {"monitor"}
+    for path in Path(dlocore.reference.__file__).parent.glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            for name in names:
+                parts = name.split(".")
+                if parts[0] != "dlocore" or len(parts) == 1:
+                    continue
+                assert parts[1] not in ("kernels", "effects", "discretisation", "holding", "grid", "report"), path
+                assert parts[1] != "solvers" or parts[2] in allowed, path
+
+
+def test_the_estimate_bounds_the_error_and_the_target_is_met():
+    loose, tight = converged(SCENE, 1e-3), converged(SCENE, 1e-4)
+    stride = (len(tight.u) - 1) // (len(loose.u) - 1)
+    error = np.linalg.norm(loose.positions - tight.positions[:, ::stride], axis=-1).max()
+    assert loose.tolerance_met
+    assert tight.tolerance_met
+    assert error < loose.error_estimate + tight.error_estimate < 1.1e-3
+
+
+def test_the_surface_is_the_motion_of_the_rods():
+    prediction = predict(SCENE)
+    rods = converged(SCENE, 1e-3)
+    assert prediction.status == "converged"
+    assert prediction.accuracy.method == "reference"
+    assert prediction.accuracy.error_estimate < 1.2e-3  # the rods' 1e-3 at most, and the fit
+    np.testing.assert_allclose(prediction.surface.positions(rods.u, rods.t), rods.positions, atol=2e-4)  # of the fit
+    assert [i.n_u for i in prediction.iterations] == sorted(i.n_u for i in prediction.iterations)
+    assert prediction.iterations[0].update == np.inf
+    assert prediction.iterations[-1].update < prediction.iterations[-2].update
+    assert prediction.iterations[-1].energy > 0.0
+    assert prediction.start_energy == pytest.approx(0.0, abs=1e-12)
+    assert prediction.material is None
+    active = {e.name for e in prediction.effects if e.active}
+    assert {"inertia", "drag", "stretch", "bend"} <= active
+    assert "twist" not in active
+    force = prediction.grasps[0]
+    assert force.reaction.shape == (len(force.times), 3)
+
+
+def test_its_end_is_the_start_of_another_motion():
+    first = predict(SCENE)
+    on = replace(SCENE, shape=first.shape_at(), grasps=(), horizon=0.1)
+    second = predict(on)
+    u = np.linspace(0.0, 1.0, 11)
+    # the start is brought to unit stretch; it stores 1e-4 of strain
+    np.testing.assert_allclose(second.surface.positions(u, [0.0]), first.surface.positions(u, [0.8]), atol=5e-4)
+    rates = [p.surface(u, [t], dt=1)[..., :3] for p, t in ((second, 0.0), (first, 0.8))]
+    np.testing.assert_allclose(*rates, atol=0.02)  # [m/s], of the fit in time
+
+
+def test_sections_turn_with_a_clamp_and_remember():
+    turn = Move(displacement=(0.0, 0.0, 0.0), duration=1.0, rotation=(12.0, 0.0, 0.0))
+    bow = np.column_stack([np.sin(np.linspace(0, 1, 30)), 1 - np.cos(np.linspace(0, 1, 30)), np.zeros(30)])
+    scene = Scene(
+        cable=cable(torsional_damping=1e-5, rest_shape="initial"),
+        shape=Points(points=bow),
+        grasps=(Grasp(u=0.0, hold="clamp", path=turn),),
+        environment=Environment(gravity=(0, 0, 0), drag=0.5),
+        quality=Quality(method="reference", target_error=0.02),
+    )
+    prediction = predict(scene)
+    # the clamp turns about the tangent there, so the section turns by 12 rad, nearly two turns
+    theta = prediction.surface(np.array([0.0]), np.array([0.0, 1.0]))[:, 0, 3]
+    assert theta[1] - theta[0] == pytest.approx(12.0, abs=0.05)  # held at u = 0, where theta lies on the edge beside it
+    material = prediction.material
+    assert material is not None
+    np.testing.assert_allclose(np.linalg.norm(material.memory[-1, :, :2], axis=1), 1.0, atol=0.05)  # of the fitted bow
+
+
+@pytest.mark.parametrize(
+    ("wrong", "field"),
+    [
+        ({"effects": {"inertia": "off"}}, "effects.inertia"),
+        ({"effects": {"self_contact": "on"}}, "effects.self_contact"),
+    ],
+)
+def test_what_it_does_not_simulate_is_refused_by_name(wrong, field):
+    with pytest.raises(SceneError) as refused:
+        predict(replace(SCENE, **wrong))
+    assert refused.value.field == field
+
+
+def test_strands_that_meet_are_refused_and_switched_off_pass():
+    phi = np.linspace(-0.6, 2 * np.pi + 0.6, 121)
+    loop = 0.1 * np.column_stack([np.sin(phi), -np.cos(phi), 0.05 * (phi - np.pi)])
+    length = float(np.linalg.norm(np.diff(loop, axis=0), axis=1).sum())
+    down = Move(displacement=(0.0, 0.0, -0.08), duration=0.4)
+    scene = Scene(
+        cable=cable(length=length, diameter=0.005),
+        shape=Points(points=loop),
+        grasps=(Grasp(u=0.0), Grasp(u=length, path=down)),
+        environment=Environment(gravity=(0, 0, 0), drag=0.2),
+        quality=Quality(method="reference", target_error=0.05),
+        effects={"self_contact": "off"},
+    )
+    assert predict(scene).status == "converged"
+    with pytest.raises(SceneError) as refused:
+        predict(replace(scene, effects={}))
+    assert refused.value.field == "effects.self_contact"
+
+
+@pytest.mark.parametrize("quality", [{"n_u": 9, "n_t": 13}, {"time_budget": 0.1}])
+def test_it_takes_no_grid_and_no_budget(quality):
+    with pytest.raises(SceneError, match="reference"):
+        Quality(method="reference", **quality)
+
+
+def test_out_of_time_it_answers_with_the_best_it_has():
+    prediction = predict(target(1e-6), deadline=1e-9)
+    assert prediction.status == "time_limit"
+    assert prediction.accuracy.error_estimate is None
+    assert "stands still" in prediction.message
+
+
+def test_cancelled_it_stops():
+    with pytest.raises(Cancelled):
+        predict(SCENE, cancelled=lambda: True)
+
+
+def test_contact_is_stiffened_until_the_table_is_hardly_entered():
+    made = Cable.preset("paper", bending_damping=1e-4)
+    scene = Scene(
+        cable=made,
+        shape=Straight(start=(0, 0, 0.03)),
+        environment=Environment(drag=0.05, table=Table(friction=0.3)),
+        horizon=0.15,
+        quality=Quality(method="reference", target_error=0.002),
+    )
+    prediction = predict(scene)
+    assert prediction.surface.positions(np.linspace(0, 1, 41), np.linspace(0, 0.15, 41))[..., 2].min() > -0.1 * 0.005
