@@ -94,6 +94,7 @@ def _add_study(subcommands: "argparse._SubParsersAction[argparse.ArgumentParser]
     study.add_argument("--methods", nargs="+", metavar="NAME", help="march, spacetime, paper")
     study.add_argument("--effects", nargs="+", metavar="SET", help="sets of effects: auto, all, or twist=off,drag=on")
     study.add_argument("--parts", nargs="+", metavar="PART", help="runs, scaling, effects; absent: all")
+    study.add_argument("--judge", choices=("march", "reference"), default="march", help="what errors are distances to")
     study.add_argument("--repeats", type=int, default=5, help="timed calls of each solve, at most (default 5)")
     study.add_argument("--estimate", action="store_true", help="estimate the errors in the solves, too")
     study.set_defaults(run=lambda o: study_command.study(o))

@@ -79,7 +79,7 @@ def _check_matplotlib() -> None:
 
 def _asked(options: argparse.Namespace) -> dict[str, Any]:
     """Return what the options ask of a study; what they leave out is the study's own default."""
-    asked: dict[str, Any] = {"repeats": options.repeats, "estimate": options.estimate}
+    asked: dict[str, Any] = {"repeats": options.repeats, "estimate": options.estimate, "judge": options.judge}
     if options.scenes:
         asked["scenes"] = _scenes(options.scenes)
     grids = _grids(options.grids, options.n_u, options.n_t)

@@ -74,6 +74,7 @@ def _plan(wanted: StudyRequest, service: Service) -> Plan:
         "deltas": tuple(dict.fromkeys(wanted.deltas)),
         "repeats": wanted.repeats,
         "estimate": wanted.estimate,
+        "judge": wanted.judge,
         "parts": tuple(dict.fromkeys(wanted.parts)),
     }
     if wanted.scenes is not None:

@@ -59,6 +59,12 @@ class StudyRequest(Model):
         default=5, ge=1, le=MAX_REPEATS, description="Timed calls of each solve, at most.", examples=[5]
     )
     estimate: Flag = Field(default=False, description="Whether the solves estimate their error.", examples=[False])
+    judge: Literal["march", "reference"] = Field(
+        default="march",
+        description="What errors are distances to: the own march refined until it stands still, or the independent "
+        "step-by-step simulation, which takes from a second to minutes a scene.",
+        examples=["march"],
+    )
     parts: list[Literal["runs", "scaling", "effects"]] = Field(
         default=["runs"],
         min_length=1,

@@ -1,4 +1,4 @@
-"""Truth to measure errors against: a march refined until it stands still."""
+"""Truth to measure errors against: a march refined until it stands still, or the independent reference."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -15,6 +15,7 @@ Floats = NDArray[np.float64]
 
 SAMPLES = (101, 33)  # along the cable and in time, at which surfaces are compared
 GRIDS = ((33, 65), (49, 97), (65, 129), (97, 193), (129, 257), (129, 385), (129, 513))  # (n_u, n_t)
+TOLERANCE = 2e-4  # of the length: the error of the reference that judges, where nothing else is asked
 STILL = 2e-5  # of the length: a refinement that moves the motion by less is the last
 
 
@@ -24,9 +25,9 @@ class Truth:
 
     Attributes:
         positions: (n_t, n_u, 3) [m], evenly spaced in time and along the cable.
-        moved: by how much the last refinement moved it [m]: about its own error.
+        moved: by how much the last refinement moved it, or its own estimated error [m].
         n_u, n_t: the finest grid.
-        status: that of the finest march.
+        status: that of the finest solve.
     """
 
     positions: Floats
@@ -75,6 +76,30 @@ def finest_march(
             break
         before = positions
     return Truth(positions=positions, moved=moved, n_u=n_u, n_t=n_t, status=prediction.status)
+
+
+def step_by_step(scene: Scene, *, tolerance: float = TOLERANCE, cancelled: Callable[[], bool] | None = None) -> Truth:
+    """Simulate a scene step by step, refined until the reference's own estimated error is below a tolerance.
+
+    Args:
+        scene: whose motion; its quality is not regarded.
+        tolerance: of the estimated error, as a part of the cable's length.
+        cancelled: asked within the solve; where it returns True it stops.
+
+    Raises:
+        SceneError: the scene can't be solved, or has an effect that the reference does not cover.
+        Cancelled: `cancelled` returned True.
+    """
+    quality = Quality(method="reference", target_error=max(tolerance * scene.cable.length, 1e-6))
+    prediction = predict(replace(scene, quality=quality), cancelled=cancelled)
+    estimate = prediction.accuracy.error_estimate
+    return Truth(
+        positions=positions_of(prediction),
+        moved=np.inf if estimate is None else estimate,
+        n_u=prediction.accuracy.n_u,
+        n_t=prediction.accuracy.n_t,
+        status=prediction.status,
+    )
 
 
 def largest_error(prediction: Prediction, truth: Truth) -> float:

@@ -9,8 +9,8 @@ from dlocore.scene import EFFECTS, Method, Quality, Scene, Switch
 from dlocore.study.record import PARTS, Part
 from dlocore.study.scenes import accuracy_scenes
 
-Judge = Literal["march"]
-JUDGES: tuple[Judge, ...] = ("march",)
+Judge = Literal["march", "reference"]
+JUDGES: tuple[Judge, ...] = ("march", "reference")
 METHODS: tuple[Method, ...] = ("march", "spacetime", "paper")
 GRIDS = ((7, 11), (9, 13), (13, 19), (17, 25), (25, 37), (33, 49))
 MAX_RUNS = 5000
@@ -38,7 +38,8 @@ class Plan:
         effects: switches by effect, by the name of the set; they replace those of the scenes.
         repeats: timed calls of each solve, 1 to 100.
         estimate: whether the solves estimate their error, too.
-        judge: what errors are distances to: "march", the project's own march refined until it stands still.
+        judge: what errors are distances to: "march", the project's own march refined until it stands still, or
+            "reference", the independent step-by-step simulation, which takes from a second to minutes a scene.
         parts: which of "runs", "scaling" and "effects" are measured.
 
     Raises:

@@ -12,7 +12,7 @@ from dlocore.front import predict, warm_up
 from dlocore.machine import machine
 from dlocore.prediction import Prediction
 from dlocore.scene import Scene
-from dlocore.study.judge import Truth, finest_march, positions_of
+from dlocore.study.judge import Truth, finest_march, positions_of, step_by_step
 from dlocore.study.plan import Case, Plan
 from dlocore.study.record import EffectCost, Run, Scaled, Step, Study
 from dlocore.study.scaling import effect_pairs, sizes
@@ -93,6 +93,11 @@ class _Measuring:
             lambda: predict(scene, deadline=self._deadline, cancelled=self._cancelled), self._plan.repeats, _PATIENCE
         )
 
+    def _truth(self, scene: Scene) -> Truth:
+        if self._plan.judge == "reference":
+            return step_by_step(scene, cancelled=self._cancelled)
+        return finest_march(scene, patience=_TRUTH_PATIENCE, cancelled=self._cancelled)
+
     def runs(self) -> tuple[Run, ...]:
         """Measure scenes over grids, thresholds, methods and sets of effects."""
         found = []
@@ -100,7 +105,7 @@ class _Measuring:
             cases = list(self._plan.cases(name, effects, scene))
             self.next(f"{name}: the converged motion")
             try:
-                truth = finest_march(scene, patience=_TRUTH_PATIENCE, cancelled=self._cancelled)
+                truth = self._truth(scene)
             except SceneError as error:
                 self.refused.append(f"{name}, effects {effects}: {error}")
                 self._done += len(cases)

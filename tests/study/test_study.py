@@ -9,7 +9,7 @@ import pytest
 from dlocore import Cancelled, Quality, SceneError, predict
 from dlocore.study import record
 from dlocore.study.compare import compare, words
-from dlocore.study.judge import finest_march, largest_error
+from dlocore.study.judge import finest_march, largest_error, step_by_step
 from dlocore.study.plan import Plan
 from dlocore.study.record import EffectCost, Scaled, Study
 from dlocore.study.running import run_study
@@ -58,6 +58,14 @@ def test_a_truth_moves_less_than_the_errors_it_judges() -> None:
     assert truth.moved < 2e-5  # the length is 1 m, and it stops at 2e-5 of it
     finer = predict(replace(hanging(), quality=Quality(n_u=129, n_t=385, method="march", estimate=False)))
     assert largest_error(finer, truth) < 5 * truth.moved  # what is left falls at least by half with each refinement
+
+
+def test_the_independent_judge_agrees_with_the_march_within_both_errors() -> None:
+    march, reference = finest_march(paper_case(0.25)), step_by_step(paper_case(0.25))
+    assert reference.status == "converged"
+    assert 0 < reference.moved <= 2e-4  # the tolerance, of a length of 1 m
+    apart = float(np.linalg.norm(march.positions - reference.positions, axis=-1).max())
+    assert 1e-9 < apart < 2 * (reference.moved + march.moved)  # both are estimates; the same numbers would be no judge
 
 
 def test_a_smaller_threshold_takes_more_iterations_down_to_it(measured: Study) -> None:
