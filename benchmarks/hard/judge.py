@@ -15,7 +15,9 @@ WRONG = 0.01  # of the length: an error that an answer has to tell of
 SURE = 0.3  # of a distance from the refined march: within it the refined marches agree where they can tell
 MOST_STRAIN = 0.02
 HELD = 1e-9  # [m]
+ASTRAY = 1e-4  # of the length: of a gripper's path by the time spline, between the ends
 GAINED = 0.02  # of the energy that was about
+LOST = 0.05  # of the impulses that were about
 
 
 def run(drawn: Drawn, deadline: float, checked: bool) -> dict[str, Any]:
@@ -75,7 +77,7 @@ def compare(prediction: Prediction, scene: Scene, deadline: float) -> dict[str, 
         n_u = int(np.clip(round(finer * accuracy.n_u), 33, 129 if finer > 2 else 97))
         n_t = int(np.clip(round(finer * accuracy.n_t), 65, 513 if finer > 2 else 385))
         quality = Quality(n_u=n_u, n_t=n_t, method="march", estimate=False)
-        refined = predict(replace(scene, quality=quality), deadline=4 * deadline)
+        refined = predict(replace(scene, quality=quality), deadline=deadline)
         if refined.status != "converged":
             return {"reference": f"{refined.status}: {refined.message[:120]}"}
         found.append(refined.surface.positions(u, t))
@@ -102,9 +104,11 @@ def faults(record: dict[str, Any]) -> list[str]:
             found.append("strained")
         if laws["held"] > HELD * max(1.0, record["length"]):
             found.append("let go of a gripper")
+        if laws["held_between"] > ASTRAY * record["length"]:
+            found.append("spline off a gripper's path")
         if laws["energy"] is not None and laws["energy"] > GAINED:
             found.append("gained energy")
-        if laws["momentum"] is not None and laws["momentum"] > GAINED:
+        if laws["momentum"] is not None and laws["momentum"] > LOST:
             found.append("lost momentum")
         error, estimate = record.get("error"), record["estimate"]
         if error is not None and error > WRONG and record["apart"] < SURE * error:

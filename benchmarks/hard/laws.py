@@ -11,6 +11,7 @@ from dlocore.shape import start_curve
 Floats = NDArray[np.float64]
 
 _LOOKS = 33  # times at which a law is looked at
+_SETTLE = 4  # steps after an event, in which the forces of what jumped die away
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,7 +21,7 @@ class Measures:
     Attributes:
         finite: every number of the answer is.
         strain: largest |axial strain| of the surface, at the middles of its spans.
-        held: largest distance of a grasped point from its gripper, at the start and at the end of each hold [m].
+        held: largest distance of a grasped point from its gripper, at the start and at the end of the motion [m].
         held_between: the same in between, where the time spline only comes near to the path [m].
         energy: largest gain of energy that no gripper and no load put in, of the energy that was about.
         momentum: largest impulse that no force accounts for, of the impulses that were about; None where forces act
@@ -67,7 +68,7 @@ def strain(prediction: Prediction) -> float:
 
 
 def held(prediction: Prediction) -> tuple[float, float]:
-    """Return how far grasped points are from their grippers at both ends of each hold, and in between [m]."""
+    """Return how far grasped points are from their grippers at both ends of the motion, and in between [m]."""
     scene, surface = prediction.scene, prediction.surface
     start = start_curve(scene.shape, scene.cable.length)
     worst_end, worst = 0.0, 0.0
@@ -82,7 +83,8 @@ def held(prediction: Prediction) -> tuple[float, float]:
         else:
             begin = surface.positions(g.u, g.start)[0, 0]
         away = np.linalg.norm(surface.positions(g.u, t)[:, 0] - g.path.at(t - g.start, begin), axis=1)
-        worst_end, worst = max(worst_end, away[0], away[-1]), max(worst, away.max())
+        ends = away[(t == 0.0) | (t == surface.horizon)]
+        worst_end, worst = max(worst_end, ends.max(initial=0.0)), max(worst, away.max())
     return float(worst_end), float(worst)
 
 
@@ -90,7 +92,8 @@ def energy_gain(prediction: Prediction) -> float | None:
     """Return the largest gain of energy beyond the work of grippers and loads, of the energy that was about.
 
     Between two jumps the energy may rise by no more than the work; at a jump of a gripper's velocity it may, as the
-    impulse is no part of the reactions. None where no reactions tell.
+    impulse is no part of the reactions. The energy of stretch, which is never negative, counts at the start alone: the
+    strain of a nearly inextensible cable is lost in what the time spline smooths.
     """
     scene, surface = prediction.scene, prediction.surface
     if not prediction.grasps:
@@ -103,13 +106,14 @@ def energy_gain(prediction: Prediction) -> float | None:
             continue
         t = times[np.unique(np.linspace(0, len(times) - 1, _LOOKS).round().astype(int))]
         parts = energies(scene, surface, t, prediction.material)
+        stored = parts.pop("stretch")[0]
         total = np.sum(list(parts.values()), axis=0)
         work = np.interp(t, times, _work(prediction, times))
-        gain = total - total[0] - work
-        largest = max(np.ptp(total), np.ptp(work), *(float(np.ptp(x)) for x in parts.values()))
+        gain = total - total[0] - stored - work
+        largest = max(float(np.ptp(x)) for x in (work, *parts.values()))
         scale = max(scale, largest, float(parts["kinetic"].max()), float(parts["bend"].max()))
         worst = max(worst, float(gain.max()))
-    return worst / scale
+    return float(worst / scale)
 
 
 def windows_of(times: Floats) -> list[Floats]:
@@ -164,12 +168,12 @@ def lost_impulse(prediction: Prediction) -> float | None:
     weight = cable.linear_density * cable.length * np.asarray(around.gravity) * ("gravity" in active)
     worst, scale = 0.0, 1e-12
     for times in windows_of(prediction.grasps[0].times):
-        if len(times) < 3:
+        if len(times) < 3 * _SETTLE:
             continue
+        held = [g.reaction[_window(g.times, times)][_SETTLE:] for g in prediction.grasps]
+        times = times[_SETTLE:]
         v = surface(u, times, dt=1)[..., :3]
-        force = np.tile(weight, (len(times), 1))
-        for g in prediction.grasps:
-            force += g.reaction[_window(g.times, times)]
+        force = np.tile(weight, (len(times), 1)) + np.sum(held, axis=0)
         for load in scene.loads:
             force += load.at(times)
         if "drag" in active:
@@ -183,7 +187,7 @@ def lost_impulse(prediction: Prediction) -> float | None:
         flow = np.abs(force).sum(axis=1)
         scale = max(scale, float(np.trapezoid(flow, times)), float(np.abs(momentum).max()))
         worst = max(worst, float(lost.max()))
-    return worst / scale
+    return float(worst / scale)
 
 
 def along(knots: Floats) -> tuple[Floats, Floats]:
