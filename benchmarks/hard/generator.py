@@ -59,10 +59,6 @@ def draw(seed: int, index: int) -> Drawn:
     draw_damping(r, d)
     draw_memory(r, d)
     draw_switches(r, d)
-    settles = d.grasps and all(g.start == 0.0 for g in d.grasps)
-    if settles and d.shape is not None and chance(r, 0.12):
-        d.shape = type(d.shape)(**{**vars(d.shape), "settle": True})
-        d.families.append("geometry: settled start")
     possible = not chance(r, IMPOSSIBLE)
     if possible:
         _draw_quality(r, d)

@@ -4,7 +4,7 @@ import numpy as np
 
 from benchmarks.hard.draft import Draft, Floats, Rng, Room, chance, in_room, pick, spread
 from benchmarks.hard.motions import started
-from dlocore import Box, Capsule, Cylinder, Sphere, Table
+from dlocore import Box, Capsule, Cylinder, Sphere, Straight, Table
 from dlocore.effects.distance import distances
 
 STRAIN = 1 / 300  # the largest that weight and inertia may cause: such a cable keeps its length
@@ -110,10 +110,22 @@ def draw_damping(r: Rng, d: Draft) -> None:
 
 
 def draw_memory(r: Rng, d: Draft) -> None:
-    """Draw a stress-free shape, and a threshold of yield near the curvatures of the motion."""
-    if chance(r, 0.08):
-        d.cable["rest_shape"] = "initial"
-        d.families.append("effects: bent stress-free shape")
+    """Draw how a bent start is kept as it is, and a threshold of yield near the curvatures of the motion.
+
+    A stiff cable that is bent and let go at t = 0 springs away within milliseconds: few scenes begin so.
+    """
+    if not isinstance(d.shape, Straight):
+        weight = d.cable["linear_density"] * d.length**3 * max(d.gravity, 9.81)
+        limp = d.cable["bending_stiffness"] < 3e-4 * weight
+        held = bool(d.grasps) and all(g.start == 0.0 for g in d.grasps)
+        kind = pick(r, {"bent by itself": 4, "settled": 4 if held else 0, "springs": 4 if limp else 0.6})
+        if kind == "bent by itself":
+            d.cable["rest_shape"] = "initial"
+            d.families.append("effects: bent stress-free shape")
+        elif kind == "settled":
+            settle(d)
+        elif not limp:
+            d.families.append("geometry: springs away at the start")
     if chance(r, 0.08):
         kappa = max(_largest_bend(d), 2.0 / d.length)
         near = float(r.choice([1.0 - 1e-3, 1.0 + 1e-3, spread(r, 0.5, 4.0)]))
@@ -121,6 +133,13 @@ def draw_memory(r: Rng, d: Draft) -> None:
         d.cable["memory_rate"] = spread(r, 1.0, 100.0) / d.time
         d.cable["hardening"] = r.uniform(0.05, 1.0)
         d.families.append("effects: plasticity")
+
+
+def settle(d: Draft) -> None:
+    """Let the start relax to equilibrium."""
+    assert d.shape is not None
+    d.shape = type(d.shape)(**{**vars(d.shape), "settle": True})
+    d.families.append("geometry: settled start")
 
 
 def _largest_bend(d: Draft) -> float:
