@@ -93,6 +93,11 @@ def _scatter(r: Rng, count: int, room: Room) -> Floats:
     return r.normal(size=(count, 3)) * free
 
 
+def apart(d: Draft) -> bool:
+    """Tell whether strands that cross have to keep apart: on a table one can lie over another."""
+    return d.room != "flat" or d.gravity == 0.0
+
+
 def start(r: Rng, d: Draft, *, straight: float = 0.35) -> None:
     """Draw a start shape of any kind; `straight` is the share of exactly straight ones."""
     length, room = d.length, d.room
@@ -114,7 +119,7 @@ def start(r: Rng, d: Draft, *, straight: float = 0.35) -> None:
     elif kind == "hairpin":
         points = hairpin(length, max(r.uniform(0.06, 0.25) * length, 4 * d.diameter), room)
     elif kind == "loop":
-        points = loop(length, r.uniform(0.4, 0.8), 0.0 if room == "flat" else 5 * d.diameter, room)
+        points = loop(length, r.uniform(0.4, 0.8), 5 * d.diameter * apart(d), room)
     elif kind == "cusp":
         points = corner(length, r.uniform(1.0, 2.6), r.uniform(0.3, 0.7), room)
     elif kind == "nearly straight":

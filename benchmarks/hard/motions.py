@@ -178,9 +178,9 @@ def tightened(r: Rng, d: Draft) -> None:
     """Pull the ends of a cable with a full loop apart."""
     d.families.append("motion: tightening a loop")
     length, share = d.length, r.uniform(0.5, 0.8)
-    gap = 0.0 if d.room == "flat" else r.uniform(3.0, 8.0) * d.diameter
+    gap = r.uniform(3.0, 8.0) * d.diameter * curves.apart(d)
     d.shape = Points(points=curves.loop(length, share, gap, d.room))
-    d.room = "flat" if d.room == "flat" else "space"
+    d.room = "space" if curves.apart(d) else "flat"
     at, duration = started(d)([0.0, length]), float(r.uniform(1.0, 3.0) * d.time)
     apart = at[1] - at[0]
     far = float(np.linalg.norm(apart))
