@@ -9,6 +9,8 @@ import argparse
 import json
 import multiprocessing
 import os
+import signal
+import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -22,8 +24,9 @@ import numpy as np
 from benchmarks.hard.generator import as_python, draw
 from benchmarks.hard.judge import run
 from benchmarks.machine import machine_line
+from dlocore import warm_up
 
-HANG = 4.0  # times the deadline, after which a process is ended
+HANG = 2.0  # times the deadline, after which a process is ended
 
 
 class Job(NamedTuple):
@@ -60,28 +63,36 @@ def run_all(seed: int, indices: list[int], jobs: int, share: float, deadline: fl
         return Job(process, ours, index, time.monotonic())
 
     running = [start(index) for _, index in zip(range(jobs), waiting, strict=False)]
-    while running:
-        ready = wait([job.pipe for job in running], timeout=1.0)
-        for job in list(running):
-            late = time.monotonic() - job.since > HANG * deadline
-            if job.pipe not in ready and not late:
-                continue
-            running.remove(job)
-            try:
-                yield job.pipe.recv() if job.pipe in ready else _lost(job.index, seed, "hang")
-                alive = job.pipe in ready
-            except EOFError:
-                yield _lost(job.index, seed, "crash")
-                alive = False
-            index = next(waiting, None)
-            if alive:
-                job.pipe.send(index)
+    try:
+        while running:
+            ready = wait([job.pipe for job in running], timeout=1.0)
+            for job in list(running):
+                late = time.monotonic() - job.since > HANG * deadline
+                if job.pipe not in ready and not late:
+                    continue
+                record, alive = _take(job, job.pipe in ready, seed)
+                index = next(waiting, None)
+                running.remove(job)
+                if alive:
+                    job.pipe.send(index)
+                else:
+                    job.process.kill()
                 if index is not None:
-                    running.append(job._replace(index=index, since=time.monotonic()))
-                continue
+                    running.append(job._replace(index=index, since=time.monotonic()) if alive else start(index))
+                yield record
+    finally:
+        for job in running:
             job.process.kill()
-            if index is not None:
-                running.append(start(index))
+
+
+def _take(job: Job, ready: bool, seed: int) -> tuple[dict[str, Any], bool]:
+    """Return the record of a job, and whether its process can go on."""
+    if not ready:
+        return _lost(job.index, seed, "hang"), False
+    try:
+        return job.pipe.recv(), True
+    except EOFError:
+        return _lost(job.index, seed, "crash"), False
 
 
 def _lost(index: int, seed: int, how: str) -> dict[str, Any]:
@@ -154,6 +165,7 @@ def main() -> None:
     parser.add_argument("--index", type=int, help="run this scene alone and print it as Python")
     parser.add_argument("--summary", action="store_true", help="only print the summary of the file")
     options = parser.parse_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that no process is left behind
     os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
     share = options.check / options.count
     if options.index is not None:
@@ -168,6 +180,8 @@ def main() -> None:
         records = [json.loads(line) for line in options.resume.read_text().splitlines()]
     done = {r["index"] for r in records}
     left = [] if options.summary else [i for i in range(options.count) if i not in done]
+    if left:
+        warm_up()  # so that no process compiles while its time runs
     for record in run_all(options.seed, left, options.jobs, share, options.deadline):
         records.append(record)
         if options.resume is not None:

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore import Grasp, Prediction, energies
+from dlocore import Grasp, Prediction, Scene, energies
 from dlocore.shape import start_curve
 
 Floats = NDArray[np.float64]
 
 _LOOKS = 33  # times at which a law is looked at
+_NOTHING = 1e-3  # of a cable's own forces: what is smaller than that is no motion
 _SETTLE = 4  # steps after an event, in which the forces of what jumped die away
 
 
@@ -77,13 +78,13 @@ def held(prediction: Prediction) -> tuple[float, float]:
         if g.start >= end:
             continue
         t = np.linspace(g.start, end, _LOOKS)
-        if g.start == 0.0:
+        if g.start > 0.0:
+            begin = surface.positions(g.u, g.start)[0, 0]  # as near as the spline comes to where the march closed it
+        else:
             settled = getattr(scene.shape, "settle", False) or scene.environment.table is not None
             begin = surface.positions(g.u, 0.0)[0, 0] if settled else start(g.u)[0]
-        else:
-            begin = surface.positions(g.u, g.start)[0, 0]
         away = np.linalg.norm(surface.positions(g.u, t)[:, 0] - g.path.at(t - g.start, begin), axis=1)
-        ends = away[(t == 0.0) | (t == surface.horizon)]
+        ends = away[(t == 0.0) | (t == surface.horizon)] if g.start == 0.0 else away[:0]
         worst_end, worst = max(worst_end, ends.max(initial=0.0)), max(worst, away.max())
     return float(worst_end), float(worst)
 
@@ -100,7 +101,7 @@ def energy_gain(prediction: Prediction) -> float | None:
         windows = [np.linspace(0.0, surface.horizon, _LOOKS)]
     else:
         windows = windows_of(prediction.grasps[0].times)
-    worst, scale = 0.0, 1e-12
+    worst, scale = 0.0, _NOTHING * sum(_own(scene)) * scene.cable.length
     for times in windows:
         if len(times) < 3:
             continue
@@ -119,6 +120,14 @@ def energy_gain(prediction: Prediction) -> float | None:
 def windows_of(times: Floats) -> list[Floats]:
     """Return the stretches of smooth motion between events, at which the times of the reactions stand twice."""
     return np.split(times, np.flatnonzero(np.diff(times) <= 0.0) + 1)
+
+
+def _own(scene: Scene) -> tuple[float, float]:
+    """Return the forces that bend a cable to a circle, and that are its weight [N]."""
+    cable = scene.cable
+    assert cable.bending_stiffness is not None
+    gravity = float(np.linalg.norm(np.asarray(scene.environment.gravity)))
+    return cable.bending_stiffness / cable.length**2, cable.linear_density * cable.length * gravity
 
 
 def _work(prediction: Prediction, times: Floats) -> Floats:
@@ -166,7 +175,7 @@ def lost_impulse(prediction: Prediction) -> float | None:
     u, w = along(surface.knots_u)
     mass = cable.linear_density if "inertia" in active else 0.0
     weight = cable.linear_density * cable.length * np.asarray(around.gravity) * ("gravity" in active)
-    worst, scale = 0.0, 1e-12
+    worst, scale = 0.0, _NOTHING * sum(_own(scene)) * surface.horizon
     for times in windows_of(prediction.grasps[0].times):
         if len(times) < 3 * _SETTLE:
             continue
@@ -184,7 +193,7 @@ def lost_impulse(prediction: Prediction) -> float | None:
         )
         momentum = mass * np.einsum("u,kud->kd", w, v)
         lost = np.linalg.norm(momentum - momentum[0] - impulse, axis=1)
-        flow = np.abs(force).sum(axis=1)
+        flow = np.linalg.norm(held, axis=2).sum(axis=0) + np.linalg.norm(weight)
         scale = max(scale, float(np.trapezoid(flow, times)), float(np.abs(momentum).max()))
         worst = max(worst, float(lost.max()))
     return float(worst / scale)
