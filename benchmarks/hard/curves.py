@@ -43,12 +43,15 @@ def hairpin(length: float, width: float, room: Room) -> Floats:
 
 
 def loop(length: float, share: float, gap: float, room: Room) -> Floats:
-    """Return a straight curve with one full loop in its middle `share`, whose strands pass `gap` [m] apart."""
-    s = np.clip((_middles() - 0.5) / share, -0.5, 0.5)
-    angle = 2 * np.pi * (s + 0.5)
-    lift = np.where(np.abs(s) < 0.5, gap / (share * length), 0.0)
+    """Return a straight curve with one full loop in its middle `share`, whose strands pass `gap` [m] apart.
+
+    The tangent turns as smoothly as minimum-jerk motion: a kink would be remembered by a cable that is bent by itself.
+    """
+    s = np.clip((_middles() - 0.5) / share + 0.5, 0.0, 1.0)
+    angle = 2 * np.pi * s**3 * (10 - 15 * s + 6 * s**2)
     tangents = np.zeros((SAMPLES, 3))
     across, out = (2, 1) if room == "upright" else (1, 2)
+    lift = gap / (share * length) * 30 * s**2 * (1 - s) ** 2
     tangents[:, 0], tangents[:, across], tangents[:, out] = np.cos(angle), np.sin(angle), lift
     return along(tangents, length)
 

@@ -138,19 +138,25 @@ def compressed(r: Rng, d: Draft) -> None:
 
 
 def snap_through(r: Rng, d: Draft) -> None:
-    """Push the middle of an arch with held ends through to its other side."""
+    """Push an arch with held ends through to its other side, beside its middle.
+
+    In the middle itself the arch would choose between two mirror images.
+    """
     d.families.append("motion: snap-through")
     length, angle = d.length, r.uniform(0.6, 2.0)
     d.shape = Points(points=curves.arc(length, angle, d.room))
     start, duration = started(d), float(r.uniform(0.6, 2.0) * d.time)
-    at = start([0.0, 0.5 * length, length])
-    rise, hold = at[1] - 0.5 * (at[0] + at[2]), pick(r, {"point": 1, "tangent": 1})
+    u = float(r.choice([r.uniform(0.4, 0.48), r.uniform(0.52, 0.6)]) * length)
+    at = start([0.0, u, length])
+    chord = (at[2] - at[0]) / np.linalg.norm(at[2] - at[0])
+    rise = at[1] - at[0] - chord * float(chord @ (at[1] - at[0]))
+    hold = pick(r, {"point": 1, "tangent": 1})
     through = chance(r, 0.4)
     path = d.move(-r.uniform(1.1, 1.9) * rise, duration)
     d.grasps = [
         Grasp(u=0.0, hold=hold),  # type: ignore[arg-type]
         Grasp(u=length, hold=hold),  # type: ignore[arg-type]
-        Grasp(u=0.5 * length, path=path, release_time=duration * r.uniform(0.6, 1.0) if through else None),
+        Grasp(u=u, path=path, release_time=duration * r.uniform(0.6, 1.0) if through else None),
     ]
     d.horizon = duration + (0.3 * d.time if through else 0.0)
 

@@ -118,7 +118,7 @@ def draw_memory(r: Rng, d: Draft) -> None:
         weight = d.cable["linear_density"] * d.length**3 * max(d.gravity, 9.81)
         limp = d.cable["bending_stiffness"] < 3e-4 * weight
         held = bool(d.grasps) and all(g.start == 0.0 for g in d.grasps)
-        kind = pick(r, {"bent by itself": 4, "settled": 4 if held else 0, "springs": 4 if limp else 0.6})
+        kind = pick(r, {"bent by itself": 4, "settled": 4 if held and _rests(d) else 0, "springs": 4 if limp else 0.6})
         if kind == "bent by itself":
             d.cable["rest_shape"] = "initial"
             d.families.append("effects: bent stress-free shape")
@@ -133,6 +133,12 @@ def draw_memory(r: Rng, d: Draft) -> None:
         d.cable["memory_rate"] = spread(r, 1.0, 100.0) / d.time
         d.cable["hardening"] = r.uniform(0.05, 1.0)
         d.families.append("effects: plasticity")
+
+
+def _rests(d: Draft) -> bool:
+    """Tell whether what holds the cable determines where it comes to rest."""
+    weight = d.gravity > 0 and "table" not in d.environment
+    return weight or len(d.grasps) > 1 or d.grasps[0].hold != "point"
 
 
 def settle(d: Draft) -> None:
