@@ -42,8 +42,8 @@ class Drawn:
     make: Callable[[], Scene]
 
 
-def draw(seed: int, index: int) -> Drawn:
-    """Draw the scene `index` of a seed."""
+def draw(seed: int, index: int, *, small: bool = False) -> Drawn:
+    """Draw the scene `index` of a seed; `small`: on a grid of some ten by twenty control points, for quick tests."""
     r = np.random.default_rng([seed, index])
     length = 1.0 if chance(r, 0.6) else spread(r, 0.05, 50.0)
     thick = spread(r, 0.002, 0.02) if chance(r, 0.5) else 0.005 * length
@@ -61,7 +61,7 @@ def draw(seed: int, index: int) -> Drawn:
     draw_switches(r, d)
     possible = not chance(r, IMPOSSIBLE)
     if possible:
-        _draw_quality(r, d)
+        _draw_quality(r, d, small)
         return Drawn(seed=seed, index=index, families=tuple(dict.fromkeys(d.families)), possible=True, make=d.scene)
     make = spoil(r, d)
     return Drawn(seed=seed, index=index, families=tuple(d.families), possible=False, make=make)
@@ -94,8 +94,14 @@ def _at_start(p: np.ndarray, q: np.ndarray, between: float) -> float:
     return float(np.linalg.norm(p[0] - q[0])) / between + 1e-9
 
 
-def _draw_quality(r: Rng, d: Draft) -> None:
+def _draw_quality(r: Rng, d: Draft, small: bool) -> None:
     """Draw what is asked: mostly a target error, else a grid and a method."""
+    if small:
+        problem = pose(d.scene())
+        n_u, n_t = int(r.integers(9, 18)), int(r.integers(13, 26))
+        n_u, n_t = max(n_u, smallest_n_u(problem)), max(n_t, smallest_n_t(problem))
+        d.quality = Quality(n_u=n_u, n_t=n_t, method="march")
+        return
     kind = pick(r, {"target": 64, "auto": 6, "march": 15, "grid": 11, "paper": 1, "odd": 3})
     d.families.append(f"numbers: {kind}")
     if kind in ("target", "auto"):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore import Grasp, Prediction, Scene, energies
+from dlocore import Grasp, Prediction, Scene, Waypoints, energies
 from dlocore.shape import start_curve
 
 Floats = NDArray[np.float64]
@@ -92,25 +92,28 @@ def held(prediction: Prediction) -> tuple[float, float]:
 def energy_gain(prediction: Prediction) -> float | None:
     """Return the largest gain of energy beyond the work of grippers and loads, of the energy that was about.
 
-    Between two jumps the energy may rise by no more than the work; at a jump of a gripper's velocity it may, as the
-    impulse is no part of the reactions. The energy of stretch, which is never negative, counts at the start alone: the
-    strain of a nearly inextensible cable is lost in what the time spline smooths.
+    It is looked for in each stretch between two events, a few steps after the first, as the impulse of a jump is no
+    part of the reactions. The energy of stretch, which is never negative, counts at the beginning alone: the strain of
+    a nearly inextensible cable is lost in what the time spline smooths. None where reactions don't tell: a path turns
+    more often than the steps.
     """
     scene, surface = prediction.scene, prediction.surface
-    if not prediction.grasps:
-        windows = [np.linspace(0.0, surface.horizon, _LOOKS)]
-    else:
+    windows = [np.linspace(0.0, surface.horizon, _LOOKS)]
+    if prediction.grasps:
         windows = windows_of(prediction.grasps[0].times)
+    if any(isinstance(g.path, Waypoints) and len(np.asarray(g.path.times)) > len(windows[0]) for g in scene.grasps):
+        return None
     worst, scale = 0.0, _NOTHING * sum(_own(scene)) * scene.cable.length
-    for times in windows:
+    for window in windows:
+        times = window[_SETTLE:]
         if len(times) < 3:
             continue
         t = times[np.unique(np.linspace(0, len(times) - 1, _LOOKS).round().astype(int))]
         parts = energies(scene, surface, t, prediction.material)
         stored = parts.pop("stretch")[0]
         total = np.sum(list(parts.values()), axis=0)
-        work = np.interp(t, times, _work(prediction, times))
-        gain = total - total[0] - stored - work
+        work = np.interp(t, times, _work(prediction, window)[_SETTLE:])
+        gain = total - total[0] - stored - (work - work[0])
         largest = max(float(np.ptp(x)) for x in (work, *parts.values()))
         scale = max(scale, largest, float(parts["kinetic"].max()), float(parts["bend"].max()))
         worst = max(worst, float(gain.max()))

@@ -122,13 +122,13 @@ def compressed(r: Rng, d: Draft) -> None:
     """Bring the ends of a nearly straight cable together, far beyond buckling."""
     d.families.append("motion: post-buckling")
     length, hold = d.length, pick(r, {"point": 3, "tangent": 2})
-    bow = 0.0 if chance(r, 0.04) else spread(r, 1e-8, 0.5)
+    bow = 0.0 if chance(r, 0.03) else spread(r, 1e-8, 1e-3) if chance(r, 0.1) else spread(r, 1e-2, 0.5)
     if bow == 0.0:
         d.families.append("geometry: straight and pushed along itself")
         d.shape = Straight()
     else:
         d.shape = Points(points=curves.arc(length, bow, d.room))
-    at, duration = started(d)([0.0, length]), float(r.uniform(0.8, 2.5) * d.time)
+    at, duration = started(d)([0.0, length]), float(r.uniform(1.5, 4.0) * d.time)
     short = r.uniform(0.05, 0.8)
     if short < 0.15:
         d.families.append("motion: compressed below 15 % of the length")

@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.hard import curves
 from benchmarks.hard.cases.base import WEIGHTLESS, case, cord, move, samples
-from dlocore import Capsule, Cylinder, Environment, Grasp, Points, Prediction, Scene, Sphere, Straight, Table
+from dlocore import Capsule, Cylinder, Environment, Grasp, Points, Prediction, Scene, Sphere, Straight, Table, Waypoints
 
 
 @case("effects", "all laws; the cable sticks where it is not pulled")
@@ -35,8 +35,6 @@ def contact_that_opens_and_closes() -> Scene:
     """A cable in space is lowered onto the table, lifted and lowered again."""
     t = np.linspace(0.0, 3.0, 31)
     way = np.column_stack([0.05 * t, 0 * t, 0.15 + 0.14 * np.cos(2 * np.pi * t / 1.5)])
-    from dlocore import Waypoints
-
     shape = Straight(start=(0, 0, 0.29))
     grasps = (Grasp(u=0.0, hold="tangent", path=Waypoints(times=t, positions=way)),)
     around = Environment(drag=0.2, table=Table(friction=0.3))
@@ -71,18 +69,16 @@ def laid_over_a_ball() -> Scene:
 
 
 def _bent(near: float) -> Scene:
-    """Return a bend to the share `near` of the yield curvature: an arc of even curvature between turned grippers."""
-    turn = 1.2
-    yields = turn / near  # [1/m]
-    angle, chord = 0.5 * turn, 2 * np.sin(0.5 * turn) / turn
-    grasps = (
-        Grasp(u=0.0, hold="tangent", path=move(0, 0, 0, time=2.0, rotation=(0, 0, -angle))),
-        Grasp(u=1.0, hold="tangent", path=move(chord - 1.0, 0, 0, time=2.0, rotation=(0, 0, angle))),
-    )
-    cable = cord(yield_strain=0.5 * 0.005 * yields, memory_rate=20.0, bending_stiffness=1e-2)
-    points = curves.arc(1.0, 1e-3, "flat")
-    around = replace(WEIGHTLESS, drag=1.0)
-    return Scene(cable=cable, shape=Points(points=points), grasps=grasps, environment=around)
+    """Return a bend to the share `near` of the yield curvature: the end goes along that of an arc of even curvature."""
+    turn = 1.2  # [rad] over one metre
+    t = np.linspace(0.0, 3.0, 61)
+    bend = np.maximum(turn * (t / 3.0) ** 3 * (10 - 15 * t / 3.0 + 6 * (t / 3.0) ** 2), 1e-6)
+    end = np.column_stack([np.sin(bend) / bend, (1 - np.cos(bend)) / bend, 0 * t])
+    quaternions = np.column_stack([np.cos(bend / 2), 0 * t, 0 * t, np.sin(bend / 2)])
+    path = Waypoints(times=t, positions=end, orientations=quaternions)
+    grasps = (Grasp(u=0.0, hold="tangent"), Grasp(u=1.0, hold="tangent", path=path))
+    cable = cord(yield_strain=0.5 * 0.005 * turn / near, memory_rate=20.0, bending_stiffness=1e-2)
+    return Scene(cable=cable, shape=Straight(), grasps=grasps, environment=replace(WEIGHTLESS, drag=0.5))
 
 
 def _remembered(p: Prediction) -> float:

@@ -118,14 +118,15 @@ def _chord(points: Floats) -> Floats:
     return np.asarray(points @ turn.T)
 
 
-@case("motion", "the straight line between the grippers", error=_from_line, within=2e-3)
+@case("motion", "the straight line between the grippers", error=_from_line, within=5e-3)
 def pulled_exactly_taut() -> Scene:
     """At the end the cable is as long as the distance: the last slack goes with the root of the way, and tension rises
     without bounds."""
     points = _chord(curves.arc(1.0, 1.5, "flat"))
     path = move(1.0 - float(points[-1, 0]), 0.0)
     grasps = (Grasp(u=0.0), Grasp(u=1.0, path=path))
-    return Scene(cable=cord(), shape=Points(points=points), grasps=grasps, environment=LYING, horizon=1.2)
+    around = replace(LYING, drag=1.0)
+    return Scene(cable=cord(), shape=Points(points=points), grasps=grasps, environment=around, horizon=2.5)
 
 
 def _compressed(bow: float, short: float, around: Environment) -> Scene:
@@ -151,7 +152,7 @@ def _elastica(p: Prediction) -> float:
 @case("motion", "the elastica of that distance", error=_elastica, within=1e-2)
 def compressed_to_5_per_cent() -> Scene:
     """Far beyond buckling, from a start bent by 1e-2 rad: it chooses the side; the tangent is indefinite."""
-    return _compressed(1e-2, 0.05, replace(LYING, drag=2.0))
+    return replace(_compressed(1e-2, 0.05, replace(LYING, drag=0.3)), horizon=3.0)
 
 
 @case("motion", "one of two mirror images: the answer must not claim to know", end="told")
