@@ -10,6 +10,7 @@ from benchmarks.hard.impossible import spoil
 from benchmarks.hard.motions import SLACK, draw_motion, started
 from benchmarks.hard.surroundings import (
     draw_damping,
+    draw_drag,
     draw_environment,
     draw_gravity,
     draw_memory,
@@ -55,8 +56,9 @@ def draw(seed: int, index: int, *, small: bool = False) -> Drawn:
     draw_motion(r, d)
     _bring_within_reach(d)
     draw_environment(r, d)
+    damping = draw_drag(r, d)
     draw_stiffness(r, d)
-    draw_damping(r, d)
+    draw_damping(r, d, damping)
     draw_memory(r, d)
     draw_switches(r, d)
     possible = not chance(r, IMPOSSIBLE)

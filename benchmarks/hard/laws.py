@@ -21,7 +21,7 @@ class Measures:
 
     Attributes:
         finite: every number of the answer is.
-        strain: largest |axial strain| of the surface, at the middles of its spans.
+        strain: largest |axial strain| of the surface, the mean over a span.
         held: largest distance of a grasped point from its gripper, at the start and at the end of the motion [m].
         held_between: the same in between, where the time spline only comes near to the path [m].
         energy: largest gain of energy that no gripper and no load put in, of the energy that was about.
@@ -62,10 +62,12 @@ def is_finite(prediction: Prediction) -> bool:
 
 
 def strain(prediction: Prediction) -> float:
-    """Return the largest |axial strain|."""
+    """Return the largest |axial strain|, the mean over a span: within one the derivative of a spline oscillates."""
     surface = prediction.surface
-    u = np.linspace(0.0, surface.length, 65)
-    return float(np.abs(surface.axial_strain(u, np.linspace(0.0, surface.horizon, _LOOKS))).max())
+    u, w = along(surface.knots_u)
+    slope = np.linalg.norm(surface(u, np.linspace(0.0, surface.horizon, _LOOKS), du=1)[..., :3], axis=-1)
+    lengths = (w * slope).reshape(len(slope), -1, 4).sum(axis=-1)
+    return float(np.abs(lengths / w.reshape(-1, 4).sum(axis=1) - 1.0).max())
 
 
 def held(prediction: Prediction) -> tuple[float, float]:

@@ -72,7 +72,8 @@ def draw_stiffness(r: Rng, d: Draft) -> None:
     EI = spread(r, 1e-6, 4.0)
     if chance(r, 0.75):  # as stiff as a wire, a cable, a pole are against their weight
         EI = float(np.clip(9.81 * mu * length**3 * spread(r, 1e-3, 3.0), 1e-6, 4.0))
-    forces = mu * (length * (d.gravity + d.acceleration) + 9.0 * d.speed**2)
+    drag = d.environment.get("drag", 0.0) + d.environment.get("drag_quadratic", 0.0) * d.speed
+    forces = mu * (length * (d.gravity + d.acceleration) + 9.0 * d.speed**2) + drag * d.speed * length
     EA = max(16 * EI / d.diameter**2, forces / STRAIN, mu * (d.jump / STRAIN) ** 2)
     if chance(r, 0.3):
         EA = max(EA, EI / length**2 * spread(r, 1e7, STIFFEST))
@@ -92,7 +93,8 @@ def draw_stiffness(r: Rng, d: Draft) -> None:
         d.families.append("stiffness: GJ/EI far from 1")
 
 
-def draw_damping(r: Rng, d: Draft) -> None:
+def draw_drag(r: Rng, d: Draft) -> str:
+    """Draw the drag, and return what kind of damping there is."""
     # a cable that buckles without damping throws itself about, and no grid agrees with the next
     buckles = "motion: post-buckling" in d.families
     kind = pick(r, {"none": 0 if buckles else 1, "usual": 5, "heavy": 1, "quadratic": 1})
@@ -105,8 +107,13 @@ def draw_damping(r: Rng, d: Draft) -> None:
         d.environment["drag_quadratic"] = mu / (d.length * spread(r, 0.05, 2.0))
     if kind == "heavy":
         d.environment["drag"] = mu / (spread(r, 0.003, 0.05) * time)
+    return kind
+
+
+def draw_damping(r: Rng, d: Draft, kind: str) -> None:
+    """Draw the internal damping."""
     if chance(r, 0.25) or kind == "heavy":
-        rate = spread(r, 1e-3, 0.1 if kind == "usual" else 1.0) * time
+        rate = spread(r, 1e-3, 0.1 if kind == "usual" else 1.0) * d.time
         d.cable["bending_damping"] = d.cable["bending_stiffness"] * rate
         d.cable["torsional_damping"] = d.cable["torsional_stiffness"] * rate
 
