@@ -25,7 +25,7 @@ from tqdm import tqdm
 
 from benchmarks.catalogue import catalogue
 from benchmarks.machine import machine, machine_line
-from benchmarks.random_scenes import random_scene
+from benchmarks.robot_scenes import random_scene
 from dlocore import Quality, Scene, SceneError, predict, warm_up
 from dlocore.study.judge import Truth, finest_march, largest_error
 

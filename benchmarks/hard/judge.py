@@ -1,0 +1,122 @@
+"""Run a drawn scene and judge what came back: a record of plain numbers and words, one line of JSON."""
+
+import time
+import traceback
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from benchmarks.hard.generator import Drawn
+from benchmarks.hard.laws import measure
+from dlocore import Prediction, Quality, Scene, SceneError, predict
+
+WRONG = 0.01  # of the length: an error that an answer has to tell of
+SURE = 0.3  # of a distance from the refined march: within it the refined marches agree where they can tell
+MOST_STRAIN = 0.02
+HELD = 1e-9  # [m]
+ASTRAY = 1e-4  # of the length: of a gripper's path by the time spline, between the ends
+GAINED = 0.02  # of the energy that was about
+LOST = 0.05  # of the impulses that were about
+
+
+def run(drawn: Drawn, deadline: float, checked: bool) -> dict[str, Any]:
+    """Run one scene and return its record.
+
+    Args:
+        drawn: the scene.
+        deadline: time that a prediction is allowed [s].
+        checked: compare it with a refined march too.
+    """
+    record: dict[str, Any] = {"index": drawn.index, "families": drawn.families, "possible": drawn.possible}
+    began, cpu = time.perf_counter(), time.process_time()
+    try:
+        scene = drawn.make()
+        prediction = predict(scene, deadline=deadline)
+        record |= _answer(prediction, scene)
+        record["seconds"] = time.process_time() - cpu
+        record["laws"] = asdict(measure(prediction))
+        if checked:
+            record |= compare(prediction, scene, deadline)
+    except SceneError as error:
+        record |= {"status": "refused", "message": str(error), "field": error.field}
+    except Exception as error:  # whatever it is, it is what this looks for
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        record |= {"status": "exception", "message": f"{type(error).__name__}: {error} at {where.name}:{where.lineno}"}
+    record.setdefault("seconds", time.process_time() - cpu)
+    record["wall"] = time.perf_counter() - began
+    record["faults"] = faults(record)
+    return record
+
+
+def _answer(prediction: Prediction, scene: Scene) -> dict[str, Any]:
+    accuracy, length = prediction.accuracy, scene.cable.length
+    estimate = accuracy.error_estimate
+    return {
+        "status": prediction.status,
+        "message": prediction.message,
+        "method": scene.quality.method,
+        "solved_by": accuracy.method,
+        "effects": [e.name for e in prediction.effects if e.active],
+        "dimensions": accuracy.dimensions,
+        "n_u": accuracy.n_u,
+        "n_t": accuracy.n_t,
+        "iterations": len(prediction.iterations),
+        "estimate": None if estimate is None else estimate / length,
+        "target": None if scene.quality.target_error is None else scene.quality.target_error / length,
+        "length": length,
+    }
+
+
+def compare(prediction: Prediction, scene: Scene, deadline: float) -> dict[str, Any]:
+    """Return the distance from a refined march, and how far two refined marches are apart, of the length."""
+    accuracy, surface, length = prediction.accuracy, prediction.surface, scene.cable.length
+    u, t = np.linspace(0.0, length, 101), np.linspace(0.0, surface.horizon, 65)
+    found = []
+    for finer in (2.0, 3.0):
+        n_u = int(np.clip(round(finer * accuracy.n_u), 33, 129 if finer > 2 else 97))
+        n_t = int(np.clip(round(finer * accuracy.n_t), 65, 513 if finer > 2 else 385))
+        quality = Quality(n_u=n_u, n_t=n_t, method="march", estimate=False)
+        refined = predict(replace(scene, quality=quality), deadline=deadline)
+        if refined.status != "converged":
+            return {"reference": f"{refined.status}: {refined.message[:120]}"}
+        found.append(refined.surface.positions(u, t))
+    own = surface.positions(u, t)
+    error = float(np.linalg.norm(own - found[1], axis=-1).max()) / length
+    apart = float(np.linalg.norm(found[0] - found[1], axis=-1).max()) / length
+    return {"reference": "converged", "error": error, "apart": apart}
+
+
+def faults(record: dict[str, Any]) -> list[str]:
+    """Return what is wrong with an answer, in words; nothing where it is right."""
+    status, found = record["status"], []
+    if status == "exception":
+        return ["exception"]
+    if status == "refused":
+        return ["refused a possible scene"] if record["possible"] else []
+    if not record["possible"]:
+        return ["converged on an impossible scene"] if status == "converged" else []
+    laws = record["laws"]
+    if not laws["finite"]:
+        return ["not finite"]
+    if status == "converged":
+        if laws["strain"] > MOST_STRAIN:
+            found.append("strained")
+        if laws["held"] > HELD * max(1.0, record["length"]):
+            found.append("let go of a gripper")
+        if laws["held_between"] > ASTRAY * record["length"]:
+            found.append("spline off a gripper's path")
+        if laws["energy"] is not None and laws["energy"] > GAINED:
+            found.append("gained energy")
+        if laws["momentum"] is not None and laws["momentum"] > LOST:
+            found.append("lost momentum")
+        error, estimate = record.get("error"), record["estimate"]
+        if error is not None and error > WRONG and record["apart"] < SURE * error:
+            told = estimate is not None and estimate > min(WRONG, 0.5 * error)
+            found.append("wrong and told" if told else "lie")
+        elif error is not None and record["apart"] > WRONG:
+            told = estimate is not None and estimate > WRONG
+            found.append("undetermined and told" if told else "undetermined and not told")
+    else:
+        found.append(f"not converged: {status}")
+    return found

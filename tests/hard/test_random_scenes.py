@@ -1,0 +1,48 @@
+"""Random hard scenes on small grids: no exception, no NaN, and a status that tells the truth."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from benchmarks.hard.generator import IMPOSSIBLE, draw
+from benchmarks.hard.judge import run
+
+SEED = 2
+COUNT = 300
+BATCH = 30
+HANGS = (43, 218)  # the search along an update for strands that touch does not end (docs/stability.md)
+
+
+@pytest.mark.parametrize("first", range(0, COUNT, BATCH))
+def test_random_scene_ends_with_a_finite_answer_or_is_refused_for_a_reason(first: int):
+    for index in range(first, first + BATCH):
+        if index in HANGS:
+            continue
+        drawn = draw(SEED, index, small=True)
+        record = run(drawn, np.inf, False)
+        assert record["status"] != "exception", (index, record["message"])
+        if record["status"] == "refused" and record["field"] == "shape.settle":
+            continue  # a start that did not come to rest is refused in words; docs/stability.md counts them
+        if drawn.possible:
+            assert record["status"] != "refused", (index, record["message"])
+            assert record["laws"]["finite"], index
+            assert record["laws"]["held"] < 1e-9 * record["length"], index  # interpolated: rounding
+            assert record["status"] != "converged" or record["estimate"] is not None, index
+        else:
+            assert record["status"] != "converged", (index, record["families"])
+
+
+def test_a_scene_is_drawn_from_its_seed_and_index_alone():
+    alone, after = draw(5, 17), [draw(5, index) for index in range(18)][17]
+    assert alone.families == after.families
+    assert repr(alone.make()) == repr(after.make())
+    assert repr(draw(6, 17).make()) != repr(alone.make())
+
+
+def test_every_kind_of_hardness_is_drawn_often():
+    families = Counter(family for index in range(600) for family in draw(3, index).families)
+    for group in ("geometry", "stiffness", "motion", "effects", "numbers", "impossible"):
+        kinds = {family: count for family, count in families.items() if family.startswith(group)}
+        assert len(kinds) >= 6, kinds
+    assert sum(count for family, count in families.items() if family.startswith("impossible")) > 600 * IMPOSSIBLE / 2
