@@ -1,0 +1,408 @@
+"""Replay of a recording: the scene of its grippers, predicted from its first frames with a candidate's parameters."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline, UnivariateSpline
+from scipy.spatial.transform import Rotation
+
+from dlocore.cable import Cable
+from dlocore.discretisation import make_grid
+from dlocore.errors import SceneError
+from dlocore.grid import Grid
+from dlocore.identify.start import StartFit
+from dlocore.paths import Waypoints
+from dlocore.problem import Problem, pose
+from dlocore.recordings import Hold, Recording
+from dlocore.scene import ControlPoints, Environment, Grasp, Material, Scene, Straight, Switch
+from dlocore.sensitivity import KnownMotion, beside, factored, objection
+from dlocore.solvers.march import STRONGLY_DAMPED, March, march
+from dlocore.solvers.monitor import Monitor
+from dlocore.spline import design_matrix
+
+Floats = NDArray[np.float64]
+
+_SLACK = 1.003  # of the cable between two grippers: held markers farther apart are brought nearer
+_JUMP = 6.0  # robust deviations beyond which a sample of a held marker is an outlier
+_FLOOR = 5e-4  # [m] below which no sample is one
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Candidate:
+    """What a recording is replayed with.
+
+    Attributes:
+        cable: its length is that of the recording.
+        environment: drag; gravity is that of the recording.
+        rest_curvature: (k, 2) [1/m] of the stress-free shape at k places from end to end, in the frame of the
+            sections; None: straight.
+        clamp_angles: (clamps, 2) [rad] by which the cable leaves each clamp beside the direction of its markers.
+        turn: [rad] of the last clamp against the first, about the cable.
+        twist: simulate twist; needed for rest_curvature and a torsional stiffness.
+    """
+
+    cable: Cable
+    environment: Environment
+    rest_curvature: Floats | None = None
+    clamp_angles: Floats | None = None
+    turn: float = 0.0
+    twist: bool = False
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Resolution:
+    """How finely a recording is replayed: control points, time step [s], frames that its start is taken from."""
+
+    n_u: int = 13
+    step: float = 0.01
+    start_frames: int = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Played:
+    """A replayed recording.
+
+    Attributes:
+        predicted: positions of all markers at the compared frames (frames, m, 3) [m].
+        problem, grid, motion: what was solved.
+    """
+
+    predicted: Floats
+    problem: Problem
+    grid: Grid
+    motion: March
+
+    @cached_property
+    def known(self) -> KnownMotion:
+        """The motion with its steps factorised."""
+        return factored(self.problem, self.motion)
+
+
+@dataclass(frozen=True, eq=False)
+class _Path:
+    """Positions (k, 3) and directions (k, 3) of a gripper at the steps, with their rates at the first."""
+
+    positions: Floats
+    directions: Floats | None
+    speed: Floats
+    turning: Floats
+
+
+class Replay:
+    """Replays one recording of a motion with any candidate: what does not depend on it is prepared once.
+
+    Args:
+        recording: of a motion.
+        resolution: how finely.
+        references: direction of each clamp about which its frame is chosen (clamps, 3); None: its mean in this
+            recording. Windows of one experiment need the same, so that angles mean the same in all of them.
+        shake: seeds noise of the held markers and of the start, as large as theirs: what the prediction owes to them.
+    """
+
+    def __init__(
+        self,
+        recording: Recording,
+        resolution: Resolution,
+        references: Floats | None = None,
+        shake: np.random.Generator | None = None,
+    ) -> None:
+        if recording.static:
+            raise SceneError("static", True, "a recording of a motion", "Shapes at rest have no motion to replay")
+        if not recording.holds:
+            raise SceneError("held", recording.held, "at least one held marker", "Nothing tells how the cable is moved")
+        self.recording, self.resolution = recording, resolution
+        times = cast(Floats, recording.times)
+        self.length = cast(float, recording.length)
+        frames = max(2, min(resolution.start_frames, len(times) - 4))
+        self.begin = float(times[:frames].mean())
+        self.compared = np.arange(frames, len(times))
+        self.horizon = float(times[-1] - self.begin)
+        self.steps = max(8, round(self.horizon / resolution.step))
+        self.step_times = np.linspace(0.0, self.horizon, self.steps + 1)
+        self.markers = cast(Floats, recording.markers)[frames:]
+        clean = _held_paths(recording, shake)
+        self.holds = recording.holds
+        self.clamps = tuple(h for h in self.holds if h.towards is not None)
+        self.references = self._references(clean) if references is None else references
+        self.paths = self._reachable(tuple(self._path(h, clean) for h in self.holds))
+        self.seen, self.start_markers, self.start_speeds = _start_markers(recording, frames, self.begin, shake)
+        self._guess: Floats | None = None
+
+    def _references(self, clean: dict[int, CubicSpline]) -> Floats:
+        t = self.begin + self.step_times
+        found = []
+        for h in self.clamps:
+            mean = self._directions(h, clean, t).mean(axis=0)
+            found.append(mean / np.linalg.norm(mean))
+        return np.array(found).reshape(-1, 3)
+
+    @staticmethod
+    def _directions(h: Hold, clean: dict[int, CubicSpline], t: Floats) -> Floats:
+        along = (clean[cast(int, h.towards)](t) - clean[h.marker](t)) * (1.0 if h.forward else -1.0)
+        return np.asarray(along / np.linalg.norm(along, axis=1)[:, None])
+
+    def _path(self, h: Hold, clean: dict[int, CubicSpline]) -> _Path:
+        t = self.begin + self.step_times
+        speed = clean[h.marker](self.begin, 1)
+        if h.towards is None:
+            return _Path(clean[h.marker](t), None, speed, np.zeros(3))
+        directions = self._directions(h, clean, t)
+        return _Path(clean[h.marker](t), directions, speed, (directions[1] - directions[0]) / self.step_times[1])
+
+    def _reachable(self, paths: tuple[_Path, ...]) -> tuple[_Path, ...]:
+        """Bring grippers together that noise has put farther apart than the cable between them reaches."""
+        u = cast(Floats, self.recording.u)
+        paths = tuple(replace(p, positions=p.positions.copy()) for p in paths)
+        for (a, p), (b, q) in zip(list(zip(self.holds, paths))[:-1], list(zip(self.holds, paths))[1:], strict=True):
+            across = q.positions - p.positions
+            apart = np.linalg.norm(across, axis=1)
+            most = _SLACK * (u[b.marker] - u[a.marker])
+            over = 0.5 * np.maximum(apart - most, 0.0) / apart
+            p.positions[:] += over[:, None] * across
+            q.positions[:] -= over[:, None] * across
+        return paths
+
+    def scene(self, candidate: Candidate) -> Scene:
+        """Return the scene of the recording for a candidate."""
+        recording = self.recording
+        u = cast(Floats, recording.u)
+        grasps, held, positions, rates = [], [], [], []
+        clamp, angles = 0, candidate.clamp_angles
+        frames = []
+        for h, path in zip(self.holds, self.paths, strict=True):
+            at = float(u[h.marker])
+            held.append((at, 0))
+            positions.append(path.positions[0])
+            rates.append(path.speed)
+            turns = None
+            if path.directions is not None:
+                reference = self.references[clamp]
+                rotations = _turned_from(reference, path.directions)
+                tangent = reference if angles is None else _tilted(reference, angles[clamp])
+                first = rotations[0].apply(tangent)
+                held.append((at, 1))
+                positions.append(first)
+                rates.append((rotations[1].apply(tangent) - first) / self.step_times[1])
+                turns = (rotations * rotations[0].inv()).as_quat()[:, [3, 0, 1, 2]]
+                frames.append((rotations[0].apply(_across(reference)), first))
+                clamp += 1
+            way = Waypoints(times=self.step_times, positions=path.positions, orientations=turns, start="moving")
+            kind: Literal["point", "tangent", "clamp"] = "point" if turns is None else "tangent"
+            grasps.append(Grasp(u=at, hold="clamp" if turns is not None and candidate.twist else kind, path=way))
+        environment = replace(candidate.environment, gravity=recording.gravity)
+        fit, knots = self._fit(candidate, tuple(grasps), tuple(held))
+        weight = candidate.cable.linear_density * np.asarray(environment.gravity)
+        seen = self.seen
+        q = fit.shape(
+            cast(float, candidate.cable.bending_stiffness), weight, u[seen], self.start_markers, np.array(positions),
+            self._guess,
+        )  # fmt: skip
+        self._guess = q
+        v = fit.velocity(q, u[seen], self.start_speeds, np.array(rates))
+        shape = ControlPoints(control_points=q, knots=knots, velocity=v)
+        if candidate.twist:
+            shape = _with_sections(shape, candidate, frames)
+        switches: dict[str, Switch] = {"inertia": "on", "twist": "on" if candidate.twist else "off"}
+        return Scene(
+            cable=replace(candidate.cable, length=self.length),
+            shape=shape,
+            grasps=tuple(grasps),
+            environment=environment,
+            horizon=self.horizon,
+            effects=switches,
+        )
+
+    def _fit(
+        self, candidate: Candidate, grasps: tuple[Grasp, ...], held: tuple[tuple[float, int], ...]
+    ) -> tuple[StartFit, Floats]:
+        """Return the fit of the start on the grid that the scene will have."""
+        if self._start is None:
+            still = tuple(Grasp(u=g.u, hold="point" if g.hold == "point" else "tangent") for g in grasps)
+            cable = replace(candidate.cable, length=self.length)
+            scene = Scene(cable=cable, shape=Straight(), grasps=still, horizon=1.0, effects={"twist": "off"})
+            grid = make_grid(pose(scene), self.resolution.n_u)
+            self._start = StartFit(grid, held)
+        return self._start, self._start.grid.knots
+
+    _start: StartFit | None = None
+
+    def posed(self, candidate: Candidate) -> tuple[Problem, Grid]:
+        """Return the equations of the recorded motion for a candidate, and its grid."""
+        problem = pose(self.scene(candidate))
+        return problem, make_grid(problem, self.resolution.n_u)
+
+    def play(self, candidate: Candidate) -> Played:
+        """Predict the recording with a candidate."""
+        problem, grid = self.posed(candidate)
+        motion = march(problem, grid, self.steps, Monitor(None, None, None))
+        if motion.stopped:
+            motion = march(problem, grid, 2 * self.steps, Monitor(None, None, None), rho=STRONGLY_DAMPED)
+        return Played(self.positions(problem, grid, motion.times, motion.states), problem, grid, motion)
+
+    def play_beside(self, played: Played, candidate: Candidate) -> Floats:
+        """Return the predicted positions (frames, m, 3) [m] with a candidate that differs a little.
+
+        Raises:
+            ValueError: the motion can't be followed from the played one.
+        """
+        problem, grid = self.posed(candidate)
+        states, times, _ = beside(played.known, problem, grid)
+        return self.positions(problem, grid, times, states)
+
+    def positions(self, problem: Problem, grid: Grid, times: Floats, states: Floats) -> Floats:
+        """Return the markers' positions (frames, m, 3) [m] at the compared frames of states (steps + 1, n_u, nc)."""
+        B = design_matrix(grid.knots, np.minimum(cast(Floats, self.recording.u), self.length))
+        dimensions = problem.plane.dimensions
+        at = CubicSpline(times, np.einsum("mi,kid->kmd", B, states[..., :dimensions]))
+        t = np.clip(cast(Floats, self.recording.times)[self.compared] - self.begin, 0.0, self.horizon)
+        return problem.plane.world(at(t))
+
+    def differentiable(self, played: Played) -> bool:
+        """Tell whether motions beside the played one can be followed."""
+        return not objection(played.problem, played.motion)
+
+
+def common_references(recordings: Sequence[Recording]) -> Floats | None:
+    """Return the mean direction of each clamp over recordings of one experiment (clamps, 3), None where they differ."""
+    if len({(r.holds, cast(Floats, r.markers).shape[1]) for r in recordings}) != 1:
+        return None
+    found = []
+    for h in recordings[0].holds:
+        if h.towards is None:
+            continue
+        sign = 1.0 if h.forward else -1.0
+        along = [sign * (cast(Floats, r.markers)[:, h.towards] - cast(Floats, r.markers)[:, h.marker]) for r in recordings]
+        unit = [x / np.linalg.norm(x, axis=1)[:, None] for x in along]
+        mean = np.nanmean(np.concatenate(unit), axis=0)
+        found.append(mean / np.linalg.norm(mean))
+    return np.array(found).reshape(-1, 3)
+
+
+def _across(direction: Floats) -> Floats:
+    """Return a unit vector across a direction, the same for directions near each other."""
+    axis = np.zeros(3)
+    axis[int(np.argmin(np.abs(direction)))] = 1.0
+    out = axis - direction * (axis @ direction)
+    return np.asarray(out / np.linalg.norm(out))
+
+
+def _tilted(direction: Floats, angles: Floats) -> Floats:
+    first = _across(direction)
+    second = np.cross(direction, first)
+    out = direction + np.tan(angles[0]) * first + np.tan(angles[1]) * second
+    return np.asarray(out / np.linalg.norm(out))
+
+
+def _turned_from(reference: Floats, directions: Floats) -> Rotation:
+    """Return the smallest rotations that bring `reference` to the unit `directions` (k, 3)."""
+    axis = np.cross(reference, directions)
+    cosine = np.clip(directions @ reference, -0.999, 1.0)
+    half = np.sqrt(0.5 * (1.0 + cosine))
+    quaternion = np.column_stack([axis / (2.0 * half)[:, None], half])
+    return Rotation.from_quat(quaternion)
+
+
+def _with_sections(shape: ControlPoints, candidate: Candidate, frames: list[tuple[Floats, Floats]]) -> ControlPoints:
+    """Return the start with the sections turned as the clamps hold them, and bent by the rest curvature."""
+    knots, q = cast(Floats, shape.knots), cast(Floats, shape.control_points)[:, :3]
+    length = float(knots[-1])
+    director = frames[0][0] - frames[0][1] * (frames[0][0] @ frames[0][1])
+    director /= np.linalg.norm(director)
+    theta = 0.0
+    if len(frames) == 2:
+        u = np.linspace(0.0, length, 201)
+        t = design_matrix(knots, u, 1) @ q
+        t /= np.linalg.norm(t, axis=1)[:, None]
+        d = director
+        for before, after in zip(t[:-1], t[1:], strict=True):
+            axis = np.cross(before, after)
+            d = (before @ after) * d + np.cross(axis, d) + axis * (axis @ d) / (1.0 + before @ after)
+        end = frames[1][0]
+        theta = float(np.arctan2(np.cross(d, end) @ t[-1], d @ end)) + candidate.turn
+        theta = (theta + np.pi) % (2.0 * np.pi) - np.pi
+    middle = (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0
+    bends = np.zeros((2, 2)) if candidate.rest_curvature is None else candidate.rest_curvature
+    at = np.linspace(0.0, length, 201)
+    places = np.linspace(0.0, length, len(bends))
+    memory = np.column_stack([np.interp(at, places, bends[:, 0]), np.interp(at, places, bends[:, 1]), 0.0 * at])
+    return replace(
+        shape,
+        control_points=np.column_stack([q, theta * middle / length]),
+        material=Material(director=director, u=at, memory=memory, natural=memory),
+    )
+
+
+def _held_paths(recording: Recording, shake: np.random.Generator | None) -> dict[int, CubicSpline]:
+    """Return smooth paths of the held markers: without outliers, as smooth as their noise asks for."""
+    times = cast(Floats, recording.times)
+    wanted = {h.marker for h in recording.holds} | {h.towards for h in recording.holds if h.towards is not None}
+    out = {}
+    for marker in wanted:
+        x = cast(Floats, recording.markers)[:, marker]
+        keep = np.isfinite(x[:, 0])
+        t, x = times[keep], x[keep]
+        for _ in range(2):
+            middle = _running_median(x)
+            away = np.linalg.norm(x - middle, axis=1)
+            kept = away <= max(_JUMP * 1.4826 * float(np.median(away)), _FLOOR)
+            t, x = t[kept], x[kept]
+        smooth = _smoothed(t, x, times)
+        if shake is not None:
+            noise = np.sqrt(((x - smooth(t)) ** 2).mean())
+            smooth = _smoothed(t, smooth(t) + noise * shake.standard_normal(x.shape), times)
+        out[marker] = smooth
+    return out
+
+
+def _running_median(x: Floats) -> Floats:
+    padded = np.concatenate([x[:1].repeat(3, axis=0), x, x[-1:].repeat(3, axis=0)])
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 7, axis=0), axis=-1))
+
+
+def _smoothed(t: Floats, x: Floats, times: Floats) -> CubicSpline:
+    """Return the spline through `times` of samples x (k, 3), as smooth as their noise asks for.
+
+    The noise is told from third differences, to which a path that is well sampled adds little.
+    """
+    if len(t) < 8:
+        raise SceneError("markers", f"{len(t)} samples of a held marker", "at least 8 that are no outliers")
+    noise = 1.4826 * np.median(np.abs(np.diff(x, n=3, axis=0)), axis=0) / np.sqrt(20.0)
+    columns = [UnivariateSpline(t, x[:, d], k=3, s=len(t) * noise[d] ** 2, ext=3)(times) for d in range(3)]
+    return CubicSpline(times, np.column_stack(columns))
+
+
+def _start_markers(
+    recording: Recording, frames: int, at: float, shake: np.random.Generator | None
+) -> tuple[NDArray[np.int64], Floats, Floats]:
+    """Return the markers seen in the first frames, where they are at time `at` and how fast they move.
+
+    From two or three frames a straight line, from more a parabola, with outliers weighed down.
+    """
+    times, markers = cast(Floats, recording.times)[:frames], cast(Floats, recording.markers)[:frames]
+    order = 1 if frames < 6 else 2
+    seen, places, speeds = [], [], []
+    for i in range(markers.shape[1]):
+        keep = np.isfinite(markers[:, i, 0])
+        if keep.sum() < order + 1:
+            continue
+        t, x = times[keep] - at, markers[keep, i]
+        A = np.vander(t, order + 1, increasing=True)
+        w = np.ones(len(t))
+        for _ in range(1 if frames < 6 else 12):
+            c = np.linalg.lstsq(A * w[:, None], x * w[:, None], rcond=None)[0]
+            away = np.linalg.norm(x - A @ c, axis=1)
+            scale = max(1.4826 * float(np.median(away)), 1e-5)
+            w = 1.0 / (1.0 + (away / (2.0 * scale)) ** 2)
+        if shake is not None and len(t) > order + 1:
+            noise = np.sqrt(((w[:, None] * (x - A @ c)) ** 2).sum() / (3.0 * (w * w).sum() - 3.0 * (order + 1) + 1e-9))
+            c = c + np.linalg.pinv(A) @ (noise * shake.standard_normal(x.shape))
+        seen.append(i)
+        places.append(c[0])
+        speeds.append(c[1])
+    if len(seen) < 3:
+        raise SceneError("markers", f"{len(seen)} markers seen at the beginning", "at least 3")
+    return np.array(seen), np.array(places), np.array(speeds)
