@@ -14,11 +14,12 @@ from dlocore.cable import Cable
 from dlocore.discretisation import make_grid
 from dlocore.errors import SceneError
 from dlocore.grid import Grid
+from dlocore.identify.frames import across, tilted, turned_from, with_sections
 from dlocore.identify.start import StartFit
 from dlocore.paths import Waypoints
 from dlocore.problem import Problem, pose
 from dlocore.recordings import Hold, Recording
-from dlocore.scene import ControlPoints, Environment, Grasp, Material, Scene, Straight, Switch
+from dlocore.scene import ControlPoints, Environment, Grasp, Scene, Straight, Switch
 from dlocore.sensitivity import KnownMotion, beside, factored, objection
 from dlocore.solvers.march import STRONGLY_DAMPED, March, march
 from dlocore.solvers.monitor import Monitor
@@ -42,6 +43,7 @@ class Candidate:
             sections; None: straight.
         clamp_angles: (clamps, 2) [rad] by which the cable leaves each clamp beside the direction of its markers.
         turn: [rad] of the last clamp against the first, about the cable.
+        length_ratio: of the cable's length and its markers' coordinates to those of the recording.
         twist: simulate twist; needed for rest_curvature and a torsional stiffness.
     """
 
@@ -50,6 +52,7 @@ class Candidate:
     rest_curvature: Floats | None = None
     clamp_angles: Floats | None = None
     turn: float = 0.0
+    length_ratio: float = 1.0
     twist: bool = False
 
 
@@ -75,6 +78,11 @@ class Played:
     problem: Problem
     grid: Grid
     motion: March
+
+    @property
+    def stopped(self) -> bool:
+        """The prediction ended before the recording."""
+        return bool(self.motion.stopped)
 
     @cached_property
     def known(self) -> KnownMotion:
@@ -129,8 +137,11 @@ class Replay:
         self.clamps = tuple(h for h in self.holds if h.towards is not None)
         self.references = self._references(clean) if references is None else references
         self.paths = self._reachable(tuple(self._path(h, clean) for h in self.holds))
+        self.ways = tuple(self._way(i) for i in range(len(self.holds)))
         self.seen, self.start_markers, self.start_speeds = _start_markers(recording, frames, self.begin, shake)
         self._guess: Floats | None = None
+        self._start: StartFit | None = None
+        self._start_length = 0.0
 
     def _references(self, clean: dict[int, CubicSpline]) -> Floats:
         t = self.begin + self.step_times
@@ -166,35 +177,43 @@ class Replay:
             q.positions[:] -= over[:, None] * across
         return paths
 
+    def _way(self, i: int) -> tuple[Waypoints, Rotation | None]:
+        """Return the path of a gripper, and how it is turned at its first two instants."""
+        path = self.paths[i]
+        if path.directions is None:
+            return Waypoints(times=self.step_times, positions=path.positions, start="moving"), None
+        turns = turned_from(self.references[self.clamps.index(self.holds[i])], path.directions)
+        quaternions = (turns * turns[0].inv()).as_quat()[:, [3, 0, 1, 2]]
+        way = Waypoints(times=self.step_times, positions=path.positions, orientations=quaternions, start="moving")
+        return way, turns[:2]
+
     def scene(self, candidate: Candidate) -> Scene:
         """Return the scene of the recording for a candidate."""
         recording = self.recording
-        u = cast(Floats, recording.u)
+        length = self.length * candidate.length_ratio
+        u = cast(Floats, recording.u) * candidate.length_ratio
         grasps, held, positions, rates = [], [], [], []
         clamp, angles = 0, candidate.clamp_angles
         frames = []
-        for h, path in zip(self.holds, self.paths, strict=True):
-            at = float(u[h.marker])
+        for h, path, (way, turns) in zip(self.holds, self.paths, self.ways, strict=True):
+            at = min(float(u[h.marker]), length)
             held.append((at, 0))
             positions.append(path.positions[0])
             rates.append(path.speed)
-            turns = None
-            if path.directions is not None:
+            kind: Literal["point", "tangent", "clamp"] = "point"
+            if turns is not None:
+                kind = "clamp" if candidate.twist else "tangent"
                 reference = self.references[clamp]
-                rotations = _turned_from(reference, path.directions)
-                tangent = reference if angles is None else _tilted(reference, angles[clamp])
-                first = rotations[0].apply(tangent)
+                tangent = reference if angles is None else tilted(reference, angles[clamp])
+                first, second = turns.apply(tangent)
                 held.append((at, 1))
                 positions.append(first)
-                rates.append((rotations[1].apply(tangent) - first) / self.step_times[1])
-                turns = (rotations * rotations[0].inv()).as_quat()[:, [3, 0, 1, 2]]
-                frames.append((rotations[0].apply(_across(reference)), first))
+                rates.append((second - first) / self.step_times[1])
+                frames.append((turns[0].apply(across(reference)), first))
                 clamp += 1
-            way = Waypoints(times=self.step_times, positions=path.positions, orientations=turns, start="moving")
-            kind: Literal["point", "tangent", "clamp"] = "point" if turns is None else "tangent"
-            grasps.append(Grasp(u=at, hold="clamp" if turns is not None and candidate.twist else kind, path=way))
+            grasps.append(Grasp(u=at, hold=kind, path=way))
         environment = replace(candidate.environment, gravity=recording.gravity)
-        fit, knots = self._fit(candidate, tuple(grasps), tuple(held))
+        fit = self._fit(candidate.cable, length, tuple(grasps), tuple(held))
         weight = candidate.cable.linear_density * np.asarray(environment.gravity)
         seen = self.seen
         q = fit.shape(
@@ -203,12 +222,12 @@ class Replay:
         )  # fmt: skip
         self._guess = q
         v = fit.velocity(q, u[seen], self.start_speeds, np.array(rates))
-        shape = ControlPoints(control_points=q, knots=knots, velocity=v)
+        shape = ControlPoints(control_points=q, knots=fit.grid.knots, velocity=v)
         if candidate.twist:
-            shape = _with_sections(shape, candidate, frames)
+            shape = with_sections(shape, candidate.rest_curvature, candidate.turn, frames)
         switches: dict[str, Switch] = {"inertia": "on", "twist": "on" if candidate.twist else "off"}
         return Scene(
-            cable=replace(candidate.cable, length=self.length),
+            cable=replace(candidate.cable, length=length),
             shape=shape,
             grasps=tuple(grasps),
             environment=environment,
@@ -217,18 +236,18 @@ class Replay:
         )
 
     def _fit(
-        self, candidate: Candidate, grasps: tuple[Grasp, ...], held: tuple[tuple[float, int], ...]
-    ) -> tuple[StartFit, Floats]:
+        self, cable: Cable, length: float, grasps: tuple[Grasp, ...], held: tuple[tuple[float, int], ...]
+    ) -> StartFit:
         """Return the fit of the start on the grid that the scene will have."""
-        if self._start is None:
+        if self._start is None or self._start_length != length:
             still = tuple(Grasp(u=g.u, hold="point" if g.hold == "point" else "tangent") for g in grasps)
-            cable = replace(candidate.cable, length=self.length)
-            scene = Scene(cable=cable, shape=Straight(), grasps=still, horizon=1.0, effects={"twist": "off"})
-            grid = make_grid(pose(scene), self.resolution.n_u)
-            self._start = StartFit(grid, held)
-        return self._start, self._start.grid.knots
-
-    _start: StartFit | None = None
+            straight = Scene(
+                cable=replace(cable, length=length), shape=Straight(), grasps=still, horizon=1.0,
+                effects={"twist": "off"},
+            )  # fmt: skip
+            self._start = StartFit(make_grid(pose(straight), self.resolution.n_u), held)
+            self._start_length = length
+        return self._start
 
     def posed(self, candidate: Candidate) -> tuple[Problem, Grid]:
         """Return the equations of the recorded motion for a candidate, and its grid."""
@@ -255,7 +274,8 @@ class Replay:
 
     def positions(self, problem: Problem, grid: Grid, times: Floats, states: Floats) -> Floats:
         """Return the markers' positions (frames, m, 3) [m] at the compared frames of states (steps + 1, n_u, nc)."""
-        B = design_matrix(grid.knots, np.minimum(cast(Floats, self.recording.u), self.length))
+        length = problem.scene.cable.length
+        B = design_matrix(grid.knots, np.minimum(cast(Floats, self.recording.u) * (length / self.length), length))
         dimensions = problem.plane.dimensions
         at = CubicSpline(times, np.einsum("mi,kid->kmd", B, states[..., :dimensions]))
         t = np.clip(cast(Floats, self.recording.times)[self.compared] - self.begin, 0.0, self.horizon)
@@ -280,60 +300,6 @@ def common_references(recordings: Sequence[Recording]) -> Floats | None:
         mean = np.nanmean(np.concatenate(unit), axis=0)
         found.append(mean / np.linalg.norm(mean))
     return np.array(found).reshape(-1, 3)
-
-
-def _across(direction: Floats) -> Floats:
-    """Return a unit vector across a direction, the same for directions near each other."""
-    axis = np.zeros(3)
-    axis[int(np.argmin(np.abs(direction)))] = 1.0
-    out = axis - direction * (axis @ direction)
-    return np.asarray(out / np.linalg.norm(out))
-
-
-def _tilted(direction: Floats, angles: Floats) -> Floats:
-    first = _across(direction)
-    second = np.cross(direction, first)
-    out = direction + np.tan(angles[0]) * first + np.tan(angles[1]) * second
-    return np.asarray(out / np.linalg.norm(out))
-
-
-def _turned_from(reference: Floats, directions: Floats) -> Rotation:
-    """Return the smallest rotations that bring `reference` to the unit `directions` (k, 3)."""
-    axis = np.cross(reference, directions)
-    cosine = np.clip(directions @ reference, -0.999, 1.0)
-    half = np.sqrt(0.5 * (1.0 + cosine))
-    quaternion = np.column_stack([axis / (2.0 * half)[:, None], half])
-    return Rotation.from_quat(quaternion)
-
-
-def _with_sections(shape: ControlPoints, candidate: Candidate, frames: list[tuple[Floats, Floats]]) -> ControlPoints:
-    """Return the start with the sections turned as the clamps hold them, and bent by the rest curvature."""
-    knots, q = cast(Floats, shape.knots), cast(Floats, shape.control_points)[:, :3]
-    length = float(knots[-1])
-    director = frames[0][0] - frames[0][1] * (frames[0][0] @ frames[0][1])
-    director /= np.linalg.norm(director)
-    theta = 0.0
-    if len(frames) == 2:
-        u = np.linspace(0.0, length, 201)
-        t = design_matrix(knots, u, 1) @ q
-        t /= np.linalg.norm(t, axis=1)[:, None]
-        d = director
-        for before, after in zip(t[:-1], t[1:], strict=True):
-            axis = np.cross(before, after)
-            d = (before @ after) * d + np.cross(axis, d) + axis * (axis @ d) / (1.0 + before @ after)
-        end = frames[1][0]
-        theta = float(np.arctan2(np.cross(d, end) @ t[-1], d @ end)) + candidate.turn
-        theta = (theta + np.pi) % (2.0 * np.pi) - np.pi
-    middle = (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0
-    bends = np.zeros((2, 2)) if candidate.rest_curvature is None else candidate.rest_curvature
-    at = np.linspace(0.0, length, 201)
-    places = np.linspace(0.0, length, len(bends))
-    memory = np.column_stack([np.interp(at, places, bends[:, 0]), np.interp(at, places, bends[:, 1]), 0.0 * at])
-    return replace(
-        shape,
-        control_points=np.column_stack([q, theta * middle / length]),
-        material=Material(director=director, u=at, memory=memory, natural=memory),
-    )
 
 
 def _held_paths(recording: Recording, shake: np.random.Generator | None) -> dict[int, CubicSpline]:

@@ -1,6 +1,7 @@
 """The state a recorded motion begins with: shape and velocity of the spline from the markers of a few frames."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +61,11 @@ class StartFit:
     grid: Grid
     held: tuple[tuple[float, int], ...]
 
+    @cached_property
+    def rows(self) -> HeldRows:
+        """The held rows, solved."""
+        return HeldRows.of(self.grid.knots, self.held)
+
     def shape(
         self, bending: float, weight: Floats, u: Floats, markers: Floats, targets: Floats, guess: Floats | None = None
     ) -> Floats:
@@ -75,7 +81,7 @@ class StartFit:
         """
         knots, tables = self.grid.knots, self.grid.tables
         n = len(knots) - 4
-        rows = HeldRows.of(knots, self.held)
+        rows = self.rows
         active = np.zeros(laws.COUNT, np.int64)
         active[[laws.STRETCH, laws.BEND]] = 1
         p = np.zeros((laws.COUNT, laws.PARAMETERS))
@@ -124,7 +130,7 @@ class StartFit:
             targets: velocities of what is held (held, 3).
         """
         tables, n = self.grid.tables, len(q)
-        rows = HeldRows.of(self.grid.knots, self.held)
+        rows = self.rows
         B = design_matrix(self.grid.knots, u)
         first = _matrix(tables.axial_first, tables.axial_b1, n)
         tangent = first @ q
