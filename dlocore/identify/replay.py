@@ -1,5 +1,6 @@
 """Replay of a recording: the scene of its grippers, predicted from its first frames with a candidate's parameters."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -24,12 +25,16 @@ from dlocore.sensitivity import KnownMotion, beside, factored, objection
 from dlocore.solvers.march import STRONGLY_DAMPED, March, march
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import design_matrix
+from dlocore.statics import start_grid
 
 Floats = NDArray[np.float64]
 
 _SLACK = 1.003  # of the cable between two grippers: held markers farther apart are brought nearer
 _JUMP = 6.0  # robust deviations beyond which a sample of a held marker is an outlier
 _FLOOR = 5e-4  # [m] below which no sample is one
+_PASSES = 20  # of looking for outliers
+_REST_FRAMES = 8  # from which on a start can be seen to be at rest
+_STILL = 0.01  # [m/s]: slower than this, or than noise lets tell, nothing moves
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -139,6 +144,7 @@ class Replay:
         self.paths = self._reachable(tuple(self._path(h, clean) for h in self.holds))
         self.ways = tuple(self._way(i) for i in range(len(self.holds)))
         self.seen, self.start_markers, self.start_speeds = _start_markers(recording, frames, self.begin, shake)
+        self.at_rest = frames >= _REST_FRAMES and _rests(recording, frames)
         self._guess: Floats | None = None
         self._start: StartFit | None = None
         self._start_length = 0.0
@@ -221,8 +227,8 @@ class Replay:
             self._guess,
         )  # fmt: skip
         self._guess = q
-        v = fit.velocity(q, u[seen], self.start_speeds, np.array(rates))
-        shape = ControlPoints(control_points=q, knots=fit.grid.knots, velocity=v)
+        v = None if self.at_rest else fit.velocity(q, u[seen], self.start_speeds, np.array(rates))
+        shape = ControlPoints(control_points=q, knots=fit.grid.knots, velocity=v, settle=self.at_rest)
         if candidate.twist:
             shape = with_sections(shape, candidate.rest_curvature, candidate.turn, frames)
         switches: dict[str, Switch] = {"inertia": "on", "twist": "on" if candidate.twist else "off"}
@@ -252,7 +258,7 @@ class Replay:
     def posed(self, candidate: Candidate) -> tuple[Problem, Grid]:
         """Return the equations of the recorded motion for a candidate, and its grid."""
         problem = pose(self.scene(candidate))
-        return problem, make_grid(problem, self.resolution.n_u)
+        return problem, start_grid(problem, self.resolution.n_u, Monitor(None, None, None))
 
     def play(self, candidate: Candidate) -> Played:
         """Predict the recording with a candidate."""
@@ -311,11 +317,7 @@ def _held_paths(recording: Recording, shake: np.random.Generator | None) -> dict
         x = cast(Floats, recording.markers)[:, marker]
         keep = np.isfinite(x[:, 0])
         t, x = times[keep], x[keep]
-        for _ in range(2):
-            middle = _running_median(x)
-            away = np.linalg.norm(x - middle, axis=1)
-            kept = away <= max(_JUMP * 1.4826 * float(np.median(away)), _FLOOR)
-            t, x = t[kept], x[kept]
+        t, x = _without_outliers(t, x)
         smooth = _smoothed(t, x, times)
         if shake is not None:
             noise = np.sqrt(((x - smooth(t)) ** 2).mean())
@@ -324,9 +326,35 @@ def _held_paths(recording: Recording, shake: np.random.Generator | None) -> dict
     return out
 
 
-def _running_median(x: Floats) -> Floats:
-    padded = np.concatenate([x[:1].repeat(3, axis=0), x, x[-1:].repeat(3, axis=0)])
-    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 7, axis=0), axis=-1))
+def _without_outliers(t: Floats, x: Floats) -> tuple[Floats, Floats]:
+    """Return the samples without those that leave the cubic through their four neighbours, the worst ones first."""
+    for _ in range(_PASSES):
+        if len(t) < 8:
+            break
+        away = _leaps(t, x)
+        limit = max(_JUMP * 1.4826 * float(np.median(away)), _FLOOR)
+        around = np.concatenate([[0.0, 0.0], away, [0.0, 0.0]])
+        worst = np.max([around[i : i + len(away)] for i in range(5)], axis=0)
+        out = (away > limit) & (away >= worst)
+        if not out.any():
+            break
+        t, x = t[~out], x[~out]
+    return t, x
+
+
+def _leaps(t: Floats, x: Floats) -> Floats:
+    """Return the distance (k,) of samples from the cubic through four neighbours, at the ends through the nearest."""
+    around = np.clip(np.arange(len(t)), 2, len(t) - 3)[:, None] + np.array([-2, -1, 0, 1, 2])
+    own = np.arange(len(t))[:, None]
+    others = around[around != own].reshape(len(t), 4)
+    value = np.zeros_like(x)
+    for a in range(4):
+        share = np.ones(len(t))
+        for b in range(4):
+            if b != a:
+                share *= (t - t[others[:, b]]) / (t[others[:, a]] - t[others[:, b]])
+        value += share[:, None] * x[others[:, a]]
+    return np.asarray(np.linalg.norm(x - value, axis=1))
 
 
 def _smoothed(t: Floats, x: Floats, times: Floats) -> CubicSpline:
@@ -339,6 +367,21 @@ def _smoothed(t: Floats, x: Floats, times: Floats) -> CubicSpline:
     noise = 1.4826 * np.median(np.abs(np.diff(x, n=3, axis=0)), axis=0) / np.sqrt(20.0)
     columns = [UnivariateSpline(t, x[:, d], k=3, s=len(t) * noise[d] ** 2, ext=3)(times) for d in range(3)]
     return CubicSpline(times, np.column_stack(columns))
+
+
+def _rests(recording: Recording, frames: int) -> bool:
+    """Tell whether no marker moves in the first frames, as far as their noise lets tell."""
+    times, markers = cast(Floats, recording.times)[:frames], cast(Floats, recording.markers)[:frames]
+    half = frames // 2
+    between = float(times[half:].mean() - times[:half].mean())
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of a marker that was not seen
+        moved = np.nanmedian(markers[half:], axis=0) - np.nanmedian(markers[:half], axis=0)
+        noise = 1.4826 * np.nanmedian(np.abs(np.diff(markers, axis=0)), axis=(0, 2)) / np.sqrt(2.0)
+    speed = np.linalg.norm(moved, axis=1) / between
+    allowed = np.maximum(_STILL, 1.25 * np.sqrt(3.0) * np.sqrt(4.0 / frames) * noise / between * 2.0)
+    known = np.isfinite(speed)
+    return bool((speed[known] <= allowed[known]).all())
 
 
 def _start_markers(
