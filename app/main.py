@@ -11,7 +11,7 @@ from fastapi_offline import FastAPIOffline
 from app import openapi, problems, viewer
 from app.access import Access
 from app.middleware import AccessLog, BodyLimit, PageHeaders
-from app.routes import batch, cables, files, health, pages, predictions, rerun, scenes, shapes
+from app.routes import batch, cables, files, health, identify, pages, predictions, rerun, scenes, shapes
 from app.service import Service
 from app.settings import Settings
 
@@ -52,7 +52,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             expose_headers=["Location", "Preference-Applied", "Retry-After"],
         )
     app.add_middleware(AccessLog)
-    for routes in (batch, predictions, files, scenes, shapes, cables, health, rerun):
+    for routes in (batch, predictions, files, scenes, shapes, cables, identify, health, rerun):
         app.include_router(routes.router)
     viewer.add_routes(app)
     pages.add_pages(app)

@@ -146,5 +146,3 @@ def simulated(
         linear_density=cable.linear_density,
         name=f"simulated {seed}",
     )
-
-

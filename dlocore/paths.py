@@ -96,7 +96,7 @@ class Move:
 class Waypoints:
     """Pass through `positions` (n, 3) [m] at `times` (n,) [s] along a C2 cubic spline.
 
-    It starts at rest, or with `start` "moving" with the velocity that the first waypoints tell, as a recorded path does.
+    It starts at rest; with `start` "moving" at the velocity that the first waypoints tell, as a recorded path does.
     `orientations` (n, 4), unit quaternions (w, x, y, z), turn the grasp by their rotation since the first. The first
     position must be that of the cable at the grasped point, within `dlocore.checks.GRASP_TOLERANCE`; the start
     shape is then brought to it.

@@ -221,7 +221,9 @@ def _from_npz(path: Path) -> Recording:
         raise SceneError("recording", path.name, "a NumPy .npz file") from error
     missing = [name for name in ("times", "markers") if name not in arrays]
     if missing:
-        raise SceneError(missing[0], sorted(arrays), "the arrays times (k,) and markers (k, m, 2 or 3)", "It is missing")
+        raise SceneError(
+            missing[0], sorted(arrays), "the arrays times (k,) and markers (k, m, 2 or 3)", "It is missing"
+        )
     facts = _json(str(arrays["about"]), path.name) if "about" in arrays else {}
     facts.setdefault("name", path.stem)
     return recording_of(arrays["times"], arrays["markers"], facts)
@@ -239,7 +241,9 @@ def _from_csv(path: Path) -> Recording:
         rows = rows[1:]  # names of the columns
     width = len(rows[0]) if rows else 0
     if width < 1 + 3 * dimensions or (width - 1) % dimensions:
-        raise SceneError("recording", f"{width} columns", f"time and {dimensions} columns for each of 3 markers or more")
+        raise SceneError(
+            "recording", f"{width} columns", f"time and {dimensions} columns for each of 3 markers or more"
+        )
     values = np.empty((len(rows), width))
     for i, row in enumerate(rows):
         if len(row) != width:

@@ -146,8 +146,10 @@ def beside(known: KnownMotion, problem: Problem, grid: Grid) -> tuple[Floats, Fl
     length = problem.scene.cable.length
     velocity = v
     marks = [0.0, *[e.time for e in events_of(problem)], problem.horizon]
+    if problem.nc != states.shape[2]:
+        raise ValueError("the motion beside it has other effects")
     if len(marks) != len(known.stretches) + 1:
-        raise ValueError("the events of the motion are others")
+        raise ValueError("the parameter brings an event into the motion, or takes one out")
     for stretch, (begin, end) in zip(known.stretches, pairwise(marks), strict=True):
         first, last = stretch.first, stretch.last
         times[first : last + 1] = np.linspace(begin, end, last - first + 1)
@@ -264,8 +266,6 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
 
     def moved(name: str, value: float) -> tuple[Problem, Grid]:
         other = pose(_with(scene, name, value), called)
-        if other.nc != problem.nc or len(events_of(other)) != len(events_of(problem)):
-            raise ValueError("the motion beside it has other effects")
         return other, start_grid(other, accuracy.n_u, monitor)
 
     above, below, exact, widths = [], [], [], []
@@ -298,9 +298,7 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     )  # fmt: skip
 
 
-def _surface(
-    problem: Problem, grid: Grid, states: Floats, times: Floats, velocity: Floats, n_t: int
-) -> SplineSurface:
+def _surface(problem: Problem, grid: Grid, states: Floats, times: Floats, velocity: Floats, n_t: int) -> SplineSurface:
     """Return the bivariate spline of the centreline of marched states; theta is left out."""
     knots_t = time_knots(problem, n_t)
     assert knots_t is not None, "the prediction has one on as many control points"

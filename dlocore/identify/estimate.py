@@ -323,7 +323,13 @@ class Search:
             return None
 
     def _column(
-        self, replay: Replay | Rest, played: Played | Settled, candidate: Candidate, x: Floats, j: int, known: Floats | None
+        self,
+        replay: Replay | Rest,
+        played: Played | Settled,
+        candidate: Candidate,
+        x: Floats,
+        j: int,
+        known: Floats | None,
     ) -> Floats:
         free = replay.recording.free
         if known is not None and isinstance(replay, Replay) and isinstance(played, Played):
@@ -403,4 +409,3 @@ def robust_deviation(r: Floats) -> float:
 def weights(r: Floats, deviation: float) -> Floats:
     """Return the weights of residuals: 1 for small ones, falling as 1/|r| for large ones."""
     return np.asarray(1.0 / np.sqrt(1.0 + (r / (_KNEE * deviation)) ** 2))
-

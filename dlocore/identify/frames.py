@@ -1,6 +1,7 @@
 """Frames of clamps that are known by their direction alone, and the sections of a cable between two of them."""
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import cast
 
 import numpy as np
@@ -59,7 +60,7 @@ def with_sections(
         t = design_matrix(knots, u, 1) @ q
         t /= np.linalg.norm(t, axis=1)[:, None]
         d = director
-        for before, after in zip(t[:-1], t[1:], strict=True):
+        for before, after in pairwise(t):
             axis = np.cross(before, after)
             d = (before @ after) * d + np.cross(axis, d) + axis * (axis @ d) / (1.0 + before @ after)
         end = frames[1][0]

@@ -140,9 +140,8 @@ def _estimated(
     low, high = p.value(x - quantile * deviation), p.value(x + quantile * deviation)
     if not p.logarithmic:
         low = max(low, p.least)
-    usual = 1.0 if p.logarithmic else 1.0 if np.isfinite(p.least) else 1.0
     unseen = not information > 1e-8
-    wide = deviation > _UNSEEN * usual
+    wide = deviation > _UNSEEN
     scale = max(abs(value), _SMALL * p.scale)
     if unseen:
         statement = f"{p.name} can't be seen in these recordings: it changes nothing that was measured."

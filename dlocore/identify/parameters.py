@@ -1,9 +1,9 @@
-"""The parameters that can be identified: how each is read from and put into a candidate, and on which scale it varies."""
+"""The parameters that can be identified: how each is put into a candidate, and on which scale it is sought."""
 
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,7 +108,8 @@ def _scalar(name: str) -> Parameter:
         unit, scale = ("N s/m^2", 0.05) if name == "drag" else ("N s^2/m^3", 0.02)
 
         def put(c: Candidate, x: float) -> Candidate:
-            return replace(c, environment=replace(c.environment, **{name: x}))
+            changes: Any = {name: x}
+            return replace(c, environment=replace(c.environment, **changes))
 
         return Parameter(name, unit, False, scale, 0.0, lambda c: cast(float, getattr(c.environment, name)), put)
     if name == "turn":
@@ -135,7 +136,8 @@ def _component(name: str, i: int, d: int) -> Parameter:
     def put(c: Candidate, x: float) -> Candidate:
         values = np.array(getattr(c, name))
         values[i, d] = x
-        return replace(c, **{name: values})
+        changes: Any = {name: values}
+        return replace(c, **changes)
 
     return Parameter(
         f"{name}[{i}][{d}]", unit, False, scale, -np.inf, lambda c: float(getattr(c, name)[i, d]), put

@@ -4,6 +4,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Literal, cast
 
 import numpy as np
@@ -174,7 +175,7 @@ class Replay:
         """Bring grippers together that noise has put farther apart than the cable between them reaches."""
         u = cast(Floats, self.recording.u)
         paths = tuple(replace(p, positions=p.positions.copy()) for p in paths)
-        for (a, p), (b, q) in zip(list(zip(self.holds, paths))[:-1], list(zip(self.holds, paths))[1:], strict=True):
+        for (a, p), (b, q) in pairwise(zip(self.holds, paths, strict=True)):
             across = q.positions - p.positions
             apart = np.linalg.norm(across, axis=1)
             most = _SLACK * (u[b.marker] - u[a.marker])
@@ -301,7 +302,9 @@ def common_references(recordings: Sequence[Recording]) -> Floats | None:
         if h.towards is None:
             continue
         sign = 1.0 if h.forward else -1.0
-        along = [sign * (cast(Floats, r.markers)[:, h.towards] - cast(Floats, r.markers)[:, h.marker]) for r in recordings]
+        along = [
+            sign * (cast(Floats, r.markers)[:, h.towards] - cast(Floats, r.markers)[:, h.marker]) for r in recordings
+        ]
         unit = [x / np.linalg.norm(x, axis=1)[:, None] for x in along]
         mean = np.nanmean(np.concatenate(unit), axis=0)
         found.append(mean / np.linalg.norm(mean))

@@ -119,9 +119,7 @@ class Rest:
             self._start = (length, fit)
         fit = self._start[1]
         weight = cable.linear_density * np.asarray(environment.gravity)
-        q = fit.shape(
-            cast(float, cable.bending_stiffness), weight, u[seen], self.given[frame, seen], np.array(targets)
-        )
+        q = fit.shape(cast(float, cable.bending_stiffness), weight, u[seen], self.given[frame, seen], np.array(targets))
         shape = ControlPoints(control_points=q, knots=fit.grid.knots)
         if candidate.twist:
             shape = with_sections(shape, candidate.rest_curvature, candidate.turn, frames)
