@@ -29,7 +29,6 @@ from dlocore.prediction import Prediction
 from dlocore.problem import Problem, pose
 from dlocore.report import surface_of
 from dlocore.scene import Scene
-from dlocore.solvers.ladder import given_steps
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, closed_grasps, events_of, march, time_knots, times_mass
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import SplineSurface
@@ -253,7 +252,7 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     values = [_number(scene, name) for name in wrt]
     problem = pose(scene, called)
     monitor = Monitor(None, None, None)
-    steps = accuracy.steps or given_steps(accuracy.n_t)
+    steps = _asked_for(problem, accuracy.steps)
     rho = RHO if problem.contact is None and problem.friction is None else STRONGLY_DAMPED
     grid = start_grid(problem, accuracy.n_u, monitor)
     motion = march(problem, grid, steps, monitor, rho=rho)
@@ -296,6 +295,19 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
         names=tuple(wrt), exact=tuple(exact), reason=reason, steps=tuple(widths), above=tuple(above),
         below=tuple(below),
     )  # fmt: skip
+
+
+def _asked_for(problem: Problem, steps: int) -> int:
+    """Return the number of steps that a march was asked for that took `steps`: stretches between events have more."""
+    marks = [0.0, *[e.time for e in events_of(problem)], problem.horizon]
+    if len(marks) == 2:
+        return steps
+
+    def taken(asked: int) -> int:
+        shares = [asked * (b - a) / problem.horizon for a, b in pairwise(marks)]
+        return sum(max(8, asked // (2 * len(marks)), round(share)) for share in shares)
+
+    return next((asked for asked in range(steps, 0, -1) if taken(asked) <= steps), steps)
 
 
 def _surface(problem: Problem, grid: Grid, states: Floats, times: Floats, velocity: Floats, n_t: int) -> SplineSurface:

@@ -141,7 +141,7 @@ def _estimated(
     if not p.logarithmic:
         low = max(low, p.least)
     unseen = not information > 1e-8
-    wide = deviation > _UNSEEN
+    wide = deviation > _UNSEEN * (1.0 if p.logarithmic else max(1.0, abs(x)))
     scale = max(abs(value), _SMALL * p.scale)
     if unseen:
         statement = f"{p.name} can't be seen in these recordings: it changes nothing that was measured."

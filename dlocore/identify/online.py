@@ -45,7 +45,7 @@ class Identifier:
     """Takes frames as they arrive and keeps an estimate of the cable.
 
     Every update replays the frames of the last `window` seconds once and makes one Gauss-Newton step, with the last
-    estimate and its covariance, widened a little, as prior. Call `update` when there is time: not every frame needs one.
+    estimate and its covariance, widened a little, as prior. Not every frame needs an update.
 
     Args:
         u: material coordinates of the markers (m,) [m].

@@ -55,9 +55,7 @@ def test_the_service_identifies_a_cable_that_a_scene_takes(client: TestClient, a
     scene = {
         "cable": answer["cable"],
         "shape": {"kind": "straight"},
-        "primitives": [
-            {"kind": "grasp", "u": 0.0, "path": {"kind": "move", "displacement": [0, 0.1, 0], "duration": 1}}
-        ],
+        "primitives": [{"u": 0.0, "path": {"kind": "move", "displacement": [0, 0.1, 0], "duration": 1}}],
         "environment": answer["environment"],
     }
     explained = client.post("/v1/scenes:explain", json=scene)
