@@ -72,8 +72,11 @@ class _Search:
         """Emit the events."""
         try:
 
+            async def send(data: bytes) -> None:
+                await emit(b"event: iteration\ndata: " + data + b"\n\n")
+
             def show(data: bytes) -> None:
-                anyio.from_thread.run(emit, b"event: iteration\ndata: " + data + b"\n\n")
+                anyio.from_thread.run(send, data)
 
             answer = await self.result(show)
             await emit(b"event: done\ndata: " + answer + b"\n\n")
