@@ -111,14 +111,16 @@ def _correlations(found: Identification) -> str:
 
 
 def _figures(fit: Fit) -> str:
-    distance = np.nanmean(np.where(np.isfinite(fit.distances), fit.distances, np.nan), axis=1) * 1e3
-    worst = int(np.nanargmax(distance))
+    # the median of the markers, which outliers of the tracking do not make
+    distance = np.array([np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else 0.0 for row in fit.distances])
+    distance *= 1e3
+    worst = int(np.argmax(distance))
     overlay = _overlay(fit, worst)
-    caption = f"{fit.name}: worst moment, {distance[worst]:.0f} mm on average at {fit.times[worst]:.2f} s"
+    caption = f"{fit.name}: worst moment, {distance[worst]:.0f} mm in the median at {fit.times[worst]:.2f} s"
     if len(fit.times) < 10:
         return f"<figure>{overlay}<figcaption>{escape(caption)}</figcaption></figure>"
     return (
-        f'<div class="row"><figure>{_over_time(fit.times, distance)}<figcaption>{escape(fit.name)}: mean distance of '
+        f'<div class="row"><figure>{_over_time(fit.times, distance)}<figcaption>{escape(fit.name)}: median distance of '
         f"the free markers over time</figcaption></figure><figure>{overlay}<figcaption>{escape(caption)}: "
         f'<span style="color:{_ORANGE}">measured</span>, <span style="color:{_BLUE}">predicted</span></figcaption>'
         "</figure></div>"
@@ -135,11 +137,10 @@ def _over_time(times: Floats, distance: Floats) -> str:
     for share in (0.0, 0.5, 1.0):
         at = top + height * (1.0 - share)
         parts.append(f'<line x1="{left}" x2="{left + width}" y1="{at}" y2="{at}" stroke="#dde"/>')
-        parts.append(_text(left - 6, at + 4, f"{share * most:g}", "end"))
+        parts.append(_text(left - 6, at + 4, f"{share * most:g}" + (" mm" if share == 1.0 else ""), "end"))
         when = times[0] + share * (times[-1] - times[0])
         parts.append(_text(left + share * width, top + height + 16, f"{when:.3g}", "middle"))
     parts.append(_text(left + width / 2, top + height + 32, "time [s]", "middle"))
-    parts.append(_text(4, top + 4, "mm", "start"))
     return _svg(420, 240, parts)
 
 
