@@ -25,11 +25,12 @@ WITHIN = 0.05
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--trials", type=int, default=50)
+    parser.add_argument("--first", type=int, default=100, help="first seed")
     parser.add_argument("--seconds", type=float, default=6.0, help="recorded time of each trial")
     options = parser.parse_args()
     print(machine_line())
     near, inside, errors, spent = [], [], [], []
-    for seed in range(100, 100 + options.trials):
+    for seed in range(options.first, options.first + options.trials):
         cable, environment = true_cable(np.random.default_rng([seed, 1]))
         truth = np.array([cable.bending_stiffness, environment.drag, cable.bending_damping], dtype=float)
         recording = simulated(seed, options.seconds)

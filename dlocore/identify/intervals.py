@@ -1,5 +1,6 @@
 """How well identified parameters are known: intervals, correlations, and what the data do not tell."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 _BLOCK = 0.5  # [s] in which residuals hang together
+_MORE = 4  # control points of a finer net
 _SHAKES = 12  # replays with other noise of the held markers and the start
 _UNSEEN = 0.5  # standard deviation of a logarithm, or share of the prior's, from which on a parameter is not identified
 _SMALL = 0.1  # of the scale of a parameter without a prior
@@ -24,9 +26,9 @@ _SMALL = 0.1  # of the scale of a parameter without a prior
 def assess(search: "Search", state: "State", seconds: float) -> "Identification":
     """Return the identification of a finished search.
 
-    The covariance of the values is the sum of three: of the residuals taken as independent, or as hanging together
-    within blocks of half a second where that is more; and of the noise of what was taken as known, the held markers and
-    the start, replayed with other noise of the same size.
+    The variance of a value is the sum of three: of the residuals taken as independent, or as hanging together within
+    blocks of half a second where that is more; of the noise of what was taken as known, the held markers and the start,
+    replayed with other noise of the same size; and the square of what a finer net and half the step would change.
     """
     from dlocore.identify.estimate import Fit, Identification, robust_deviation, weights
 
@@ -47,7 +49,8 @@ def assess(search: "Search", state: "State", seconds: float) -> "Identification"
     clustered = inverse @ spread @ inverse
     shaken = inverse @ _shaken(search, state, w / deviation**2) @ inverse
     plain = np.diag(inverse)
-    variance = np.maximum(plain, np.diag(clustered)) + np.diag(shaken)
+    refined = inverse @ _refined(search, state, w / deviation**2)
+    variance = np.maximum(plain, np.diag(clustered)) + np.diag(shaken) + refined**2
     quantile = float(student.ppf(0.975, max(len(blocks) - len(x), 2)))
     share = np.array([_information(D, residual, deviation) for D, residual in
                       zip(derivatives, state.residuals, strict=True)])  # fmt: skip
@@ -128,6 +131,25 @@ def _shaken(search: "Search", state: "State", scale: Floats) -> Floats:
                 change = other.play(state.candidate).predicted - played.predicted
             found.append(D.T @ (factor * change[:, free].ravel()))
         total += np.array(found).T @ np.array(found) / _SHAKES
+    return total
+
+
+def _refined(search: "Search", state: "State", scale: Floats) -> Floats:
+    """Return the gradient of the misfit that a finer net and half the step give."""
+    resolution = search.resolution
+    finer = replace(resolution, n_u=resolution.n_u + _MORE, step=0.5 * resolution.step)
+    total = np.zeros(len(search.chosen))
+    at = 0
+    for i, (replay, played) in enumerate(zip(search.replays, state.played, strict=True)):
+        search._check()
+        D = cast(list[Floats], state.derivatives)[i]
+        factor = scale[at : at + len(D)]
+        at += len(D)
+        kind = Rest if isinstance(replay, Rest) else Replay
+        other = kind(replay.recording, finer, search.references).play(state.candidate)
+        if not other.stopped:
+            change = other.predicted - played.predicted
+            total += D.T @ (factor * change[:, replay.recording.free].ravel())
     return total
 
 
