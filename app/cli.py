@@ -1,11 +1,11 @@
-"""The command line: ``dlo serve``, ``dlo predict``, ``dlo calibrate``, ``dlo study``, ``dlo warmup``."""
+"""The command line: ``dlo serve``, ``predict``, ``identify``, ``validate``, ``calibrate``, ``study``, ``warmup``."""
 
 import argparse
 import sys
 from collections.abc import Sequence
 from typing import get_args
 
-from app import commands, study_command
+from app import commands, identify_commands, study_command
 from dlocore.scene import Method
 
 _DESCRIPTION = "Predict how a cable moves when grippers move it."
@@ -16,6 +16,8 @@ _EPILOG = """examples:
   dlo predict scene.json --rrd out.rrd  a recording for rerun: iterations and motion
   dlo calibrate                         what accuracy costs in time on this machine
   dlo study -o now.json --plots plots   the same in full, with plots
+  dlo identify shaken.npz -o cable.json the parameters of a tracked cable, with intervals
+  dlo validate DATASET                  fit and predict published measurements
 
 Settings come from the environment, e.g. DLO_PORT=9000, DLO_DATA_DIR=/srv/dlo, DLO_WORKERS=4."""
 _EXIT = """exit codes: 0 converged; 2 bad input, named on stderr; 3 not converged (the output is still written)"""
@@ -67,6 +69,43 @@ def parser() -> argparse.ArgumentParser:
     calibrate.set_defaults(run=lambda o: commands.calibrate(repeats=o.repeats, json=o.json))
 
     _add_study(subcommands)
+
+    find = subcommands.add_parser(
+        "identify",
+        help="identify a cable from recordings",
+        description="Identify the parameters of one cable from recordings of its tracked markers.",
+        epilog=_EXIT,
+    )
+    find.add_argument("recordings", nargs="+", metavar="RECORDING", help=".npz, or .csv with a .json beside it")
+    find.add_argument("-o", "--output", metavar="CABLE.json", default="-", help='the cable; "-" (default) prints it')
+    find.add_argument("--report", metavar="OUT.html", help="write a page with fits, errors and intervals")
+    find.add_argument(
+        "--parameters",
+        metavar="NAMES",
+        default="bending_stiffness,drag,drag_quadratic,bending_damping",
+        help="which, by commas; also torsional_stiffness, length_ratio, turn, clamp_angles, rest_curvature",
+    )
+    find.add_argument("--n-u", type=int, default=13, help="control points along the cable (default 13)")
+    find.set_defaults(
+        run=lambda o: identify_commands.identify(
+            o.recordings, names=o.parameters.split(","), output=o.output, report=o.report, n_u=o.n_u
+        )
+    )
+
+    check = subcommands.add_parser(
+        "validate",
+        help="compare with published measurements",
+        description="Fit cables on some windows of published motion capture and predict the others; fit hanging wires.",
+    )
+    check.add_argument("datasets", nargs="+", metavar="DATASET", help="files, or folders of files (docs/validation.md)")
+    check.add_argument("--fit", type=int, default=4, help="windows of each cable to fit on (default 4)")
+    check.add_argument(
+        "--models", default="scalars,bends", help="scalars (four numbers), bends (and rest shape and clamps), or both"
+    )
+    check.add_argument("--json", metavar="OUT.json", help="write all numbers")
+    check.set_defaults(
+        run=lambda o: identify_commands.validate(o.datasets, fit=o.fit, models=o.models.split(","), json=o.json)
+    )
 
     warmup = subcommands.add_parser(
         "warmup", help="compile the solver", description="Compile the solver now, so that the first solve is fast."

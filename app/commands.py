@@ -80,9 +80,9 @@ def predict(scene: str, *, npz: str | None, json: str | None, rrd: str | None, m
     if npz is not None:
         from app.archive import surface_npz
 
-        _write(npz, surface_npz(document, prediction.material))
+        write_output(npz, surface_npz(document, prediction.material))
     if json is not None:
-        _write(json, orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY))
+        write_output(json, orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY))
     if rrd is not None:
         _record(rrd, request_json=stdlib_json.loads(raw), document=document, prediction=prediction)
     print(summary(prediction), file=sys.stderr)
@@ -228,10 +228,11 @@ def _record(rrd: str, *, request_json: dict[str, Any], document: dict[str, Any],
         write_recording(run, path)
     except (OSError, RuntimeError) as error:
         raise CommandError(f"can't write {rrd}: {error}", exit_code=1) from None
-    _write(str(path.with_suffix(".rbl")), layout())
+    write_output(str(path.with_suffix(".rbl")), layout())
 
 
-def _write(path: str, content: bytes) -> None:
+def write_output(path: str, content: bytes) -> None:
+    """Write a file, "-" for standard output."""
     if path == "-":
         sys.stdout.buffer.write(content)
         sys.stdout.buffer.flush()

@@ -18,6 +18,7 @@ from app.routes import (
     examples,
     files,
     health,
+    identify,
     pages,
     predictions,
     rerun,
@@ -65,7 +66,20 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             expose_headers=["Location", "Preference-Applied", "Retry-After"],
         )
     app.add_middleware(AccessLog)
-    for routes in (batch, predictions, files, scenes, examples, shapes, cables, health, rerun, calibration, studies):
+    for routes in (
+        batch,
+        predictions,
+        files,
+        scenes,
+        examples,
+        shapes,
+        cables,
+        health,
+        rerun,
+        calibration,
+        studies,
+        identify,
+    ):
         app.include_router(routes.router)
     viewer.add_routes(app)
     pages.add_pages(app)

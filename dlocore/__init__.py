@@ -7,6 +7,7 @@ from dlocore.errors import Cancelled, DloError, SceneError
 from dlocore.obstacles import Box, Capsule, Cylinder, Sphere
 from dlocore.paths import Move, Still, Waypoints
 from dlocore.prediction import Accuracy, EffectReport, GraspReaction, Iteration, MaterialMotion, Prediction, continued
+from dlocore.recordings import Recording, load_recording, save_recording
 from dlocore.scene import ControlPoints, Environment, Grasp, Load, Material, Points, Quality, Scene, Straight, Table
 from dlocore.spline import SplineSurface
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from dlocore.balance import effect_forces, energies
     from dlocore.front import predict, warm_up
     from dlocore.planning import Plan, plan
+    from dlocore.sensitivity import Sensitivities, sensitivities
     from dlocore.statics import Equilibrium, equilibrium
 
 __all__ = [
@@ -40,8 +42,10 @@ __all__ = [
     "Points",
     "Prediction",
     "Quality",
+    "Recording",
     "Scene",
     "SceneError",
+    "Sensitivities",
     "Sphere",
     "SplineSurface",
     "Still",
@@ -52,8 +56,11 @@ __all__ = [
     "effect_forces",
     "energies",
     "equilibrium",
+    "load_recording",
     "plan",
     "predict",
+    "save_recording",
+    "sensitivities",
     "warm_up",
 ]
 
@@ -62,6 +69,7 @@ def __getattr__(name: str) -> Any:
     """Import the solver on first use: its compiler takes longer to import than the rest of the package together."""
     homes = {"predict": "front", "warm_up": "front", "equilibrium": "statics", "Equilibrium": "statics"}
     homes |= {"plan": "planning", "Plan": "planning", "energies": "balance", "effect_forces": "balance"}
+    homes |= {"sensitivities": "sensitivity", "Sensitivities": "sensitivity"}
     if name not in homes:
         raise AttributeError(name)
     import importlib

@@ -94,8 +94,9 @@ class Move:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Waypoints:
-    """Pass through `positions` (n, 3) [m] at `times` (n,) [s] along a C2 cubic spline that starts at rest.
+    """Pass through `positions` (n, 3) [m] at `times` (n,) [s] along a C2 cubic spline.
 
+    It starts at rest; with `start` "moving" at the velocity that the first waypoints tell, as a recorded path does.
     `orientations` (n, 4), unit quaternions (w, x, y, z), turn the grasp by their rotation since the first. The first
     position must be that of the cable at the grasped point, within `dlocore.checks.GRASP_TOLERANCE`; the start
     shape is then brought to it.
@@ -104,8 +105,10 @@ class Waypoints:
     times: ArrayLike
     positions: ArrayLike
     orientations: ArrayLike | None = None
+    start: Literal["rest", "moving"] = "rest"
 
     def __post_init__(self) -> None:
+        choice("start", self.start, ("rest", "moving"))
         times = array("times", self.times, shape=(None,), unit="s")
         if not 2 <= len(times) <= MAX_WAYPOINTS:
             raise SceneError("times", f"{len(times)} times", f"2 to {MAX_WAYPOINTS} times")
@@ -120,7 +123,7 @@ class Waypoints:
             raise SceneError("positions", f"{len(positions)} positions", f"as many as times ({len(times)})")
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "positions", positions)
-        boundary = ((1, np.zeros(3)), (2, np.zeros(3)))
+        boundary = "not-a-knot" if self.start == "moving" else ((1, np.zeros(3)), (2, np.zeros(3)))
         object.__setattr__(self, "_spline", CubicSpline(times, positions, bc_type=boundary))  # type: ignore[arg-type]
         if self.orientations is not None:
             quaternions = array("orientations", self.orientations, shape=(None, 4))

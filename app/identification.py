@@ -1,0 +1,190 @@
+"""What an identification says, as JSON and as one page of HTML: tables, plots, worst moments."""
+
+from html import escape
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.identify import Fit, Identification
+
+Floats = NDArray[np.float64]
+
+_BLUE, _ORANGE, _GREY = "#0072b2", "#d55e00", "#8a8f98"  # Okabe-Ito
+_STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#1c2024}
+h1{font-size:1.5rem}h2{font-size:1.15rem;margin-top:2rem}table{border-collapse:collapse;width:100%}
+td,th{padding:.3rem .6rem;border-bottom:1px solid #dde;text-align:right}td:first-child,th:first-child{text-align:left}
+figure{margin:1rem 0}figcaption{color:#555;font-size:.9rem}svg{width:100%;height:auto}.row{display:flex;gap:1rem}
+.row figure{flex:1}.unknown{color:#8a8f98}"""
+
+
+def document_of_identification(found: Identification) -> dict[str, Any]:
+    """Return an identification as JSON-ready data: the cable and drag as scenes take them, and how they are known."""
+    candidate = found.candidate
+    cable = candidate.cable
+    names = ("length", "diameter", "linear_density", "bending_stiffness", "axial_stiffness", "torsional_stiffness")
+    document: dict[str, Any] = {
+        "status": found.status,
+        "message": found.message,
+        "cable": {**{n: getattr(cable, n) for n in names}, "bending_damping": cable.bending_damping},
+        "environment": {
+            "drag": candidate.environment.drag,
+            "drag_quadratic": candidate.environment.drag_quadratic,
+            "gravity": np.asarray(candidate.environment.gravity).tolist(),
+        },
+        "parameters": [
+            {
+                "name": p.name, "unit": p.unit, "value": p.value, "low": p.low, "high": p.high,
+                "identifiable": p.identifiable, "statement": p.statement, "rests_on": p.rests_on,
+            }
+            for p in found.parameters
+        ],
+        "correlations": [[None if np.isnan(x) else float(x) for x in row] for row in found.correlations],
+        "fit": [
+            {
+                "recording": fit.name,
+                "mean": float(np.nanmean(fit.distances)),
+                "median": float(np.nanmedian(fit.distances)),
+                "worst": float(np.nanmax(fit.distances)),
+                "stalled": fit.stalled,
+            }
+            for fit in found.fits
+        ],
+        "deviation": found.deviation,
+        "iterations": found.iterations,
+        "seconds": found.seconds,
+    }  # fmt: skip
+    if candidate.rest_curvature is not None:
+        document["rest_curvature"] = candidate.rest_curvature.tolist()
+    if candidate.clamp_angles is not None:
+        document["clamp_angles"] = candidate.clamp_angles.tolist()
+    if any(p.name == "length_ratio" for p in found.parameters):
+        document["cable"]["length"] = cable.length * candidate.length_ratio
+    return document
+
+
+def report_of(found: Identification, title: str) -> str:
+    """Return one self-contained page: parameters with intervals, fits, errors over time, and the worst moments."""
+    rows = "".join(
+        f"<tr{'' if p.identifiable else ' class=unknown'}><td>{escape(p.name)}</td>"
+        + (
+            f"<td>{p.value:.4g}</td><td>{p.low:.3g} to {p.high:.3g}</td>"
+            if p.identifiable
+            else "<td>not identifiable</td><td>-</td>"
+        )
+        + f"<td>{escape(p.unit)}</td></tr>"
+        for p in found.parameters
+    )
+    fits = "".join(
+        f"<tr><td>{escape(f.name)}</td><td>{1e3 * np.nanmean(f.distances):.1f}</td>"
+        f"<td>{1e3 * np.nanmedian(f.distances):.1f}</td><td>{1e3 * np.nanmax(f.distances):.1f}</td>"
+        f"<td>{'stalled' if f.stalled else ''}</td></tr>"
+        for f in found.fits
+    )
+    figures = "".join(_figures(fit) for fit in found.fits[:8])
+    more = f"<p>{len(found.fits) - 8} more windows are in the table.</p>" if len(found.fits) > 8 else ""
+    every = np.concatenate([f.distances.ravel() for f in found.fits])
+    typical = 1e3 * float(np.nanmedian(every))
+    return (
+        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
+        f"<style>{_STYLE}</style></head><body><h1>{escape(title)}: the prediction is within {typical:.1f} mm of half "
+        f"the markers</h1><p>{escape(found.message)}</p><h2>Parameters</h2><table><tr><th>parameter</th><th>value</th>"
+        f"<th>95 % interval</th><th>unit</th></tr>{rows}</table>{_correlations(found)}<h2>Distance of free markers "
+        f"from the prediction [mm]</h2><table><tr><th>recording</th><th>mean</th><th>median</th><th>worst</th>"
+        f"<th></th></tr>{fits}</table>{figures}{more}<p>{found.iterations} iterations in {found.seconds:.1f} s.</p>"
+        "</body></html>"
+    )
+
+
+def _correlations(found: Identification) -> str:
+    names = [p.name for p in found.parameters]
+    if len(names) < 2 or len(names) > 12:
+        return ""
+    head = "".join(f"<th>{escape(n)}</th>" for n in names)
+    body = "".join(
+        f"<tr><td>{escape(name)}</td>"
+        + "".join("<td>-</td>" if np.isnan(x) else f"<td>{x:.2f}</td>" for x in row)
+        + "</tr>"
+        for name, row in zip(names, found.correlations, strict=True)
+    )
+    return f"<h2>Correlations</h2><table><tr><th></th>{head}</tr>{body}</table>"
+
+
+def _figures(fit: Fit) -> str:
+    # the median of the markers, which outliers of the tracking do not make
+    distance = np.array([np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else 0.0 for row in fit.distances])
+    distance *= 1e3
+    worst = int(np.argmax(distance))
+    overlay = _overlay(fit, worst)
+    caption = f"{fit.name}: worst moment, {distance[worst]:.0f} mm in the median at {fit.times[worst]:.2f} s"
+    if len(fit.times) < 10:
+        return f"<figure>{overlay}<figcaption>{escape(caption)}</figcaption></figure>"
+    return (
+        f'<div class="row"><figure>{_over_time(fit.times, distance)}<figcaption>{escape(fit.name)}: median distance of '
+        f"the free markers over time</figcaption></figure><figure>{overlay}<figcaption>{escape(caption)}: "
+        f'<span style="color:{_ORANGE}">measured</span>, <span style="color:{_BLUE}">predicted</span></figcaption>'
+        "</figure></div>"
+    )
+
+
+def _over_time(times: Floats, distance: Floats) -> str:
+    left, top, width, height = 48.0, 10.0, 360.0, 190.0
+    most = _round_up(float(np.nanmax(distance)))
+    x = left + width * (times - times[0]) / (times[-1] - times[0])
+    y = top + height * (1.0 - distance / most)
+    line = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True) if np.isfinite(b))
+    parts = [f'<polyline points="{line}" fill="none" stroke="{_BLUE}" stroke-width="1.5"/>']
+    for share in (0.0, 0.5, 1.0):
+        at = top + height * (1.0 - share)
+        parts.append(f'<line x1="{left}" x2="{left + width}" y1="{at}" y2="{at}" stroke="#dde"/>')
+        parts.append(_text(left - 6, at + 4, f"{share * most:g}" + (" mm" if share == 1.0 else ""), "end"))
+        when = times[0] + share * (times[-1] - times[0])
+        parts.append(_text(left + share * width, top + height + 16, f"{when:.3g}", "middle"))
+    parts.append(_text(left + width / 2, top + height + 32, "time [s]", "middle"))
+    return _svg(420, 240, parts)
+
+
+def _overlay(fit: Fit, frame: int) -> str:
+    """Return a view along the direction in which the shape is flattest, x-like to the right and up upwards."""
+    measured, predicted = fit.measured[frame], fit.predicted[frame]
+    middle = predicted.mean(axis=0)
+    spread = (predicted - middle)[:, :2]
+    along = np.linalg.svd(spread)[2][0]
+    along = along * (1.0 if along[np.argmax(np.abs(along))] > 0 else -1.0)
+
+    def seen(points: Floats) -> Floats:
+        return np.column_stack([(points - middle)[:, :2] @ along, points[:, 2]])
+
+    a, b = seen(measured), seen(predicted)
+    every = np.concatenate([a[np.isfinite(a).all(axis=1)], b])
+    low, high = every.min(axis=0), every.max(axis=0)
+    scale = min(390.0 / max(high[0] - low[0], 1e-3), 210.0 / max(high[1] - low[1], 1e-3))
+
+    def placed(points: Floats) -> Floats:
+        x = 210.0 + scale * (points[:, 0] - 0.5 * (low[0] + high[0]))
+        return np.column_stack([x, 120.0 - scale * (points[:, 1] - 0.5 * (low[1] + high[1]))])
+
+    line = " ".join(f"{x:.1f},{y:.1f}" for x, y in placed(b))
+    parts = [f'<polyline points="{line}" fill="none" stroke="{_BLUE}" stroke-width="2"/>']
+    for (x, y), (p, q) in zip(placed(a), placed(b), strict=True):
+        if np.isfinite(x):
+            parts.append(f'<line x1="{x:.1f}" y1="{y:.1f}" x2="{p:.1f}" y2="{q:.1f}" stroke="{_GREY}"/>')
+            parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{_ORANGE}"/>')
+        parts.append(f'<circle cx="{p:.1f}" cy="{q:.1f}" r="2.5" fill="{_BLUE}"/>')
+    parts.append(f'<line x1="10" y1="232" x2="{10 + 0.1 * scale:.1f}" y2="232" stroke="#333" stroke-width="2"/>')
+    parts.append(_text(10, 226, "0.1 m", "start"))
+    return _svg(420, 240, parts)
+
+
+def _round_up(value: float) -> float:
+    """Return the next 1, 2 or 5 times a power of ten."""
+    power = 10.0 ** np.floor(np.log10(max(value, 1e-9)))
+    return float(next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= value * (1 - 1e-12)))
+
+
+def _text(x: float, y: float, words: str, anchor: str) -> str:
+    return f'<text x="{x:.1f}" y="{y:.1f}" font-size="12" fill="#555" text-anchor="{anchor}">{escape(words)}</text>'
+
+
+def _svg(width: int, height: int, parts: list[str]) -> str:
+    return f'<svg viewBox="0 0 {width} {height}" role="img">{"".join(parts)}</svg>'

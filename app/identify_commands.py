@@ -1,0 +1,127 @@
+"""What ``dlo identify`` and ``dlo validate`` do."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import orjson
+
+from app.commands import BAD_INPUT, NOT_CONVERGED, CommandError, write_output
+from dlocore import SceneError
+from dlocore.recordings import Recording, load_recording
+
+if TYPE_CHECKING:
+    from dlocore.identify import Progress
+    from dlocore.identify.validation import CableValidation, WireValidation
+
+
+def identify(recordings: list[str], *, names: list[str], output: str, report: str | None, n_u: int) -> int:
+    """Identify a cable from recordings, write it as JSON, and a report where one is asked for."""
+    from app.identification import document_of_identification, report_of
+    from dlocore.identify import Resolution
+    from dlocore.identify import identify as find
+
+    try:
+        loaded = [_load(path) for path in recordings]
+        found = find(loaded, names=tuple(names), resolution=Resolution(n_u=n_u), on_progress=_show)
+    except SceneError as error:
+        raise CommandError(str(error), BAD_INPUT) from None
+    document = document_of_identification(found)
+    write_output(output, orjson.dumps(document, option=orjson.OPT_INDENT_2 | orjson.OPT_SERIALIZE_NUMPY))
+    if report is not None:
+        write_output(report, report_of(found, ", ".join(Path(r).stem for r in recordings)).encode())
+    for p in found.parameters:
+        value = f"{p.value:<10.4g} {p.low:.3g} to {p.high:.3g} {p.unit}" if p.identifiable else "not identifiable"
+        print(f"{p.name:<24} {value}", file=sys.stderr)
+    print(found.message, file=sys.stderr)
+    return 0 if found.status == "converged" else NOT_CONVERGED
+
+
+def _load(path: str) -> Recording:
+    try:
+        return load_recording(path)
+    except OSError as error:
+        raise CommandError(f"can't read {path}: {error.strerror or error}") from None
+
+
+def _show(progress: "Progress") -> None:
+    values = "  ".join(f"{name} {value:.4g}" for name, value in list(progress.values.items())[:5])
+    print(f"{progress.iteration:>3}  {1e3 * progress.distance:6.2f} mm  {values}", file=sys.stderr, flush=True)
+
+
+def validate(datasets: list[str], *, fit: int, models: list[str], json: str | None) -> int:
+    """Run the published protocols on data sets and print the table."""
+    from app.machine import machine_line
+    from dlocore.identify.datasets import PUBLISHED, PUBLISHED_BY, load_datasets
+    from dlocore.identify.validation import validate_cable, validate_wire
+
+    try:
+        cables, wires = load_datasets([Path(d) for d in datasets], fit)
+        print(machine_line())
+        out: list[dict[str, object]] = []
+        if cables:
+            print(
+                f"\nState from frames 0 and 1, all later frames open loop; L1 is the mean |dx| over frames, all "
+                f"markers and coordinates [m].\npublished: {PUBLISHED_BY}\n\n"
+                f"{'cable':<8}{'model':<9}{'mean':>8}{'median':>8}{'worst':>8}{'publ.':>8}{'mm/free':>9}"
+                f"{'ms/seq':>8}{'x real':>8}{'stalled':>8}{'fit s':>7}"
+            )
+        for cable in cables:
+            start = None
+            for model in models:
+                result = validate_cable(cable, "bends" if model == "bends" else "scalars", start)
+                start = result.found.candidate
+                print(_row(result, PUBLISHED.get(cable.name)), flush=True)
+                out.append(_document(result))
+        if wires:
+            print(f"\n{'wire':<8}{'fitted':<50}{'rms mm':>8}{'worst':>8}   EI [N m^2] and interval (published)")
+        for wire in wires:
+            for names in (("bending_stiffness", "clamp_angles"), ("bending_stiffness", "clamp_angles", *_BENT)):
+                settled = validate_wire(wire, names)
+                published = wire.published_bending_stiffness
+                print(_wire_row(settled, published), flush=True)
+                out.append({"wire": wire.name, "fitted": list(names), "rms": settled.rms.tolist()})
+    except SceneError as error:
+        raise CommandError(str(error), BAD_INPUT) from None
+    if json is not None:
+        write_output(json, orjson.dumps(out, option=orjson.OPT_INDENT_2 | orjson.OPT_SERIALIZE_NUMPY))
+    return 0
+
+
+_BENT = ("rest_curvature",)
+
+
+def _row(result: "CableValidation", published: float | None) -> str:
+    l1, windows = result.l1, result.windows
+    seconds = float(np.median([w.seconds for w in windows]))
+    recorded = float(np.median([w.recorded for w in windows]))
+    distance = 1e3 * float(np.mean([w.distance for w in windows]))
+    known = "-" if published is None else f"{published:.4f}"
+    stalled = sum(w.stalled for w in windows)
+    return (
+        f"{result.name:<8}{result.model:<9}{l1.mean():>8.4f}{np.median(l1):>8.4f}{l1.max():>8.4f}{known:>8}"
+        f"{distance:>9.1f}{1e3 * seconds:>8.0f}{recorded / seconds:>8.0f}{stalled:>8}{result.seconds:>7.0f}"
+    )
+
+
+def _wire_row(result: "WireValidation", published: float | None) -> str:
+    stiffness = result.found.parameters[0]
+    known = "-" if published is None else f"{published:.3g}"
+    return (
+        f"{result.name:<8}{', '.join(result.names):<50}{1e3 * np.sqrt((result.rms**2).mean()):>8.2f}"
+        f"{1e3 * result.rms.max():>8.2f}   {stiffness.value:.3g} ({stiffness.low:.2g} to {stiffness.high:.2g}; {known})"
+    )
+
+
+def _document(result: "CableValidation") -> dict[str, object]:
+    return {
+        "cable": result.name,
+        "model": result.model,
+        "fit_on": [fit.name for fit in result.found.fits],
+        "parameters": {p.name: [p.value, p.low, p.high, p.identifiable] for p in result.found.parameters},
+        "windows": {w.name: w.l1 for w in result.windows},
+        "over_time": {w.name: w.over_time for w in result.windows},
+        "milliseconds": {w.name: 1e3 * w.seconds for w in result.windows},
+        "stalled": [w.name for w in result.windows if w.stalled],
+    }

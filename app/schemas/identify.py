@@ -1,0 +1,104 @@
+"""The request and the answer of ``POST /v1/cables:identify``."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, Field
+
+from app.schemas.base import Count, Flag, Model, Number, Vector
+from app.schemas.fit import Coordinate
+
+Marker = Annotated[list[Coordinate], Field(min_length=2, max_length=3)]
+Frame = Annotated[list[Marker | None], Field(min_length=3, max_length=200)]
+Name = Annotated[str, Field(max_length=40)]
+DEFAULT = ["bending_stiffness", "drag", "drag_quadratic", "bending_damping"]
+
+
+class RecordingModel(Model):
+    """Tracked markers of one motion, or of shapes at rest."""
+
+    times: list[Number] = Field(
+        min_length=1, max_length=5000, description="Time of each frame [s], rising.", examples=[[0.0, 0.01, 0.02]]
+    )
+    markers: list[Frame] = Field(
+        min_length=1,
+        max_length=5000,
+        description="Position of each marker in each frame [m], in order along the cable; null where it was lost.",
+        examples=[[[[0.0, 0.0, 0.0], None, [0.2, 0.0, -0.1]]]],
+    )
+    u: list[Number] | None = Field(
+        default=None,
+        description="Material coordinate of each marker [m]; absent: from the distances of neighbours.",
+        examples=[[0.0, 0.1, 0.2]],
+    )
+    held: list[Count] = Field(
+        default_factory=list,
+        max_length=64,
+        description="Numbers of the markers that grippers hold, negative from the end; close neighbours are a clamp.",
+        examples=[[0, 1, -2, -1]],
+    )
+    length: Number | None = Field(default=None, gt=0.0, le=1000.0, description="Of the cable [m].", examples=[1.0])
+    diameter: Number | None = Field(default=None, gt=0.0, le=1.0, description="Of the cable [m].", examples=[0.005])
+    linear_density: Number | None = Field(
+        default=None,
+        gt=0.0,
+        le=1e4,
+        description="Mass per length [kg/m]; absent: 0.04. Stiffnesses and drag are in proportion to it.",
+        examples=[0.04],
+    )
+    gravity: Vector = Field(default=[0.0, 0.0, -9.81], description="[m/s^2].", examples=[[0.0, 0.0, -9.81]])
+    static: Flag = Field(default=False, description="Every frame is a shape at rest.", examples=[False])
+    name: Annotated[str, Field(max_length=100)] = Field(default="recording", examples=["shaken"])
+
+
+class IdentifyRequest(Model):
+    """Recordings of one cable, and what to find."""
+
+    recordings: list[RecordingModel] = Field(min_length=1, max_length=16, description="Of one cable.")
+    parameters: list[Name] = Field(
+        default=DEFAULT,
+        min_length=1,
+        max_length=40,
+        description="What to find (docs/identification.md).",
+        examples=[DEFAULT],
+    )
+    n_u: Count = Field(default=13, ge=7, le=65, description="Control points along the cable.", examples=[13])
+
+
+class EstimatedModel(BaseModel):
+    """A parameter, and how well it is known."""
+
+    name: str = Field(examples=["bending_stiffness"])
+    unit: str = Field(examples=["N m^2"])
+    value: float = Field(description="Of a parameter that is not identifiable: what was assumed.", examples=[1e-3])
+    low: float | None = Field(description="Lower end of the 95 % interval.", examples=[0.9e-3])
+    high: float | None = Field(description="Upper end.", examples=[1.1e-3])
+    identifiable: bool = Field(description="Whether the recordings tell it.", examples=[True])
+    statement: str = Field(description="In words.", examples=["bending_stiffness = 0.001 N m^2, known to 10 %."])
+    rests_on: dict[str, float] = Field(description="Share of what is known by recording.", examples=[{"shaken": 1.0}])
+
+
+class FitOfRecording(BaseModel):
+    """Distances of the free markers from the prediction."""
+
+    recording: str = Field(examples=["shaken"])
+    mean: float = Field(description="[m].", examples=[0.004])
+    median: float = Field(description="[m].", examples=[0.003])
+    worst: float = Field(description="[m].", examples=[0.02])
+    stalled: bool = Field(description="Whether the prediction ended early.", examples=[False])
+
+
+class IdentifyResponse(BaseModel):
+    """A cable with what is known of it; `cable` and `environment` can be those of a prediction."""
+
+    status: Literal["converged", "max_iterations"] = Field(examples=["converged"])
+    message: str = Field(description="In words, with what could not be identified.", examples=["Converged."])
+    cable: dict[str, Any] = Field(description="The cable, for a prediction.", examples=[{"length": 1.0}])
+    environment: dict[str, Any] = Field(description="Drag and gravity.", examples=[{"drag": 0.05}])
+    parameters: list[EstimatedModel] = Field(description="In the order of the request.")
+    correlations: list[list[float | None]] = Field(description="Null where not identifiable.", examples=[[[1.0]]])
+    fit: list[FitOfRecording] = Field(description="How each window of the recordings is met.")
+    deviation: float = Field(description="Robust deviation of a coordinate [m].", examples=[0.001])
+    iterations: int = Field(examples=[6])
+    seconds: float = Field(description="Time it took [s].", examples=[4.2])
+    rest_curvature: list[list[float]] | None = Field(default=None, description="[1/m], where it was asked for.")
+    clamp_angles: list[list[float]] | None = Field(default=None, description="[rad], where they were asked for.")

@@ -1,0 +1,411 @@
+"""identify(recordings, ...): robust Gauss-Newton over whole windows, with intervals and what could not be seen."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.cable import Cable
+from dlocore.errors import Cancelled, SceneError
+from dlocore.identify.parameters import DEFAULT, Parameter, parameters, prepared
+from dlocore.identify.replay import Candidate, Played, Replay, Resolution, common_references
+from dlocore.identify.rest import Rest, Settled
+from dlocore.recordings import Recording
+from dlocore.scene import Environment
+
+Floats = NDArray[np.float64]
+
+WINDOW = 5.0  # [s]: longer recordings are replayed in windows of about this length, each from its own start
+_FOLLOWED = 1e-5  # step of a coordinate in which a motion beside is followed
+_MARCHED = 2e-2  # where it is marched, whose tolerance would drown a smaller one
+_KNEE = 1.5  # robust deviations from which on a residual counts by its size, not its square
+_LEAST_DEVIATION = 2e-4  # [m] of the residuals, below which nothing is tracked
+_MOST_CHANGE = 1.0  # of a coordinate in one iteration
+_PRIOR_LOG = 3.0  # standard deviation of the logarithms: a factor of 20 either way is no surprise
+_CONVERGED = 1e-3  # relative decrease of the cost
+
+Status = Literal["converged", "max_iterations"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimated:
+    """An identified parameter.
+
+    Attributes:
+        name, unit: of the parameter.
+        value: [unit]; where it is not identifiable what it was assumed to be.
+        low, high: 95 % interval [unit].
+        identifiable: the data tell it.
+        statement: in words.
+        rests_on: share of what is known of it by recording.
+    """
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    identifiable: bool
+    statement: str
+    rests_on: dict[str, float]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fit:
+    """How a recording's window is met.
+
+    Attributes:
+        name: of the recording.
+        begin: of the window in it [s].
+        times: of the compared frames in it (k,) [s].
+        measured, predicted: (k, m, 3) [m].
+        free: the markers that nothing holds.
+        stalled: the prediction stopped before the end.
+    """
+
+    name: str
+    begin: float
+    times: Floats
+    measured: Floats
+    predicted: Floats
+    free: NDArray[np.int64]
+    stalled: bool
+
+    @property
+    def distances(self) -> Floats:
+        """Distance of each free marker from its prediction (k, free) [m], NaN where it was lost."""
+        away = self.measured[:, self.free] - self.predicted[:, self.free]
+        return np.asarray(np.linalg.norm(away, axis=2))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Identification:
+    """What recordings tell of a cable.
+
+    Attributes:
+        status: "converged" or "max_iterations".
+        message: in words, with what could not be identified.
+        candidate: everything that was found, to replay with.
+        parameters: as asked for, with intervals.
+        correlations: between the identified ones, (n, n), in the order of `parameters`; NaN for others.
+        fits: how each window is met.
+        deviation: robust standard deviation of a coordinate of the residuals [m].
+        iterations: of Gauss-Newton.
+        seconds: time it took.
+    """
+
+    status: Status
+    message: str
+    candidate: Candidate
+    parameters: tuple[Estimated, ...]
+    correlations: Floats
+    fits: tuple[Fit, ...]
+    deviation: float
+    iterations: int
+    seconds: float
+
+    @property
+    def cable(self) -> Cable:
+        """The cable, to be used in scenes."""
+        return self.candidate.cable
+
+    @property
+    def environment(self) -> Environment:
+        """The drag found."""
+        return self.candidate.environment
+
+
+@dataclass(frozen=True, kw_only=True)
+class Progress:
+    """One iteration: its number, the median distance of the free markers [m], and the values by name."""
+
+    iteration: int
+    distance: float
+    values: dict[str, float]
+
+
+def identify(
+    recordings: Sequence[Recording],
+    cable: Cable | None = None,
+    environment: Environment | None = None,
+    *,
+    names: tuple[str, ...] = DEFAULT,
+    start: Candidate | None = None,
+    resolution: Resolution | None = None,
+    window: float = WINDOW,
+    iterations: int = 25,
+    on_progress: Callable[[Progress], None] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> Identification:
+    """Identify parameters of a cable from recordings of its motions, or of its shapes at rest.
+
+    Args:
+        recordings: of one cable.
+        cable: what is known of it, and first guesses; None: from the recordings' facts. Motion and shape depend on
+            forces per mass alone, so its linear density is taken as known.
+        environment: first guesses of the drag, and a table.
+        names: parameters to identify (`parameters.SCALARS`, "rest_curvature", "clamp_angles").
+        start: a candidate to begin with instead of cable and environment.
+        resolution: how finely recordings are replayed.
+        window: [s] of the windows into which longer recordings are cut.
+        iterations: at most.
+        on_progress: called after every iteration.
+        cancelled: asked between replays.
+
+    Raises:
+        SceneError: the recordings, or what is asked of them, do not fit together.
+        Cancelled: `cancelled` returned True.
+    """
+    began = perf_counter()
+    if not recordings:
+        raise SceneError("recordings", [], "at least one recording")
+    windows = cut(recordings, window)
+    clamps = max(sum(h.towards is not None for h in r.holds) for r in windows)
+    chosen = parameters(names, clamps)
+    given = start or Candidate(cable=cable or cable_of(recordings), environment=environment or Environment())
+    candidate = prepared(given, tuple(p.name for p in chosen), clamps)
+    search = Search(windows, chosen, resolution or Resolution(), cancelled)
+    state = search.run(candidate, iterations, on_progress)
+    return search.result(state, perf_counter() - began)
+
+
+def cable_of(recordings: Sequence[Recording]) -> Cable:
+    """Return a first guess of the cable from the facts of its recordings, else 5 mm thick and 40 g/m.
+
+    The axial stiffness is that of a cable that nothing stretches.
+    """
+    first = recordings[0]
+    return Cable(
+        length=cast(float, first.length),
+        diameter=first.diameter or 0.005,
+        linear_density=first.linear_density or 0.04,
+        bending_stiffness=1e-3 * (first.linear_density or 0.04) / 0.04,
+        axial_stiffness=500.0 * (first.linear_density or 0.04) / 0.04,
+        bending_damping=2e-4,
+    )
+
+
+def cut(recordings: Sequence[Recording], window: float) -> list[Recording]:
+    """Return the recordings in windows of about `window` seconds."""
+    out = []
+    for recording in recordings:
+        parts = 1 if recording.static else max(1, round(recording.duration / window))
+        for i in range(parts):
+            width = recording.duration / parts
+            out.append(recording if parts == 1 else recording.part(i * width, (i + 1) * width))
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Where the search stands: candidate, replays of it, residuals."""
+
+    candidate: Candidate
+    played: list[Played | Settled]
+    residuals: list[Floats]
+    status: Status = "max_iterations"
+    iterations: int = 0
+    derivatives: list[Floats] | None = None
+
+
+class Search:
+    """Robust Gauss-Newton over the windows of some recordings."""
+
+    def __init__(
+        self,
+        windows: Sequence[Recording],
+        chosen: tuple[Parameter, ...],
+        resolution: Resolution,
+        cancelled: Callable[[], bool] | None = None,
+    ) -> None:
+        self.windows, self.chosen, self.resolution, self.cancelled = windows, chosen, resolution, cancelled
+        self.references = common_references(windows)
+        self.replays = [self._replay(w) for w in windows]
+
+    def _replay(self, window: Recording, shake: np.random.Generator | None = None) -> Replay | Rest:
+        if window.static:
+            return Rest(window, self.resolution, self.references, shake)
+        return Replay(window, self.resolution, self.references, shake)
+
+    def _check(self) -> None:
+        if self.cancelled is not None and self.cancelled():
+            raise Cancelled("The identification was cancelled")
+
+    def run(
+        self, candidate: Candidate, iterations: int, on_progress: Callable[[Progress], None] | None = None
+    ) -> State:
+        """Return the best candidate found from the given one, and its derivatives."""
+        state = self.play(candidate)
+        damping, status, done = 1e-3, cast(Status, "max_iterations"), 0
+        for done in range(1, iterations + 1):
+            r = np.concatenate(state.residuals)
+            deviation = robust_deviation(r)
+            state = replace(state, derivatives=self.derivatives(state))
+            J = np.concatenate(cast(list[Floats], state.derivatives))
+            x = self.coordinates(state.candidate)
+            H, g = self._normal(J, r, deviation, x)
+            before = self.cost(r, deviation, x)
+            free = self._free(x, g)
+            found: State | None = None
+            after = before
+            for _ in range(6):
+                step = np.zeros(len(x))
+                matrix = H[np.ix_(free, free)]
+                step[free] = -np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), g[free])
+                trial = self._bounded(x + np.clip(step, -_MOST_CHANGE, _MOST_CHANGE))
+                candidate = self.candidate(state.candidate, trial)
+                try:
+                    tried = self.play(candidate)
+                except SceneError:
+                    damping *= 10.0
+                    continue
+                after = self.cost(np.concatenate(tried.residuals), deviation, trial)
+                if after < before:
+                    found = tried
+                    break
+                damping = max(10.0 * damping, 1e-2)
+            if found is None:
+                status = "converged"
+                break
+            damping = max(0.2 * damping, 1e-7)
+            state = found
+            if on_progress is not None:
+                values = {p.name: p.get(state.candidate) for p in self.chosen}
+                on_progress(Progress(iteration=done, distance=self._distance(state), values=values))
+            if before - after < _CONVERGED * before:
+                status = "converged"
+                break
+        if state.derivatives is None:
+            state = replace(state, derivatives=self.derivatives(state))
+        return replace(state, status=status, iterations=done)
+
+    def play(self, candidate: Candidate) -> State:
+        """Return all windows replayed with a candidate."""
+        played: list[Played | Settled] = []
+        residuals = []
+        for replay in self.replays:
+            self._check()
+            one = replay.play(candidate)
+            played.append(one)
+            residuals.append(self._residuals(replay, one.predicted))
+        return State(candidate, played, residuals)
+
+    def _residuals(self, replay: Replay | Rest, predicted: Floats) -> Floats:
+        free = replay.recording.free
+        away = (predicted - replay.markers)[:, free]
+        return np.where(np.isfinite(away), away, 0.0).ravel()
+
+    def derivatives(self, state: State) -> list[Floats]:
+        """Return the derivatives (residuals, parameters) of the residuals of each window."""
+        x = self.coordinates(state.candidate)
+        out = []
+        for replay, played in zip(self.replays, state.played, strict=True):
+            J = np.zeros((len(self._residuals(replay, played.predicted)), len(x)))
+            known = self._followed(replay, played, state.candidate)
+            for j in range(len(x)):
+                self._check()
+                J[:, j] = self._column(replay, played, state.candidate, x, j, known)
+            lost = ~np.isfinite(replay.markers[:, replay.recording.free]).ravel()
+            J[lost] = 0.0
+            out.append(J)
+        return out
+
+    def _followed(self, replay: Replay | Rest, played: Played | Settled, candidate: Candidate) -> Floats | None:
+        """Return the prediction, followed to rounding; None where it can't be."""
+        if isinstance(replay, Rest) or isinstance(played, Settled) or not replay.differentiable(played):
+            return None
+        try:
+            return replay.play_beside(played, candidate)
+        except ValueError:
+            return None
+
+    def _column(
+        self,
+        replay: Replay | Rest,
+        played: Played | Settled,
+        candidate: Candidate,
+        x: Floats,
+        j: int,
+        known: Floats | None,
+    ) -> Floats:
+        free = replay.recording.free
+        if known is not None and isinstance(replay, Replay) and isinstance(played, Played):
+            moved = x.copy()
+            moved[j] += _FOLLOWED
+            try:
+                change = replay.play_beside(played, self.candidate(candidate, moved)) - known
+                return (change[:, free] / _FOLLOWED).ravel()
+            except ValueError:
+                pass  # it strayed: marched instead
+        both = []
+        for side in (1.0, -1.0):
+            moved = self._bounded(x + side * _MARCHED * np.eye(len(x))[j])
+            both.append((replay.play(self.candidate(candidate, moved)).predicted, moved[j]))
+        (high, a), (low, b) = both
+        return ((high - low)[:, free] / (a - b)).ravel()
+
+    def coordinates(self, candidate: Candidate) -> Floats:
+        """Return the parameters of a candidate on the scales on which they are sought."""
+        return np.array([p.coordinate(p.get(candidate)) for p in self.chosen])
+
+    def candidate(self, base: Candidate, x: Floats) -> Candidate:
+        """Return the candidate of coordinates."""
+        for p, value in zip(self.chosen, x, strict=True):
+            base = p.put(base, p.value(float(value)))
+        return base
+
+    def _bounded(self, x: Floats) -> Floats:
+        least = [-np.inf if p.logarithmic else p.least / p.scale for p in self.chosen]
+        return np.maximum(x, least)
+
+    def _free(self, x: Floats, g: Floats) -> NDArray[np.int64]:
+        """Return the parameters that are not held at their bound."""
+        held = [not p.logarithmic and x[j] <= p.least / p.scale and g[j] > 0 for j, p in enumerate(self.chosen)]
+        return np.flatnonzero(~np.array(held))
+
+    def _normal(self, J: Floats, r: Floats, deviation: float, x: Floats) -> tuple[Floats, Floats]:
+        """Return the normal matrix and gradient of the cost."""
+        w = weights(r, deviation) / deviation**2
+        H = (J * w[:, None]).T @ J + np.diag(1.0 / self._prior() ** 2)
+        return H, J.T @ (w * r) + self._pull(x)
+
+    def _prior(self) -> Floats:
+        """Return the standard deviation of the prior of each coordinate; infinite where there is none."""
+        return np.array([_PRIOR_LOG if p.logarithmic and p.name != "length_ratio" else 1.0 if not np.isfinite(p.least)
+                         else p.scale if p.name == "length_ratio" else np.inf for p in self.chosen])  # fmt: skip
+
+    def _pull(self, x: Floats) -> Floats:
+        """Return the gradient of the prior: angles and bends are about zero; logarithms have none."""
+        centred = np.array([not p.logarithmic or p.name == "length_ratio" for p in self.chosen])
+        return np.where(centred, x / self._prior() ** 2, 0.0)
+
+    def cost(self, r: Floats, deviation: float, x: Floats) -> float:
+        """Return the robust cost of residuals and prior."""
+        knee = _KNEE * deviation
+        misfit = float((np.sqrt(1.0 + (r / knee) ** 2) - 1.0).sum()) * _KNEE**2
+        return misfit + 0.5 * float(x @ self._pull(x))
+
+    def _distance(self, state: State) -> float:
+        found = [np.linalg.norm(r.reshape(-1, 3), axis=1) for r in state.residuals]
+        every = np.concatenate(found)
+        return float(np.median(every[every > 0.0]))
+
+    def result(self, state: State, seconds: float) -> Identification:
+        """Return the identification: values with intervals, and what they rest on."""
+        from dlocore.identify.intervals import assess
+
+        return assess(self, state, seconds)
+
+
+def robust_deviation(r: Floats) -> float:
+    """Return the standard deviation of residuals (k,) [m] that outliers do not swell; zeros are lost markers."""
+    seen = r[r != 0.0]
+    return max(1.4826 * float(np.median(np.abs(seen))) if len(seen) else 0.0, _LEAST_DEVIATION)
+
+
+def weights(r: Floats, deviation: float) -> Floats:
+    """Return the weights of residuals: 1 for small ones, falling as 1/|r| for large ones."""
+    return np.asarray(1.0 / np.sqrt(1.0 + (r / (_KNEE * deviation)) ** 2))

@@ -1,0 +1,78 @@
+"""Frames of clamps that are known by their direction alone, and the sections of a cable between two of them."""
+
+from dataclasses import replace
+from itertools import pairwise
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from dlocore.scene import ControlPoints, Material
+from dlocore.spline import design_matrix
+
+Floats = NDArray[np.float64]
+
+
+def across(direction: Floats) -> Floats:
+    """Return a unit vector (3,) across a unit direction (3,)."""
+    axis = np.zeros(3)
+    axis[int(np.argmin(np.abs(direction)))] = 1.0
+    out = axis - direction * (axis @ direction)
+    return np.asarray(out / np.linalg.norm(out))
+
+
+def tilted(direction: Floats, angles: Floats) -> Floats:
+    """Return a unit direction (3,) tilted by two angles [rad]."""
+    first = across(direction)
+    second = np.cross(direction, first)
+    out = direction + np.tan(angles[0]) * first + np.tan(angles[1]) * second
+    return np.asarray(out / np.linalg.norm(out))
+
+
+def turned_from(reference: Floats, directions: Floats) -> Rotation:
+    """Return the smallest rotations that bring `reference` to the unit `directions` (k, 3)."""
+    axis = np.cross(reference, directions)
+    cosine = np.clip(directions @ reference, -0.999, 1.0)
+    half = np.sqrt(0.5 * (1.0 + cosine))
+    quaternion = np.column_stack([axis / (2.0 * half)[:, None], half])
+    return Rotation.from_quat(quaternion)
+
+
+def with_sections(
+    shape: ControlPoints, rest_curvature: Floats | None, turn: float, frames: list[tuple[Floats, Floats]]
+) -> ControlPoints:
+    """Return the start with the sections turned as the clamps hold them, and bent by the rest curvature.
+
+    Args:
+        shape: the centreline.
+        rest_curvature: (k, 2) [1/m] in the frame of the sections, from end to end; None: straight.
+        turn: [rad] of the last clamp against the first.
+        frames: director and tangent of each clamp.
+    """
+    knots, q = cast(Floats, shape.knots), cast(Floats, shape.control_points)[:, :3]
+    length = float(knots[-1])
+    director = frames[0][0] - frames[0][1] * (frames[0][0] @ frames[0][1])
+    director /= np.linalg.norm(director)
+    theta = 0.0
+    if len(frames) == 2:
+        u = np.linspace(0.0, length, 201)
+        t = design_matrix(knots, u, 1) @ q
+        t /= np.linalg.norm(t, axis=1)[:, None]
+        d = director
+        for before, after in pairwise(t):
+            axis = np.cross(before, after)
+            d = (before @ after) * d + np.cross(axis, d) + axis * (axis @ d) / (1.0 + before @ after)
+        end = frames[1][0]
+        theta = float(np.arctan2(np.cross(d, end) @ t[-1], d @ end)) + turn
+        theta = (theta + np.pi) % (2.0 * np.pi) - np.pi
+    middle = (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0
+    bends = np.zeros((2, 2)) if rest_curvature is None else rest_curvature
+    at = np.linspace(0.0, length, 201)
+    places = np.linspace(0.0, length, len(bends))
+    memory = np.column_stack([np.interp(at, places, bends[:, 0]), np.interp(at, places, bends[:, 1]), 0.0 * at])
+    return replace(
+        shape,
+        control_points=np.column_stack([q, theta * middle / length]),
+        material=Material(director=director, u=at, memory=memory, natural=memory),
+    )

@@ -1,0 +1,201 @@
+"""How well identified parameters are known: intervals, correlations, and what the data do not tell."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from dlocore.identify.parameters import Parameter
+from dlocore.identify.replay import Played, Replay
+from dlocore.identify.rest import Rest
+
+if TYPE_CHECKING:
+    from dlocore.identify.estimate import Estimated, Identification, Search, State
+
+Floats = NDArray[np.float64]
+
+_BLOCK = 0.5  # [s] in which residuals hang together
+_MORE = 4  # control points of a finer net
+_SHAKES = 12  # replays with other noise of the held markers and the start
+_UNSEEN = 0.5  # standard deviation of a logarithm, or share of the prior's, from which on a parameter is not identified
+_SMALL = 0.1  # of the scale of a parameter without a prior
+
+
+def assess(search: "Search", state: "State", seconds: float) -> "Identification":
+    """Return the identification of a finished search.
+
+    The variance of a value is the sum of three: of the residuals taken as independent, or as hanging together within
+    blocks of half a second where that is more; of the noise of what was taken as known, the held markers and the start,
+    replayed with other noise of the same size; and the square of what a finer net and half the step would change.
+    """
+    from dlocore.identify.estimate import Fit, Identification, robust_deviation, weights
+
+    chosen = search.chosen
+    x = search.coordinates(state.candidate)
+    r = np.concatenate(state.residuals)
+    deviation = robust_deviation(r)
+    derivatives = cast(list[Floats], state.derivatives)
+    J = np.concatenate(derivatives)
+    w = weights(r, deviation)
+    data = (J * w[:, None]).T @ J / deviation**2
+    prior = np.diag(1.0 / search._prior() ** 2)
+    weak = np.diag(np.where(np.diag(prior) > 0, np.diag(prior), 1e-4))
+    inverse = np.linalg.inv(data + weak)
+    blocks = _blocks(search, state, w * r / deviation**2)
+    spread = sum((np.outer(g, g) for g in blocks), np.zeros_like(data))
+    spread *= len(blocks) / max(len(blocks) - len(x), 1)
+    clustered = inverse @ spread @ inverse
+    shaken = inverse @ _shaken(search, state, w / deviation**2) @ inverse
+    plain = np.diag(inverse)
+    refined = inverse @ _refined(search, state, w / deviation**2)
+    variance = np.maximum(plain, np.diag(clustered)) + np.diag(shaken) + refined**2
+    quantile = float(student.ppf(0.975, max(len(blocks) - len(x), 2)))
+    share = np.array([_information(D, residual, deviation) for D, residual in
+                      zip(derivatives, state.residuals, strict=True)])  # fmt: skip
+    parts = share / np.maximum(share.sum(axis=0), 1e-300)
+    estimated = tuple(
+        _estimated(p, x[j], float(np.sqrt(variance[j])), quantile, float(data[j, j]), search, parts[:, j])
+        for j, p in enumerate(chosen)
+    )
+    told = np.array([e.identifiable for e in estimated])
+    size = np.sqrt(np.diag(inverse))
+    correlations = inverse / np.outer(size, size)
+    correlations[~told] = np.nan
+    correlations[:, ~told] = np.nan
+    fits = tuple(
+        Fit(
+            name=replay.recording.name,
+            begin=0.0,
+            times=cast(Floats, replay.recording.times)[replay.compared],
+            measured=replay.markers,
+            predicted=played.predicted,
+            free=replay.recording.free,
+            stalled=played.stopped,
+        )
+        for replay, played in zip(search.replays, state.played, strict=True)
+    )
+    message = _message(state.status, state.iterations, estimated, correlations)
+    return Identification(
+        status=state.status,
+        message=message,
+        candidate=state.candidate,
+        parameters=estimated,
+        correlations=correlations,
+        fits=fits,
+        deviation=deviation,
+        iterations=state.iterations,
+        seconds=seconds,
+    )
+
+
+def _information(D: Floats, r: Floats, deviation: float) -> Floats:
+    from dlocore.identify.estimate import weights
+
+    return np.asarray(((D * weights(r, deviation)[:, None]) * D).sum(axis=0))
+
+
+def _blocks(search: "Search", state: "State", pull: Floats) -> list[Floats]:
+    """Return the gradient of the misfit by blocks of time, or by shapes at rest."""
+    out, at = [], 0
+    for replay, D in zip(search.replays, cast(list[Floats], state.derivatives), strict=True):
+        part = (D * pull[at : at + len(D), None]).reshape(len(replay.compared), -1, D.shape[1]).sum(axis=1)
+        at += len(D)
+        times = cast(Floats, replay.recording.times)[replay.compared]
+        number = np.arange(len(times)) if isinstance(replay, Rest) else ((times - times[0]) / _BLOCK).astype(int)
+        out += [part[number == k].sum(axis=0) for k in np.unique(number)]
+    return out
+
+
+def _shaken(search: "Search", state: "State", scale: Floats) -> Floats:
+    """Return the covariance of the gradient of the misfit that noise of the held markers and the start gives."""
+    size = len(search.chosen)
+    total = np.zeros((size, size))
+    at = 0
+    for i, (replay, played) in enumerate(zip(search.replays, state.played, strict=True)):
+        D = cast(list[Floats], state.derivatives)[i]
+        factor = scale[at : at + len(D)]
+        at += len(D)
+        if not isinstance(replay, Replay) or not isinstance(played, Played) or not replay.differentiable(played):
+            continue
+        free = replay.recording.free
+        found = []
+        for seed in range(_SHAKES):
+            search._check()
+            other = search._replay(replay.recording, np.random.default_rng([i, seed]))
+            assert isinstance(other, Replay)
+            try:
+                change = other.play_beside(played, state.candidate) - played.predicted
+            except ValueError:
+                change = other.play(state.candidate).predicted - played.predicted
+            found.append(D.T @ (factor * change[:, free].ravel()))
+        total += np.array(found).T @ np.array(found) / _SHAKES
+    return total
+
+
+def _refined(search: "Search", state: "State", scale: Floats) -> Floats:
+    """Return the gradient of the misfit that a finer net and half the step give."""
+    resolution = search.resolution
+    finer = replace(resolution, n_u=resolution.n_u + _MORE, step=0.5 * resolution.step)
+    total = np.zeros(len(search.chosen))
+    at = 0
+    for i, (replay, played) in enumerate(zip(search.replays, state.played, strict=True)):
+        search._check()
+        D = cast(list[Floats], state.derivatives)[i]
+        factor = scale[at : at + len(D)]
+        at += len(D)
+        kind = Rest if isinstance(replay, Rest) else Replay
+        other = kind(replay.recording, finer, search.references).play(state.candidate)
+        if not other.stopped:
+            change = other.predicted - played.predicted
+            total += D.T @ (factor * change[:, replay.recording.free].ravel())
+    return total
+
+
+def _estimated(
+    p: Parameter, x: float, deviation: float, quantile: float, information: float, search: "Search", parts: Floats
+) -> "Estimated":
+    from dlocore.identify.estimate import Estimated
+
+    value = p.value(x)
+    low, high = p.value(x - quantile * deviation), p.value(x + quantile * deviation)
+    if not p.logarithmic:
+        low = max(low, p.least)
+    unseen = not information > 1e-8
+    wide = deviation > _UNSEEN * (1.0 if p.logarithmic else max(1.0, abs(x)))
+    scale = max(abs(value), _SMALL * p.scale)
+    if unseen:
+        statement = f"{p.name} can't be seen in these recordings: it changes nothing that was measured."
+    elif wide:
+        statement = f"{p.name} can't be told from these recordings: anything from {low:.2g} to {high:.2g} fits."
+    elif not p.logarithmic and np.isfinite(p.least) and low <= p.least:
+        statement = f"{p.name} is at most {high:.2g} {p.unit}, and may be zero."
+    else:
+        statement = f"{p.name} = {value:.3g} {p.unit}, known to {100 * 0.5 * (high - low) / scale:.2g} %."
+    rests: dict[str, float] = {}
+    for replay, part in zip(search.replays, parts, strict=True):
+        rests[replay.recording.name] = rests.get(replay.recording.name, 0.0) + float(part)
+    return Estimated(
+        name=p.name,
+        unit=p.unit,
+        value=value,
+        low=low,
+        high=high,
+        identifiable=not (unseen or wide),
+        statement=statement,
+        rests_on={} if unseen else rests,
+    )
+
+
+def _message(status: str, iterations: int, estimated: tuple["Estimated", ...], correlations: Floats) -> str:
+    done = "Converged" if status == "converged" else "Stopped without converging"
+    parts = [f"{done} in {iterations} iterations."]
+    parts += [e.statement for e in estimated if not e.identifiable]
+    n = len(estimated)
+    tied = [(i, j) for i in range(n) for j in range(i) if abs(correlations[i, j]) > 0.95]
+    parts += [
+        f"{estimated[i].name} and {estimated[j].name} are hardly told apart (correlation {correlations[i, j]:.2f})."
+        for i, j in tied
+    ]
+    return " ".join(parts)

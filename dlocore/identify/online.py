@@ -1,0 +1,156 @@
+"""Identification while a cable moves: a window of frames that moves on, with the last estimate as prior."""
+
+from collections import deque
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dlocore.cable import Cable
+from dlocore.errors import SceneError, array
+from dlocore.identify.estimate import robust_deviation, weights
+from dlocore.identify.parameters import DEFAULT, parameters, prepared
+from dlocore.identify.replay import Candidate, Replay, Resolution
+from dlocore.recordings import Recording
+from dlocore.scene import Environment
+
+Floats = NDArray[np.float64]
+
+_FOLLOWED = 1e-5  # step of a coordinate in which a motion beside is followed
+_FIRST = 1.0  # standard deviation of a logarithm, or of a share of a usual value, before anything was seen
+_FORGOTTEN = 0.02  # that is added to it in every update: cables warm up, wear, are changed
+_STEP = 0.3  # of a coordinate at most in one update
+_BLOCK = 25  # frames whose residuals hang together: so many count as one
+
+
+@dataclass(frozen=True, kw_only=True)
+class Update:
+    """What an update found.
+
+    Attributes:
+        values: by parameter.
+        deviations: standard deviation of each on the scale on which it is sought.
+        distance: median distance of the free markers from the prediction of the window [m].
+        seconds: time that the update took.
+    """
+
+    values: dict[str, float]
+    deviations: dict[str, float]
+    distance: float
+    seconds: float
+
+
+class Identifier:
+    """Takes frames as they arrive and keeps an estimate of the cable.
+
+    Every update replays the frames of the last `window` seconds once and makes one Gauss-Newton step, with the last
+    estimate and its covariance, widened a little, as prior. Not every frame needs an update.
+
+    Args:
+        u: material coordinates of the markers (m,) [m].
+        held: markers that grippers hold.
+        cable, environment: first guesses, and what is known.
+        length: of the cable [m].
+        names: parameters to identify.
+        window: [s].
+        rate: of the frames [Hz].
+        resolution: how finely the window is replayed.
+    """
+
+    def __init__(
+        self,
+        u: ArrayLike,
+        held: tuple[int, ...],
+        cable: Cable,
+        environment: Environment | None = None,
+        *,
+        names: tuple[str, ...] = DEFAULT,
+        window: float = 0.8,
+        rate: float = 30.0,
+        resolution: Resolution | None = None,
+    ) -> None:
+        self._u = array("u", u, shape=(None,), unit="m")
+        self._held = tuple(held)
+        self._length = cable.length
+        self._frames = max(12, round(window * rate))
+        self._times: deque[float] = deque(maxlen=self._frames)
+        self._markers: deque[Floats] = deque(maxlen=self._frames)
+        self._resolution = resolution or Resolution(n_u=9, step=1.0 / rate, start_frames=6)
+        self._chosen = parameters(names, 2)
+        start = Candidate(cable=cable, environment=environment or Environment())
+        self._candidate = prepared(start, tuple(p.name for p in self._chosen), 2)
+        self._precision = np.eye(len(self._chosen)) / _FIRST**2
+
+    @property
+    def cable(self) -> Cable:
+        """The latest estimate of the cable."""
+        return self._candidate.cable
+
+    @property
+    def environment(self) -> Environment:
+        """The latest estimate of the drag."""
+        return self._candidate.environment
+
+    def add(self, time: float, markers: ArrayLike) -> None:
+        """Take a frame: time [s] and markers (m, 3) [m], NaN where lost.
+
+        Raises:
+            SceneError: the time is not after the last one, or the number of markers is another.
+        """
+        x = np.array(markers, dtype=float)
+        if x.shape != (len(self._u), 3):
+            raise SceneError("markers", f"shape {x.shape}", f"({len(self._u)}, 3)")
+        if self._times and not time > self._times[-1]:
+            raise SceneError("time", time, f"after the last frame at {self._times[-1]:g} s")
+        self._times.append(float(time))
+        self._markers.append(x)
+
+    def update(self) -> Update | None:
+        """Improve the estimate by the latest frames; None while there are too few, or nothing can be replayed."""
+        if len(self._times) < self._frames:
+            return None
+        began = perf_counter()
+        recording = Recording(
+            times=np.array(self._times) - self._times[0],
+            markers=np.array(self._markers),
+            u=self._u,
+            held=self._held,
+            length=self._length,
+            gravity=self._candidate.environment.gravity,
+        )
+        replay = Replay(recording, self._resolution)
+        played = replay.play(self._candidate)
+        if not replay.differentiable(played):
+            return None
+        free = recording.free
+        x = np.array([p.coordinate(p.get(self._candidate)) for p in self._chosen])
+        try:
+            known = replay.play_beside(played, self._candidate)
+            columns = []
+            for j, p in enumerate(self._chosen):
+                moved = p.put(self._candidate, p.value(x[j] + _FOLLOWED))
+                columns.append(((replay.play_beside(played, moved) - known)[:, free] / _FOLLOWED).ravel())
+        except ValueError:
+            return None
+        away = (known - replay.markers)[:, free]
+        r = np.where(np.isfinite(away), away, 0.0).ravel()
+        J = np.column_stack(columns)
+        J[~np.isfinite(away).ravel()] = 0.0
+        deviation = robust_deviation(r)
+        w = weights(r, deviation) / (deviation**2 * _BLOCK)
+        prior = np.linalg.inv(np.linalg.inv(self._precision) + _FORGOTTEN**2 * np.eye(len(x)))
+        data = (J * w[:, None]).T @ J
+        step = np.clip(-np.linalg.solve(prior + data, J.T @ (w * r)), -_STEP, _STEP)
+        for j, p in enumerate(self._chosen):
+            value = p.value(float(x[j] + step[j]))
+            self._candidate = p.put(self._candidate, value if p.logarithmic else max(value, p.least))
+        # neighbouring windows share most frames: only what is new counts
+        self._precision = prior + data / self._frames
+        spread = np.sqrt(np.diag(np.linalg.inv(self._precision)))
+        return Update(
+            values={p.name: p.get(self._candidate) for p in self._chosen},
+            deviations={p.name: float(s) for p, s in zip(self._chosen, spread, strict=True)},
+            distance=float(np.nanmedian(np.linalg.norm(away, axis=2))),
+            seconds=perf_counter() - began,
+        )

@@ -1,0 +1,144 @@
+"""The parameters that can be identified: how each is put into a candidate, and on which scale it is sought."""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.errors import SceneError
+from dlocore.identify.replay import Candidate
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a candidate.
+
+    Attributes:
+        name: as in results, e.g. "bending_stiffness" or "rest_curvature[2][0]".
+        unit: SI.
+        logarithmic: varies by factors, else by `scale`.
+        scale: [unit] a usual value; the prior's standard deviation of those that may have either sign.
+        least: lower bound of those that vary evenly.
+        get, put: read it from a candidate; return a candidate with it.
+    """
+
+    name: str
+    unit: str
+    logarithmic: bool
+    scale: float
+    least: float
+    get: Callable[[Candidate], float]
+    put: Callable[[Candidate, float], Candidate]
+
+    def coordinate(self, value: float) -> float:
+        """Return the value on the scale on which it is sought."""
+        return float(np.log(value)) if self.logarithmic else value / self.scale
+
+    def value(self, coordinate: float) -> float:
+        """Return the value of a coordinate."""
+        return float(np.exp(coordinate)) if self.logarithmic else coordinate * self.scale
+
+
+SCALARS = (
+    "bending_stiffness",
+    "bending_damping",
+    "drag",
+    "drag_quadratic",
+    "torsional_stiffness",
+    "linear_density",
+    "length_ratio",
+    "turn",
+    "yield_strain",
+)
+DEFAULT = ("bending_stiffness", "drag", "drag_quadratic", "bending_damping")
+_FIRST = {"bending_damping": 1e-4, "drag": 0.05, "drag_quadratic": 0.02, "yield_strain": 0.02}  # where none is given
+_INDEXED = re.compile(r"(rest_curvature|clamp_angles)\[(\d+)\]\[([01])\]")
+PLACES = 5  # along the cable at which its rest curvature is sought
+CLAMPS = 2
+
+
+def parameters(names: tuple[str, ...], clamps: int) -> tuple[Parameter, ...]:
+    """Return the parameters of names; "rest_curvature" and "clamp_angles" stand for all of theirs.
+
+    Raises:
+        SceneError: a name is unknown or given twice.
+    """
+    found: list[Parameter] = []
+    for name in names:
+        if name == "rest_curvature":
+            found += [_component("rest_curvature", i, d) for i in range(PLACES) for d in range(2)]
+        elif name == "clamp_angles":
+            found += [_component("clamp_angles", i, d) for i in range(clamps) for d in range(2)]
+        elif name in SCALARS:
+            found.append(_scalar(name))
+        elif match := _INDEXED.fullmatch(name):
+            found.append(_component(match[1], int(match[2]), int(match[3])))
+        else:
+            raise SceneError("parameters", name, "one of " + ", ".join([*SCALARS, "rest_curvature", "clamp_angles"]))
+    if len({p.name for p in found}) != len(found):
+        raise SceneError("parameters", names, "each parameter once")
+    if not found:
+        raise SceneError("parameters", names, "at least one parameter")
+    return tuple(found)
+
+
+def prepared(candidate: Candidate, names: tuple[str, ...], clamps: int) -> Candidate:
+    """Return the candidate with everything in place that the parameters vary."""
+    if any(n.startswith("rest_curvature") for n in names) and candidate.rest_curvature is None:
+        candidate = replace(candidate, rest_curvature=np.zeros((PLACES, 2)), twist=True)
+    if any(n.startswith("clamp_angles") for n in names) and candidate.clamp_angles is None:
+        candidate = replace(candidate, clamp_angles=np.zeros((clamps, 2)))
+    if "turn" in names or "torsional_stiffness" in names:
+        candidate = replace(candidate, twist=True)
+    for name in names:
+        if name in _FIRST:
+            parameter = _scalar(name)
+            if not (parameter.get(candidate) or 0.0) > 0.0:
+                candidate = parameter.put(candidate, _FIRST[name])
+    return candidate
+
+
+def _scalar(name: str) -> Parameter:
+    if name in ("drag", "drag_quadratic"):
+        unit, scale = ("N s/m^2", 0.05) if name == "drag" else ("N s^2/m^3", 0.02)
+
+        def put(c: Candidate, x: float) -> Candidate:
+            changes: Any = {name: x}
+            return replace(c, environment=replace(c.environment, **changes))
+
+        return Parameter(name, unit, False, scale, 0.0, lambda c: cast(float, getattr(c.environment, name)), put)
+    if name == "turn":
+        return Parameter(
+            name, "rad", False, 1.0, -np.inf, lambda c: c.turn, lambda c, x: replace(c, turn=x)
+        )  # fmt: skip
+    if name == "length_ratio":
+        return Parameter(name, "", True, 0.01, 0.0, lambda c: c.length_ratio, lambda c, x: replace(c, length_ratio=x))
+    units = {"bending_stiffness": "N m^2", "torsional_stiffness": "N m^2", "bending_damping": "N m^2 s"}
+
+    def put_cable(c: Candidate, x: float) -> Candidate:
+        changes = {name: x}
+        if name == "yield_strain" and c.cable.memory_rate is None:
+            changes["memory_rate"] = 100.0
+        return replace(c, cable=replace(c.cable, **changes))
+
+    unit = units.get(name, "kg/m" if name == "linear_density" else "")
+    return Parameter(name, unit, True, 1.0, 0.0, lambda c: cast(float, getattr(c.cable, name)), put_cable)
+
+
+def _component(name: str, i: int, d: int) -> Parameter:
+    unit, scale = ("1/m", 2.0) if name == "rest_curvature" else ("rad", 0.2)
+
+    def put(c: Candidate, x: float) -> Candidate:
+        values = np.array(getattr(c, name))
+        values[i, d] = x
+        changes: Any = {name: values}
+        return replace(c, **changes)
+
+    return Parameter(
+        f"{name}[{i}][{d}]", unit, False, scale, -np.inf, lambda c: float(getattr(c, name)[i, d]), put
+    )  # fmt: skip

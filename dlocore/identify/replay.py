@@ -1,0 +1,420 @@
+"""Replay of a recording: the scene of its grippers, predicted from its first frames with a candidate's parameters."""
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline, UnivariateSpline
+from scipy.spatial.transform import Rotation
+
+from dlocore.cable import Cable
+from dlocore.discretisation import make_grid
+from dlocore.errors import SceneError
+from dlocore.grid import Grid
+from dlocore.identify.frames import across, tilted, turned_from, with_sections
+from dlocore.identify.start import StartFit
+from dlocore.paths import Waypoints
+from dlocore.problem import Problem, pose
+from dlocore.recordings import Hold, Recording
+from dlocore.scene import ControlPoints, Environment, Grasp, Scene, Straight, Switch
+from dlocore.sensitivity import KnownMotion, beside, factored, objection
+from dlocore.solvers.march import STRONGLY_DAMPED, March, march
+from dlocore.solvers.monitor import Monitor
+from dlocore.spline import design_matrix
+from dlocore.statics import start_grid
+
+Floats = NDArray[np.float64]
+
+_SLACK = 1.003  # of the cable between two grippers: held markers farther apart are brought nearer
+_JUMP = 6.0  # robust deviations beyond which a sample of a held marker is an outlier
+_FLOOR = 5e-4  # [m] below which no sample is one
+_PASSES = 20  # of looking for outliers
+_REST_FRAMES = 8  # from which on a start can be seen to be at rest
+_STILL = 0.01  # [m/s]: slower than this, or than noise lets tell, nothing moves
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Candidate:
+    """What a recording is replayed with.
+
+    Attributes:
+        cable: its length is that of the recording.
+        environment: drag; gravity is that of the recording.
+        rest_curvature: (k, 2) [1/m] of the stress-free shape at k places from end to end, in the frame of the
+            sections; None: straight.
+        clamp_angles: (clamps, 2) [rad] by which the cable leaves each clamp beside the direction of its markers.
+        turn: [rad] of the last clamp against the first, about the cable.
+        length_ratio: of the cable's length and its markers' coordinates to those of the recording.
+        twist: simulate twist; needed for rest_curvature and a torsional stiffness.
+    """
+
+    cable: Cable
+    environment: Environment
+    rest_curvature: Floats | None = None
+    clamp_angles: Floats | None = None
+    turn: float = 0.0
+    length_ratio: float = 1.0
+    twist: bool = False
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Resolution:
+    """How finely a recording is replayed: control points, time step [s], frames that its start is taken from."""
+
+    n_u: int = 13
+    step: float = 0.01
+    start_frames: int = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Played:
+    """A replayed recording.
+
+    Attributes:
+        predicted: positions of all markers at the compared frames (frames, m, 3) [m].
+        problem, grid, motion: what was solved.
+    """
+
+    predicted: Floats
+    problem: Problem
+    grid: Grid
+    motion: March
+
+    @property
+    def stopped(self) -> bool:
+        """The prediction ended before the recording."""
+        return bool(self.motion.stopped)
+
+    @cached_property
+    def known(self) -> KnownMotion:
+        """The motion with its steps factorised."""
+        return factored(self.problem, self.motion)
+
+
+@dataclass(frozen=True, eq=False)
+class _Path:
+    """Positions (k, 3) and directions (k, 3) of a gripper at the steps, with their rates at the first."""
+
+    positions: Floats
+    directions: Floats | None
+    speed: Floats
+    turning: Floats
+
+
+class Replay:
+    """Replays one recording of a motion with any candidate: what does not depend on it is prepared once.
+
+    Args:
+        recording: of a motion.
+        resolution: how finely.
+        references: direction of each clamp about which its frame is chosen (clamps, 3); None: its mean in this
+            recording. Windows of one experiment need the same, so that angles mean the same in all of them.
+        shake: seeds noise of the held markers and of the start, as large as theirs: what the prediction owes to them.
+    """
+
+    def __init__(
+        self,
+        recording: Recording,
+        resolution: Resolution,
+        references: Floats | None = None,
+        shake: np.random.Generator | None = None,
+    ) -> None:
+        if recording.static:
+            raise SceneError("static", True, "a recording of a motion", "Shapes at rest have no motion to replay")
+        if not recording.holds:
+            raise SceneError("held", recording.held, "at least one held marker", "Nothing tells how the cable is moved")
+        self.recording, self.resolution = recording, resolution
+        times = cast(Floats, recording.times)
+        self.length = cast(float, recording.length)
+        frames = max(2, min(resolution.start_frames, len(times) - 4))
+        self.begin = float(times[:frames].mean())
+        self.compared = np.arange(frames, len(times))
+        self.horizon = float(times[-1] - self.begin)
+        self.steps = max(8, round(self.horizon / resolution.step))
+        self.step_times = np.linspace(0.0, self.horizon, self.steps + 1)
+        self.markers = cast(Floats, recording.markers)[frames:]
+        clean = _held_paths(recording, shake)
+        self.holds = recording.holds
+        self.clamps = tuple(h for h in self.holds if h.towards is not None)
+        self.references = self._references(clean) if references is None else references
+        self.paths = self._reachable(tuple(self._path(h, clean) for h in self.holds))
+        self.ways = tuple(self._way(i) for i in range(len(self.holds)))
+        self.seen, self.start_markers, self.start_speeds = _start_markers(recording, frames, self.begin, shake)
+        self.at_rest = frames >= _REST_FRAMES and _rests(recording, frames)
+        self._guess: Floats | None = None
+        self._start: StartFit | None = None
+        self._start_length = 0.0
+
+    def _references(self, clean: dict[int, CubicSpline]) -> Floats:
+        t = self.begin + self.step_times
+        found = []
+        for h in self.clamps:
+            mean = self._directions(h, clean, t).mean(axis=0)
+            found.append(mean / np.linalg.norm(mean))
+        return np.array(found).reshape(-1, 3)
+
+    @staticmethod
+    def _directions(h: Hold, clean: dict[int, CubicSpline], t: Floats) -> Floats:
+        along = (clean[cast(int, h.towards)](t) - clean[h.marker](t)) * (1.0 if h.forward else -1.0)
+        return np.asarray(along / np.linalg.norm(along, axis=1)[:, None])
+
+    def _path(self, h: Hold, clean: dict[int, CubicSpline]) -> _Path:
+        t = self.begin + self.step_times
+        speed = clean[h.marker](self.begin, 1)
+        if h.towards is None:
+            return _Path(clean[h.marker](t), None, speed, np.zeros(3))
+        directions = self._directions(h, clean, t)
+        return _Path(clean[h.marker](t), directions, speed, (directions[1] - directions[0]) / self.step_times[1])
+
+    def _reachable(self, paths: tuple[_Path, ...]) -> tuple[_Path, ...]:
+        """Bring grippers together that noise has put farther apart than the cable between them reaches."""
+        u = cast(Floats, self.recording.u)
+        paths = tuple(replace(p, positions=p.positions.copy()) for p in paths)
+        for (a, p), (b, q) in pairwise(zip(self.holds, paths, strict=True)):
+            across = q.positions - p.positions
+            apart = np.linalg.norm(across, axis=1)
+            most = _SLACK * (u[b.marker] - u[a.marker])
+            over = 0.5 * np.maximum(apart - most, 0.0) / apart
+            p.positions[:] += over[:, None] * across
+            q.positions[:] -= over[:, None] * across
+        return paths
+
+    def _way(self, i: int) -> tuple[Waypoints, Rotation | None]:
+        """Return the path of a gripper, and how it is turned at its first two instants."""
+        path = self.paths[i]
+        if path.directions is None:
+            return Waypoints(times=self.step_times, positions=path.positions, start="moving"), None
+        turns = turned_from(self.references[self.clamps.index(self.holds[i])], path.directions)
+        quaternions = (turns * turns[0].inv()).as_quat()[:, [3, 0, 1, 2]]
+        way = Waypoints(times=self.step_times, positions=path.positions, orientations=quaternions, start="moving")
+        return way, turns[:2]
+
+    def scene(self, candidate: Candidate) -> Scene:
+        """Return the scene of the recording for a candidate."""
+        recording = self.recording
+        length = self.length * candidate.length_ratio
+        u = cast(Floats, recording.u) * candidate.length_ratio
+        grasps, held, positions, rates = [], [], [], []
+        clamp, angles = 0, candidate.clamp_angles
+        frames = []
+        for h, path, (way, turns) in zip(self.holds, self.paths, self.ways, strict=True):
+            at = min(float(u[h.marker]), length)
+            held.append((at, 0))
+            positions.append(path.positions[0])
+            rates.append(path.speed)
+            kind: Literal["point", "tangent", "clamp"] = "point"
+            if turns is not None:
+                kind = "clamp" if candidate.twist else "tangent"
+                reference = self.references[clamp]
+                tangent = reference if angles is None else tilted(reference, angles[clamp])
+                first, second = turns.apply(tangent)
+                held.append((at, 1))
+                positions.append(first)
+                rates.append((second - first) / self.step_times[1])
+                frames.append((turns[0].apply(across(reference)), first))
+                clamp += 1
+            grasps.append(Grasp(u=at, hold=kind, path=way))
+        environment = replace(candidate.environment, gravity=recording.gravity)
+        fit = self._fit(candidate.cable, length, tuple(grasps), tuple(held))
+        weight = candidate.cable.linear_density * np.asarray(environment.gravity)
+        seen = self.seen
+        q = fit.shape(
+            cast(float, candidate.cable.bending_stiffness), weight, u[seen], self.start_markers, np.array(positions),
+            self._guess,
+        )  # fmt: skip
+        self._guess = q
+        v = None if self.at_rest else fit.velocity(q, u[seen], self.start_speeds, np.array(rates))
+        shape = ControlPoints(control_points=q, knots=fit.grid.knots, velocity=v, settle=self.at_rest)
+        if candidate.twist:
+            shape = with_sections(shape, candidate.rest_curvature, candidate.turn, frames)
+        switches: dict[str, Switch] = {"inertia": "on", "twist": "on" if candidate.twist else "off"}
+        return Scene(
+            cable=replace(candidate.cable, length=length),
+            shape=shape,
+            grasps=tuple(grasps),
+            environment=environment,
+            horizon=self.horizon,
+            effects=switches,
+        )
+
+    def _fit(
+        self, cable: Cable, length: float, grasps: tuple[Grasp, ...], held: tuple[tuple[float, int], ...]
+    ) -> StartFit:
+        """Return the fit of the start on the grid that the scene will have."""
+        if self._start is None or self._start_length != length:
+            still = tuple(Grasp(u=g.u, hold="point" if g.hold == "point" else "tangent") for g in grasps)
+            straight = Scene(
+                cable=replace(cable, length=length), shape=Straight(), grasps=still, horizon=1.0,
+                effects={"twist": "off"},
+            )  # fmt: skip
+            self._start = StartFit(make_grid(pose(straight), self.resolution.n_u), held)
+            self._start_length = length
+        return self._start
+
+    def posed(self, candidate: Candidate) -> tuple[Problem, Grid]:
+        """Return the equations of the recorded motion for a candidate, and its grid."""
+        problem = pose(self.scene(candidate))
+        return problem, start_grid(problem, self.resolution.n_u, Monitor(None, None, None))
+
+    def play(self, candidate: Candidate) -> Played:
+        """Predict the recording with a candidate."""
+        problem, grid = self.posed(candidate)
+        motion = march(problem, grid, self.steps, Monitor(None, None, None))
+        if motion.stopped:
+            motion = march(problem, grid, 2 * self.steps, Monitor(None, None, None), rho=STRONGLY_DAMPED)
+        return Played(self.positions(problem, grid, motion.times, motion.states), problem, grid, motion)
+
+    def play_beside(self, played: Played, candidate: Candidate) -> Floats:
+        """Return the predicted positions (frames, m, 3) [m] with a candidate that differs a little.
+
+        Raises:
+            ValueError: the motion can't be followed from the played one.
+        """
+        problem, grid = self.posed(candidate)
+        states, times, _ = beside(played.known, problem, grid)
+        return self.positions(problem, grid, times, states)
+
+    def positions(self, problem: Problem, grid: Grid, times: Floats, states: Floats) -> Floats:
+        """Return the markers' positions (frames, m, 3) [m] at the compared frames of states (steps + 1, n_u, nc)."""
+        length = problem.scene.cable.length
+        B = design_matrix(grid.knots, np.minimum(cast(Floats, self.recording.u) * (length / self.length), length))
+        dimensions = problem.plane.dimensions
+        at = CubicSpline(times, np.einsum("mi,kid->kmd", B, states[..., :dimensions]))
+        t = np.clip(cast(Floats, self.recording.times)[self.compared] - self.begin, 0.0, self.horizon)
+        return problem.plane.world(at(t))
+
+    def differentiable(self, played: Played) -> bool:
+        """Tell whether motions beside the played one can be followed."""
+        return not objection(played.problem, played.motion)
+
+
+def common_references(recordings: Sequence[Recording]) -> Floats | None:
+    """Return the mean direction of each clamp over recordings of one experiment (clamps, 3), None where they differ."""
+    if len({(r.holds, cast(Floats, r.markers).shape[1]) for r in recordings}) != 1:
+        return None
+    found = []
+    for h in recordings[0].holds:
+        if h.towards is None:
+            continue
+        sign = 1.0 if h.forward else -1.0
+        along = [
+            sign * (cast(Floats, r.markers)[:, h.towards] - cast(Floats, r.markers)[:, h.marker]) for r in recordings
+        ]
+        unit = [x / np.linalg.norm(x, axis=1)[:, None] for x in along]
+        mean = np.nanmean(np.concatenate(unit), axis=0)
+        found.append(mean / np.linalg.norm(mean))
+    return np.array(found).reshape(-1, 3)
+
+
+def _held_paths(recording: Recording, shake: np.random.Generator | None) -> dict[int, CubicSpline]:
+    """Return smooth paths of the held markers: without outliers, as smooth as their noise asks for."""
+    times = cast(Floats, recording.times)
+    wanted = {h.marker for h in recording.holds} | {h.towards for h in recording.holds if h.towards is not None}
+    out = {}
+    for marker in wanted:
+        x = cast(Floats, recording.markers)[:, marker]
+        keep = np.isfinite(x[:, 0])
+        t, x = times[keep], x[keep]
+        t, x = _without_outliers(t, x)
+        smooth = _smoothed(t, x, times)
+        if shake is not None:
+            noise = np.sqrt(((x - smooth(t)) ** 2).mean())
+            smooth = _smoothed(t, smooth(t) + noise * shake.standard_normal(x.shape), times)
+        out[marker] = smooth
+    return out
+
+
+def _without_outliers(t: Floats, x: Floats) -> tuple[Floats, Floats]:
+    """Return the samples without those that leave the cubic through their four neighbours, the worst ones first."""
+    for _ in range(_PASSES):
+        if len(t) < 8:
+            break
+        away = _leaps(t, x)
+        limit = max(_JUMP * 1.4826 * float(np.median(away)), _FLOOR)
+        around = np.concatenate([[0.0, 0.0], away, [0.0, 0.0]])
+        worst = np.max([around[i : i + len(away)] for i in range(5)], axis=0)
+        out = (away > limit) & (away >= worst)
+        if not out.any():
+            break
+        t, x = t[~out], x[~out]
+    return t, x
+
+
+def _leaps(t: Floats, x: Floats) -> Floats:
+    """Return the distance (k,) of samples from the cubic through four neighbours, at the ends through the nearest."""
+    around = np.clip(np.arange(len(t)), 2, len(t) - 3)[:, None] + np.array([-2, -1, 0, 1, 2])
+    own = np.arange(len(t))[:, None]
+    others = around[around != own].reshape(len(t), 4)
+    value = np.zeros_like(x)
+    for a in range(4):
+        share = np.ones(len(t))
+        for b in range(4):
+            if b != a:
+                share *= (t - t[others[:, b]]) / (t[others[:, a]] - t[others[:, b]])
+        value += share[:, None] * x[others[:, a]]
+    return np.asarray(np.linalg.norm(x - value, axis=1))
+
+
+def _smoothed(t: Floats, x: Floats, times: Floats) -> CubicSpline:
+    """Return the spline through `times` of samples x (k, 3), as smooth as their noise asks for.
+
+    The noise is told from third differences, to which a path that is well sampled adds little.
+    """
+    if len(t) < 8:
+        raise SceneError("markers", f"{len(t)} samples of a held marker", "at least 8 that are no outliers")
+    noise = 1.4826 * np.median(np.abs(np.diff(x, n=3, axis=0)), axis=0) / np.sqrt(20.0)
+    columns = [UnivariateSpline(t, x[:, d], k=3, s=len(t) * noise[d] ** 2, ext=3)(times) for d in range(3)]
+    return CubicSpline(times, np.column_stack(columns))
+
+
+def _rests(recording: Recording, frames: int) -> bool:
+    """Tell whether no marker moves in the first frames, as far as their noise lets tell."""
+    times, markers = cast(Floats, recording.times)[:frames], cast(Floats, recording.markers)[:frames]
+    half = frames // 2
+    between = float(times[half:].mean() - times[:half].mean())
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of a marker that was not seen
+        moved = np.nanmedian(markers[half:], axis=0) - np.nanmedian(markers[:half], axis=0)
+        noise = 1.4826 * np.nanmedian(np.abs(np.diff(markers, axis=0)), axis=(0, 2)) / np.sqrt(2.0)
+    speed = np.linalg.norm(moved, axis=1) / between
+    allowed = np.maximum(_STILL, 1.25 * np.sqrt(3.0) * np.sqrt(4.0 / frames) * noise / between * 2.0)
+    known = np.isfinite(speed)
+    return bool((speed[known] <= allowed[known]).all())
+
+
+def _start_markers(
+    recording: Recording, frames: int, at: float, shake: np.random.Generator | None
+) -> tuple[NDArray[np.int64], Floats, Floats]:
+    """Return the markers seen in the first frames, where they are at time `at` and how fast they move.
+
+    From two or three frames a straight line, from more a parabola, with outliers weighed down.
+    """
+    times, markers = cast(Floats, recording.times)[:frames], cast(Floats, recording.markers)[:frames]
+    order = 1 if frames < 6 else 2
+    seen, places, speeds = [], [], []
+    for i in range(markers.shape[1]):
+        keep = np.isfinite(markers[:, i, 0])
+        if keep.sum() < order + 1:
+            continue
+        t, x = times[keep] - at, markers[keep, i]
+        A = np.vander(t, order + 1, increasing=True)
+        w = np.ones(len(t))
+        for _ in range(1 if frames < 6 else 12):
+            c = np.linalg.lstsq(A * w[:, None], x * w[:, None], rcond=None)[0]
+            away = np.linalg.norm(x - A @ c, axis=1)
+            scale = max(1.4826 * float(np.median(away)), 1e-5)
+            w = 1.0 / (1.0 + (away / (2.0 * scale)) ** 2)
+        if shake is not None and len(t) > order + 1:
+            noise = np.sqrt(((w[:, None] * (x - A @ c)) ** 2).sum() / (3.0 * (w * w).sum() - 3.0 * (order + 1) + 1e-9))
+            c = c + np.linalg.pinv(A) @ (noise * shake.standard_normal(x.shape))
+        seen.append(i)
+        places.append(c[0])
+        speeds.append(c[1])
+    if len(seen) < 3:
+        raise SceneError("markers", f"{len(seen)} markers seen at the beginning", "at least 3")
+    return np.array(seen), np.array(places), np.array(speeds)

@@ -1,0 +1,129 @@
+"""Shapes at rest as recordings: every frame is an equilibrium under the cable's weight, held as its markers tell."""
+
+from dataclasses import dataclass, replace
+from typing import Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.discretisation import make_grid
+from dlocore.errors import SceneError
+from dlocore.identify.frames import across, tilted, turned_from, with_sections
+from dlocore.identify.replay import Candidate, Resolution
+from dlocore.identify.start import StartFit
+from dlocore.problem import pose
+from dlocore.recordings import Recording
+from dlocore.scene import ControlPoints, Grasp, Scene, Straight, Switch
+from dlocore.solvers.monitor import Monitor
+from dlocore.spline import design_matrix
+from dlocore.statics import settle
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """Shapes at rest: positions of all markers in every frame (frames, m, 3) [m], and whether each came to rest."""
+
+    predicted: Floats
+    stopped: bool
+
+
+class Rest:
+    """Settles the shapes of one recording with any candidate.
+
+    Args:
+        recording: of shapes at rest, with every held marker seen in every frame.
+        resolution: its n_u.
+        references: direction of each clamp about which its frame is chosen (clamps, 3); None: its mean.
+        shake: seeds noise of the markers, as large as that of the repeats.
+    """
+
+    def __init__(
+        self,
+        recording: Recording,
+        resolution: Resolution,
+        references: Floats | None = None,
+        shake: np.random.Generator | None = None,
+    ) -> None:
+        if not recording.holds:
+            raise SceneError("held", recording.held, "at least one held marker", "Nothing holds the cable")
+        self.recording, self.resolution = recording, resolution
+        markers = np.array(recording.markers)
+        if shake is not None:
+            spread = np.nanstd(markers - np.nanmean(markers, axis=0), axis=0).mean() if len(markers) > 1 else 0.0
+            markers = markers + spread * 0.1 * shake.standard_normal(markers.shape)
+        self.given = markers
+        self.markers = cast(Floats, recording.markers)
+        self.compared = np.arange(len(markers))
+        self.begin = 0.0
+        held = markers[:, list(recording.held)]
+        if not np.isfinite(held).all():
+            frame = int(np.argwhere(~np.isfinite(held))[0, 0])
+            raise SceneError(f"markers[{frame}]", "a lost held marker", "held markers seen in every shape at rest")
+        self.holds = recording.holds
+        self.references = self._directions().mean(axis=0) if references is None else references
+        self._start: tuple[float, StartFit] | None = None
+
+    def _directions(self) -> Floats:
+        """Return the unit directions of the clamps (frames, clamps, 3)."""
+        found = []
+        for h in self.holds:
+            if h.towards is not None:
+                along = (self.given[:, h.towards] - self.given[:, h.marker]) * (1.0 if h.forward else -1.0)
+                found.append(along / np.linalg.norm(along, axis=1)[:, None])
+        return np.stack(found, axis=1) if found else np.zeros((len(self.given), 0, 3))
+
+    def play(self, candidate: Candidate) -> Settled:
+        """Settle every shape with a candidate."""
+        shapes, stopped = [], False
+        for frame in range(len(self.given)):
+            scene = self.scene(candidate, frame)
+            problem = pose(scene)
+            grid = make_grid(problem, self.resolution.n_u)
+            q, rest, _, _ = settle(problem, grid, 0.0, Monitor(None, None, None))
+            stopped |= rest != "settled"
+            length = scene.cable.length
+            u = np.minimum(cast(Floats, self.recording.u) * candidate.length_ratio, length)
+            shapes.append(design_matrix(grid.knots, u) @ problem.world(q)[:, :3])
+        return Settled(np.array(shapes), stopped)
+
+    def scene(self, candidate: Candidate, frame: int) -> Scene:
+        """Return the scene of one shape for a candidate."""
+        length = cast(float, self.recording.length) * candidate.length_ratio
+        u = cast(Floats, self.recording.u) * candidate.length_ratio
+        directions = self._directions()[frame]
+        grasps, held, targets, frames, clamp = [], [], [], [], 0
+        for h in self.holds:
+            at = min(float(u[h.marker]), length)
+            kind: Literal["point", "tangent", "clamp"] = "point"
+            held.append((at, 0))
+            targets.append(self.given[frame, h.marker])
+            if h.towards is not None:
+                kind = "clamp" if candidate.twist else "tangent"
+                turn = turned_from(self.references[clamp], directions[clamp : clamp + 1])[0]
+                angles = candidate.clamp_angles
+                reference = self.references[clamp]
+                held.append((at, 1))
+                targets.append(turn.apply(reference if angles is None else tilted(reference, angles[clamp])))
+                frames.append((turn.apply(across(reference)), targets[-1]))
+                clamp += 1
+            grasps.append(Grasp(u=at, hold=kind))
+        cable = replace(candidate.cable, length=length)
+        environment = replace(candidate.environment, gravity=self.recording.gravity)
+        seen = np.isfinite(self.given[frame, :, 0])
+        if self._start is None or self._start[0] != length:
+            still = tuple(Grasp(u=g.u, hold="point" if g.hold == "point" else "tangent") for g in grasps)
+            straight = Scene(cable=cable, shape=Straight(), grasps=still, horizon=1.0, effects={"twist": "off"})
+            fit = StartFit(make_grid(pose(straight), self.resolution.n_u), tuple(held))
+            self._start = (length, fit)
+        fit = self._start[1]
+        weight = cable.linear_density * np.asarray(environment.gravity)
+        q = fit.shape(cast(float, cable.bending_stiffness), weight, u[seen], self.given[frame, seen], np.array(targets))
+        shape = ControlPoints(control_points=q, knots=fit.grid.knots)
+        if candidate.twist:
+            shape = with_sections(shape, candidate.rest_curvature, candidate.turn, frames)
+        switches: dict[str, Switch] = {"twist": "on" if candidate.twist else "off"}
+        return Scene(
+            cable=cable, shape=shape, grasps=tuple(grasps), environment=environment, horizon=1.0, effects=switches
+        )

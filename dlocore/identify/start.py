@@ -1,0 +1,161 @@
+"""The state a recorded motion begins with: shape and velocity of the spline from the markers of a few frames."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.effects import laws
+from dlocore.grid import Grid
+from dlocore.kernels.assembly import NO_RATES, assemble, stored_energy
+from dlocore.spline import design_matrix
+
+Floats = NDArray[np.float64]
+
+_AXES = (0, 1, 2)
+_AXIAL = 50.0  # [N]: of the relaxation, enough to keep the length within the markers' noise
+_SPRING = 50.0  # [N/m]: of a marker; a cable of 1e-3 N m^2 gives way by 1 mm per 2 mm of noise over 0.1 m
+_EVEN = 1e-5  # [m^4] of the smoothing of the velocity, against markers 0.1 m apart
+_KEPT_LENGTH = 10.0  # weight of the stretch rate beside a marker's velocity
+_TOLERANCE = 1e-8  # [m]
+
+
+@dataclass(frozen=True, eq=False)
+class HeldRows:
+    """Held rows of the spline: C q = target, solved for the pivots.
+
+    Attributes:
+        free: (n, free) what the control points follow of the free ones.
+        offset: (n, rows) what they follow of the targets.
+    """
+
+    free: Floats
+    offset: Floats
+
+    @staticmethod
+    def of(knots: Floats, held: tuple[tuple[float, int], ...]) -> "HeldRows":
+        """Return those of (u [m], derivative 0 or 1)."""
+        n = len(knots) - 4
+        if not held:
+            return HeldRows(np.eye(n), np.zeros((n, 0)))
+        C = np.vstack([design_matrix(knots, [u], order) for u, order in held])
+        left, size, right = np.linalg.svd(C)
+        null = right[len(C) :].T
+        return HeldRows(null, right[: len(C)].T @ ((left / size).T))
+
+
+@dataclass(frozen=True, eq=False)
+class StartFit:
+    """Fits the start of recordings of one cable on one grid.
+
+    The shape is where the cable would rest under its weight with springs to the markers: so a stiff cable bends no more
+    than it can between two noisy markers, and there may be more control points than markers. The velocity is smooth,
+    keeps the length, and comes as near to the markers' as it can.
+
+    Args:
+        grid: whose knots and tables serve.
+        held: (u [m], 0 for a position or 1 for a direction) of what is held.
+    """
+
+    grid: Grid
+    held: tuple[tuple[float, int], ...]
+
+    @cached_property
+    def rows(self) -> HeldRows:
+        """The held rows, solved."""
+        return HeldRows.of(self.grid.knots, self.held)
+
+    def shape(
+        self, bending: float, weight: Floats, u: Floats, markers: Floats, targets: Floats, guess: Floats | None = None
+    ) -> Floats:
+        """Return control points (n, 3) [m].
+
+        Args:
+            bending: EI [N m^2].
+            weight: per length (3,) [N/m].
+            u: markers' coordinates (m,) [m].
+            markers: (m, 3) [m], all seen.
+            targets: positions [m] and unit directions (held, 3).
+            guess: control points near it; None: along the markers.
+        """
+        knots, tables = self.grid.knots, self.grid.tables
+        n = len(knots) - 4
+        rows = self.rows
+        active = np.zeros(laws.COUNT, np.int64)
+        active[[laws.STRETCH, laws.BEND]] = 1
+        p = np.zeros((laws.COUNT, laws.PARAMETERS))
+        p[laws.STRETCH, 0], p[laws.BEND, 0] = _AXIAL, bending
+        history = self.grid.past()
+        B = design_matrix(knots, u)
+        load = np.asarray(tables.weight)[:, None] * weight
+        springs = _SPRING * np.kron(rows.free.T @ (B.T @ B) @ rows.free, np.eye(3))
+        Z = np.kron(rows.free, np.eye(3))
+        if guess is None:
+            middle = (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0
+            guess = np.column_stack([np.interp(middle, u, markers[:, d]) for d in range(3)])
+        C = np.vstack([design_matrix(knots, [at], order) for at, order in self.held]) if self.held else np.zeros((0, n))
+        q = guess + rows.offset @ (targets - C @ guess)
+
+        def energy(q: Floats) -> float:
+            away = B @ q - markers
+            stored = float(stored_energy(_AXES, q, tables, active, p, history))
+            return stored - float((load * q).sum()) + 0.5 * _SPRING * float((away * away).sum())
+
+        K, f, still = np.empty((3 * n, 12)), np.empty((n, 3)), np.zeros((n, 3))
+        before = energy(q)
+        for _ in range(60):
+            scales = (1.0, 0.0, 0.0)  # the positive part: from a guess along noisy markers the full one need not be
+            assemble(_AXES, q, still, tables, active, p, history, NO_RATES, scales, f, K)
+            force = (Z.T @ (f - load + _SPRING * B.T @ (B @ q - markers)).ravel()).astype(float)
+            step = -np.linalg.solve(Z.T @ _dense(K) @ Z + springs, force)
+            slope, length = float(force @ step), 1.0
+            change = (Z @ step).reshape(n, 3)
+            after = energy(q + change)
+            while not after <= before + 1e-4 * length * slope + 1e-15 and length > 1e-4:
+                length *= 0.5
+                after = energy(q + length * change)
+            q, before = q + length * change, after
+            if np.abs(change).max() < _TOLERANCE:
+                break
+        return np.ascontiguousarray(q)
+
+    def velocity(self, q: Floats, u: Floats, speeds: Floats, targets: Floats) -> Floats:
+        """Return control points (n, 3) [m/s] of the velocity of the shape q.
+
+        Args:
+            q: control points (n, 3) [m].
+            u: markers' coordinates (m,) [m].
+            speeds: their velocities (m, 3) [m/s].
+            targets: velocities of what is held (held, 3).
+        """
+        tables, n = self.grid.tables, len(q)
+        rows = self.rows
+        B = design_matrix(self.grid.knots, u)
+        first = _matrix(tables.axial_first, tables.axial_b1, n)
+        tangent = first @ q
+        tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+        second = _matrix(tables.curvature_first, tables.curvature_b2, n)
+        second *= np.sqrt(_EVEN * np.asarray(tables.curvature_w))[:, None]
+        stretch = (_KEPT_LENGTH * first[:, :, None] * tangent[:, None, :]).reshape(len(first), -1)
+        J = np.vstack([np.kron(B, np.eye(3)), stretch, np.kron(second, np.eye(3))])
+        known = rows.offset @ targets
+        y = np.concatenate([speeds.ravel(), np.zeros(len(J) - speeds.size)]) - J @ known.ravel()
+        Z = np.kron(rows.free, np.eye(3))
+        free = np.linalg.lstsq(J @ Z, y, rcond=None)[0]
+        return np.ascontiguousarray(known + (Z @ free).reshape(n, 3))
+
+
+def _dense(K: Floats) -> Floats:
+    size, width = K.shape
+    out = np.zeros((size, size))
+    for o in range(min(width, size)):
+        at = np.arange(size - o)
+        out[at + o, at] = out[at, at + o] = K[: size - o, o]
+    return out
+
+
+def _matrix(first: NDArray[np.int64], values: Floats, n: int) -> Floats:
+    out = np.zeros((len(first), n))
+    out[np.arange(len(first))[:, None], np.asarray(first)[:, None] + np.arange(4)] = values
+    return out

@@ -1,0 +1,369 @@
+"""Derivatives of a predicted motion by parameters of its scene (docs/identification.md).
+
+Every step of a march solves R(q, v, a, past; parameter) = 0. The derivative of the motion obeys the linearised step,
+whose matrix is the step's own Newton matrix. It is found without a new march: two motions beside the known one, with
+the parameter a little larger and smaller, are followed to rounding with the factors of the known motion's steps, and
+their difference is taken. This differentiates the converged discrete system directly: what depends on the parameter
+(knots under a grasp that moves, the start, weights, the past of the strain) is covered alike, and the noise of a
+solver's tolerance is not in it. The error that is left is that of a central difference of a smooth function over a
+relative step of 1e-4: about 1e-7 of the derivative.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from itertools import pairwise
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dlocore.discretisation import applied_forces
+from dlocore.errors import SceneError
+from dlocore.grid import Grid
+from dlocore.holding import Starts, close_grasps, hold
+from dlocore.kernels.banded import Elimination
+from dlocore.kernels.march import constrained_mass_solve, fit_time, initial_state
+from dlocore.kernels.sensitivity import factor_steps, follow_steps
+from dlocore.prediction import Prediction
+from dlocore.problem import Problem, pose
+from dlocore.report import surface_of
+from dlocore.scene import Scene
+from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, closed_grasps, events_of, march, time_knots, times_mass
+from dlocore.solvers.monitor import Monitor
+from dlocore.spline import SplineSurface
+from dlocore.statics import start_grid
+
+Floats = NDArray[np.float64]
+
+STEP = 1e-4  # relative, of the parameter: the difference's own error is its square
+COARSE_STEP = 1e-2  # where whole marches are compared, whose tolerance would drown a smaller one
+_FOLLOWED = 1e-12  # of the length, on the last update of a followed step
+_STRAYED = 1e-8  # of the length: a step left with more than this was not followed
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A smooth stretch of a known motion: its steps, from `first` to `last`, and their factors."""
+
+    begin: float
+    end: float
+    first: int
+    last: int
+    factors: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class KnownMotion:
+    """A marched motion whose steps are factorised, so that motions beside it can be followed.
+
+    Attributes:
+        motion: the march.
+        stretches: between each two events.
+        softened: steps whose tangent is not positive; they are followed with its positive part.
+    """
+
+    motion: March
+    stretches: tuple[Stretch, ...]
+    softened: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Entry:
+    """How a stretch begins: elimination, prescribed parts, velocity, acceleration and G."""
+
+    e: Elimination
+    offsets: Floats
+    v: Floats
+    a: Floats
+    G: Floats
+
+
+def objection(problem: Problem, motion: March) -> str:
+    """Return why the steps of a motion can't be differentiated one by one, "" where they can."""
+    for name in ("contact", "self_contact", "friction"):
+        if getattr(problem, name) is not None:
+            return f"{name.replace('_', '-')} has kinks, and steps at which it strikes are done in another way"
+    if motion.stopped:
+        return "the motion stopped before its end"
+    if motion.split:
+        return "some steps found equilibrium only in smaller ones"
+    return ""
+
+
+def factored(problem: Problem, motion: March) -> KnownMotion:
+    """Return the motion with its steps factorised.
+
+    Raises:
+        ValueError: `objection` has one.
+    """
+    if objection(problem, motion):
+        raise ValueError(objection(problem, motion))
+    grid, states = motion.grid, motion.states
+    active, parameters = problem.law_table()
+    mass, drag = grid.tables.mass * problem.mass_density(), grid.tables.mass * problem.drag_coefficient()
+    history, starts, stretches = grid.past(), cast(Starts, {}), []
+    v, softened = grid.velocity.copy(), 0
+    for begin, end, first, last in _stretches(problem, motion.times):
+        h = (end - begin) / (last - first)
+        entry = _enter(problem, grid, starts, motion.times[first : last + 1], begin, h, states[first], v, history)
+        v, a = entry.v.copy(), entry.a.copy()
+        free = states[0].size - len(entry.e.held)
+        factors = np.empty((last - first, free, 4 * problem.nc))
+        part = np.ascontiguousarray(states[first : last + 1])
+        found = factor_steps(
+            problem.axes, h, motion.rho, part, v, a, mass, drag, grid.tables, active, parameters, history, entry.e,
+            factors,
+        )  # fmt: skip
+        if found < 0:
+            raise ValueError("the tangent of a step is singular")
+        softened += int(found)
+        stretches.append(Stretch(begin, end, first, last, factors))
+    return KnownMotion(motion, tuple(stretches), softened)
+
+
+def beside(known: KnownMotion, problem: Problem, grid: Grid) -> tuple[Floats, Floats, Floats]:
+    """Return the motion of a problem that differs a little from the known one.
+
+    Args:
+        known: the known motion.
+        problem: with the same effects and events as the known one's, those at slightly other times at most.
+        grid: with as many control points.
+
+    Returns:
+        states (steps + 1, n_u, nc) [m], their times (steps + 1,) [s] and the velocity after t = 0.
+
+    Raises:
+        ValueError: the motion strays too far to be followed.
+    """
+    states = np.empty_like(known.motion.states)
+    states[0] = grid.start
+    times = known.motion.times.copy()
+    active, parameters = problem.law_table()
+    mass, drag = grid.tables.mass * problem.mass_density(), grid.tables.mass * problem.drag_coefficient()
+    history, starts, v = grid.past(), cast(Starts, {}), grid.velocity.copy()
+    length = problem.scene.cable.length
+    velocity = v
+    marks = [0.0, *[e.time for e in events_of(problem)], problem.horizon]
+    if problem.nc != states.shape[2]:
+        raise ValueError("the motion beside it has other effects")
+    if len(marks) != len(known.stretches) + 1:
+        raise ValueError("the parameter brings an event into the motion, or takes one out")
+    for stretch, (begin, end) in zip(known.stretches, pairwise(marks), strict=True):
+        first, last = stretch.first, stretch.last
+        times[first : last + 1] = np.linspace(begin, end, last - first + 1)
+        h = (end - begin) / (last - first)
+        entry = _enter(problem, grid, starts, times[first : last + 1], begin, h, states[first], v, history)
+        velocity = entry.v.copy() if first == 0 else velocity
+        v, a, G = entry.v.copy(), entry.a.copy(), entry.G.copy()
+        applied = applied_forces(problem, grid, times[first : last + 1])
+        left = follow_steps(
+            problem.axes, h, known.motion.rho, _FOLLOWED * length, known.motion.states[first : last + 1],
+            stretch.factors, states[first : last + 1], v, a, G, mass, drag, grid.tables, active, parameters, history,
+            applied, entry.e, entry.offsets,
+        )  # fmt: skip
+        if not left <= _STRAYED * length:
+            raise ValueError(f"the motion beside it can't be followed: a step was left with {left:.2g} m")
+    return states, times, velocity
+
+
+def _stretches(problem: Problem, times: Floats) -> list[tuple[float, float, int, int]]:
+    marks = [0.0, *[e.time for e in events_of(problem)], problem.horizon]
+    at = [int(np.argmin(np.abs(times - mark))) for mark in marks]
+    return [(*pairs, *steps) for pairs, steps in zip(pairwise(marks), pairwise(at), strict=True)]
+
+
+def _enter(
+    problem: Problem, grid: Grid, starts: Starts, times: Floats, begin: float, h: float, q: Floats, v: Floats,
+    history: Any,
+) -> _Entry:  # fmt: skip
+    """Close the grasps of a stretch and return how it begins, as `solvers.march.march` does."""
+    tables, nc = grid.tables, problem.nc
+    unit, mass = tables.mass, tables.mass * problem.mass_density()
+    q = np.ascontiguousarray(q)
+    grasps = closed_grasps(problem, begin, float(times[-1]))
+    close_grasps(problem, grid, grasps, starts, q)
+    near_times = begin + 1e-3 * h * np.arange(3.0)
+    held = hold(problem, grid, grasps, np.concatenate([near_times, times]), starts, q)
+    near, e = held.offsets[:3], held.elimination
+    rate = (4 * near[1] - 3 * near[0] - near[2]) / (2e-3 * h)
+    acceleration = (near[2] - 2 * near[1] + near[0]) / (1e-3 * h) ** 2
+    v = constrained_mass_solve(nc, unit, e, rate, times_mass(unit, v))
+    if problem.inertia is None:
+        v = np.zeros_like(v)
+    G = np.empty_like(v)
+    active, parameters = problem.law_table()
+    load = applied_forces(problem, grid, times[:1])[0]
+    a = initial_state(
+        problem.axes, q, v, mass, tables.mass * problem.drag_coefficient(), tables, active, parameters, history, load,
+        e, acceleration, G,
+    )  # fmt: skip
+    if problem.inertia is None:
+        a = np.zeros_like(v)
+    return _Entry(e, np.ascontiguousarray(held.offsets[3:]), v, a, G)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sensitivities:
+    """Derivatives of a predicted motion by parameters of its scene.
+
+    Attributes:
+        names: the parameters.
+        exact: by parameter: differentiated step by step; else by differences of whole marches.
+        reason: why not, "" where all are.
+        steps: the change of each parameter, up and down, on which the derivative rests.
+        above, below: the motions with each parameter a little larger and smaller.
+    """
+
+    names: tuple[str, ...]
+    exact: tuple[bool, ...]
+    reason: str
+    steps: tuple[float, ...]
+    above: tuple[SplineSurface, ...]
+    below: tuple[SplineSurface, ...]
+
+    def __call__(self, u: ArrayLike, t: ArrayLike) -> Floats:
+        """Return dr/dparameter on the grid of t (m,) [s] and u (k,) [m]; (parameters, m, k, 3) [m per its unit]."""
+        u, t = np.atleast_1d(np.asarray(u, float)), np.atleast_1d(np.asarray(t, float))
+        both = zip(self.above, self.below, self.steps, strict=True)
+        # beyond the end of a cable or a motion that is a little shorter, its end
+        return np.array([(_at(high, u, t) - _at(low, u, t)) / (2.0 * step) for high, low, step in both])
+
+
+def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
+    """Return the derivatives of a predicted motion by parameters of its scene.
+
+    The motion is marched once more on the prediction's grid, with the effects that it found, and differentiated step by
+    step: exact up to about 1e-6 of the largest derivative. Where steps can't be differentiated (contact, friction,
+    strands that touch, steps that had to be split) whole marches are compared instead, and `exact` and `reason` say so.
+
+    Args:
+        prediction: of the scene.
+        wrt: numbers of the scene by their path, e.g. "cable.bending_stiffness", "environment.drag", "grasps[0].u",
+            "grasps[0].path.displacement[1]", "shape.control_points[4][2]". A derivative is by the number alone:
+            stiffnesses that were derived from others stay.
+
+    Raises:
+        SceneError: a path leads to no number.
+    """
+    scene, accuracy = prediction.scene, prediction.accuracy
+    found = {report.name: "" for report in prediction.effects if report.active}
+    called = {name: "the prediction found it" for name in found if name in ("plasticity", "self_contact", "obstacles")}
+    values = [_number(scene, name) for name in wrt]
+    problem = pose(scene, called)
+    monitor = Monitor(None, None, None)
+    steps = _asked_for(problem, accuracy.steps)
+    rho = RHO if problem.contact is None and problem.friction is None else STRONGLY_DAMPED
+    grid = start_grid(problem, accuracy.n_u, monitor)
+    motion = march(problem, grid, steps, monitor, rho=rho)
+    reason = objection(problem, motion)
+    known = None
+    if not reason and not scene.shape.settle:
+        known = factored(problem, motion)
+    elif not reason:
+        reason = "the start is an equilibrium that is found by iteration"
+
+    def moved(name: str, value: float) -> tuple[Problem, Grid]:
+        other = pose(_with(scene, name, value), called)
+        return other, start_grid(other, accuracy.n_u, monitor)
+
+    above, below, exact, widths = [], [], [], []
+    for name, value in zip(wrt, values, strict=True):
+        size = abs(value) if value != 0.0 else 1.0
+        sides: list[SplineSurface] = []
+        followed = known is not None
+        width = STEP * size
+        try:
+            if known is not None:
+                for sign in (1.0, -1.0):
+                    other, other_grid = moved(name, value + sign * width)
+                    sides.append(_surface(other, other_grid, *beside(known, other, other_grid), accuracy.n_t))
+        except ValueError as error:
+            followed, reason = False, str(error)
+        if not followed:
+            width = COARSE_STEP * size
+            sides = []
+            for sign in (1.0, -1.0):
+                other, other_grid = moved(name, value + sign * width)
+                one = march(other, other_grid, steps, monitor, rho=rho)
+                sides.append(_surface(other, other_grid, one.states, one.times, one.velocity, accuracy.n_t))
+        above.append(sides[0])
+        below.append(sides[1])
+        exact.append(followed)
+        widths.append(width)
+    return Sensitivities(
+        names=tuple(wrt), exact=tuple(exact), reason=reason, steps=tuple(widths), above=tuple(above),
+        below=tuple(below),
+    )  # fmt: skip
+
+
+def _asked_for(problem: Problem, steps: int) -> int:
+    """Return the number of steps that a march was asked for that took `steps`: stretches between events have more."""
+    marks = [0.0, *[e.time for e in events_of(problem)], problem.horizon]
+    if len(marks) == 2:
+        return steps
+
+    def taken(asked: int) -> int:
+        shares = [asked * (b - a) / problem.horizon for a, b in pairwise(marks)]
+        return sum(max(8, asked // (2 * len(marks)), round(share)) for share in shares)
+
+    return next((asked for asked in range(steps, 0, -1) if taken(asked) <= steps), steps)
+
+
+def _surface(problem: Problem, grid: Grid, states: Floats, times: Floats, velocity: Floats, n_t: int) -> SplineSurface:
+    """Return the bivariate spline of the centreline of marched states; theta is left out."""
+    knots_t = time_knots(problem, n_t)
+    assert knots_t is not None, "the prediction has one on as many control points"
+    steps, n_u, nc = states.shape
+    flat = fit_time(knots_t, times, states.reshape(steps, n_u * nc), velocity.reshape(-1))
+    return surface_of(problem, grid.knots, knots_t, flat.reshape(len(knots_t) - 4, n_u, nc))
+
+
+def _at(surface: SplineSurface, u: Floats, t: Floats) -> Floats:
+    """Return positions (m, k, 3) at u (k,) and t (m,) within the surface."""
+    inside = surface(np.minimum(u, surface.knots_u[-1]), np.minimum(t, surface.horizon))
+    return np.asarray(inside[..., :3])
+
+
+_STEP_OF_PATH = re.compile(r"([A-Za-z_]\w*)|\[(\d+)\]")
+
+
+def _steps_of(path: str) -> list[str | int]:
+    if not re.fullmatch(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*|\[\d+\])*", path):
+        raise SceneError("wrt", path, 'a path such as "cable.bending_stiffness" or "grasps[0].u"')
+    return [int(index) if index else name for name, index in _STEP_OF_PATH.findall(path)]
+
+
+def _number(scene: Scene, path: str) -> float:
+    """Return the number at a path of the scene."""
+    value: Any = scene
+    for step in _steps_of(path):
+        try:
+            value = value[step] if isinstance(step, int) else getattr(value, step)
+        except (AttributeError, IndexError, TypeError):
+            raise SceneError("wrt", path, "the path of a number of the scene") from None
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        raise SceneError("wrt", path, "the path of a number of the scene")
+    return float(value)
+
+
+def _with(part: Any, path: str, value: float) -> Any:
+    """Return a part of a scene with another number at a path."""
+
+    def changed(part: Any, steps: list[str | int]) -> Any:
+        if not steps:
+            return value
+        step, *rest = steps
+        if isinstance(step, str):
+            if not is_dataclass(part) or step not in {f.name for f in fields(part)}:
+                raise SceneError("wrt", path, "the path of a number of the scene")
+            return replace(part, **{step: changed(getattr(part, step), rest)})  # type: ignore[type-var]
+        if isinstance(part, np.ndarray):
+            out = part.copy()
+            out[step] = changed(part[step], rest)
+            return out
+        items = list(part)
+        items[step] = changed(items[step], rest)
+        return type(part)(items)
+
+    return changed(part, _steps_of(path))

@@ -1,0 +1,93 @@
+"""Identification: simulated recordings give back what they were made with, and what they do not tell is said."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.simulated_recordings import Tracking, simulated, true_cable
+from dlocore import Cable, Cancelled, Environment, SceneError
+from dlocore.identify import Candidate, Replay, Resolution, identify
+from dlocore.identify.datasets import load_datasets
+from dlocore.recordings import Recording
+
+FINE = Resolution(n_u=17)
+CABLE = Cable(
+    length=1.0,
+    diameter=0.006,
+    linear_density=0.05,
+    bending_stiffness=3e-3,
+    bending_damping=5e-4,
+    axial_stiffness=600.0,
+)
+DRAG = Environment(drag=0.06)
+NAMES = ("bending_stiffness", "drag", "bending_damping")
+
+
+def test_a_clean_recording_is_replayed_as_it_was() -> None:
+    clean = Tracking(noise=0.0, held=0.0, outliers=0.0, lost=0.0)
+    replay = Replay(simulated(3, 2.0, cable=CABLE, environment=DRAG, tracking=clean), Resolution(n_u=17, step=0.005))
+    predicted = replay.play(Candidate(cable=CABLE, environment=DRAG)).predicted
+    away = np.linalg.norm((predicted - replay.markers)[:, replay.recording.free], axis=2)
+    # of a motion of half a metre; net and steps are those of the truth, what is left is how frames are interpolated
+    assert away.max() < 1e-4
+
+
+def test_a_badly_tracked_recording_gives_back_its_cable() -> None:
+    cable, environment = true_cable(np.random.default_rng([5, 1]))
+    found = identify([simulated(5, 5.0)], names=NAMES, resolution=FINE)
+    truth = (cable.bending_stiffness, environment.drag, cable.bending_damping)
+    assert found.status == "converged"
+    for p, true in zip(found.parameters, truth, strict=True):
+        assert true is not None
+        # 5 %, the accuracy that benchmarks/identification.py measures over 50 trials
+        assert p.value == pytest.approx(true, rel=0.05), p.name
+        assert p.low < p.value < p.high
+        assert p.identifiable
+
+
+def test_twist_can_not_be_seen_in_a_planar_motion() -> None:
+    still = Environment(gravity=(0.0, 0.0, -9.81), drag=0.06)
+    flat = simulated(2, 2.0, cable=CABLE, environment=still, planar=True)
+    known = Candidate(cable=replace(CABLE, torsional_stiffness=2e-3), environment=DRAG)
+    found = identify([flat], names=("bending_stiffness", "torsional_stiffness"), start=known, iterations=4)
+    stiffness, torsion = found.parameters
+    assert stiffness.identifiable
+    assert not torsion.identifiable
+    assert "torsional_stiffness" in found.message
+
+
+def test_a_hanging_shape_tells_the_bending_stiffness() -> None:
+    x = simulated(4, 1.0, cable=CABLE, environment=DRAG, tracking=Tracking(noise=0.0, held=0.0, outliers=0.0, lost=0.0))
+    rest = Recording(
+        times=[0.0], markers=np.asarray(x.markers)[:1], u=x.u, held=x.held, length=1.0, linear_density=0.05, static=True
+    )
+    found = identify([rest], names=("bending_stiffness",), resolution=FINE)
+    # no noise: what is left is the difference of the start's relaxation, far below a per cent
+    assert found.parameters[0].value == pytest.approx(3e-3, rel=0.01)
+
+
+def test_what_can_not_be_replayed_is_named() -> None:
+    markers = np.zeros((12, 4, 3))
+    markers[:, :, 0] = 0.1 * np.arange(4)
+    free = Recording(times=np.arange(12) * 0.01, markers=markers)
+    with pytest.raises(SceneError, match="held"):
+        identify([free])
+    with pytest.raises(SceneError, match="parameters"):
+        identify([free], names=("colour",))
+    with pytest.raises(SceneError, match="recordings"):
+        identify([])
+
+
+def test_an_identification_is_cancelled() -> None:
+    recording = simulated(3, 1.0, cable=CABLE, environment=DRAG)
+    with pytest.raises(Cancelled):
+        identify([recording], cancelled=lambda: True)
+
+
+def test_a_data_set_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match="dataset"):
+        load_datasets([tmp_path / "nothing"])
+    with pytest.raises(SceneError, match="dataset"):
+        load_datasets([tmp_path])

@@ -1,0 +1,45 @@
+"""Identification while a cable moves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.simulated_recordings import simulated
+from dlocore import Cable, Environment, SceneError
+from dlocore.identify.online import Identifier
+
+CABLE = Cable(
+    length=1.0,
+    diameter=0.006,
+    linear_density=0.05,
+    bending_stiffness=3e-3,
+    bending_damping=5e-4,
+    axial_stiffness=600.0,
+)
+
+
+def test_a_wrong_stiffness_is_corrected_while_frames_arrive() -> None:
+    recording = simulated(8, 4.0, cable=CABLE, environment=Environment(drag=0.06))
+    wrong = replace(CABLE, bending_stiffness=9e-3)
+    names = ("bending_stiffness", "bending_damping")
+    identifier = Identifier(recording.u, recording.held, wrong, Environment(drag=0.06), names=names)
+    updates = []
+    for k in range(0, 400, 3):  # 33 frames a second
+        identifier.add(float(np.asarray(recording.times)[k]), np.asarray(recording.markers)[k])
+        if k % 12 == 0 and (update := identifier.update()) is not None:
+            updates.append(update)
+    first, last = updates[0], updates[-1]
+    assert last.deviations["bending_stiffness"] < 0.5 * first.deviations["bending_stiffness"]
+    # from three times too stiff to within a third: windows of 0.8 s whose start is as noisy as their markers
+    assert identifier.cable.bending_stiffness == pytest.approx(3e-3, rel=0.35)
+
+
+def test_frames_that_do_not_fit_are_refused() -> None:
+    identifier = Identifier(np.linspace(0.0, 1.0, 5), (0,), CABLE)
+    identifier.add(0.0, np.zeros((5, 3)))
+    assert identifier.update() is None
+    with pytest.raises(SceneError, match="time"):
+        identifier.add(0.0, np.zeros((5, 3)))
+    with pytest.raises(SceneError, match="markers"):
+        identifier.add(0.1, np.zeros((4, 3)))

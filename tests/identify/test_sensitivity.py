@@ -1,0 +1,85 @@
+"""Derivatives of a prediction: those of closed forms, and those of marches whose tolerance is far below the change."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dlocore import Cable, Environment, Grasp, Move, Quality, Scene, SceneError, Straight, predict
+from dlocore.sensitivity import STEP, sensitivities
+from dlocore.solvers import march as marching
+
+U, T = np.linspace(0.05, 0.95, 7), np.linspace(0.2, 1.5, 6)
+
+
+def scene(**changes: Any) -> Scene:
+    values: dict[str, Any] = {
+        "cable": Cable.preset("paper", bending_damping=2e-4, axial_stiffness=640.0, torsional_stiffness=1e-3),
+        "shape": Straight(start=(0, 0, 0), direction=(1, 0, 0)),
+        "grasps": (Grasp(u=0.3, path=Move(displacement=(0.0, 0.4, 0.0), duration=1.5)),),
+        "environment": Environment(gravity=(0, 0, 0), drag=0.1, drag_quadratic=0.05),
+        "horizon": 1.7,
+        "quality": Quality(n_u=11, n_t=15, method="march", estimate=False),
+    }
+    return Scene(**(values | changes))
+
+
+NAMES = (
+    "cable.bending_stiffness",
+    "cable.bending_damping",
+    "cable.linear_density",
+    "environment.drag",
+    "environment.drag_quadratic",
+    "grasps[0].u",
+    "grasps[0].path.displacement[1]",
+    "grasps[0].path.duration",
+)
+
+
+@pytest.fixture(scope="module")
+def found() -> np.ndarray:
+    sensed = sensitivities(predict(scene()), NAMES)
+    assert sensed.exact == (True,) * len(NAMES), sensed.reason
+    return sensed(U, T)
+
+
+def test_the_gripper_moves_with_its_displacement(found: np.ndarray) -> None:
+    sensed = sensitivities(predict(scene()), ["grasps[0].path.displacement[1]"])
+    x = T / 1.5
+    expected = x**3 * (10 - 15 * x + 6 * x**2)  # minimum jerk; the time spline of 15 control points misses 1e-3 of it
+    np.testing.assert_allclose(sensed([0.3], T)[0, :, 0, 1], expected, atol=2e-3)
+
+
+@pytest.mark.parametrize("index", range(len(NAMES)), ids=NAMES)
+def test_derivatives_are_those_of_marches_solved_to_rounding(
+    index: int, found: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from dlocore.sensitivity import _number, _with
+
+    # whole marches, with a Newton tolerance so far below the change that their difference is a derivative
+    monkeypatch.setattr(marching, "TOLERANCE", 1e-13)
+    name = NAMES[index]
+    value = _number(scene(), name)
+    width = 10 * STEP * value
+    ends = [predict(_with(scene(), name, value + sign * width)).surface(U, T)[..., :3] for sign in (1.0, -1.0)]
+    difference = (ends[0] - ends[1]) / (2.0 * width)
+    # central differences over 1e-3 of the value are right to about its square; the largest derivative sets the scale
+    scale = np.abs(difference).max()
+    np.testing.assert_allclose(found[index], difference, atol=2e-5 * scale)
+
+
+def test_contact_is_differentiated_by_whole_marches_and_said_so() -> None:
+    from dlocore import Sphere
+
+    ball = Sphere(center=(0.6, 0.1, 0.0), radius=0.05)
+    touched = scene(environment=Environment(gravity=(0, 0, 0), drag=0.1, obstacles=(ball,)))
+    sensed = sensitivities(predict(touched), ["grasps[0].path.displacement[1]"])
+    assert sensed.exact == (False,)
+    assert "contact" in sensed.reason
+    assert np.isfinite(sensed(U, T)).all()
+
+
+@pytest.mark.parametrize("path", ["cable.colour", "grasps[3].u", "cable", "environment.gravity[7]", "__class__", "a b"])
+def test_a_path_that_leads_to_no_number_is_refused(path: str) -> None:
+    with pytest.raises(SceneError, match="wrt"):
+        sensitivities(predict(scene()), [path])
