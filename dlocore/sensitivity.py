@@ -22,6 +22,7 @@ from dlocore.discretisation import applied_forces
 from dlocore.errors import SceneError
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
+from dlocore.kernels.assembly import times_scalar_band
 from dlocore.kernels.banded import Elimination
 from dlocore.kernels.march import constrained_mass_solve, fit_time, initial_state
 from dlocore.kernels.sensitivity import factor_steps, follow_steps
@@ -29,7 +30,7 @@ from dlocore.prediction import Prediction
 from dlocore.problem import Problem, pose
 from dlocore.report import surface_of
 from dlocore.scene import Scene
-from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, closed_grasps, events_of, march, time_knots, times_mass
+from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, closed_grasps, events_of, march, time_knots
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import SplineSurface
 from dlocore.statics import start_grid
@@ -188,7 +189,7 @@ def _enter(
     near, e = held.offsets[:3], held.elimination
     rate = (4 * near[1] - 3 * near[0] - near[2]) / (2e-3 * h)
     acceleration = (near[2] - 2 * near[1] + near[0]) / (1e-3 * h) ** 2
-    v = constrained_mass_solve(nc, unit, e, rate, times_mass(unit, v))
+    v = constrained_mass_solve(nc, unit, e, rate, times_scalar_band(unit, v))
     if problem.inertia is None:
         v = np.zeros_like(v)
     G = np.empty_like(v)
