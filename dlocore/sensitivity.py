@@ -110,7 +110,7 @@ def factored(problem: Problem, motion: March) -> KnownMotion:
         entry = _enter(problem, grid, starts, motion.times[first : last + 1], begin, h, states[first], v, history)
         v, a = entry.v.copy(), entry.a.copy()
         free = states[0].size - len(entry.e.held)
-        factors = np.empty((last - first, free, 4 * problem.nc))
+        factors = np.empty((last - first, free, entry.e.width))
         part = np.ascontiguousarray(states[first : last + 1])
         found = factor_steps(
             problem.axes, h, motion.rho, part, v, a, mass, drag, grid.tables, active, parameters, history, entry.e,

@@ -33,7 +33,7 @@ def factor_steps(
     axes: Any, h: float, rho: float, Q: Any, v: Any, a: Any, mass: Any, drag: Any, tables: Any, active: Any, p: Any,
     history: Any, e: Any, factors: Any,
 ) -> int:  # fmt: skip
-    """Write the factors (steps, free, 4 nc) of the tangent of every step of a marched motion Q (steps + 1, n, nc).
+    """Write the factors (steps, free, e.width) of the tangent of every step of a marched motion Q (steps + 1, n, nc).
 
     v, a (n, nc) and `history` are those at its first state; at its last on return. Where a tangent is not positive
     its positive semidefinite part is taken.
