@@ -16,7 +16,7 @@ def test_a_thousand_plastic_cycles_neither_drift_nor_grow():
     )  # fmt: skip
     shape, side, kept = Straight(), 1.0, []
     for _ in range(2 * CYCLES):  # a cycle is one bend to either side
-        path = Move(displacement=(0.0, 0.16 * side if kept else 0.08, 0.0), duration=0.5)
+        path = Move(displacement=(0.0, 0.16 * side, 0.0) if kept else (-0.03, 0.08, 0.0), duration=0.5)
         scene = Scene(
             cable=wire,
             shape=shape,

@@ -27,7 +27,8 @@ def test_random_scene_ends_with_a_finite_answer_or_is_refused_for_a_reason(first
         if drawn.possible:
             assert record["status"] != "refused", (index, record["message"])
             assert record["laws"]["finite"], index
-            assert record["laws"]["held"] < 1e-9 * record["length"], index  # interpolated: rounding
+            if record["status"] == "converged":  # else the surface stands still from where the march ended
+                assert record["laws"]["held"] < 1e-9 * record["length"], index  # interpolated: rounding
             assert record["status"] != "converged" or record["estimate"] is not None, index
         else:
             assert record["status"] != "converged", (index, record["families"])
@@ -41,8 +42,8 @@ def test_a_scene_is_drawn_from_its_seed_and_index_alone():
 
 
 def test_every_kind_of_hardness_is_drawn_often():
-    families = Counter(family for index in range(600) for family in draw(3, index).families)
+    families = Counter(family for index in range(300) for family in draw(3, index).families)
     for group in ("geometry", "stiffness", "motion", "effects", "numbers", "impossible"):
         kinds = {family: count for family, count in families.items() if family.startswith(group)}
         assert len(kinds) >= 6, kinds
-    assert sum(count for family, count in families.items() if family.startswith("impossible")) > 600 * IMPOSSIBLE / 2
+    assert sum(count for family, count in families.items() if family.startswith("impossible")) > 300 * IMPOSSIBLE / 2
