@@ -14,7 +14,6 @@ OPEN = {
     "compressed to 5 per cent": "the instant of buckling moves from grid to grid; a fifth too far from the target",
     "bending stiffness of 1e minus 6": "called converged though one span is strained by 4 per cent",
 }
-HANGS = {"strands in one place": "the search along an update for strands that touch never ends at a distance of zero"}
 STRAIN = 0.02  # the cases are built so that weight and inertia strain them by less than 0.5 per cent
 HELD = 1e-9  # of the length: the ends of a hold are interpolated, so that only rounding is left
 GAIN = 0.02  # of the energy that was about: the velocities of the time spline, and trapezoids of the power
@@ -23,9 +22,7 @@ LOST = 0.05  # of the impulses that were about: the same
 
 def of_group(group: str) -> list[object]:
     """Return the cases of a group as parameters of a test."""
-    marks: dict[str, list[pytest.MarkDecorator]]
     marks = {name: [pytest.mark.xfail(reason=reason, strict=True)] for name, reason in OPEN.items()}
-    marks |= {name: [pytest.mark.skip(reason=reason)] for name, reason in HANGS.items()}
     return [
         pytest.param(case, id=case.name, marks=marks.get(case.name, []))
         for case in CASES.values()

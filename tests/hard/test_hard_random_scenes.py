@@ -2,7 +2,6 @@
 
 from collections import Counter
 
-import numpy as np
 import pytest
 
 from benchmarks.hard.generator import IMPOSSIBLE, draw
@@ -11,16 +10,14 @@ from benchmarks.hard.judge import run
 SEED = 2
 COUNT = 300
 BATCH = 30
-HANGS = (43, 218)  # the search along an update for strands that touch does not end (docs/stability.md)
+DEADLINE = 10.0  # [s]: an answer that is cut off has a status too
 
 
 @pytest.mark.parametrize("first", range(0, COUNT, BATCH))
 def test_random_scene_ends_with_a_finite_answer_or_is_refused_for_a_reason(first: int):
     for index in range(first, first + BATCH):
-        if index in HANGS:
-            continue
         drawn = draw(SEED, index, small=True)
-        record = run(drawn, np.inf, False)
+        record = run(drawn, DEADLINE, False)
         assert record["status"] != "exception", (index, record["message"])
         if record["status"] == "refused" and record["field"] == "shape.settle":
             continue  # a start that did not come to rest is refused in words; docs/stability.md counts them
