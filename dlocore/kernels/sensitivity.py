@@ -94,7 +94,7 @@ def follow_steps(
     nc = len(axes)
     n = Q.shape[1]
     size = n * nc
-    al_m, al_f, gm, ta, tv, carry = newmark(rho, h)
+    al_m, al_f, gm, ta, _, carry = newmark(rho, h)
     K = np.empty((1, 1))
     f = np.empty((n, nc))
     R = np.empty((n, nc))
