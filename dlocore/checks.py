@@ -81,9 +81,12 @@ def check_above(scene: Scene, start: StartCurve) -> None:
 
 
 def check_apart(scene: Scene, start: StartCurve) -> None:
-    """Refuse a start in which a strand lies inside another: contact could not tell to which side it belongs."""
+    """Refuse a start in which a strand lies inside another: contact could not tell to which side it belongs.
+
+    The ends of a ring may lie in one place.
+    """
     diameter, control = scene.cable.diameter, np.ascontiguousarray(start.control_points)
-    if len(control) <= 4:
+    if len(control) <= 4 or np.linalg.norm(control[-1] - control[0]) < diameter:
         return
     apart = nearest_strands(start.knots, control[None], 3, diameter, diameter)
     if not apart >= CROSSING * diameter:

@@ -18,8 +18,6 @@ _PLAIN_ITERATIONS = 8  # Newton iterations before a step is done again with a li
 _ROBUST_ITERATIONS = 60
 _STRIKE = 0.02  # [m/s]: a node that comes faster to what it touches would bounce, by an amount that steps decide
 _DULL = 3  # steps by backward Euler, of which the cable does not bounce
-_CAUTION = 4.0  # times the contraction that the first update of an earlier step showed
-_MEASURE = 8  # of so many steps one measures it anew
 _LINE_SEARCH = 12  # looks along a step
 
 
@@ -250,14 +248,13 @@ def march_steps(
                         v1[i, d] += tv * s
                         a1[i, d] += ta * s
                 # with contraction c the error left after this update is c/(1-c) of it
+                left = update
                 if it > 0:
                     contraction = min(update / previous, 1.0)
+                    left *= min(1.0, contraction / (1.0 - contraction + 1e-300))
                 else:  # as that of a first update lately was; of Newton's method it is in proportion to the update
-                    contraction = min(_CAUTION * first_contraction * max(1.0, update / first_update), 0.5)
-                left = update * min(1.0, contraction / (1.0 - contraction + 1e-300))
-                if it == 0 and k % _MEASURE == 0:
-                    left = update
-                if it == 1 and not exact and not tight:
+                    contraction = min(first_contraction * max(1.0, update / first_update), 0.5)
+                if it == 1:
                     first_contraction, first_update = contraction, previous
                 if left <= tolerance and length == 1.0:
                     info[LEFT] = max(info[LEFT], left)
