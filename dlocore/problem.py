@@ -177,7 +177,7 @@ class Problem:
             return max(min(apart, rests), cable.length / MOST_NODES)
         flat = [o for o in self.obstacles if isinstance(o, Box | Cylinder)]
         sharp = (bool(flat) and not self.on_table) or any(isinstance(o, Box) for o in flat)
-        return max(cable.diameter / (8.0 if sharp else 1.0), cable.length / MOST_NODES)
+        return max(cable.diameter / (16.0 if sharp else 1.0), cable.length / MOST_NODES)
 
     def weight(self) -> Floats:
         """Return the weight per unit length in the solve's coordinates (nc,) [N/m]."""

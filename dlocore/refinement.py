@@ -202,7 +202,6 @@ def _slopes(level: Level) -> tuple[float, float]:
     """Return the smallest and the largest |r'| at the curvature points of some states of a motion."""
     tables, states = level.motion.grid.tables, level.motion.states
     some = states[:: max(1, len(states) // _LOOKS), :, : level.problem.plane.dimensions]
-    around = some[:, tables.curvature_first[:, None] + np.arange(4)]
-    slope = np.matmul(tables.curvature_b1[:, None, :], around)
+    slope = sum(tables.curvature_b1[:, i, None] * some[:, tables.curvature_first + i] for i in range(4))
     square = (slope * slope).sum(axis=-1)
     return float(np.sqrt(square.min())), float(np.sqrt(square.max()))

@@ -135,10 +135,10 @@ def run_level(
     if free_knots and (problem.contact is not None or motion.deepest > 0.0):
         knots_t, smooth = refined(motion, knots_t, _MISSED * problem.scene.cable.diameter)
     control = fit(smooth, knots_t)
-    off = float(np.quantile(missed(motion, knots_t, control), _MOST_OF_THE_TIME))
+    off = np.sort(missed(motion, knots_t, control))
     if booked:
         monitor.phase("fit")
-    return Level(posed, problem, motion, knots_t, control, off, np.inf)
+    return Level(posed, problem, motion, knots_t, control, float(off[int(_MOST_OF_THE_TIME * (len(off) - 1))]), np.inf)
 
 
 def extrapolated(change: float, before: float) -> float:

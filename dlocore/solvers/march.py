@@ -36,7 +36,7 @@ Floats = NDArray[np.float64]
 # undamped motion energy grows without bounds; 0.5 holds nearly always, 0 always (docs/model.md).
 RHO = 0.5
 STRONGLY_DAMPED = 0.0
-TOLERANCE = 3e-7  # of the length, on the error that the Newton iterations of a step leave
+TOLERANCE = 1e-8  # of the length, on the error that the Newton iterations of a step leave
 _REFINEMENTS = 8  # of the time knots: each halves spans
 _RESTS = 0.05  # of the diameter above the table: nearer to it the cable rests on it
 _CHUNK = 256  # steps between looks at the clock
@@ -399,8 +399,8 @@ def refined(motion: March, knots_t: Floats, tolerance: float) -> tuple[Floats, M
 def missed(motion: March, knots_t: Floats, control: Floats) -> Floats:
     """Return by how much the time spline of `control` (n_t, n_u, nc) misses each state (steps + 1,) [m]."""
     first, table = basis_rows(knots_t, motion.times, 0)
-    fitted = np.einsum("ki,kind->knd", table[:, 0], control[first[:, None] + np.arange(4)])
-    return np.asarray(np.abs(fitted - motion.states)[..., :3].max(axis=(1, 2)))
+    away = motion.states - sum(table[:, 0, i, None, None] * control[first + i] for i in range(4))
+    return np.asarray(np.abs(away[..., :3]).max(axis=(1, 2)))
 
 
 def _halved(motion: March, knots_t: Floats, tolerance: float) -> March:

@@ -348,7 +348,7 @@ def test_over_a_frictionless_obstacle_the_tension_at_the_grasp_is_the_weight_of_
     u = np.linspace(0, hanging.surface.length, 401)
     r, tangent = hanging.surface.positions(u, [3.0])[0], hanging.surface([0.0], [3.0], du=1)[0, 0, :3]
     force = -hanging.grasps[0].reaction[-1] @ tangent / np.linalg.norm(tangent)
-    # what still swings: 2 mm/s; over an edge the cable slides from node to node, a diameter's eighth apart
+    # what still swings: 2 mm/s; over an edge the cable slides from node to node, a sixteenth of a diameter apart
     close = 0.03 if name == "box" else 0.02
     assert force == pytest.approx(WEIGHT * (r[0, 2] - r[-1, 2]), rel=close, abs=2e-3)
     assert deepest(hanging) < DEEPEST
