@@ -112,7 +112,9 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor) -> Outcome:
                 return Outcome(best, status, f"A finer grid was not finished: {message}", _finite(best.change))
             changes[direction] = level.change, changes.get(direction, (np.inf, np.inf))[0]
             estimate = max(_error(changes), MISSED_COUNTS * level.missed)
-            rho = STRONGLY_DAMPED if level.change > ROUGH * problem.scene.cable.length else RHO
+            rough = level.change > ROUGH * problem.scene.cable.length
+            if rough or number < len(LEVELS):  # later on two marches would differ by their damping
+                rho = STRONGLY_DAMPED if rough else RHO
         record_level(problem, level, monitor)
         best = level
         status, message = march_status(problem, level)

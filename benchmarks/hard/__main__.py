@@ -72,10 +72,8 @@ def row(case: Case, method: str) -> dict[str, Any]:
     }
 
 
-def cell(found: dict[str, Any] | None) -> str:
+def cell(found: dict[str, Any]) -> str:
     """Return a row's result as a cell of the table."""
-    if found is None:
-        return "does not end"
     if found["status"] == "refused":
         return f"refused ({found['field']})"
     words = [found["status"].replace("_", " ")]

@@ -40,7 +40,14 @@ def put(scene: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
     return scene
 
 
-ABSENT = object()
+class _Absent:
+    """Stands for a field that is left out; its name is the same in every process, as parallel tests need."""
+
+    def __repr__(self) -> str:
+        return "absent"
+
+
+ABSENT = _Absent()
 
 
 def start(client: TestClient) -> TestClient:

@@ -19,7 +19,7 @@ IMAGES = {
 SCENES = (6, 7, 8, 11, 12, 20, 26, 30, 35, 41)  # of seed 1: tables, friction, twist, settled and bent starts
 SMOOTH = 1e-6  # of the length: rounding, as the amplified waves of stiff cables leave it
 # friction and contact have kinks, at which a rounding of 1e-16 decides on one more Newton iteration: the tolerance of a
-# step, 3e-7 of the length, times a few
+# step, 1e-8 of the length, as the motion amplifies it
 KINKED = 2e-5
 
 

@@ -1,0 +1,100 @@
+"""Refinement and what an answer says of itself: regressions found by random hard scenes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dlocore import Cable, Environment, Grasp, Move, Quality, Scene, Straight, predict
+from dlocore.discretisation import make_grid
+from dlocore.holding import Starts, close_grasps, hold
+from dlocore.kernels.banded import reduce_matrix
+from dlocore.problem import pose
+from tests.solver.scenes import apart, march, paper_scene, refined
+
+
+def swinging(quality: Quality) -> Scene:
+    """Return a limp cable hung by its end and carried off, whose free end cracks and trembles on."""
+    return Scene(
+        cable=Cable(length=0.6, diameter=0.005, linear_density=0.08, bending_stiffness=1.2e-4),
+        shape=Straight(direction=(0.0, 0.0, -1.0)),
+        grasps=(Grasp(u=0.0, hold="tangent", path=Move(displacement=(0.3, 0.0, 0.0), duration=0.6)),),
+        environment=Environment(drag=0.013),
+        horizon=1.6,
+        quality=quality,
+    )
+
+
+@pytest.mark.parametrize("n_u", [9, 21])
+def test_no_coupling_of_held_points_is_lost_from_the_reduced_tangent(n_u: int):
+    # with twist a point grasp holds three of the four coordinates of a control point, which widens the band
+    scene = Scene(
+        cable=Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-3),
+        shape=Straight(),
+        grasps=(Grasp(u=0.25, hold="clamp"), Grasp(u=0.9), Grasp(u=0.6, hold="tangent")),
+        effects={"twist": "on"},
+        horizon=1.0,
+    )
+    problem = pose(scene)
+    grid = make_grid(problem, n_u)
+    starts: Starts = {}
+    close_grasps(problem, grid, list(scene.grasps), starts, None)
+    e = hold(problem, grid, list(scene.grasps), np.zeros(1), starts, grid.start).elimination
+    size, width = n_u * problem.nc, 4 * problem.nc
+    random = np.random.default_rng(1)
+    band = np.zeros((size, width))
+    for o in range(width):
+        band[: size - o, o] = random.normal(0.0, 1.0, size - o)
+    full = sum(np.diag(band[: size - o, o], -o) for o in range(width))
+    full = full + np.tril(full, -1).T
+    Z = np.zeros((size, size - len(e.held)))
+    for i in range(size):
+        if e.index[i] >= 0:
+            Z[i, e.index[i]] = 1.0
+        else:
+            terms = slice(e.start[-1 - e.index[i]], e.start[-e.index[i]])
+            np.add.at(Z[i], e.index[e.dof[terms]], e.coefficient[terms])
+    dense = Z.T @ full @ Z
+    reduced = np.empty((Z.shape[1], e.width))
+    reduce_matrix(e, band, reduced)
+    for o in range(len(dense)):
+        there = reduced[: len(dense) - o, o] if o < e.width else np.zeros(len(dense) - o)
+        # sums of some products of numbers about one: rounding
+        np.testing.assert_allclose(there, np.diag(dense, -o), atol=1e-12)
+
+
+def test_an_error_that_two_grids_share_is_told():
+    # both time splines pass through the middle of the trembling, and so agree
+    coarse = predict(swinging(march(13, 19, estimate=True)))
+    fine = predict(swinging(Quality(target_error=3e-3)))
+    assert fine.status == "converged"
+    truth = refined(swinging(Quality()), 1e-3)
+    for found in (coarse, fine):
+        estimate = found.accuracy.error_estimate
+        assert estimate is not None
+        assert apart(found.surface, truth.surface).max() < 2.0 * estimate  # what an estimate may be off by
+
+
+def test_a_target_is_reached_by_more_steps_where_only_time_errs():
+    found = predict(swinging(Quality(target_error=2e-3)))
+    assert found.status == "converged"
+    assert found.accuracy.steps > 10 * found.accuracy.n_u
+
+
+def test_auto_answers_with_the_march_where_the_least_squares_fails():
+    scene = replace(swinging(Quality(n_u=17, n_t=17, delta=1e-9)), horizon=1.6)
+    jerked = Grasp(u=0.0, path=Move(displacement=(0.3, 0.0, 0.0), duration=0.15, profile="linear"))
+    scene = replace(scene, grasps=(jerked,))
+    auto, asked = predict(scene), predict(replace(scene, quality=replace(scene.quality, method="spacetime")))
+    assert asked.status == "max_iterations"
+    assert asked.accuracy.method == "spacetime"
+    assert auto.status == "converged"
+    assert auto.accuracy.method == "march"
+    assert "least squares did not converge" in auto.message
+    np.testing.assert_array_equal(auto.surface.control_points, asked.surface.control_points)
+
+
+def test_a_time_spline_that_misses_its_march_is_not_called_converged():
+    found = predict(paper_scene(0.25, quality=march(33, 5)))
+    assert found.status == "max_iterations"
+    assert "Raise n_t" in found.message
