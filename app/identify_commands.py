@@ -52,9 +52,9 @@ def _show(progress: "Progress") -> None:
 
 def validate(datasets: list[str], *, fit: int, models: list[str], json: str | None) -> int:
     """Run the published protocols on data sets and print the table."""
-    from app.machine import machine_line
     from dlocore.identify.datasets import PUBLISHED, PUBLISHED_BY, load_datasets
     from dlocore.identify.validation import validate_cable, validate_wire
+    from dlocore.machine import machine_line
 
     try:
         cables, wires = load_datasets([Path(d) for d in datasets], fit)

@@ -51,6 +51,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             yield
 
     app = FastAPIOffline(title="dlo", version=_version(), description=_ABOUT, lifespan=lifespan, redoc_url=None)
+    app.state.settings = settings
     problems.install(app)
     openapi.install(app)
     app.add_middleware(BodyLimit, limit=settings.max_body_bytes)

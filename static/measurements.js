@@ -81,16 +81,26 @@ function present(calibration) {
   draw();
 }
 
+function tellHow() {
+  note.hidden = points.length > 0;
+  note.replaceChildren("This machine has not been measured yet. Measure it with ", make("code", {}, "dlo calibrate"), ".");
+}
+
 async function load() {
   const { value: dimensions } = figure.querySelector("input:checked");
   try {
+    const health = await (await fetch("/health")).json(); // asked for in vain, the measurements would be an error in the log
+    if (health.calibrated === false) {
+      measuring.hidden = false;
+      tellHow();
+      return;
+    }
     const answer = await fetch(`${ADDRESS}?dimensions=${dimensions}`, { headers: { Accept: "application/json" } });
     if (!answer.ok && answer.status !== 404) throw new Error(answer.statusText);
     const found = await answer.json();
     measuring.hidden = !answer.ok && found.type !== NOT_YET;
     if (answer.ok) present(found);
-    note.hidden = points.length > 0;
-    note.replaceChildren("This machine has not been measured yet. Measure it with ", make("code", {}, "dlo calibrate"), ".");
+    tellHow();
   } catch {
     note.textContent = "The measurements can't be read just now.";
   }

@@ -2,13 +2,14 @@
 
 from typing import Literal
 
-from fastapi import APIRouter, Response
-from pydantic import BaseModel
+from fastapi import APIRouter, Request, Response
+from pydantic import BaseModel, Field
 
 from app import metrics
 from app.routes import described
 from app.schemas import problem_document
 from app.service import TheService
+from dlocore.calibration import FILE
 
 router = APIRouter(tags=["service"])
 
@@ -17,6 +18,7 @@ class Health(BaseModel):
     """The process answers."""
 
     status: Literal["ok"] = "ok"
+    calibrated: bool = Field(description="Whether `GET /v1/calibration` has something to tell.", examples=[False])
 
 
 class Ready(BaseModel):
@@ -26,9 +28,9 @@ class Ready(BaseModel):
 
 
 @router.get("/health", summary="Is the process alive?")
-async def health() -> Health:
+async def health(request: Request) -> Health:
     """Answer as long as the process does."""
-    return Health()
+    return Health(calibrated=(request.app.state.settings.data_dir / FILE).exists())
 
 
 @router.get("/ready", summary="Can it solve?", responses={503: problem_document("The solver is still being compiled.")})

@@ -47,7 +47,9 @@ class RecordingModel(Model):
     )
     gravity: Vector = Field(default=[0.0, 0.0, -9.81], description="[m/s^2].", examples=[[0.0, 0.0, -9.81]])
     static: Flag = Field(default=False, description="Every frame is a shape at rest.", examples=[False])
-    name: Annotated[str, Field(max_length=100)] = Field(default="recording", examples=["shaken"])
+    name: Annotated[str, Field(max_length=100)] = Field(
+        default="recording", description="What to call it in the answer.", examples=["shaken"]
+    )
 
 
 class IdentifyRequest(Model):
@@ -67,8 +69,8 @@ class IdentifyRequest(Model):
 class EstimatedModel(BaseModel):
     """A parameter, and how well it is known."""
 
-    name: str = Field(examples=["bending_stiffness"])
-    unit: str = Field(examples=["N m^2"])
+    name: str = Field(description="As in the request.", examples=["bending_stiffness"])
+    unit: str = Field(description="Of value and interval.", examples=["N m^2"])
     value: float = Field(description="Of a parameter that is not identifiable: what was assumed.", examples=[1e-3])
     low: float | None = Field(description="Lower end of the 95 % interval.", examples=[0.9e-3])
     high: float | None = Field(description="Upper end.", examples=[1.1e-3])
@@ -80,17 +82,19 @@ class EstimatedModel(BaseModel):
 class FitOfRecording(BaseModel):
     """Distances of the free markers from the prediction."""
 
-    recording: str = Field(examples=["shaken"])
-    mean: float = Field(description="[m].", examples=[0.004])
-    median: float = Field(description="[m].", examples=[0.003])
-    worst: float = Field(description="[m].", examples=[0.02])
+    recording: str = Field(description="Its name.", examples=["shaken"])
+    mean: float = Field(description="Over markers and frames [m].", examples=[0.004])
+    median: float = Field(description="The same [m].", examples=[0.003])
+    worst: float = Field(description="Of any marker in any frame [m].", examples=[0.02])
     stalled: bool = Field(description="Whether the prediction ended early.", examples=[False])
 
 
 class IdentifyResponse(BaseModel):
     """A cable with what is known of it; `cable` and `environment` can be those of a prediction."""
 
-    status: Literal["converged", "max_iterations"] = Field(examples=["converged"])
+    status: Literal["converged", "max_iterations"] = Field(
+        description="Whether the search came to an end.", examples=["converged"]
+    )
     message: str = Field(description="In words, with what could not be identified.", examples=["Converged."])
     cable: dict[str, Any] = Field(description="The cable, for a prediction.", examples=[{"length": 1.0}])
     environment: dict[str, Any] = Field(description="Drag and gravity.", examples=[{"drag": 0.05}])
@@ -98,7 +102,11 @@ class IdentifyResponse(BaseModel):
     correlations: list[list[float | None]] = Field(description="Null where not identifiable.", examples=[[[1.0]]])
     fit: list[FitOfRecording] = Field(description="How each window of the recordings is met.")
     deviation: float = Field(description="Robust deviation of a coordinate [m].", examples=[0.001])
-    iterations: int = Field(examples=[6])
+    iterations: int = Field(description="Of the search.", examples=[6])
     seconds: float = Field(description="Time it took [s].", examples=[4.2])
-    rest_curvature: list[list[float]] | None = Field(default=None, description="[1/m], where it was asked for.")
-    clamp_angles: list[list[float]] | None = Field(default=None, description="[rad], where they were asked for.")
+    rest_curvature: list[list[float]] | None = Field(
+        default=None, description="[1/m], where it was asked for.", examples=[[[0.1, 0.0]]]
+    )
+    clamp_angles: list[list[float]] | None = Field(
+        default=None, description="[rad], where they were asked for.", examples=[[[0.05, -0.02]]]
+    )

@@ -110,7 +110,7 @@ def test_it_is_healthy_before_it_is_ready(tmp_path: Path) -> None:
     with TestClient(app) as client:
         start(client)
         app.state.service.ready = False
-        assert client.get("/health").json() == {"status": "ok"}
+        assert client.get("/health").json()["status"] == "ok"
         the_problem(client.get("/ready"), 503)
         refused = client.post("/v1/predictions", json=paper_scene())
         the_problem(refused, 503)
