@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from time import monotonic
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -14,6 +15,7 @@ from app.viewer.examples import example, example_names
 
 pytestmark = pytest.mark.browser
 NAME = "An arc"
+PATIENCE = 60.0  # s: a renderer without a GPU
 ARC = {
     "name": NAME,
     "cable": {"preset": "paper"},
@@ -95,9 +97,11 @@ def test_a_click_on_the_cable_takes_hold_of_it_there(service, witness):
     time.press("Enter")
     grasp = field(page, "Grasp u [m]")
     expect(grasp).to_have_value("0.25")
-    page.mouse.click(*on_screen(page, 0.7, 0.0))
-    expect(grasp).not_to_have_value("0.25")
-    assert abs(float(grasp.input_value()) - 0.7) < 0.02  # a pixel is about 2 mm
+    give_up = monotonic() + PATIENCE
+    while abs(float(grasp.input_value()) - 0.7) > 0.02:  # a pixel is about 2 mm
+        assert monotonic() < give_up, f"taken hold of at {grasp.input_value()} m"
+        page.mouse.click(*on_screen(page, 0.7, 0.0))  # until the picture of t = 0 is there, it hits another place
+        page.wait_for_timeout(1000)
     assert witness.errors == []
 
 
