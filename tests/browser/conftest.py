@@ -68,7 +68,7 @@ def chromium() -> str | None:
     return next((path for name in names if name and (path := shutil.which(name))), None)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # its event loop ends with it: tests of other files that follow run loops of their own
 def browser() -> Iterator[Browser]:
     path = chromium()
     if path is None:
