@@ -1,8 +1,10 @@
 """The course of a prediction as server-sent events: its state, each iteration, and its end."""
 
+from typing import Annotated
+
 import anyio.to_thread
 import orjson
-from fastapi import Response
+from fastapi import Header, Response
 
 from app.formats import EVENTS
 from app.jobs import Job
@@ -10,6 +12,9 @@ from app.problems import ProblemError, document_of
 from app.service import Service
 from app.streamed import Emit, Streamed
 
+LastEventId = Annotated[
+    str | None, Header(description="Number of the last event seen, to go on after it.", examples=["3"])
+]
 # nothing may keep events back: no cache, and no proxy that collects them
 _HEADERS = {"Cache-Control": "no-store", "X-Accel-Buffering": "no", "Vary": "Accept"}
 

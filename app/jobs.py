@@ -16,6 +16,7 @@ State = Literal["queued", "running", "done", "failed", "cancelled"]
 MAX_FINISHED = 256  # jobs remembered after their end, where no stored run stands for them
 MAX_BYTES = 256_000_000  # of their answers
 HEARTBEAT = 15.0  # s without news after which a follower hears that the connection is alive
+CANCEL_TIME = 1.0  # s to wait for a cancelled job to stop
 
 
 @dataclass(eq=False)
@@ -64,6 +65,12 @@ class Job:
         if self.state == "queued":
             self.scope.cancel()
 
+    async def stop(self) -> None:
+        """Cancel it, and give it a moment to end: `finished` tells whether it has."""
+        self.cancel()
+        with anyio.move_on_after(CANCEL_TIME):
+            await self.finished.wait()
+
     def begin(self) -> None:
         """Note that a worker has taken it up."""
         self.state = "running"
@@ -92,16 +99,16 @@ class Job:
         """
         shown: State | None = None
         while True:
-            changed = self._changed
+            changed = self._changed  # before what is looked at, so that nothing comes unseen between
             if shown is None or (self.state == "running" and shown == "queued"):
                 shown = self.state
                 yield shown
-            while seen < len(self.iterations):
+            elif seen < len(self.iterations):
                 seen += 1
                 yield self.iterations[seen - 1]
-            if self.finished.is_set():
+            elif self.finished.is_set():
                 return
-            if changed is self._changed:
+            elif changed is self._changed:
                 with anyio.move_on_after(HEARTBEAT) as waiting:
                     await changed.wait()
                 if waiting.cancelled_caught:

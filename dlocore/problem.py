@@ -91,18 +91,17 @@ class Problem:
 
     def coordinates(self, r: Floats, theta: Floats | None = None) -> Floats:
         """Return control points (..., nc) in the solve's coordinates of r (..., 3) [m] and theta (...) [rad]."""
-        x = self.plane.points(r)
-        if self.twist is None:
-            return np.ascontiguousarray(x)
-        turned = np.zeros(x.shape[:-1]) if theta is None else theta
-        return np.concatenate([x, self.twist.radius * turned[..., None]], axis=-1)
+        return self._with_twist(self.plane.points(r), theta)
 
     def rates(self, v: Floats, theta_rate: Floats | None = None) -> Floats:
         """Return velocities (..., nc) in the solve's coordinates of v (..., 3) [m/s] and of theta [rad/s]."""
-        x = self.plane.vectors(v)
+        return self._with_twist(self.plane.vectors(v), theta_rate)
+
+    def _with_twist(self, x: Floats, theta: Floats | None) -> Floats:
+        """Return x (..., 2 or 3) with the fourth coordinate of an angle, or its rate, where there is twist."""
         if self.twist is None:
             return np.ascontiguousarray(x)
-        turned = np.zeros(x.shape[:-1]) if theta_rate is None else theta_rate
+        turned = np.zeros(x.shape[:-1]) if theta is None else theta
         return np.concatenate([x, self.twist.radius * turned[..., None]], axis=-1)
 
     def world(self, q: Floats) -> Floats:

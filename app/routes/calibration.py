@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import anyio
 import anyio.to_thread
 import orjson
-from fastapi import APIRouter, Header, Query, Request
+from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
 
 from app import events
@@ -27,7 +27,6 @@ from dlocore.calibration import Calibration
 
 router = APIRouter(prefix="/v1/calibration", tags=["calibration"], route_class=JsonRoute)
 KIND = "calibration"
-CANCEL_TIME = 1.0  # s to wait for a cancelled measurement to stop
 
 
 def path_of(service: Service) -> Path:
@@ -100,9 +99,7 @@ async def stop(service: TheService) -> Response:
     if not running:
         raise ProblemError(404, "not-calibrating", "No calibration is under way.")
     job = running[0]
-    job.cancel()
-    with anyio.move_on_after(CANCEL_TIME):
-        await job.finished.wait()
+    await job.stop()
     return _state(job.summary(), 200 if job.finished.is_set() else 202)
 
 
@@ -110,9 +107,7 @@ async def stop(service: TheService) -> Response:
 async def follow(
     request: Request,
     service: TheService,
-    last_event_id: Annotated[
-        str | None, Header(description="Number of the last event seen, to go on after it.", examples=["3"])
-    ] = None,
+    last_event_id: events.LastEventId = None,
 ) -> Response:
     """Give the course of the last calibration as server-sent events: `state`, `progress`, and `done` or `error`."""
     negotiated(request.headers.get("accept"), (EVENTS,))

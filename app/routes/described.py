@@ -15,18 +15,25 @@ _BINARY = {"schema": {"type": "string", "format": "binary"}}
 _PREDICTION = {"$ref": "#/components/schemas/PredictionResponse"}
 _JOB = {"$ref": "#/components/schemas/JobResponse"}
 _MEASUREMENT = {"$ref": "#/components/schemas/MeasurementResponse"}
-_EVENTS = {
-    "itemSchema": {
-        "type": "object",
-        "properties": {
-            "event": {"enum": ["state", "iteration", "done", "error"]},
-            "id": {"type": "string", "description": "Number of the event, but for `state`.", "examples": ["0"]},
-            "data": {"type": "string", "contentMediaType": JSON, "description": "JSON in one line."},
+
+
+def _course(item: str, example: str) -> dict[str, Any]:
+    """Return the description of a course of events whose items are called `item`."""
+    return {
+        "itemSchema": {
+            "type": "object",
+            "properties": {
+                "event": {"enum": ["state", item, "done", "error"]},
+                "id": {"type": "string", "description": "Number of the event, but for `state`.", "examples": ["0"]},
+                "data": {"type": "string", "contentMediaType": JSON, "description": "JSON in one line."},
+            },
+            "required": ["event", "data"],
         },
-        "required": ["event", "data"],
-    },
-    "example": 'id: 0\nevent: iteration\ndata: {"number":0,"update":null,"residual":1.2e-9}\n\n',
-}
+        "example": f"id: 0\nevent: {item}\ndata: {example}\n\n",
+    }
+
+
+_EVENTS = _course("iteration", '{"number":0,"update":null,"residual":1.2e-9}')
 _FAILURES = {
     401: "The service needs a bearer token.",
     404: "There is no such thing here, or not yet.",
@@ -87,18 +94,7 @@ FOLLOW: Responses = {
     **failures(401, 404, 406),
 }
 
-_PROGRESS = {
-    "itemSchema": {
-        "type": "object",
-        "properties": {
-            "event": {"enum": ["state", "progress", "done", "error"]},
-            "id": {"type": "string", "description": "Number of the event, but for `state`.", "examples": ["0"]},
-            "data": {"type": "string", "contentMediaType": JSON, "description": "JSON in one line."},
-        },
-        "required": ["event", "data"],
-    },
-    "example": 'id: 0\nevent: progress\ndata: {"number":0,"done":0,"total":99,"what":"compiling"}\n\n',
-}
+_PROGRESS = _course("progress", '{"number":0,"done":0,"total":99,"what":"compiling"}')
 MEASURE: Responses = {
     200: {"description": "Its progress as server-sent events.", "content": {EVENTS: _PROGRESS}},
     202: {

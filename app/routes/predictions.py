@@ -27,7 +27,6 @@ from dlocore.prediction import Status
 
 router = APIRouter(prefix="/v1/predictions", tags=["predictions"], route_class=JsonRoute)
 _ISO = re.compile(r"\d{4}-\d\d-\d\d[Tt ]\d\d:\d\d(:\d\d([.,]\d+)?)?([Zz]|[+-]\d\d:?\d\d)", re.ASCII)
-CANCEL_TIME = 1.0  # s to wait for a cancelled solve to stop
 
 
 def _iso(value: str) -> str:
@@ -190,9 +189,7 @@ async def remove(id: str, service: TheService) -> Response:
     """Cancel the prediction where it is queued or running (200, or 202 while it still stops); else remove it (204)."""
     job = service.jobs.get(id)
     if job is not None and not job.finished.is_set():
-        job.cancel()
-        with anyio.move_on_after(CANCEL_TIME):
-            await job.finished.wait()
+        await job.stop()
         if job.state != "done":
             return _state(job, 200 if job.finished.is_set() else 202)
     known = service.jobs.forget(id)
@@ -206,9 +203,7 @@ async def follow(
     id: str,
     request: Request,
     service: TheService,
-    last_event_id: Annotated[
-        str | None, Header(description="Number of the last event seen, to go on after it.", examples=["3"])
-    ] = None,
+    last_event_id: events.LastEventId = None,
 ) -> Response:
     """Give the course of the solve as server-sent events.
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, cast
 import anyio
 import anyio.to_thread
 import orjson
-from fastapi import APIRouter, Body, Header, Request
+from fastapi import APIRouter, Body, Request
 from fastapi.responses import Response
 
 from app import events
@@ -15,7 +15,6 @@ from app.measurements import Tell
 from app.problems import ProblemError
 from app.routes import described
 from app.routes.body import JsonRoute
-from app.routes.calibration import CANCEL_TIME
 from app.runs import new_id
 from app.schemas import to_scene
 from app.schemas.study import STUDY_EXAMPLES, StudyList, StudyRequest, StudyResponse
@@ -124,9 +123,7 @@ async def remove(id: str, service: TheService) -> Response:
     job = service.measurements.get(id)
     mine = job is not None and job.kind == KIND
     if mine and job is not None and not job.finished.is_set():
-        job.cancel()
-        with anyio.move_on_after(CANCEL_TIME):
-            await job.finished.wait()
+        await job.stop()
         if job.state != "done":
             return _state(job.summary(), 200 if job.finished.is_set() else 202)
     known = mine and service.measurements.forget(id)
@@ -140,9 +137,7 @@ async def follow(
     id: str,
     request: Request,
     service: TheService,
-    last_event_id: Annotated[
-        str | None, Header(description="Number of the last event seen, to go on after it.", examples=["3"])
-    ] = None,
+    last_event_id: events.LastEventId = None,
 ) -> Response:
     """Give the course of a study as server-sent events: `state`, `progress`, and `done` or `error`."""
     negotiated(request.headers.get("accept"), (EVENTS,))

@@ -6,13 +6,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import anyio
 import httpx
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from app import jobs
 from app.main import create_app
-from app.routes import predictions
 from app.settings import Settings
 from tests.app.conftest import paper_scene, start
 from tests.app.live import Live, serving
@@ -111,7 +112,7 @@ def test_a_running_solve_is_cancelled_at_once_and_then_removed(client: TestClien
 def test_a_solve_that_is_slow_to_stop_is_said_to_be_stopping(
     client: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(predictions, "CANCEL_TIME", 0.0)
+    monkeypatch.setattr(jobs, "CANCEL_TIME", 0.0)
     address = client.post("/v1/predictions", json=SLOW, headers=ASYNC).headers["location"]
     until(client, address, "running")
     stopping = client.delete(address)
@@ -160,6 +161,34 @@ def test_a_direct_prediction_is_followed_to_its_end(client: TestClient) -> None:
     document = events[-1][2]
     assert [data for _, _, data in events[first:-1]] == document["iterations"]
     assert client.get(response.headers["location"]).json() == document
+
+
+def test_a_solve_that_begins_while_its_state_is_told_is_told_running_before_its_iterations() -> None:
+    async def course() -> list[Any]:
+        job, told = jobs.Job(store=False), []
+        async for news in job.progress():
+            told.append(news)
+            if news == "queued":  # the worker is quicker than the follower
+                job.begin()
+                job.add({"number": 0})
+                job.end("done")
+        return told
+
+    # its end came with the first news, so no running is told any more
+    assert anyio.run(course) == ["queued", {"number": 0}]
+
+    async def slower() -> list[Any]:
+        job, told = jobs.Job(store=False), []
+        async for news in job.progress():
+            told.append(news)
+            if news == "queued":
+                job.begin()
+                job.add({"number": 0})
+            else:
+                job.end("done")
+        return told
+
+    assert anyio.run(slower) == ["queued", "running", {"number": 0}]
 
 
 def test_who_comes_late_gets_the_same_events_first(client: TestClient) -> None:
