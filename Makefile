@@ -22,6 +22,8 @@ run: $(VENV)/.run-installed
 test: $(VENV)/.dev-installed
 	@command -v chromium >/dev/null || command -v chromium-browser >/dev/null || command -v google-chrome >/dev/null || \
 		echo 'No Chromium found: the browser tests will be skipped.'
+	@echo 'Compiling; this takes a minute or two the first time.'
+	$(BIN)/python -c 'import dlocore; dlocore.warm_up()'
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(PYTEST_ARGS)
 
 check: $(VENV)/.dev-installed

@@ -14,6 +14,7 @@ from dlocore.spline import SplineSurface
 if TYPE_CHECKING:
     from dlocore.balance import effect_forces, energies
     from dlocore.front import predict, warm_up
+    from dlocore.many import predict_many
     from dlocore.planning import Plan, plan
     from dlocore.sensitivity import Sensitivities, sensitivities
     from dlocore.statics import Equilibrium, equilibrium
@@ -59,6 +60,7 @@ __all__ = [
     "load_recording",
     "plan",
     "predict",
+    "predict_many",
     "save_recording",
     "sensitivities",
     "warm_up",
@@ -69,6 +71,7 @@ def __getattr__(name: str) -> Any:
     """Import the solver on first use: its compiler takes longer to import than the rest of the package together."""
     homes = {"predict": "front", "warm_up": "front", "equilibrium": "statics", "Equilibrium": "statics"}
     homes |= {"plan": "planning", "Plan": "planning", "energies": "balance", "effect_forces": "balance"}
+    homes |= {"predict_many": "many"}
     homes |= {"sensitivities": "sensitivity", "Sensitivities": "sensitivity"}
     if name not in homes:
         raise AttributeError(name)

@@ -135,26 +135,32 @@ def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method:
         message += " The iterates grew beyond all bounds; the surface is that of a march."
         control = level.control
     level = replace(level, control=control)
-    estimate = _companion(problem, quality, level, monitor) if method != "paper" or converged else None
-    return _answer(monitor, method, Outcome(level, status, message, estimate), forces)
+    estimate, doubt = _companion(problem, quality, level, monitor) if method != "paper" or converged else (None, "")
+    return _answer(monitor, method, Outcome(level, status, message + doubt, estimate), forces)
 
 
-def _companion(problem: Problem, quality: Quality, level: Level, monitor: Monitor) -> float | None:
-    """Return the error estimate [m]: the distance to a march on a grid half as fine again, with a margin."""
+def _companion(problem: Problem, quality: Quality, level: Level, monitor: Monitor) -> tuple[float | None, str]:
+    """Return the error estimate [m], or None and why there is none, in words.
+
+    It is the distance to a march on a grid half as fine again, with a margin.
+    """
     assert quality.n_u is not None
     assert quality.n_t is not None
-    if not quality.estimate:
-        return None
+    if not quality.estimate or level.motion.stopped:
+        return None, ""
     n_u = max(smallest_n_u(problem), round(FINER * quality.n_u))
     n_t = max(smallest_n_t(problem), round(FINER * quality.n_t))
     try:
         monitor.check()
         finer = run_level(problem, n_u, n_t, round(FINER * given_steps(quality.n_t)), monitor, booked=False)
     except TimeIsUp:
-        return None
-    estimate = None if finer.motion.stopped else SAFETY * distance(level, finer, problem)
+        return None, " The time limit passed before its error was estimated."
     monitor.phase("estimate")
-    return estimate
+    if finer.motion.stopped == "time":
+        return None, " The time limit passed before its error was estimated."
+    if finer.motion.stopped:
+        return None, " Its error is not known: the finer march to compare it with found no equilibrium."
+    return SAFETY * distance(level, finer, problem), ""
 
 
 def _check_n_t(problem: Problem, n_t: int) -> None:
@@ -172,7 +178,7 @@ def _given(problem: Problem, quality: Quality, monitor: Monitor) -> Outcome:
     level = march_level(problem, Size(quality.n_u, quality.n_t, given_steps(quality.n_t)), monitor)
     problem = level.problem
     record_level(problem, level, monitor)
-    estimate = None if level.motion.stopped else _companion(problem, quality, level, monitor)
+    estimate, doubt = _companion(problem, quality, level, monitor)
     if estimate is not None:
         estimate = max(estimate, MISSED_COUNTS * level.missed)
     status, message = march_status(problem, level)
@@ -180,7 +186,7 @@ def _given(problem: Problem, quality: Quality, monitor: Monitor) -> Outcome:
     if status == "converged" and off > MISSED * problem.scene.cable.length:
         status = "max_iterations"
         message += f" The time spline of {quality.n_t} control points misses them by {off * 1e3:.2g} mm. Raise n_t."
-    return Outcome(level, status, message, estimate)
+    return Outcome(level, status, message + doubt, estimate)
 
 
 def _answer(
@@ -201,7 +207,7 @@ def _answer(
         status=outcome.status,
         message=message,
         surface=surface,
-        grasps=reactions(problem, grid, level.motion.forces if forces is None else forces),
+        report_grasps=partial(reactions, problem, grid, level.motion.forces if forces is None else forces),
         report_effects=partial(effect_reports, problem, grid, partial(_material, problem, level)),
         report_material=partial(_material, problem, level),
         iterations=tuple(monitor.iterations),

@@ -111,6 +111,8 @@ def lay_on_table(scene: Scene, start: StartCurve) -> StartCurve:
     """Return the start at the table's height."""
     table = scene.environment.table
     assert table is not None
+    if (start.control_points[:, 2] == table.height).all():
+        return start
     flat = start.control_points.copy()
     flat[:, 2] = table.height
     return replace(start, control_points=flat)

@@ -164,7 +164,7 @@ class Prediction:
         message: the status in words, and what to do about it.
         surface: the bivariate spline q(u, t).
         grasps: reaction of each grasp, in the scene's order.
-        effects: what was simulated and why (a function of the rest, evaluated when it is first read).
+        effects: what was simulated and why. Both are functions of the rest, evaluated when they are first read.
         iterations: how the solve went.
         accuracy: method, estimated error, time.
         start_energy: elastic energy stored in the start shape [J].
@@ -175,13 +175,18 @@ class Prediction:
     status: Status
     message: str
     surface: SplineSurface
-    grasps: tuple[GraspReaction, ...]
     iterations: tuple[Iteration, ...]
     accuracy: Accuracy
     start_energy: float
     start_fit: float
+    report_grasps: Callable[[], tuple[GraspReaction, ...]] = field(repr=False)
     report_effects: Callable[[SplineSurface], tuple[EffectReport, ...]] = field(repr=False)
     report_material: Callable[[], MaterialMotion | None] = field(repr=False)
+
+    @cached_property
+    def grasps(self) -> tuple[GraspReaction, ...]:
+        """Reaction of each grasp, in the scene's order."""
+        return self.report_grasps()
 
     @cached_property
     def effects(self) -> tuple[EffectReport, ...]:

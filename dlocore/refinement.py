@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dlocore.discretisation import smallest_n_u
+from dlocore.kernels.assembly import slopes
 from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
 from dlocore.progress import record_level
@@ -203,7 +204,5 @@ def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
 def _slopes(level: Level) -> tuple[float, float]:
     """Return the smallest and the largest |r'| at the curvature points of some states of a motion."""
     tables, states = level.motion.grid.tables, level.motion.states
-    some = states[:: max(1, len(states) // _LOOKS), :, : level.problem.plane.dimensions]
-    slope = sum(tables.curvature_b1[:, i, None] * some[:, tables.curvature_first + i] for i in range(4))
-    square = (slope * slope).sum(axis=-1)
-    return float(np.sqrt(square.min())), float(np.sqrt(square.max()))
+    least, largest = slopes(level.problem.axes, states, max(1, len(states) // _LOOKS), tables)
+    return float(least), float(largest)

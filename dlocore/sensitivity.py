@@ -21,17 +21,16 @@ from numpy.typing import ArrayLike, NDArray
 from dlocore.discretisation import applied_forces
 from dlocore.errors import SceneError
 from dlocore.grid import Grid
-from dlocore.holding import Starts, close_grasps, hold
-from dlocore.kernels.assembly import times_scalar_band
-from dlocore.kernels.banded import Elimination
-from dlocore.kernels.march import constrained_mass_solve, fit_time, initial_state
+from dlocore.holding import Starts
+from dlocore.kernels.march import fit_time
 from dlocore.kernels.sensitivity import factor_steps, follow_steps
 from dlocore.prediction import Prediction
 from dlocore.problem import Problem, pose
 from dlocore.report import surface_of
 from dlocore.scene import Scene
-from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, closed_grasps, events_of, march, time_knots
+from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, closed_grasps, march, marks_of, step_counts, time_knots
 from dlocore.solvers.monitor import Monitor
+from dlocore.solvers.stretch import Entry, enter
 from dlocore.spline import SplineSurface
 from dlocore.statics import start_grid
 
@@ -69,17 +68,6 @@ class KnownMotion:
     softened: int
 
 
-@dataclass(frozen=True, eq=False)
-class _Entry:
-    """How a stretch begins: elimination, prescribed parts, velocity, acceleration and G."""
-
-    e: Elimination
-    offsets: Floats
-    v: Floats
-    a: Floats
-    G: Floats
-
-
 def objection(problem: Problem, motion: March) -> str:
     """Return why the steps of a motion can't be differentiated one by one, "" where they can."""
     for name in ("contact", "self_contact", "friction"):
@@ -109,12 +97,12 @@ def factored(problem: Problem, motion: March) -> KnownMotion:
         h = (end - begin) / (last - first)
         entry = _enter(problem, grid, starts, motion.times[first : last + 1], begin, h, states[first], v, history)
         v, a = entry.v.copy(), entry.a.copy()
-        free = states[0].size - len(entry.e.held)
-        factors = np.empty((last - first, free, entry.e.width))
+        free = states[0].size - len(entry.held.elimination.held)
+        factors = np.empty((last - first, free, entry.held.elimination.width))
         part = np.ascontiguousarray(states[first : last + 1])
         found = factor_steps(
-            problem.axes, h, motion.rho, part, v, a, mass, drag, grid.tables, active, parameters, history, entry.e,
-            factors,
+            problem.axes, h, motion.rho, part, v, a, mass, drag, grid.tables, active, parameters, history,
+            entry.held.elimination, factors,
         )  # fmt: skip
         if found < 0:
             raise ValueError("the tangent of a step is singular")
@@ -145,7 +133,7 @@ def beside(known: KnownMotion, problem: Problem, grid: Grid) -> tuple[Floats, Fl
     history, starts, v = grid.past(), cast(Starts, {}), grid.velocity.copy()
     length = problem.scene.cable.length
     velocity = v
-    marks = [0.0, *[e.time for e in events_of(problem)], problem.horizon]
+    marks = marks_of(problem)
     if problem.nc != states.shape[2]:
         raise ValueError("the motion beside it has other effects")
     if len(marks) != len(known.stretches) + 1:
@@ -155,13 +143,13 @@ def beside(known: KnownMotion, problem: Problem, grid: Grid) -> tuple[Floats, Fl
         times[first : last + 1] = np.linspace(begin, end, last - first + 1)
         h = (end - begin) / (last - first)
         entry = _enter(problem, grid, starts, times[first : last + 1], begin, h, states[first], v, history)
-        velocity = entry.v.copy() if first == 0 else velocity
+        velocity = entry.closed if first == 0 else velocity
         v, a, G = entry.v.copy(), entry.a.copy(), entry.G.copy()
         applied = applied_forces(problem, grid, times[first : last + 1])
         left = follow_steps(
             problem.axes, h, known.motion.rho, _FOLLOWED * length, known.motion.states[first : last + 1],
             stretch.factors, states[first : last + 1], v, a, G, mass, drag, grid.tables, active, parameters, history,
-            applied, entry.e, entry.offsets,
+            applied, entry.held.elimination, entry.offsets,
         )  # fmt: skip
         if not left <= _STRAYED * length:
             raise ValueError(f"the motion beside it can't be followed: a step was left with {left:.2g} m")
@@ -169,7 +157,7 @@ def beside(known: KnownMotion, problem: Problem, grid: Grid) -> tuple[Floats, Fl
 
 
 def _stretches(problem: Problem, times: Floats) -> list[tuple[float, float, int, int]]:
-    marks = [0.0, *[e.time for e in events_of(problem)], problem.horizon]
+    marks = marks_of(problem)
     at = [int(np.argmin(np.abs(times - mark))) for mark in marks]
     return [(*pairs, *steps) for pairs, steps in zip(pairwise(marks), pairwise(at), strict=True)]
 
@@ -177,31 +165,11 @@ def _stretches(problem: Problem, times: Floats) -> list[tuple[float, float, int,
 def _enter(
     problem: Problem, grid: Grid, starts: Starts, times: Floats, begin: float, h: float, q: Floats, v: Floats,
     history: Any,
-) -> _Entry:  # fmt: skip
-    """Close the grasps of a stretch and return how it begins, as `solvers.march.march` does."""
-    tables, nc = grid.tables, problem.nc
-    unit, mass = tables.mass, tables.mass * problem.mass_density()
-    q = np.ascontiguousarray(q)
-    grasps = closed_grasps(problem, begin, float(times[-1]))
-    close_grasps(problem, grid, grasps, starts, q)
-    near_times = begin + 1e-3 * h * np.arange(3.0)
-    held = hold(problem, grid, grasps, np.concatenate([near_times, times]), starts, q)
-    near, e = held.offsets[:3], held.elimination
-    rate = (4 * near[1] - 3 * near[0] - near[2]) / (2e-3 * h)
-    acceleration = (near[2] - 2 * near[1] + near[0]) / (1e-3 * h) ** 2
-    v = constrained_mass_solve(nc, unit, e, rate, times_scalar_band(unit, v))
-    if problem.inertia is None:
-        v = np.zeros_like(v)
-    G = np.empty_like(v)
-    active, parameters = problem.law_table()
+) -> Entry:  # fmt: skip
+    """Close the grasps of a stretch and return how it begins."""
     load = applied_forces(problem, grid, times[:1])[0]
-    a = initial_state(
-        problem.axes, q, v, mass, tables.mass * problem.drag_coefficient(), tables, active, parameters, history, load,
-        e, acceleration, G,
-    )  # fmt: skip
-    if problem.inertia is None:
-        a = np.zeros_like(v)
-    return _Entry(e, np.ascontiguousarray(held.offsets[3:]), v, a, G)
+    grasps = closed_grasps(problem, begin, float(times[-1]))
+    return enter(problem, grid, grasps, starts, times, h, np.ascontiguousarray(q), v, history, load)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -300,15 +268,8 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
 
 def _asked_for(problem: Problem, steps: int) -> int:
     """Return the number of steps that a march was asked for that took `steps`: stretches between events have more."""
-    marks = [0.0, *[e.time for e in events_of(problem)], problem.horizon]
-    if len(marks) == 2:
-        return steps
-
-    def taken(asked: int) -> int:
-        shares = [asked * (b - a) / problem.horizon for a, b in pairwise(marks)]
-        return sum(max(8, asked // (2 * len(marks)), round(share)) for share in shares)
-
-    return next((asked for asked in range(steps, 0, -1) if taken(asked) <= steps), steps)
+    marks = marks_of(problem)
+    return next((asked for asked in range(steps, 0, -1) if sum(step_counts(marks, asked)) <= steps), steps)
 
 
 def _surface(problem: Problem, grid: Grid, states: Floats, times: Floats, velocity: Floats, n_t: int) -> SplineSurface:

@@ -20,6 +20,7 @@ Floats = NDArray[np.float64]
 
 SPEED_RANGE = (0.5, 1.5)  # of |r'|: a coarse spline of a hairpin stays within, evenly spaced control points don't
 SAME_ANGLE = 1e-9  # [rad]
+_THIRDS = np.linspace(0.0, 1.0, 4)[:, None]
 GAUSS = ((np.polynomial.legendre.leggauss(4)[0] + 1) / 2, np.polynomial.legendre.leggauss(4)[1] / 2)  # on [0, 1]
 
 
@@ -78,8 +79,7 @@ def start_curve(shape: Shape, length: float) -> StartCurve:
 
 def _straight(shape: Straight, length: float) -> StartCurve:
     start, direction = cast(Floats, shape.start), cast(Floats, shape.direction)
-    u = np.linspace(0.0, length, 4)
-    control = start + u[:, None] * (direction / np.linalg.norm(direction))
+    control = start + length * _THIRDS * (direction / np.linalg.norm(direction))
     velocity = _velocity(shape.velocity, length, lambda rows: np.linspace(0.0, length, rows), exact=True)
     return StartCurve(knots=uniform_knots(4, length), control_points=control, velocity=velocity, length_given=length)
 

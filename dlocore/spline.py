@@ -13,8 +13,8 @@ DEGREE = 3
 def uniform_knots(n: int, end: float) -> Floats:
     """Return clamped uniform cubic knots for `n` control points on [0, end]; (n + 4,)."""
     knots = np.zeros(n + DEGREE + 1)
-    knots[DEGREE : n + 1] = np.linspace(0.0, end, n - 2)
-    knots[n + 1 :] = end
+    knots[DEGREE:n] = end / (n - 3) * np.arange(n - 3)
+    knots[n:] = end
     return knots
 
 

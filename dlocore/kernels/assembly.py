@@ -16,7 +16,7 @@ import numpy as np
 from dlocore.effects.laws import BEND, CONTACT, DAMPING, FRICTION, QUADRATIC_DRAG, STRETCH_MEMORY, axial_memory
 from dlocore.kernels import contact, plane, space, twisted
 from dlocore.kernels.basis import row_of
-from dlocore.kernels.compile import kernel
+from dlocore.kernels.compile import brief, kernel
 from dlocore.kernels.strain import space_curvature
 
 NO_RATES = (0.0, 0.0, 0.0, 0.0)  # `rates` of `assemble` where the rate of strain comes from v and nothing yields
@@ -144,7 +144,7 @@ def note(axes: Any, history: Any, out: Any) -> None:
             out[n, frames + d] = history.memory[n, d]
 
 
-@kernel
+@brief
 def stored_energy(axes: Any, q: Any, tables: Any, active: Any, p: Any, history: Any) -> float:
     """Return the elastic energy [J] of the control points q (n, nc)."""
     if len(axes) == 2:
@@ -161,7 +161,7 @@ def contact_energy(axes: Any, q: Any, tables: Any, active: Any, p: Any) -> float
     return contact.energy(len(axes), q, tables, active, p) if active[CONTACT] else 0.0
 
 
-@kernel
+@brief
 def largest_strain(axes: Any, states: Any, tables: Any) -> float:
     """Return the largest |axial strain| at the axial points over the states (k, n, nc)."""
     largest = 0.0
@@ -175,6 +175,22 @@ def largest_strain(axes: Any, states: Any, tables: Any) -> float:
                 square += value * value
             largest = max(largest, abs(np.sqrt(square) - 1.0))
     return largest
+
+
+@brief
+def slopes(axes: Any, states: Any, every: int, tables: Any) -> Any:
+    """Return the least and the largest |r'| at the curvature points over every so many of the states (k, n, nc)."""
+    least, largest = np.inf, 0.0
+    for s in range(0, len(states), every):
+        for n in range(len(tables.curvature_w)):
+            square = 0.0
+            for d in range(min(len(axes), 3)):
+                value = 0.0
+                for i in range(4):
+                    value += tables.curvature_b1[n, i] * states[s, tables.curvature_first[n] + i, d]
+                square += value * value
+            least, largest = min(least, square), max(largest, square)
+    return np.sqrt(least), np.sqrt(largest)
 
 
 @kernel

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dlocore.kernels.compile import kernel
+from dlocore.kernels.compile import brief, kernel
 
 
 @kernel
@@ -58,6 +58,8 @@ class Elimination(NamedTuple):
         dof: terms' degrees of freedom (all free).
         coefficient: terms' coefficients.
         width: columns of the reduced band: what follows others couples them beyond the band.
+        entry, place, share: (k,) of each entry of a flattened band (n nc, 4 nc) its places in the flattened reduced
+            one (free, width), and what it counts there.
     """
 
     index: Any
@@ -66,9 +68,12 @@ class Elimination(NamedTuple):
     dof: Any
     coefficient: Any
     width: int
+    entry: Any
+    place: Any
+    share: Any
 
 
-@kernel
+@brief
 def elimination(n: int, nc: int, dimensions: int, pivots: Any, follow: Any, turned: Any, turned_follow: Any) -> Any:
     """Return the `Elimination` of held control points among n.
 
@@ -105,23 +110,17 @@ def elimination(n: int, nc: int, dimensions: int, pivots: Any, follow: Any, turn
         if index[i] == 0:
             index[i] = free
             free += 1
-    e = Elimination(index, held, start, dof[:terms].copy(), coefficient[:terms].copy(), 4 * nc)
+    dof, coefficient = dof[:terms].copy(), coefficient[:terms].copy()
     width = 4 * nc
     for k in range(count):
         for i in range(max(0, held[k] - 4 * nc + 1), min(n * nc, held[k] + 4 * nc)):
-            a, b = _terms(e, i)
+            a, b = (0, 1) if index[i] >= 0 else (start[-1 - index[i]], start[-index[i]])
             for s in range(start[k], start[k + 1]):
                 for r in range(a, b):
                     row = index[i] if index[i] >= 0 else index[dof[r]]
                     width = max(width, abs(row - index[dof[s]]) + 1)
-    return Elimination(index, held, start, dof[:terms].copy(), coefficient[:terms].copy(), width)
-
-
-@kernel
-def _terms(e: Any, i: int) -> Any:
-    """Return the range of the terms of a degree of freedom: of one that is free, itself."""
-    k = e.index[i]
-    return (0, 1) if k >= 0 else (e.start[-1 - k], e.start[-k])
+    entry, place, share = _folded(index, start, dof, coefficient, 4 * nc, width)
+    return Elimination(index, held, start, dof, coefficient, width, entry, place, share)
 
 
 @kernel
@@ -163,39 +162,44 @@ def place_held(e: Any, offset: Any, q: Any) -> None:
 @kernel
 def reduce_matrix(e: Any, A: Any, out: Any) -> None:
     """Write Z' A Z of the banded A (n nc, 4 nc) to the banded out (free, e.width)."""
-    n, width = A.shape
-    out[:] = 0.0
-    for j in range(n):
-        b = e.index[j]
-        last = min(width, n - j)
-        if b >= 0 and e.index[j + last - 1] == b + last - 1:  # nothing held below: the column stays whole
-            for o in range(last):
-                out[b, o] += A[j, o]
-            continue
-        for o in range(last):
-            value = A[j, o]
-            a = e.index[j + o]
-            if a >= 0 and b >= 0:
-                out[b, a - b] += value
-            elif value != 0.0:
-                _distribute(e, j + o, j, value, out)
+    entries, reduced = A.ravel(), out.ravel()
+    reduced[:] = 0.0
+    for k in range(len(e.share)):
+        reduced[e.place[k]] += e.share[k] * entries[e.entry[k]]
 
 
 @kernel
-def _distribute(e: Any, i: int, j: int, value: float, out: Any) -> None:
-    """Add the entry A[i, j] = A[j, i] = value, of which one or both degrees of freedom are held."""
-    a, b = e.index[i], e.index[j]
-    a0, a1 = _terms(e, i)
-    b0, b1 = _terms(e, j)
-    for s in range(a0, a1):
-        row = a if a >= 0 else e.index[e.dof[s]]
-        scale = value if a >= 0 else value * e.coefficient[s]
-        for r in range(b0, b1):
-            column = b if b >= 0 else e.index[e.dof[r]]
-            entry = scale if b >= 0 else scale * e.coefficient[r]
-            if row == column:
-                out[row, 0] += entry if i == j else 2.0 * entry
-            elif row > column:
-                out[column, row - column] += entry
-            elif i != j:
-                out[row, column - row] += entry
+def _folded(index: Any, start: Any, dof: Any, coefficient: Any, band: int, width: int) -> Any:
+    """Return the entries of a band (n, band), their places in the reduced one, of `width`, and their shares there.
+
+    An entry of a held degree of freedom counts for all those that it follows.
+    """
+    n = len(index)
+    count = 0
+    for j in range(n):
+        inner = 1 if index[j] >= 0 else start[-index[j]] - start[-1 - index[j]]
+        for i in range(j, min(j + band, n)):
+            count += inner * (1 if index[i] >= 0 else start[-index[i]] - start[-1 - index[i]])
+    entry, place, share = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count)
+    k = 0
+    for j in range(n):
+        b = index[j]
+        b0, b1 = (0, 1) if b >= 0 else (start[-1 - b], start[-b])
+        for i in range(j, min(j + band, n)):
+            a = index[i]
+            a0, a1 = (0, 1) if a >= 0 else (start[-1 - a], start[-a])
+            for s in range(a0, a1):
+                row = a if a >= 0 else index[dof[s]]
+                of_row = 1.0 if a >= 0 else coefficient[s]
+                for r in range(b0, b1):
+                    column = b if b >= 0 else index[dof[r]]
+                    value = of_row if b >= 0 else of_row * coefficient[r]
+                    if i == j and row < column:
+                        continue  # the diagonal block of what is held is symmetric: its lower half is enough
+                    if i != j and row == column:
+                        value *= 2.0  # of A[i, j] and A[j, i]
+                    entry[k] = j * band + i - j
+                    place[k] = min(row, column) * width + abs(row - column)
+                    share[k] = value
+                    k += 1
+    return entry[:k].copy(), place[:k].copy(), share[:k].copy()

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dlocore.kernels.compile import kernel, law
+from dlocore.kernels.compile import brief, kernel, law
 
 GAUSS_2 = np.polynomial.legendre.leggauss(2)
 GAUSS_3 = np.polynomial.legendre.leggauss(3)
@@ -67,7 +67,7 @@ def find_span(knots: Any, x: float) -> int:
     return k
 
 
-@kernel
+@brief
 def basis_rows(knots: Any, x: Any, order: int) -> Any:
     """Return first control points (len(x),) and tables (len(x), order + 1, 4) of the basis at the points `x`."""
     first = np.empty(len(x), np.int64)
@@ -79,7 +79,7 @@ def basis_rows(knots: Any, x: Any, order: int) -> Any:
     return first, table
 
 
-@kernel
+@brief
 def spline_values(knots: Any, control: Any, u: Any, derivative: int) -> Any:
     """Return the value, or a derivative, (len(u), m) of the spline with control points (n, m) at the points `u`."""
     first, table = basis_rows(knots, u, derivative)
@@ -91,7 +91,7 @@ def spline_values(knots: Any, control: Any, u: Any, derivative: int) -> Any:
     return out
 
 
-@kernel
+@brief
 def graded_knots(n: int, length: float, features: Any, multiplicity: Any, power: Any, width: Any) -> Any:
     """Return clamped knots for `n` control points on [0, length] with knots at, and graded towards, the features.
 
@@ -296,7 +296,7 @@ def _nodes(knots: Any, spacing: float) -> Any:
     return u, w
 
 
-@kernel
+@brief
 def build_tables(
     knots: Any,
     free_start: bool,

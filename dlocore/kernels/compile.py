@@ -24,7 +24,16 @@ def kernel(function: Callable[..., Any]) -> Any:
     numba's cache of a function looks only at the age of that function's own file, so a change of a law that is inlined
     into a kernel would go unnoticed. The stamp is therefore the hash of all compiled sources.
     """
-    compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    return _compiled(function, nogil=True)
+
+
+def brief(function: Callable[..., Any]) -> Any:
+    """Compile a kernel that takes microseconds, with the GIL: to hand it to another thread and back takes longer."""
+    return _compiled(function, nogil=False)
+
+
+def _compiled(function: Callable[..., Any], *, nogil: bool) -> Any:
+    compiled: Any = numba.njit(cache=True, nogil=nogil, error_model="numpy")(function)
     if hasattr(compiled, "_cache"):  # not where compilation is switched off for debugging
         compiled._cache._cache_file._source_stamp = _SOURCE
     return compiled

@@ -5,10 +5,18 @@ from typing import Any
 import numpy as np
 
 from dlocore.effects.laws import CONTACT, SELF_CONTACT, has_kinks, keeps_history
-from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, multiply_scalar_band, note, remember
+from dlocore.kernels.assembly import (
+    NO_RATES,
+    add_scalar_band,
+    assemble,
+    multiply_scalar_band,
+    note,
+    remember,
+    times_scalar_band,
+)
 from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_matrix, reduce_vector, solve
 from dlocore.kernels.basis import basis_rows
-from dlocore.kernels.compile import kernel
+from dlocore.kernels.compile import brief, kernel
 from dlocore.kernels.contact import strikes
 from dlocore.kernels.selfcontact import clear_way, closing, factor_wide, place_nodes, press, solve_wide, widen
 
@@ -21,7 +29,7 @@ _DULL = 3  # steps by backward Euler, of which the cable does not bounce
 _LINE_SEARCH = 12  # looks along a step
 
 
-@kernel
+@brief
 def constrained_mass_solve(nc: int, mass: Any, e: Any, held: Any, right: Any) -> Any:
     """Return x (n, nc) with Z' M x = Z' right and the held degrees of freedom placed by `held`.
 
@@ -366,13 +374,27 @@ def _effective(nc: int, K: Any, mass: Any, drag: Any, inertia: float, share: flo
                 K[i * nc + d, o * nc] += value
 
 
-@kernel
-def initial_state(
-    axes: Any, q: Any, v: Any, mass: Any, drag: Any, tables: Any, active: Any, p: Any, history: Any, load: Any,
-    e: Any, held_acceleration: Any, G: Any,
+@brief
+def begin_stretch(
+    axes: Any, q: Any, v: Any, unit: Any, density: float, dragged: float, tables: Any, active: Any, p: Any,
+    history: Any, load: Any, e: Any, near: Any, h: float, inertial: bool,
 ) -> Any:  # fmt: skip
-    """Return the consistent acceleration (n, nc), and write G = f + C v - load, where a smooth stretch begins."""
+    """Return velocity, acceleration and G = f + C v - load, each (n, nc), where a smooth stretch begins.
+
+    The velocity is what the last one, v, becomes as the grasps close; the acceleration is consistent with the forces.
+
+    Args:
+        q: (n, nc) [m] the state.
+        unit: (n, 4) mass matrix of unit density; `density` [kg/m] and `dragged` [N s/m^2] are those of the cable.
+        near: (3, held) [m] prescribed part of what is held at the beginning, h and 2 h later.
+        h: [s], short.
+        inertial: False where the cable goes through equilibria: it has no velocity that counts, and no acceleration.
+    """
     nc = len(axes)
+    rate = (4.0 * near[1] - 3.0 * near[0] - near[2]) / (2.0 * h)
+    closed = constrained_mass_solve(nc, unit, e, rate, times_scalar_band(unit, v))
+    v = closed if inertial else np.zeros_like(closed)
+    G = np.empty_like(v)
     K = np.empty((1, 1))
     assemble(axes, q, v, tables, active, p, history, NO_RATES, (0.0, 0.0, 0.0), G, K)
     if active[SELF_CONTACT]:
@@ -380,11 +402,33 @@ def initial_state(
         press(q, v, tables, p, x, np.empty((64, 2), np.int64), G)
     if keeps_history(active):
         remember(axes, q, tables, active, p, history, 0.0, False)
-    multiply_scalar_band(drag, v, 1.0, G)
+    multiply_scalar_band(dragged * unit, v, 1.0, G)
     for i in range(len(G)):
         for d in range(nc):
             G[i, d] -= load[i, d]
-    return constrained_mass_solve(nc, mass, e, held_acceleration, -G)
+    if not inertial:
+        return closed, np.zeros_like(v), G
+    held_acceleration = (near[2] - 2.0 * near[1] + near[0]) / (h * h)
+    return closed, constrained_mass_solve(nc, density * unit, e, held_acceleration, -G), G
+
+
+@brief
+def fit_missed(knots: Any, times: Any, Q: Any, C: Any, dimensions: int) -> Any:
+    """Return by how much the time spline of C (n_t, n, nc) misses each of the states Q (k, n, nc) at `times` [m].
+
+    The largest difference of the first so many coordinates counts.
+    """
+    first, table = basis_rows(knots, times, 0)
+    out = np.zeros(len(times))
+    for s in range(len(times)):
+        b = table[s, 0]
+        g = first[s]
+        for i in range(Q.shape[1]):
+            for d in range(dimensions):
+                fitted = b[0] * C[g, i, d] + b[1] * C[g + 1, i, d] + b[2] * C[g + 2, i, d] + b[3] * C[g + 3, i, d]
+                away = abs(Q[s, i, d] - fitted)
+                out[s] = max(out[s], away) if away == away else np.inf
+    return out
 
 
 @kernel

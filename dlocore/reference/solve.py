@@ -163,10 +163,6 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
         status=status,
         message=message,
         surface=fitted.surface,
-        grasps=tuple(
-            GraspReaction(g.u, motion.times, motion.forces[i], motion.moments[i])
-            for i, g in enumerate(problem.scene.grasps)
-        ),
         iterations=tuple(monitor.iterations),
         accuracy=Accuracy(
             method="reference",
@@ -183,6 +179,10 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
         ),
         start_energy=_elastic_energy(last, 0),
         start_fit=problem.start.fit_rms,
+        report_grasps=lambda: tuple(
+            GraspReaction(g.u, motion.times, motion.forces[i], motion.moments[i])
+            for i, g in enumerate(problem.scene.grasps)
+        ),
         report_effects=lambda surface: _effects(refined, surface),
         report_material=lambda: material_of(motion, last.taken),
     )

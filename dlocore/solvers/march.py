@@ -9,17 +9,17 @@ from numpy.typing import NDArray
 from dlocore.discretisation import applied_forces
 from dlocore.effects.friction import SLIP_SPEED
 from dlocore.grid import Grid
-from dlocore.holding import Starts, close_grasps, hold
+from dlocore.holding import Starts, hold
 from dlocore.kernels.assembly import History, largest_strain, note, times_scalar_band
 from dlocore.kernels.banded import Elimination
-from dlocore.kernels.basis import basis_rows, graded_knots
+from dlocore.kernels.basis import graded_knots
 from dlocore.kernels.march import (
     DEEPEST,
     FAILED_STEP,
     LEFT,
     constrained_mass_solve,
+    fit_missed,
     fit_time,
-    initial_state,
     march_steps,
 )
 from dlocore.kernels.twisted import PAST
@@ -28,6 +28,7 @@ from dlocore.problem import Problem
 from dlocore.report import WindowForces
 from dlocore.scene import Grasp
 from dlocore.solvers.monitor import Monitor, TimeIsUp
+from dlocore.solvers.stretch import enter
 from dlocore.spline import design_matrix
 
 Floats = NDArray[np.float64]
@@ -176,6 +177,29 @@ def closed_grasps(problem: Problem, begin: float, end: float) -> list[Grasp]:
     ]
 
 
+def marks_of(problem: Problem) -> list[float]:
+    """Return the times [s] between which the motion is smooth: its beginning, its events and its end."""
+    return [0.0, *[e.time for e in events_of(problem)], problem.horizon]
+
+
+def step_counts(marks: list[float], steps: int) -> list[int]:
+    """Return the time steps of each stretch between the marks, about `steps` in all, more where marks lie close."""
+    if len(marks) == 2:
+        return [steps]
+    return [max(8, steps // (2 * len(marks)), round(steps * (b - a) / marks[-1])) for a, b in pairwise(marks)]
+
+
+def _times(marks: list[float], counts: list[int]) -> Floats:
+    """Return the times (steps + 1,) [s] of a march with so many steps between each two marks."""
+    times = np.zeros(sum(counts) + 1)
+    first = 0
+    for (a, b), count in zip(pairwise(marks), counts, strict=True):
+        times[first : first + count] = a + (b - a) / count * np.arange(count)
+        first += count
+        times[first] = b
+    return times
+
+
 def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: float = RHO) -> March:
     """March the motion of a problem on `grid` in about `steps` equal steps, more where events lie close.
 
@@ -183,13 +207,9 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
         Cancelled: the caller asked to stop.
     """
     axes, nc = problem.axes, problem.nc
-    marks = [0.0, *[e.time for e in events_of(problem)], problem.horizon]
-    counts = [max(8, steps // (2 * len(marks)), round(steps * (b - a) / problem.horizon)) for a, b in pairwise(marks)]
-    if len(counts) == 1:
-        counts = [steps]
-    times = np.concatenate(
-        [[0.0], *[np.linspace(a, b, n + 1)[1:] for a, b, n in zip(marks[:-1], marks[1:], counts, strict=True)]]
-    )
+    marks = marks_of(problem)
+    counts = step_counts(marks, steps)
+    times = _times(marks, counts)
     active, parameters = problem.law_table()
     if problem.inertia is None or problem.contact is not None or problem.friction is not None:
         rho = STRONGLY_DAMPED  # forces that jump are balanced at the end of each step
@@ -216,42 +236,19 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
         last = first + count
         h = (end - begin) / count
         grasps = closed_grasps(problem, begin, end)
-        close_grasps(problem, grid, grasps, starts, states[first])
-        near_times = begin + 1e-3 * h * np.arange(3.0)  # for velocity and acceleration of the paths at the beginning
-        held = hold(problem, grid, grasps, np.concatenate([near_times, times[first : last + 1]]), starts, states[first])
-        near, e = held.offsets[:3], held.elimination
-        rate = (4 * near[1] - 3 * near[0] - near[2]) / (2e-3 * h)
-        v = constrained_mass_solve(nc, unit_mass, e, rate, times_scalar_band(unit_mass, v))
-        if first == 0:
-            velocity = v.copy()
         load = applied[min(first, len(applied) - 1)]
-        G = np.empty_like(v)
-        acceleration = (near[2] - 2 * near[1] + near[0]) / (1e-3 * h) ** 2
-        if problem.inertia is None:
-            v = np.zeros_like(v)
-        a = initial_state(
-            axes,
-            states[first],
-            v,
-            mass,
-            drag,
-            grid.tables,
-            active,
-            parameters,
-            history,
-            load,
-            e,
-            acceleration,
-            G,
-        )
+        entry = enter(problem, grid, grasps, starts, times[first : last + 1], h, states[first], v, history, load)
+        held, v, a, G, e = entry.held, entry.v, entry.a, entry.G, entry.held.elimination
+        if first == 0:
+            velocity = entry.closed
         if problem.friction is not None and problem.table is not None and first == 0:
             _lean_on_table(problem, grid, a, history)
         if problem.friction is not None and problem.friction.lying > 0 and first == 0:
             a = _lean_on_anchors(problem, grid, v, a, mass, e, G, history)
-        if problem.inertia is None:
-            a = np.zeros_like(v)
+            if problem.inertia is None:
+                a = np.zeros_like(v)
         offsets = np.zeros((len(times), len(e.held)))
-        offsets[first : last + 1] = held.offsets[3:]
+        offsets[first : last + 1] = entry.offsets
         reactions = np.zeros((len(times), len(e.held)))
         reactions[first] = (times_scalar_band(mass, a) + G).reshape(-1)[e.held]
         at, smooth = first, first  # the step reached, and the first of the smooth stretch that it lies in
@@ -398,9 +395,7 @@ def refined(motion: March, knots_t: Floats, tolerance: float) -> tuple[Floats, M
 
 def missed(motion: March, knots_t: Floats, control: Floats) -> Floats:
     """Return by how much the time spline of `control` (n_t, n_u, nc) misses each state (steps + 1,) [m]."""
-    first, table = basis_rows(knots_t, motion.times, 0)
-    away = motion.states - sum(table[:, 0, i, None, None] * control[first + i] for i in range(4))
-    return np.asarray(np.abs(away[..., :3]).max(axis=(1, 2)))
+    return np.asarray(fit_missed(knots_t, motion.times, motion.states, control, min(3, control.shape[2])))
 
 
 def _halved(motion: March, knots_t: Floats, tolerance: float) -> March:

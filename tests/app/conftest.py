@@ -52,7 +52,7 @@ ABSENT = _Absent()
 
 def start(client: TestClient) -> TestClient:
     """Wait until the service is ready; its kernels may have to be compiled."""
-    give_up = time.monotonic() + 240
+    give_up = time.monotonic() + 540
     while client.get("/ready").status_code != 200:
         assert time.monotonic() < give_up, "the service did not get ready"
         time.sleep(0.1)

@@ -43,7 +43,7 @@ def serving(directory: Path, **settings: str) -> Iterator[Live]:
         )
     url = f"http://127.0.0.1:{port}"
     try:
-        give_up = time.monotonic() + 240
+        give_up = time.monotonic() + 540
         while not _ready(url):
             assert process.poll() is None, log.read_text()
             assert time.monotonic() < give_up

@@ -67,7 +67,7 @@ def service(data: Path) -> Iterator[tuple[str, "subprocess.Popen[bytes]"]]:
     process = subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         address = f"http://127.0.0.1:{port}"
-        give_up = time.monotonic() + 240
+        give_up = time.monotonic() + 540
         while not ready(address):
             assert process.poll() is None
             assert time.monotonic() < give_up, "the service did not get ready"

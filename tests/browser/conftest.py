@@ -92,7 +92,7 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
         process = subprocess.Popen(command, cwd=ROOT, env=environment, stdout=output, stderr=subprocess.STDOUT)
     try:
         address = f"http://127.0.0.1:{port}"
-        give_up = time.monotonic() + 240
+        give_up = time.monotonic() + 540
         while not _is_ready(address):
             assert process.poll() is None, log.read_text()
             assert time.monotonic() < give_up, "the service did not get ready"

@@ -1,6 +1,7 @@
 """The cable does not pass through itself, and feels nothing of itself while its strands are apart."""
 
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from dlocore.effects import laws
 from dlocore.effects.selfcontact import APART, nearest_strands
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
-from dlocore.kernels.banded import Elimination, factor, reduce_matrix, solve
+from dlocore.kernels.banded import Elimination, elimination, factor, reduce_matrix, solve
 from dlocore.kernels.selfcontact import clear_way, factor_wide, press, solve_wide, widen
 from dlocore.problem import Problem, pose
 from dlocore.solvers.march import closed_grasps
@@ -202,9 +203,11 @@ class Tangle:
         return S, end
 
 
-NOTHING = Elimination(
-    np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0), 0
-)
+def nothing_held(q: Floats) -> Elimination:
+    """Return the elimination where nothing holds the control points q (n, nc)."""
+    none = np.zeros(0, np.int64)
+    follow = np.zeros((0, len(q)))
+    return cast(Elimination, elimination(len(q), q.shape[1], min(q.shape[1], 3), none, follow, none, follow))
 
 
 @DIMENSIONS
@@ -225,7 +228,7 @@ def test_forces_balance_and_turn_nothing(nc: int) -> None:
 def test_the_tangent_is_the_derivative_of_the_forces(nc: int) -> None:
     tangle = Tangle(nc, 3)
     size = tangle.q.size
-    e = NOTHING._replace(index=np.arange(size))
+    e = nothing_held(tangle.q)
     S, _ = tangle.tangent(e, np.zeros((size, 4 * nc)))
     K = np.triu(S) + np.triu(S, 1).T
     random = np.random.default_rng(4)
@@ -241,7 +244,7 @@ def test_the_tangent_is_the_derivative_of_the_forces(nc: int) -> None:
 def test_the_tangent_by_velocity_is_the_derivative_of_the_damping(nc: int) -> None:
     tangle = Tangle(nc, 5)
     size = tangle.q.size
-    S, _ = tangle.tangent(NOTHING._replace(index=np.arange(size)), np.zeros((size, 4 * nc)), (0.0, 1.0, 0.0))
+    S, _ = tangle.tangent(nothing_held(tangle.q), np.zeros((size, 4 * nc)), (0.0, 1.0, 0.0))
     C = np.triu(S) + np.triu(S, 1).T
     v = 1e-6 * np.random.default_rng(6).normal(0.0, 1.0, tangle.q.shape)  # so slow that no pair lets go
     change = tangle.press(tangle.q, v)[0] - tangle.press(tangle.q)[0]
@@ -273,7 +276,7 @@ def test_the_wide_solve_is_the_dense_one(nc: int) -> None:
         else:
             for s in range(e.start[-1 - e.index[i]], e.start[-e.index[i]]):
                 Z[i, e.index[e.dof[s]]] += e.coefficient[s]
-    full, _ = tangle.tangent(NOTHING._replace(index=np.arange(n)), band, (1.0, 0.0, 0.0))
+    full, _ = tangle.tangent(nothing_held(tangle.q), band, (1.0, 0.0, 0.0))
     dense = Z.T @ (np.triu(full) + np.triu(full, 1).T) @ Z
     scale = np.abs(dense).max()
     # sums of some hundred products: rounding

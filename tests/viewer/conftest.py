@@ -38,7 +38,7 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     while not server.started:
         time.sleep(0.01)
     address = f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
-    give_up = time.monotonic() + 240
+    give_up = time.monotonic() + 540
     while httpx.get(f"{address}/ready").status_code != 200:
         assert time.monotonic() < give_up, "the service did not get ready"
         time.sleep(0.1)

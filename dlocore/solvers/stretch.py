@@ -1,0 +1,66 @@
+"""How a stretch of smooth motion begins: what is held in it, and the state that the grasps close on."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.grid import Grid
+from dlocore.holding import Held, Starts, close_grasps, hold
+from dlocore.kernels.assembly import History
+from dlocore.kernels.march import begin_stretch
+from dlocore.problem import Problem
+from dlocore.scene import Grasp
+
+Floats = NDArray[np.float64]
+
+_NEAR = 1e-3 * np.arange(3.0)  # of a step: for velocity and acceleration of the paths at the beginning
+
+
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """How a stretch begins.
+
+    Attributes:
+        held: what is held in it.
+        offsets: (k, held) [m] its prescribed part at the times of the stretch.
+        closed: (n_u, nc) [m/s] velocity as the grasps close.
+        v: the same, zero where inertia is left out.
+        a: (n_u, nc) [m/s^2] consistent acceleration.
+        G: (n_u, nc) [N] forces f + C v - load.
+    """
+
+    held: Held
+    offsets: Floats
+    closed: Floats
+    v: Floats
+    a: Floats
+    G: Floats
+
+
+def enter(
+    problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, times: Floats, h: float, q: Floats, v: Floats,
+    history: History, load: Floats,
+) -> Entry:  # fmt: skip
+    """Close the grasps of a stretch and return how it begins.
+
+    Args:
+        problem: what is solved.
+        grid: its space discretisation.
+        grasps: that hold in the stretch.
+        starts: where paths begin; those of grasps that close now are noted.
+        times: (k,) [s] of the stretch.
+        h: time step [s].
+        q, v: (n_u, nc) state and velocity before [m, m/s].
+        history: what lies behind; the strain of q is noted in it.
+        load: (n_u, nc) applied forces at its beginning [N].
+    """
+    close_grasps(problem, grid, grasps, starts, q)
+    held = hold(problem, grid, grasps, np.concatenate([times[0] + h * _NEAR, times]), starts, q)
+    active, parameters = problem.law_table()
+    closed, a, G = begin_stretch(
+        problem.axes, q, v, grid.tables.mass, problem.mass_density(), problem.drag_coefficient(), grid.tables, active,
+        parameters, history, load, held.elimination, held.offsets[:3], h * _NEAR[1], problem.inertia is not None,
+    )  # fmt: skip
+    started = closed.copy() if problem.inertia is not None else np.zeros_like(closed)
+    return Entry(held, held.offsets[3:], closed, started, a, G)

@@ -1,0 +1,107 @@
+"""predict_many: each scene as predict would, whatever runs beside it."""
+
+import threading
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from dlocore import (
+    Cable,
+    Cancelled,
+    Environment,
+    Grasp,
+    Move,
+    Points,
+    Prediction,
+    Quality,
+    Scene,
+    SceneError,
+    Straight,
+    Table,
+    predict,
+    predict_many,
+)
+
+COARSE = Quality(n_u=9, n_t=13, method="march")
+
+
+def scene(u: float, quality: Quality = COARSE, displacement: tuple[float, float, float] = (0.0, 0.4, 0.0)) -> Scene:
+    return Scene(
+        cable=Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-3),
+        shape=Straight(),
+        grasps=(Grasp(u=u, path=Move(displacement=displacement, duration=1.6)),),
+        environment=Environment(drag=0.05, table=Table()),
+        quality=quality,
+    )
+
+
+def hanging(u: float) -> Scene:
+    arc = np.linspace(0.0, 1.0, 9)[:, None] * [1.0, 0.0, 0.0]
+    lift = Grasp(u=u, path=Move(displacement=(-0.02, 0.02, 0.01), duration=0.4))
+    return Scene(cable=Cable.preset("paper"), shape=Points(points=arc), grasps=(lift, Grasp(u=0.0)), quality=COARSE)
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_each_is_bit_for_bit_what_predict_gives(threads: int):
+    scenes = [make(u) for u in (0.1, 0.35, 0.6, 0.85, 1.0) for make in (scene, hanging)]
+    scenes.append(scene(0.5, Quality()))
+    together = predict_many(scenes, threads=threads)
+    assert len(together) == len(scenes)
+    for given, one in zip(scenes, together, strict=True):
+        assert isinstance(one, Prediction)
+        assert one.scene is given
+        alone = predict(given)
+        assert np.array_equal(one.surface.control_points, alone.surface.control_points)
+        assert one.accuracy.error_estimate == alone.accuracy.error_estimate
+        assert (one.status, one.message) == (alone.status, alone.message)
+
+
+def test_an_impossible_scene_has_its_error_in_its_place_and_spoils_no_other():
+    taut = Scene(
+        cable=Cable.preset("paper"), shape=Straight(),
+        grasps=(Grasp(u=0.0), Grasp(u=1.0, path=Move(displacement=(0.5, 0.0, 0.0), duration=1.0))), quality=COARSE,
+    )  # fmt: skip
+    first, second, third = predict_many([scene(0.2), taut, scene(0.8)], threads=2)
+    assert isinstance(first, Prediction)
+    assert isinstance(third, Prediction)
+    assert isinstance(second, SceneError)
+    with pytest.raises(SceneError) as alone:
+        predict(taut)
+    assert str(second) == str(alone.value)
+
+
+def test_no_scenes_give_no_predictions():
+    assert predict_many([]) == []
+    assert predict_many(iter([])) == []
+
+
+@pytest.mark.parametrize("threads", [0, -1, float("nan"), "2", True, 10**9])
+def test_a_wrong_number_of_threads_is_refused_by_name(threads: object):
+    with pytest.raises(SceneError) as error:
+        predict_many([scene(0.2)], threads=threads)  # type: ignore[arg-type]
+    assert error.value.field == "threads"
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_cancelling_stops_all(threads: int):
+    asked: Callable[[], bool] = lambda: True  # noqa: E731
+    with pytest.raises(Cancelled):
+        predict_many([scene(0.2)] * 6, threads=threads, cancelled=asked)
+    names = [thread.name for thread in threading.enumerate()]
+    assert not [name for name in names if name.startswith("dlo-predict")]
+
+
+def test_what_goes_wrong_in_one_solve_is_what_the_caller_sees():
+    def broken() -> bool:
+        raise ZeroDivisionError("from the caller's own function")
+
+    with pytest.raises(ZeroDivisionError):
+        predict_many([scene(0.2)] * 6, threads=3, cancelled=broken)
+
+
+def test_a_deadline_is_that_of_each_scene():
+    late = predict_many([scene(0.2, Quality(target_error=1e-6))] * 3, threads=2, deadline=0.02)
+    for one in late:
+        assert isinstance(one, Prediction)
+        assert one.status == "time_limit"
