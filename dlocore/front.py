@@ -245,27 +245,32 @@ def warm_up() -> None:
     """Compile, or load from the cache, every kernel, so that the first prediction is as fast as the next."""
     from dlocore.cable import Cable
     from dlocore.effects.selfcontact import nearest_strands
+    from dlocore.obstacles import Sphere
     from dlocore.paths import Move
     from dlocore.scene import Environment, Grasp, Points, Switch, Table
     from dlocore.statics import equilibrium
 
-    cable = Cable.preset("paper", bending_damping=1e-4)
+    # yields at a bend that is not reached, rubs, and lies beside something: so all that looks for that is compiled, too
+    cable = Cable.preset("paper", bending_damping=1e-4, yield_strain=0.1, memory_rate=1.0)
     u = np.linspace(0.0, 1.0, 12)[:, None]
     arc = u * [1.0, 0.0, 0.0] + 0.05 * np.sin(3.0 * u) * [0.0, 1.0, 0.0]
     grasp = Grasp(u=0.3, hold="clamp", path=Move(displacement=(0.0, 0.01, 0.0), duration=1.0))
-    kinds: tuple[tuple[Table | None, Switch], ...] = ((Table(), "auto"), (None, "auto"), (None, "on"))
-    for table, switch in kinds:  # two, three and four coordinates
-        environment = Environment(drag=0.1, drag_quadratic=0.1, table=table)
-        for quality in (Quality(), Quality(n_u=9, n_t=9)):
+    beside = (Sphere(center=(0.5, 0.3, 0.0), radius=0.2),)
+    kinds: tuple[tuple[Table | None, Switch], ...] = ((Table(friction=0.1), "auto"), (None, "off"), (None, "on"))
+    for table, twist in kinds:  # two, three and four coordinates
+        environment = Environment(drag=0.1, drag_quadratic=0.1, table=table, obstacles=beside)
+        for quality in (Quality(), Quality(n_u=9, n_t=9), Quality(n_u=9, n_t=9, method="spacetime")):
+            plastic: Switch = "on" if quality.method == "auto" and twist != "off" else "off"
             scene = Scene(
                 cable=cable,
                 shape=Points(points=arc, settle=table is None),
                 grasps=(grasp,),
                 environment=environment,
-                effects={"twist": switch},
+                effects={"twist": twist, "plasticity": plastic},
                 quality=quality,
             )
             predict(scene)
+            predict(replace(scene, effects={"twist": twist, "obstacles": "off"}))
         equilibrium(scene, n_u=9)
     loop = np.column_stack([np.cos(np.linspace(0.0, 7.0, 9)), np.sin(np.linspace(0.0, 7.0, 9)), 0.1 * u[:9, 0]])
     nearest_strands(uniform_knots(9, 1.0), loop[None], 3, 0.01, 0.03)
