@@ -97,7 +97,7 @@ def calibrate(*, repeats: int, json: str | None) -> int:
 
     if repeats < 1:
         raise CommandError(f"--repeats: got {repeats}. Allowed: at least 1.")
-    path = _settings().data_dir / calibration.FILE if json is None else Path(json)
+    path = _settings().calibration_file if json is None else Path(json)
     with tqdm(desc="calibrating", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
 
         def show(done: int, total: int, what: str) -> None:
@@ -203,6 +203,7 @@ def _solve(request: PredictionRequest) -> Prediction:
 
     from dlocore import predict as solve
     from dlocore import warm_up
+    from dlocore.calibration import stored_cost
 
     with tqdm(desc="solving", unit=" iterations", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
 
@@ -213,7 +214,8 @@ def _solve(request: PredictionRequest) -> Prediction:
         try:
             scene = to_scene(request, _stored)
             warm_up()  # so that the reported time is that of the solve
-            return solve(scene, on_iteration=show)
+            cost = stored_cost(_settings().calibration_file) if scene.quality.time_budget is not None else None
+            return solve(scene, on_iteration=show, cost=cost)
         except SceneError as error:
             raise CommandError(_words([BadField.from_scene_error(error)])) from None
 

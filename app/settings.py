@@ -6,6 +6,7 @@ from typing import Literal
 from pydantic import Field, SecretStr, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from dlocore.calibration import FILE
 from dlocore.machine import usable_cores, user_data_dir
 
 
@@ -35,6 +36,11 @@ class Settings(BaseSettings):
     max_scenes: int = Field(default=16, ge=1, le=1000, description="Tabs of the 3D scene that may be open at once.")
     max_runs: int = Field(default=1000, ge=1, description="Stored runs kept; the oldest go first.")
     max_run_bytes: int = Field(default=2_000_000_000, ge=1_000_000, description="Bytes of stored runs kept.")
+
+    @property
+    def calibration_file(self) -> Path:
+        """Where the calibration of this machine is stored."""
+        return self.data_dir / FILE
 
     @field_validator("data_dir")
     @classmethod

@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from threading import Event
 
 import anyio
@@ -12,6 +13,8 @@ import anyio.to_thread
 from app.problems import ProblemError
 from app.settings import Settings
 from dlocore import Cancelled, Iteration, Prediction, Scene, predict
+from dlocore.calibration import stored_cost
+from dlocore.cost import Cost
 
 GRACE = 5.0  # s that a solve may take beyond its deadline, which it looks at between steps
 _MEMORY = 0.8  # weight of the past in the running mean of solve times
@@ -31,6 +34,7 @@ class Worker:
         workers: solves that run at once.
         queue_size: requests that may wait.
         time_limit: longest solve [s].
+        calibration_file: where what solves cost on this machine is stored; None: nowhere.
 
     Attributes:
         running: solves that run.
@@ -41,6 +45,7 @@ class Worker:
     workers: int
     queue_size: int
     time_limit: float
+    calibration_file: Path | None = None
     running: int = field(init=False, default=0)
     admitted: int = field(init=False, default=0)
     closed: bool = field(init=False, default=False)
@@ -54,7 +59,7 @@ class Worker:
     @staticmethod
     def of(settings: Settings) -> "Worker":
         """Return the worker that `settings` describe."""
-        return Worker(settings.workers, settings.queue_size, settings.time_limit)
+        return Worker(settings.workers, settings.queue_size, settings.time_limit, settings.calibration_file)
 
     @property
     def waiting(self) -> int:
@@ -107,7 +112,11 @@ class Worker:
                 try:
                     return await self._run(
                         lambda: predict(
-                            scene, on_iteration=on_iteration, deadline=self.time_limit, cancelled=cancelled.is_set
+                            scene,
+                            on_iteration=on_iteration,
+                            deadline=self.time_limit,
+                            cancelled=cancelled.is_set,
+                            cost=self._cost(scene),
                         )
                     )
                 finally:
@@ -115,6 +124,11 @@ class Worker:
         finally:
             cancelled.set()  # a thread left behind stops at its next step
             self._solves.discard(cancelled)
+
+    def _cost(self, scene: Scene) -> Cost | None:
+        if self.calibration_file is None or scene.quality.time_budget is None:
+            return None
+        return stored_cost(self.calibration_file)
 
     async def _run(self, solve: Callable[[], Prediction]) -> Prediction:
         began = time.perf_counter()

@@ -1,39 +1,34 @@
-"""The grid that a time budget allows, chosen before solving from what solves cost on this machine."""
-
-import numpy as np
+"""Where a time budget begins to refine, chosen before solving from what solves cost on this machine."""
 
 from dlocore.cost import Cost
-from dlocore.discretisation import smallest_n_u
 from dlocore.problem import Problem
-from dlocore.solvers.ladder import given_steps
-from dlocore.solvers.march import smallest_n_t
+from dlocore.solvers.ladder import LEVELS, Size, stretched
 
-MOST_N_U, MOST_N_T = 129, 513
-_TIMES_PER_POINT = 1.5  # n_t over n_u: halves both parts of the error alike in a motion of about two seconds of a metre
+GROWTH = 2.5  # of the time from one grid to the next, where nothing is known of this machine
+_KEPT = 0.8  # of the budget: what the model may be sure of, as it knows nothing of the motion
 
 
-def grid_within(
-    problem: Problem, cost: Cost, budget: float, *, method: str = "march", estimate: bool = True
-) -> tuple[int, int] | None:
-    """Return the finest grid (n_u, n_t) whose solve should take no longer than a budget; None where none does.
-
-    Args:
-        problem: what is solved: its features set the least grid, its horizon the ratio of n_t to n_u.
-        cost: what solves cost on this machine.
-        budget: allowed time [s].
-        method: "march" or "spacetime".
-        estimate: whether the error is estimated within the budget, too.
-    """
-    natural = 2.0 * np.sqrt(problem.scene.cable.length)  # [s]: about the period of a cable that swings
-    ratio = _TIMES_PER_POINT * float(np.clip(problem.horizon / natural, 1.0, 64.0))
+def march_time(problem: Problem, cost: Cost, size: Size) -> float:
+    """Return about how long a march on a grid takes [s]."""
     active = [name for name, choice in problem.choices.items() if choice.active]
-    best = None
-    for n_u in range(max(7, smallest_n_u(problem)), MOST_N_U + 1):
-        n_t = min(max(round(ratio * n_u), smallest_n_t(problem)), MOST_N_T)
-        expected = cost.time(
-            method, n_u, n_t, given_steps(n_t), coordinates=problem.nc, effects=active, estimate=estimate
-        )
-        if expected > budget:
-            break
-        best = n_u, n_t
-    return best
+    return cost.time("march", *size, coordinates=problem.nc, effects=active, estimate=False)
+
+
+def first_level(problem: Problem, cost: Cost | None, budget: float) -> int:
+    """Return the first grid, a number in `LEVELS`, of the marches within a time budget [s].
+
+    It is the finest that leaves time for the next one, by which its error is told; the coarsest where nothing is known
+    of this machine.
+    """
+    if cost is None or problem.nc not in cost.rates:
+        return 0
+    spent = [march_time(problem, cost, stretched(problem, level)) for level in range(len(LEVELS))]
+    fitting = [k for k in range(len(LEVELS) - 1) if spent[k] + spent[k + 1] <= _KEPT * budget]
+    return max(fitting, default=0)
+
+
+def growth(problem: Problem, cost: Cost | None, size: Size, next_size: Size) -> float:
+    """Return how many times as long a march on the next grid will take as on this one."""
+    if cost is None or problem.nc not in cost.rates:
+        return GROWTH
+    return march_time(problem, cost, next_size) / march_time(problem, cost, size)

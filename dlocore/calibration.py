@@ -19,6 +19,7 @@ from dlocore.machine import machine, user_data_dir
 
 FORMAT = 1
 FILE = "calibration.json"
+_read: dict[Path, tuple[int, Cost | None]] = {}  # by file: when it was changed, and what it tells
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,6 +133,23 @@ def load(path: Path | None = None) -> Calibration | None:
         return from_document(json.loads((path or default_path()).read_text()))
     except (OSError, ValueError, KeyError, TypeError):
         return None
+
+
+def stored_cost(path: Path | None = None) -> Cost | None:
+    """Return what solves cost on this machine, from its stored calibration; None where there is none of this machine.
+
+    Args:
+        path: its file; that of the user's data directory by default. It is read again only after it has changed.
+    """
+    path = path or default_path()
+    try:
+        changed = path.stat().st_mtime_ns
+    except OSError:
+        return None
+    if path not in _read or _read[path][0] != changed:
+        found = load(path)
+        _read[path] = changed, None if found is None or found.machine != machine() else found.cost
+    return _read[path][1]
 
 
 def table(calibration: Calibration) -> str:

@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.cost import Cost
 from dlocore.discretisation import smallest_n_u
 from dlocore.errors import SceneError
 from dlocore.frames import material_of
@@ -36,6 +37,7 @@ def predict(
     on_iteration: OnIteration | None = None,
     deadline: float | None = None,
     cancelled: Callable[[], bool] | None = None,
+    cost: Cost | None = None,
 ) -> Prediction:
     """Predict the motion of a scene's cable as one bivariate spline.
 
@@ -44,6 +46,8 @@ def predict(
         on_iteration: called after every iteration, or refinement level, with its record.
         deadline: time allowed [s]; after it the best iterate is returned with status "time_limit".
         cancelled: asked between iterations; where it returns True the solve stops.
+        cost: what solves cost on this machine (`dlocore.calibration.stored_cost`), by which a time budget begins with a
+            grid that fits; without it with the coarsest.
 
     Returns:
         The prediction. Not converging is a status, not an exception.
@@ -63,7 +67,7 @@ def predict(
     if method == "auto":
         method = automatic_method(problem)
     if method == "march":
-        outcome = (climb if quality.n_u is None else _given)(problem, quality, monitor)
+        outcome = climb(problem, quality, monitor, cost) if quality.n_u is None else _given(problem, quality, monitor)
         return _answer(monitor, "march", outcome)
     return _least_squares(problem, quality, monitor, method)
 

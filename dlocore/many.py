@@ -1,12 +1,12 @@
 """Many predictions at once, on all processors."""
 
-import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from threading import Event, Lock
 
 from dlocore.errors import Cancelled, SceneError, number
 from dlocore.front import predict
+from dlocore.machine import usable_cores
 from dlocore.prediction import Prediction
 from dlocore.scene import Scene
 
@@ -35,7 +35,7 @@ def predict_many(
         SceneError: `threads` is no positive whole number.
         Cancelled: `cancelled` returned True.
     """
-    wanted = _processors() if threads is None else int(number("threads", threads, at_least=1, at_most=1024))
+    wanted = usable_cores() if threads is None else int(number("threads", threads, at_least=1, at_most=1024))
     given = list(scenes)
     found: list[Prediction | SceneError | None] = [None] * len(given)
     rest, lock, stop = iter(range(len(given))), Lock(), Event()
@@ -77,9 +77,3 @@ def _shared(rest: Iterator[int], lock: Lock) -> Iterator[int]:
         if index is None:
             return
         yield index
-
-
-def _processors() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

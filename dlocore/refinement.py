@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dlocore.budget import first_level, growth
+from dlocore.cost import Cost
 from dlocore.discretisation import smallest_n_u
 from dlocore.kernels.assembly import slopes
 from dlocore.prediction import Status
@@ -69,7 +71,7 @@ def march_level(
         problem = pose(problem.scene, called)
 
 
-def climb(problem: Problem, quality: Quality, monitor: Monitor) -> Outcome:
+def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | None = None) -> Outcome:
     """March on finer and finer grids until two agree within the target, or the time budget is used.
 
     The first few refine space and time together, which is what most motions need. What is left errs mostly in one of
@@ -77,16 +79,17 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor) -> Outcome:
     So from there on each grid is finer in one direction, that whose last refinement moved the surface most, and the
     error is the sum of both. It is at least what the time spline misses of its march: a cable that trembles faster than
     two grids can show looks alike on both. A march that finds no equilibrium is tried with more steps before it is
-    given up.
+    given up. Within a time budget the first grid is the one that what solves cost on this machine allows.
     """
     target = quality.target_error or AUTO_TARGET * problem.scene.cable.length
     budget = quality.time_budget or np.inf
     best: Level | None = None
     estimate = np.inf
     rho = RHO
-    size, direction = stretched(problem, 0), "both"
+    number = 0 if quality.time_budget is None else first_level(problem, cost, quality.time_budget)
+    size, direction = stretched(problem, number), "both"
     changes: dict[str, tuple[float, float]] = {}  # how far the two last refinements of a direction moved the surface
-    number = failures = 0
+    failures = 0
     while size.n_u <= _MOST_POINTS and size.n_u * size.steps <= MOST_WORK:
         began = monitor.elapsed()
         try:
@@ -125,16 +128,17 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor) -> Outcome:
         if estimate <= ACCEPT * target and quality.time_budget is None:
             agreed = f"Two grids agree to {level.change * 1e3:.2g} mm, target {target * 1e3:.2g} mm."
             return Outcome(level, status, agreed if status == "converged" else message, estimate)
-        if 2.5 * (monitor.elapsed() - began) > budget - monitor.elapsed():
-            if number == 0:
-                return Outcome(level, "time_limit", f"{budget * 1e3:.3g} ms allow one grid, unchecked.", None)
-            return Outcome(level, status, f"The best grid in {budget * 1e3:.3g} ms; {moved}.", estimate)
         number += 1
         if number < len(LEVELS):
-            size = stretched(problem, number)
+            finer = stretched(problem, number)
         else:
             direction = "time" if MISSED_COUNTS * level.missed > _error(changes) else _worst(changes)
-            size = _finer(size, direction)
+            finer = _finer(size, direction)
+        if growth(problem, cost, size, finer) * (monitor.elapsed() - began) > budget - monitor.elapsed():
+            if not np.isfinite(level.change):
+                return Outcome(level, "time_limit", f"{budget * 1e3:.3g} ms allow one grid, unchecked.", None)
+            return Outcome(level, status, f"The best grid in {budget * 1e3:.3g} ms; {moved}.", estimate)
+        size = finer
     assert best is not None
     status, message = march_status(problem, best)
     moved = f"the last refinement moved the surface by {best.change * 1e3:.3g} mm, target {target * 1e3:.3g} mm"

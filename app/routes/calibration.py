@@ -4,7 +4,6 @@ It is measured when someone asks for it, not at the first start: it takes tens o
 requests would feel a part, and what it measures while others compile is worth little.
 """
 
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import anyio
@@ -21,17 +20,12 @@ from app.routes import described
 from app.routes.body import JsonRoute
 from app.runs import new_id
 from app.schemas.calibration import CalibrationResponse
-from app.service import Service, TheService
+from app.service import TheService
 from dlocore import calibration
 from dlocore.calibration import Calibration
 
 router = APIRouter(prefix="/v1/calibration", tags=["calibration"], route_class=JsonRoute)
 KIND = "calibration"
-
-
-def path_of(service: Service) -> Path:
-    """Return the file of the calibration."""
-    return service.settings.data_dir / calibration.FILE
 
 
 def document_of(found: Calibration, dimensions: int) -> dict[str, Any]:
@@ -64,7 +58,7 @@ async def read(
 ) -> Response:
     """Return error and time of both methods over grids, and the Pareto front; 404 until it has been measured."""
     negotiated(request.headers.get("accept"), (JSON,))
-    found = await anyio.to_thread.run_sync(calibration.load, path_of(service))
+    found = await anyio.to_thread.run_sync(calibration.load, service.settings.calibration_file)
     if found is None:
         detail = "This machine has not been calibrated. POST /v1/calibration, or run: dlo calibrate."
         raise ProblemError(404, "not-calibrated", detail)
@@ -83,7 +77,7 @@ async def measure(request: Request, service: TheService) -> Response:
 
     def work(tell: Tell, cancelled: Any) -> bytes:
         found = calibration.measure(on_progress=tell, cancelled=cancelled)
-        found.save(path_of(service))
+        found.save(service.settings.calibration_file)
         return orjson.dumps(document_of(found, 2))
 
     job = running[0] if running else service.measure(KIND, new_id(), work)

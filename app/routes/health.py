@@ -9,7 +9,6 @@ from app import metrics
 from app.routes import described
 from app.schemas import problem_document
 from app.service import TheService
-from dlocore.calibration import FILE
 
 router = APIRouter(tags=["service"])
 
@@ -30,7 +29,7 @@ class Ready(BaseModel):
 @router.get("/health", summary="Is the process alive?")
 async def health(request: Request) -> Health:
     """Answer as long as the process does."""
-    return Health(calibrated=(request.app.state.settings.data_dir / FILE).exists())
+    return Health(calibrated=request.app.state.settings.calibration_file.exists())
 
 
 @router.get("/ready", summary="Can it solve?", responses={503: problem_document("The solver is still being compiled.")})

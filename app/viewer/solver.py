@@ -43,12 +43,13 @@ class ServiceSolver:
 
     def measured(self, dimensions: int) -> tuple[Measured, ...]:
         """Return what this machine was calibrated to, in the plane (2) or in space (3); nothing where it was not."""
-        found = calibration.load(self._service.settings.data_dir / calibration.FILE)
+        found = calibration.load(self._service.settings.calibration_file)
         return () if found is None else found.of_dimensions(dimensions)
 
     def preview(self, scene: Scene, cancelled: Callable[[], bool]) -> Prediction:
         """Solve at once on the calling thread."""
-        prediction = dlocore.predict(scene, deadline=LONGEST_PREVIEW, cancelled=cancelled)
+        cost = calibration.stored_cost(self._service.settings.calibration_file)
+        prediction = dlocore.predict(scene, deadline=LONGEST_PREVIEW, cancelled=cancelled, cost=cost)
         self._service.metrics.solved(prediction)
         return prediction
 

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dlocore.budget import grid_within
+from dlocore import Quality, Scene, predict
+from dlocore.budget import GROWTH, first_level, growth, march_time
 from dlocore.cost import Cost, Rates, Sample, exponent, fitted_rates, pareto_front
 from dlocore.problem import pose
-from dlocore.solvers.ladder import given_steps
+from dlocore.solvers.ladder import LEVELS, given_steps, stretched
 from dlocore.study.scenes import hanging, paper_case
 
 PLANE = Rates(
@@ -58,25 +59,45 @@ def test_effects_and_estimates_lengthen_a_solve_by_their_factors() -> None:
 
 
 @pytest.mark.parametrize("scene", [paper_case(0.25), paper_case(0.25, friction=0.2), hanging()])
-def test_the_grid_for_a_budget_costs_no_more_and_the_next_one_does(scene: object) -> None:
-    problem = pose(scene)  # type: ignore[arg-type]
-    active = [name for name, choice in problem.choices.items() if choice.active]
-    sizes = []
-    for budget in (0.02, 0.05, 0.2):
-        grid = grid_within(problem, COST, budget)
-        assert grid is not None
-        n_u, n_t = grid
+def test_a_budget_begins_with_the_finest_grid_that_leaves_time_for_the_next(scene: Scene) -> None:
+    problem = pose(scene)
+    times = [march_time(problem, COST, stretched(problem, level)) for level in range(len(LEVELS))]
+    found = []
+    for budget in (0.005, 0.02, 0.05, 0.2, 10.0):
+        level = first_level(problem, COST, budget)
+        if level > 0:
+            assert times[level] + times[level + 1] <= budget
+        if level < len(LEVELS) - 2:
+            assert times[level + 1] + times[level + 2] > 0.8 * budget
+        found.append(level)
+    assert found == sorted(found), "more time begins finer"
+    assert found[0] == 0
+    assert found[-1] == len(LEVELS) - 2
 
-        def time(n_u: int, n_t: int) -> float:
-            return COST.time("march", n_u, n_t, given_steps(n_t), coordinates=problem.nc, effects=active)
 
-        assert time(n_u, n_t) <= budget < time(n_u + 1, round(n_t * (n_u + 1) / n_u) + 1)
-        sizes.append(n_u)
-    assert sizes == sorted(set(sizes)), "more time gives a finer grid"
+def test_effects_that_cost_time_begin_coarser() -> None:
+    smooth, rough = (pose(paper_case(0.25, friction=friction)) for friction in (0.0, 0.2))
+    slow = replace(COST, effects={"friction": 20.0})
+    assert first_level(rough, slow, 0.02) < first_level(smooth, slow, 0.02)
 
 
-def test_a_budget_below_every_grid_gives_none() -> None:
-    assert grid_within(pose(paper_case(0.25)), COST, 1e-4) is None
+def test_without_a_calibration_a_budget_begins_with_the_coarsest_grid() -> None:
+    problem = pose(paper_case(0.25))
+    assert first_level(problem, None, 10.0) == 0
+    assert growth(problem, None, stretched(problem, 0), stretched(problem, 1)) == GROWTH
+    assert first_level(pose(hanging()), Cost(rates={2: PLANE}), 10.0) == 0  # calibrated in the plane only
+    assert growth(problem, COST, stretched(problem, 0), stretched(problem, 4)) > 2.0
+
+
+def test_a_time_budget_with_a_calibration_skips_the_coarse_grids() -> None:
+    scene = replace(paper_case(0.25), quality=Quality(time_budget=5.0))
+    blind, known = predict(scene), predict(scene, cost=COST)
+    assert blind.iterations[0].n_u == stretched(pose(scene), 0).n_u
+    assert known.iterations[0].n_u == stretched(pose(scene), len(LEVELS) - 2).n_u
+    for one in (blind, known):
+        assert one.status == "converged"
+        assert one.accuracy.error_estimate is not None
+    assert known.accuracy.n_u >= blind.accuracy.n_u
 
 
 def test_the_front_has_every_point_that_no_other_beats_and_only_those() -> None:
