@@ -5,9 +5,8 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
-from dlocore.effects.distance import BOX, CAPSULE, CYLINDER, SPHERE
+from dlocore.effects.kinds import BOX, CAPSULE, CYLINDER, SPHERE
 from dlocore.errors import SceneError, array, number
 
 Floats = NDArray[np.float64]
@@ -193,6 +192,8 @@ class Box:
         """Return the axes of the box as rows (3, 3)."""
         if self.orientation is None:
             return np.eye(3)
+        from scipy.spatial.transform import Rotation  # slow to import, and seldom needed
+
         w, x, y, z = cast(Floats, self.orientation)
         return Rotation.from_quat([x, y, z, w]).as_matrix().T
 

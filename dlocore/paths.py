@@ -10,8 +10,6 @@ from typing import Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
-from scipy.spatial.transform import Rotation, Slerp
 
 from dlocore.errors import SceneError, array, choice, number
 
@@ -78,6 +76,8 @@ class Move:
         """Rotations since the grasp began at times `t`; (k, 3, 3), or None where it never turns."""
         if self.rotation is None:
             return None
+        from scipy.spatial.transform import Rotation  # slow to import, and seldom needed
+
         s = _PROFILES[self.profile](np.clip(t / self.duration, 0.0, 1.0))
         return Rotation.from_rotvec(s[:, None] * cast(Floats, self.rotation)).as_matrix()
 
@@ -123,6 +123,8 @@ class Waypoints:
             raise SceneError("positions", f"{len(positions)} positions", f"as many as times ({len(times)})")
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "positions", positions)
+        from scipy.interpolate import CubicSpline  # slow to import, as the rotations below
+
         boundary = "not-a-knot" if self.start == "moving" else ((1, np.zeros(3)), (2, np.zeros(3)))
         object.__setattr__(self, "_spline", CubicSpline(times, positions, bc_type=boundary))  # type: ignore[arg-type]
         if self.orientations is not None:
@@ -134,6 +136,8 @@ class Waypoints:
                 k = int(np.argmax(np.abs(norms - 1.0)))
                 raise SceneError(f"orientations[{k}]", quaternions[k], "unit quaternions (w, x, y, z)")
             object.__setattr__(self, "orientations", quaternions)
+            from scipy.spatial.transform import Rotation, Slerp
+
             turns = Rotation.from_quat(quaternions[:, [1, 2, 3, 0]])
             object.__setattr__(self, "_slerp", Slerp(times, turns * turns[0].inv()))
 

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import BSpline
 
 Floats = NDArray[np.float64]
 DEGREE = 3
@@ -20,6 +19,8 @@ def uniform_knots(n: int, end: float) -> Floats:
 
 def design_matrix(knots: Floats, x: ArrayLike, derivative: int = 0) -> Floats:
     """Return the basis functions, or a derivative of them, at the points `x`; (len(x), n) [1/unit^derivative]."""
+    from scipy.interpolate import BSpline  # slow to import, and not needed to make a scene
+
     n = len(knots) - DEGREE - 1
     return BSpline(knots, np.eye(n), DEGREE)(np.asarray(x, dtype=float), derivative)
 

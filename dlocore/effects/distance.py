@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from dlocore.effects.base import Symmetric, Vector
+from dlocore.effects.kinds import CAPSULE, CYLINDER, SPHERE
 from dlocore.kernels.compile import kernel, law
 
-SPHERE, CAPSULE, CYLINDER, BOX = range(4)  # kinds of obstacles
 ROW = 17  # numbers in a row: kind, centre 3, axes of the body's frame 9, half sizes 3, friction
 
 _NEAR = 1e-12  # [m] from a centre, an axis or an edge: the direction from there is rounding
