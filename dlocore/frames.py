@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dlocore.discretisation import start_director
 from dlocore.grid import Grid
 from dlocore.kernels.march import fit_time
-from dlocore.kernels.twisted import twist_rates
+from dlocore.kernels.twisted import mean_over_spans, twist_rates
 from dlocore.prediction import MaterialMotion
 from dlocore.problem import Problem
 from dlocore.spline import SplineSurface, design_matrix
@@ -38,6 +38,7 @@ def free_of_frames(problem: Problem, grid: Grid, states: Floats, frames: Floats)
     root = np.sqrt(grid.tables.curvature_w)[:, None]
     slopes = np.zeros((len(root), grid.n_u))
     np.put_along_axis(slopes, grid.tables.curvature_first[:, None] + np.arange(4), grid.tables.curvature_b1, axis=1)
+    slopes = mean_over_spans(grid.tables) @ slopes  # as the twist rates are
     free = states.copy()
     right = problem.twist.radius * tau - states[:, :1, 3] * slopes[:, 0]
     free[:, 1:, 3] = right * root[:, 0] @ np.linalg.pinv(root * slopes[:, 1:]).T

@@ -19,16 +19,20 @@ from dlocore.solvers.ladder import ACCEPT, LEVELS, Level, Size, distance, extrap
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED, smallest_n_t
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 
-AUTO_TARGET = 2e-3  # of the length: the target error of quality "auto"
+AUTO_TARGET = 2e-3  # of the length: the error that quality "auto" aims at
+AUTO_ENOUGH = 1e-2  # of the length: the estimated error with which it is content where the finest grids reach no closer
 ROUGH = 0.05  # of the length: two grids that differ more are in no order yet: the next is marched with strong damping
 TOO_DEEP = 0.25  # of the diameter, in the table, an obstacle or itself
 TORN = 0.2  # axial strain: no cable of this kind follows
 FOLDED = 0.4  # of |r'| between the points that watch over the length: less is a fold that no energy sees
 _LOOKS = 12  # states of a motion that are searched for folds
-MOST_WORK = 5e5  # control points times steps of one march
+MOST_WORK = 4e6  # control points times steps of one march in the plane; each coordinate more costs twice the time
+AUTO_SHARE = 0.25  # of it for who asked for no target
 MISSED_COUNTS = 3.0  # what the time spline misses of its march, times this, is the least that the error may be
 _MOST_POINTS = 220  # along the cable
 _FINER = {"space": 1.5, "time": 2.0}
+_FINE_IN_TIME = 0.3  # of the target: a time spline that misses its march by less keeps its knots as the steps halve
+_AT_BEST = 0.2  # of an error, is left by one refinement: what is still too much after all of them is not begun
 _FAILURES = 3  # refinements in time of a march that found no equilibrium
 
 
@@ -80,17 +84,24 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
     error is the sum of both. It is at least what the time spline misses of its march: a cable that trembles faster than
     two grids can show looks alike on both. A march that finds no equilibrium is tried with more steps before it is
     given up. Within a time budget the first grid is the one that what solves cost on this machine allows.
+
+    A target that was asked for has to be met. Quality "auto" aims at AUTO_TARGET, and where the finest grids that it
+    tries reach no closer, an estimate of AUTO_ENOUGH is success; the message says how far the grids agree.
     """
-    target = quality.target_error or AUTO_TARGET * problem.scene.cable.length
+    length = problem.scene.cable.length
+    target = quality.target_error or AUTO_TARGET * length
+    enough = quality.target_error or AUTO_ENOUGH * length
+    most_work = MOST_WORK * (AUTO_SHARE if quality.target_error is None else 1.0)
     budget = quality.time_budget or np.inf
     best: Level | None = None
     estimate = np.inf
     rho = RHO
     number = 0 if quality.time_budget is None else first_level(problem, cost, quality.time_budget)
-    size, direction = stretched(problem, number), "both"
+    size: Size | None = stretched(problem, number)
+    direction = "both"
     changes: dict[str, tuple[float, float]] = {}  # how far the two last refinements of a direction moved the surface
     failures = 0
-    while size.n_u <= _MOST_POINTS and size.n_u * size.steps <= MOST_WORK:
+    while size is not None:
         began = monitor.elapsed()
         try:
             if best is not None:
@@ -98,7 +109,7 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
             level = march_level(problem, size, monitor, rho, free_knots=True, rough=True)
             if best is not None and level.posed is problem:
                 level = replace(level, change=distance(best, level, problem))
-                if level.change <= ROUGH * problem.scene.cable.length:  # so strands do not meet because of the grid
+                if level.change <= ROUGH * length:  # so strands do not meet because of the grid
                     level = march_level(problem, size, monitor, rho, free_knots=True, known=level)
             if level.posed is not problem:
                 best, changes = None, {}  # another motion: the grid before says nothing about it
@@ -110,13 +121,15 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
                 failures += 1
                 if failures <= _FAILURES and level.motion.stopped != "time" and quality.time_budget is None:
                     record_level(problem, level, monitor)
-                    size = _finer(size, "time")
+                    size = _affordable(_finer(size, "time", True), problem, most_work)
                     continue
+                if estimate <= enough:
+                    break
                 status, message = march_status(problem, level)
                 return Outcome(best, status, f"A finer grid was not finished: {message}", _finite(best.change))
             changes[direction] = level.change, changes.get(direction, (np.inf, np.inf))[0]
             estimate = max(_error(changes), MISSED_COUNTS * level.missed)
-            rough = level.change > ROUGH * problem.scene.cable.length
+            rough = level.change > ROUGH * length
             if rough or number < len(LEVELS):  # later on two marches would differ by their damping
                 rho = STRONGLY_DAMPED if rough else RHO
         record_level(problem, level, monitor)
@@ -129,22 +142,33 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
             agreed = f"Two grids agree to {level.change * 1e3:.2g} mm, target {target * 1e3:.2g} mm."
             return Outcome(level, status, agreed if status == "converged" else message, estimate)
         number += 1
+        next_size: Size | None
         if number < len(LEVELS):
-            finer = stretched(problem, number)
+            next_size = stretched(problem, number)
         else:
+            trembles = MISSED_COUNTS * level.missed > _FINE_IN_TIME * target
+            finer = {d: _affordable(_finer(size, d, trembles), problem, most_work) for d in _FINER}
             direction = "time" if MISSED_COUNTS * level.missed > _error(changes) else _worst(changes)
-            finer = _finer(size, direction)
-        if growth(problem, cost, size, finer) * (monitor.elapsed() - began) > budget - monitor.elapsed():
+            left = extrapolated(*changes[direction]) if direction in changes else 0.0
+            if finer[direction] is None and left < target:
+                direction = next(d for d in _FINER if d != direction)  # may still bring the sum of both below it
+            next_size = finer[direction]
+            if next_size is not None and _AT_BEST ** _left(next_size, direction, problem, most_work) * left > enough:
+                next_size = None
+        spent = monitor.elapsed() - began
+        if next_size is not None and growth(problem, cost, size, next_size) * spent > budget - monitor.elapsed():
             if not np.isfinite(level.change):
                 return Outcome(level, "time_limit", f"{budget * 1e3:.3g} ms allow one grid, unchecked.", None)
             return Outcome(level, status, f"The best grid in {budget * 1e3:.3g} ms; {moved}.", estimate)
-        size = finer
+        size = next_size
     assert best is not None
     status, message = march_status(problem, best)
     moved = f"the last refinement moved the surface by {best.change * 1e3:.3g} mm, target {target * 1e3:.3g} mm"
     advice = "Allow a larger target_error, more time or a shorter motion."
-    if status == "converged" and estimate <= target:
+    if status == "converged" and estimate <= enough:
         message = f"Two grids agree to {best.change * 1e3:.2g} mm, target {target * 1e3:.2g} mm."
+        if estimate > target:
+            message += f" No finer grid was tried; the estimated error of {estimate * 1e3:.2g} mm is above the target."
     elif status == "converged" and monitor.remaining() <= 0:
         status, message = "time_limit", f"The time limit passed; {moved}. {advice}"
     elif status == "converged":
@@ -152,11 +176,27 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
     return Outcome(best, status, message, _finite(estimate))
 
 
-def _finer(size: Size, direction: str) -> Size:
+def _finer(size: Size, direction: str, trembles: bool) -> Size:
+    """Return the next size in a direction; more time knots go with more steps only where the motion `trembles`."""
     ratio = _FINER[direction]
     if direction == "space":
         return size._replace(n_u=round(ratio * size.n_u))
-    return size._replace(n_t=round(ratio * size.n_t), steps=round(ratio * size.steps))
+    return size._replace(n_t=round(ratio * size.n_t) if trembles else size.n_t, steps=round(ratio * size.steps))
+
+
+def _affordable(size: Size, problem: Problem, most_work: float) -> Size | None:
+    """Return a size, or None where a march of it takes too long."""
+    work = size.n_u * size.steps * 2 ** (problem.nc - 2)
+    return size if size.n_u <= _MOST_POINTS and work <= most_work else None
+
+
+def _left(size: Size | None, direction: str, problem: Problem, most_work: float) -> int:
+    """Return how many refinements in a direction are left, from a size on."""
+    count = 0
+    while size is not None:
+        count += 1
+        size = _affordable(_finer(size, direction, False), problem, most_work)
+    return count
 
 
 def _worst(changes: Mapping[str, tuple[float, float]]) -> str:

@@ -5,6 +5,11 @@ derivative k0 along the cable, a director across it, the twist rate of these fra
 (two curvatures in the frame of the sections, twist rate) of the two last steps. A state is measured against the frame
 that the smallest rotation carries from t0 to its tangent: nothing is singular where the cable is straight, and theta
 counts turns without end (docs/model.md eq. 19).
+
+The twist rate of a point is the mean over its knot span, but in the two end spans. Where the curvature jumps, the twist
+rate of the carried frames jumps too as the cable swings about its own tangent, and theta, a spline, can't follow: point
+by point the cable would be held back from swinging (membrane locking, of twist). Without the end spans two oscillations
+of theta would be free of energy.
 """
 
 from typing import Any
@@ -69,6 +74,42 @@ def _strain(q: Any, tables: Any, past: Any, n: int, inverse: float) -> tuple[Vec
     return (_dot(kappa, m1), _dot(kappa, m2), tau), t, kappa
 
 
+@law
+def _span_end(firsts: Any, n: int) -> int:
+    """Return the end of the points over which the twist rate of point n, the first of them, is averaged."""
+    end = n + 1
+    if firsts[n] != firsts[0] and firsts[n] != firsts[len(firsts) - 1]:
+        while firsts[end] == firsts[n]:
+            end += 1
+    return end
+
+
+@kernel
+def _mean_twists(q: Any, tables: Any, past: Any, inverse: float) -> Any:
+    """Return the twist rate (points,) [rad/m] of q, the mean over each inner knot span."""
+    out = np.empty(len(tables.curvature_w))
+    firsts, weights = tables.curvature_first, tables.curvature_w
+    n = 0
+    while n < len(out):
+        end = _span_end(firsts, n)
+        mean, width = 0.0, 0.0
+        for m in range(n, end):
+            mean += weights[m] * _strain(q, tables, past, m, inverse)[0][2]
+            width += weights[m]
+        for m in range(n, end):
+            out[m] = mean / width
+        n = end
+    return out
+
+
+def mean_over_spans(tables: Any) -> Any:
+    """Return the matrix (points, points) that takes values at the curvature points to those that the twist rate has."""
+    firsts, weights = tables.curvature_first, tables.curvature_w
+    same = (firsts[:, None] == firsts) & (firsts != firsts[0]) & (firsts != firsts[-1])
+    shares = same * weights + np.diag(~same.any(axis=0) * weights)
+    return shares / shares.sum(axis=1, keepdims=True)
+
+
 @kernel
 def curvature(
     q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any, tangent: bool,
@@ -90,27 +131,47 @@ def curvature(
     SE = np.empty((3, 16))
     A = np.empty((3, 3))
     B = np.empty((3, 3))
+    mean = np.zeros(16)  # of the derivative of the twist rate over a span
+    mean_tau, until = 0.0, 0
     for n in range(len(weights)):
         k, w = firsts[n], weights[n]
+        if n == until:
+            until = _span_end(firsts, n)
+            mean[:] = 0.0
+            mean_tau, width = 0.0, 0.0
+            for m in range(n, until):
+                b, c = row_of(b1, m), row_of(b2, m)
+                length, h, t, kappa = space_curvature(combine(q, k, b), combine(q, k, c))
+                increment, spin, by_t = twist_increment(vector(past, m, TANGENT), vector(past, m, BEND), t, kappa)
+                mean_tau += weights[m] * (inverse * _angle(q, k, b) + past[m, FRAME] + increment)
+                width += weights[m]
+                tangential, turned = _dot(by_t, t), _dot(spin, kappa)
+                for j in range(4):
+                    across = weights[m] * (c[j] - h * b[j] / length) / length
+                    along = weights[m] * b[j] / length
+                    for d in range(3):
+                        mean[4 * j + d] += across * spin[d] + along * (by_t[d] - (tangential + turned) * t[d])
+                    mean[4 * j + 3] += weights[m] * inverse * b[j]
+            mean /= width
+            mean_tau /= width
         a, b, c = row_of(tables.body_b0, n), row_of(b1, n), row_of(b2, n)
         first = combine(q, k, b)
         second = combine(q, k, c)
         length, h, t, kappa = space_curvature(first, second)
         t0 = vector(past, n, TANGENT)
         m1, m2 = _directors(t0, t, vector(past, n, DIRECTOR), inverse * _angle(q, k, a))
-        increment, spin, by_t = twist_increment(t0, vector(past, n, BEND), t, kappa)
+        spin = twist_increment(t0, vector(past, n, BEND), t, kappa)[1]
         k1, k2 = _dot(kappa, m1), _dot(kappa, m2)
-        tau = inverse * _angle(q, k, b) + past[n, FRAME] + increment
-        tangential, turned = _dot(by_t, t), _dot(spin, kappa)
+        tau = mean_tau
         for j in range(4):
             across, along = (c[j] - h * b[j] / length) / length, b[j] / length
             for d in range(3):
                 E[0, 4 * j + d] = across * m1[d] + along * (k2 * spin[d] - k1 * t[d])
                 E[1, 4 * j + d] = across * m2[d] - along * (k1 * spin[d] + k2 * t[d])
-                E[2, 4 * j + d] = across * spin[d] + along * (by_t[d] - (tangential + turned) * t[d])
             E[0, 4 * j + 3] = inverse * a[j] * k2
             E[1, 4 * j + 3] = -inverse * a[j] * k1
-            E[2, 4 * j + 3] = inverse * b[j]
+        for j in range(16):
+            E[2, j] = mean[j]
         rate = (0.0, 0.0, 0.0)
         if damped and rates[0] != 0.0:
             rate = (
@@ -206,8 +267,10 @@ def curvature(
 def remember(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h: float) -> None:
     """Carry the frames to q, note its strain, and let what yielded in a step h become memory."""
     inverse = p[TWIST, 1]
+    twists = _mean_twists(q, tables, past, inverse)
     for n in range(len(past)):
-        strain, t, kappa = _strain(q, tables, past, n, inverse)
+        (k1, k2, _), t, kappa = _strain(q, tables, past, n, inverse)
+        strain = (k1, k2, twists[n])
         last = vector(past, n, LAST)
         free, _ = curvature_memory(
             active, p, (strain[0], strain[1], 0.0), (memory[n, 0], memory[n, 1], 0.0),
@@ -230,12 +293,13 @@ def remember(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h
 def energy(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any) -> float:
     """Return the stored energy of curvature and twist [J]."""
     total = 0.0
+    twists = _mean_twists(q, tables, past, p[TWIST, 1])
     for n in range(len(tables.curvature_w)):
         strain, _, _ = _strain(q, tables, past, n, p[TWIST, 1])
         free = (memory[n, 0], memory[n, 1], 0.0)
         total += tables.curvature_w[n] * (
             curvature_energy(active, p, (strain[0], strain[1], 0.0), free)
-            + twist_energy(active, p, strain[2], memory[n, 2])
+            + twist_energy(active, p, twists[n], memory[n, 2])
         )
     return total
 
@@ -244,8 +308,7 @@ def energy(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any) -> 
 def twist_rates(states: Any, tables: Any, p: Any, frames: Any, out: Any) -> None:
     """Write the twist rate (k, points) [rad/m] of the states (k, n, 4) measured against `frames` (k, points, >= 16)."""
     for s in range(len(states)):
-        for n in range(out.shape[1]):
-            out[s, n] = _strain(states[s], tables, frames[s], n, p[TWIST, 1])[0][2]
+        out[s] = _mean_twists(states[s], tables, frames[s], p[TWIST, 1])
 
 
 @kernel
