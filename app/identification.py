@@ -58,6 +58,8 @@ def document_of_identification(found: Identification) -> dict[str, Any]:
         document["rest_curvature"] = candidate.rest_curvature.tolist()
     if candidate.clamp_angles is not None:
         document["clamp_angles"] = candidate.clamp_angles.tolist()
+    if candidate.marker_offsets is not None:
+        document["marker_offsets"] = candidate.marker_offsets.tolist()
     if any(p.name == "length_ratio" for p in found.parameters):
         document["cable"]["length"] = cable.length * candidate.length_ratio
     return document

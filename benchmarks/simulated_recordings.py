@@ -1,6 +1,6 @@
 """Recordings of a simulated cable between two grippers, tracked badly: noise, outliers, lost markers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,8 @@ from dlocore.statics import start_grid
 Floats = NDArray[np.float64]
 
 RATE = 100.0  # [Hz]
-U = np.array([0.0, 0.03, *np.linspace(0.12, 0.88, 9), 0.97, 1.0])  # [m] of the markers; two pairs are held
+JAW = 0.05  # [m] between the two markers of a gripper, from which the cable hangs
+U = np.array([0.0, JAW, *np.linspace(0.13, 0.87, 9), 1.0 - JAW, 1.0])  # [m] of the markers; two pairs are held
 HELD = (0, 1, -2, -1)
 STILL = 0.3  # [s] before the grippers start
 
@@ -75,9 +76,9 @@ def scene_of(rng: np.random.Generator, cable: Cable, environment: Environment, s
     times = np.arange(round(seconds * RATE) + 1) / RATE
     x = np.linspace(0.0, 1.0, 41)
     sag = np.column_stack([0.5 * x - 0.04 * np.sin(2 * np.pi * x), 0.0 * x, -1.55 * x * (1.0 - x)])
-    sag *= 1.0 / np.linalg.norm(np.diff(sag, axis=0), axis=1).sum()
+    sag *= cable.length / np.linalg.norm(np.diff(sag, axis=0), axis=1).sum()
     grasps = []
-    for u, at in ((0.0, sag[0]), (1.0, sag[-1])):
+    for u, at in ((0.0, sag[0]), (cable.length, sag[-1])):
         shift, turn = gripper_path(rng, times, planar)
         turns = Rotation.from_rotvec(turn).as_quat()[:, [3, 0, 1, 2]]
         way = Waypoints(times=times, positions=at + shift, orientations=turns)
@@ -115,7 +116,8 @@ def simulated(
     drawn = true_cable(np.random.default_rng([seed, 1]))
     cable, environment = cable or drawn[0], environment or drawn[1]
     rng = np.random.default_rng([seed, 2])
-    scene = scene_of(rng, cable, environment, seconds, planar)
+    between = 1.0 - 2.0 * JAW  # [m] of the cable, which each gripper keeps straight between its markers
+    scene = scene_of(rng, replace(cable, length=between), environment, seconds, planar)
     problem = pose(scene)
     monitor = Monitor(None, None, None)
     grid = start_grid(problem, n_u, monitor)
@@ -123,11 +125,10 @@ def simulated(
     motion = march(problem, grid, steps, monitor)
     assert not motion.stopped, "the truth must be a whole motion"
     states = problem.world(motion.states[::2])[..., :3]
-    markers = np.einsum("mi,kid->kmd", design_matrix(grid.knots, U), states)
-    for jaw, tip, sign in ((1, 0.0, 1.0), (-2, 1.0, -1.0)):  # on the jaws, which point along the cable
+    markers = np.einsum("mi,kid->kmd", design_matrix(grid.knots, np.clip(U - JAW, 0.0, between)), states)
+    for outer, tip, sign in ((0, 0.0, -1.0), (-1, between, 1.0)):
         along = (design_matrix(grid.knots, [tip], 1) @ states)[:, 0]
-        markers[:, jaw] = (design_matrix(grid.knots, [tip]) @ states)[:, 0]
-        markers[:, jaw] += sign * 0.03 * along / np.linalg.norm(along, axis=1)[:, None]
+        markers[:, outer] += sign * JAW * along / np.linalg.norm(along, axis=1)[:, None]
     tracking = tracking or Tracking()
     spread = np.array([1.0, 0.0 if planar else 1.0, 1.0])
     size = np.full(len(U), float(tracking.noise))

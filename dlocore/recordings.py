@@ -113,9 +113,10 @@ class Recording:
 
     @property
     def holds(self) -> tuple[Hold, ...]:
-        """The grippers: a pair of close held neighbours is a clamp, of which the outer one is held in place.
+        """The grippers: a pair of close held neighbours is a clamp, of which the inner one is held in place.
 
         Both as two held positions would fight: their measured distance varies by millimetres, the cable's does not.
+        Between them the cable is as straight as the gripper.
         """
         u, rest, found = cast(Floats, self.u), list(self.held), []
         middle = 0.5 * cast(float, self.length)
@@ -126,8 +127,8 @@ class Recording:
                 found.append(Hold(first))
                 continue
             second = rest.pop(0)
-            outer_first = 0.5 * (u[first] + u[second]) < middle
-            found.append(Hold(first, second, True) if outer_first else Hold(second, first, False))
+            near_begin = 0.5 * (u[first] + u[second]) < middle
+            found.append(Hold(second, first, False) if near_begin else Hold(first, second, True))
         return tuple(found)
 
     def part(self, begin: float, end: float) -> "Recording":

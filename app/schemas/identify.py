@@ -110,3 +110,6 @@ class IdentifyResponse(BaseModel):
     clamp_angles: list[list[float]] | None = Field(
         default=None, description="[rad], where they were asked for.", examples=[[[0.05, -0.02]]]
     )
+    marker_offsets: list[list[float]] | None = Field(
+        default=None, description="Of every marker, [m], where they were asked for.", examples=[[[0.004, -0.001]]]
+    )

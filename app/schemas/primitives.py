@@ -35,7 +35,7 @@ class MovePath(Model):
 
 
 class WaypointsPath(Model):
-    """Pass through positions at given times, along a C2 spline that starts at rest."""
+    """Pass through positions at given times, along a C2 spline."""
 
     kind: Literal["waypoints"]
     times: list[Instant] = Field(
@@ -48,6 +48,11 @@ class WaypointsPath(Model):
     )
     orientations: list[Quaternion] | None = Field(
         default=None, description="One unit quaternion (w, x, y, z) for each time.", examples=[[[1, 0, 0, 0]] * 3]
+    )
+    start: Literal["rest", "moving"] = Field(
+        default="rest",
+        description="`rest`: it starts at rest; `moving`: as fast as the first positions tell, as of a recorded path.",
+        examples=["rest"],
     )
 
 

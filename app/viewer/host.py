@@ -14,6 +14,7 @@ from viser import ClientHandle, _messages
 
 from app.service import Service
 from app.viewer.gateway import ADDRESS_HEADER, EXAMPLE_HEADER, KEY_HEADER, Upstream
+from app.viewer.kept import KeptCables
 from app.viewer.quiet import quiet_console
 from app.viewer.session import Session, Shared
 from app.viewer.solver import ServiceSolver
@@ -79,7 +80,8 @@ class SceneHost:
 async def hosting(app: FastAPI, service: Service) -> AsyncIterator[SceneHost]:
     """Run a viser server behind the gateway of `app` while the context lasts."""
     settings = service.settings
-    shared = Shared(service.runs, ServiceSolver(service, asyncio.get_running_loop()))
+    solver = ServiceSolver(service, asyncio.get_running_loop())
+    shared = Shared(service.runs, solver, KeptCables(settings.data_dir))
     host = await anyio.to_thread.run_sync(SceneHost, shared, settings.max_scenes)
     app.state.viewer_upstream = Upstream(
         port=host.port,

@@ -11,6 +11,8 @@ from app.viewer import report
 from app.viewer.draft import Draft
 from app.viewer.examples import example_names
 from app.viewer.forms import CableForm, EffectsForm, GripperForm, QualityForm, SurroundingsForm, show_value
+from app.viewer.forms.recording import RecordingActions, RecordingForm
+from app.viewer.kept import KeptCables
 from app.viewer.palette import QUANTITIES, ColourScale
 from app.viewer.picture import SURFACE_STYLES, Look
 from app.viewer.playback import Playback
@@ -70,6 +72,8 @@ class Panel:
         address: of the service, for the shell line.
         actions: what its controls do.
         ready: whether the solver is compiled.
+        recording: what the tab of recordings does.
+        cables: that were kept as presets.
     """
 
     def __init__(
@@ -82,6 +86,8 @@ class Panel:
         actions: Actions,
         *,
         ready: bool,
+        recording: RecordingActions,
+        cables: KeptCables,
     ) -> None:
         self._gui = client.gui
         self._playback = playback
@@ -95,7 +101,7 @@ class Panel:
         with tabs.add_tab("Scene"):
             self._gripper = GripperForm(self._gui, draft, start, actions.edit)
             self._add_start()
-            self._cable = CableForm(self._gui, draft, actions.edit)
+            self._cable = CableForm(self._gui, draft, actions.edit, cables)
             self._surroundings = SurroundingsForm(self._gui, draft, actions.edit)
         with tabs.add_tab("Effects"):
             self._add_effects(draft)
@@ -104,6 +110,8 @@ class Panel:
             self._add_result()
         with tabs.add_tab("View"):
             self._add_view()
+        with tabs.add_tab("Recording"):
+            self.recording = RecordingForm(self._gui, recording)
         with tabs.add_tab("Share"):
             self._add_share()
         self._forms = (self._gripper, self._cable, self._surroundings, self._effects, self._quality)
@@ -115,6 +123,7 @@ class Panel:
         )
         self._play = self._gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
         self._speed = self._gui.add_dropdown("Speed", tuple(SPEEDS), initial_value="1×")
+        self._error = self._gui.add_html("")
 
         @self._slider.on_update
         async def _seek(event: GuiEvent[Any]) -> None:
@@ -158,6 +167,20 @@ class Panel:
         if (self._play.label == "Pause") != self._playback.playing:
             self._label_button()
 
+    def show_error(self, html: str) -> None:
+        """Show how far the prediction is from a recording, if there is one."""
+        if self._error.content != html:
+            self._error.content = html
+
+    def show_look(self, look: Look) -> None:
+        """Show how the motion is drawn."""
+        show_value(self._surface, look.surface)
+        show_value(self._ghosts, look.ghosts)
+
+    def offer_cables(self) -> None:
+        """Offer the kept cables among the presets."""
+        self._cable.offer()
+
     def _add_start(self) -> None:
         with self._gui.add_folder("Start shape", expand_by_default=False):
             self._editing = self._gui.add_checkbox("Drag its points", initial_value=False)
@@ -200,8 +223,8 @@ class Panel:
 
     def _add_view(self) -> None:
         colour = self._gui.add_dropdown("Colour", tuple(QUANTITIES), initial_value="time")
-        surface = self._gui.add_dropdown("Surface", SURFACE_STYLES)
-        ghosts = self._gui.add_checkbox("Shapes at intervals", initial_value=True)
+        surface = self._surface = self._gui.add_dropdown("Surface", SURFACE_STYLES)
+        ghosts = self._ghosts = self._gui.add_checkbox("Shapes at intervals", initial_value=True)
         reactions = self._gui.add_checkbox("Forces of the grippers", initial_value=True)
         contacts = self._gui.add_checkbox("Contacts", initial_value=True)
         looping = self._gui.add_checkbox("Repeat", initial_value=self._playback.looping)

@@ -2,7 +2,7 @@
 
 import asyncio
 import contextlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from viser import ClientHandle, SceneClickEvent
@@ -11,7 +11,9 @@ from app.viewer import grips, uploads
 from app.viewer.camera import FIELD_OF_VIEW, PHONE, extent, start_pose
 from app.viewer.draft import Draft, start_draft
 from app.viewer.examples import example
+from app.viewer.forms.recording import RecordingActions
 from app.viewer.gizmo import Gizmo
+from app.viewer.kept import KeptCables
 from app.viewer.outbox import Outbox, Runs
 from app.viewer.palette import BRAND
 from app.viewer.panel import Actions, Panel
@@ -21,6 +23,7 @@ from app.viewer.playback import Playback
 from app.viewer.shape_editor import ShapeEditor
 from app.viewer.shapes import straightened, with_points
 from app.viewer.solving import Kind, Outcome, Solver, SolverThread
+from app.viewer.tracking import Tracking, TrackingActions
 from dlocore import Prediction, SceneError
 
 FRAME = 1 / 40  # s
@@ -37,10 +40,12 @@ class Shared:
     Attributes:
         runs: where runs are stored.
         solver: solves their scenes.
+        cables: that were kept as presets.
     """
 
     runs: Runs
     solver: Solver
+    cables: KeptCables
 
 
 class Session:
@@ -77,7 +82,28 @@ class Session:
         self._gizmo = Gizmo(client.scene, self._begin_drag, self._drag, self._end_drag)
         self._shape = ShapeEditor(client, self._shape_dragged)
         self._panel = Panel(
-            client, self._draft, self._start, self._playback, address, self._actions(), ready=shared.solver.ready
+            client,
+            self._draft,
+            self._start,
+            self._playback,
+            address,
+            self._actions(),
+            ready=shared.solver.ready,
+            recording=RecordingActions(
+                open=self._open_recording,
+                show=lambda number: self._tracking.window(number),
+                identify=lambda: self._tracking.search(),
+                keep=lambda name: self._tracking.keep(name),
+            ),
+            cables=shared.cables,
+        )
+        self._tracking = Tracking(
+            client.scene,
+            self._panel.recording,
+            shared.cables,
+            TrackingActions(
+                show=self._show_recorded, draft=lambda: self._draft, flush=client.flush, kept=self._panel.offer_cables
+            ),
         )
         self._take_draft()
         self._solver = SolverThread(shared.solver, self._deliver, f"viewer-solver-{client.client_id}")
@@ -104,6 +130,7 @@ class Session:
     def close(self) -> None:
         """Free the solver thread and the animation."""
         self._solver.close()
+        self._tracking.close()
         self._animation.cancel()
         for timer in (self._refine_timer, self._busy_timer):
             if timer is not None:
@@ -286,6 +313,8 @@ class Session:
         self._panel.take_prediction(outcome.job.draft, prediction, scale, outcome.measured, preview=preview)
         self._gizmo.warn("")
         if not preview:
+            self._tracking.take_prediction(prediction)
+            self._panel.show_error(self._tracking.card(self._playback.time))
             self._shown = (outcome.job.draft, prediction)
             self._panel.follow(self._start, prediction.surface)
             if not self._dragging:
@@ -302,8 +331,10 @@ class Session:
     def _draw_time(self, *, panel: bool = True) -> None:
         with self._client.atomic():
             self._picture.pose(self._playback.time)
+            self._tracking.pose(self._playback.time)
             if panel:
                 self._panel.show_time()
+                self._panel.show_error(self._tracking.card(self._playback.time))
         self._client.flush()
 
     async def _animate(self) -> None:
@@ -336,11 +367,23 @@ class Session:
             self._panel.say_file(f"{name} was not opened: {error}", good=False)
             return
         self._panel.say_file(f"{name} was opened.", good=True)
+        self._tracking.leave()
         self._replace(draft)
+
+    def _show_recorded(self, draft: Draft) -> None:
+        """Show a scene beside its markers, which a surface would hide."""
+        look = replace(self._look, surface="hidden", ghosts=False)
+        self._panel.show_look(look)
+        self._restyle(look)
+        self._replace(draft)
+
+    async def _open_recording(self, name: str, content: bytes) -> None:
+        await self._tracking.open(name, content)
 
     def _open_example(self, name: str) -> None:
         document = example(name)
         if document is not None:
+            self._tracking.leave()
             self._replace(Draft.of(document))
 
     def _download(self) -> None:

@@ -147,7 +147,7 @@ def identify(
         cable: what is known of it, and first guesses; None: from the recordings' facts. Motion and shape depend on
             forces per mass alone, so its linear density is taken as known.
         environment: first guesses of the drag, and a table.
-        names: parameters to identify (`parameters.SCALARS`, "rest_curvature", "clamp_angles").
+        names: parameters to identify (`parameters.SCALARS`, "rest_curvature", "clamp_angles", "marker_offsets").
         start: a candidate to begin with instead of cable and environment.
         resolution: how finely recordings are replayed.
         window: [s] of the windows into which longer recordings are cut.
@@ -164,9 +164,11 @@ def identify(
         raise SceneError("recordings", [], "at least one recording")
     windows = cut(recordings, window)
     clamps = max(sum(h.towards is not None for h in r.holds) for r in windows)
-    chosen = parameters(names, clamps)
+    free = sorted({int(i) for r in windows for i in r.free})
+    chosen = parameters(names, clamps, free)
     given = start or Candidate(cable=cable or cable_of(recordings), environment=environment or Environment())
-    candidate = prepared(given, tuple(p.name for p in chosen), clamps)
+    markers = max(cast(Floats, r.markers).shape[1] for r in windows)
+    candidate = prepared(given, tuple(p.name for p in chosen), clamps, markers)
     search = Search(windows, chosen, resolution or Resolution(), cancelled)
     state = search.run(candidate, iterations, on_progress)
     return search.result(state, perf_counter() - began)
@@ -335,6 +337,10 @@ class Search:
         if known is not None and isinstance(replay, Replay) and isinstance(played, Played):
             moved = x.copy()
             moved[j] += _FOLLOWED
+            if self.chosen[j].name.startswith("marker_offsets"):  # the start moves with it too, and forgets it soon
+                placed = (played.problem, played.grid, played.motion.times, played.motion.states)
+                change = replay.positions(self.candidate(candidate, moved), *placed) - played.predicted
+                return (change[:, free] / _FOLLOWED).ravel()
             try:
                 change = replay.play_beside(played, self.candidate(candidate, moved)) - known
                 return (change[:, free] / _FOLLOWED).ravel()

@@ -1,7 +1,6 @@
 """Frames of clamps that are known by their direction alone, and the sections of a cable between two of them."""
 
 from dataclasses import replace
-from itertools import pairwise
 from typing import cast
 
 import numpy as np
@@ -39,6 +38,32 @@ def turned_from(reference: Floats, directions: Floats) -> Rotation:
     return Rotation.from_quat(quaternion)
 
 
+def carried(tangents: Floats, director: Floats) -> Floats:
+    """Return a director (3, ...) at the first of the unit tangents (n, 3, ...) carried along them without twist.
+
+    It is made perpendicular to the first one. The result has the shape of the tangents.
+    """
+    out = np.empty_like(tangents)
+    (a, b, c), (x, y, z) = tangents[0], director
+    along = a * x + b * y + c * z
+    x, y, z = x - along * a, y - along * b, z - along * c
+    size = np.sqrt(x * x + y * y + z * z)
+    x, y, z = x / size, y / size, z / size
+    out[0] = x, y, z
+    for i in range(1, len(tangents)):
+        (a, b, c), (p, q, r) = tangents[i - 1], tangents[i]
+        cosine = a * p + b * q + c * r
+        f, g, h = b * r - c * q, c * p - a * r, a * q - b * p
+        s = (f * x + g * y + h * z) / (1.0 + cosine)
+        x, y, z = (
+            cosine * x + g * z - h * y + s * f,
+            cosine * y + h * x - f * z + s * g,
+            cosine * z + f * y - g * x + s * h,
+        )
+        out[i] = x, y, z
+    return out
+
+
 def with_sections(
     shape: ControlPoints, rest_curvature: Floats | None, turn: float, frames: list[tuple[Floats, Floats]]
 ) -> ControlPoints:
@@ -59,11 +84,7 @@ def with_sections(
         u = np.linspace(0.0, length, 201)
         t = design_matrix(knots, u, 1) @ q
         t /= np.linalg.norm(t, axis=1)[:, None]
-        d = director
-        for before, after in pairwise(t):
-            axis = np.cross(before, after)
-            d = (before @ after) * d + np.cross(axis, d) + axis * (axis @ d) / (1.0 + before @ after)
-        end = frames[1][0]
+        d, end = carried(t, director)[-1], frames[1][0]
         theta = float(np.arctan2(np.cross(d, end) @ t[-1], d @ end)) + turn
         theta = (theta + np.pi) % (2.0 * np.pi) - np.pi
     middle = (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0

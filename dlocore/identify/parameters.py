@@ -1,7 +1,7 @@
 """The parameters that can be identified: how each is put into a candidate, and on which scale it is sought."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -57,13 +57,19 @@ SCALARS = (
 )
 DEFAULT = ("bending_stiffness", "drag", "drag_quadratic", "bending_damping")
 _FIRST = {"bending_damping": 1e-4, "drag": 0.05, "drag_quadratic": 0.02, "yield_strain": 0.02}  # where none is given
-_INDEXED = re.compile(r"(rest_curvature|clamp_angles)\[(\d+)\]\[([01])\]")
+_INDEXED = re.compile(r"(rest_curvature|clamp_angles|marker_offsets)\[(\d+)\]\[([01])\]")
+_SEVERAL = {"rest_curvature": ("1/m", 2.0), "clamp_angles": ("rad", 0.2), "marker_offsets": ("m", 0.01)}
 PLACES = 5  # along the cable at which its rest curvature is sought
 CLAMPS = 2
 
 
-def parameters(names: tuple[str, ...], clamps: int) -> tuple[Parameter, ...]:
-    """Return the parameters of names; "rest_curvature" and "clamp_angles" stand for all of theirs.
+def parameters(names: tuple[str, ...], clamps: int, free: Sequence[int] = ()) -> tuple[Parameter, ...]:
+    """Return the parameters of names; "rest_curvature", "clamp_angles" and "marker_offsets" stand for all of theirs.
+
+    Args:
+        names: of the parameters.
+        clamps: their number.
+        free: markers that nothing holds.
 
     Raises:
         SceneError: a name is unknown or given twice.
@@ -74,12 +80,14 @@ def parameters(names: tuple[str, ...], clamps: int) -> tuple[Parameter, ...]:
             found += [_component("rest_curvature", i, d) for i in range(PLACES) for d in range(2)]
         elif name == "clamp_angles":
             found += [_component("clamp_angles", i, d) for i in range(clamps) for d in range(2)]
+        elif name == "marker_offsets":
+            found += [_component("marker_offsets", int(i), d) for i in free for d in range(2)]
         elif name in SCALARS:
             found.append(_scalar(name))
         elif match := _INDEXED.fullmatch(name):
             found.append(_component(match[1], int(match[2]), int(match[3])))
         else:
-            raise SceneError("parameters", name, "one of " + ", ".join([*SCALARS, "rest_curvature", "clamp_angles"]))
+            raise SceneError("parameters", name, "one of " + ", ".join([*SCALARS, *_SEVERAL]))
     if len({p.name for p in found}) != len(found):
         raise SceneError("parameters", names, "each parameter once")
     if not found:
@@ -87,12 +95,14 @@ def parameters(names: tuple[str, ...], clamps: int) -> tuple[Parameter, ...]:
     return tuple(found)
 
 
-def prepared(candidate: Candidate, names: tuple[str, ...], clamps: int) -> Candidate:
-    """Return the candidate with everything in place that the parameters vary."""
+def prepared(candidate: Candidate, names: tuple[str, ...], clamps: int, markers: int = 0) -> Candidate:
+    """Return the candidate with everything in place that the parameters vary, of so many clamps and markers."""
     if any(n.startswith("rest_curvature") for n in names) and candidate.rest_curvature is None:
         candidate = replace(candidate, rest_curvature=np.zeros((PLACES, 2)), twist=True)
     if any(n.startswith("clamp_angles") for n in names) and candidate.clamp_angles is None:
         candidate = replace(candidate, clamp_angles=np.zeros((clamps, 2)))
+    if any(n.startswith("marker_offsets") for n in names) and candidate.marker_offsets is None:
+        candidate = replace(candidate, marker_offsets=np.zeros((markers, 2)))
     if "turn" in names or "torsional_stiffness" in names:
         candidate = replace(candidate, twist=True)
     for name in names:
@@ -131,7 +141,7 @@ def _scalar(name: str) -> Parameter:
 
 
 def _component(name: str, i: int, d: int) -> Parameter:
-    unit, scale = ("1/m", 2.0) if name == "rest_curvature" else ("rad", 0.2)
+    unit, scale = _SEVERAL[name]
 
     def put(c: Candidate, x: float) -> Candidate:
         values = np.array(getattr(c, name))

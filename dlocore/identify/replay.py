@@ -16,7 +16,8 @@ from dlocore.cable import Cable
 from dlocore.discretisation import make_grid
 from dlocore.errors import SceneError
 from dlocore.grid import Grid
-from dlocore.identify.frames import across, tilted, turned_from, with_sections
+from dlocore.identify.frames import across, carried, tilted, turned_from, with_sections
+from dlocore.identify.span import Span
 from dlocore.identify.start import StartFit
 from dlocore.paths import Waypoints
 from dlocore.problem import Problem, pose
@@ -35,6 +36,7 @@ _JUMP = 6.0  # robust deviations beyond which a sample of a held marker is an ou
 _FLOOR = 5e-4  # [m] below which no sample is one
 _PASSES = 20  # of looking for outliers
 _REST_FRAMES = 8  # from which on a start can be seen to be at rest
+_CARRIED = 3  # tangents from a marker to the next, over which a frame is carried
 _STILL = 0.01  # [m/s]: slower than this, or than noise lets tell, nothing moves
 
 
@@ -49,6 +51,8 @@ class Candidate:
             sections; None: straight.
         clamp_angles: (clamps, 2) [rad] by which the cable leaves each clamp beside the direction of its markers.
         turn: [rad] of the last clamp against the first, about the cable.
+        marker_offsets: (m, 2) [m] of the markers beside the centreline, across it, in a frame that is carried from the
+            first clamp without twist; None: on it.
         length_ratio: of the cable's length and its markers' coordinates to those of the recording.
         twist: simulate twist; needed for rest_curvature and a torsional stiffness.
     """
@@ -58,6 +62,7 @@ class Candidate:
     rest_curvature: Floats | None = None
     clamp_angles: Floats | None = None
     turn: float = 0.0
+    marker_offsets: Floats | None = None
     length_ratio: float = 1.0
     twist: bool = False
 
@@ -130,7 +135,7 @@ class Replay:
             raise SceneError("held", recording.held, "at least one held marker", "Nothing tells how the cable is moved")
         self.recording, self.resolution = recording, resolution
         times = cast(Floats, recording.times)
-        self.length = cast(float, recording.length)
+        self.span = Span.of(recording)
         frames = max(2, min(resolution.start_frames, len(times) - 4))
         self.begin = float(times[:frames].mean())
         self.compared = np.arange(frames, len(times))
@@ -173,7 +178,7 @@ class Replay:
 
     def _reachable(self, paths: tuple[_Path, ...]) -> tuple[_Path, ...]:
         """Bring grippers together that noise has put farther apart than the cable between them reaches."""
-        u = cast(Floats, self.recording.u)
+        u = self.span.u
         paths = tuple(replace(p, positions=p.positions.copy()) for p in paths)
         for (a, p), (b, q) in pairwise(zip(self.holds, paths, strict=True)):
             across = q.positions - p.positions
@@ -197,13 +202,13 @@ class Replay:
     def scene(self, candidate: Candidate) -> Scene:
         """Return the scene of the recording for a candidate."""
         recording = self.recording
-        length = self.length * candidate.length_ratio
-        u = cast(Floats, recording.u) * candidate.length_ratio
+        span = self.span.scaled(candidate.length_ratio)
+        length, u = span.length, span.u
         grasps, held, positions, rates = [], [], [], []
         clamp, angles = 0, candidate.clamp_angles
         frames = []
         for h, path, (way, turns) in zip(self.holds, self.paths, self.ways, strict=True):
-            at = min(float(u[h.marker]), length)
+            at = float(np.clip(u[h.marker], 0.0, length))
             held.append((at, 0))
             positions.append(path.positions[0])
             rates.append(path.speed)
@@ -222,13 +227,14 @@ class Replay:
         environment = replace(candidate.environment, gravity=recording.gravity)
         fit = self._fit(candidate.cable, length, tuple(grasps), tuple(held))
         weight = candidate.cable.linear_density * np.asarray(environment.gravity)
-        seen = self.seen
+        on = span.inside(self.seen)
+        seen = self.seen[on]
+        markers = self.start_markers[on] - self._beside_start(candidate, seen, self.start_markers[on])
         q = fit.shape(
-            cast(float, candidate.cable.bending_stiffness), weight, u[seen], self.start_markers, np.array(positions),
-            self._guess,
-        )  # fmt: skip
+            cast(float, candidate.cable.bending_stiffness), weight, u[seen], markers, np.array(positions), self._guess
+        )
         self._guess = q
-        v = None if self.at_rest else fit.velocity(q, u[seen], self.start_speeds, np.array(rates))
+        v = None if self.at_rest else fit.velocity(q, u[seen], self.start_speeds[on], np.array(rates))
         shape = ControlPoints(control_points=q, knots=fit.grid.knots, velocity=v, settle=self.at_rest)
         if candidate.twist:
             shape = with_sections(shape, candidate.rest_curvature, candidate.turn, frames)
@@ -267,7 +273,7 @@ class Replay:
         motion = march(problem, grid, self.steps, Monitor(None, None, None))
         if motion.stopped:
             motion = march(problem, grid, 2 * self.steps, Monitor(None, None, None), rho=STRONGLY_DAMPED)
-        return Played(self.positions(problem, grid, motion.times, motion.states), problem, grid, motion)
+        return Played(self.positions(candidate, problem, grid, motion.times, motion.states), problem, grid, motion)
 
     def play_beside(self, played: Played, candidate: Candidate) -> Floats:
         """Return the predicted positions (frames, m, 3) [m] with a candidate that differs a little.
@@ -277,16 +283,54 @@ class Replay:
         """
         problem, grid = self.posed(candidate)
         states, times, _ = beside(played.known, problem, grid)
-        return self.positions(problem, grid, times, states)
+        return self.positions(candidate, problem, grid, times, states)
 
-    def positions(self, problem: Problem, grid: Grid, times: Floats, states: Floats) -> Floats:
+    def positions(self, candidate: Candidate, problem: Problem, grid: Grid, times: Floats, states: Floats) -> Floats:
         """Return the markers' positions (frames, m, 3) [m] at the compared frames of states (steps + 1, n_u, nc)."""
-        length = problem.scene.cable.length
-        B = design_matrix(grid.knots, np.minimum(cast(Floats, self.recording.u) * (length / self.length), length))
-        dimensions = problem.plane.dimensions
-        at = CubicSpline(times, np.einsum("mi,kid->kmd", B, states[..., :dimensions]))
+        B = self.span.scaled(problem.scene.cable.length / self.span.length).rows(grid.knots)
+        q = problem.plane.world(states[..., : problem.plane.dimensions])
+        x = np.einsum("mi,kid->kmd", B, q)
+        at = np.clip(np.rint(times / self.step_times[1]).astype(int), 0, self.steps)
+        if candidate.marker_offsets is not None:
+            x += self._beside(candidate.marker_offsets, grid, self._directors[at], q)
+        for h, path in zip(self.holds, self.paths, strict=True):
+            if h.towards is not None and not self.span.inside(np.array([h.towards]))[0]:  # on the gripper
+                gap = candidate.length_ratio * (self.span.u[h.towards] - self.span.u[h.marker])
+                x[:, h.towards] = path.positions[at] + gap * cast(Floats, path.directions)[at]
         t = np.clip(cast(Floats, self.recording.times)[self.compared] - self.begin, 0.0, self.horizon)
-        return problem.plane.world(at(t))
+        return np.asarray(CubicSpline(times, x)(t))
+
+    def _beside(self, offsets: Floats, grid: Grid, directors: Floats, q: Floats) -> Floats:
+        """Return how far the markers lie beside the centreline (k, m, 3) [m] of shapes q (k, n_u, 3)."""
+        length = float(grid.knots[-1])
+        on = np.clip(self.span.u * (length / self.span.length), 0.0, length)
+        ends = np.concatenate([[0.0], on])
+        u = np.linspace(ends[:-1], ends[1:], _CARRIED + 1)[1:].T.ravel()  # the last of each _CARRIED is a marker
+        tangents = np.einsum("ni,kid->ndk", design_matrix(grid.knots, u, 1), q)
+        tangents /= np.sqrt((tangents**2).sum(axis=1))[:, None]
+        first = carried(tangents, directors.T)[_CARRIED - 1 :: _CARRIED]
+        along = tangents[_CARRIED - 1 :: _CARRIED]
+        second = np.cross(along, first, axis=1)
+        beside = offsets[:, :1, None] * first + offsets[:, 1:, None] * second
+        return np.ascontiguousarray(beside.transpose(2, 0, 1))
+
+    @cached_property
+    def _directors(self) -> Floats:
+        """Direction (steps + 1, 3) across the first clamp that turns with it."""
+        if not self.clamps:
+            raise SceneError("parameters", "marker_offsets", "a recording with a clamp", "No frame is known without")
+        directions = cast(Floats, self.paths[self.holds.index(self.clamps[0])].directions)
+        return np.asarray(turned_from(self.references[0], directions).apply(across(self.references[0])))
+
+    def _beside_start(self, candidate: Candidate, seen: NDArray[np.int64], markers: Floats) -> Floats:
+        """Return how far the seen markers (k, 3) lie beside the centreline at the start, by their own polygon."""
+        if candidate.marker_offsets is None:
+            return np.zeros((len(seen), 3))
+        tangents = np.gradient(markers, self.span.u[seen], axis=0)
+        tangents /= np.linalg.norm(tangents, axis=1)[:, None]
+        first = carried(tangents, self._directors[0])
+        offsets = candidate.marker_offsets[seen]
+        return np.asarray(offsets[:, :1] * first + offsets[:, 1:] * np.cross(tangents, first))
 
     def differentiable(self, played: Played) -> bool:
         """Tell whether motions beside the played one can be followed."""

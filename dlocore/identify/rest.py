@@ -10,12 +10,12 @@ from dlocore.discretisation import make_grid
 from dlocore.errors import SceneError
 from dlocore.identify.frames import across, tilted, turned_from, with_sections
 from dlocore.identify.replay import Candidate, Resolution
+from dlocore.identify.span import Span
 from dlocore.identify.start import StartFit
 from dlocore.problem import pose
 from dlocore.recordings import Recording
 from dlocore.scene import ControlPoints, Grasp, Scene, Straight, Switch
 from dlocore.solvers.monitor import Monitor
-from dlocore.spline import design_matrix
 from dlocore.statics import settle
 
 Floats = NDArray[np.float64]
@@ -61,7 +61,7 @@ class Rest:
         if not np.isfinite(held).all():
             frame = int(np.argwhere(~np.isfinite(held))[0, 0])
             raise SceneError(f"markers[{frame}]", "a lost held marker", "held markers seen in every shape at rest")
-        self.holds = recording.holds
+        self.holds, self.span = recording.holds, Span.of(recording)
         self.references = self._directions().mean(axis=0) if references is None else references
         self._start: tuple[float, StartFit] | None = None
 
@@ -83,19 +83,17 @@ class Rest:
             grid = make_grid(problem, self.resolution.n_u)
             q, rest, _, _ = settle(problem, grid, 0.0, Monitor(None, None, None))
             stopped |= rest != "settled"
-            length = scene.cable.length
-            u = np.minimum(cast(Floats, self.recording.u) * candidate.length_ratio, length)
-            shapes.append(design_matrix(grid.knots, u) @ problem.world(q)[:, :3])
+            shapes.append(self.span.scaled(candidate.length_ratio).rows(grid.knots) @ problem.world(q)[:, :3])
         return Settled(np.array(shapes), stopped)
 
     def scene(self, candidate: Candidate, frame: int) -> Scene:
         """Return the scene of one shape for a candidate."""
-        length = cast(float, self.recording.length) * candidate.length_ratio
-        u = cast(Floats, self.recording.u) * candidate.length_ratio
+        span = self.span.scaled(candidate.length_ratio)
+        length, u = span.length, span.u
         directions = self._directions()[frame]
         grasps, held, targets, frames, clamp = [], [], [], [], 0
         for h in self.holds:
-            at = min(float(u[h.marker]), length)
+            at = float(np.clip(u[h.marker], 0.0, length))
             kind: Literal["point", "tangent", "clamp"] = "point"
             held.append((at, 0))
             targets.append(self.given[frame, h.marker])
@@ -111,7 +109,8 @@ class Rest:
             grasps.append(Grasp(u=at, hold=kind))
         cable = replace(candidate.cable, length=length)
         environment = replace(candidate.environment, gravity=self.recording.gravity)
-        seen = np.isfinite(self.given[frame, :, 0])
+        seen = np.flatnonzero(np.isfinite(self.given[frame, :, 0]))
+        seen = seen[span.inside(seen)]
         if self._start is None or self._start[0] != length:
             still = tuple(Grasp(u=g.u, hold="point" if g.hold == "point" else "tangent") for g in grasps)
             straight = Scene(cable=cable, shape=Straight(), grasps=still, horizon=1.0, effects={"twist": "off"})

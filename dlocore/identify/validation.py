@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from dlocore.identify.datasets import HangingWire, MovedCable
 from dlocore.identify.estimate import Identification, Progress, identify
-from dlocore.identify.parameters import DEFAULT
 from dlocore.identify.replay import Candidate, Replay, Resolution, common_references
 from dlocore.recordings import Recording
 from dlocore.scene import Environment
@@ -19,8 +18,8 @@ Floats = NDArray[np.float64]
 Model = Literal["scalars", "bends"]
 
 PROTOCOL = Resolution(n_u=13, step=0.01, start_frames=2)  # state from frames 0 and 1, then open loop
-SCALARS = DEFAULT
-BENDS = (*DEFAULT, "clamp_angles", "turn", "torsional_stiffness", "rest_curvature")
+SCALARS = ("bending_stiffness", "drag", "bending_damping", "length_ratio")
+BENDS = (*SCALARS, "drag_quadratic", "clamp_angles", "marker_offsets", "turn", "torsional_stiffness", "rest_curvature")
 WIRE_GRID = 33  # control points along a wire
 
 
@@ -83,8 +82,8 @@ def validate_cable(
 
     Args:
         cable: windows of one cable.
-        model: "scalars": EI, linear and quadratic drag, bending damping; "bends": and how the cable leaves its clamps,
-            its rest curvature, and the twist that those need.
+        model: "scalars": EI, drag, bending damping, length; "bends": and how the cable leaves its clamps, where the
+            markers sit beside it, its rest curvature, and the twist that those need.
         start: a candidate to begin with.
         on_progress: called after every iteration.
     """

@@ -12,6 +12,8 @@ from playwright.sync_api import Locator, Page, expect
 from test_browser import canvas, on_screen, open_scene
 
 from app.viewer.examples import example, example_names
+from benchmarks.simulated_recordings import simulated
+from dlocore.recordings import save_recording
 
 pytestmark = pytest.mark.browser
 NAME = "An arc"
@@ -132,3 +134,22 @@ def test_a_ready_scene_opens_by_its_address_and_asks_no_other_host(service, witn
     assert document == example(name)
     assert witness.errors == []
     assert witness.hosts == {urlsplit(service.address).netloc}
+
+
+def test_a_recording_is_opened_and_its_error_is_read_on_the_timeline(service, witness, tmp_path):
+    file = tmp_path / "shaken.npz"
+    save_recording(simulated(6, 1.2), file)
+    page = open_scene(witness, service)
+    page.get_by_role("tab", name="Recording").click()
+    with page.expect_file_chooser() as choosing:
+        page.get_by_role("button", name="Open a recording").click()
+    choosing.value.set_files(file)
+    expect(page.locator("[data-error]")).to_contain_text("mm from the measured markers")
+    expect(page.get_by_role("img", name="error over time")).to_be_visible()
+    page.get_by_role("button", name="Identify the cable").click()
+    expect(page.get_by_role("button", name="Stop")).to_be_visible()
+    expect(page.locator('[data-identify="converged"]')).to_contain_text("95 % intervals", timeout=240_000)
+    page.get_by_role("button", name="Keep as a preset").click()
+    page.get_by_role("tab", name="Scene").click()
+    expect(page.get_by_role("combobox", name="Preset")).to_have_value("my cable")
+    assert witness.errors == []

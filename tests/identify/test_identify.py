@@ -91,3 +91,42 @@ def test_a_data_set_that_is_not_there_is_named(tmp_path: Path) -> None:
         load_datasets([tmp_path / "nothing"])
     with pytest.raises(SceneError, match="dataset"):
         load_datasets([tmp_path])
+
+
+def test_markers_beside_the_cable_are_found_beside_it() -> None:
+    clean = Tracking(noise=0.0, held=0.0, outliers=0.0, lost=0.0)
+    recording = simulated(3, 2.0, cable=CABLE, environment=DRAG, tracking=clean)
+    offsets = np.zeros((13, 2))
+    offsets[2:-2] = np.random.default_rng(7).normal(0.0, 0.006, (9, 2))
+    truth = Candidate(cable=CABLE, environment=DRAG, marker_offsets=offsets)
+    replay = Replay(recording, FINE)
+    centred = replay.play(replace(truth, marker_offsets=None))
+    shift = replay.positions(truth, centred.problem, centred.grid, centred.motion.times, centred.motion.states)
+    shift = shift - centred.predicted
+    # across the cable by as much as was asked for, also where the frame is carried over a bend
+    size = np.linalg.norm(shift[:, 2:-2], axis=2)
+    np.testing.assert_allclose(size, np.tile(np.linalg.norm(offsets[2:-2], axis=1), (len(size), 1)), rtol=2e-3)
+    markers = np.asarray(recording.markers).copy()
+    markers[replay.compared] += shift
+    markers[: replay.compared[0]] += shift[0]
+    found = identify(
+        [replace(recording, markers=markers)],
+        names=("bending_stiffness", "marker_offsets"),
+        start=Candidate(cable=replace(CABLE, bending_stiffness=4e-3), environment=DRAG),
+        resolution=FINE,
+        iterations=8,
+    )
+    # the start is where a spring holds it to its markers, which leaves a tenth of their offsets to it
+    np.testing.assert_allclose(found.candidate.marker_offsets[2:-2], offsets[2:-2], atol=1e-3)
+    assert found.parameters[0].value == pytest.approx(3e-3, rel=0.05)
+
+
+def test_the_outer_marker_of_a_clamp_stays_on_its_gripper() -> None:
+    recording = simulated(
+        3, 1.0, cable=CABLE, environment=DRAG, tracking=Tracking(noise=0.0, held=0.0, outliers=0.0, lost=0.0)
+    )
+    angles = np.full((2, 2), 0.3)
+    predicted = Replay(recording, FINE).play(Candidate(cable=CABLE, environment=DRAG, clamp_angles=angles)).predicted
+    away = predicted - np.asarray(recording.markers)[FINE.start_frames :]
+    # however the cable leaves the clamp; a path of 100 Hz is smoothed by far less
+    assert np.abs(away[:, [0, 1, -2, -1]]).max() < 2e-4

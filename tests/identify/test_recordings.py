@@ -48,10 +48,10 @@ def test_a_csv_with_its_json_gives_the_same_recording(tmp_path: Path) -> None:
     assert found.name == "table"
 
 
-def test_close_held_neighbours_are_a_clamp_whose_outer_marker_is_held() -> None:
+def test_close_held_neighbours_are_a_clamp_whose_inner_marker_is_held() -> None:
     u = [0.0, 0.02, 0.3, 0.5, 0.7, 0.98, 1.0]
     found = recording(markers=markers(7), u=u, held=(0, 1, -2, -1)).holds
-    assert found == (Hold(0, 1, True), Hold(6, 5, False))
+    assert found == (Hold(1, 0, False), Hold(5, 6, True))
 
 
 def test_far_held_neighbours_are_two_grippers() -> None:

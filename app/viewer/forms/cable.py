@@ -6,6 +6,7 @@ from viser import GuiApi
 
 from app.viewer.draft import Draft
 from app.viewer.forms.base import Form, OnEdit, show_if, show_value
+from app.viewer.kept import KeptCables
 from app.viewer.shapes import scaled
 from dlocore import PRESETS, Cable, SceneError
 
@@ -17,10 +18,12 @@ PLASTIC_RATE = 50.0  # 1/s, of the memory, where a yield strain is set and no ra
 class CableForm(Form):
     """Edits the cable."""
 
-    def __init__(self, gui: GuiApi, draft: Draft, on_edit: OnEdit) -> None:
+    def __init__(self, gui: GuiApi, draft: Draft, on_edit: OnEdit, cables: KeptCables) -> None:
         super().__init__(draft, on_edit)
+        self._cables = cables
+        self._kept = cables.all()
         with gui.add_folder("Cable"):
-            self._preset = gui.add_dropdown("Preset", (*PRESETS, CUSTOM))
+            self._preset = gui.add_dropdown("Preset", (*PRESETS, *self._kept, CUSTOM))
             self._length = gui.add_number("Length [m]", 1.0, min=0.05, max=1000.0, step=0.05)
             self._diameter = gui.add_number("Diameter [mm]", 1.0, min=0.01, max=1e4, step=0.1)
             self._density = gui.add_number("Density [g/m]", 1.0, min=0.01, max=1e7, step=0.1)
@@ -54,7 +57,18 @@ class CableForm(Form):
 
     def _with_preset(self, draft: Draft) -> Draft:
         name = self._preset.value
+        if name in self._kept:
+            kept = self._kept[name]
+            for key, value in kept["environment"].items():
+                draft = draft.put(("environment", key), value)
+            return draft.put(("cable",), {**kept["cable"], "length": draft.length})
         return draft if name == CUSTOM else draft.put(("cable",), {**PRESETS[name].values, "length": draft.length})
+
+    def offer(self) -> None:
+        """Offer the cables that are kept now."""
+        self._kept = self._cables.all()
+        self._preset.options = (*PRESETS, *self._kept, CUSTOM)
+        show_value(self._preset, preset_of(self._draft.get(("cable",), {}), self._kept))
 
     def _with_yield(self, draft: Draft, strain: float) -> Draft:
         if strain <= 0.0:
@@ -73,7 +87,7 @@ class CableForm(Form):
             cable = draft.cable()
         except SceneError:
             return
-        show_value(self._preset, preset_of(draft.get(("cable",), {})))
+        show_value(self._preset, preset_of(draft.get(("cable",), {}), self._kept))
         show_value(self._length, cable.length)
         show_value(self._diameter, _shown(1e3, cable.diameter))
         show_value(self._density, _shown(1e3, cable.linear_density))
@@ -97,12 +111,12 @@ def _shown(scale: float, value: float | None) -> float:
     return float(f"{scale * (value or 0.0):.7g}")
 
 
-def preset_of(cable: dict[str, Any]) -> str:
-    """Return the name of the preset that has the values of `cable`, whatever its length, or that they are its own."""
+def preset_of(cable: dict[str, Any], kept: dict[str, dict[str, Any]] | None = None) -> str:
+    """Return the name of the preset or kept cable that has the values of `cable`, whatever its length, or `CUSTOM`."""
     values = {name: value for name, value in cable.items() if name != "length"}
     if set(values) == {"preset"}:
         return str(values["preset"])
     for name, preset in PRESETS.items():
         if values == {key: value for key, value in preset.values.items() if key != "length"}:
             return name
-    return CUSTOM
+    return next((name for name, one in (kept or {}).items() if values == one["cable"]), CUSTOM)

@@ -1,0 +1,66 @@
+"""Cables that were identified and kept: presets beside those of the library, for all tabs of a service."""
+
+import json
+import logging
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from app.problems import ProblemError
+from app.schemas.cable import CableModel
+
+LONGEST_NAME = 60
+MOST = 200
+FILE = "cables.json"
+_log = logging.getLogger(__name__)
+
+
+class KeptCables:
+    """Named cables with the drag that belongs to them, in one file of the data directory.
+
+    Args:
+        folder: the data directory.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / FILE
+        self._lock = threading.Lock()
+
+    def all(self) -> dict[str, dict[str, Any]]:
+        """Return what is kept: by name `cable` without its length, and `environment` with its drag."""
+        try:
+            found = json.loads(self._path.read_text())
+        except FileNotFoundError:
+            return {}
+        except (OSError, ValueError):
+            _log.exception("%s can't be read", self._path)
+            return {}
+        if not isinstance(found, dict):
+            return {}
+        return {str(k): v for k, v in found.items() if isinstance(v, dict) and _is_cable(v.get("cable"))}
+
+    def keep(self, name: str, cable: Mapping[str, Any], environment: Mapping[str, Any]) -> None:
+        """Keep a cable under a name, instead of one that was kept under it before.
+
+        Raises:
+            ProblemError: the name is empty or too long, or there are too many.
+            OSError: the file can't be written.
+        """
+        name = name.strip()
+        if not 0 < len(name) <= LONGEST_NAME:
+            raise ProblemError(422, "preset-name", f"A name of 1 to {LONGEST_NAME} characters is needed.")
+        with self._lock:
+            kept = self.all()
+            if name not in kept and len(kept) >= MOST:
+                raise ProblemError(422, "too-many-presets", f"{MOST} cables are kept already.")
+            values = {key: value for key, value in cable.items() if key != "length" and value is not None}
+            kept[name] = {"cable": values, "environment": dict(environment)}
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            written = self._path.with_suffix(".part")
+            written.write_text(json.dumps(kept, indent=1))
+            written.replace(self._path)
+
+
+def _is_cable(values: Any) -> bool:
+    return isinstance(values, dict) and set(values) <= set(CableModel.model_fields)

@@ -1,0 +1,153 @@
+"""A recording in the scene: the window that is shown as a scene of its own, and how far a prediction is from it."""
+
+import tempfile
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.viewer.draft import Draft
+from dlocore import Environment, Prediction, SceneError, Waypoints
+from dlocore.identify import Candidate, Replay, Resolution
+from dlocore.identify.estimate import WINDOW, cable_of, cut
+from dlocore.recordings import Recording, load_recording
+from dlocore.scene import ControlPoints
+
+Floats = NDArray[np.float64]
+LARGEST = 20_000_000  # bytes
+MOST_WINDOWS = 8  # that are identified from; the others are shown only
+STEP = 0.02  # s, of the grippers' waypoints in the document
+POINTS_IN_SECOND = 25  # control points in time; those of a cable that swings at 3 Hz
+MOST_IN_TIME = 129
+N_U = 13
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tracked:
+    """A recording, cut into windows, of which one is shown.
+
+    Attributes:
+        windows: of about 5 s.
+        candidate: what is known or was found of the cable.
+        shown: number of the shown window.
+    """
+
+    windows: tuple[Recording, ...]
+    candidate: Candidate
+    shown: int = 0
+
+    @staticmethod
+    def of(recording: Recording) -> "Tracked":
+        """Return a recording that was just opened.
+
+        Raises:
+            SceneError: it holds shapes at rest, which have no motion to show.
+        """
+        if recording.static:
+            raise SceneError("static", True, "a recording of a motion", "Shapes at rest have no motion to show")
+        candidate = Candidate(cable=cable_of([recording]), environment=Environment(drag=0.05))
+        return Tracked(windows=tuple(cut([recording], WINDOW)), candidate=candidate)
+
+    @property
+    def recording(self) -> Recording:
+        """The shown window."""
+        return self.windows[self.shown]
+
+    def draft(self) -> Draft:
+        """Return the scene of the shown window: its start, its grippers' paths, the cable as it is known."""
+        scene = self._replay.scene(self.candidate)
+        shape, cable, surroundings = cast(ControlPoints, scene.shape), scene.cable, scene.environment
+        names = ("length", "diameter", "linear_density", "bending_stiffness", "axial_stiffness", "bending_damping")
+        start: dict[str, Any] = {
+            "kind": "control_points",
+            "control_points": _rounded(cast(Floats, shape.control_points)),
+            "knots": np.asarray(shape.knots).tolist(),
+            "settle": shape.settle,
+        }
+        if shape.velocity is not None:
+            velocity = _rounded(cast(Floats, shape.velocity))
+            start["velocity"] = {"kind": "control_points", "control_points": velocity}
+        return Draft.of(
+            {
+                "name": self.recording.name[:200],
+                "cable": {name: float(f"{getattr(cable, name):.9g}") for name in names},
+                "shape": start,
+                "primitives": [
+                    {"u": grasp.u, "hold": grasp.hold, "path": _path(cast(Waypoints, grasp.path))}
+                    for grasp in scene.grasps
+                ],
+                "environment": {
+                    "gravity": np.asarray(surroundings.gravity).tolist(),
+                    "drag": float(f"{surroundings.drag:.6g}"),
+                    "drag_quadratic": float(f"{surroundings.drag_quadratic:.6g}"),
+                    "table": None,
+                },
+                "horizon": self._replay.horizon,
+                "effects": {"twist": "off"},
+                "quality": {
+                    "n_u": N_U,
+                    "n_t": min(MOST_IN_TIME, 13 + round(POINTS_IN_SECOND * self._replay.horizon)),
+                    "method": "march",
+                },
+            }
+        )
+
+    def markers_at(self, time: float) -> Floats:
+        """Return the measured markers (k, 3) [m] of the frame nearest to a time [s] of the scene that were seen."""
+        x = cast(Floats, self.recording.markers)[int(np.argmin(np.abs(self.times - time)))]
+        return x[np.isfinite(x[:, 0])]
+
+    @property
+    def times(self) -> Floats:
+        """The frames' times in the scene (k,) [s]."""
+        return np.asarray(cast(Floats, self.recording.times) - self._replay.begin)
+
+    @cached_property
+    def _replay(self) -> Replay:
+        return Replay(self.recording, Resolution(n_u=N_U, step=STEP))
+
+    def distances(self, prediction: Prediction) -> Floats:
+        """Return the median distance of the free markers from a prediction at every frame (k,) [m]; NaN: unseen."""
+        recording, surface, span = self.recording, prediction.surface, self._replay.span
+        u = np.clip(span.u[recording.free] * (surface.length / span.length), 0.0, surface.length)
+        away = surface.positions(u, np.clip(self.times, 0.0, surface.horizon))[..., :3]
+        away = np.linalg.norm(away - cast(Floats, recording.markers)[:, recording.free], axis=2)
+        away[(self.times < 0.0) | (self.times > surface.horizon)] = np.nan
+        seen = np.isfinite(away).any(axis=1)
+        out = np.full(len(away), np.nan)
+        out[seen] = np.nanmedian(away[seen], axis=1)
+        return out
+
+
+def opened(name: str, content: bytes, beside: dict[str, bytes]) -> Tracked:
+    """Return the recording of a file, with those uploaded before it (a .csv needs the .json of its name).
+
+    Raises:
+        SceneError: it is none.
+    """
+    if len(content) > LARGEST:
+        raise SceneError("file", f"{len(content)} bytes", f"at most {LARGEST} bytes")
+    with tempfile.TemporaryDirectory() as folder:
+        for file, bytes_of in {**beside, name: content}.items():
+            (Path(folder) / Path(file).name).write_bytes(bytes_of)
+        return Tracked.of(load_recording(Path(folder) / Path(name).name))
+
+
+def _path(path: Waypoints) -> dict[str, Any]:
+    found: dict[str, Any] = {
+        "kind": "waypoints",
+        "times": np.round(np.asarray(path.times, dtype=float), 9).tolist(),
+        "positions": _rounded(cast(Floats, path.positions)),
+        "start": path.start,
+    }
+    if path.orientations is not None:
+        found["orientations"] = np.round(cast(Floats, path.orientations), 9).tolist()
+    return found
+
+
+def _rounded(values: Floats) -> list[Any]:
+    """Return numbers for the document, to the hundredth of a millimetre of what tracking can tell."""
+    return cast(list[Any], np.round(values, 7).tolist())

@@ -1,0 +1,125 @@
+"""A recording in the scene: markers over the prediction, the error in time, the cable found from it and kept."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from protocol_client import SceneClient, connected
+
+from app.viewer.kept import FILE, KeptCables
+from app.viewer.tracking_report import error_card
+from benchmarks.simulated_recordings import simulated
+from dlocore import Cable, Environment
+from dlocore.recordings import Recording, save_recording
+
+CABLE = Cable(
+    length=1.0,
+    diameter=0.006,
+    linear_density=0.05,
+    bending_stiffness=3e-3,
+    bending_damping=5e-4,
+    axial_stiffness=600.0,
+)
+OPEN = "Open a recording …"
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    return replace(simulated(6, 1.5, cable=CABLE, environment=Environment(drag=0.06)), name="shaken")
+
+
+def npz(recording: Recording, folder: Path) -> bytes:
+    save_recording(recording, folder / "shaken.npz")
+    return (folder / "shaken.npz").read_bytes()
+
+
+def shown_error(client: SceneClient) -> float:
+    found = re.search(r'data-error="([0-9.]+)"', client.html("data-error"))
+    return float(found[1]) if found else np.inf
+
+
+def test_a_recording_is_seen_over_its_prediction_and_its_cable_is_found_and_kept(service, recording, tmp_path):
+    with connected(service) as client:
+        client.upload(OPEN, "shaken.npz", npz(recording, tmp_path))
+        client.wait_for(lambda: client.html("data-error"), timeout=60)
+        client.set("Time [s]", 1.0)  # it stands there
+        client.wait_for(lambda: client.visible.get("/measured"))
+        times, seen = np.asarray(recording.times), np.asarray(recording.markers)
+        frame = seen[np.argmin(np.abs(times - times[:12].mean() - 1.0))]
+        expected = frame[np.isfinite(frame[:, 0])]
+        client.wait_for(lambda: _same(client.nodes["/measured"]["points"].reshape(-1, 3), expected))
+
+        client.press("Identify the cable")
+        client.wait_for(lambda: 'data-identify="converged"' in client.html("data-identify"), timeout=180)
+        client.wait_for(lambda: abs(client.document["cable"]["bending_stiffness"] / 3e-3 - 1.0) < 0.15)
+        assert "95 % intervals" in client.html("data-identify")
+        client.refined()
+        client.set("Time [s]", 1.0)  # it stands there
+        # the noise of the markers is 1 mm in each direction; the prediction's own error is of that size
+        client.wait_for(lambda: shown_error(client) < 4.0, timeout=60)
+
+        client.set("Name of the preset", "my wire")
+        client.press("Keep as a preset")
+        client.wait_for(lambda: "my wire" in client.control("Preset")[1]["options"])
+        client.wait_for(lambda: client.control("Preset")[1]["value"] == "my wire")
+        kept = client.document
+    with connected(service) as another:
+        another.set("Preset", "my wire")
+        another.wait_for(lambda: another.document["cable"].get("bending_damping"))
+        found = another.document
+        names = ("bending_stiffness", "bending_damping", "linear_density")
+        assert [found["cable"][n] for n in names] == [kept["cable"][n] for n in names]
+        assert found["environment"]["drag"] == kept["environment"]["drag"]
+        assert found["cable"]["length"] == 1.0  # that of the scene
+
+
+def _same(points: np.ndarray, markers: np.ndarray) -> bool:
+    return points.shape == markers.shape and bool(np.abs(points - markers).max() < 1e-5)  # single precision on the wire
+
+
+def test_a_csv_waits_for_its_json_and_another_scene_takes_the_recording_away(service, recording):
+    markers, times = np.asarray(recording.markers), np.asarray(recording.times)
+    rows = [
+        ",".join(["" if np.isnan(x) else f"{x:.5f}" for x in (t, *frame.ravel())])
+        for t, frame in zip(times, markers, strict=True)
+    ]
+    facts = {"u": np.asarray(recording.u).tolist(), "held": list(recording.held), "length": 1.0, "linear_density": 0.05}
+    with connected(service) as client:
+        client.upload(OPEN, "table.json", json.dumps(facts).encode())
+        client.wait_for(lambda: client.html("Now open table.csv"))
+        client.upload(OPEN, "table.csv", "\n".join(rows).encode())
+        client.wait_for(lambda: client.html("data-error"), timeout=60)
+        client.upload(
+            "Open a file …",
+            "scene.json",
+            json.dumps({"cable": {"preset": "paper"}, "shape": {"kind": "straight"}}).encode(),
+        )
+        client.wait_for(lambda: client.visible.get("/measured") is False)
+        client.wait_for(lambda: not client.html("data-error"))
+
+
+@pytest.mark.parametrize(("name", "content"), [("bad.npz", b"nothing"), ("scene.txt", b"1 2 3")])
+def test_a_file_that_is_no_recording_is_refused_and_the_scene_stays(service, name, content):
+    with connected(service) as client:
+        before = client.document
+        client.upload(OPEN, name, content)
+        client.wait_for(lambda: "was not opened" in client.html("was not opened"))
+        assert client.document == before
+
+
+def test_the_error_is_shown_at_the_cursor_and_over_time():
+    times, distances = np.linspace(0.0, 2.0, 201), np.linspace(0.0, 0.02, 201)
+    assert 'data-error="5.00"' in error_card(times, distances, 0.5)
+    distances[:] = np.nan
+    assert error_card(times, distances, 0.5) == ""
+
+
+def test_kept_cables_outlive_the_service_and_a_damaged_file(tmp_path):
+    KeptCables(tmp_path).keep("one", {"length": 2.0, "diameter": 0.01, "bending_stiffness": 0.2}, {"drag": 0.1})
+    expected = {"one": {"cable": {"diameter": 0.01, "bending_stiffness": 0.2}, "environment": {"drag": 0.1}}}
+    assert KeptCables(tmp_path).all() == expected
+    (tmp_path / FILE).write_text("{")
+    assert KeptCables(tmp_path).all() == {}
