@@ -5,15 +5,14 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.linalg.lapack import dpbtrf, dpbtrs
 
+from dlocore.kernels.smoothing import TINY, scores
 from dlocore.spline import DEGREE
 
 Floats = NDArray[np.float64]
 
 WEAKEST = 1e-6  # lambda, relative to the data: interpolation
 STRONGEST = 1e-2  # relative to the data and the sixth power of the spans: a parabola to 1 %, and well above rounding
-LEAST_NOISE = 1e-6  # of the size of the data: below it rounding, not the data, would choose the smoothness
 SOFTEST = 0.03  # of the mean |r'''|^2, below which straight parts differ in nothing but their noise
-TINY = 1e-300  # so that data that are all zero have a logarithm
 
 
 def smooth(
@@ -45,7 +44,8 @@ def smooth(
     penalty = _penalty(stiffness)
     decades = np.arange(np.log10(WEAKEST), np.log10(STRONGEST * spans**6) + 1)
     strengths = 10.0**decades * (normal[0].mean() / penalty[0].mean())
-    score = np.array([_score(normal, penalty, right, square, len(x), most_noise, s) for s in strengths])
+    bands = (np.ascontiguousarray(band.T) for band in (normal, penalty))
+    score = scores(*bands, right, square, len(x), most_noise, strengths)
     control = _solve(normal + _least(strengths, score) * penalty, right)[1]
     return BSpline(length / spans * np.arange(-DEGREE, spans + DEGREE + 1), control, DEGREE)
 
@@ -79,21 +79,6 @@ def _penalty(stiffness: Floats) -> Floats:
         for j, b in enumerate(difference[: i + 1]):
             band[i - j, j : j + n - 3] += a * b * stiffness
     return band
-
-
-def _score(
-    normal: Floats, penalty: Floats, right: Floats, square: float, count: int, most_noise: float, strength: float
-) -> float:
-    """Return the restricted likelihood's -2 log, up to a constant, for one lambda."""
-    factor, c = _solve(normal + strength * penalty, right)
-    if not factor[0].min() > 0:
-        return np.inf  # so weak that rounding leaves a long gap between the data without a curve
-    misfit = max(square - float((c * right).sum()), 0.0) + LEAST_NOISE**2 * square + TINY
-    free = normal.shape[1] - DEGREE
-    seen = 3 * max(count - 3, 1)
-    variance = min(misfit / seen, most_noise**2)
-    fit = np.log(variance) + misfit / (seen * variance)
-    return seen / 3 * fit + 2 * np.log(factor[0]).sum() - free * np.log(strength)
 
 
 def _least(strengths: Floats, score: Floats) -> float:

@@ -1,0 +1,56 @@
+"""How well each of many smoothnesses explains the data of a penalised spline."""
+
+from typing import Any
+
+import numpy as np
+
+from dlocore.kernels.banded import factor, solve
+from dlocore.kernels.compile import brief
+
+LEAST_NOISE = 1e-6  # of the size of the data: below it rounding, not the data, would choose the smoothness
+TINY = 1e-300  # so that data that are all zero have a logarithm
+
+
+@brief
+def scores(
+    normal: Any, penalty: Any, right: Any, square: float, count: int, most_noise: float, strengths: Any
+) -> Any:  # fmt: skip
+    """Return the restricted likelihood's -2 log (k,), up to a constant, for each lambda in `strengths` (k,).
+
+    It is infinite where lambda is so weak that rounding leaves a long gap between the data without a curve.
+
+    Args:
+        normal, penalty: (n, 4) bands A and P, by column below their diagonals.
+        right: (n, 3) b.
+        square: D + b . c, the sum w |y|^2 of the data.
+        count: number of data.
+        most_noise: bound on the standard deviation of a coordinate of the data.
+        strengths: (k,).
+    """
+    n, width = normal.shape
+    free = n - 3
+    seen = 3 * max(count - 3, 1)
+    band = np.empty((n, width))
+    c = np.empty(n)
+    out = np.empty(len(strengths))
+    for k in range(len(strengths)):
+        for i in range(n):
+            for o in range(width):
+                band[i, o] = normal[i, o] + strengths[k] * penalty[i, o]
+        if factor(band) >= 0:
+            out[k] = np.inf
+            continue
+        misfit = square
+        for d in range(right.shape[1]):
+            c[:] = right[:, d]
+            solve(band, c)
+            for i in range(n):
+                misfit -= c[i] * right[i, d]
+        misfit = max(misfit, 0.0) + LEAST_NOISE**2 * square + TINY
+        variance = min(misfit / seen, most_noise**2)
+        determinant = 0.0
+        for i in range(n):
+            determinant += np.log(band[i, 0])
+        fit = np.log(variance) + misfit / (seen * variance)
+        out[k] = seen / 3 * fit + determinant - free * np.log(strengths[k])
+    return out
