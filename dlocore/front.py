@@ -113,7 +113,7 @@ def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method:
         message = "The time limit passed; this is the last iterate. Allow more time or a coarser grid."
         return _answer(monitor, method, Outcome(level, "time_limit", message, None))
     monitor.phase(method)
-    count = len(monitor.iterations)
+    count, left = len(monitor.iterations), update
     status: Status = "converged" if converged else "max_iterations"
     message = f"The update fell below delta = {quality.delta:g} m in {count} iterations."
     if not converged:
@@ -124,7 +124,7 @@ def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method:
     if problem.self_contact is not None:
         message += " The least squares does not know of contact of the cable with itself; method march does."
     if not converged and method == "spacetime":
-        control, forces = level.control, None
+        control, forces, left = level.control, None, level.motion.update
         if quality.method == "auto":
             method, status, found = "march", *march_status(problem, level)
             spent = monitor.phases["spacetime"]
@@ -137,10 +137,11 @@ def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method:
     elif not np.isfinite(control).all():
         status = "stalled"
         message += " The iterates grew beyond all bounds; the surface is that of a march."
-        control = level.control
+        control, left = level.control, level.motion.update
     level = replace(level, control=control)
     estimate, doubt = _companion(problem, quality, level, monitor) if method != "paper" or converged else (None, "")
-    return _answer(monitor, method, Outcome(level, status, message + doubt, estimate), forces)
+    errors = None if estimate is None else {"grid": estimate, "iteration": left}
+    return _answer(monitor, method, Outcome(level, status, message + doubt, errors), forces)
 
 
 def _companion(problem: Problem, quality: Quality, level: Level, monitor: Monitor) -> tuple[float | None, str]:
@@ -190,7 +191,7 @@ def _given(problem: Problem, quality: Quality, monitor: Monitor) -> Outcome:
     if status == "converged" and off > MISSED * problem.scene.cable.length:
         status = "max_iterations"
         message += f" The time spline of {quality.n_t} control points misses them by {off * 1e3:.2g} mm. Raise n_t."
-    return Outcome(level, status, message + doubt, estimate)
+    return Outcome(level, status, message + doubt, None if estimate is None else {"grid": estimate})
 
 
 def _answer(
@@ -204,7 +205,10 @@ def _answer(
     grid = level.motion.grid
     surface = surface_at(problem, level, level.control)
     left_out = neglected(level)
-    estimate = None if outcome.estimate is None else outcome.estimate + left_out
+    errors: dict[str, float] = {}
+    if outcome.errors is not None:
+        errors = {**outcome.errors, "neglected": left_out}
+        errors.setdefault("iteration", level.motion.update)
     message = " ".join([outcome.message, *[f"Note: {objection}." for objection in objections(level)]])
     return Prediction(
         scene=problem.scene,
@@ -217,7 +221,8 @@ def _answer(
         iterations=tuple(monitor.iterations),
         accuracy=Accuracy(
             method=method,
-            error_estimate=estimate,
+            error_estimate=sum(errors.values()) if errors else None,
+            error_parts=errors,
             neglected=left_out,
             wall_time=monitor.elapsed(),
             n_u=grid.n_u,

@@ -36,13 +36,17 @@ _AT_BEST = 0.2  # of an error, is left by one refinement: what is still too much
 _FAILURES = 3  # refinements in time of a march that found no equilibrium
 
 
+# by direction, "space", "time" or "both": how far its two last refinements moved the surface [m]
+Changes = dict[str, tuple[float, float]]
+
+
 class Outcome(NamedTuple):
-    """A level of refinement, what to say of it, and its estimated error [m]."""
+    """A level of refinement, what to say of it, and the parts of its estimated error [m], or None."""
 
     level: Level
     status: Status
     message: str
-    estimate: float | None
+    errors: Mapping[str, float] | None
 
 
 def march_level(
@@ -99,7 +103,7 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
     number = 0 if quality.time_budget is None else first_level(problem, cost, quality.time_budget)
     size: Size | None = stretched(problem, number)
     direction = "both"
-    changes: dict[str, tuple[float, float]] = {}  # how far the two last refinements of a direction moved the surface
+    changes: Changes = {}
     failures = 0
     while size is not None:
         began = monitor.elapsed()
@@ -126,7 +130,8 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
                 if estimate <= enough:
                     break
                 status, message = march_status(problem, level)
-                return Outcome(best, status, f"A finer grid was not finished: {message}", _finite(best.change))
+                errors = {"grid": best.change} if np.isfinite(best.change) else None
+                return Outcome(best, status, f"A finer grid was not finished: {message}", errors)
             changes[direction] = level.change, changes.get(direction, (np.inf, np.inf))[0]
             estimate = max(_error(changes), MISSED_COUNTS * level.missed)
             rough = level.change > ROUGH * length
@@ -140,7 +145,7 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
             return Outcome(level, status, message, None)
         if estimate <= ACCEPT * target and quality.time_budget is None:
             agreed = f"Two grids agree to {level.change * 1e3:.2g} mm, target {target * 1e3:.2g} mm."
-            return Outcome(level, status, agreed if status == "converged" else message, estimate)
+            return Outcome(level, status, agreed if status == "converged" else message, _parts(changes, level))
         number += 1
         next_size: Size | None
         if number < len(LEVELS):
@@ -159,7 +164,7 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
         if next_size is not None and growth(problem, cost, size, next_size) * spent > budget - monitor.elapsed():
             if not np.isfinite(level.change):
                 return Outcome(level, "time_limit", f"{budget * 1e3:.3g} ms allow one grid, unchecked.", None)
-            return Outcome(level, status, f"The best grid in {budget * 1e3:.3g} ms; {moved}.", estimate)
+            return Outcome(level, status, f"The best grid in {budget * 1e3:.3g} ms; {moved}.", _parts(changes, level))
         size = next_size
     assert best is not None
     status, message = march_status(problem, best)
@@ -173,7 +178,7 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
         status, message = "time_limit", f"The time limit passed; {moved}. {advice}"
     elif status == "converged":
         status, message = "max_iterations", f"No finer grid; {moved}. {advice}"
-    return Outcome(best, status, message, _finite(estimate))
+    return Outcome(best, status, message, _parts(changes, best) if np.isfinite(estimate) else None)
 
 
 def _finer(size: Size, direction: str, trembles: bool) -> Size:
@@ -199,21 +204,28 @@ def _left(size: Size | None, direction: str, problem: Problem, most_work: float)
     return count
 
 
-def _worst(changes: Mapping[str, tuple[float, float]]) -> str:
+def _worst(changes: Changes) -> str:
     """Return the direction to refine: time, then space, then that which erred more."""
     unknown = [direction for direction in ("time", "space") if direction not in changes]
     return unknown[0] if unknown else max(_FINER, key=lambda direction: extrapolated(*changes[direction]))
 
 
-def _error(changes: Mapping[str, tuple[float, float]]) -> float:
+def _error(changes: Changes) -> float:
     """Return the error [m] that the changes point to: of the whole grid, or of both directions once both are known."""
     if all(direction in changes for direction in _FINER):
         return float(sum(extrapolated(*changes[direction]) for direction in _FINER))
     return extrapolated(*changes["both"]) if "both" in changes else np.inf
 
 
-def _finite(x: float) -> float | None:
-    return x if np.isfinite(x) else None
+def _parts(changes: Changes, level: Level) -> dict[str, float]:
+    """Return the parts of the error [m] of a level: of the grid in space and time, as far as they are known apart."""
+    known = list(_FINER) if all(direction in changes for direction in _FINER) else ["both"]
+    parts = {"grid" if direction == "both" else direction: extrapolated(*changes[direction]) for direction in known}
+    unseen = MISSED_COUNTS * level.missed - sum(parts.values())
+    if unseen > 0.0:  # what the time spline misses of its march is told by no other grid
+        last = list(parts)[-1]
+        parts[last] += unseen
+    return parts
 
 
 def march_status(problem: Problem, level: Level) -> tuple[Status, str]:

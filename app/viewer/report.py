@@ -59,6 +59,11 @@ def status_card(prediction: Prediction, *, preview: bool) -> str:
     )
     steps = f"{len(prediction.iterations)} iterations" if len(prediction.iterations) != 1 else "1 iteration"
     detail = f"{accuracy.method}, {accuracy.n_u} × {accuracy.n_t} control points, {steps}, {accuracy.dimensions}D"
+    parts = {
+        name: size for name, size in accuracy.error_parts.items() if size > 0.01 * (accuracy.error_estimate or 0.0)
+    }
+    if not preview and len(parts) > 1:
+        detail += "; error by " + ", ".join(f"{name} {millimetres(size)}" for name, size in parts.items())
     advice = "" if preview or prediction.status == "converged" else f"<div>{escape(prediction.message)}</div>"
     return (
         f'<div style="{_CARD} background: {ground};" data-status="{escape(prediction.status)}">'

@@ -167,6 +167,7 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
         accuracy=Accuracy(
             method="reference",
             error_estimate=estimate if np.isfinite(estimate) else None,
+            error_parts={"grid": refined.estimate, "time": fitted.missed} if np.isfinite(estimate) else {},
             neglected=0.0,
             wall_time=monitor.elapsed(),
             n_u=control.shape[1],

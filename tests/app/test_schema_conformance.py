@@ -16,7 +16,7 @@ OPTIONS = [*CHECKS, "--max-examples=40", "--seed=1", "--request-timeout=30", "--
 
 @pytest.mark.slow
 def test_every_answer_is_as_described_whatever_is_sent(tmp_path: Path) -> None:
-    with serving(tmp_path, time_limit="20") as live:  # a slow machine solves every example in it, an endless solve ends
+    with serving(tmp_path, time_limit="5") as live:  # so that the odd hard scene among the examples costs little
         command = [sys.executable, "-m", "schemathesis.cli", "--config-file", str(CONFIG), "run", *OPTIONS]
         address = f"{live.url}/openapi.json"
         done = subprocess.run([*command, address], capture_output=True, text=True, timeout=500, cwd=tmp_path)
