@@ -9,6 +9,7 @@ import numpy as np
 from dlocore.budget import first_level, growth
 from dlocore.cost import Cost
 from dlocore.discretisation import smallest_n_u
+from dlocore.errors import SceneError
 from dlocore.kernels.assembly import slopes
 from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
@@ -116,6 +117,12 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
             problem = level.posed  # a rough grid may have needed contact that is too stiff for a fine one
         except TimeIsUp:
             break
+        except SceneError:  # a start that finds no rest on few control points may do so on more
+            number += 1
+            if best is not None or number == len(LEVELS):
+                raise
+            size = stretched(problem, number)
+            continue
         if best is not None:
             if level.motion.stopped and not best.motion.stopped:
                 failures += 1

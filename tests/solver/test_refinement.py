@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.hard.curves import hairpin
-from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, Straight, predict
+from benchmarks.hard.curves import arc, hairpin
+from benchmarks.hard.generator import draw
+from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, SceneError, Straight, equilibrium, predict
 from dlocore.discretisation import make_grid
 from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.banded import reduce_matrix
@@ -119,6 +120,29 @@ def test_theta_does_not_hold_back_a_bent_cable_that_swings_about_its_tangent():
     assert fine.surface.positions([0.0], 1.0)[0, 0, 2] < -0.1  # it does swing
     # the curvature jumps within a span: 21 to 33 control points are off by 0.06 to 0.01 L
     assert apart(coarse.surface, fine.surface).max() < 0.03
+
+
+def test_a_start_that_hardly_stretches_comes_to_rest_below_the_rounding_of_its_energy():
+    # EA L^2/EI = 1e8: the line search can't see the last steps in the energy, but in the work of the residual
+    scene = Scene(
+        cable=Cable(
+            length=1.0, diameter=0.0089, linear_density=0.0129, bending_stiffness=3.2e-4, axial_stiffness=33171.0,
+            torsional_stiffness=2.6e-4,
+        ),
+        shape=Points(points=arc(1.0, 0.0217, "flat"), settle=True),
+        grasps=(Grasp(u=0.0, hold="clamp"), Grasp(u=1.0, hold="clamp")),
+        effects={"twist": "on"},
+        horizon=1.0,
+    )  # fmt: skip
+    for n_u in (9, 13, 17, 33):
+        assert equilibrium(scene, n_u=n_u).status == "converged"
+
+
+def test_a_start_that_rests_on_enough_control_points_is_not_refused():
+    scene = draw(1, 199).make()  # a stiff loop with tangents held, in space with twist
+    with pytest.raises(SceneError, match="rest"):
+        predict(replace(scene, quality=march(9, 13)))
+    assert predict(scene).status == "converged"
 
 
 def test_auto_is_content_with_one_per_cent_and_tells_what_it_reached():
