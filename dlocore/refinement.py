@@ -16,7 +16,17 @@ from dlocore.problem import Problem, pose
 from dlocore.progress import record_level
 from dlocore.review import called_for
 from dlocore.scene import Quality
-from dlocore.solvers.ladder import ACCEPT, LEVELS, Level, Size, distance, extrapolated, run_level, stretched
+from dlocore.solvers.ladder import (
+    ACCEPT,
+    CREDIBLE_STRAIN,
+    LEVELS,
+    Level,
+    Size,
+    distance,
+    extrapolated,
+    run_level,
+    stretched,
+)
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED, smallest_n_t
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 
@@ -101,7 +111,7 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
     size: Size | None = stretched(problem, number)
     direction = "both"
     changes: dict[str, tuple[float, float]] = {}  # how far the two last refinements of a direction moved the surface
-    failures = 0
+    failures = 0  # in a row
     while size is not None:
         began = monitor.elapsed()
         try:
@@ -124,23 +134,26 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
             size = stretched(problem, number)
             continue
         if best is not None:
-            if level.motion.stopped and not best.motion.stopped:
+            if _is_worse(level, best):
                 failures += 1
-                if failures <= _FAILURES and level.motion.stopped != "time" and quality.time_budget is None:
+                more = _affordable(_finer(size, "time", True), problem, most_work)
+                if failures <= _FAILURES and level.motion.stopped != "time" and quality.time_budget is None and more:
                     record_level(problem, level, monitor)
-                    size = _affordable(_finer(size, "time", True), problem, most_work)
+                    size = more
                     continue
                 if estimate <= enough:
                     break
                 status, message = march_status(problem, level)
-                return Outcome(best, status, f"A finer grid was not finished: {message}", _finite(best.change))
+                if status == "converged":  # each step of a motion that no cable makes
+                    status, message = "max_iterations", f"It strains the cable by {level.motion.largest_strain:.0%}."
+                return Outcome(best, status, f"A finer grid failed: {message}", _finite(best.change))
             changes[direction] = level.change, changes.get(direction, (np.inf, np.inf))[0]
             estimate = max(_error(changes), MISSED_COUNTS * level.missed)
             rough = level.change > ROUGH * length
             if rough or number < len(LEVELS):  # later on two marches would differ by their damping
                 rho = STRONGLY_DAMPED if rough else RHO
         record_level(problem, level, monitor)
-        best = level
+        best, failures = level, 0
         status, message = march_status(problem, level)
         moved = f"the last refinement moved the surface by {level.change * 1e3:.2g} mm"
         if level.motion.stopped == "time":
@@ -152,15 +165,19 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
         next_size: Size | None
         if number < len(LEVELS):
             next_size = stretched(problem, number)
+            next_size = next_size._replace(
+                steps=max(next_size.steps, size.steps)
+            )  # more than that may have been needed
         else:
             trembles = MISSED_COUNTS * level.missed > _FINE_IN_TIME * target
             finer = {d: _affordable(_finer(size, d, trembles), problem, most_work) for d in _FINER}
             direction = "time" if MISSED_COUNTS * level.missed > _error(changes) else _worst(changes)
-            left = extrapolated(*changes[direction]) if direction in changes else 0.0
-            if finer[direction] is None and left < target:
+            moved_by = changes.get(direction, (0.0, 0.0))
+            if finer[direction] is None and extrapolated(*moved_by) < target:
                 direction = next(d for d in _FINER if d != direction)  # may still bring the sum of both below it
             next_size = finer[direction]
-            if next_size is not None and _AT_BEST ** _left(next_size, direction, problem, most_work) * left > enough:
+            hope = _AT_BEST ** _left(next_size, direction, problem, most_work)
+            if next_size is not None and hope * moved_by[0] > enough:
                 next_size = None
         spent = monitor.elapsed() - began
         if next_size is not None and growth(problem, cost, size, next_size) * spent > budget - monitor.elapsed():
@@ -181,6 +198,13 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
     elif status == "converged":
         status, message = "max_iterations", f"No finer grid; {moved}. {advice}"
     return Outcome(best, status, message, _finite(estimate))
+
+
+def _is_worse(level: Level, best: Level) -> bool:
+    """Tell whether a finer grid failed, or strained the cable beyond belief, and the one before did not."""
+    torn = level.motion.largest_strain > CREDIBLE_STRAIN >= best.motion.largest_strain
+    stalled = march_status(level.problem, level)[0] != "converged" == march_status(best.problem, best)[0]
+    return torn or stalled
 
 
 def _finer(size: Size, direction: str, trembles: bool) -> Size:
