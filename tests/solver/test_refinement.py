@@ -7,11 +7,13 @@ import pytest
 
 from benchmarks.hard.curves import arc, hairpin
 from benchmarks.hard.generator import draw
-from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, SceneError, Straight, equilibrium, predict
+from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, Straight, equilibrium, predict
 from dlocore.discretisation import make_grid
 from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.banded import reduce_matrix
 from dlocore.problem import pose
+from dlocore.solvers.march import march as take_steps
+from dlocore.solvers.monitor import Monitor
 from tests.solver.scenes import apart, march, paper_scene, refined
 
 
@@ -138,11 +140,16 @@ def test_a_start_that_hardly_stretches_comes_to_rest_below_the_rounding_of_its_e
         assert equilibrium(scene, n_u=n_u).status == "converged"
 
 
-def test_a_start_that_rests_on_enough_control_points_is_not_refused():
-    scene = draw(1, 199).make()  # a stiff loop with tangents held, in space with twist
-    with pytest.raises(SceneError, match="rest"):
-        predict(replace(scene, quality=march(9, 13)))
-    assert predict(scene).status == "converged"
+def test_a_stiff_loop_in_space_comes_to_rest_before_its_ends_are_pulled():
+    assert predict(draw(1, 199).make()).status == "converged"  # was refused, as nine control points found no rest
+
+
+def test_short_steps_of_a_cable_that_hardly_stretches_make_no_noise_of_its_tension():
+    # EA L^2/EI = 1e9: with Newton's iterations left at 1e-8 L these steps strained it by 8e-6, and did not converge
+    problem = pose(draw(1, 54).make())
+    motion = take_steps(problem, make_grid(problem, 33), 2304, Monitor())
+    assert not motion.stopped
+    assert motion.largest_strain < 1e-6  # inertia and drag strain it by 2e-7
 
 
 def test_auto_is_content_with_one_per_cent_and_tells_what_it_reached():
