@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmarks.hard.generator import as_python, draw
-from benchmarks.hard.judge import run
+from benchmarks.hard.judge import WRONG, is_undetermined, run
 from benchmarks.machine import machine_line
 from dlocore import warm_up
 
@@ -109,9 +109,16 @@ def summary(records: list[dict[str, Any]]) -> str:
     possible = [r for r in records if r["possible"]]
     printed = [r for r in possible if r.get("method") == "paper"]
     judged = [r for r in possible if r.get("method") != "paper"]
-    converged = sum(r["status"] == "converged" for r in judged)
+    undetermined = [r for r in judged if is_undetermined(r)]
+    told = sum(r["status"] != "converged" or (r["estimate"] or 0.0) > WRONG for r in undetermined)
+    determined = [r for r in judged if not is_undetermined(r)]
+    free = [r for r in determined if not r["families"][-1].endswith(("march", "grid", "odd"))]
+    given = [r for r in determined if r["families"][-1].endswith(("march", "grid", "odd"))]
     lines.append(f"{len(records)} scenes, {len(possible)} of them possible, {len(printed)} of these by method paper")
-    lines.append(f"converged: {converged} of {len(judged)}, {converged / max(1, len(judged)):.2%}")
+    lines.append(f"undetermined: {len(undetermined)}, {told} of them told")
+    for name, part in (("of the others", determined), ("grid free", free), ("grid given", given)):
+        converged = sum(r["status"] == "converged" for r in part)
+        lines.append(f"converged, {name}: {converged} of {len(part)}, {converged / max(1, len(part)):.2%}")
     seconds = np.array([r["seconds"] for r in records])
     lines.append(
         f"CPU time: median {np.median(seconds) * 1e3:.0f} ms, mean {seconds.mean() * 1e3:.0f} ms, "

@@ -9,13 +9,24 @@ import numpy as np
 from dlocore.budget import first_level, growth
 from dlocore.cost import Cost
 from dlocore.discretisation import smallest_n_u
+from dlocore.errors import SceneError
 from dlocore.kernels.assembly import slopes
 from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
 from dlocore.progress import record_level
 from dlocore.review import called_for
 from dlocore.scene import Quality
-from dlocore.solvers.ladder import ACCEPT, LEVELS, Level, Size, distance, extrapolated, run_level, stretched
+from dlocore.solvers.ladder import (
+    ACCEPT,
+    CREDIBLE_STRAIN,
+    LEVELS,
+    Level,
+    Size,
+    distance,
+    extrapolated,
+    run_level,
+    stretched,
+)
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED, smallest_n_t
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 
@@ -104,7 +115,7 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
     size: Size | None = stretched(problem, number)
     direction = "both"
     changes: Changes = {}
-    failures = 0
+    failures = 0  # in a row
     while size is not None:
         began = monitor.elapsed()
         try:
@@ -116,29 +127,38 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
                 if level.change <= ROUGH * length:  # so strands do not meet because of the grid
                     level = march_level(problem, size, monitor, rho, free_knots=True, known=level)
             if level.posed is not problem:
-                best, changes = None, {}  # another motion: the grid before says nothing about it
+                best, changes, estimate = None, {}, np.inf  # another motion: the grid before says nothing about it
             problem = level.posed  # a rough grid may have needed contact that is too stiff for a fine one
         except TimeIsUp:
             break
+        except SceneError:  # a start that finds no rest on few control points may do so on more
+            number += 1
+            if best is not None or number == len(LEVELS):
+                raise
+            size = stretched(problem, number)
+            continue
         if best is not None:
-            if level.motion.stopped and not best.motion.stopped:
+            if _is_worse(level, best):
                 failures += 1
-                if failures <= _FAILURES and level.motion.stopped != "time" and quality.time_budget is None:
+                more = _affordable(_finer(size, "time", True), problem, most_work)
+                if failures <= _FAILURES and level.motion.stopped != "time" and quality.time_budget is None and more:
                     record_level(problem, level, monitor)
-                    size = _affordable(_finer(size, "time", True), problem, most_work)
+                    size = more
                     continue
                 if estimate <= enough:
                     break
                 status, message = march_status(problem, level)
                 errors = {"grid": best.change} if np.isfinite(best.change) else None
-                return Outcome(best, status, f"A finer grid was not finished: {message}", errors)
+                if status == "converged":  # each step of a motion that no cable makes
+                    status, message = "max_iterations", f"It strains the cable by {level.motion.largest_strain:.0%}."
+                return Outcome(best, status, f"A finer grid failed: {message}", errors)
             changes[direction] = level.change, changes.get(direction, (np.inf, np.inf))[0]
             estimate = max(_error(changes), MISSED_COUNTS * level.missed)
             rough = level.change > ROUGH * length
             if rough or number < len(LEVELS):  # later on two marches would differ by their damping
                 rho = STRONGLY_DAMPED if rough else RHO
         record_level(problem, level, monitor)
-        best = level
+        best, failures = level, 0
         status, message = march_status(problem, level)
         moved = f"the last refinement moved the surface by {level.change * 1e3:.2g} mm"
         if level.motion.stopped == "time":
@@ -150,15 +170,17 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
         next_size: Size | None
         if number < len(LEVELS):
             next_size = stretched(problem, number)
+            next_size = next_size._replace(steps=max(next_size.steps, size.steps))  # more may have been needed
         else:
             trembles = MISSED_COUNTS * level.missed > _FINE_IN_TIME * target
             finer = {d: _affordable(_finer(size, d, trembles), problem, most_work) for d in _FINER}
             direction = "time" if MISSED_COUNTS * level.missed > _error(changes) else _worst(changes)
-            left = extrapolated(*changes[direction]) if direction in changes else 0.0
-            if finer[direction] is None and left < target:
+            moved_by = changes.get(direction, (0.0, 0.0))
+            if finer[direction] is None and extrapolated(*moved_by) < target:
                 direction = next(d for d in _FINER if d != direction)  # may still bring the sum of both below it
             next_size = finer[direction]
-            if next_size is not None and _AT_BEST ** _left(next_size, direction, problem, most_work) * left > enough:
+            hope = _AT_BEST ** _left(next_size, direction, problem, most_work)
+            if next_size is not None and hope * moved_by[0] > enough:
                 next_size = None
         spent = monitor.elapsed() - began
         if next_size is not None and growth(problem, cost, size, next_size) * spent > budget - monitor.elapsed():
@@ -178,7 +200,14 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
         status, message = "time_limit", f"The time limit passed; {moved}. {advice}"
     elif status == "converged":
         status, message = "max_iterations", f"No finer grid; {moved}. {advice}"
-    return Outcome(best, status, message, _parts(changes, best) if np.isfinite(estimate) else None)
+    return Outcome(best, status, message, _parts(changes, best))
+
+
+def _is_worse(level: Level, best: Level) -> bool:
+    """Tell whether a finer grid failed, or strained the cable beyond belief, and the one before did not."""
+    torn = level.motion.largest_strain > CREDIBLE_STRAIN >= best.motion.largest_strain
+    stalled = march_status(level.problem, level)[0] != "converged" == march_status(best.problem, best)[0]
+    return torn or stalled
 
 
 def _finer(size: Size, direction: str, trembles: bool) -> Size:
@@ -217,8 +246,10 @@ def _error(changes: Changes) -> float:
     return extrapolated(*changes["both"]) if "both" in changes else np.inf
 
 
-def _parts(changes: Changes, level: Level) -> dict[str, float]:
-    """Return the parts of the error [m] of a level: of the grid in space and time, as far as they are known apart."""
+def _parts(changes: Changes, level: Level) -> dict[str, float] | None:
+    """Return the parts of the error [m] of a level, of space and time as far as they are known apart; None if unknown."""
+    if not np.isfinite(_error(changes)):
+        return None
     known = list(_FINER) if all(direction in changes for direction in _FINER) else ["both"]
     parts = {"grid" if direction == "both" else direction: extrapolated(*changes[direction]) for direction in known}
     unseen = MISSED_COUNTS * level.missed - sum(parts.values())

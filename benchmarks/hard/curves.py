@@ -75,7 +75,7 @@ def as_seen(r: Rng, d: Draft, points: Floats, *, exact: bool = False) -> Points:
     d.families.append(f"geometry: {fault} points")
     if fault == "stretched":
         points = points.mean(axis=0) + r.uniform(0.95, 1.05) * (points - points.mean(axis=0))
-        if d.room == "flat":
+        if not apart(d):
             points = points * [1, 1, 0] + [0, 0, points[0, 2]]
     elif fault == "repeated":
         jitter = spread(r, 1e-12, 1e-6) * length

@@ -10,6 +10,12 @@ import numpy as np
 from benchmarks.hard.generator import Drawn
 from benchmarks.hard.laws import measure
 from dlocore import Prediction, Quality, Scene, SceneError, predict
+from dlocore.discretisation import smallest_n_u
+from dlocore.problem import pose
+from dlocore.solvers.ladder import stretched
+from dlocore.solvers.march import march
+from dlocore.solvers.monitor import Monitor
+from dlocore.statics import start_grid
 
 WRONG = 0.01  # of the length: an error that an answer has to tell of
 SURE = 0.3  # of a distance from the refined march: within it the refined marches agree where they can tell
@@ -18,6 +24,7 @@ HELD = 1e-9  # [m]
 ASTRAY = 1e-4  # of the length: of a gripper's path by the time spline, between the ends
 GAINED = 0.02  # of the energy that was about
 LOST = 0.05  # of the impulses that were about
+DISTURBED = 1e-6  # of the length: a start that is this much different is the same to any hand
 
 
 def run(drawn: Drawn, deadline: float, checked: bool) -> dict[str, Any]:
@@ -38,6 +45,8 @@ def run(drawn: Drawn, deadline: float, checked: bool) -> dict[str, Any]:
         record["laws"] = asdict(measure(prediction))
         if checked:
             record |= compare(prediction, scene, deadline)
+        if prediction.status != "converged" or record.get("apart", 0.0) > WRONG:
+            record["disturbed"] = disturbed(prediction, scene, deadline)
     except SceneError as error:
         record |= {"status": "refused", "message": str(error), "field": error.field}
     except Exception as error:  # whatever it is, it is what this looks for
@@ -87,6 +96,39 @@ def compare(prediction: Prediction, scene: Scene, deadline: float) -> dict[str, 
     return {"reference": "converged", "error": error, "apart": apart}
 
 
+def disturbed(prediction: Prediction, scene: Scene, deadline: float) -> float | None:
+    """Return how far a start that is bent by DISTURBED takes the motion, of the length; None where no march tells.
+
+    More than WRONG: the scene does not determine its motion. Three marches on one grid, whose start is as it is, or
+    bent by some half waves; only where each finds its equilibria and keeps the cable's length.
+    """
+    found = {e.name: e.reason for e in prediction.effects if e.active}
+    problem = pose(scene, found)
+    level = stretched(problem, 3)
+    n_u = max(50, smallest_n_u(problem))
+    t = np.linspace(0.0, problem.horizon, 65)
+    shapes = []
+    for seed in range(3):
+        monitor = Monitor(None, deadline)
+        grid = start_grid(problem, n_u, monitor)
+        u = np.linspace(0.0, np.pi, grid.n_u)[:, None]
+        waves = np.sin(u * [1.0, 2.0, 3.0]) @ np.random.default_rng(seed).normal(size=(3, problem.plane.dimensions)) / 2
+        start = grid.start.copy()
+        start[:, : waves.shape[1]] += DISTURBED * scene.cable.length * waves * (seed > 0)
+        motion = march(problem, replace(grid, start=start), 8 * level.steps, monitor)
+        if motion.stopped or motion.largest_strain > MOST_STRAIN:
+            return None
+        at = np.searchsorted(motion.times, t).clip(0, len(motion.times) - 1)
+        shapes.append(motion.states[at][:, :, : waves.shape[1]])
+    away = max(float(np.linalg.norm(x - shapes[0], axis=-1).max()) for x in shapes[1:])
+    return away / scene.cable.length
+
+
+def is_undetermined(record: dict[str, Any]) -> bool:
+    """Tell whether a scene was proven not to determine its motion."""
+    return (record.get("disturbed") or 0.0) > WRONG
+
+
 def faults(record: dict[str, Any]) -> list[str]:
     """Return what is wrong with an answer, in words; nothing where it is right."""
     status, found = record["status"], []
@@ -116,7 +158,10 @@ def faults(record: dict[str, Any]) -> list[str]:
             found.append("wrong and told" if told else "lie")
         elif error is not None and record["apart"] > WRONG:
             told = estimate is not None and estimate > WRONG
-            found.append("undetermined and told" if told else "undetermined and not told")
+            kind = "undetermined" if is_undetermined(record) else "no reference"
+            found.append(f"{kind} and told" if told else f"{kind} and not told")
+    elif is_undetermined(record):
+        found.append(f"undetermined and told: {status}")
     else:
         found.append(f"not converged: {status}")
     return found

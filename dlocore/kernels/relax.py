@@ -16,6 +16,7 @@ from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_mat
 from dlocore.kernels.compile import kernel
 
 _HALVINGS = 30
+_DROWNED = 1e-9  # of the energy: differences of it that rounding may make where the cable hardly stretches
 
 
 @kernel
@@ -105,6 +106,16 @@ def relax(
                 after = _merit(axes, q - length * step, target, strength, applied, tables, active, p, history, w)
                 if after <= energy - 1e-4 * length * slope + 1e-14 * abs(energy):
                     break
+                if abs(after - energy) <= _DROWNED * abs(energy):
+                    trial = q - length * step
+                    assemble(axes, trial, still, tables, active, p, history, NO_RATES, (0.0, 0.0, 0.0), f, K)
+                    f -= applied
+                    multiply_scalar_band(tables.mass, trial - target, strength, f)
+                    work = 0.0
+                    for i in range(size):
+                        work += change[i] * f.ravel()[i]
+                    if abs(work) <= 0.9 * abs(slope):
+                        break
                 length *= 0.5
         q -= length * step
         energy = _merit(axes, q, target, strength, applied, tables, active, p, history, w)

@@ -38,6 +38,8 @@ Floats = NDArray[np.float64]
 RHO = 0.5
 STRONGLY_DAMPED = 0.0
 TOLERANCE = 1e-8  # of the length, on the error that the Newton iterations of a step leave
+LEAST_TOLERANCE = 1e-11
+COARSE = 1 / 256  # of the period of a cable that swings: of shorter steps the tolerance goes with their square
 _REFINEMENTS = 8  # of the time knots: each halves spans
 _RESTS = 0.05  # of the diameter above the table: nearer to it the cable rests on it
 _CHUNK = 256  # steps between looks at the clock
@@ -217,7 +219,7 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
     mass = unit_mass * problem.mass_density()
     drag = unit_mass * problem.drag_coefficient()
     applied = applied_forces(problem, grid, times)
-    tolerance = TOLERANCE * problem.scene.cable.length
+    tolerance = _tolerance(problem, problem.horizon / len(times))
     states = np.empty((len(times), grid.n_u, nc))
     states[0] = grid.start
     v = grid.velocity.copy()
@@ -307,6 +309,19 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
         grid, times, states, velocity, tuple(forces), history, log, reached, stopped, rho, split,
         float(largest_strain(axes, states, grid.tables)), float(info[LEFT]), float(info[DEEPEST]),
     )  # fmt: skip
+
+
+def _tolerance(problem: Problem, step: float) -> float:
+    """Return the error that Newton's iterations may leave in a step [m].
+
+    Over a short step it is an acceleration, of which the tension of a cable that hardly stretches makes noise. Forces
+    with kinks are not solved for more closely, as steps would fail at them.
+    """
+    length = problem.scene.cable.length
+    if problem.contact is not None or problem.friction is not None or problem.self_contact is not None:
+        return TOLERANCE * length
+    short = min(1.0, step / (COARSE * 2.0 * float(np.sqrt(length))))
+    return max(LEAST_TOLERANCE, TOLERANCE * short**2) * length
 
 
 def _lean_on_anchors(
