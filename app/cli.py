@@ -104,8 +104,11 @@ def parser() -> argparse.ArgumentParser:
         "--models", default="scalars,bends", help="scalars (four numbers), bends (and rest shape and clamps), or both"
     )
     check.add_argument("--json", metavar="OUT.json", help="write all numbers")
+    check.add_argument("--plots", metavar="FOLDER", help="write the plots of docs/validation.md, as SVG")
     check.set_defaults(
-        run=lambda o: identify_commands.validate(o.datasets, fit=o.fit, models=o.models.split(","), json=o.json)
+        run=lambda o: identify_commands.validate(
+            o.datasets, fit=o.fit, models=o.models.split(","), json=o.json, plots=o.plots
+        )
     )
 
     warmup = subcommands.add_parser(

@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import orjson
@@ -50,8 +50,9 @@ def _show(progress: "Progress") -> None:
     print(f"{progress.iteration:>3}  {1e3 * progress.distance:6.2f} mm  {values}", file=sys.stderr, flush=True)
 
 
-def validate(datasets: list[str], *, fit: int, models: list[str], json: str | None) -> int:
+def validate(datasets: list[str], *, fit: int, models: list[str], json: str | None, plots: str | None) -> int:
     """Run the published protocols on data sets and print the table."""
+    from app.validation_plots import plots_of
     from dlocore.identify.datasets import PUBLISHED, PUBLISHED_BY, load_datasets
     from dlocore.identify.validation import validate_cable, validate_wire
     from dlocore.machine import machine_line
@@ -59,7 +60,7 @@ def validate(datasets: list[str], *, fit: int, models: list[str], json: str | No
     try:
         cables, wires = load_datasets([Path(d) for d in datasets], fit)
         print(machine_line())
-        out: list[dict[str, object]] = []
+        out: list[dict[str, Any]] = []
         if cables:
             print(
                 f"\nState from frames 0 and 1, all later frames open loop; L1 is the mean |dx| over frames, all "
@@ -86,6 +87,13 @@ def validate(datasets: list[str], *, fit: int, models: list[str], json: str | No
         raise CommandError(str(error), BAD_INPUT) from None
     if json is not None:
         write_output(json, orjson.dumps(out, option=orjson.OPT_INDENT_2 | orjson.OPT_SERIALIZE_NUMPY))
+    if plots is not None:
+        try:
+            Path(plots).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise CommandError(f"can't write {plots}: {error.strerror}", exit_code=1) from None
+        for name, drawn in plots_of(out, PUBLISHED).items():
+            write_output(str(Path(plots) / name), drawn.encode())
     return 0
 
 

@@ -16,7 +16,9 @@ from dlocore.statics import start_grid
 
 Floats = NDArray[np.float64]
 
-RATE = 100.0  # [Hz]
+RATE = 200.0  # [Hz]
+STEPS = 200.0  # [1/s] of the truth
+SWUNG, APART = 0.10, 0.04  # [m] how far both grippers swing together, and each of them beside that
 JAW = 0.05  # [m] between the two markers of a gripper, from which the cable hangs
 U = np.array([0.0, JAW, *np.linspace(0.13, 0.87, 9), 1.0 - JAW, 1.0])  # [m] of the markers; two pairs are held
 HELD = (0, 1, -2, -1)
@@ -27,11 +29,11 @@ STILL = 0.3  # [s] before the grippers start
 class Tracking:
     """How badly markers are tracked: noise [m], share of outliers and their size [m], share of lost markers.
 
-    The held markers are those of grippers, whose places a robot's encoders tell better: `held` is their noise [m].
+    `held` is the noise of the grippers' own markers [m].
     """
 
     noise: float = 1e-3
-    held: float = 1e-4
+    held: float = 1e-3
     outliers: float = 0.05
     size: float = 0.05
     lost: float = 0.10
@@ -54,14 +56,14 @@ def true_cable(rng: np.random.Generator) -> tuple[Cable, Environment]:
     return cable, Environment(drag=about(0.06))
 
 
-def gripper_path(rng: np.random.Generator, times: Floats, planar: bool) -> tuple[Floats, Floats]:
-    """Return displacements (k, 3) [m] and rotation vectors (k, 3) [rad] of a gripper that starts at rest."""
+def gripper_path(rng: np.random.Generator, times: Floats, planar: bool, far: float) -> tuple[Floats, Floats]:
+    """Return displacements (k, 3) of about `far` [m] and rotation vectors (k, 3) [rad] that start at rest."""
     t = np.maximum(times - STILL, 0.0)
     ramp = 1.0 - np.exp(-((t / 0.5) ** 3))
     shift, turn = np.zeros((len(t), 3)), np.zeros((len(t), 3))
     for frequency in (0.6, 1.1, 1.7):
         phase = rng.uniform(0.0, 2.0 * np.pi, 6)
-        size = rng.normal(0.0, 0.045, 3) / np.sqrt(frequency)
+        size = rng.normal(0.0, far, 3) / np.sqrt(frequency)
         bend = rng.normal(0.0, 0.12, 3)
         shift += ramp[:, None] * size * np.sin(2.0 * np.pi * frequency * t[:, None] + phase[:3])
         turn += ramp[:, None] * bend * np.sin(2.0 * np.pi * frequency * t[:, None] + phase[3:])
@@ -77,11 +79,12 @@ def scene_of(rng: np.random.Generator, cable: Cable, environment: Environment, s
     x = np.linspace(0.0, 1.0, 41)
     sag = np.column_stack([0.5 * x - 0.04 * np.sin(2 * np.pi * x), 0.0 * x, -1.55 * x * (1.0 - x)])
     sag *= cable.length / np.linalg.norm(np.diff(sag, axis=0), axis=1).sum()
+    swing = gripper_path(rng, times, planar, SWUNG)[0]
     grasps = []
     for u, at in ((0.0, sag[0]), (cable.length, sag[-1])):
-        shift, turn = gripper_path(rng, times, planar)
+        shift, turn = gripper_path(rng, times, planar, APART)
         turns = Rotation.from_rotvec(turn).as_quat()[:, [3, 0, 1, 2]]
-        way = Waypoints(times=times, positions=at + shift, orientations=turns)
+        way = Waypoints(times=times, positions=at + swing + shift, orientations=turns)
         grasps.append(Grasp(u=u, hold="tangent", path=way))
     return Scene(
         cable=cable,
@@ -103,7 +106,7 @@ def simulated(
     planar: bool = False,
     n_u: int = 17,
 ) -> Recording:
-    """Return a recording of a simulated motion, marched twice as finely in time as it is replayed, and on a finer net.
+    """Return a recording of a simulated motion, marched twice as finely in time as it is replayed.
 
     Args:
         seed: of the motion and of the tracking.
@@ -121,10 +124,10 @@ def simulated(
     problem = pose(scene)
     monitor = Monitor(None, None, None)
     grid = start_grid(problem, n_u, monitor)
-    steps = 2 * round(seconds * RATE)
+    steps = round(seconds * STEPS)
     motion = march(problem, grid, steps, monitor)
     assert not motion.stopped, "the truth must be a whole motion"
-    states = problem.world(motion.states[::2])[..., :3]
+    states = problem.world(motion.states[:: round(STEPS / RATE)])[..., :3]
     markers = np.einsum("mi,kid->kmd", design_matrix(grid.knots, np.clip(U - JAW, 0.0, between)), states)
     for outer, tip, sign in ((0, 0.0, -1.0), (-1, between, 1.0)):
         along = (design_matrix(grid.knots, [tip], 1) @ states)[:, 0]

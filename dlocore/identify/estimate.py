@@ -23,8 +23,13 @@ _FOLLOWED = 1e-5  # step of a coordinate in which a motion beside is followed
 _MARCHED = 2e-2  # where it is marched, whose tolerance would drown a smaller one
 _KNEE = 1.5  # robust deviations from which on a residual counts by its size, not its square
 _LEAST_DEVIATION = 2e-4  # [m] of the residuals, below which nothing is tracked
+_SHORT = 1.0  # [s] of the windows on which a search begins
+_MOST_SHORT = 8  # of them
+_COARSE = 13  # control points that they are replayed with at most
+_BEGINNING = 4  # iterations on them
 _MOST_CHANGE = 1.0  # of a coordinate in one iteration
 _PRIOR_LOG = 3.0  # standard deviation of the logarithms: a factor of 20 either way is no surprise
+_HOPED = 1e-2  # relative decrease that a search may end without, when no step is better
 _CONVERGED = 1e-3  # relative decrease of the cost
 
 Status = Literal["converged", "max_iterations"]
@@ -169,9 +174,34 @@ def identify(
     given = start or Candidate(cable=cable or cable_of(recordings), environment=environment or Environment())
     markers = max(cast(Floats, r.markers).shape[1] for r in windows)
     candidate = prepared(given, tuple(p.name for p in chosen), clamps, markers)
-    search = Search(windows, chosen, resolution or Resolution(), cancelled)
+    resolution = resolution or Resolution()
+    if start is None:
+        candidate = _begun(recordings, candidate, chosen, resolution, cancelled)
+    search = Search(windows, chosen, resolution, cancelled)
     state = search.run(candidate, iterations, on_progress)
     return search.result(state, perf_counter() - began)
+
+
+def _begun(
+    recordings: Sequence[Recording],
+    candidate: Candidate,
+    chosen: tuple[Parameter, ...],
+    resolution: Resolution,
+    cancelled: Callable[[], bool] | None,
+) -> Candidate:
+    """Return a candidate improved on short windows, where a wrong guess has no time to grow into another motion.
+
+    Numbers of the cable alone are sought here: the others need none but a fair guess of these.
+    """
+    moving = [r for r in recordings if not r.static]
+    scalars = tuple(p for p in chosen if p.name in DEFAULT)
+    short = [w for w in cut(moving, _SHORT) if np.isfinite(cast(Floats, w.markers)[..., 0]).any(axis=0).all()]
+    if not scalars or len(short) <= len(moving):
+        return candidate
+    picked = np.unique(np.linspace(0, len(short) - 1, _MOST_SHORT).round().astype(int))
+    coarse = replace(resolution, n_u=min(resolution.n_u, _COARSE))
+    search = Search([short[i] for i in picked], scalars, coarse, cancelled)
+    return search.run(candidate, _BEGINNING, None).candidate
 
 
 def cable_of(recordings: Sequence[Recording]) -> Cable:
@@ -252,11 +282,12 @@ class Search:
             before = self.cost(r, deviation, x)
             free = self._free(x, g)
             found: State | None = None
-            after = before
+            after, hoped = before, 0.0
             for _ in range(6):
                 step = np.zeros(len(x))
                 matrix = H[np.ix_(free, free)]
                 step[free] = -np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), g[free])
+                hoped = hoped or -0.5 * float(g[free] @ step[free])
                 trial = self._bounded(x + np.clip(step, -_MOST_CHANGE, _MOST_CHANGE))
                 candidate = self.candidate(state.candidate, trial)
                 try:
@@ -269,8 +300,8 @@ class Search:
                     found = tried
                     break
                 damping = max(10.0 * damping, 1e-2)
-            if found is None:
-                status = "converged"
+            if found is None:  # no better one is near; where much was hoped for, that is no minimum
+                status = "converged" if hoped < _HOPED * before else "max_iterations"
                 break
             damping = max(0.2 * damping, 1e-7)
             state = found

@@ -9,7 +9,7 @@ from typing import Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline, UnivariateSpline
+from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from dlocore.cable import Cable
@@ -19,6 +19,7 @@ from dlocore.grid import Grid
 from dlocore.identify.frames import across, carried, tilted, turned_from, with_sections
 from dlocore.identify.span import Span
 from dlocore.identify.start import StartFit
+from dlocore.identify.tracks import held_paths
 from dlocore.paths import Waypoints
 from dlocore.problem import Problem, pose
 from dlocore.recordings import Hold, Recording
@@ -32,9 +33,6 @@ from dlocore.statics import start_grid
 Floats = NDArray[np.float64]
 
 _SLACK = 1.003  # of the cable between two grippers: held markers farther apart are brought nearer
-_JUMP = 6.0  # robust deviations beyond which a sample of a held marker is an outlier
-_FLOOR = 5e-4  # [m] below which no sample is one
-_PASSES = 20  # of looking for outliers
 _REST_FRAMES = 8  # from which on a start can be seen to be at rest
 _CARRIED = 3  # tangents from a marker to the next, over which a frame is carried
 _STILL = 0.01  # [m/s]: slower than this, or than noise lets tell, nothing moves
@@ -143,7 +141,7 @@ class Replay:
         self.steps = max(8, round(self.horizon / resolution.step))
         self.step_times = np.linspace(0.0, self.horizon, self.steps + 1)
         self.markers = cast(Floats, recording.markers)[frames:]
-        clean = _held_paths(recording, shake)
+        clean = held_paths(recording, shake)
         self.holds = recording.holds
         self.clamps = tuple(h for h in self.holds if h.towards is not None)
         self.references = self._references(clean) if references is None else references
@@ -355,67 +353,6 @@ def common_references(recordings: Sequence[Recording]) -> Floats | None:
     return np.array(found).reshape(-1, 3)
 
 
-def _held_paths(recording: Recording, shake: np.random.Generator | None) -> dict[int, CubicSpline]:
-    """Return smooth paths of the held markers: without outliers, as smooth as their noise asks for."""
-    times = cast(Floats, recording.times)
-    wanted = {h.marker for h in recording.holds} | {h.towards for h in recording.holds if h.towards is not None}
-    out = {}
-    for marker in wanted:
-        x = cast(Floats, recording.markers)[:, marker]
-        keep = np.isfinite(x[:, 0])
-        t, x = times[keep], x[keep]
-        t, x = _without_outliers(t, x)
-        smooth = _smoothed(t, x, times)
-        if shake is not None:
-            noise = np.sqrt(((x - smooth(t)) ** 2).mean())
-            smooth = _smoothed(t, smooth(t) + noise * shake.standard_normal(x.shape), times)
-        out[marker] = smooth
-    return out
-
-
-def _without_outliers(t: Floats, x: Floats) -> tuple[Floats, Floats]:
-    """Return the samples without those that leave the cubic through their four neighbours, the worst ones first."""
-    for _ in range(_PASSES):
-        if len(t) < 8:
-            break
-        away = _leaps(t, x)
-        limit = max(_JUMP * 1.4826 * float(np.median(away)), _FLOOR)
-        around = np.concatenate([[0.0, 0.0], away, [0.0, 0.0]])
-        worst = np.max([around[i : i + len(away)] for i in range(5)], axis=0)
-        out = (away > limit) & (away >= worst)
-        if not out.any():
-            break
-        t, x = t[~out], x[~out]
-    return t, x
-
-
-def _leaps(t: Floats, x: Floats) -> Floats:
-    """Return the distance (k,) of samples from the cubic through four neighbours, at the ends through the nearest."""
-    around = np.clip(np.arange(len(t)), 2, len(t) - 3)[:, None] + np.array([-2, -1, 0, 1, 2])
-    own = np.arange(len(t))[:, None]
-    others = around[around != own].reshape(len(t), 4)
-    value = np.zeros_like(x)
-    for a in range(4):
-        share = np.ones(len(t))
-        for b in range(4):
-            if b != a:
-                share *= (t - t[others[:, b]]) / (t[others[:, a]] - t[others[:, b]])
-        value += share[:, None] * x[others[:, a]]
-    return np.asarray(np.linalg.norm(x - value, axis=1))
-
-
-def _smoothed(t: Floats, x: Floats, times: Floats) -> CubicSpline:
-    """Return the spline through `times` of samples x (k, 3), as smooth as their noise asks for.
-
-    The noise is told from third differences, to which a path that is well sampled adds little.
-    """
-    if len(t) < 8:
-        raise SceneError("markers", f"{len(t)} samples of a held marker", "at least 8 that are no outliers")
-    noise = 1.4826 * np.median(np.abs(np.diff(x, n=3, axis=0)), axis=0) / np.sqrt(20.0)
-    columns = [UnivariateSpline(t, x[:, d], k=3, s=len(t) * noise[d] ** 2, ext=3)(times) for d in range(3)]
-    return CubicSpline(times, np.column_stack(columns))
-
-
 def _rests(recording: Recording, frames: int) -> bool:
     """Tell whether no marker moves in the first frames, as far as their noise lets tell."""
     times, markers = cast(Floats, recording.times)[:frames], cast(Floats, recording.markers)[:frames]
@@ -454,7 +391,8 @@ def _start_markers(
             scale = max(1.4826 * float(np.median(away)), 1e-5)
             w = 1.0 / (1.0 + (away / (2.0 * scale)) ** 2)
         if shake is not None and len(t) > order + 1:
-            noise = np.sqrt(((w[:, None] * (x - A @ c)) ** 2).sum() / (3.0 * (w * w).sum() - 3.0 * (order + 1) + 1e-9))
+            spare = max(float((w * w).sum()) - (order + 1), 1.0)
+            noise = np.sqrt(((w[:, None] * (x - A @ c)) ** 2).sum() / (3.0 * spare))
             c = c + np.linalg.pinv(A) @ (noise * shake.standard_normal(x.shape))
         seen.append(i)
         places.append(c[0])

@@ -9,7 +9,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.cli import main
-from benchmarks.simulated_recordings import simulated
+from benchmarks.simulated_recordings import Tracking, simulated
 from dlocore import Cable, Environment
 from dlocore.recordings import save_recording
 
@@ -113,3 +113,22 @@ def test_the_command_line_names_what_is_wrong(tmp_path: Path, capsys: pytest.Cap
     assert main(["identify", str(tmp_path / "missing.npz")]) == 2
     assert main(["validate", str(tmp_path / "missing")]) == 2
     assert "missing" in capsys.readouterr().err
+
+
+def test_a_cable_is_validated_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    clean = Tracking(noise=2e-5, held=2e-5, outliers=0.0, lost=0.0)
+    windows = [simulated(k, 1.0, cable=CABLE, environment=Environment(drag=0.06), tracking=clean) for k in (3, 4, 5)]
+    np.savez(tmp_path / "cable_train.npz", markers=np.array([np.asarray(w.markers)[::2] for w in windows]))
+    (tmp_path / "cable_train.json").write_text(
+        json.dumps({"held_markers": [0, 1, -2, -1], "nominal_linear_density": 0.05})
+    )
+    numbers, plots = tmp_path / "numbers.json", tmp_path / "plots"
+    asked = ["validate", str(tmp_path / "cable_train.npz"), "--fit", "1", "--models", "scalars"]
+    assert main([*asked, "--json", str(numbers), "--plots", str(plots)]) == 0
+    assert "cable   scalars" in capsys.readouterr().out
+    found = json.loads(numbers.read_text())[0]
+    assert len(found["windows"]) == 2
+    # the cable is one that the model describes; what is left is that its length is told by chords, not arcs
+    assert max(found["windows"].values()) < 2e-3
+    for name in ("validation-windows.svg", "validation-time.svg"):
+        assert (plots / name).read_text().startswith("<svg")

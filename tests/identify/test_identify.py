@@ -30,8 +30,9 @@ def test_a_clean_recording_is_replayed_as_it_was() -> None:
     replay = Replay(simulated(3, 2.0, cable=CABLE, environment=DRAG, tracking=clean), Resolution(n_u=17, step=0.005))
     predicted = replay.play(Candidate(cable=CABLE, environment=DRAG)).predicted
     away = np.linalg.norm((predicted - replay.markers)[:, replay.recording.free], axis=2)
-    # of a motion of half a metre; net and steps are those of the truth, what is left is how frames are interpolated
-    assert away.max() < 1e-4
+    # net and steps are those of the truth, begun between two of them: what is left is the second order of steps of 5 ms
+    # in a motion of up to half a metre within half a second
+    assert away.max() < 4e-4
 
 
 def test_a_badly_tracked_recording_gives_back_its_cable() -> None:

@@ -1,0 +1,104 @@
+"""Smooth paths of held markers: without outliers, as smooth as their noise asks for."""
+
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from dlocore.errors import SceneError
+from dlocore.recordings import Recording
+from dlocore.smoothing import smooth
+
+Floats = NDArray[np.float64]
+
+_JUMP = 6.0  # robust deviations beyond which a sample of a held marker is an outlier
+_FLOOR = 5e-4  # [m] below which no sample is one
+_PASSES = 20  # of looking for outliers
+_AWAY = 4.0  # robust deviations from the smooth path beyond which a sample is an outlier that was small enough to pass
+_MOST = 1.3  # times the noise that neighbouring samples tell
+_CROWD = 7  # samples, of which most are no outliers
+_LEAST = 8  # samples
+_SPANS = 0.7  # of the path's spline for each sample at most
+_KNOT = 0.02  # [s] between its knots at least
+_MOST_SPANS = 300  # with more the likelihood of the smoothest ones drowns in rounding
+
+
+def held_paths(recording: Recording, shake: np.random.Generator | None) -> dict[int, CubicSpline]:
+    """Return smooth paths of the held markers: without outliers, as smooth as their noise asks for."""
+    times = cast(Floats, recording.times)
+    wanted = {h.marker for h in recording.holds} | {h.towards for h in recording.holds if h.towards is not None}
+    out = {}
+    for marker in wanted:
+        x = cast(Floats, recording.markers)[:, marker]
+        keep = np.isfinite(x[:, 0])
+        t, x = times[keep], x[keep]
+        t, x = _without_outliers(t, x)
+        path = _smoothed(t, x, times)
+        if shake is not None:
+            noise = 1.4826 * float(np.median(np.abs(x - path(t))))
+            path = _smoothed(t, path(t) + noise * shake.standard_normal(x.shape), times)
+        out[marker] = path
+    return out
+
+
+def _without_outliers(t: Floats, x: Floats) -> tuple[Floats, Floats]:
+    """Return the samples without those that leave the cubic through their four neighbours, the worst ones first."""
+    for _ in range(_PASSES):
+        if len(t) < 8:
+            break
+        away = _leaps(t, x)
+        limit = max(_JUMP * 1.4826 * float(np.median(away)), _FLOOR)
+        around = np.concatenate([[0.0, 0.0], away, [0.0, 0.0]])
+        worst = np.max([around[i : i + len(away)] for i in range(5)], axis=0)
+        out = (away > limit) & (away >= worst)
+        if not out.any():
+            break
+        t, x = t[~out], x[~out]
+    return t, x
+
+
+def _leaps(t: Floats, x: Floats) -> Floats:
+    """Return the distance (k,) of samples from the cubic through four neighbours, at the ends through the nearest."""
+    around = np.clip(np.arange(len(t)), 2, len(t) - 3)[:, None] + np.array([-2, -1, 0, 1, 2])
+    own = np.arange(len(t))[:, None]
+    others = around[around != own].reshape(len(t), 4)
+    value = np.zeros_like(x)
+    for a in range(4):
+        share = np.ones(len(t))
+        for b in range(4):
+            if b != a:
+                share *= (t - t[others[:, b]]) / (t[others[:, a]] - t[others[:, b]])
+        value += share[:, None] * x[others[:, a]]
+    return np.asarray(np.linalg.norm(x - value, axis=1))
+
+
+def _smoothed(t: Floats, x: Floats, times: Floats) -> CubicSpline:
+    """Return the spline through `times` of samples x (k, 3), whose smoothness has the largest likelihood.
+
+    Samples that are far from it are left out, and it is made again. Before the first and after the last that is left
+    it goes on straight.
+
+    Raises:
+        SceneError: too few samples are left.
+    """
+    keep = np.ones(len(t), dtype=bool)
+    middle = x.mean(axis=0)
+    # third differences, to which a path that is well sampled adds little, bound the noise: else it could be all noise
+    most = _MOST * 1.4826 * float(np.median(np.abs(np.diff(x, n=3, axis=0)))) / np.sqrt(20.0) if len(t) > 3 else np.inf
+    for _ in range(_PASSES):
+        if keep.sum() < _LEAST:
+            raise SceneError("markers", f"{keep.sum()} samples of a held marker", "at least 8 that are no outliers")
+        first, last = t[keep][0], t[keep][-1]
+        spans = int(np.clip(round(min(_SPANS * keep.sum(), (last - first) / _KNOT)), _LEAST, _MOST_SPANS))
+        path = smooth(t[keep] - first, x[keep] - middle, np.ones(keep.sum()), last - first, spans, most, np.ones(spans))
+        away = x - middle - path(np.clip(t, first, last) - first)
+        limit = max(_AWAY * 1.4826 * float(np.median(np.abs(away[keep]))), _FLOOR)
+        near = np.linalg.norm(away, axis=1) <= limit
+        near |= np.convolve(~near, np.ones(_CROWD), "same") > 0.5 * _CROWD  # so many at once are none: it is too smooth
+        if (near == keep).all():
+            break
+        keep = near
+    inside = np.clip(times, first, last)
+    slope = path.derivative()(inside - first)
+    return CubicSpline(times, middle + path(inside - first) + (times - inside)[:, None] * slope)
