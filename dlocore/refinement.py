@@ -247,7 +247,7 @@ def _error(changes: Changes) -> float:
 
 
 def _parts(changes: Changes, level: Level) -> dict[str, float] | None:
-    """Return the parts of the error [m] of a level, of space and time as far as they are known apart; None if unknown."""
+    """Return the parts of the error [m] of a level, space and time as far as they are known apart, or None."""
     if not np.isfinite(_error(changes)):
         return None
     known = list(_FINER) if all(direction in changes for direction in _FINER) else ["both"]
