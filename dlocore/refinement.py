@@ -44,7 +44,7 @@ _MOST_POINTS = 220  # along the cable
 _FINER = {"space": 1.5, "time": 2.0}
 _FINE_IN_TIME = 0.3  # of the target: a time spline that misses its march by less keeps its knots as the steps halve
 _AT_BEST = 0.2  # of an error, is left by one refinement: what is still too much after all of them is not begun
-_FAILURES = 3  # refinements in time of a march that found no equilibrium
+_FAILURES = 2  # refinements in time of a march that found no equilibrium
 
 
 # by direction, "space", "time" or "both": how far its two last refinements moved the surface [m]
@@ -145,13 +145,12 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
                     record_level(problem, level, monitor)
                     size = more
                     continue
+            if level.motion.stopped and not best.motion.stopped:
                 if estimate <= enough:
                     break
                 status, message = march_status(problem, level)
                 errors = {"grid": best.change} if np.isfinite(best.change) else None
-                if status == "converged":  # each step of a motion that no cable makes
-                    status, message = "max_iterations", f"It strains the cable by {level.motion.largest_strain:.0%}."
-                return Outcome(best, status, f"A finer grid failed: {message}", errors)
+                return Outcome(best, status, f"A finer grid was not finished: {message}", errors)
             changes[direction] = level.change, changes.get(direction, (np.inf, np.inf))[0]
             estimate = max(_error(changes), MISSED_COUNTS * level.missed)
             rough = level.change > ROUGH * length
