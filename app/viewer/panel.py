@@ -110,10 +110,10 @@ class Panel:
             self._add_result()
         with tabs.add_tab("View"):
             self._add_view()
-        with tabs.add_tab("Recording"):
-            self.recording = RecordingForm(self._gui, recording)
-        with tabs.add_tab("Share"):
+        with tabs.add_tab("Files"):
             self._add_share()
+            with self._gui.add_folder("Tracked cable"):
+                self.recording = RecordingForm(self._gui, recording)
         self._forms = (self._gripper, self._cable, self._surroundings, self._effects, self._quality)
         self._draft = draft
 

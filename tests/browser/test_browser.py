@@ -43,7 +43,7 @@ def on_screen(page: Page, x: float, y: float) -> tuple[float, float]:
 
 def kept_run(page: Page | Frame) -> str:
     """Keep the run on show; return its id."""
-    page.get_by_role("tab", name="Share").click()
+    page.get_by_role("tab", name="Files").click()
     page.get_by_role("button", name="Keep this run").click()
     return page.locator("[data-run]").get_attribute("data-run") or ""
 

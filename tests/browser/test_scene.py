@@ -42,7 +42,7 @@ def downloaded(page: Page, button: str) -> Path:
 
 def test_a_scene_is_loaded_from_a_file_and_saved_again(service, witness, tmp_path):
     page = open_scene(witness, service)
-    page.get_by_role("tab", name="Share").click()
+    page.get_by_role("tab", name="Files").click()
     file = tmp_path / "arc.json"
     file.write_text(json.dumps(ARC))
     with page.expect_file_chooser() as choosing:
@@ -56,7 +56,7 @@ def test_a_scene_is_loaded_from_a_file_and_saved_again(service, witness, tmp_pat
 
 def test_a_saved_playback_plays_offline_and_asks_nobody(service, witness):
     page = open_scene(witness, service)
-    page.get_by_role("tab", name="Share").click()
+    page.get_by_role("tab", name="Files").click()
     file = downloaded(page, "Save playback.html")
     context = page.context.browser.new_context(viewport={"width": 400, "height": 300}, offline=True)
     page.close()  # two pictures at once are much for a renderer without a GPU
@@ -84,7 +84,7 @@ def test_a_saved_playback_plays_offline_and_asks_nobody(service, witness):
 
 def test_a_picture_of_the_scene_is_saved_larger_than_it_is_on_the_screen(service, witness):
     page = open_scene(witness, service)
-    page.get_by_role("tab", name="Share").click()
+    page.get_by_role("tab", name="Files").click()
     picture = Image.open(downloaded(page, "Save picture.png"))
     assert picture.size == (1920, 1080)
     assert np.asarray(picture.convert("L")).std() > 1.0  # something is drawn
@@ -118,7 +118,7 @@ def test_two_tabs_have_their_own_scenes(service, witness):
             page.get_by_role("button", name="Add").first.click()
             expect(page.get_by_role("combobox", name="Gripper")).to_have_value("2 at 1 m")
         page.bring_to_front()
-        page.get_by_role("tab", name="Share").click()
+        page.get_by_role("tab", name="Files").click()
         assert len(json.loads(downloaded(page, "Download scene.json").read_bytes())["primitives"]) == count
     assert witness.errors == []
 
@@ -129,7 +129,7 @@ def test_a_ready_scene_opens_by_its_address_and_asks_no_other_host(service, witn
     page = witness.page
     page.goto(f"{service.address}/scene/?example={name}")
     page.wait_for_selector('[data-status="converged"]')
-    page.get_by_role("tab", name="Share").click()
+    page.get_by_role("tab", name="Files").click()
     document = json.loads(downloaded(page, "Download scene.json").read_bytes())
     assert document == example(name)
     assert witness.errors == []
@@ -140,7 +140,7 @@ def test_a_recording_is_opened_and_its_error_is_read_on_the_timeline(service, wi
     file = tmp_path / "shaken.npz"
     save_recording(simulated(6, 1.2), file)
     page = open_scene(witness, service)
-    page.get_by_role("tab", name="Recording").click()
+    page.get_by_role("tab", name="Files").click()
     with page.expect_file_chooser() as choosing:
         page.get_by_role("button", name="Open a recording").click()
     choosing.value.set_files(file)

@@ -1,4 +1,4 @@
-"""The tab of recordings: open one, choose its window, identify the cable, keep it as a preset."""
+"""The recording of a tracked cable: open one, choose its window, identify the cable, keep it as a preset."""
 
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
