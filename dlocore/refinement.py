@@ -38,6 +38,7 @@ TORN = 0.2  # axial strain: no cable of this kind follows
 FOLDED = 0.4  # of |r'| between the points that watch over the length: less is a fold that no energy sees
 _LOOKS = 12  # states of a motion that are searched for folds
 MOST_WORK = 4e6  # control points times steps of one march in the plane; each coordinate more costs twice the time
+CONTACT_COSTS = 4  # times the work of a march without, at least
 AUTO_SHARE = 0.25  # of it for who asked for no target
 MISSED_COUNTS = 3.0  # what the time spline misses of its march, times this, is the least that the error may be
 _MOST_POINTS = 220  # along the cable
@@ -230,7 +231,8 @@ def _finer(size: Size, direction: str, trembles: bool) -> Size:
 
 def _affordable(size: Size, problem: Problem, most_work: float) -> Size | None:
     """Return a size, or None where a march of it takes too long."""
-    work = size.n_u * size.steps * 2 ** (problem.nc - 2)
+    touches = problem.contact is not None or problem.self_contact is not None
+    work = size.n_u * size.steps * 2 ** (problem.nc - 2) * (CONTACT_COSTS if touches else 1)
     return size if size.n_u <= _MOST_POINTS and work <= most_work else None
 
 
