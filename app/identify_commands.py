@@ -54,7 +54,7 @@ def validate(datasets: list[str], *, fit: int, models: list[str], json: str | No
     """Run the published protocols on data sets and print the table."""
     from app.validation_plots import plots_of
     from dlocore.identify.datasets import PUBLISHED, PUBLISHED_BY, load_datasets
-    from dlocore.identify.validation import validate_cable, validate_wire
+    from dlocore.identify.validation import each_repeat, validate_cable, validate_wire
     from dlocore.machine import machine_line
 
     try:
@@ -83,6 +83,9 @@ def validate(datasets: list[str], *, fit: int, models: list[str], json: str | No
                 published = wire.published_bending_stiffness
                 print(_wire_row(settled, published), flush=True)
                 out.append({"wire": wire.name, "fitted": list(names), "rms": settled.rms.tolist()})
+            alone = each_repeat(wire)
+            print(f"{wire.name:<8}each repeat alone: {', '.join(f'{1e3 * x:.1f}' for x in alone)} mm", flush=True)
+            out.append({"wire": wire.name, "fitted": ["each repeat alone"], "rms": alone.tolist()})
     except SceneError as error:
         raise CommandError(str(error), BAD_INPUT) from None
     if json is not None:

@@ -21,6 +21,7 @@ _FOLLOWED = 1e-5  # step of a coordinate in which a motion beside is followed
 _FIRST = 1.0  # standard deviation of a logarithm, or of a share of a usual value, before anything was seen
 _FORGOTTEN = 0.02  # that is added to it in every update: cables warm up, wear, are changed
 _STEP = 0.3  # of a coordinate at most in one update
+_AT_ONCE = 2  # parameters that an update improves: each costs a motion beside the replayed one
 _BLOCK = 25  # frames whose residuals hang together: so many count as one
 
 
@@ -44,8 +45,8 @@ class Update:
 class Identifier:
     """Takes frames as they arrive and keeps an estimate of the cable.
 
-    Every update replays the frames of the last `window` seconds once and makes one Gauss-Newton step, with the last
-    estimate and its covariance, widened a little, as prior. Not every frame needs an update.
+    Every update replays the frames of the last `window` seconds once and makes one Gauss-Newton step of two parameters,
+    by turns, with the last estimate and its covariance, widened a little, as prior. Not every frame needs an update.
 
     Args:
         u: material coordinates of the markers (m,) [m].
@@ -81,6 +82,7 @@ class Identifier:
         start = Candidate(cable=cable, environment=environment or Environment())
         self._candidate = prepared(start, tuple(p.name for p in self._chosen), 2)
         self._precision = np.eye(len(self._chosen)) / _FIRST**2
+        self._next = 0
 
     @property
     def cable(self) -> Cable:
@@ -106,6 +108,13 @@ class Identifier:
         self._times.append(float(time))
         self._markers.append(x)
 
+    def _turn(self) -> list[int]:
+        """Return the parameters that this update improves: two of them, and the next two in the next one."""
+        count = len(self._chosen)
+        found = sorted({(self._next + i) % count for i in range(min(_AT_ONCE, count))})
+        self._next = (self._next + _AT_ONCE) % count
+        return found
+
     def update(self) -> Update | None:
         """Improve the estimate by the latest frames; None while there are too few, or nothing can be replayed."""
         if len(self._times) < self._frames:
@@ -119,23 +128,27 @@ class Identifier:
             length=self._length,
             gravity=self._candidate.environment.gravity,
         )
-        replay = Replay(recording, self._resolution)
-        played = replay.play(self._candidate)
+        try:
+            replay = Replay(recording, self._resolution)
+            played = replay.play(self._candidate)
+        except SceneError:  # outliers where the window begins: no cable lies so
+            return None
         if not replay.differentiable(played):
             return None
         free = recording.free
         x = np.array([p.coordinate(p.get(self._candidate)) for p in self._chosen])
         try:
             known = replay.play_beside(played, self._candidate)
-            columns = []
-            for j, p in enumerate(self._chosen):
+            columns = np.zeros((known[:, free].size, len(self._chosen)))
+            for j in self._turn():
+                p = self._chosen[j]
                 moved = p.put(self._candidate, p.value(x[j] + _FOLLOWED))
-                columns.append(((replay.play_beside(played, moved) - known)[:, free] / _FOLLOWED).ravel())
+                columns[:, j] = ((replay.play_beside(played, moved) - known)[:, free] / _FOLLOWED).ravel()
         except ValueError:
             return None
         away = (known - replay.markers)[:, free]
         r = np.where(np.isfinite(away), away, 0.0).ravel()
-        J = np.column_stack(columns)
+        J = columns
         J[~np.isfinite(away).ravel()] = 0.0
         deviation = robust_deviation(r)
         w = weights(r, deviation) / (deviation**2 * _BLOCK)

@@ -34,6 +34,8 @@ Floats = NDArray[np.float64]
 
 _SLACK = 1.003  # of the cable between two grippers: held markers farther apart are brought nearer
 _REST_FRAMES = 8  # from which on a start can be seen to be at rest
+_REWEIGHTED = 12  # times at most that outliers of the start are weighed down
+_SETTLED = 1e-3  # change of a weight
 _CARRIED = 3  # tangents from a marker to the next, over which a frame is carried
 _STILL = 0.01  # [m/s]: slower than this, or than noise lets tell, nothing moves
 
@@ -385,11 +387,13 @@ def _start_markers(
         t, x = times[keep] - at, markers[keep, i]
         A = np.vander(t, order + 1, increasing=True)
         w = np.ones(len(t))
-        for _ in range(1 if frames < 6 else 12):
+        for _ in range(1 if frames < 6 else _REWEIGHTED):
             c = np.linalg.lstsq(A * w[:, None], x * w[:, None], rcond=None)[0]
             away = np.linalg.norm(x - A @ c, axis=1)
             scale = max(1.4826 * float(np.median(away)), 1e-5)
-            w = 1.0 / (1.0 + (away / (2.0 * scale)) ** 2)
+            before, w = w, 1.0 / (1.0 + (away / (2.0 * scale)) ** 2)
+            if np.abs(w - before).max() < _SETTLED:
+                break
         if shake is not None and len(t) > order + 1:
             spare = max(float((w * w).sum()) - (order + 1), 1.0)
             noise = np.sqrt(((w[:, None] * (x - A @ c)) ** 2).sum() / (3.0 * spare))

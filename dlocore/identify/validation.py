@@ -1,7 +1,7 @@
 """Validation against measurements: parameters fitted on some windows of a set, and the others predicted."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import process_time
 from typing import Literal
 
@@ -122,3 +122,13 @@ def validate_wire(wire: HangingWire, names: Sequence[str] = ("bending_stiffness"
     )
     distances = np.concatenate([fit.distances for fit in found.fits])
     return WireValidation(name=wire.name, names=tuple(names), found=found, rms=np.sqrt((distances**2).mean(axis=1)))
+
+
+def each_repeat(wire: HangingWire, names: Sequence[str] = ("bending_stiffness", "clamp_angles")) -> Floats:
+    """Return the rms distance (k,) [m] of each repeat when it is fitted alone."""
+    whole, out = wire.recording, []
+    for shape in np.asarray(whole.markers):
+        alone = replace(whole, times=[0.0], markers=shape[None])
+        found = identify([alone], environment=Environment(), names=tuple(names), resolution=Resolution(n_u=WIRE_GRID))
+        out.append(np.sqrt((found.fits[0].distances ** 2).mean()))
+    return np.array(out)
