@@ -26,7 +26,7 @@ def with_control(prediction: Prediction, control: Floats) -> Prediction:
 
 def with_reaction(prediction: Prediction, factor: float) -> Prediction:
     grasps = tuple(replace(g, reaction=factor * g.reaction) for g in prediction.grasps)
-    return replace(prediction, grasps=grasps)
+    return replace(prediction, report_grasps=lambda: grasps)
 
 
 def test_a_sound_motion_keeps_all_laws(sound: Prediction):
