@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help run test check format bench lock clean distclean
+.PHONY: help run setup compile test check format bench lock clean distclean
 
 help:
 	@echo 'make run     install into $(VENV) and serve the page, the 3D scene and the API on http://127.0.0.1:8000'
@@ -19,11 +19,15 @@ help:
 run: $(VENV)/.run-installed
 	$(BIN)/dlo serve
 
-test: $(VENV)/.dev-installed
-	@command -v chromium >/dev/null || command -v chromium-browser >/dev/null || command -v google-chrome >/dev/null || \
-		echo 'No Chromium found: the browser tests will be skipped.'
+setup: $(VENV)/.dev-installed
+
+compile: $(VENV)/.dev-installed
 	@echo 'Compiling; this takes a minute or two the first time.'
 	$(BIN)/python -c 'import dlocore; dlocore.warm_up()'
+
+test: compile
+	@command -v chromium >/dev/null || command -v chromium-browser >/dev/null || command -v google-chrome >/dev/null || \
+		echo 'No Chromium found: the browser tests will be skipped.'
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(PYTEST_ARGS)
 
 check: $(VENV)/.dev-installed
