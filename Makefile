@@ -11,6 +11,7 @@ help:
 	@echo 'make run     install into $(VENV) and serve the page, the 3D scene and the API on http://127.0.0.1:8000'
 	@echo 'make test    run all tests (PYTEST_ARGS="-m '"'not slow'"'" for the quick ones)'
 	@echo 'make check   ruff and mypy'
+	@echo 'make setup   install what the tests need; make compile compiles the solver, too'
 	@echo 'make format  format the code'
 	@echo 'make bench   measure the predictor on the reference cases'
 	@echo 'make lock    resolve the locked requirements anew'
