@@ -28,6 +28,7 @@ from dlocore.spline import uniform_knots
 Floats = NDArray[np.float64]
 
 MISSED = 0.02  # of the length: a time spline that misses its march by more is no answer
+_TOO_LATE = " The time limit passed before its error was estimated."
 SAFETY = 1.5  # times the distance to a finer march: what a slowly converging motion may be off beyond it
 
 
@@ -159,10 +160,10 @@ def _companion(problem: Problem, quality: Quality, level: Level, monitor: Monito
         monitor.check()
         finer = run_level(problem, n_u, n_t, round(FINER * given_steps(quality.n_t)), monitor, booked=False)
     except TimeIsUp:
-        return None, " The time limit passed before its error was estimated."
+        return None, _TOO_LATE
     monitor.phase("estimate")
     if finer.motion.stopped == "time":
-        return None, " The time limit passed before its error was estimated."
+        return None, _TOO_LATE
     if finer.motion.stopped:
         return None, " Its error is not known: the finer march to compare it with found no equilibrium."
     return SAFETY * distance(level, finer, problem), ""

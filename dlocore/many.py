@@ -1,10 +1,10 @@
 """Many predictions at once, on all processors."""
 
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
-from threading import Event, Lock
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from threading import Event
 
-from dlocore.errors import Cancelled, SceneError, number
+from dlocore.errors import SceneError, number
 from dlocore.front import predict
 from dlocore.machine import usable_cores
 from dlocore.prediction import Prediction
@@ -36,44 +36,20 @@ def predict_many(
         Cancelled: `cancelled` returned True.
     """
     wanted = usable_cores() if threads is None else int(number("threads", threads, at_least=1, at_most=1024))
-    given = list(scenes)
-    found: list[Prediction | SceneError | None] = [None] * len(given)
-    rest, lock, stop = iter(range(len(given))), Lock(), Event()
+    stop = Event()
 
     def stopped() -> bool:
         return stop.is_set() or (cancelled is not None and cancelled())
 
-    def work() -> None:
-        for index in _shared(rest, lock):
-            if stopped():
-                raise Cancelled("the solves were cancelled")
-            try:
-                found[index] = predict(given[index], deadline=deadline, cancelled=stopped)
-            except SceneError as error:
-                found[index] = error
+    def solve(scene: Scene) -> Prediction | SceneError:
+        try:
+            return predict(scene, deadline=deadline, cancelled=stopped)
+        except SceneError as error:
+            return error
 
-    count = min(wanted, len(given))
-    if count <= 1:
-        work()
-    else:
-        with ThreadPoolExecutor(count, "dlo-predict") as pool:
-            done = [pool.submit(work) for _ in range(count)]
-            try:
-                wait(done, return_when=FIRST_EXCEPTION)
-            finally:
-                stop.set()  # also where this thread is interrupted
-        errors = [one.exception() for one in done]
-        # the others were only stopped by the first
-        for error in sorted((e for e in errors if e is not None), key=lambda e: isinstance(e, Cancelled)):
-            raise error
-    return [one for one in found if one is not None]
-
-
-def _shared(rest: Iterator[int], lock: Lock) -> Iterator[int]:
-    """Give what is left of an iterator that several threads draw from."""
-    while True:
-        with lock:
-            index = next(rest, None)
-        if index is None:
-            return
-        yield index
+    pool = ThreadPoolExecutor(wanted, "dlo-predict")
+    try:
+        return list(pool.map(solve, scenes))
+    finally:
+        stop.set()  # what still runs where a solve failed, or this thread is interrupted
+        pool.shutdown(cancel_futures=True)

@@ -46,7 +46,7 @@ def smooth(
     strengths = 10.0**decades * (normal[0].mean() / penalty[0].mean())
     bands = (np.ascontiguousarray(band.T) for band in (normal, penalty))
     score = scores(*bands, right, square, len(x), most_noise, strengths)
-    control = _solve(normal + _least(strengths, score) * penalty, right)[1]
+    control = _solve(normal + _least(strengths, score) * penalty, right)
     return BSpline(length / spans * np.arange(-DEGREE, spans + DEGREE + 1), control, DEGREE)
 
 
@@ -92,12 +92,10 @@ def _least(strengths: Floats, score: Floats) -> float:
     return float(strengths[i] * (strengths[1] / strengths[0]) ** np.clip(shift, -1.0, 1.0))
 
 
-def _solve(band: Floats, right: Floats) -> tuple[Floats, Floats]:
-    """Return the banded Cholesky factor, its diagonal first, and the solution; zeros unless positive definite."""
+def _solve(band: Floats, right: Floats) -> Floats:
+    """Return the solution of a banded system; zeros unless it is positive definite."""
     factor, failed = dpbtrf(band, lower=1)
-    if failed:
-        return np.zeros_like(band), np.zeros_like(right)
-    return factor, dpbtrs(factor, right, lower=1)[0]
+    return np.zeros_like(right) if failed else dpbtrs(factor, right, lower=1)[0]
 
 
 def stiffness_of(spline: BSpline) -> Floats:
