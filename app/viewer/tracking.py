@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from viser import SceneApi
 
 from app.problems import ProblemError
+from app.viewer import report
 from app.viewer import tracking_report as say
 from app.viewer.draft import Draft
 from app.viewer.forms.recording import RecordingForm
@@ -152,7 +153,7 @@ class Tracking:
             return
         self._cancelled = threading.Event()
         self._form.running(True)
-        self._form.found(say.note("Waiting for the search of another tab, or compiling …"), keep=False)
+        self._form.found(report.note("Waiting for the search of another tab, or compiling …", good=True), keep=False)
         threading.Thread(target=self._search, args=(self._tracked, self._cancelled), daemon=True).start()
 
     def _search(self, tracked: Tracked, cancelled: threading.Event) -> None:
@@ -192,7 +193,7 @@ class Tracking:
     def _fail(self, words: str) -> None:
         self._cancelled = None
         self._form.running(False)
-        self._form.found(say.note(words), keep=False)
+        self._form.found(report.note(words, good=False), keep=False)
 
     def _take(self, found: Identification) -> None:
         """Show what was found, and the recording with it."""

@@ -13,11 +13,6 @@ DRAWN = 200  # points of the error over time
 WIDTH, HEIGHT = 300, 84
 
 
-def note(words: str) -> str:
-    """Return a small paragraph."""
-    return f'<div style="margin: 0.2rem 0.75rem; font-size: 0.78rem;">{escape(words)}</div>'
-
-
 def progress(progress: Progress) -> str:
     """Return where a search stands."""
     values = ", ".join(f"{name} {value:.3g}" for name, value in progress.values.items())
