@@ -348,16 +348,24 @@ def _residual(
     w: Any,
     R: Any,
 ) -> None:
-    """Turn f into G1 = f + C v1 - load, and write the residual R."""
+    """Turn f into G1 = f + C v1 - load, and write the residual R; w is overwritten."""
     n, nc = f.shape
-    if drag[0, 0] != 0.0:
-        multiply_scalar_band(drag, v1, 1.0, f)
     for i in range(n):
         for d in range(nc):
-            f[i, d] -= load[i, d]
-            R[i, d] = (1.0 - alpha_f) * f[i, d] + alpha_f * G[i, d]
             w[i, d] = (1.0 - alpha_m) * a1[i, d] + alpha_m * a[i, d]
-    multiply_scalar_band(mass, w, 1.0, R)
+            f[i, d] += drag[i, 0] * v1[i, d] - load[i, d]
+            R[i, d] = mass[i, 0] * w[i, d]
+    for o in range(1, 4):  # both products with bands in one pass
+        for i in range(n - o):
+            m, c = mass[i, o], drag[i, o]
+            for d in range(nc):
+                f[i, d] += c * v1[i + o, d]
+                f[i + o, d] += c * v1[i, d]
+                R[i, d] += m * w[i + o, d]
+                R[i + o, d] += m * w[i, d]
+    for i in range(n):
+        for d in range(nc):
+            R[i, d] += (1.0 - alpha_f) * f[i, d] + alpha_f * G[i, d]
 
 
 @kernel

@@ -10,7 +10,7 @@ from dlocore.discretisation import applied_forces
 from dlocore.effects.friction import SLIP_SPEED
 from dlocore.grid import Grid
 from dlocore.holding import Starts, hold
-from dlocore.kernels.assembly import History, largest_strain, note, times_scalar_band
+from dlocore.kernels.assembly import History, note, times_scalar_band
 from dlocore.kernels.banded import Elimination
 from dlocore.kernels.basis import graded_knots
 from dlocore.kernels.march import (
@@ -38,8 +38,8 @@ Floats = NDArray[np.float64]
 RHO = 0.5
 STRONGLY_DAMPED = 0.0
 TOLERANCE = 1e-8  # of the length, on the error that the Newton iterations of a step leave
-LEAST_TOLERANCE = 1e-11
-COARSE = 1 / 256  # of the period of a cable that swings: of shorter steps the tolerance goes with their square
+LEAST_TOLERANCE, MOST_TOLERANCE = 1e-11, 2e-7
+COARSE = 1 / 256  # of the period of a cable that swings: in steps as long as this `TOLERANCE` is left
 _REFINEMENTS = 8  # of the time knots: each halves spans
 _RESTS = 0.05  # of the diameter above the table: nearer to it the cable rests on it
 _CHUNK = 256  # steps between looks at the clock
@@ -307,21 +307,22 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
     log[reached + 1 :] = log[reached : reached + 1]
     return March(
         grid, times, states, velocity, tuple(forces), history, log, reached, stopped, rho, split,
-        float(largest_strain(axes, states, grid.tables)), float(info[LEFT]), float(info[DEEPEST]),
+        grid.largest_strain(states), float(info[LEFT]), float(info[DEEPEST]),
     )  # fmt: skip
 
 
 def _tolerance(problem: Problem, step: float) -> float:
     """Return the error that Newton's iterations may leave in a step [m].
 
-    Over a short step it is an acceleration, of which the tension of a cable that hardly stretches makes noise. Forces
-    with kinks are not solved for more closely, as steps would fail at them.
+    It goes with the square of the step, as the error of the step itself does; over a short step it is an acceleration,
+    of which the tension of a cable that hardly stretches makes noise. Forces with kinks have one for all steps: closer,
+    steps would fail at them.
     """
     length = problem.scene.cable.length
     if problem.contact is not None or problem.friction is not None or problem.self_contact is not None:
         return TOLERANCE * length
-    short = min(1.0, step / (COARSE * 2.0 * float(np.sqrt(length))))
-    return max(LEAST_TOLERANCE, TOLERANCE * short**2) * length
+    share = step / (COARSE * 2.0 * float(np.sqrt(length)))
+    return min(max(LEAST_TOLERANCE, TOLERANCE * share**2), MOST_TOLERANCE) * length
 
 
 def _lean_on_anchors(
@@ -380,7 +381,7 @@ def _to_ends_of_steps(reactions: Floats, lag: float) -> None:
     A generalised-alpha step balances its forces `lag` steps before its end (alpha_f).
     """
     if len(reactions) > 2:
-        rate = np.diff(reactions[1:], axis=0)
+        rate = reactions[2:] - reactions[1:-1]
         reactions[1:-1] += lag * rate
         reactions[-1] += lag * rate[-1]
 
