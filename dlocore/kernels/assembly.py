@@ -15,6 +15,7 @@ import numpy as np
 
 from dlocore.effects.laws import BEND, CONTACT, DAMPING, FRICTION, QUADRATIC_DRAG, STRETCH_MEMORY, axial_memory
 from dlocore.kernels import contact, plane, space, twisted
+from dlocore.kernels.banded import clear
 from dlocore.kernels.basis import row_of
 from dlocore.kernels.compile import brief, kernel
 from dlocore.kernels.strain import space_curvature
@@ -68,9 +69,9 @@ def assemble(
         f, K: outputs; K is untouched where all scales are zero.
     """
     tangent = scales[0] != 0.0 or scales[1] != 0.0
-    f[:] = 0.0
+    clear(f)
     if tangent:
-        K[:] = 0.0
+        clear(K)
     bends = active[BEND] or active[DAMPING]
     if len(axes) == 2:
         plane.axial(q, tables, active, p, history.axial, rates[3], scales, tangent, f, K)

@@ -7,7 +7,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dlocore.kernels.compile import brief, kernel
+from dlocore.kernels.compile import brief, kernel, law
+
+
+@law
+def clear(A: Any) -> None:
+    """Set the entries of A (n, m) to zero."""
+    for i in range(A.shape[0]):
+        for j in range(A.shape[1]):
+            A[i, j] = 0.0
 
 
 @kernel
@@ -77,6 +85,26 @@ def solve(A: Any, x: Any) -> None:
         for i in range(1, min(width, n - j)):
             total -= A[j, i] * x[j + i]
         x[j] = total
+
+
+@kernel
+def solve_rows(A: Any, X: Any) -> None:
+    """Solve L D L' X = B in place for the rows of X (n, m), with the factors of `factor`."""
+    n, width = A.shape
+    m = X.shape[1]
+    for j in range(n):
+        for i in range(1, min(width, n - j)):
+            s = A[j, i]
+            for c in range(m):
+                X[j + i, c] -= s * X[j, c]
+    for j in range(n - 1, -1, -1):
+        s = 1.0 / A[j, 0]
+        for c in range(m):
+            X[j, c] *= s
+        for i in range(1, min(width, n - j)):
+            s = A[j, i]
+            for c in range(m):
+                X[j, c] -= s * X[j + i, c]
 
 
 class Elimination(NamedTuple):

@@ -6,7 +6,7 @@ import numpy as np
 
 from dlocore.effects.laws import has_viscosity
 from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, history_at, multiply_scalar_band
-from dlocore.kernels.banded import factor, reduce_matrix, reduce_vector
+from dlocore.kernels.banded import factor, reduce_matrix, reduce_vector, solve_rows
 from dlocore.kernels.compile import kernel
 
 
@@ -19,26 +19,6 @@ def band_to_dense(A: Any, out: Any) -> None:
         for o in range(min(width, n - j)):
             out[j + o, j] = A[j, o]
             out[j, j + o] = A[j, o]
-
-
-@kernel
-def solve_rows(A: Any, X: Any) -> None:
-    """Solve L D L' X = B in place for the rows of X (n, m), with the factors of `factor`."""
-    n, width = A.shape
-    m = X.shape[1]
-    for j in range(n):
-        for i in range(1, min(width, n - j)):
-            s = A[j, i]
-            for c in range(m):
-                X[j + i, c] -= s * X[j, c]
-    for j in range(n - 1, -1, -1):
-        s = 1.0 / A[j, 0]
-        for c in range(m):
-            X[j, c] *= s
-        for i in range(1, min(width, n - j)):
-            s = A[j, i]
-            for c in range(m):
-                X[j, c] -= s * X[j + i, c]
 
 
 @kernel

@@ -38,8 +38,8 @@ Floats = NDArray[np.float64]
 RHO = 0.5
 STRONGLY_DAMPED = 0.0
 TOLERANCE = 1e-8  # of the length, on the error that the Newton iterations of a step leave
-LEAST_TOLERANCE, MOST_TOLERANCE = 1e-11, 2e-7
-COARSE = 1 / 256  # of the period of a cable that swings: in steps as long as this `TOLERANCE` is left
+LEAST_TOLERANCE = 1e-11
+COARSE = 1 / 256  # of the period of a cable that swings: of shorter steps the tolerance goes with their square
 _REFINEMENTS = 8  # of the time knots: each halves spans
 _RESTS = 0.05  # of the diameter above the table: nearer to it the cable rests on it
 _CHUNK = 256  # steps between looks at the clock
@@ -314,15 +314,14 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
 def _tolerance(problem: Problem, step: float) -> float:
     """Return the error that Newton's iterations may leave in a step [m].
 
-    It goes with the square of the step, as the error of the step itself does; over a short step it is an acceleration,
-    of which the tension of a cable that hardly stretches makes noise. Forces with kinks have one for all steps: closer,
-    steps would fail at them.
+    Over a short step it is an acceleration, of which the tension of a cable that hardly stretches makes noise. Forces
+    with kinks are not solved for more closely, as steps would fail at them.
     """
     length = problem.scene.cable.length
     if problem.contact is not None or problem.friction is not None or problem.self_contact is not None:
         return TOLERANCE * length
-    share = step / (COARSE * 2.0 * float(np.sqrt(length)))
-    return min(max(LEAST_TOLERANCE, TOLERANCE * share**2), MOST_TOLERANCE) * length
+    short = min(1.0, step / (COARSE * 2.0 * float(np.sqrt(length))))
+    return max(LEAST_TOLERANCE, TOLERANCE * short**2) * length
 
 
 def _lean_on_anchors(
