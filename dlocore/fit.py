@@ -66,9 +66,14 @@ def fit_points(points: Floats, length: float) -> PointFit:
     return _fit(np.asarray(points, dtype=np.float64).tobytes(), length)
 
 
+def forget_fits() -> None:
+    """Forget the fits that are kept, so that a prediction takes as long as the first from its points."""
+    _fit.cache_clear()
+
+
 @lru_cache(maxsize=KEPT)
 def _fit(coordinates: bytes, length: float) -> PointFit:
-    """Fit as `fit_points`: the last fits are kept, as planners predict many motions from one shape."""
+    """Fit as `fit_points` does; the last fits are kept, as planners predict many motions from one shape."""
     points = np.frombuffer(coordinates).reshape(-1, 3)
     distinct, which = _distinct(points, SAME * length)
     if len(distinct) < 3:
