@@ -2,7 +2,7 @@
 
 import io
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -116,7 +116,7 @@ def unpack(request: dict[str, Any], document: dict[str, Any], nets: bytes) -> Ru
             **{name: float(values[k]) for name, values in scalars.items()},
             n_u=shown["n_u"],
             n_t=shown["n_t"],
-            surface=iterates[k],
+            find_surface=partial(iterates.__getitem__, k),
             note=shown["note"],
         )
         for k, shown in enumerate(document["iterations"])

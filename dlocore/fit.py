@@ -1,6 +1,7 @@
 """Fit a unit-speed curve to ordered, noisy points: a penalised cubic B-spline in true arclength."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -26,10 +27,8 @@ SPEED_ERROR = 3e-4  # at quarter points; between them it is at most twice that, 
 SLOWEST = 1e-3  # of the chord's speed: where the parameter of a fit moves on and the curve doesn't, it is a cusp
 MIN_STEPS = 512  # of the arclength of a fit, so that its inverse is smooth to SPEED_ERROR
 MIN_SPANS = 8  # of a fit, at which even few points can show three bends
-MIN_UNIT_SPANS, MAX_UNIT_SPANS = (
-    64,
-    1024,
-)  # beyond which a curve is too sharp for a cable, and is fitted anew with fewer
+MIN_UNIT_SPANS, MAX_UNIT_SPANS = 64, 1024  # beyond which a curve is too sharp for a cable, and is fitted with fewer
+KEPT = 64  # fits, each at most some 100 kB
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +63,18 @@ def fit_points(points: Floats, length: float) -> PointFit:
         SceneError: the curve differs in length from the cable by more than MAX_LENGTH_MISMATCH, or fewer than three
             points are distinct.
     """
+    return _fit(np.asarray(points, dtype=np.float64).tobytes(), length)
+
+
+def forget_fits() -> None:
+    """Forget the fits that are kept, so that a prediction takes as long as the first from its points."""
+    _fit.cache_clear()
+
+
+@lru_cache(maxsize=KEPT)
+def _fit(coordinates: bytes, length: float) -> PointFit:
+    """Fit as `fit_points` does; the last fits are kept, as planners predict many motions from one shape."""
+    points = np.frombuffer(coordinates).reshape(-1, 3)
     distinct, which = _distinct(points, SAME * length)
     if len(distinct) < 3:
         raise SceneError("shape.points", f"{len(distinct)} distinct points", "at least 3 distinct points")

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.kernels.assembly import History
+from dlocore.kernels.assembly import History, slopes
 from dlocore.kernels.basis import Tables, basis_rows
 
 Floats = NDArray[np.float64]
@@ -47,3 +47,8 @@ class Grid:
         """Return the value or derivative at `u` [m] of control points q (..., n_u, nc)."""
         first, b = self.rows(u, derivative)
         return b @ q[..., first : first + 4, :]
+
+    def largest_strain(self, states: Floats) -> float:
+        """Return the largest |axial strain| at the axial points over the states (k, n_u, nc)."""
+        least, most = slopes(states, 1, self.tables.axial_first, self.tables.axial_b1)
+        return float(max(0.0, most - 1.0, 1.0 - least))

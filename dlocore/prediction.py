@@ -52,7 +52,7 @@ class Iteration:
         step_length: fraction of the full step that was taken.
         n_u: control points along the cable at this iteration.
         n_t: control points in time.
-        surface: the iterate itself.
+        find_surface: finds the iterate itself, which `surface` keeps.
         note: what happened, in words, e.g. "Gauss-Newton tangent"; empty for a plain iteration.
     """
 
@@ -65,8 +65,13 @@ class Iteration:
     step_length: float
     n_u: int
     n_t: int
-    surface: SplineSurface
+    find_surface: Callable[[], SplineSurface] = field(repr=False)
     note: str = ""
+
+    @cached_property
+    def surface(self) -> SplineSurface:
+        """The iterate itself."""
+        return self.find_surface()
 
 
 OnIteration = Callable[[Iteration], None]

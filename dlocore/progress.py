@@ -1,5 +1,7 @@
 """What a solve reports while it runs: its grids and iterates, as surfaces in the world frame."""
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -48,7 +50,7 @@ def record(
             step_length=step_length,
             n_u=grid.n_u,
             n_t=len(control),
-            surface=surface_at(problem, level, control),
+            find_surface=partial(surface_at, problem, level, control),
             note=note,
         )
     )

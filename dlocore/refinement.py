@@ -303,5 +303,5 @@ def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
 def _slopes(level: Level) -> tuple[float, float]:
     """Return the smallest and the largest |r'| at the curvature points of some states of a motion."""
     tables, states = level.motion.grid.tables, level.motion.states
-    least, largest = slopes(level.problem.axes, states, max(1, len(states) // _LOOKS), tables)
+    least, largest = slopes(states, max(1, len(states) // _LOOKS), tables.curvature_first, tables.curvature_b1)
     return float(least), float(largest)

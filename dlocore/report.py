@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dlocore.effects.distance import distances
 from dlocore.grid import Grid
 from dlocore.holding import Held
-from dlocore.kernels.assembly import History, largest_strain, stored_energy
+from dlocore.kernels.assembly import History, stored_energy
 from dlocore.prediction import EffectReport, GraspReaction, MaterialMotion
 from dlocore.problem import Problem
 from dlocore.scene import Grasp
@@ -111,7 +111,7 @@ def effect_reports(
         "drag": (float(np.trapezoid(drag, u, axis=1).max()), "N"),
         "damping": (float(cable.bending_damping * np.abs(np.gradient(curvature, t, axis=0)).max()), "N m"),
         "gravity": (weight, "N"),
-        "stretch": (float(largest_strain(problem.axes, states, grid.tables)), "axial strain"),
+        "stretch": (grid.largest_strain(states), "axial strain"),
         "bend": (float(EI * curvature.max()), "N m"),
         "table": (weight, "N"),
         "twist": (float(cast(float, cable.torsional_stiffness) * np.abs(tau).max()), "N m"),

@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from dlocore.errors import SceneError
+from dlocore.fit import forget_fits
 from dlocore.scene import ControlPoints, Points, Straight
 from dlocore.shape import StartCurve, fit_to_knots, start_curve, velocity_to_knots
 from dlocore.spline import design_matrix, uniform_knots
@@ -348,3 +349,18 @@ def test_a_cable_that_doubles_back_on_itself_is_refused_by_name() -> None:
         with pytest.raises(SceneError) as error:
             fitted(np.column_stack([np.minimum(u, 2 * middle - u), 0 * u, 0 * u]))
         assert error.value.field == "shape.points"
+
+
+def test_a_fit_that_is_kept_is_that_of_its_points_and_length() -> None:
+    points = CURVES["helix"](np.linspace(0.0, 1.0, 30))
+    first = start_curve(Points(points=points), 1.0).control_points
+    moved = points.copy()
+    moved[7, 0] += 0.003
+    others = [(moved, 1.0), (points, 1.01)]
+    for changed, length in others:
+        assert not np.array_equal(start_curve(Points(points=changed), length).control_points, first)
+    kept = start_curve(Points(points=points), 1.0).control_points
+    forget_fits()
+    anew = start_curve(Points(points=points), 1.0).control_points
+    assert np.array_equal(kept, first)
+    assert np.array_equal(anew, first)

@@ -15,6 +15,7 @@ import numpy as np
 
 from dlocore.effects.laws import BEND, CONTACT, DAMPING, FRICTION, QUADRATIC_DRAG, STRETCH_MEMORY, axial_memory
 from dlocore.kernels import contact, plane, space, twisted
+from dlocore.kernels.banded import clear
 from dlocore.kernels.basis import row_of
 from dlocore.kernels.compile import brief, kernel
 from dlocore.kernels.strain import space_curvature
@@ -68,9 +69,9 @@ def assemble(
         f, K: outputs; K is untouched where all scales are zero.
     """
     tangent = scales[0] != 0.0 or scales[1] != 0.0
-    f[:] = 0.0
+    clear(f)
     if tangent:
-        K[:] = 0.0
+        clear(K)
     bends = active[BEND] or active[DAMPING]
     if len(axes) == 2:
         plane.axial(q, tables, active, p, history.axial, rates[3], scales, tangent, f, K)
@@ -162,32 +163,19 @@ def contact_energy(axes: Any, q: Any, tables: Any, active: Any, p: Any) -> float
 
 
 @brief
-def largest_strain(axes: Any, states: Any, tables: Any) -> float:
-    """Return the largest |axial strain| at the axial points over the states (k, n, nc)."""
-    largest = 0.0
-    for s in range(len(states)):
-        for n in range(len(tables.axial_w)):
-            square = 0.0
-            for d in range(min(len(axes), 3)):
-                value = 0.0
-                for i in range(4):
-                    value += tables.axial_b1[n, i] * states[s, tables.axial_first[n] + i, d]
-                square += value * value
-            largest = max(largest, abs(np.sqrt(square) - 1.0))
-    return largest
+def slopes(states: Any, every: int, first: Any, b1: Any) -> Any:
+    """Return the least and the largest |r'| over every so many of the states (k, n, nc).
 
-
-@brief
-def slopes(axes: Any, states: Any, every: int, tables: Any) -> Any:
-    """Return the least and the largest |r'| at the curvature points over every so many of the states (k, n, nc)."""
+    It is taken at points with the derivatives b1 (points, 4) of the basis functions from `first` (points,).
+    """
     least, largest = np.inf, 0.0
     for s in range(0, len(states), every):
-        for n in range(len(tables.curvature_w)):
+        for n in range(len(first)):
             square = 0.0
-            for d in range(min(len(axes), 3)):
+            for d in range(min(states.shape[2], 3)):
                 value = 0.0
                 for i in range(4):
-                    value += tables.curvature_b1[n, i] * states[s, tables.curvature_first[n] + i, d]
+                    value += b1[n, i] * states[s, first[n] + i, d]
                 square += value * value
             least, largest = min(least, square), max(largest, square)
     return np.sqrt(least), np.sqrt(largest)

@@ -7,20 +7,22 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dlocore.kernels.compile import brief, kernel
+from dlocore.kernels.compile import brief, kernel, law
+
+
+@law
+def clear(A: Any) -> None:
+    """Set the entries of A (n, m) to zero."""
+    for i in range(A.shape[0]):
+        for j in range(A.shape[1]):
+            A[i, j] = 0.0
 
 
 @kernel
 def factor(A: Any) -> int:
     """Factor A = L D L' in place; return -1, or the column where a pivot is not positive (A is then spoilt)."""
-    return factor_columns(A, 0, A.shape[0])
-
-
-@kernel
-def factor_columns(A: Any, start: int, stop: int) -> int:
-    """Factor the columns `start` to `stop` of A, those before them being factored; return as `factor`."""
     n, width = A.shape
-    for j in range(start, stop):
+    for j in range(n):
         pivot = A[j, 0]
         if not pivot > 0.0:
             return j
@@ -31,6 +33,43 @@ def factor_columns(A: Any, start: int, stop: int) -> int:
                 A[j + i, k - i] -= ratio * A[j, k]
             # the loop above still needs the unscaled entries of this column to the right of i only
             A[j, i] = ratio
+    return -1
+
+
+@kernel
+def factor_columns(A: Any, start: int, stop: int) -> int:
+    """Factor the columns `start` to `stop` of a wide band A, those before them being factored; return as `factor`.
+
+    They go by fours, so that what lies behind them is passed over a quarter as often.
+    """
+    n, width = A.shape
+    for j in range(start, stop, 4):
+        panel = min(4, stop - j)
+        for p in range(panel):
+            if not A[j + p, 0] > 0.0:
+                return j + p
+            last = min(width, n - j - p)
+            for i in range(1, min(panel - p, last)):
+                ratio = A[j + p, i] / A[j + p, 0]
+                for k in range(i, last):
+                    A[j + p + i, k - i] -= ratio * A[j + p, k]
+        for t in range(panel, min(width - 1 + panel, n - j)):
+            row = A[j + t]
+            common = max(0, min(width - t, n - j - t)) if panel == 4 else 0
+            if common > 0:
+                a0, a1, a2, a3 = A[j, t:], A[j + 1, t - 1 :], A[j + 2, t - 2 :], A[j + 3, t - 3 :]
+                r0, r1, r2, r3 = a0[0] / A[j, 0], a1[0] / A[j + 1, 0], a2[0] / A[j + 2, 0], a3[0] / A[j + 3, 0]
+                for k in range(common):
+                    row[k] -= r0 * a0[k] + r1 * a1[k] + r2 * a2[k] + r3 * a3[k]
+            for p in range(panel):  # the columns do not reach equally far
+                if t - p < width:
+                    rest = A[j + p, t - p :]
+                    ratio = rest[0] / A[j + p, 0]
+                    for k in range(common, min(len(rest), n - j - t)):
+                        row[k] -= ratio * rest[k]
+        for p in range(panel):
+            for i in range(1, min(width, n - j - p)):
+                A[j + p, i] /= A[j + p, 0]
     return -1
 
 
@@ -46,6 +85,26 @@ def solve(A: Any, x: Any) -> None:
         for i in range(1, min(width, n - j)):
             total -= A[j, i] * x[j + i]
         x[j] = total
+
+
+@kernel
+def solve_rows(A: Any, X: Any) -> None:
+    """Solve L D L' X = B in place for the rows of X (n, m), with the factors of `factor`."""
+    n, width = A.shape
+    m = X.shape[1]
+    for j in range(n):
+        for i in range(1, min(width, n - j)):
+            s = A[j, i]
+            for c in range(m):
+                X[j + i, c] -= s * X[j, c]
+    for j in range(n - 1, -1, -1):
+        s = 1.0 / A[j, 0]
+        for c in range(m):
+            X[j, c] *= s
+        for i in range(1, min(width, n - j)):
+            s = A[j, i]
+            for c in range(m):
+                X[j, c] -= s * X[j + i, c]
 
 
 class Elimination(NamedTuple):
@@ -147,6 +206,15 @@ def expand_vector(e: Any, x: Any, out: Any) -> None:
             out[i] = 0.0
             for s in range(e.start[-1 - k], e.start[-k]):
                 out[i] += e.coefficient[s] * x[e.index[e.dof[s]]]
+
+
+@brief
+def expand_rows(e: Any, x: Any, n: int) -> Any:
+    """Return Z x (k, n) for each row of x (k, free)."""
+    out = np.empty((len(x), n))
+    for k in range(len(x)):
+        expand_vector(e, x[k], out[k])
+    return out
 
 
 @kernel

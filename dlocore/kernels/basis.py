@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dlocore.kernels.compile import brief, kernel, law
+from dlocore.kernels.pairs import pair_products
 
 GAUSS_2 = np.polynomial.legendre.leggauss(2)
 GAUSS_3 = np.polynomial.legendre.leggauss(3)
@@ -182,7 +183,8 @@ class Tables(NamedTuple):
     """Basis functions at the quadrature points of a set of knots.
 
     `*_first` (p,): index of the first of the four control points at each point; `*_b1` (p, 4): first derivatives of
-    their basis functions [1/m], `*_b2` second [1/m^2], `*_b0` values; `*_w` (p,): weights [m]. Axial points: one a span
+    their basis functions [1/m], `*_b2` second [1/m^2], `*_b0` values; `*_w` (p,): weights [m]; `curvature_pairs`: see
+    `pairs.py`. Axial points: one a span
     and two in an end span whose end direction is free (selective reduced integration, docs/model.md). Curvature and
     body points: three a span. Contact nodes: every span in parts of one length, with their ends; none where contact is
     off. `mass` (n, 4): integrals of b_i b_{i+d} du [m]; `weight` (n,): integrals of b_i du [m].
@@ -197,6 +199,7 @@ class Tables(NamedTuple):
     curvature_b1: Any
     curvature_b2: Any
     curvature_w: Any
+    curvature_pairs: Any
     body_first: Any
     body_b0: Any
     body_w: Any
@@ -337,6 +340,6 @@ def build_tables(
             for j in range(i, 4):
                 mass[f + i, j - i] += weights4[p] * table4[p, 0, i] * table4[p, 0, j]
     return Tables(
-        u, axial_first, axial_b1, axial_w, curvature_u, curvature_first, b1, b2, curvature_w, curvature_first, b0,
-        curvature_w, contact_u, contact_first, contact_b0, contact_w, mass, weight,
+        u, axial_first, axial_b1, axial_w, curvature_u, curvature_first, b1, b2, curvature_w, pair_products(b0, b1, b2),
+        curvature_first, b0, curvature_w, contact_u, contact_first, contact_b0, contact_w, mass, weight,
     )  # fmt: skip

@@ -6,7 +6,7 @@ import numpy as np
 
 from dlocore.effects.laws import has_viscosity
 from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, history_at, multiply_scalar_band
-from dlocore.kernels.banded import factor, reduce_matrix, reduce_vector
+from dlocore.kernels.banded import factor, reduce_matrix, reduce_vector, solve_rows
 from dlocore.kernels.compile import kernel
 
 
@@ -22,57 +22,55 @@ def band_to_dense(A: Any, out: Any) -> None:
 
 
 @kernel
-def solve_rows(A: Any, X: Any) -> None:
-    """Solve L D L' X = B in place for the rows of X (n, m), with the factors of `factor`."""
-    n, width = A.shape
-    m = X.shape[1]
-    for j in range(n):
-        for i in range(1, min(width, n - j)):
-            s = A[j, i]
-            for c in range(m):
-                X[j + i, c] -= s * X[j, c]
-    for j in range(n - 1, -1, -1):
-        s = 1.0 / A[j, 0]
-        for c in range(m):
-            X[j, c] *= s
-        for i in range(1, min(width, n - j)):
-            s = A[j, i]
-            for c in range(m):
-                X[j, c] -= s * X[j + i, c]
-
-
-@kernel
-def _times_root(B: Any, X: Any) -> None:
-    """Replace X (n, m) by D^1/2 L' X with the factors L D L' = B of `factor`."""
+def _times_band(B: Any, X: Any, out: Any) -> None:
+    """Write B X (n, m) for the symmetric banded B (n, width)."""
     n, width = B.shape
     m = X.shape[1]
+    out[:] = 0.0
     for j in range(n):
+        s = B[j, 0]
+        for c in range(m):
+            out[j, c] += s * X[j, c]
         for i in range(1, min(width, n - j)):
             s = B[j, i]
             for c in range(m):
-                X[j, c] += s * X[j + i, c]
-        s = np.sqrt(B[j, 0])
-        for c in range(m):
-            X[j, c] *= s
+                out[j, c] += s * X[j + i, c]
+            for c in range(m):
+                out[j + i, c] += s * X[j, c]
 
 
 @kernel
-def _gram(X: Any, Y: Any, out: Any) -> None:
-    """Write X' Y."""
+def _products(X: Any, Y: Any, symmetric: bool, out: Any) -> None:
+    """Write X' Y (m, m), of which half is computed where it is symmetric.
+
+    Four rows at a time, to pass less often over the result.
+    """
     n, m = X.shape
     out[:] = 0.0
-    for r in range(n):
+    for r in range(0, n - n % 4, 4):
+        y0, y1, y2, y3 = Y[r], Y[r + 1], Y[r + 2], Y[r + 3]
+        for i in range(m):
+            row = out[i]
+            s0, s1, s2, s3 = X[r, i], X[r + 1, i], X[r + 2, i], X[r + 3, i]
+            for j in range(i if symmetric else 0, m):
+                row[j] += s0 * y0[j] + s1 * y1[j] + s2 * y2[j] + s3 * y3[j]
+    for r in range(n - n % 4, n):
         for i in range(m):
             s = X[r, i]
-            for j in range(m):
+            for j in range(i if symmetric else 0, m):
                 out[i, j] += s * Y[r, j]
+    if symmetric:
+        for i in range(m):
+            for j in range(i):
+                out[i, j] = out[j, i]
 
 
 @kernel
-def _add_transposed(X: Any, r: Any, out: Any) -> None:
-    """Add X' r for r (n, 1)."""
+def _transposed_times(X: Any, y: Any, out: Any) -> None:
+    """Write X' y (m,) for y (n,)."""
+    out[:] = 0.0
     for i in range(X.shape[0]):
-        s = r[i, 0]
+        s = y[i]
         for c in range(X.shape[1]):
             out[c] += s * X[i, c]
 
@@ -91,26 +89,29 @@ def states_at(first: Any, table: Any, C: Any, out: Any) -> None:
 
 @kernel
 def normal_equations(
-    axes: Any, C: Any, first: Any, table: Any, weights: Any, h: float, mass: Any, drag: Any, tables: Any, active: Any,
-    p: Any, histories: Any, applied: Any, e: Any, geometric: float, A: Any, right: Any, forces: Any, tangent: bool,
-    begin: int, end: int,
+    axes: Any, C: Any, first: Any, table: Any, weights: Any, h: float, unit: Any, density: float, dragged: float,
+    tables: Any, active: Any, p: Any, histories: Any, applied: Any, e: Any, A: Any, right: Any, forces: Any,
+    tangent: bool, begin: int, end: int,
 ) -> float:  # fmt: skip
     """Add points to the normal equations of the weighted least squares at C; return their part of the objective [J].
 
     The objective is (1/T) sum_k w_k |W_k Z' R_k|^2 with the residual R = M a + C v + f(q, v) - F of the motion at the
-    collocation point k and W'W = G^-1 B G^-1, B = 12/h^2 M + 2/h C, G = B + K+ (docs/model.md eq. 16).
+    collocation point k and W'W = G^-1 B G^-1, B = 12/h^2 M + 2/h C, G = B + K+ + 2/h N (docs/model.md eq. 16).
+
+    Masses and linear drag are parts of B, and K+ = G - B - 2/h N, so that by the control point with basis function c
+    G^-1 dR = c I + d S + e V, with S = G^-1 B, V = G^-1 N and numbers d, e. The products of three matrices serve all
+    pairs of control points, and B S and S' B S are symmetric.
 
     Args:
-        axes: (0, 1) or (0, 1, 2).
+        axes: (0, 1), (0, 1, 2) or (0, 1, 2, 3).
         C: control points (n_t, n, nc) [m]; the first two are given.
         first, table: (k,), (k, 3, 4): time basis functions and two derivatives at the collocation points.
         weights: (k,) [s].
         h: length of a time span [s].
-        mass, drag: scalar bands (n, 4) times density and drag coefficient.
+        unit: (n, 4) mass matrix of unit density; `density` [kg/m] and `dragged` [N s/m^2] are those of the cable.
         histories: `History` with arrays (1 or k, ...), what lies behind each collocation point.
         applied: (1 or k, n, nc) [N].
         e: elimination of the held degrees of freedom.
-        geometric: 1 for the full tangent in the Jacobian, 0 for its positive semidefinite part.
         A, right: normal matrix, banded ((n_t - 2) free, 4 free), and right side, which are added to; untouched where
             `tangent` is False.
         forces: (k, held) residual at the held degrees of freedom: the forces that hold them [N]; written.
@@ -124,30 +125,19 @@ def normal_equations(
     f = np.empty((n, nc))
     full = np.zeros((size, 4 * nc))
     K = np.empty((size, 4 * nc))
-    Kr = np.empty((free, e.width))
-    Mr = np.empty((free, e.width))
-    Nr = np.empty((free, e.width))
-    B = np.empty((free, e.width))
-    G = np.empty((free, e.width))
-    add_scalar_band(nc, mass, 1.0, full)
-    reduce_matrix(e, full, Mr)
-    full[:] = 0.0
-    add_scalar_band(nc, drag, 1.0, full)
-    reduce_matrix(e, full, Nr)
-    B0 = 12.0 / (h * h) * Mr + 2.0 / h * Nr
-    B[:] = B0
-    factor(B)
-    Md = np.empty((free, free))
-    Nd = np.empty((free, free))
-    band_to_dense(Mr, Md)
-    band_to_dense(Nr, Nd)
-    X, Y, Z = np.empty((free, free)), np.empty((free, free)), np.empty((free, free))
-    XX, XZ, ZZ = np.empty((free, free)), np.empty((free, free)), np.empty((free, free))
-    XY, YY, YZ = np.empty((free, free)), np.empty((free, free)), np.empty((free, free))
-    gradient = np.empty((3, free))
-    r = np.empty((free, 1))
-    state = np.empty((3, n, nc))
+    N, B, G = np.empty((free, e.width)), np.empty((free, e.width)), np.empty((free, e.width))
+    weight = 12.0 / (h * h) * density + 2.0 / h * dragged
+    add_scalar_band(nc, unit, weight, full)
+    reduce_matrix(e, full, B)
+    S, P, Q = np.empty((free, free)), np.empty((free, free)), np.empty((free, free))
+    dense = np.empty((free, free))
+    band_to_dense(B, dense)
     viscous = has_viscosity(active)
+    wide = free if viscous else 0
+    V, BV, SBV, VBV = np.empty((wide, wide)), np.empty((wide, wide)), np.empty((wide, wide)), np.empty((wide, wide))
+    gradient = np.empty((2, free))
+    r, y = np.empty((free, 1)), np.empty((free, 1))
+    state = np.empty((3, n, nc))
     objective = 0.0
     total = np.sum(weights)
     for k in range(begin, end):
@@ -155,72 +145,71 @@ def normal_equations(
         q, v, a = state[0], state[1], state[2]
         history = history_at(histories, k)
         assemble(axes, q, v, tables, active, p, history, NO_RATES, (1.0, 0.0, 0.0), f, K)
-        reduce_matrix(e, K, Kr)
-        G[:] = B0 + Kr
+        reduce_matrix(e, K, G)
+        G += B
         if viscous:
             assemble(axes, q, v, tables, active, p, history, NO_RATES, (0.0, 1.0, 0.0), f, K)
-            reduce_matrix(e, K, Nr)
-            G += 2.0 / h * Nr
-            if tangent:
-                band_to_dense(Nr, Y)
-                Y += Nd
-        if tangent and geometric != 0.0:
-            assemble(axes, q, v, tables, active, p, history, NO_RATES, (1.0, 0.0, 1.0), f, K)
-            reduce_matrix(e, K, Kr)
+            reduce_matrix(e, K, N)
+            G += 2.0 / h * N
         factor(G)
-        multiply_scalar_band(mass, a, 1.0, f)
-        multiply_scalar_band(drag, v, 1.0, f)
+        multiply_scalar_band(unit, a, density, f)
+        multiply_scalar_band(unit, v, dragged, f)
         f -= applied[min(k, len(applied) - 1)]
         for i in range(len(e.held)):
             forces[k, i] = f[e.held[i] // nc, e.held[i] % nc]
         reduce_vector(e, f.ravel(), r[:, 0])
         solve_rows(G, r)
-        _times_root(B, r)
+        _times_band(B, r, y)
         share = weights[k] / total
-        objective += share * np.sum(r * r)
+        objective += share * np.sum(r * y)
         if not tangent:
             continue
-        X[:] = Md
-        band_to_dense(Kr, Z)
-        solve_rows(G, X)
-        solve_rows(G, Z)
-        _times_root(B, X)
-        _times_root(B, Z)
-        # J_j = a_j X + b_j Y + c_j Z: the products of the three matrices serve all pairs of time basis functions.
-        # Without viscous laws the damping matrix is proportional to the mass matrix, and Y is merged into X.
-        _gram(X, X, XX)
-        _gram(X, Z, XZ)
-        _gram(Z, Z, ZZ)
-        gradient[:] = 0.0
-        _add_transposed(X, r, gradient[0])
-        _add_transposed(Z, r, gradient[2])
+        S[:] = dense
+        solve_rows(G, S)
+        _times_band(B, S, P)
+        _products(S, P, True, Q)
+        _transposed_times(S, y[:, 0], gradient[0])
         if viscous:
-            solve_rows(G, Y)
-            _times_root(B, Y)
-            _gram(X, Y, XY)
-            _gram(Y, Y, YY)
-            _gram(Y, Z, YZ)
-            _add_transposed(Y, r, gradient[1])
-        merged = 0.0 if viscous else drag[0, 0] / mass[0, 0]
+            band_to_dense(N, V)
+            solve_rows(G, V)
+            _times_band(B, V, BV)
+            _products(S, BV, False, SBV)
+            _products(V, BV, True, VBV)
+            _transposed_times(V, y[:, 0], gradient[1])
         for j in range(4):
             column = (first[k] + j - 2) * free
             if column < 0:
                 continue
-            aj, bj, cj = table[k, 2, j] + merged * table[k, 1, j], table[k, 1, j], table[k, 0, j]
+            cj, dj, ej = _parts(table[k, :, j], density / weight, dragged / weight, h)
             for c in range(free):
-                right[column + c] += share * (aj * gradient[0, c] + bj * gradient[1, c] + cj * gradient[2, c])
-            for i in range(j, 4):
-                ai, bi, ci = table[k, 2, i] + merged * table[k, 1, i], table[k, 1, i], table[k, 0, i]
-                shift = (i - j) * free
-                aa, ac, ca, cc = share * aj * ai, share * aj * ci, share * cj * ai, share * cj * ci
+                right[column + c] += share * (cj * y[c, 0] + dj * gradient[0, c])
+            if viscous:
                 for c in range(free):
-                    for d in range(c if i == j else 0, free):
-                        A[column + c, shift + d - c] += aa * XX[c, d] + ac * XZ[c, d] + ca * XZ[d, c] + cc * ZZ[c, d]
+                    right[column + c] += share * ej * gradient[1, c]
+            for i in range(j, 4):
+                ci, di, ei = _parts(table[k, :, i], density / weight, dragged / weight, h)
+                cc, cd, dd = share * cj * ci, share * (cj * di + dj * ci), share * dj * di
+                shift = (i - j) * free
+                for c in range(free):
+                    first_d = c if i == j else 0
+                    row = A[column + c, shift - c + first_d : shift - c + free]
+                    Bc, Pc, Qc = dense[c, first_d:], P[c, first_d:], Q[c, first_d:]
+                    for d in range(len(row)):
+                        row[d] += cc * Bc[d] + cd * Pc[d] + dd * Qc[d]
                 if viscous:
-                    ab, ba, bb = share * aj * bi, share * bj * ai, share * bj * bi
-                    bc, cb = share * bj * ci, share * cj * bi
+                    ce, ec, ee = share * cj * ei, share * ej * ci, share * ej * ei
+                    de, ed = share * dj * ei, share * ej * di
                     for c in range(free):
                         for d in range(c if i == j else 0, free):
-                            value = ab * XY[c, d] + ba * XY[d, c] + bb * YY[c, d] + bc * YZ[c, d] + cb * YZ[d, c]
+                            value = ce * BV[c, d] + ec * BV[d, c] + de * SBV[c, d] + ed * SBV[d, c] + ee * VBV[c, d]
                             A[column + c, shift + d - c] += value
     return objective
+
+
+@kernel
+def _parts(basis: Any, mass: float, drag: float, h: float) -> tuple[float, float, float]:
+    """Return c, d and e of G^-1 dR = c I + d S + e V for `basis` (3,), a basis function and its derivatives.
+
+    `mass` and `drag` are density and drag coefficient over that of B.
+    """
+    return basis[0], mass * basis[2] + drag * basis[1] - basis[0], basis[1] - 2.0 / h * basis[0]

@@ -14,7 +14,7 @@ from dlocore.kernels.assembly import (
     remember,
     times_scalar_band,
 )
-from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_matrix, reduce_vector, solve
+from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_matrix, reduce_vector, solve, solve_rows
 from dlocore.kernels.basis import basis_rows
 from dlocore.kernels.compile import brief, kernel
 from dlocore.kernels.contact import strikes
@@ -348,16 +348,24 @@ def _residual(
     w: Any,
     R: Any,
 ) -> None:
-    """Turn f into G1 = f + C v1 - load, and write the residual R."""
+    """Turn f into G1 = f + C v1 - load, and write the residual R; w is overwritten."""
     n, nc = f.shape
-    if drag[0, 0] != 0.0:
-        multiply_scalar_band(drag, v1, 1.0, f)
     for i in range(n):
         for d in range(nc):
-            f[i, d] -= load[i, d]
-            R[i, d] = (1.0 - alpha_f) * f[i, d] + alpha_f * G[i, d]
             w[i, d] = (1.0 - alpha_m) * a1[i, d] + alpha_m * a[i, d]
-    multiply_scalar_band(mass, w, 1.0, R)
+            f[i, d] += drag[i, 0] * v1[i, d] - load[i, d]
+            R[i, d] = mass[i, 0] * w[i, d]
+    for o in range(1, 4):  # both products with bands in one pass
+        for i in range(n - o):
+            m, c = mass[i, o], drag[i, o]
+            for d in range(nc):
+                f[i, d] += c * v1[i + o, d]
+                f[i + o, d] += c * v1[i, d]
+                R[i, d] += m * w[i + o, d]
+                R[i + o, d] += m * w[i, d]
+    for i in range(n):
+        for d in range(nc):
+            R[i, d] += (1.0 - alpha_f) * f[i, d] + alpha_f * G[i, d]
 
 
 @kernel
@@ -448,32 +456,29 @@ def fit_time(knots: Any, times: Any, Q: Any, v0: Any) -> Any:
     A = np.zeros((size, 4))
     right = np.zeros((size, m))
     first, table = basis_rows(knots, times, 0)
-    values = np.empty(m)
     for s in range(1, k - 1):
         w = 0.5 * (times[s + 1] - times[s - 1])
         b = table[s, 0]
-        values[:] = Q[s]
-        for i in range(4):
-            g = first[s] + i
-            if g < 2 or g == n - 1:
-                values -= b[i] * C[g]
         for i in range(4):
             row = first[s] + i - 2
             if row < 0 or row >= size:
                 continue
-            right[row] += (w * b[i]) * values
-            for j in range(i, 4):
+            share = w * b[i]
+            for c in range(m):
+                right[row, c] += share * Q[s, c]
+            for j in range(4):
                 column = first[s] + j - 2
-                if column < size:
-                    A[row, column - row] += w * b[i] * b[j]
+                if column < 0 or column == size:  # given
+                    for c in range(m):
+                        right[row, c] -= share * b[j] * C[column + 2, c]
+                elif j >= i:
+                    A[row, column - row] += share * b[j]
     trace = 0.0
     for i in range(size):
         trace += A[i, 0]
     for i in range(size):
         A[i, 0] += 1e-13 * trace
     factor(A)
-    for d in range(m):
-        x = right[:, d].copy()
-        solve(A, x)
-        C[2 : n - 1, d] = x
+    solve_rows(A, right)
+    C[2 : n - 1] = right
     return C

@@ -9,8 +9,10 @@ import numpy as np
 
 from dlocore.effects.base import Symmetric, Vector
 from dlocore.effects.laws import DAMPING, axial_energy, axial_stress, body_force, curvature_energy, curvature_stress
+from dlocore.kernels.banded import clear
 from dlocore.kernels.basis import row_of
 from dlocore.kernels.compile import kernel, law
+from dlocore.kernels.pairs import PAIRS, add_derivatives
 from dlocore.kernels.strain import space_curvature, space_curvature_rate, space_moment, transport
 
 STRAIGHT = (0.0, 0.0, 0.0)  # the stress-free curvature without a twist coordinate
@@ -77,17 +79,16 @@ def curvature(
 ) -> None:  # fmt: skip
     """Add the forces and tangents of the curvature site; `past` holds kappa of two steps and t of the last (points, 9).
 
-    With G_j = (c_j - h b_j / l) P / l - b_j kappa t' / l, the derivative of kappa by control point j, the material
-    part of the tangent is G_i' S G_j; the geometric part is M . d2kappa.
+    With J = -h P / l^2 - kappa t' / l by r', and P / l by r'', the derivatives of kappa, the material part of the
+    tangent is J' S J; the geometric part is M . d2kappa.
     """
     elastic, viscous, geometric = scales
     if viscous != 0.0 and rates[0] != 0.0:
         viscous = rates[0]
     firsts, b1, b2, weights = tables.curvature_first, tables.curvature_b1, tables.curvature_b2, tables.curvature_w
-    G = np.empty((4, 3, 3))
-    SG = np.empty((3, 3))
-    A = np.empty((3, 3))
-    B = np.empty((3, 3))
+    pairs = tables.curvature_pairs
+    sums = np.zeros((9 if tangent else 0, PAIRS))  # over a span, of the blocks' entries
+    J, SJ = np.empty((2, 3, 3)), np.empty((2, 3, 3))  # of kappa by r' and by r''
     S = np.empty((3, 3))
     for n in range(len(weights)):
         k, w = firsts[n], weights[n]
@@ -117,34 +118,46 @@ def curvature(
             d, e = (0, 1, 2, 0, 0, 1)[o], (0, 1, 2, 1, 2, 2)[o]
             S[d, e] = w * (elastic * stiffness[o] + viscous * viscosity[o])
             S[e, d] = S[d, e]
-        for j in range(4):
-            across, along = (c[j] - h * b[j] / length) / length, b[j] / length
+        for d in range(3):
+            for e in range(3):
+                J[0, d, e] = (h * t[d] / length - kappa[d]) * t[e] / length
+                J[1, d, e] = -t[d] * t[e] / length
+            J[0, d, d] -= h / (length * length)
+            J[1, d, d] += 1.0 / length
+        for o in range(2):
             for d in range(3):
                 for e in range(3):
-                    G[j, d, e] = -(across * t[d] + along * kappa[d]) * t[e]
-                G[j, d, d] += across
+                    SJ[o, d, e] = S[d, 0] * J[o, 0, e] + S[d, 1] * J[o, 1, e] + S[d, 2] * J[o, 2, e]
         scale = w * geometric / (length * length)
         dot = M[0] * kappa[0] + M[1] * kappa[1] + M[2] * kappa[2]
         for d in range(3):
             for e in range(3):
                 Mt = M[d] * t[e] + t[d] * M[e]
-                A[d, e] = -scale * Mt  # by r' and r''
-                B[d, e] = scale * (3.0 * dot * t[d] * t[e] + 2.0 * h / length * Mt)  # by r' twice
-                B[d, e] -= scale * 0.5 * (M[d] * kappa[e] + kappa[d] * M[e])
-            B[d, d] -= scale * dot
-        for j in range(4):
-            for d in range(3):
-                for e in range(3):
-                    SG[d, e] = S[d, 0] * G[j, 0, e] + S[d, 1] * G[j, 1, e] + S[d, 2] * G[j, 2, e]
-            for i in range(j, 4):
-                both = b[i] * b[j]
-                mixed = b[i] * c[j] + c[i] * b[j]
-                for e in range(3):
-                    column = 3 * (k + j) + e
-                    offset = 3 * (i - j) - e
-                    for d in range(e if i == j else 0, 3):
-                        value = G[i, 0, d] * SG[0, e] + G[i, 1, d] * SG[1, e] + G[i, 2, d] * SG[2, e]
-                        K[column, offset + d] += value + both * B[d, e] + mixed * A[d, e]
+                by_first = 3.0 * dot * t[d] * t[e] + 2.0 * h / length * Mt - 0.5 * (M[d] * kappa[e] + kappa[d] * M[e])
+                if d == e:
+                    by_first -= dot
+                add_derivatives(
+                    sums[3 * d + e],
+                    pairs[n],
+                    scale * by_first + _column_product(J, 0, d, SJ, 0, e),
+                    _column_product(J, 0, d, SJ, 1, e) - scale * Mt,
+                    _column_product(J, 1, d, SJ, 0, e) - scale * Mt,
+                    _column_product(J, 1, d, SJ, 1, e),
+                )
+        if n + 1 == len(weights) or firsts[n + 1] != k:
+            pair = 0
+            for j in range(4):
+                for i in range(j, 4):
+                    for e in range(3):
+                        for d in range(e if i == j else 0, 3):
+                            K[3 * (k + j) + e, 3 * (i - j) + d - e] += sums[3 * d + e, pair]
+                    pair += 1
+            clear(sums)
+
+
+@law
+def _column_product(X: Any, o: int, d: int, Y: Any, p: int, e: int) -> float:
+    return X[o, 0, d] * Y[p, 0, e] + X[o, 1, d] * Y[p, 1, e] + X[o, 2, d] * Y[p, 2, e]
 
 
 @law

@@ -28,19 +28,22 @@ from dlocore.effects.laws import (
     twist_memory,
     twist_stress,
 )
+from dlocore.kernels.banded import clear
 from dlocore.kernels.basis import basis, find_span, row_of
 from dlocore.kernels.compile import kernel, law
+from dlocore.kernels.pairs import AA, AB, AC, BA, CA, PAIRS, add_angles, add_derivatives, add_one
 from dlocore.kernels.space import combine, vector
 from dlocore.kernels.strain import space_curvature, transport, twist_increment
 
 TANGENT, BEND, DIRECTOR, FRAME, LAST, BEFORE = 0, 3, 6, 9, 10, 13  # columns of `past`
 TWIST_RATE = LAST + 2
 PAST = 16
+Row = tuple[float, float, float, float]  # of basis functions
 _STEPS = 8  # of the transport along the cable between two curvature points
 
 
 @law
-def _angle(q: Any, k: int, b: tuple[float, float, float, float]) -> float:
+def _angle(q: Any, k: int, b: Row) -> float:
     return b[0] * q[k, 3] + b[1] * q[k + 1, 3] + b[2] * q[k + 2, 3] + b[3] * q[k + 3, 3]
 
 
@@ -117,150 +120,183 @@ def curvature(
 ) -> None:  # fmt: skip
     """Add the forces and tangents of curvature and twist.
 
-    E_a is the derivative of strain a = (k1, k2, tau) by a control point (x, y, z, fourth); in x, y, z it is
-    across A_a + along B_a, with `across` and `along` those of `space.curvature`. The material part of the tangent is
-    E' S E. The geometric part is that at the carried frame: what the carrying adds vanishes with the step.
+    The derivatives of k1 and k2 are O by r', P by r'' and A by theta; that of the twist rate is the mean of its points'
+    over a span. The material part of the tangent is E' S E with the derivatives E by the control points. The
+    geometric part is that at the carried frame: what the carrying adds vanishes with the step.
+    """
+    firsts, weights, pairs = tables.curvature_first, tables.curvature_w, tables.curvature_pairs
+    b0, b1, b2 = tables.body_b0, tables.curvature_b1, tables.curvature_b2
+    mean = np.empty(16)  # of the derivative of the twist rate over a span
+    sums = np.zeros((16 if tangent else 0, PAIRS))  # over a span, of the blocks' entries
+    n = 0
+    while n < len(weights):
+        k, until = firsts[n], _span_end(firsts, n)
+        tau = _mean_twist(q, k, weights, b1, b2, past, n, until, p[TWIST, 1], mean)
+        torque, stiffness = 0.0, 0.0
+        for m in range(n, until):
+            T, S = _point(
+                q, v, k, weights[m], row_of(b0, m), row_of(b1, m), row_of(b2, m), pairs, active, p, memory, past, rates,
+                scales, tangent, m, tau, mean, f, sums,
+            )  # fmt: skip
+            torque += T
+            stiffness += S
+        for j in range(4):
+            for d in range(4):
+                f[k + j, d] += torque * mean[4 * j + d]
+        if tangent:
+            for j in range(16):
+                row = K[4 * k + j]
+                for i in range(j, 16):
+                    row[i - j] += stiffness * mean[j] * mean[i]
+            if until == len(weights) or firsts[until] != k:
+                _add_span(K, k, sums)
+        n = until
+
+
+@law
+def _mean_twist(
+    q: Any, k: int, weights: Any, b1: Any, b2: Any, past: Any, n: int, until: int, inverse: float, mean: Any
+) -> float:
+    """Return the mean twist rate [rad/m] of the points n to `until`, and write its derivative (16,) by x, y, z, fourth
+    of the four control points.
+    """
+    for j in range(16):
+        mean[j] = 0.0
+    tau, width = 0.0, 0.0
+    for m in range(n, until):
+        w, b, c = weights[m], row_of(b1, m), row_of(b2, m)
+        length, h, t, kappa = space_curvature(combine(q, k, b), combine(q, k, c))
+        increment, spin, by_t = twist_increment(vector(past, m, TANGENT), vector(past, m, BEND), t, kappa)
+        tau += w * (inverse * _angle(q, k, b) + past[m, FRAME] + increment)
+        width += w
+        turned = _dot(by_t, t) + _dot(spin, kappa)
+        for j in range(4):
+            across, along = w * (c[j] - h * b[j] / length) / length, w * b[j] / length
+            for d in range(3):
+                mean[4 * j + d] += across * spin[d] + along * (by_t[d] - turned * t[d])
+            mean[4 * j + 3] += w * inverse * b[j]
+    for j in range(16):
+        mean[j] /= width
+    return tau / width
+
+
+@law
+def _point(
+    q: Any, v: Any, k: int, w: float, a: Row, b: Row, c: Row, pairs: Any, active: Any, p: Any, memory: Any, past: Any,
+    rates: Any, scales: Any, tangent: bool, n: int, tau: float, mean: Any, f: Any, sums: Any,
+) -> tuple[float, float]:  # fmt: skip
+    """Add the forces of the bends of a point, and its share in the blocks of its span, but for that of the twist rate.
+
+    Returns:
+        the torque and the torsional stiffness of its part of the cable.
     """
     elastic, viscous, geometric = scales
     if viscous != 0.0 and rates[0] != 0.0:
         viscous = rates[0]
-    firsts, b1, b2, weights = tables.curvature_first, tables.curvature_b1, tables.curvature_b2, tables.curvature_w
     inverse = p[TWIST, 1]
+    length, h, t, kappa = space_curvature(combine(q, k, b), combine(q, k, c))
+    t0 = vector(past, n, TANGENT)
+    m1, m2 = _directors(t0, t, vector(past, n, DIRECTOR), inverse * _angle(q, k, a))
+    spin = twist_increment(t0, vector(past, n, BEND), t, kappa)[1]
+    k1, k2 = _dot(kappa, m1), _dot(kappa, m2)
+    O1, P1 = _derivatives(length, h, m1, k2, spin, -k1, t)
+    O2, P2 = _derivatives(length, h, m2, -k1, spin, -k2, t)
+    A1, A2 = inverse * k2, -inverse * k1
+    rate = (0.0, 0.0, 0.0)
     damped = active[DAMPING] or active[TWIST_DAMPING]
-    E = np.empty((3, 16))
-    SE = np.empty((3, 16))
-    A = np.empty((3, 3))
-    B = np.empty((3, 3))
-    mean = np.zeros(16)  # of the derivative of the twist rate over a span
-    mean_tau, until = 0.0, 0
-    for n in range(len(weights)):
-        k, w = firsts[n], weights[n]
-        if n == until:
-            until = _span_end(firsts, n)
-            mean[:] = 0.0
-            mean_tau, width = 0.0, 0.0
-            for m in range(n, until):
-                b, c = row_of(b1, m), row_of(b2, m)
-                length, h, t, kappa = space_curvature(combine(q, k, b), combine(q, k, c))
-                increment, spin, by_t = twist_increment(vector(past, m, TANGENT), vector(past, m, BEND), t, kappa)
-                mean_tau += weights[m] * (inverse * _angle(q, k, b) + past[m, FRAME] + increment)
-                width += weights[m]
-                tangential, turned = _dot(by_t, t), _dot(spin, kappa)
-                for j in range(4):
-                    across = weights[m] * (c[j] - h * b[j] / length) / length
-                    along = weights[m] * b[j] / length
-                    for d in range(3):
-                        mean[4 * j + d] += across * spin[d] + along * (by_t[d] - (tangential + turned) * t[d])
-                    mean[4 * j + 3] += weights[m] * inverse * b[j]
-            mean /= width
-            mean_tau /= width
-        a, b, c = row_of(tables.body_b0, n), row_of(b1, n), row_of(b2, n)
-        first = combine(q, k, b)
-        second = combine(q, k, c)
-        length, h, t, kappa = space_curvature(first, second)
-        t0 = vector(past, n, TANGENT)
-        m1, m2 = _directors(t0, t, vector(past, n, DIRECTOR), inverse * _angle(q, k, a))
-        spin = twist_increment(t0, vector(past, n, BEND), t, kappa)[1]
-        k1, k2 = _dot(kappa, m1), _dot(kappa, m2)
-        tau = mean_tau
-        for j in range(4):
-            across, along = (c[j] - h * b[j] / length) / length, b[j] / length
-            for d in range(3):
-                E[0, 4 * j + d] = across * m1[d] + along * (k2 * spin[d] - k1 * t[d])
-                E[1, 4 * j + d] = across * m2[d] - along * (k1 * spin[d] + k2 * t[d])
-            E[0, 4 * j + 3] = inverse * a[j] * k2
-            E[1, 4 * j + 3] = -inverse * a[j] * k1
-        for j in range(16):
-            E[2, j] = mean[j]
-        rate = (0.0, 0.0, 0.0)
-        if damped and rates[0] != 0.0:
-            rate = (
-                rates[0] * k1 + rates[1] * past[n, LAST] + rates[2] * past[n, BEFORE],
-                rates[0] * k2 + rates[1] * past[n, LAST + 1] + rates[2] * past[n, BEFORE + 1],
-                rates[0] * tau + rates[1] * past[n, LAST + 2] + rates[2] * past[n, BEFORE + 2],
-            )
-        elif damped:
-            r0, r1, r2 = 0.0, 0.0, 0.0
-            for j in range(4):
-                for d in range(4):
-                    r0 += E[0, 4 * j + d] * v[k + j, d]
-                    r1 += E[1, 4 * j + d] * v[k + j, d]
-                    r2 += E[2, 4 * j + d] * v[k + j, d]
-            rate = (r0, r1, r2)
-        moment, stiffness, viscosity = curvature_stress(
-            active, p, (k1, k2, 0.0), (rate[0], rate[1], 0.0), (memory[n, 0], memory[n, 1], 0.0),
-            (memory[n, 3], memory[n, 4], 0.0), (past[n, LAST], past[n, LAST + 1], 0.0), rates[3],
-        )  # fmt: skip
-        T, twist_stiffness, twist_viscosity = twist_stress(
-            active, p, tau, rate[2], memory[n, 2], memory[n, 5], past[n, LAST + 2], rates[3]
+    if damped and rates[0] != 0.0:
+        rate = (
+            rates[0] * k1 + rates[1] * past[n, LAST] + rates[2] * past[n, BEFORE],
+            rates[0] * k2 + rates[1] * past[n, LAST + 1] + rates[2] * past[n, BEFORE + 1],
+            rates[0] * tau + rates[1] * past[n, LAST + 2] + rates[2] * past[n, BEFORE + 2],
         )
-        M1, M2 = moment[0], moment[1]
+    elif damped:
+        first, second, turn = combine(v, k, b), combine(v, k, c), _angle(v, k, a)
+        twisting = 0.0
         for j in range(4):
             for d in range(4):
-                f[k + j, d] += w * (M1 * E[0, 4 * j + d] + M2 * E[1, 4 * j + d] + T * E[2, 4 * j + d])
-        if not tangent:
-            continue
-        S11 = w * (elastic * stiffness[0] + viscous * viscosity[0])
-        S22 = w * (elastic * stiffness[1] + viscous * viscosity[1])
-        S12 = w * (elastic * stiffness[3] + viscous * viscosity[3])
-        S33 = w * (elastic * twist_stiffness + viscous * twist_viscosity)
-        for j in range(16):
-            SE[0, j] = S11 * E[0, j] + S12 * E[1, j]
-            SE[1, j] = S12 * E[0, j] + S22 * E[1, j]
-            SE[2, j] = S33 * E[2, j]
-        for j in range(16):
-            column = 4 * k + j
-            for i in range(j, 16):
-                K[column, i - j] += E[0, i] * SE[0, j] + E[1, i] * SE[1, j] + E[2, i] * SE[2, j]
-        if geometric == 0.0:
-            continue
-        M = (M1 * m1[0] + M2 * m2[0], M1 * m1[1] + M2 * m2[1], M1 * m1[2] + M2 * m2[2])
-        N = (M1 * m2[0] - M2 * m1[0], M1 * m2[1] - M2 * m1[1], M1 * m2[2] - M2 * m1[2])  # t x M
-        dot = M1 * k1 + M2 * k2
-        along_N = _dot(N, kappa)
-        scale = w * geometric / (length * length)
-        kb = (
-            t[1] * kappa[2] - t[2] * kappa[1],
-            t[2] * kappa[0] - t[0] * kappa[2],
-            t[0] * kappa[1] - t[1] * kappa[0],
-        )
+                twisting += mean[4 * j + d] * v[k + j, d]
+        rate = (
+            _dot(O1, first) + _dot(P1, second) + A1 * turn, _dot(O2, first) + _dot(P2, second) + A2 * turn, twisting,
+        )  # fmt: skip
+    moment, stiffness, viscosity = curvature_stress(
+        active, p, (k1, k2, 0.0), (rate[0], rate[1], 0.0), (memory[n, 0], memory[n, 1], 0.0),
+        (memory[n, 3], memory[n, 4], 0.0), (past[n, LAST], past[n, LAST + 1], 0.0), rates[3],
+    )  # fmt: skip
+    T, twist_stiffness, twist_viscosity = twist_stress(
+        active, p, tau, rate[2], memory[n, 2], memory[n, 5], past[n, LAST + 2], rates[3]
+    )
+    M1, M2 = moment[0], moment[1]
+    for j in range(4):
+        bj, cj = w * b[j], w * c[j]
         for d in range(3):
-            for e in range(3):
-                Mt = M[d] * t[e] + t[d] * M[e]
-                A[d, e] = -scale * Mt
-                B[d, e] = scale * (3.0 * dot * t[d] * t[e] + 2.0 * h / length * Mt)
-                B[d, e] -= scale * 0.5 * (M[d] * kappa[e] + kappa[d] * M[e])
-                B[d, e] -= scale * T * 1.5 * (kb[d] * t[e] + t[d] * kb[e])
-            B[d, d] -= scale * dot
-        half = 0.5 * scale * T
-        cross = (  # of t, times half the torque
-            (0.0, -half * t[2], half * t[1]),
-            (half * t[2], 0.0, -half * t[0]),
-            (-half * t[1], half * t[0], 0.0),
-        )
-        turn = w * geometric * inverse
-        for j in range(4):
-            for i in range(j, 4):
-                both = b[i] * b[j]
-                mixed = b[i] * c[j] + c[i] * b[j]
-                skew = b[i] * c[j] - c[i] * b[j]
-                column, offset = 4 * (k + j), 4 * (i - j)
-                for e in range(3):
-                    for d in range(e if i == j else 0, 3):
-                        K[column + e, offset + d - e] += both * B[d, e] + mixed * A[d, e] + skew * cross[d][e]
-                # between theta of i and x, y, z of j, and the other way
-                across, along = (c[j] - h * b[j] / length) / length, b[j] / length
-                if i > j:
-                    for e in range(3):
-                        K[column + e, offset + 3 - e] += turn * a[i] * (across * N[e] - along * along_N * t[e])
-                across, along = (c[i] - h * b[i] / length) / length, b[i] / length
-                if i > j:
-                    for d in range(3):
-                        K[column + 3, offset + d - 3] += turn * a[j] * (across * N[d] - along * along_N * t[d])
-                else:
-                    for e in range(3):
-                        K[column + e, 3 - e] += turn * a[i] * (across * N[e] - along * along_N * t[e])
-                K[column + 3, offset] -= turn * inverse * dot * a[i] * a[j]
+            f[k + j, d] += bj * (M1 * O1[d] + M2 * O2[d]) + cj * (M1 * P1[d] + M2 * P2[d])
+        f[k + j, 3] += w * a[j] * (M1 * A1 + M2 * A2)
+    if not tangent:
+        return w * T, 0.0
+    S11 = w * (elastic * stiffness[0] + viscous * viscosity[0])
+    S22 = w * (elastic * stiffness[1] + viscous * viscosity[1])
+    S12 = w * (elastic * stiffness[3] + viscous * viscosity[3])
+    M = (M1 * m1[0] + M2 * m2[0], M1 * m1[1] + M2 * m2[1], M1 * m1[2] + M2 * m2[2])
+    N = (M1 * m2[0] - M2 * m1[0], M1 * m2[1] - M2 * m1[1], M1 * m2[2] - M2 * m1[2])  # t x M
+    dot, along = M1 * k1 + M2 * k2, _dot(N, kappa)
+    scale = w * geometric / (length * length)
+    turn = w * geometric * inverse / length
+    kb = (t[1] * kappa[2] - t[2] * kappa[1], t[2] * kappa[0] - t[0] * kappa[2], t[0] * kappa[1] - t[1] * kappa[0])
+    half = 0.5 * scale * T
+    cross = ((0.0, -half * t[2], half * t[1]), (half * t[2], 0.0, -half * t[0]), (-half * t[1], half * t[0], 0.0))
+    products = pairs[n]
+    for e in range(3):
+        # S times the derivatives by coordinate e of r' and of r''
+        SO1, SO2 = S11 * O1[e] + S12 * O2[e], S12 * O1[e] + S22 * O2[e]
+        SP1, SP2 = S11 * P1[e] + S12 * P2[e], S12 * P1[e] + S22 * P2[e]
+        for d in range(3):
+            Mt = M[d] * t[e] + t[d] * M[e]
+            by_first = 3.0 * dot * t[d] * t[e] + 2.0 * h / length * Mt - 0.5 * (M[d] * kappa[e] + kappa[d] * M[e])
+            by_first -= 1.5 * T * (kb[d] * t[e] + t[d] * kb[e])
+            if d == e:
+                by_first -= dot
+            add_derivatives(
+                sums[4 * d + e],
+                products,
+                scale * by_first + O1[d] * SO1 + O2[d] * SO2,
+                cross[d][e] - scale * Mt + O1[d] * SP1 + O2[d] * SP2,
+                -cross[d][e] - scale * Mt + P1[d] * SO1 + P2[d] * SO2,
+                P1[d] * SP1 + P2[d] * SP2,
+            )
+        by_first = A1 * SO1 + A2 * SO2 - turn * (h / length * N[e] + along * t[e])
+        by_second = A1 * SP1 + A2 * SP2 + turn * N[e]
+        add_angles(sums[12 + e], products, AB, by_first, AC, by_second)
+        add_angles(sums[4 * e + 3], products, BA, by_first, CA, by_second)
+    angular = S11 * A1 * A1 + 2.0 * S12 * A1 * A2 + S22 * A2 * A2 - w * geometric * inverse * inverse * dot
+    add_one(sums[15], products, AA, angular)
+    return w * T, w * (elastic * twist_stiffness + viscous * twist_viscosity)
+
+
+@law
+def _derivatives(
+    length: float, h: float, director: Vector, by_spin: float, spin: Vector, by_t: float, t: Vector
+) -> tuple[Vector, Vector]:
+    """Return the derivatives by r' and by r'' of a curvature along a director, which turns with the frames."""
+    first = (
+        (by_spin * spin[0] + by_t * t[0] - h / length * director[0]) / length,
+        (by_spin * spin[1] + by_t * t[1] - h / length * director[1]) / length,
+        (by_spin * spin[2] + by_t * t[2] - h / length * director[2]) / length,
+    )
+    return first, (director[0] / length, director[1] / length, director[2] / length)
+
+
+@law
+def _add_span(K: Any, k: int, sums: Any) -> None:
+    """Add the blocks of a span from control point k on to the band K, and clear their `sums`."""
+    pair = 0
+    for j in range(4):
+        for i in range(j, 4):
+            for e in range(4):
+                for d in range(e if i == j else 0, 4):
+                    K[4 * (k + j) + e, 4 * (i - j) + d - e] += sums[4 * d + e, pair]
+            pair += 1
+    clear(sums)
 
 
 @kernel

@@ -112,7 +112,7 @@ def reference(problem: Problem, monitor: Monitor) -> Prediction:
                 step_length=1.0,
                 n_u=surface.control_points.shape[1],
                 n_t=len(surface.control_points),
-                surface=surface,
+                find_surface=lambda: surface,
                 note=f"rod of {len(motion.rod.u) - 1} elements, {motion.steps} steps",
             )
         )

@@ -10,7 +10,7 @@ from dlocore.discretisation import applied_forces
 from dlocore.effects.friction import SLIP_SPEED
 from dlocore.grid import Grid
 from dlocore.holding import Starts, hold
-from dlocore.kernels.assembly import History, largest_strain, note, times_scalar_band
+from dlocore.kernels.assembly import History, note, times_scalar_band
 from dlocore.kernels.banded import Elimination
 from dlocore.kernels.basis import graded_knots
 from dlocore.kernels.march import (
@@ -307,7 +307,7 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
     log[reached + 1 :] = log[reached : reached + 1]
     return March(
         grid, times, states, velocity, tuple(forces), history, log, reached, stopped, rho, split,
-        float(largest_strain(axes, states, grid.tables)), float(info[LEFT]), float(info[DEEPEST]),
+        grid.largest_strain(states), float(info[LEFT]), float(info[DEEPEST]),
     )  # fmt: skip
 
 
@@ -380,7 +380,7 @@ def _to_ends_of_steps(reactions: Floats, lag: float) -> None:
     A generalised-alpha step balances its forces `lag` steps before its end (alpha_f).
     """
     if len(reactions) > 2:
-        rate = np.diff(reactions[1:], axis=0)
+        rate = reactions[2:] - reactions[1:-1]
         reactions[1:-1] += lag * rate
         reactions[-1] += lag * rate[-1]
 

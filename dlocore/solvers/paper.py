@@ -102,7 +102,8 @@ def _equations(
     n_t, n_u, nc = control.shape
     size, free = n_u * nc, window.free
     K, dense = np.empty((size, 4 * nc)), np.empty((size, size))
-    M, N = (_dense_band(band, nc) for band in (window.mass, window.drag))
+    unit, density, dragged = window.unit_mass, window.problem.mass_density(), window.problem.drag_coefficient()
+    M, N = (_dense_band(factor * unit, nc) for factor in (density, dragged))
     f, state = np.empty((n_u, nc)), np.empty((3, n_u, nc))
     J = np.zeros((len(first) * free, (n_t - 2) * free))
     R = np.empty(len(first) * free)
@@ -111,8 +112,8 @@ def _equations(
         laws = (window.active, window.parameters, history_at(histories, k), NO_RATES)
         assemble(window.axes, state[0], state[1], window.grid.tables, *laws, (1.0, 0.0, 1.0), f, K)
         band_to_dense(K, dense)
-        multiply_scalar_band(window.mass, state[2], 1.0, f)
-        multiply_scalar_band(window.drag, state[1], 1.0, f)
+        multiply_scalar_band(unit, state[2], density, f)
+        multiply_scalar_band(unit, state[1], dragged, f)
         f -= applied[min(k, len(applied) - 1)]
         rows = slice(k * free, (k + 1) * free)
         R[rows] = Z.T @ f.ravel()

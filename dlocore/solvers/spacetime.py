@@ -15,7 +15,7 @@ from dlocore.discretisation import applied_forces
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.assembly import times_scalar_band
-from dlocore.kernels.banded import expand_vector, factor_columns, place_held
+from dlocore.kernels.banded import expand_rows, factor_columns, place_held
 from dlocore.kernels.banded import solve as solve_factored
 from dlocore.kernels.basis import GAUSS_2, basis_rows
 from dlocore.kernels.leastsquares import normal_equations
@@ -106,8 +106,7 @@ class WindowSolver:
         self.span = (window.end - window.begin) / len(spans)
         self.active, self.parameters = problem.law_table()
         self.parameters[0, 0] = axial_stiffness
-        self.mass = grid.tables.mass * problem.mass_density()
-        self.drag = grid.tables.mass * problem.drag_coefficient()
+        self.unit_mass = grid.tables.mass
         self.applied = applied_forces(problem, grid, self.times)
         fine = np.linspace(window.begin, window.end, 6 * len(spans) + 1)
         self.histories = motion.behind(self.times)
@@ -131,7 +130,7 @@ class WindowSolver:
             place_held(self.held.elimination, self.offsets[j], control[j].reshape(-1))
         return control
 
-    def objective(self, control: Floats, tangent: bool, geometric: float = 1.0) -> tuple[float, Floats, Floats, Floats]:
+    def objective(self, control: Floats, tangent: bool) -> tuple[float, Floats, Floats, Floats]:
         """Return the objective, eq. 16 [m^2], the normal matrix, its right side and the holding forces at `control`."""
         size = (len(control) - 2) * self.free
         A = np.zeros((size, 4 * self.free) if tangent else (1, 1))  # lazily: a large one is not cleared at once
@@ -142,9 +141,10 @@ class WindowSolver:
         for begin in range(0, len(self.times), points):
             self.monitor.check()
             value += normal_equations(
-                self.axes, control, self.first, self.table, self.weights, self.span, self.mass, self.drag,
-                self.grid.tables, self.active, self.parameters, self.histories, self.applied, self.held.elimination,
-                geometric, A, right, forces, tangent, begin, min(begin + points, len(self.times)),
+                self.axes, control, self.first, self.table, self.weights, self.span, self.unit_mass,
+                self.problem.mass_density(), self.problem.drag_coefficient(), self.grid.tables, self.active,
+                self.parameters, self.histories, self.applied, self.held.elimination, A, right, forces, tangent, begin,
+                min(begin + points, len(self.times)),
             )  # fmt: skip
         weight = 12.0 * self.problem.mass_density() / self.span**2 + 2.0 * self.problem.drag_coefficient() / self.span
         return value / (weight * self.problem.scene.cable.length), A, right, forces
@@ -165,8 +165,7 @@ class WindowSolver:
         """Return the change (n, n_u, nc) of all control points for a step x of the free ones."""
         steps = x.reshape(-1, self.free)
         change = np.zeros((len(steps) + 2, self.grid.n_u, self.nc))
-        for j, row in enumerate(steps):
-            expand_vector(self.held.elimination, row, change[j + 2].reshape(-1))
+        change[2:] = expand_rows(self.held.elimination, steps, self.grid.n_u * self.nc).reshape(change[2:].shape)
         return change
 
 
@@ -263,13 +262,13 @@ def _iterate(
     best = (np.inf, control)
     for _ in range(MAX_ITERATIONS):
         monitor.check()
-        value, A, right, _ = solver.objective(control, True, 0.0)
+        value, A, right, _ = solver.objective(control, True)
         if not np.isfinite(value):
             break
         x, positive = solver.step(A, right, 0.0)
         damping = 0.0
         if not positive:
-            _, A, right, _ = solver.objective(control, True, 0.0)
+            _, A, right, _ = solver.objective(control, True)
             damping = _DAMPING
             x, positive = solver.step(A, right, damping)
         step = solver.expand(x)

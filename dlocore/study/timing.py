@@ -6,6 +6,8 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from dlocore.fit import forget_fits
+
 Answer = TypeVar("Answer")
 
 # A solve runs in one thread: the processor time of this thread is the time that it takes on a core of its own, whatever
@@ -23,7 +25,9 @@ class Times(NamedTuple):
 
 
 def timed(call: Callable[[], Answer], repeats: int, patience: float = np.inf) -> tuple[Answer, Times]:
-    """Return the last answer of `call` and its times; the first of several calls, which fills caches, is not counted.
+    """Return the last answer of `call` and its times; the first of several calls, which loads code, is not counted.
+
+    A call finds nothing of those before it: fits of points are forgotten in between.
 
     Args:
         call: what is measured.
@@ -32,6 +36,7 @@ def timed(call: Callable[[], Answer], repeats: int, patience: float = np.inf) ->
     """
     taken: list[float] = []
     while len(taken) <= repeats and (len(taken) < 2 or sum(taken) < patience):
+        forget_fits()
         began = clock()
         answer = call()
         taken.append(clock() - began)
