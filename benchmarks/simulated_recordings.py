@@ -17,8 +17,8 @@ from dlocore.statics import start_grid
 Floats = NDArray[np.float64]
 
 RATE = 200.0  # [Hz]
-STEPS = 200.0  # [1/s] of the truth
-SWUNG, APART = 0.10, 0.04  # [m] how far both grippers swing together, and each of them beside that
+STEPS = 400.0  # [1/s] of the truth
+SWUNG, APART = 0.09, 0.05  # [m] how far both grippers swing together once a second, and each of them beside that
 JAW = 0.05  # [m] between the two markers of a gripper, from which the cable hangs
 U = np.array([0.0, JAW, *np.linspace(0.13, 0.87, 9), 1.0 - JAW, 1.0])  # [m] of the markers; two pairs are held
 HELD = (0, 1, -2, -1)
@@ -57,13 +57,17 @@ def true_cable(rng: np.random.Generator) -> tuple[Cable, Environment]:
 
 
 def gripper_path(rng: np.random.Generator, times: Floats, planar: bool, far: float) -> tuple[Floats, Floats]:
-    """Return displacements (k, 3) of about `far` [m] and rotation vectors (k, 3) [rad] that start at rest."""
+    """Return displacements (k, 3) [m] and rotation vectors (k, 3) [rad] that start at rest.
+
+    They are three swings in directions of their own, `far` [m] at 1 Hz, slower ones farther and faster ones less far.
+    """
     t = np.maximum(times - STILL, 0.0)
     ramp = 1.0 - np.exp(-((t / 0.5) ** 3))
     shift, turn = np.zeros((len(t), 3)), np.zeros((len(t), 3))
     for frequency in (0.6, 1.1, 1.7):
         phase = rng.uniform(0.0, 2.0 * np.pi, 6)
-        size = rng.normal(0.0, far, 3) / np.sqrt(frequency)
+        size = rng.standard_normal(3)
+        size *= far / np.sqrt(frequency) / np.linalg.norm(size)
         bend = rng.normal(0.0, 0.12, 3)
         shift += ramp[:, None] * size * np.sin(2.0 * np.pi * frequency * t[:, None] + phase[:3])
         turn += ramp[:, None] * bend * np.sin(2.0 * np.pi * frequency * t[:, None] + phase[3:])

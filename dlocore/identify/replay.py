@@ -1,6 +1,5 @@
 """Replay of a recording: the scene of its grippers, predicted from its first frames with a candidate's parameters."""
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -16,6 +15,8 @@ from dlocore.cable import Cable
 from dlocore.discretisation import make_grid
 from dlocore.errors import SceneError
 from dlocore.grid import Grid
+from dlocore.identify.beginning import rests, start_markers
+from dlocore.identify.candidate import Candidate, varied
 from dlocore.identify.frames import across, carried, tilted, turned_from, with_sections
 from dlocore.identify.span import Span
 from dlocore.identify.start import StartFit
@@ -23,7 +24,7 @@ from dlocore.identify.tracks import held_paths
 from dlocore.paths import Waypoints
 from dlocore.problem import Problem, pose
 from dlocore.recordings import Hold, Recording
-from dlocore.scene import ControlPoints, Environment, Grasp, Scene, Straight, Switch
+from dlocore.scene import ControlPoints, Grasp, Scene, Straight, Switch
 from dlocore.sensitivity import KnownMotion, beside, factored, objection
 from dlocore.solvers.march import STRONGLY_DAMPED, March, march
 from dlocore.solvers.monitor import Monitor
@@ -34,37 +35,7 @@ Floats = NDArray[np.float64]
 
 _SLACK = 1.003  # of the cable between two grippers: held markers farther apart are brought nearer
 _REST_FRAMES = 8  # from which on a start can be seen to be at rest
-_REWEIGHTED = 12  # times at most that outliers of the start are weighed down
-_SETTLED = 1e-3  # change of a weight
 _CARRIED = 3  # tangents from a marker to the next, over which a frame is carried
-_STILL = 0.01  # [m/s]: slower than this, or than noise lets tell, nothing moves
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Candidate:
-    """What a recording is replayed with.
-
-    Attributes:
-        cable: its length is that of the recording.
-        environment: drag; gravity is that of the recording.
-        rest_curvature: (k, 2) [1/m] of the stress-free shape at k places from end to end, in the frame of the
-            sections; None: straight.
-        clamp_angles: (clamps, 2) [rad] by which the cable leaves each clamp beside the direction of its markers.
-        turn: [rad] of the last clamp against the first, about the cable.
-        marker_offsets: (m, 2) [m] of the markers beside the centreline, across it, in a frame that is carried from the
-            first clamp without twist; None: on it.
-        length_ratio: of the cable's length and its markers' coordinates to those of the recording.
-        twist: simulate twist; needed for rest_curvature and a torsional stiffness.
-    """
-
-    cable: Cable
-    environment: Environment
-    rest_curvature: Floats | None = None
-    clamp_angles: Floats | None = None
-    turn: float = 0.0
-    marker_offsets: Floats | None = None
-    length_ratio: float = 1.0
-    twist: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,7 +43,7 @@ class Resolution:
     """How finely a recording is replayed: control points, time step [s], frames that its start is taken from."""
 
     n_u: int = 13
-    step: float = 0.01
+    step: float = 0.005
     start_frames: int = 12
 
 
@@ -81,10 +52,12 @@ class Played:
     """A replayed recording.
 
     Attributes:
+        candidate: that it was replayed with.
         predicted: positions of all markers at the compared frames (frames, m, 3) [m].
         problem, grid, motion: what was solved.
     """
 
+    candidate: Candidate
     predicted: Floats
     problem: Problem
     grid: Grid
@@ -149,8 +122,8 @@ class Replay:
         self.references = self._references(clean) if references is None else references
         self.paths = self._reachable(tuple(self._path(h, clean) for h in self.holds))
         self.ways = tuple(self._way(i) for i in range(len(self.holds)))
-        self.seen, self.start_markers, self.start_speeds = _start_markers(recording, frames, self.begin, shake)
-        self.at_rest = frames >= _REST_FRAMES and _rests(recording, frames)
+        self.seen, self.start_markers, self.start_speeds = start_markers(recording, frames, self.begin, shake)
+        self.at_rest = frames >= _REST_FRAMES and rests(recording, frames)
         self._guess: Floats | None = None
         self._start: StartFit | None = None
         self._start_length = 0.0
@@ -267,13 +240,19 @@ class Replay:
         problem = pose(self.scene(candidate))
         return problem, start_grid(problem, self.resolution.n_u, Monitor(None, None, None))
 
-    def play(self, candidate: Candidate) -> Played:
-        """Predict the recording with a candidate."""
-        problem, grid = self.posed(candidate)
+    def play(self, candidate: Candidate, like: Played | None = None) -> Played:
+        """Predict the recording with a candidate.
+
+        Args:
+            candidate: to predict it with.
+            like: it with another candidate, whose equations serve as far as they are the same.
+        """
+        problem, grid = self.posed(candidate) if like is None else self._posed_beside(like, candidate)
         motion = march(problem, grid, self.steps, Monitor(None, None, None))
         if motion.stopped:
             motion = march(problem, grid, 2 * self.steps, Monitor(None, None, None), rho=STRONGLY_DAMPED)
-        return Played(self.positions(candidate, problem, grid, motion.times, motion.states), problem, grid, motion)
+        predicted = self.positions(candidate, problem, grid, motion.times, motion.states)
+        return Played(candidate, predicted, problem, grid, motion)
 
     def play_beside(self, played: Played, candidate: Candidate) -> Floats:
         """Return the predicted positions (frames, m, 3) [m] with a candidate that differs a little.
@@ -281,9 +260,14 @@ class Replay:
         Raises:
             ValueError: the motion can't be followed from the played one.
         """
-        problem, grid = self.posed(candidate)
+        problem, grid = self._posed_beside(played, candidate)
         states, times, _ = beside(played.known, problem, grid)
         return self.positions(candidate, problem, grid, times, states)
+
+    def _posed_beside(self, played: Played, candidate: Candidate) -> tuple[Problem, Grid]:
+        """Return the equations for a candidate beside the played one, with its grid where the start is the same."""
+        problem = varied(played.problem, played.candidate, candidate)
+        return self.posed(candidate) if problem is None else (problem, played.grid)
 
     def positions(self, candidate: Candidate, problem: Problem, grid: Grid, times: Floats, states: Floats) -> Floats:
         """Return the markers' positions (frames, m, 3) [m] at the compared frames of states (steps + 1, n_u, nc)."""
@@ -353,54 +337,3 @@ def common_references(recordings: Sequence[Recording]) -> Floats | None:
         mean = np.nanmean(np.concatenate(unit), axis=0)
         found.append(mean / np.linalg.norm(mean))
     return np.array(found).reshape(-1, 3)
-
-
-def _rests(recording: Recording, frames: int) -> bool:
-    """Tell whether no marker moves in the first frames, as far as their noise lets tell."""
-    times, markers = cast(Floats, recording.times)[:frames], cast(Floats, recording.markers)[:frames]
-    half = frames // 2
-    between = float(times[half:].mean() - times[:half].mean())
-    with np.errstate(all="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of a marker that was not seen
-        moved = np.nanmedian(markers[half:], axis=0) - np.nanmedian(markers[:half], axis=0)
-        noise = 1.4826 * np.nanmedian(np.abs(np.diff(markers, axis=0)), axis=(0, 2)) / np.sqrt(2.0)
-    speed = np.linalg.norm(moved, axis=1) / between
-    allowed = np.maximum(_STILL, 1.25 * np.sqrt(3.0) * np.sqrt(4.0 / frames) * noise / between * 2.0)
-    known = np.isfinite(speed)
-    return bool((speed[known] <= allowed[known]).all())
-
-
-def _start_markers(
-    recording: Recording, frames: int, at: float, shake: np.random.Generator | None
-) -> tuple[NDArray[np.int64], Floats, Floats]:
-    """Return the markers seen in the first frames, where they are at time `at` and how fast they move.
-
-    From two or three frames a straight line, from more a parabola, with outliers weighed down.
-    """
-    times, markers = cast(Floats, recording.times)[:frames], cast(Floats, recording.markers)[:frames]
-    order = 1 if frames < 6 else 2
-    seen, places, speeds = [], [], []
-    for i in range(markers.shape[1]):
-        keep = np.isfinite(markers[:, i, 0])
-        if keep.sum() < order + 1:
-            continue
-        t, x = times[keep] - at, markers[keep, i]
-        A = np.vander(t, order + 1, increasing=True)
-        w = np.ones(len(t))
-        for _ in range(1 if frames < 6 else _REWEIGHTED):
-            c = np.linalg.lstsq(A * w[:, None], x * w[:, None], rcond=None)[0]
-            away = np.linalg.norm(x - A @ c, axis=1)
-            scale = max(1.4826 * float(np.median(away)), 1e-5)
-            before, w = w, 1.0 / (1.0 + (away / (2.0 * scale)) ** 2)
-            if np.abs(w - before).max() < _SETTLED:
-                break
-        if shake is not None and len(t) > order + 1:
-            spare = max(float((w * w).sum()) - (order + 1), 1.0)
-            noise = np.sqrt(((w[:, None] * (x - A @ c)) ** 2).sum() / (3.0 * spare))
-            c = c + np.linalg.pinv(A) @ (noise * shake.standard_normal(x.shape))
-        seen.append(i)
-        places.append(c[0])
-        speeds.append(c[1])
-    if len(seen) < 3:
-        raise SceneError("markers", f"{len(seen)} markers seen at the beginning", "at least 3")
-    return np.array(seen), np.array(places), np.array(speeds)

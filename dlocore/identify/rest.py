@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from dlocore.discretisation import make_grid
 from dlocore.errors import SceneError
+from dlocore.identify.candidate import Candidate
 from dlocore.identify.frames import across, tilted, turned_from, with_sections
-from dlocore.identify.replay import Candidate, Resolution
+from dlocore.identify.replay import Resolution
 from dlocore.identify.span import Span
 from dlocore.identify.start import StartFit
 from dlocore.problem import pose

@@ -8,9 +8,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.identify.candidate import Candidate
 from dlocore.identify.datasets import HangingWire, MovedCable
 from dlocore.identify.estimate import Identification, Progress, identify
-from dlocore.identify.replay import Candidate, Replay, Resolution, common_references
+from dlocore.identify.replay import Replay, Resolution, common_references
 from dlocore.recordings import Recording
 from dlocore.scene import Environment
 
