@@ -80,4 +80,6 @@ def _alike(a: Any, b: Any) -> bool:
     if isinstance(a, Cable | Environment):
         names = [f.name for f in fields(a) if f.name not in _RESISTS]
         return type(a) is type(b) and all(_alike(getattr(a, name), getattr(b, name)) for name in names)
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        return np.array_equal(a, b)
     return isinstance(a, float | int | str) and bool(a == b)

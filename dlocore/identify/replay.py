@@ -11,20 +11,18 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from dlocore.cable import Cable
-from dlocore.discretisation import make_grid
 from dlocore.errors import SceneError
 from dlocore.grid import Grid
 from dlocore.identify.beginning import rests, start_markers
 from dlocore.identify.candidate import Candidate, varied
 from dlocore.identify.frames import across, carried, tilted, turned_from, with_sections
 from dlocore.identify.span import Span
-from dlocore.identify.start import StartFit
+from dlocore.identify.start import start_fit
 from dlocore.identify.tracks import held_paths
 from dlocore.paths import Waypoints
 from dlocore.problem import Problem, pose
 from dlocore.recordings import Hold, Recording
-from dlocore.scene import ControlPoints, Grasp, Scene, Straight, Switch
+from dlocore.scene import ControlPoints, Grasp, Scene, Switch
 from dlocore.sensitivity import KnownMotion, beside, factored, objection
 from dlocore.solvers.march import STRONGLY_DAMPED, March, march
 from dlocore.solvers.monitor import Monitor
@@ -125,8 +123,6 @@ class Replay:
         self.seen, self.start_markers, self.start_speeds = start_markers(recording, frames, self.begin, shake)
         self.at_rest = frames >= _REST_FRAMES and rests(recording, frames)
         self._guess: Floats | None = None
-        self._start: StartFit | None = None
-        self._start_length = 0.0
 
     def _references(self, clean: dict[int, CubicSpline]) -> Floats:
         t = self.begin + self.step_times
@@ -198,7 +194,7 @@ class Replay:
                 clamp += 1
             grasps.append(Grasp(u=at, hold=kind, path=way))
         environment = replace(candidate.environment, gravity=recording.gravity)
-        fit = self._fit(candidate.cable, length, tuple(grasps), tuple(held))
+        fit = start_fit(length, self.resolution.n_u, tuple(held))
         weight = candidate.cable.linear_density * np.asarray(environment.gravity)
         on = span.inside(self.seen)
         seen = self.seen[on]
@@ -220,20 +216,6 @@ class Replay:
             horizon=self.horizon,
             effects=switches,
         )
-
-    def _fit(
-        self, cable: Cable, length: float, grasps: tuple[Grasp, ...], held: tuple[tuple[float, int], ...]
-    ) -> StartFit:
-        """Return the fit of the start on the grid that the scene will have."""
-        if self._start is None or self._start_length != length:
-            still = tuple(Grasp(u=g.u, hold="point" if g.hold == "point" else "tangent") for g in grasps)
-            straight = Scene(
-                cable=replace(cable, length=length), shape=Straight(), grasps=still, horizon=1.0,
-                effects={"twist": "off"},
-            )  # fmt: skip
-            self._start = StartFit(make_grid(pose(straight), self.resolution.n_u), held)
-            self._start_length = length
-        return self._start
 
     def posed(self, candidate: Candidate) -> tuple[Problem, Grid]:
         """Return the equations of the recorded motion for a candidate, and its grid."""

@@ -27,10 +27,10 @@ NAMES = ("bending_stiffness", "drag", "bending_damping")
 
 def test_a_clean_recording_is_replayed_as_it_was() -> None:
     clean = Tracking(noise=0.0, held=0.0, outliers=0.0, lost=0.0)
-    replay = Replay(simulated(3, 2.0, cable=CABLE, environment=DRAG, tracking=clean), Resolution(n_u=17, step=0.005))
+    replay = Replay(simulated(3, 2.0, cable=CABLE, environment=DRAG, tracking=clean), Resolution(n_u=17, step=0.0025))
     predicted = replay.play(Candidate(cable=CABLE, environment=DRAG)).predicted
     away = np.linalg.norm((predicted - replay.markers)[:, replay.recording.free], axis=2)
-    # net and steps are those of the truth, begun between two of them: what is left is the second order of steps of 5 ms
+    # net and steps are those of the truth, begun between two of them: what is left is the second order of steps of 2.5 ms
     # in a motion of up to half a metre within half a second
     assert away.max() < 4e-4
 
