@@ -1,6 +1,7 @@
 """Recordings of a simulated cable between two grippers, tracked badly: noise, outliers, lost markers."""
 
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,15 @@ JAW = 0.05  # [m] between the two markers of a gripper, from which the cable han
 U = np.array([0.0, JAW, *np.linspace(0.13, 0.87, 9), 1.0 - JAW, 1.0])  # [m] of the markers; two pairs are held
 HELD = (0, 1, -2, -1)
 STILL = 0.3  # [s] before the grippers start
+CABLE = Cable(
+    length=1.0,
+    diameter=0.006,
+    linear_density=0.05,
+    bending_stiffness=3e-3,
+    bending_damping=5e-4,
+    axial_stiffness=600.0,
+)
+DRAG = Environment(drag=0.06)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,20 +50,17 @@ class Tracking:
 
 
 def true_cable(rng: np.random.Generator) -> tuple[Cable, Environment]:
-    """Return a cable and drag as a trial draws them, over a factor of three each."""
+    """Return a cable and drag as a trial draws them, over a factor of three each about `CABLE` and `DRAG`."""
 
     def about(value: float) -> float:
         return float(value * np.exp(rng.uniform(-0.55, 0.55)))
 
-    cable = Cable(
-        length=1.0,
-        diameter=0.006,
-        linear_density=0.05,
-        bending_stiffness=about(3e-3),
-        bending_damping=about(5e-4),
-        axial_stiffness=600.0,
+    cable = replace(
+        CABLE,
+        bending_stiffness=about(cast(float, CABLE.bending_stiffness)),
+        bending_damping=about(CABLE.bending_damping),
     )
-    return cable, Environment(drag=about(0.06))
+    return cable, Environment(drag=about(DRAG.drag))
 
 
 def gripper_path(rng: np.random.Generator, times: Floats, planar: bool, far: float) -> tuple[Floats, Floats]:

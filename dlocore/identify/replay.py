@@ -12,6 +12,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from dlocore.errors import SceneError
+from dlocore.frames import unit
 from dlocore.grid import Grid
 from dlocore.identify.beginning import rests, start_markers
 from dlocore.identify.candidate import Candidate, varied
@@ -272,13 +273,10 @@ class Replay:
         on = np.clip(self.span.u * (length / self.span.length), 0.0, length)
         ends = np.concatenate([[0.0], on])
         u = np.linspace(ends[:-1], ends[1:], _CARRIED + 1)[1:].T.ravel()  # the last of each _CARRIED is a marker
-        tangents = np.einsum("ni,kid->ndk", design_matrix(grid.knots, u, 1), q)
-        tangents /= np.sqrt((tangents**2).sum(axis=1))[:, None]
-        first = carried(tangents, directors.T)[_CARRIED - 1 :: _CARRIED]
-        along = tangents[_CARRIED - 1 :: _CARRIED]
-        second = np.cross(along, first, axis=1)
-        beside = offsets[:, :1, None] * first + offsets[:, 1:, None] * second
-        return np.ascontiguousarray(beside.transpose(2, 0, 1))
+        tangents = unit(np.einsum("ni,kid->nkd", design_matrix(grid.knots, u, 1), q))
+        first = carried(tangents, directors)[_CARRIED - 1 :: _CARRIED]
+        second = np.cross(tangents[_CARRIED - 1 :: _CARRIED], first)
+        return np.asarray((offsets[:, :1] * first.swapaxes(0, 1)) + offsets[:, 1:] * second.swapaxes(0, 1))
 
     @cached_property
     def _directors(self) -> Floats:
@@ -292,8 +290,7 @@ class Replay:
         """Return how far the seen markers (k, 3) lie beside the centreline at the start, by their own polygon."""
         if candidate.marker_offsets is None:
             return np.zeros((len(seen), 3))
-        tangents = np.gradient(markers, self.span.u[seen], axis=0)
-        tangents /= np.linalg.norm(tangents, axis=1)[:, None]
+        tangents = unit(np.gradient(markers, self.span.u[seen], axis=0))
         first = carried(tangents, self._directors[0])
         offsets = candidate.marker_offsets[seen]
         return np.asarray(offsets[:, :1] * first + offsets[:, 1:] * np.cross(tangents, first))
