@@ -256,7 +256,7 @@ class Replay:
         """Return the markers' positions (frames, m, 3) [m] at the compared frames of states (steps + 1, n_u, nc)."""
         B = self.span.scaled(problem.scene.cable.length / self.span.length).rows(grid.knots)
         q = problem.plane.world(states[..., : problem.plane.dimensions])
-        x = np.einsum("mi,kid->kmd", B, q)
+        x = np.ascontiguousarray(np.tensordot(B, q, axes=(1, 1)).swapaxes(0, 1))
         at = np.clip(np.rint(times / self.step_times[1]).astype(int), 0, self.steps)
         if candidate.marker_offsets is not None:
             x += self._beside(candidate.marker_offsets, grid, self._directors[at], q)
@@ -273,7 +273,7 @@ class Replay:
         on = np.clip(self.span.u * (length / self.span.length), 0.0, length)
         ends = np.concatenate([[0.0], on])
         u = np.linspace(ends[:-1], ends[1:], _CARRIED + 1)[1:].T.ravel()  # the last of each _CARRIED is a marker
-        tangents = unit(np.einsum("ni,kid->nkd", design_matrix(grid.knots, u, 1), q))
+        tangents = unit(np.tensordot(design_matrix(grid.knots, u, 1), q, axes=(1, 1)))
         first = carried(tangents, directors)[_CARRIED - 1 :: _CARRIED]
         second = np.cross(tangents[_CARRIED - 1 :: _CARRIED], first)
         return np.asarray((offsets[:, :1] * first.swapaxes(0, 1)) + offsets[:, 1:] * second.swapaxes(0, 1))
