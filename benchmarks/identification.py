@@ -3,7 +3,8 @@
 Each trial draws a cable and its drag over a factor of three, hangs it between two grippers that swing together and a
 little against each other, and tracks it at 200 Hz: nine markers on the cable and two on each gripper, 5 cm apart, all
 with 1 mm of noise, 5 % outliers of 5 cm and 10 % lost. Nothing else tells where the grippers are. The truth is marched
-with steps half as long as those that recordings are replayed with.
+with steps half as long as those that recordings are replayed with, on a net of as many control points, or of more
+(`--truth`).
 """
 
 import os
@@ -21,22 +22,24 @@ from dlocore.identify import Resolution, identify
 
 NAMES = ("bending_stiffness", "drag", "bending_damping")
 WITHIN = 0.05
+N_U = 17  # control points of the replays
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--trials", type=int, default=50)
     parser.add_argument("--first", type=int, default=100, help="first seed")
-    parser.add_argument("--seconds", type=float, default=6.0, help="recorded time of each trial")
+    parser.add_argument("--seconds", type=float, default=10.0, help="recorded time of each trial")
+    parser.add_argument("--truth", type=int, default=N_U, help="control points of the simulated cable")
     options = parser.parse_args()
     print(machine_line())
     near, inside, errors, spent = [], [], [], []
     for seed in range(options.first, options.first + options.trials):
         cable, environment = true_cable(np.random.default_rng([seed, 1]))
         truth = np.array([cable.bending_stiffness, environment.drag, cable.bending_damping], dtype=float)
-        recording = simulated(seed, options.seconds)
+        recording = simulated(seed, options.seconds, n_u=options.truth)
         began = process_time()
-        found = identify([recording], names=NAMES, resolution=Resolution(n_u=17))
+        found = identify([recording], names=NAMES, resolution=Resolution(n_u=N_U))
         spent.append(process_time() - began)
         error = np.array([p.value for p in found.parameters]) / truth - 1.0
         errors.append(error)

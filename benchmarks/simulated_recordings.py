@@ -1,6 +1,7 @@
 """Recordings of a simulated cable between two grippers, tracked badly: noise, outliers, lost markers."""
 
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +18,21 @@ from dlocore.statics import start_grid
 Floats = NDArray[np.float64]
 
 RATE = 200.0  # [Hz]
-STEPS = 200.0  # [1/s] of the truth
-SWUNG, APART = 0.10, 0.04  # [m] how far both grippers swing together, and each of them beside that
+STEPS = 400.0  # [1/s] of the truth
+SWUNG, APART = 0.09, 0.05  # [m] how far both grippers swing together once a second, and each of them beside that
 JAW = 0.05  # [m] between the two markers of a gripper, from which the cable hangs
 U = np.array([0.0, JAW, *np.linspace(0.13, 0.87, 9), 1.0 - JAW, 1.0])  # [m] of the markers; two pairs are held
 HELD = (0, 1, -2, -1)
 STILL = 0.3  # [s] before the grippers start
+CABLE = Cable(
+    length=1.0,
+    diameter=0.006,
+    linear_density=0.05,
+    bending_stiffness=3e-3,
+    bending_damping=5e-4,
+    axial_stiffness=600.0,
+)
+DRAG = Environment(drag=0.06)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,30 +50,31 @@ class Tracking:
 
 
 def true_cable(rng: np.random.Generator) -> tuple[Cable, Environment]:
-    """Return a cable and drag as a trial draws them, over a factor of three each."""
+    """Return a cable and drag as a trial draws them, over a factor of three each about `CABLE` and `DRAG`."""
 
     def about(value: float) -> float:
         return float(value * np.exp(rng.uniform(-0.55, 0.55)))
 
-    cable = Cable(
-        length=1.0,
-        diameter=0.006,
-        linear_density=0.05,
-        bending_stiffness=about(3e-3),
-        bending_damping=about(5e-4),
-        axial_stiffness=600.0,
+    cable = replace(
+        CABLE,
+        bending_stiffness=about(cast(float, CABLE.bending_stiffness)),
+        bending_damping=about(CABLE.bending_damping),
     )
-    return cable, Environment(drag=about(0.06))
+    return cable, Environment(drag=about(DRAG.drag))
 
 
 def gripper_path(rng: np.random.Generator, times: Floats, planar: bool, far: float) -> tuple[Floats, Floats]:
-    """Return displacements (k, 3) of about `far` [m] and rotation vectors (k, 3) [rad] that start at rest."""
+    """Return displacements (k, 3) [m] and rotation vectors (k, 3) [rad] that start at rest.
+
+    They are three swings in directions of their own, `far` [m] at 1 Hz, slower ones farther and faster ones less far.
+    """
     t = np.maximum(times - STILL, 0.0)
     ramp = 1.0 - np.exp(-((t / 0.5) ** 3))
     shift, turn = np.zeros((len(t), 3)), np.zeros((len(t), 3))
     for frequency in (0.6, 1.1, 1.7):
         phase = rng.uniform(0.0, 2.0 * np.pi, 6)
-        size = rng.normal(0.0, far, 3) / np.sqrt(frequency)
+        size = rng.standard_normal(3)
+        size *= far / np.sqrt(frequency) / np.linalg.norm(size)
         bend = rng.normal(0.0, 0.12, 3)
         shift += ramp[:, None] * size * np.sin(2.0 * np.pi * frequency * t[:, None] + phase[:3])
         turn += ramp[:, None] * bend * np.sin(2.0 * np.pi * frequency * t[:, None] + phase[3:])

@@ -12,11 +12,18 @@ Floats = NDArray[np.float64]
 
 WEAKEST = 1e-6  # lambda, relative to the data: interpolation
 STRONGEST = 1e-2  # relative to the data and the sixth power of the spans: a parabola to 1 %, and well above rounding
+MOST_SPANS = 300  # with more the likelihood of the smoothest curves drowns in rounding
 SOFTEST = 0.03  # of the mean |r'''|^2, below which straight parts differ in nothing but their noise
 
 
 def smooth(
-    x: Floats, y: Floats, weight: Floats, length: float, spans: int, most_noise: float, stiffness: Floats
+    x: Floats,
+    y: Floats,
+    weight: Floats,
+    length: float,
+    spans: int,
+    most_noise: float,
+    stiffness: Floats | None = None,
 ) -> BSpline:
     """Return the cubic spline that minimises sum w |r(x) - y|^2 + lambda int k |r'''|^2 on uniform knots.
 
@@ -33,15 +40,16 @@ def smooth(
         y: data (N, 3).
         weight: number of points that each row stands for (N,).
         length: end of the last span [m].
-        spans: number of knot spans.
+        spans: number of knot spans, of which `MOST_SPANS` are taken at most.
         most_noise: bound on the standard deviation of a coordinate of the data.
-        stiffness: k, relative, of each span (spans,).
+        stiffness: k, relative, of each of no more than `MOST_SPANS` spans (spans,); None: 1.
     """
+    spans = min(spans, MOST_SPANS)
     n = spans + DEGREE
     k, basis = _basis(x * spans / length, spans)
     normal, right = normal_equations(k, basis, weight, y, n)
     square = float((weight * (y**2).sum(axis=1)).sum())
-    penalty = _penalty(stiffness)
+    penalty = _penalty(np.ones(spans) if stiffness is None else stiffness)
     decades = np.arange(np.log10(WEAKEST), np.log10(STRONGEST * spans**6) + 1)
     strengths = 10.0**decades * (normal[0].mean() / penalty[0].mean())
     bands = (np.ascontiguousarray(band.T) for band in (normal, penalty))

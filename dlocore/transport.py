@@ -11,6 +11,7 @@ def transported(before: Floats, after: Floats, x: Floats) -> Floats:
 
     `kernels.strain.transport` is its compiled twin for one point.
     """
-    axis = np.cross(before, after)
+    both = before + after
     cosine = (before * after).sum(axis=-1, keepdims=True)
-    return np.asarray(cosine * x + np.cross(axis, x) + axis * (axis * x).sum(axis=-1, keepdims=True) / (1.0 + cosine))
+    mirrored = x - both * ((both * x).sum(axis=-1, keepdims=True) / (1.0 + cosine))
+    return np.asarray(mirrored + 2.0 * after * (before * x).sum(axis=-1, keepdims=True))

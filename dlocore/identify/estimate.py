@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from dlocore.cable import Cable
 from dlocore.errors import Cancelled, SceneError
+from dlocore.identify.candidate import Candidate
 from dlocore.identify.parameters import DEFAULT, Parameter, parameters, prepared
-from dlocore.identify.replay import Candidate, Played, Replay, Resolution, common_references
+from dlocore.identify.replay import Played, Replay, Resolution, common_references
 from dlocore.identify.rest import Rest, Settled
 from dlocore.recordings import Recording
 from dlocore.scene import Environment
@@ -377,12 +378,14 @@ class Search:
                 return (change[:, free] / _FOLLOWED).ravel()
             except ValueError:
                 pass  # it strayed: marched instead
-        both = []
-        for side in (1.0, -1.0):
-            moved = self._bounded(x + side * _MARCHED * np.eye(len(x))[j])
-            both.append((replay.play(self.candidate(candidate, moved)).predicted, moved[j]))
-        (high, a), (low, b) = both
-        return ((high - low)[:, free] / (a - b)).ravel()
+        moved = x.copy()
+        moved[j] += _MARCHED
+        beside = self.candidate(candidate, moved)
+        if isinstance(replay, Replay) and isinstance(played, Played):
+            change = replay.play(beside, played).predicted - played.predicted
+        else:
+            change = replay.play(beside).predicted - played.predicted
+        return (change[:, free] / _MARCHED).ravel()
 
     def coordinates(self, candidate: Candidate) -> Floats:
         """Return the parameters of a candidate on the scales on which they are sought."""

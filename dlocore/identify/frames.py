@@ -7,8 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from dlocore.frames import unit
 from dlocore.scene import ControlPoints, Material
 from dlocore.spline import design_matrix
+from dlocore.transport import transported
 
 Floats = NDArray[np.float64]
 
@@ -39,28 +41,15 @@ def turned_from(reference: Floats, directions: Floats) -> Rotation:
 
 
 def carried(tangents: Floats, director: Floats) -> Floats:
-    """Return a director (3, ...) at the first of the unit tangents (n, 3, ...) carried along them without twist.
+    """Return a director (..., 3) at the first of the unit tangents (n, ..., 3) carried along them without twist.
 
     It is made perpendicular to the first one. The result has the shape of the tangents.
     """
     out = np.empty_like(tangents)
-    (a, b, c), (x, y, z) = tangents[0], director
-    along = a * x + b * y + c * z
-    x, y, z = x - along * a, y - along * b, z - along * c
-    size = np.sqrt(x * x + y * y + z * z)
-    x, y, z = x / size, y / size, z / size
-    out[0] = x, y, z
+    first = director - tangents[0] * (tangents[0] * director).sum(axis=-1, keepdims=True)
+    out[0] = unit(first)
     for i in range(1, len(tangents)):
-        (a, b, c), (p, q, r) = tangents[i - 1], tangents[i]
-        cosine = a * p + b * q + c * r
-        f, g, h = b * r - c * q, c * p - a * r, a * q - b * p
-        s = (f * x + g * y + h * z) / (1.0 + cosine)
-        x, y, z = (
-            cosine * x + g * z - h * y + s * f,
-            cosine * y + h * x - f * z + s * g,
-            cosine * z + f * y - g * x + s * h,
-        )
-        out[i] = x, y, z
+        out[i] = transported(tangents[i - 1], tangents[i], out[i - 1])
     return out
 
 
@@ -82,8 +71,7 @@ def with_sections(
     theta = 0.0
     if len(frames) == 2:
         u = np.linspace(0.0, length, 201)
-        t = design_matrix(knots, u, 1) @ q
-        t /= np.linalg.norm(t, axis=1)[:, None]
+        t = unit(design_matrix(knots, u, 1) @ q)
         d, end = carried(t, director)[-1], frames[1][0]
         theta = float(np.arctan2(np.cross(d, end) @ t[-1], d @ end)) + turn
         theta = (theta + np.pi) % (2.0 * np.pi) - np.pi

@@ -117,18 +117,14 @@ def _shaken(search: "Search", state: "State", scale: Floats) -> Floats:
         D = cast(list[Floats], state.derivatives)[i]
         factor = scale[at : at + len(D)]
         at += len(D)
-        if not isinstance(replay, Replay) or not isinstance(played, Played) or not replay.differentiable(played):
+        if not isinstance(replay, Replay) or not isinstance(played, Played):
             continue
         free = replay.recording.free
         found = []
         for seed in range(_SHAKES):
             search._check()
             other = search._replay(replay.recording, np.random.default_rng([i, seed]))
-            assert isinstance(other, Replay)
-            try:
-                change = other.play_beside(played, state.candidate) - played.predicted
-            except ValueError:
-                change = other.play(state.candidate).predicted - played.predicted
+            change = other.play(state.candidate).predicted - played.predicted
             found.append(D.T @ (factor * change[:, free].ravel()))
         total += np.array(found).T @ np.array(found) / _SHAKES
     return total

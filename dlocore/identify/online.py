@@ -9,15 +9,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from dlocore.cable import Cable
 from dlocore.errors import SceneError, array
+from dlocore.identify.candidate import Candidate
 from dlocore.identify.estimate import robust_deviation, weights
 from dlocore.identify.parameters import DEFAULT, parameters, prepared
-from dlocore.identify.replay import Candidate, Replay, Resolution
+from dlocore.identify.replay import Played, Replay, Resolution
 from dlocore.recordings import Recording
 from dlocore.scene import Environment
 
 Floats = NDArray[np.float64]
 
-_FOLLOWED = 1e-5  # step of a coordinate in which a motion beside is followed
+_ASIDE = 1e-3  # step of a coordinate to a motion beside: far enough for one that is marched with a tolerance
 _FIRST = 1.0  # standard deviation of a logarithm, or of a share of a usual value, before anything was seen
 _FORGOTTEN = 0.02  # that is added to it in every update: cables warm up, wear, are changed
 _STEP = 0.3  # of a coordinate at most in one update
@@ -115,6 +116,14 @@ class Identifier:
         self._next = (self._next + _AT_ONCE) % count
         return found
 
+    @staticmethod
+    def _beside(replay: Replay, played: Played, candidate: Candidate) -> Floats:
+        """Return the predicted positions (frames, m, 3) [m] with a candidate that differs a little."""
+        try:
+            return replay.play_beside(played, candidate)
+        except ValueError:  # it can't be followed
+            return replay.play(candidate, played).predicted
+
     def update(self) -> Update | None:
         """Improve the estimate by the latest frames; None while there are too few, or nothing can be replayed."""
         if len(self._times) < self._frames:
@@ -133,22 +142,17 @@ class Identifier:
             played = replay.play(self._candidate)
         except SceneError:  # outliers where the window begins: no cable lies so
             return None
-        if not replay.differentiable(played):
+        if played.stopped:
             return None
         free = recording.free
         x = np.array([p.coordinate(p.get(self._candidate)) for p in self._chosen])
-        try:
-            known = replay.play_beside(played, self._candidate)
-            columns = np.zeros((known[:, free].size, len(self._chosen)))
-            for j in self._turn():
-                p = self._chosen[j]
-                moved = p.put(self._candidate, p.value(x[j] + _FOLLOWED))
-                columns[:, j] = ((replay.play_beside(played, moved) - known)[:, free] / _FOLLOWED).ravel()
-        except ValueError:
-            return None
-        away = (known - replay.markers)[:, free]
+        J = np.zeros((played.predicted[:, free].size, len(x)))
+        for j in self._turn():
+            p = self._chosen[j]
+            moved = self._beside(replay, played, p.put(self._candidate, p.value(x[j] + _ASIDE)))
+            J[:, j] = ((moved - played.predicted)[:, free] / _ASIDE).ravel()
+        away = (played.predicted - replay.markers)[:, free]
         r = np.where(np.isfinite(away), away, 0.0).ravel()
-        J = columns
         J[~np.isfinite(away).ravel()] = 0.0
         deviation = robust_deviation(r)
         w = weights(r, deviation) / (deviation**2 * _BLOCK)

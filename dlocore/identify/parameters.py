@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.errors import SceneError
-from dlocore.identify.replay import Candidate
+from dlocore.identify.candidate import Candidate
 
 Floats = NDArray[np.float64]
 

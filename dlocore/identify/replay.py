@@ -1,6 +1,5 @@
 """Replay of a recording: the scene of its grippers, predicted from its first frames with a candidate's parameters."""
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,18 +11,19 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from dlocore.cable import Cable
-from dlocore.discretisation import make_grid
 from dlocore.errors import SceneError
+from dlocore.frames import unit
 from dlocore.grid import Grid
+from dlocore.identify.beginning import rests, start_markers
+from dlocore.identify.candidate import Candidate, varied
 from dlocore.identify.frames import across, carried, tilted, turned_from, with_sections
 from dlocore.identify.span import Span
-from dlocore.identify.start import StartFit
+from dlocore.identify.start import start_fit
 from dlocore.identify.tracks import held_paths
 from dlocore.paths import Waypoints
 from dlocore.problem import Problem, pose
 from dlocore.recordings import Hold, Recording
-from dlocore.scene import ControlPoints, Environment, Grasp, Scene, Straight, Switch
+from dlocore.scene import ControlPoints, Grasp, Scene, Switch
 from dlocore.sensitivity import KnownMotion, beside, factored, objection
 from dlocore.solvers.march import STRONGLY_DAMPED, March, march
 from dlocore.solvers.monitor import Monitor
@@ -34,37 +34,7 @@ Floats = NDArray[np.float64]
 
 _SLACK = 1.003  # of the cable between two grippers: held markers farther apart are brought nearer
 _REST_FRAMES = 8  # from which on a start can be seen to be at rest
-_REWEIGHTED = 12  # times at most that outliers of the start are weighed down
-_SETTLED = 1e-3  # change of a weight
 _CARRIED = 3  # tangents from a marker to the next, over which a frame is carried
-_STILL = 0.01  # [m/s]: slower than this, or than noise lets tell, nothing moves
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Candidate:
-    """What a recording is replayed with.
-
-    Attributes:
-        cable: its length is that of the recording.
-        environment: drag; gravity is that of the recording.
-        rest_curvature: (k, 2) [1/m] of the stress-free shape at k places from end to end, in the frame of the
-            sections; None: straight.
-        clamp_angles: (clamps, 2) [rad] by which the cable leaves each clamp beside the direction of its markers.
-        turn: [rad] of the last clamp against the first, about the cable.
-        marker_offsets: (m, 2) [m] of the markers beside the centreline, across it, in a frame that is carried from the
-            first clamp without twist; None: on it.
-        length_ratio: of the cable's length and its markers' coordinates to those of the recording.
-        twist: simulate twist; needed for rest_curvature and a torsional stiffness.
-    """
-
-    cable: Cable
-    environment: Environment
-    rest_curvature: Floats | None = None
-    clamp_angles: Floats | None = None
-    turn: float = 0.0
-    marker_offsets: Floats | None = None
-    length_ratio: float = 1.0
-    twist: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,7 +42,7 @@ class Resolution:
     """How finely a recording is replayed: control points, time step [s], frames that its start is taken from."""
 
     n_u: int = 13
-    step: float = 0.01
+    step: float = 0.005
     start_frames: int = 12
 
 
@@ -81,10 +51,12 @@ class Played:
     """A replayed recording.
 
     Attributes:
+        candidate: that it was replayed with.
         predicted: positions of all markers at the compared frames (frames, m, 3) [m].
         problem, grid, motion: what was solved.
     """
 
+    candidate: Candidate
     predicted: Floats
     problem: Problem
     grid: Grid
@@ -149,11 +121,9 @@ class Replay:
         self.references = self._references(clean) if references is None else references
         self.paths = self._reachable(tuple(self._path(h, clean) for h in self.holds))
         self.ways = tuple(self._way(i) for i in range(len(self.holds)))
-        self.seen, self.start_markers, self.start_speeds = _start_markers(recording, frames, self.begin, shake)
-        self.at_rest = frames >= _REST_FRAMES and _rests(recording, frames)
+        self.seen, self.start_markers, self.start_speeds = start_markers(recording, frames, self.begin, shake)
+        self.at_rest = frames >= _REST_FRAMES and rests(recording, frames)
         self._guess: Floats | None = None
-        self._start: StartFit | None = None
-        self._start_length = 0.0
 
     def _references(self, clean: dict[int, CubicSpline]) -> Floats:
         t = self.begin + self.step_times
@@ -225,7 +195,7 @@ class Replay:
                 clamp += 1
             grasps.append(Grasp(u=at, hold=kind, path=way))
         environment = replace(candidate.environment, gravity=recording.gravity)
-        fit = self._fit(candidate.cable, length, tuple(grasps), tuple(held))
+        fit = start_fit(length, self.resolution.n_u, tuple(held))
         weight = candidate.cable.linear_density * np.asarray(environment.gravity)
         on = span.inside(self.seen)
         seen = self.seen[on]
@@ -248,32 +218,24 @@ class Replay:
             effects=switches,
         )
 
-    def _fit(
-        self, cable: Cable, length: float, grasps: tuple[Grasp, ...], held: tuple[tuple[float, int], ...]
-    ) -> StartFit:
-        """Return the fit of the start on the grid that the scene will have."""
-        if self._start is None or self._start_length != length:
-            still = tuple(Grasp(u=g.u, hold="point" if g.hold == "point" else "tangent") for g in grasps)
-            straight = Scene(
-                cable=replace(cable, length=length), shape=Straight(), grasps=still, horizon=1.0,
-                effects={"twist": "off"},
-            )  # fmt: skip
-            self._start = StartFit(make_grid(pose(straight), self.resolution.n_u), held)
-            self._start_length = length
-        return self._start
-
     def posed(self, candidate: Candidate) -> tuple[Problem, Grid]:
         """Return the equations of the recorded motion for a candidate, and its grid."""
         problem = pose(self.scene(candidate))
         return problem, start_grid(problem, self.resolution.n_u, Monitor(None, None, None))
 
-    def play(self, candidate: Candidate) -> Played:
-        """Predict the recording with a candidate."""
-        problem, grid = self.posed(candidate)
+    def play(self, candidate: Candidate, like: Played | None = None) -> Played:
+        """Predict the recording with a candidate.
+
+        Args:
+            candidate: to predict it with.
+            like: it with another candidate, whose equations serve as far as they are the same.
+        """
+        problem, grid = self.posed(candidate) if like is None else self._posed_beside(like, candidate)
         motion = march(problem, grid, self.steps, Monitor(None, None, None))
         if motion.stopped:
             motion = march(problem, grid, 2 * self.steps, Monitor(None, None, None), rho=STRONGLY_DAMPED)
-        return Played(self.positions(candidate, problem, grid, motion.times, motion.states), problem, grid, motion)
+        predicted = self.positions(candidate, problem, grid, motion.times, motion.states)
+        return Played(candidate, predicted, problem, grid, motion)
 
     def play_beside(self, played: Played, candidate: Candidate) -> Floats:
         """Return the predicted positions (frames, m, 3) [m] with a candidate that differs a little.
@@ -281,15 +243,20 @@ class Replay:
         Raises:
             ValueError: the motion can't be followed from the played one.
         """
-        problem, grid = self.posed(candidate)
+        problem, grid = self._posed_beside(played, candidate)
         states, times, _ = beside(played.known, problem, grid)
         return self.positions(candidate, problem, grid, times, states)
+
+    def _posed_beside(self, played: Played, candidate: Candidate) -> tuple[Problem, Grid]:
+        """Return the equations for a candidate beside the played one, with its grid where the start is the same."""
+        problem = varied(played.problem, played.candidate, candidate)
+        return self.posed(candidate) if problem is None else (problem, played.grid)
 
     def positions(self, candidate: Candidate, problem: Problem, grid: Grid, times: Floats, states: Floats) -> Floats:
         """Return the markers' positions (frames, m, 3) [m] at the compared frames of states (steps + 1, n_u, nc)."""
         B = self.span.scaled(problem.scene.cable.length / self.span.length).rows(grid.knots)
         q = problem.plane.world(states[..., : problem.plane.dimensions])
-        x = np.einsum("mi,kid->kmd", B, q)
+        x = np.ascontiguousarray(np.tensordot(B, q, axes=(1, 1)).swapaxes(0, 1))
         at = np.clip(np.rint(times / self.step_times[1]).astype(int), 0, self.steps)
         if candidate.marker_offsets is not None:
             x += self._beside(candidate.marker_offsets, grid, self._directors[at], q)
@@ -306,13 +273,10 @@ class Replay:
         on = np.clip(self.span.u * (length / self.span.length), 0.0, length)
         ends = np.concatenate([[0.0], on])
         u = np.linspace(ends[:-1], ends[1:], _CARRIED + 1)[1:].T.ravel()  # the last of each _CARRIED is a marker
-        tangents = np.einsum("ni,kid->ndk", design_matrix(grid.knots, u, 1), q)
-        tangents /= np.sqrt((tangents**2).sum(axis=1))[:, None]
-        first = carried(tangents, directors.T)[_CARRIED - 1 :: _CARRIED]
-        along = tangents[_CARRIED - 1 :: _CARRIED]
-        second = np.cross(along, first, axis=1)
-        beside = offsets[:, :1, None] * first + offsets[:, 1:, None] * second
-        return np.ascontiguousarray(beside.transpose(2, 0, 1))
+        tangents = unit(np.tensordot(design_matrix(grid.knots, u, 1), q, axes=(1, 1)))
+        first = carried(tangents, directors)[_CARRIED - 1 :: _CARRIED]
+        second = np.cross(tangents[_CARRIED - 1 :: _CARRIED], first)
+        return np.asarray((offsets[:, :1] * first.swapaxes(0, 1)) + offsets[:, 1:] * second.swapaxes(0, 1))
 
     @cached_property
     def _directors(self) -> Floats:
@@ -326,8 +290,7 @@ class Replay:
         """Return how far the seen markers (k, 3) lie beside the centreline at the start, by their own polygon."""
         if candidate.marker_offsets is None:
             return np.zeros((len(seen), 3))
-        tangents = np.gradient(markers, self.span.u[seen], axis=0)
-        tangents /= np.linalg.norm(tangents, axis=1)[:, None]
+        tangents = unit(np.gradient(markers, self.span.u[seen], axis=0))
         first = carried(tangents, self._directors[0])
         offsets = candidate.marker_offsets[seen]
         return np.asarray(offsets[:, :1] * first + offsets[:, 1:] * np.cross(tangents, first))
@@ -353,54 +316,3 @@ def common_references(recordings: Sequence[Recording]) -> Floats | None:
         mean = np.nanmean(np.concatenate(unit), axis=0)
         found.append(mean / np.linalg.norm(mean))
     return np.array(found).reshape(-1, 3)
-
-
-def _rests(recording: Recording, frames: int) -> bool:
-    """Tell whether no marker moves in the first frames, as far as their noise lets tell."""
-    times, markers = cast(Floats, recording.times)[:frames], cast(Floats, recording.markers)[:frames]
-    half = frames // 2
-    between = float(times[half:].mean() - times[:half].mean())
-    with np.errstate(all="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of a marker that was not seen
-        moved = np.nanmedian(markers[half:], axis=0) - np.nanmedian(markers[:half], axis=0)
-        noise = 1.4826 * np.nanmedian(np.abs(np.diff(markers, axis=0)), axis=(0, 2)) / np.sqrt(2.0)
-    speed = np.linalg.norm(moved, axis=1) / between
-    allowed = np.maximum(_STILL, 1.25 * np.sqrt(3.0) * np.sqrt(4.0 / frames) * noise / between * 2.0)
-    known = np.isfinite(speed)
-    return bool((speed[known] <= allowed[known]).all())
-
-
-def _start_markers(
-    recording: Recording, frames: int, at: float, shake: np.random.Generator | None
-) -> tuple[NDArray[np.int64], Floats, Floats]:
-    """Return the markers seen in the first frames, where they are at time `at` and how fast they move.
-
-    From two or three frames a straight line, from more a parabola, with outliers weighed down.
-    """
-    times, markers = cast(Floats, recording.times)[:frames], cast(Floats, recording.markers)[:frames]
-    order = 1 if frames < 6 else 2
-    seen, places, speeds = [], [], []
-    for i in range(markers.shape[1]):
-        keep = np.isfinite(markers[:, i, 0])
-        if keep.sum() < order + 1:
-            continue
-        t, x = times[keep] - at, markers[keep, i]
-        A = np.vander(t, order + 1, increasing=True)
-        w = np.ones(len(t))
-        for _ in range(1 if frames < 6 else _REWEIGHTED):
-            c = np.linalg.lstsq(A * w[:, None], x * w[:, None], rcond=None)[0]
-            away = np.linalg.norm(x - A @ c, axis=1)
-            scale = max(1.4826 * float(np.median(away)), 1e-5)
-            before, w = w, 1.0 / (1.0 + (away / (2.0 * scale)) ** 2)
-            if np.abs(w - before).max() < _SETTLED:
-                break
-        if shake is not None and len(t) > order + 1:
-            spare = max(float((w * w).sum()) - (order + 1), 1.0)
-            noise = np.sqrt(((w[:, None] * (x - A @ c)) ** 2).sum() / (3.0 * spare))
-            c = c + np.linalg.pinv(A) @ (noise * shake.standard_normal(x.shape))
-        seen.append(i)
-        places.append(c[0])
-        speeds.append(c[1])
-    if len(seen) < 3:
-        raise SceneError("markers", f"{len(seen)} markers seen at the beginning", "at least 3")
-    return np.array(seen), np.array(places), np.array(speeds)

@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 
 from dlocore.discretisation import make_grid
 from dlocore.errors import SceneError
+from dlocore.identify.candidate import Candidate
 from dlocore.identify.frames import across, tilted, turned_from, with_sections
-from dlocore.identify.replay import Candidate, Resolution
+from dlocore.identify.replay import Resolution
 from dlocore.identify.span import Span
-from dlocore.identify.start import StartFit
+from dlocore.identify.start import start_fit
 from dlocore.problem import pose
 from dlocore.recordings import Recording
-from dlocore.scene import ControlPoints, Grasp, Scene, Straight, Switch
+from dlocore.scene import ControlPoints, Grasp, Scene, Switch
 from dlocore.solvers.monitor import Monitor
 from dlocore.statics import settle
 
@@ -63,7 +64,6 @@ class Rest:
             raise SceneError(f"markers[{frame}]", "a lost held marker", "held markers seen in every shape at rest")
         self.holds, self.span = recording.holds, Span.of(recording)
         self.references = self._directions().mean(axis=0) if references is None else references
-        self._start: tuple[float, StartFit] | None = None
 
     def _directions(self) -> Floats:
         """Return the unit directions of the clamps (frames, clamps, 3)."""
@@ -111,12 +111,7 @@ class Rest:
         environment = replace(candidate.environment, gravity=self.recording.gravity)
         seen = np.flatnonzero(np.isfinite(self.given[frame, :, 0]))
         seen = seen[span.inside(seen)]
-        if self._start is None or self._start[0] != length:
-            still = tuple(Grasp(u=g.u, hold="point" if g.hold == "point" else "tangent") for g in grasps)
-            straight = Scene(cable=cable, shape=Straight(), grasps=still, horizon=1.0, effects={"twist": "off"})
-            fit = StartFit(make_grid(pose(straight), self.resolution.n_u), tuple(held))
-            self._start = (length, fit)
-        fit = self._start[1]
+        fit = start_fit(length, self.resolution.n_u, tuple(held))
         weight = cable.linear_density * np.asarray(environment.gravity)
         q = fit.shape(cast(float, cable.bending_stiffness), weight, u[seen], self.given[frame, seen], np.array(targets))
         shape = ControlPoints(control_points=q, knots=fit.grid.knots)

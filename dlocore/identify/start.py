@@ -1,14 +1,18 @@
 """The state a recorded motion begins with: shape and velocity of the spline from the markers of a few frames."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.cable import Cable
+from dlocore.discretisation import make_grid
 from dlocore.effects import laws
 from dlocore.grid import Grid
 from dlocore.kernels.assembly import NO_RATES, assemble, stored_energy
+from dlocore.problem import pose
+from dlocore.scene import Grasp, Scene, Straight
 from dlocore.spline import design_matrix
 
 Floats = NDArray[np.float64]
@@ -144,6 +148,23 @@ class StartFit:
         Z = np.kron(rows.free, np.eye(3))
         free = np.linalg.lstsq(J @ Z, y, rcond=None)[0]
         return np.ascontiguousarray(known + (Z @ free).reshape(n, 3))
+
+
+@lru_cache(maxsize=16)
+def start_fit(length: float, n_u: int, held: tuple[tuple[float, int], ...]) -> StartFit:
+    """Return the fit on the grid of `n_u` control points that a scene has whose grasps hold the cable so.
+
+    Args:
+        length: of the cable [m].
+        n_u: number of control points.
+        held: (u [m], 0 for a position or 1 for a direction) of what is held.
+    """
+    directions = {u for u, order in held if order == 1}
+    grasps = tuple(Grasp(u=u, hold="tangent" if u in directions else "point") for u, order in held if order == 0)
+    # knots and tables depend on where it is held alone, not on what it is made of
+    cable = Cable(length=length, diameter=0.01 * length, linear_density=1.0, bending_stiffness=1.0)
+    straight = Scene(cable=cable, shape=Straight(), grasps=grasps, horizon=1.0, effects={"twist": "off"})
+    return StartFit(make_grid(pose(straight), n_u), held)
 
 
 def _dense(K: Floats) -> Floats:

@@ -21,7 +21,6 @@ _CROWD = 7  # samples, of which most are no outliers
 _LEAST = 8  # samples
 _SPANS = 0.7  # of the path's spline for each sample at most
 _KNOT = 0.02  # [s] between its knots at least
-_MOST_SPANS = 300  # with more the likelihood of the smoothest ones drowns in rounding
 
 
 def held_paths(recording: Recording, shake: np.random.Generator | None) -> dict[int, CubicSpline]:
@@ -90,8 +89,8 @@ def _smoothed(t: Floats, x: Floats, times: Floats) -> CubicSpline:
         if keep.sum() < _LEAST:
             raise SceneError("markers", f"{keep.sum()} samples of a held marker", "at least 8 that are no outliers")
         first, last = t[keep][0], t[keep][-1]
-        spans = int(np.clip(round(min(_SPANS * keep.sum(), (last - first) / _KNOT)), _LEAST, _MOST_SPANS))
-        path = smooth(t[keep] - first, x[keep] - middle, np.ones(keep.sum()), last - first, spans, most, np.ones(spans))
+        spans = max(round(min(_SPANS * keep.sum(), (last - first) / _KNOT)), _LEAST)
+        path = smooth(t[keep] - first, x[keep] - middle, np.ones(keep.sum()), last - first, spans, most)
         away = x - middle - path(np.clip(t, first, last) - first)
         limit = max(_AWAY * 1.4826 * float(np.median(np.abs(away[keep]))), _FLOOR)
         near = np.linalg.norm(away, axis=1) <= limit

@@ -8,16 +8,17 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.identify.candidate import Candidate
 from dlocore.identify.datasets import HangingWire, MovedCable
 from dlocore.identify.estimate import Identification, Progress, identify
-from dlocore.identify.replay import Candidate, Replay, Resolution, common_references
+from dlocore.identify.replay import Replay, Resolution, common_references
 from dlocore.recordings import Recording
 from dlocore.scene import Environment
 
 Floats = NDArray[np.float64]
 Model = Literal["scalars", "bends"]
 
-PROTOCOL = Resolution(n_u=13, step=0.01, start_frames=2)  # state from frames 0 and 1, then open loop
+PROTOCOL = Resolution(n_u=11, step=0.01, start_frames=2)  # state from frames 0 and 1, then open loop
 SCALARS = ("bending_stiffness", "drag", "bending_damping", "length_ratio")
 BENDS = (*SCALARS, "drag_quadratic", "clamp_angles", "marker_offsets", "turn", "torsional_stiffness", "rest_curvature")
 WIRE_GRID = 33  # control points along a wire

@@ -9,24 +9,15 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.cli import main
-from benchmarks.simulated_recordings import Tracking, simulated
-from dlocore import Cable, Environment
+from benchmarks.simulated_recordings import CABLE, DRAG, Tracking, simulated
 from dlocore.recordings import save_recording
 
-CABLE = Cable(
-    length=1.0,
-    diameter=0.006,
-    linear_density=0.05,
-    bending_stiffness=3e-3,
-    bending_damping=5e-4,
-    axial_stiffness=600.0,
-)
 ADDRESS = "/v1/cables:identify"
 
 
 @pytest.fixture(scope="module")
 def asked() -> dict[str, Any]:
-    recording = simulated(6, 1.5, cable=CABLE, environment=Environment(drag=0.06))
+    recording = simulated(6, 1.5, cable=CABLE, environment=DRAG)
     markers = np.asarray(recording.markers)
     return {
         "recordings": [
@@ -94,7 +85,7 @@ def test_frames_with_other_numbers_of_markers_are_named(client: TestClient, aske
 
 
 def test_the_command_line_writes_the_cable_and_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    recording = simulated(6, 1.5, cable=CABLE, environment=Environment(drag=0.06))
+    recording = simulated(6, 1.5, cable=CABLE, environment=DRAG)
     save_recording(recording, tmp_path / "shaken.npz")
     command = ["identify", str(tmp_path / "shaken.npz"), "-o", str(tmp_path / "cable.json")]
     command += ["--report", str(tmp_path / "page.html"), "--parameters", "bending_stiffness,bending_damping"]
@@ -117,7 +108,7 @@ def test_the_command_line_names_what_is_wrong(tmp_path: Path, capsys: pytest.Cap
 
 def test_a_cable_is_validated_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     clean = Tracking(noise=2e-5, held=2e-5, outliers=0.0, lost=0.0)
-    windows = [simulated(k, 1.0, cable=CABLE, environment=Environment(drag=0.06), tracking=clean) for k in (3, 4, 5)]
+    windows = [simulated(k, 1.0, cable=CABLE, environment=DRAG, tracking=clean) for k in (3, 4, 5)]
     np.savez(tmp_path / "cable_train.npz", markers=np.array([np.asarray(w.markers)[::2] for w in windows]))
     (tmp_path / "cable_train.json").write_text(
         json.dumps({"held_markers": [0, 1, -2, -1], "nominal_linear_density": 0.05})

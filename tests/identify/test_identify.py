@@ -6,32 +6,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.simulated_recordings import Tracking, simulated, true_cable
-from dlocore import Cable, Cancelled, Environment, SceneError
+from benchmarks.simulated_recordings import CABLE, DRAG, Tracking, simulated, true_cable
+from dlocore import Cancelled, Environment, SceneError
 from dlocore.identify import Candidate, Replay, Resolution, identify
 from dlocore.identify.datasets import load_datasets
 from dlocore.recordings import Recording
 
 FINE = Resolution(n_u=17)
-CABLE = Cable(
-    length=1.0,
-    diameter=0.006,
-    linear_density=0.05,
-    bending_stiffness=3e-3,
-    bending_damping=5e-4,
-    axial_stiffness=600.0,
-)
-DRAG = Environment(drag=0.06)
 NAMES = ("bending_stiffness", "drag", "bending_damping")
 
 
 def test_a_clean_recording_is_replayed_as_it_was() -> None:
     clean = Tracking(noise=0.0, held=0.0, outliers=0.0, lost=0.0)
-    replay = Replay(simulated(3, 2.0, cable=CABLE, environment=DRAG, tracking=clean), Resolution(n_u=17, step=0.005))
+    replay = Replay(simulated(3, 2.0, cable=CABLE, environment=DRAG, tracking=clean), Resolution(n_u=17, step=0.0025))
     predicted = replay.play(Candidate(cable=CABLE, environment=DRAG)).predicted
     away = np.linalg.norm((predicted - replay.markers)[:, replay.recording.free], axis=2)
-    # net and steps are those of the truth, begun between two of them: what is left is the second order of steps of 5 ms
-    # in a motion of up to half a metre within half a second
+    # net and steps are those of the truth, begun between two of them: what is left is the second order of steps of
+    # 2.5 ms in a motion of up to half a metre within half a second
     assert away.max() < 4e-4
 
 

@@ -5,25 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.simulated_recordings import simulated
-from dlocore import Cable, Environment, SceneError
+from benchmarks.simulated_recordings import CABLE, DRAG, simulated
+from dlocore import SceneError
 from dlocore.identify.online import Identifier
-
-CABLE = Cable(
-    length=1.0,
-    diameter=0.006,
-    linear_density=0.05,
-    bending_stiffness=3e-3,
-    bending_damping=5e-4,
-    axial_stiffness=600.0,
-)
 
 
 def test_a_wrong_stiffness_is_corrected_while_frames_arrive() -> None:
-    recording = simulated(8, 4.0, cable=CABLE, environment=Environment(drag=0.06))
+    recording = simulated(8, 4.0, cable=CABLE, environment=DRAG)
     wrong = replace(CABLE, bending_stiffness=9e-3)
     names = ("bending_stiffness", "bending_damping")
-    identifier = Identifier(recording.u, recording.held, wrong, Environment(drag=0.06), names=names)
+    identifier = Identifier(recording.u, recording.held, wrong, DRAG, names=names)
     updates = []
     for k in range(0, 400, 3):  # 33 frames a second
         identifier.add(float(np.asarray(recording.times)[k]), np.asarray(recording.markers)[k])

@@ -11,24 +11,15 @@ from protocol_client import SceneClient, connected
 
 from app.viewer.kept import FILE, KeptCables
 from app.viewer.tracking_report import error_card
-from benchmarks.simulated_recordings import simulated
-from dlocore import Cable, Environment
+from benchmarks.simulated_recordings import CABLE, DRAG, simulated
 from dlocore.recordings import Recording, save_recording
 
-CABLE = Cable(
-    length=1.0,
-    diameter=0.006,
-    linear_density=0.05,
-    bending_stiffness=3e-3,
-    bending_damping=5e-4,
-    axial_stiffness=600.0,
-)
 OPEN = "Open a recording …"
 
 
 @pytest.fixture(scope="module")
 def recording() -> Recording:
-    return replace(simulated(6, 1.5, cable=CABLE, environment=Environment(drag=0.06)), name="shaken")
+    return replace(simulated(6, 1.5, cable=CABLE, environment=DRAG), name="shaken")
 
 
 def npz(recording: Recording, folder: Path) -> bytes:
