@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.hard.curves import arc, hairpin
+from benchmarks.hard.curves import arc, corner, hairpin, helix
 from benchmarks.hard.generator import draw
 from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, Straight, equilibrium, predict
-from dlocore.discretisation import make_grid
+from dlocore.discretisation import corners, make_grid
 from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.banded import reduce_matrix
 from dlocore.problem import pose
+from dlocore.shape import start_curve
 from dlocore.solvers.march import march as take_steps
 from dlocore.solvers.monitor import Monitor
 from tests.solver.scenes import apart, march, paper_scene, refined
@@ -179,3 +180,40 @@ def test_a_fold_between_control_points_gets_more_of_them_though_coarse_grids_agr
     r = found.surface.positions(np.linspace(0.0, 1.0, 401), 4.0)[0]
     steps = 400.0 * np.linalg.norm(np.diff(r, axis=0), axis=1)
     assert steps.min() > 0.8  # |r'| between the knots, as the bend is resolved; of the folds it is 0.3
+
+
+def kinked(quality: Quality) -> Scene:
+    """Return a wire that is bent by a right angle within a hundredth of its length, and carried by its end."""
+    return Scene(
+        cable=Cable(
+            length=1.0, diameter=0.004, linear_density=0.05, bending_stiffness=0.02, rest_shape="initial"
+        ),
+        shape=Points(points=corner(1.0, 0.5 * np.pi, 0.4, "upright")),
+        grasps=(Grasp(u=0.0, hold="clamp", path=Move(displacement=(0.0, 0.2, 0.1), duration=0.5)),),
+        environment=Environment(drag=0.1),
+        horizon=0.8,
+        quality=quality,
+    )  # fmt: skip
+
+
+def test_a_sharp_bend_is_the_same_on_coarse_and_fine_grids():
+    coarse, fine = predict(kinked(march(25, 33))), predict(kinked(march(97, 65)))
+    # 1.4 mm; with knots spread evenly, where the bend is another one on each grid, 14 mm
+    assert apart(coarse.surface, fine.surface).max() < 3e-3
+    assert predict(kinked(march(5, 9))).surface.positions(0.5, 0.0).shape == (1, 1, 3)  # too few for knots at it
+
+
+@pytest.mark.parametrize(
+    ("points", "found"),
+    [
+        (corner(1.0, 2.0, 0.4, "flat"), [0.4]),
+        (corner(1.0, 0.5, 0.4, "flat"), []),
+        (hairpin(1.0, 0.2, "flat"), []),
+        (arc(1.0, 6.0, "flat"), []),
+        (helix(1.0, 10.0, 0.3), []),
+    ],
+    ids=["corner", "blunt corner", "hairpin", "arc", "helix"],
+)
+def test_only_a_bend_sharper_than_the_rest_of_the_cable_is_a_corner(points, found):
+    u = corners(start_curve(Points(points=points), 1.0), 1.0)
+    np.testing.assert_allclose(u, found, atol=0.01)  # the points are a hundredth of the length apart
