@@ -24,6 +24,7 @@ from dlocore.solvers.ladder import (
     Size,
     distance,
     extrapolated,
+    hardness,
     run_level,
     stretched,
 )
@@ -70,17 +71,19 @@ def march_level(
     free_knots: bool = False,
     rough: bool = False,
     known: Level | None = None,
+    before: Level | None = None,
 ) -> Level:
     """March on one grid; where the motion calls for effects that were left out, again with them.
 
     On a `rough` grid, which another follows, strands that meet may do so because of the grid. A march of this grid that
-    is `known` is not done again.
+    is `known` is not done again. Contact begins as stiff as the level `before` had to make it.
     """
     called = dict(problem.called_for)
     while True:
         if free_knots:
             size = Size(max(size.n_u, smallest_n_u(problem)), max(size.n_t, smallest_n_t(problem)), size.steps)
-        level = known or run_level(problem, *size, monitor, rho=rho, free_knots=free_knots)
+        stiffness = 1.0 if before is None or before.posed is not problem else hardness(before)
+        level = known or run_level(problem, *size, monitor, rho=rho, free_knots=free_knots, hardness=stiffness)
         known = None
         new = {} if level.motion.stopped == "time" else called_for(level)
         if rough:
@@ -124,7 +127,7 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
         try:
             if best is not None:
                 monitor.check()
-            level = march_level(problem, size, monitor, rho, free_knots=True, rough=True)
+            level = march_level(problem, size, monitor, rho, free_knots=True, rough=True, before=best)
             if best is not None and level.posed is problem:
                 level = replace(level, change=distance(best, level, problem))
                 if level.change <= ROUGH * length:  # so strands do not meet because of the grid
@@ -178,7 +181,8 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
             next_size = next_size._replace(n_u=max(next_size.n_u, size.n_u), steps=max(next_size.steps, size.steps))
         elif unfolds is not None:
             direction, next_size = "space", unfolds
-            changes.setdefault("time", changes["both"])  # of space, grids that agree on a fold tell nothing
+            if "both" in changes:
+                changes.setdefault("time", changes["both"])  # of space, grids that agree on a fold tell nothing
         else:
             trembles = MISSED_COUNTS * level.missed > _FINE_IN_TIME * target
             finer = {d: _affordable(_finer(size, d, trembles), problem, most_work) for d in _FINER}

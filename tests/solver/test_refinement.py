@@ -7,12 +7,13 @@ import pytest
 
 from benchmarks.hard.curves import arc, corner, hairpin, helix
 from benchmarks.hard.generator import draw
-from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, Straight, equilibrium, predict
+from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, Sphere, Straight, equilibrium, predict
 from dlocore.discretisation import corners, make_grid
 from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.banded import reduce_matrix
 from dlocore.problem import pose
 from dlocore.shape import start_curve
+from dlocore.solvers.ladder import hardness, run_level
 from dlocore.solvers.march import march as take_steps
 from dlocore.solvers.monitor import Monitor
 from tests.solver.scenes import apart, march, paper_scene, refined
@@ -217,3 +218,21 @@ def test_a_sharp_bend_is_the_same_on_coarse_and_fine_grids():
 def test_only_a_bend_sharper_than_the_rest_of_the_cable_is_a_corner(points, found):
     u = corners(start_curve(Points(points=points), 1.0), 1.0)
     np.testing.assert_allclose(u, found, atol=0.01)  # the points are a hundredth of the length apart
+
+
+def test_contact_that_a_grid_had_to_make_stiffer_begins_so_on_the_next():
+    peg = Sphere(center=(0.5, 0.0, -0.15), radius=0.05)
+    scene = Scene(
+        cable=Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-3),
+        shape=Straight(),
+        grasps=(Grasp(u=0.0),),
+        environment=Environment(drag=0.1, obstacles=(peg,)),
+        horizon=0.5,
+    )
+    problem = pose(scene)
+    first = run_level(problem, 13, 25, 96, Monitor())
+    needed = hardness(first)
+    assert needed > 10.0  # it strikes: nobody can tell before how hard
+    again = run_level(problem, 13, 25, 96, Monitor(), hardness=needed)
+    assert again.motion.deepest == pytest.approx(first.motion.deepest, rel=1e-6)  # the same march, to rounding
+    assert hardness(again) == pytest.approx(needed)
