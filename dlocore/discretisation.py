@@ -26,11 +26,18 @@ Floats = NDArray[np.float64]
 _INTERIOR = (0.6, 0.02)
 _END = (0.3, 0.04)
 _SAME = 1e-9  # of the length: features this close are one
+# A start that turns by SHARP [rad] within BEND of the length to either side of a point, which is many times as much as
+# it turns elsewhere, has knots graded towards that point: the corner would be another one on every grid.
+_CORNER = (1.0, 0.01)
+SHARP = 1.0
+BEND = 0.02
+_ELSEWHERE = 4.0  # times the median curvature
+_MOST_CORNERS = 4
 
 
 def smallest_n_u(problem: Problem) -> int:
-    """Return the least number of control points that has a knot at every feature."""
-    features, multiplicity, _, _ = _features(problem)
+    """Return the least number of control points that has a knot at every grasp and load."""
+    features, multiplicity, _, _ = _features(problem, [])
     inside = [m for u, m in zip(features, multiplicity, strict=True) if 0 < u < problem.scene.cable.length]
     return max(5, 4 + sum(inside))
 
@@ -42,8 +49,12 @@ def make_grid(problem: Problem, n_u: int) -> Grid:
         SceneError: n_u is too small for the knots that the grasps and loads need.
     """
     cable = problem.scene.cable
-    features, multiplicity, power, width = _features(problem)
+    bends = corners(problem.start, cable.length)
+    features, multiplicity, power, width = _features(problem, bends)
     knots = graded_knots(n_u, cable.length, features, multiplicity, power, width)
+    if len(knots) == 0 and bends:
+        features, multiplicity, power, width = _features(problem, [])
+        knots = graded_knots(n_u, cable.length, features, multiplicity, power, width)
     if len(knots) == 0:
         reason = f"{len(features)} grasps and loads need a knot each"
         raise SceneError("quality.n_u", n_u, f"at least {smallest_n_u(problem)} in this scene", reason)
@@ -116,8 +127,26 @@ def plane_director(tangent: Floats) -> Floats:
     return left / size if size > 1e-9 * float(np.linalg.norm(tangent)) else np.array([1.0, 0.0, 0.0])
 
 
-def _features(problem: Problem) -> tuple[Floats, NDArray[np.int64], Floats, Floats]:
-    """Return sorted coordinates of grasps and loads, knot multiplicities, grading exponents and widths."""
+def corners(curve: SplineCurve, length: float) -> list[float]:
+    """Return the material coordinates [m] of the sharp bends of a start curve, sharpest first."""
+    if (len(curve.control_points) - 3) * BEND < 2.0:
+        return []  # its spans are too long for it
+    u = np.linspace(0.0, length, 501)
+    first, second = curve(u, 1), curve(u, 2)
+    bends = np.linalg.norm(np.cross(first, second), axis=1) / np.linalg.norm(first, axis=1) ** 3
+    turned = np.concatenate([[0.0], np.cumsum(0.5 * (bends[1:] + bends[:-1]))]) * (u[1] - u[0])
+    found: list[float] = []
+    for k in np.argsort(-bends):
+        around = np.interp([u[k] - BEND * length, u[k] + BEND * length], u, turned)
+        if len(found) == _MOST_CORNERS or bends[k] < _ELSEWHERE * np.median(bends) or around[1] - around[0] < SHARP:
+            break
+        if all(abs(u[k] - v) > 2.0 * BEND * length for v in found):
+            found.append(float(u[k]))
+    return found
+
+
+def _features(problem: Problem, bends: list[float]) -> tuple[Floats, NDArray[np.int64], Floats, Floats]:
+    """Return sorted coordinates of grasps, loads and bends, knot multiplicities, grading exponents and widths."""
     length = problem.scene.cable.length
     found: dict[float, tuple[int, float, float]] = {}
     places = [(g.u, 1 if g.hold == "point" else 2) for g in problem.scene.grasps]
@@ -128,6 +157,9 @@ def _features(problem: Problem) -> tuple[Floats, NDArray[np.int64], Floats, Floa
         power, width = _END if at_end or multiplicity == 2 else _INTERIOR
         before = found.get(u, (0, 0.0, 1.0))
         found[u] = (max(before[0], multiplicity), max(before[1], power), min(before[2], width))
+    for u in bends:
+        if all(abs(u - v) > BEND * length for v in found):
+            found[u] = (1, *_CORNER)
     order = sorted(found)
     columns = np.array([found[u] for u in order]).reshape(-1, 3)
     return np.array(order, float), columns[:, 0].astype(np.int64), columns[:, 1].copy(), columns[:, 2].copy()

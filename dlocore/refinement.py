@@ -24,6 +24,7 @@ from dlocore.solvers.ladder import (
     Size,
     distance,
     extrapolated,
+    hardness,
     run_level,
     stretched,
 )
@@ -70,17 +71,19 @@ def march_level(
     free_knots: bool = False,
     rough: bool = False,
     known: Level | None = None,
+    before: Level | None = None,
 ) -> Level:
     """March on one grid; where the motion calls for effects that were left out, again with them.
 
     On a `rough` grid, which another follows, strands that meet may do so because of the grid. A march of this grid that
-    is `known` is not done again.
+    is `known` is not done again. Contact begins as stiff as the level `before` had to make it.
     """
     called = dict(problem.called_for)
     while True:
         if free_knots:
             size = Size(max(size.n_u, smallest_n_u(problem)), max(size.n_t, smallest_n_t(problem)), size.steps)
-        level = known or run_level(problem, *size, monitor, rho=rho, free_knots=free_knots)
+        stiffness = 1.0 if before is None or before.posed is not problem else hardness(before)
+        level = known or run_level(problem, *size, monitor, rho=rho, free_knots=free_knots, hardness=stiffness)
         known = None
         new = {} if level.motion.stopped == "time" else called_for(level)
         if rough:
@@ -98,7 +101,8 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
     The first few refine space and time together, which is what most motions need. What is left errs mostly in one of
     them: a cable that is let go vibrates faster than it is curved, a loop that tightens is curved more than it is fast.
     So from there on each grid is finer in one direction, that whose last refinement moved the surface most, and the
-    error is the sum of both. It is at least what the time spline misses of its march: a cable that trembles faster than
+    error is the sum of both. A cable that folds between its control points gets more of them, whatever grids agree on.
+    The error is at least what the time spline misses of its march: a cable that trembles faster than
     two grids can show looks alike on both. A march that finds no equilibrium is tried with more steps before it is
     given up. Within a time budget the first grid is the one that what solves cost on this machine allows.
 
@@ -123,7 +127,7 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
         try:
             if best is not None:
                 monitor.check()
-            level = march_level(problem, size, monitor, rho, free_knots=True, rough=True)
+            level = march_level(problem, size, monitor, rho, free_knots=True, rough=True, before=best)
             if best is not None and level.posed is problem:
                 level = replace(level, change=distance(best, level, problem))
                 if level.change <= ROUGH * length:  # so strands do not meet because of the grid
@@ -142,7 +146,7 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
         if best is not None:
             if _is_worse(level, best):
                 failures += 1
-                more = _affordable(_finer(size, "time", True), problem, most_work)
+                more = _affordable(_finer(size, "space" if _is_folded(best) else "time", True), problem, most_work)
                 if failures <= _FAILURES and level.motion.stopped != "time" and quality.time_budget is None and more:
                     record_level(problem, level, monitor)
                     size = more
@@ -164,14 +168,21 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
         moved = f"the last refinement moved the surface by {level.change * 1e3:.2g} mm"
         if level.motion.stopped == "time":
             return Outcome(level, status, message, None)
-        if estimate <= ACCEPT * target and quality.time_budget is None:
+        folded = _is_folded(level)
+        unfolds = _affordable(_finer(size, "space", False), problem, most_work) if folded else None
+        if estimate <= ACCEPT * target and quality.time_budget is None and unfolds is None:
             agreed = f"Two grids agree to {level.change * 1e3:.2g} mm, target {target * 1e3:.2g} mm."
             return Outcome(level, status, agreed if status == "converged" else message, _parts(changes, level))
         number += 1
         next_size: Size | None
         if number < len(LEVELS):
             next_size = stretched(problem, number)
-            next_size = next_size._replace(steps=max(next_size.steps, size.steps))  # more may have been needed
+            # more may have been needed
+            next_size = next_size._replace(n_u=max(next_size.n_u, size.n_u), steps=max(next_size.steps, size.steps))
+        elif unfolds is not None:
+            direction, next_size = "space", unfolds
+            if "both" in changes:
+                changes.setdefault("time", changes["both"])  # of space, grids that agree on a fold tell nothing
         else:
             trembles = MISSED_COUNTS * level.missed > _FINE_IN_TIME * target
             finer = {d: _affordable(_finer(size, d, trembles), problem, most_work) for d in _FINER}
@@ -207,8 +218,9 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
 def _is_worse(level: Level, best: Level) -> bool:
     """Tell whether a finer grid failed, or strained the cable beyond belief, and the one before did not."""
     torn = level.motion.largest_strain > CREDIBLE_STRAIN >= best.motion.largest_strain
+    failed = bool(level.motion.stopped) and not best.motion.stopped
     stalled = march_status(level.problem, level)[0] != "converged" == march_status(best.problem, best)[0]
-    return torn or stalled
+    return torn or failed or stalled
 
 
 def _as_by_half(level: Level, before: Level) -> float:
@@ -279,8 +291,8 @@ def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
         advice = "Bring the grasps no farther apart than the cable between them, or make the motion slower."
         push = "A straight cable pushed along itself has no side to buckle to: start it slightly bent."
         return "stalled", f"{strain} {advice} {push}"
-    least, most = _slopes(level)
-    if not motion.stopped and not (least >= FOLDED and most <= 2.0 - FOLDED):
+    if _is_folded(level):
+        least, most = _slopes(level)
         seen = f"|r'| is {least:.2g} to {most:.2g} within a span"
         return "stalled", f"The cable is folded finer than its control points can show: {seen}. Take more of them."
     deep = motion.deepest / problem.scene.cable.diameter
@@ -298,6 +310,12 @@ def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
         "stalled",
         f"A time step found no equilibrium. {rest} Allow more control points, or a slower or smoother motion.",
     )
+
+
+def _is_folded(level: Level) -> bool:
+    """Tell whether a whole motion folds the cable within a span: grids may agree on that, and it is none of a cable."""
+    least, most = _slopes(level)
+    return not level.motion.stopped and not (least >= FOLDED and most <= 2.0 - FOLDED)
 
 
 def _slopes(level: Level) -> tuple[float, float]:

@@ -27,6 +27,8 @@ Floats = NDArray[np.float64]
 LEVELS = (9, 13, 17, 25, 33, 49, 65, 97)
 TOLERANCE = 1e-10  # of the length, on the last Newton update
 RESTING = 1e-8  # of the length, as near to the equilibrium as a march solves its steps
+UNDRIVEN = 1e-6  # of what weighs on the cable and bends it: a force that drives nothing
+_ROUNDING = 1e-15  # of the axial stiffness: what it makes of a force
 ITERATIONS = 60  # of one relaxation
 ROUNDS = 400  # of relaxations, each held back less by where it started
 Rest = Literal["settled", "restless", "time"]  # at rest; no rest found; the time was up
@@ -199,17 +201,44 @@ def settle(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> Settled
             moved = float(np.abs(q - before).max())
             resting = update <= RESTING * length  # rounding may keep a stiff cable from TOLERANCE
             strength *= 0.2 if used <= 12 else 0.5 if resting else 1.0
-            if moved <= RESTING * length and resting:
+            near = moved <= RESTING * length
+            if resting if near else _only_turns(problem, grid, history, before, q, applied):
                 rest = "settled"
                 break
         forces = (
             WindowForces(
-                held, np.array([t]), _holding(problem, grid, history, q, applied, held.elimination.held), q[None]
+                held,
+                np.array([t]),
+                _unbalanced(problem, grid, history, q, applied).reshape(1, -1)[:, held.elimination.held],
+                q[None],
             ),
         )
         if rest == "time":
             break
     return q, rest, forces, history
+
+
+def _only_turns(problem: Problem, grid: Grid, history: History, before: Floats, q: Floats, applied: Floats) -> bool:
+    """Tell whether a relaxation turned the cable as a whole, from `before` to q (n_u, nc), and no force drives that.
+
+    A cable that hangs from a point, or between two, may turn about itself: it is in equilibrium at any angle.
+    """
+    length, dimensions = problem.scene.cable.length, problem.plane.dimensions
+    if _reshaped(before[:, :dimensions], q[:, :dimensions]) > RESTING * length:
+        return False
+    step = q - before
+    work = abs(float(np.sum(_unbalanced(problem, grid, history, q, applied) * step)))
+    bending = problem.bend.bending_stiffness if problem.bend else 0.0
+    scale = bending / length**2 + length * float(np.linalg.norm(problem.weight()))
+    force = UNDRIVEN * scale + _ROUNDING * problem.stretch.axial_stiffness
+    return work <= force * float(np.abs(step).max())
+
+
+def _reshaped(before: Floats, after: Floats) -> float:
+    """Return how far points (n, 2 or 3) came apart from the best rigid motion of where they were before [m]."""
+    x, y = before - before.mean(axis=0), after - after.mean(axis=0)
+    left, _, right = np.linalg.svd(x.T @ y)
+    return float(np.abs(x @ (left @ right) - y).max())
 
 
 def _carry(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, t: float, q: Floats) -> None:
@@ -229,13 +258,12 @@ def _carry(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, t:
         q[:, d] += np.interp(middle, [g.u for g in order], shift[:, d])
 
 
-def _holding(
-    problem: Problem, grid: Grid, history: History, q: Floats, applied: Floats, held: NDArray[np.int64]
-) -> Floats:
+def _unbalanced(problem: Problem, grid: Grid, history: History, q: Floats, applied: Floats) -> Floats:
+    """Return the forces (n_u, nc) [N] on the control points q that nothing balances but what holds them."""
     active, parameters = problem.law_table()
     f, nothing = np.empty_like(q), np.empty((1, 1))
-    still = np.zeros_like(q)
     assemble(
-        problem.axes, q, still, grid.tables, active, parameters, history, NO_RATES, (0.0, 0.0, 0.0), f, nothing
+        problem.axes, q, np.zeros_like(q), grid.tables, active, parameters, history, NO_RATES, (0.0, 0.0, 0.0), f,
+        nothing,
     )  # fmt: skip
-    return (f - applied).reshape(1, -1)[:, held]
+    return np.asarray(f - applied)

@@ -14,6 +14,7 @@ from dlocore.kernels.assembly import (
 )
 from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_matrix, reduce_vector, solve
 from dlocore.kernels.compile import kernel
+from dlocore.kernels.twisted import remember as carry
 
 _HALVINGS = 30
 _DROWNED = 1e-9  # of the energy: differences of it that rounding may make where the cable hardly stretches
@@ -52,7 +53,8 @@ def relax(
 
     The energy is the stored one, minus the work of the applied forces, plus a spring of `strength` [N/m^2] towards
     `target`. Where the tangent is not positive its positive semidefinite part is taken. The work of the
-    residual, not the energy, decides where energy differences drown in rounding.
+    residual, not the energy, decides where energy differences drown in rounding. Frames of the sections are carried
+    along with every step: the tangent is exact at the carried frame alone.
 
     Args:
         e, offset: elimination and prescribed part of the held degrees of freedom.
@@ -118,6 +120,8 @@ def relax(
                         break
                 length *= 0.5
         q -= length * step
+        if len(axes) == 4:
+            carry(q, tables, active, p, history.memory, history.past, 0.0)
         energy = _merit(axes, q, target, strength, applied, tables, active, p, history, w)
         if update <= tolerance:
             return update, it + 1

@@ -93,6 +93,7 @@ def run_level(
     rho: float = RHO,
     booked: bool = True,
     free_knots: bool = False,
+    hardness: float = 1.0,
 ) -> Level:
     """March on one grid and fit the time spline.
 
@@ -103,16 +104,22 @@ def run_level(
         rho: spectral radius of the march.
         booked: whether to book the time by phase.
         free_knots: whether to add time knots where the cable strikes something.
+        hardness: times that contact is stiffer to begin with, as it had to be made on a grid before.
     """
     posed = problem
+    if hardness > 1.0:
+        problem = stiffer(problem, hardness)
     grid = start_grid(problem, n_u, monitor)
     knots_t = time_knots(problem, n_t)
     assert knots_t is not None, "the caller asks for enough control points"
     if booked:
         monitor.phase("setup")
     motion = march(problem, grid, steps, monitor, rho=rho)
+    if hardness > 1.0 and motion.stopped == "step":  # too stiff for this grid
+        problem = posed
+        motion = march(problem, grid, steps, monitor, rho=rho)
+    allowed = DEEPEST * problem.scene.cable.diameter
     for _ in range(_STIFFER):
-        allowed = DEEPEST * problem.scene.cable.diameter
         if motion.stopped == "time" or motion.deepest <= allowed:
             break
         if motion.stopped and problem.self_contact is None:
@@ -139,6 +146,18 @@ def run_level(
     if booked:
         monitor.phase("fit")
     return Level(posed, problem, motion, knots_t, control, float(off[int(_MOST_OF_THE_TIME * (len(off) - 1))]), np.inf)
+
+
+def hardness(level: Level) -> float:
+    """Return how many times stiffer than posed contact may have to be on the grid after a level: 1 or more.
+
+    What the level needed, but no more than leaves half the depth that is allowed.
+    """
+    posed, solved = (p.self_contact or p.contact for p in (level.posed, level.problem))
+    if posed is None or solved is None:
+        return 1.0
+    allowed = DEEPEST * level.problem.scene.cable.diameter
+    return max(1.0, solved.stiffness / posed.stiffness * min(1.0, 2.0 * level.motion.deepest / allowed))
 
 
 def extrapolated(change: float, before: float) -> float:

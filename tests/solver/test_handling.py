@@ -7,6 +7,7 @@ import pytest
 
 from benchmarks.rod import converged
 from dlocore import (
+    Cable,
     ControlPoints,
     Environment,
     Grasp,
@@ -190,6 +191,32 @@ def test_a_settled_cable_hangs_still():
     r = predict(scene).surface.positions(u, t)
     # the relaxation ends 1e-8 m from equilibrium, the Newton iteration of a step 3e-7 m
     np.testing.assert_allclose(r, np.broadcast_to(r[0], r.shape), atol=1e-6)
+
+
+def hung_from_a_point() -> Scene:
+    rope = Cable(length=1.0, diameter=0.012, linear_density=0.8, bending_stiffness=0.04)
+    grasps, around = (Grasp(u=0.4),), Environment(drag=2.8)
+    return Scene(
+        cable=rope, shape=Points(points=arc(1.0, 1.0), settle=True), grasps=grasps, environment=around, horizon=1.0
+    )
+
+
+def spanned_between_two() -> Scene:
+    turn = np.linspace(0.0, 3.0 * np.pi, 97)[:, None]
+    helix = np.hstack([1.7 * np.cos(turn), 1.7 * np.sin(turn), 0.9 * turn])
+    length = float(np.linalg.norm(np.diff(helix, axis=0), axis=1).sum())
+    wire = Cable(length=length, diameter=0.0027, linear_density=0.16, bending_stiffness=4.4, torsional_stiffness=0.24)
+    grasps = (Grasp(u=0.1 * length), Grasp(u=0.8 * length))
+    shape = Points(points=helix, settle=True)
+    return Scene(cable=wire, shape=shape, grasps=grasps, environment=WEIGHTLESS, horizon=1.0)
+
+
+@pytest.mark.parametrize("build", [hung_from_a_point, spanned_between_two])
+def test_a_cable_that_may_turn_about_itself_settles_and_stays_at_rest(build):
+    scene = replace(build(), effects={"twist": "on"}, quality=march(17, 13))
+    r = predict(scene).surface.positions(*samples(scene))
+    # a force of 1e-6 of the weight moves it by 5e-6 m in a second
+    np.testing.assert_allclose(r, np.broadcast_to(r[0], r.shape), atol=5e-6)
 
 
 def bent_start() -> ControlPoints:

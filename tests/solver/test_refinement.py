@@ -5,13 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.hard.curves import arc, hairpin
+from benchmarks.hard.curves import arc, corner, hairpin, helix
 from benchmarks.hard.generator import draw
-from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, Straight, equilibrium, predict
-from dlocore.discretisation import make_grid
+from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, Sphere, Straight, equilibrium, predict
+from dlocore.discretisation import corners, make_grid
 from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.banded import reduce_matrix
 from dlocore.problem import pose
+from dlocore.shape import start_curve
+from dlocore.solvers.ladder import hardness, run_level
 from dlocore.solvers.march import march as take_steps
 from dlocore.solvers.monitor import Monitor
 from tests.solver.scenes import apart, march, paper_scene, refined
@@ -161,3 +163,76 @@ def test_auto_is_content_with_one_per_cent_and_tells_what_it_reached():
     assert estimate < 0.01 * 0.6
     truth = refined(swinging(Quality()), 1e-3)
     assert apart(found.surface, truth.surface).max() < 2.0 * estimate + 1e-3  # what an estimate may be off by
+
+
+def test_a_fold_between_control_points_gets_more_of_them_though_coarse_grids_agree_on_it():
+    # hung by a point it bends within a hundredth of its length; grids of up to 33 points fold it there, all alike
+    rope = Cable(length=1.0, diameter=0.003, linear_density=0.05, bending_stiffness=5e-7, axial_stiffness=100.0)
+    lift = Grasp(u=0.4, path=Move(displacement=(0.1, 0.2, 0.1), duration=4.0))
+    scene = Scene(
+        cable=rope,
+        shape=Points(points=arc(1.0, 1.0, "flat"), settle=True),
+        grasps=(lift,),
+        environment=Environment(drag=0.5),
+        effects={"inertia": "off", "self_contact": "off"},
+    )
+    found = predict(scene)
+    assert found.status == "converged", found.message
+    r = found.surface.positions(np.linspace(0.0, 1.0, 401), 4.0)[0]
+    steps = 400.0 * np.linalg.norm(np.diff(r, axis=0), axis=1)
+    assert steps.min() > 0.8  # |r'| between the knots, as the bend is resolved; of the folds it is 0.3
+
+
+def kinked(quality: Quality) -> Scene:
+    """Return a wire that is bent by a right angle within a hundredth of its length, and carried by its end."""
+    return Scene(
+        cable=Cable(
+            length=1.0, diameter=0.004, linear_density=0.05, bending_stiffness=0.02, rest_shape="initial"
+        ),
+        shape=Points(points=corner(1.0, 0.5 * np.pi, 0.4, "upright")),
+        grasps=(Grasp(u=0.0, hold="clamp", path=Move(displacement=(0.0, 0.2, 0.1), duration=0.5)),),
+        environment=Environment(drag=0.1),
+        horizon=0.8,
+        quality=quality,
+    )  # fmt: skip
+
+
+def test_a_sharp_bend_is_the_same_on_coarse_and_fine_grids():
+    coarse, fine = predict(kinked(march(25, 33))), predict(kinked(march(97, 65)))
+    # 1.4 mm; with knots spread evenly, where the bend is another one on each grid, 14 mm
+    assert apart(coarse.surface, fine.surface).max() < 3e-3
+    assert predict(kinked(march(5, 9))).surface.positions(0.5, 0.0).shape == (1, 1, 3)  # too few for knots at it
+
+
+@pytest.mark.parametrize(
+    ("points", "found"),
+    [
+        (corner(1.0, 2.0, 0.4, "flat"), [0.4]),
+        (corner(1.0, 0.5, 0.4, "flat"), []),
+        (hairpin(1.0, 0.2, "flat"), []),
+        (arc(1.0, 6.0, "flat"), []),
+        (helix(1.0, 10.0, 0.3), []),
+    ],
+    ids=["corner", "blunt corner", "hairpin", "arc", "helix"],
+)
+def test_only_a_bend_sharper_than_the_rest_of_the_cable_is_a_corner(points, found):
+    u = corners(start_curve(Points(points=points), 1.0), 1.0)
+    np.testing.assert_allclose(u, found, atol=0.01)  # the points are a hundredth of the length apart
+
+
+def test_contact_that_a_grid_had_to_make_stiffer_begins_so_on_the_next():
+    peg = Sphere(center=(0.5, 0.0, -0.15), radius=0.05)
+    scene = Scene(
+        cable=Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-3),
+        shape=Straight(),
+        grasps=(Grasp(u=0.0),),
+        environment=Environment(drag=0.1, obstacles=(peg,)),
+        horizon=0.5,
+    )
+    problem = pose(scene)
+    first = run_level(problem, 13, 25, 96, Monitor())
+    needed = hardness(first)
+    assert needed > 10.0  # it strikes: nobody can tell before how hard
+    again = run_level(problem, 13, 25, 96, Monitor(), hardness=needed)
+    assert again.motion.deepest == pytest.approx(first.motion.deepest, rel=1e-6)  # the same march, to rounding
+    assert hardness(again) == pytest.approx(needed)
