@@ -47,6 +47,7 @@ _FINER = {"space": 1.5, "time": 2.0}
 _FINE_IN_TIME = 0.3  # of the target: a time spline that misses its march by less keeps its knots as the steps halve
 _AT_BEST = 0.2  # of an error, is left by one refinement: what is still too much after all of them is not begun
 _MORE = 1.1  # times as many steps: fewer are as many
+_DAMPED_LEAVE = 1.5  # times the error that steps without strong damping leave: benchmarks.estimate
 _FAILURES = 2  # refinements in time of a march that found no equilibrium
 
 
@@ -227,10 +228,12 @@ def _as_by_half(level: Level, before: Level) -> float:
     """Return how far a level would lie from the one before [m] if its steps were half as many again, or more.
 
     The errors of the steps are of second order: 1.25 of that of a level is what half as many steps again take away
-    from it, 0.78 what a third as many do.
+    from it, 0.78 what a third as many do. Strongly damped steps, as forces with kinks ask for, are of first order in
+    part, and leave more.
     """
     more = len(level.motion.times) / len(before.motion.times)
-    return level.change * max(1.0, 1.25 / (more**2 - 1.0)) if more > _MORE else level.change
+    counts = _DAMPED_LEAVE if level.motion.rho == STRONGLY_DAMPED else 1.0
+    return counts * level.change * (max(1.0, 1.25 / (more**2 - 1.0)) if more > _MORE else 1.0)
 
 
 def _finer(size: Size, direction: str, trembles: bool) -> Size:
