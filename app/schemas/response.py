@@ -1,5 +1,6 @@
 """The response of the predictions, as data to serialise and as a schema to read."""
 
+from dataclasses import fields
 from datetime import UTC, datetime
 from typing import Any, Literal
 
@@ -284,7 +285,7 @@ def from_prediction(prediction: Prediction, id: str, samples_u: int = 101, sampl
 
 def iteration_document(iteration: Iteration) -> dict[str, Any]:
     """Return an iteration without its surface, with None where a value is not finite."""
-    document = {name: value for name, value in vars(iteration).items() if name != "surface"}
+    document = {f.name: getattr(iteration, f.name) for f in fields(iteration) if f.name != "find_surface"}
     for name in ("update", "residual", "energy", "damping", "step_length"):
         document[name] = _finite(document[name])
     return document
