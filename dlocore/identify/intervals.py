@@ -10,6 +10,7 @@ from scipy.stats import t as student
 from dlocore.identify.parameters import Parameter
 from dlocore.identify.replay import Played, Replay
 from dlocore.identify.rest import Rest
+from dlocore.spline import DEGREE
 
 if TYPE_CHECKING:
     from dlocore.identify.estimate import Estimated, Identification, Search, State
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 _BLOCK = 0.5  # [s] in which residuals hang together
-_MORE = 4  # control points of a finer net
 _SHAKES = 12  # replays with other noise of the held markers and the start
 _UNSEEN = 0.5  # standard deviation of a logarithm, or share of the prior's, from which on a parameter is not identified
 _SMALL = 0.1  # of the scale of a parameter without a prior
@@ -28,7 +28,7 @@ def assess(search: "Search", state: "State", seconds: float) -> "Identification"
 
     The variance of a value is the sum of three: of the residuals taken as independent, or as hanging together within
     blocks of half a second where that is more; of the noise of what was taken as known, the held markers and the start,
-    replayed with other noise of the same size; and the square of what a finer net and half the step would change.
+    replayed with other noise of the same size; and the square of what half the spans and half the step would change.
     """
     from dlocore.identify.estimate import Fit, Identification, robust_deviation, weights
 
@@ -131,9 +131,13 @@ def _shaken(search: "Search", state: "State", scale: Floats) -> Floats:
 
 
 def _refined(search: "Search", state: "State", scale: Floats) -> Floats:
-    """Return the gradient of the misfit that a finer net and half the step give."""
+    """Return the gradient of the misfit that a net twice as fine and half the step give.
+
+    A few more control points would not tell: in space, bending damping without twist is not smooth where the cable is
+    straight, and the motion converges slowly with the net.
+    """
     resolution = search.resolution
-    finer = replace(resolution, n_u=resolution.n_u + _MORE, step=0.5 * resolution.step)
+    finer = replace(resolution, n_u=2 * resolution.n_u - DEGREE, step=0.5 * resolution.step)
     total = np.zeros(len(search.chosen))
     at = 0
     for i, (replay, played) in enumerate(zip(search.replays, state.played, strict=True)):

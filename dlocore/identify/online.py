@@ -22,7 +22,7 @@ _ASIDE = 1e-3  # step of a coordinate to a motion beside: far enough for one tha
 _FIRST = 1.0  # standard deviation of a logarithm, or of a share of a usual value, before anything was seen
 _FORGOTTEN = 0.02  # that is added to it in every update: cables warm up, wear, are changed
 _STEP = 0.3  # of a coordinate at most in one update
-_AT_ONCE = 2  # parameters that an update improves: each costs a motion beside the replayed one
+_AT_ONCE = 2  # parameters at most that an update improves: each costs a motion beside the replayed one
 _BLOCK = 25  # frames whose residuals hang together: so many count as one
 
 
@@ -46,8 +46,9 @@ class Update:
 class Identifier:
     """Takes frames as they arrive and keeps an estimate of the cable.
 
-    Every update replays the frames of the last `window` seconds once and makes one Gauss-Newton step of two parameters,
-    by turns, with the last estimate and its covariance, widened a little, as prior. Not every frame needs an update.
+    Every update replays the frames of the last `window` seconds once and makes one Gauss-Newton step of two parameters
+    at most, by turns, with the last estimate and its covariance, widened a little, as prior. Not every frame needs an
+    update.
 
     Args:
         u: material coordinates of the markers (m,) [m].
@@ -109,20 +110,25 @@ class Identifier:
         self._times.append(float(time))
         self._markers.append(x)
 
-    def _turn(self) -> list[int]:
-        """Return the parameters that this update improves: two of them, and the next two in the next one."""
-        count = len(self._chosen)
-        found = sorted({(self._next + i) % count for i in range(min(_AT_ONCE, count))})
-        self._next = (self._next + _AT_ONCE) % count
-        return found
+    def _derivatives(self, replay: Replay, played: Played, x: Floats) -> Floats:
+        """Return the derivatives (frames, m, 3, parameters) of the prediction by the parameters whose turn it is.
 
-    @staticmethod
-    def _beside(replay: Replay, played: Played, candidate: Candidate) -> Floats:
-        """Return the predicted positions (frames, m, 3) [m] with a candidate that differs a little."""
-        try:
-            return replay.play_beside(played, candidate)
-        except ValueError:  # it can't be followed
-            return replay.play(candidate, played).predicted
+        They are two, or one where motions beside the played one can't be followed: to march one takes twice the time.
+        """
+        count = len(x)
+        out = np.zeros((*played.predicted.shape, count))
+        for _ in range(min(_AT_ONCE, count)):
+            j, p = self._next, self._chosen[self._next]
+            self._next = (j + 1) % count
+            candidate = p.put(self._candidate, p.value(x[j] + _ASIDE))
+            try:
+                moved, followed = replay.play_beside(played, candidate), True
+            except ValueError:
+                moved, followed = replay.play(candidate, played).predicted, False
+            out[..., j] = (moved - played.predicted) / _ASIDE
+            if not followed:
+                break
+        return out
 
     def update(self) -> Update | None:
         """Improve the estimate by the latest frames; None while there are too few, or nothing can be replayed."""
@@ -146,11 +152,7 @@ class Identifier:
             return None
         free = recording.free
         x = np.array([p.coordinate(p.get(self._candidate)) for p in self._chosen])
-        J = np.zeros((played.predicted[:, free].size, len(x)))
-        for j in self._turn():
-            p = self._chosen[j]
-            moved = self._beside(replay, played, p.put(self._candidate, p.value(x[j] + _ASIDE)))
-            J[:, j] = ((moved - played.predicted)[:, free] / _ASIDE).ravel()
+        J = self._derivatives(replay, played, x)[:, free].reshape(-1, len(x))
         away = (played.predicted - replay.markers)[:, free]
         r = np.where(np.isfinite(away), away, 0.0).ravel()
         J[~np.isfinite(away).ravel()] = 0.0

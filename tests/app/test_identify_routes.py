@@ -31,7 +31,7 @@ def asked() -> dict[str, Any]:
                 "name": "shaken",
             }
         ],
-        "parameters": ["bending_stiffness", "bending_damping"],
+        "parameters": ["bending_stiffness", "drag", "bending_damping"],
     }
 
 
@@ -88,7 +88,7 @@ def test_the_command_line_writes_the_cable_and_a_page(tmp_path: Path, capsys: py
     recording = simulated(6, 1.5, cable=CABLE, environment=DRAG)
     save_recording(recording, tmp_path / "shaken.npz")
     command = ["identify", str(tmp_path / "shaken.npz"), "-o", str(tmp_path / "cable.json")]
-    command += ["--report", str(tmp_path / "page.html"), "--parameters", "bending_stiffness,bending_damping"]
+    command += ["--report", str(tmp_path / "page.html"), "--parameters", "bending_stiffness,drag,bending_damping"]
     assert main(command) == 0
     cable = json.loads((tmp_path / "cable.json").read_text())
     assert cable["cable"]["bending_stiffness"] == pytest.approx(3e-3, rel=0.2)
