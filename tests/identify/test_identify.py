@@ -28,7 +28,7 @@ def test_a_clean_recording_is_replayed_as_it_was() -> None:
 
 def test_a_badly_tracked_recording_gives_back_its_cable() -> None:
     cable, environment = true_cable(np.random.default_rng([5, 1]))
-    found = identify([simulated(5, 5.0)], names=NAMES, resolution=FINE)
+    found = identify([simulated(5, 4.0)], names=NAMES, resolution=FINE)
     truth = (cable.bending_stiffness, environment.drag, cable.bending_damping)
     assert found.status == "converged"
     for p, true in zip(found.parameters, truth, strict=True):
@@ -87,7 +87,7 @@ def test_a_data_set_that_is_not_there_is_named(tmp_path: Path) -> None:
 
 def test_markers_beside_the_cable_are_found_beside_it() -> None:
     clean = Tracking(noise=0.0, held=0.0, outliers=0.0, lost=0.0)
-    recording = simulated(3, 2.0, cable=CABLE, environment=DRAG, tracking=clean)
+    recording = simulated(3, 1.2, cable=CABLE, environment=DRAG, tracking=clean)
     offsets = np.zeros((13, 2))
     offsets[2:-2] = np.random.default_rng(7).normal(0.0, 0.006, (9, 2))
     truth = Candidate(cable=CABLE, environment=DRAG, marker_offsets=offsets)
