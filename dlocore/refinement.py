@@ -47,7 +47,7 @@ _FINER = {"space": 1.5, "time": 2.0}
 _FINE_IN_TIME = 0.3  # of the target: a time spline that misses its march by less keeps its knots as the steps halve
 _AT_BEST = 0.2  # of an error, is left by one refinement: what is still too much after all of them is not begun
 _MORE = 1.1  # times as many steps: fewer are as many
-_DAMPED_LEAVE = 1.5  # times the error that steps without strong damping leave: benchmarks.estimate
+_DAMPED_LEAVE = 1.5  # times the error that half as many steps again leave without strong damping: benchmarks.estimate
 _FAILURES = 2  # refinements in time of a march that found no equilibrium
 
 
@@ -229,11 +229,15 @@ def _as_by_half(level: Level, before: Level) -> float:
 
     The errors of the steps are of second order: 1.25 of that of a level is what half as many steps again take away
     from it, 0.78 what a third as many do. Strongly damped steps, as forces with kinks ask for, are of first order in
-    part, and leave more.
+    part: unless there are twice as many, they leave more.
     """
     more = len(level.motion.times) / len(before.motion.times)
-    counts = _DAMPED_LEAVE if level.motion.rho == STRONGLY_DAMPED else 1.0
-    return counts * level.change * (max(1.0, 1.25 / (more**2 - 1.0)) if more > _MORE else 1.0)
+    if more <= _MORE:
+        return level.change
+    counts = max(1.0, 1.25 / (more**2 - 1.0))
+    if level.motion.rho == STRONGLY_DAMPED:
+        counts *= min(_DAMPED_LEAVE, max(1.0, 0.5 * _DAMPED_LEAVE / (more - 1.0)))
+    return counts * level.change
 
 
 def _finer(size: Size, direction: str, trembles: bool) -> Size:

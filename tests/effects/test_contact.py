@@ -91,8 +91,9 @@ def test_a_dropped_cable_comes_to_rest_on_the_table(tilt):
         environment=Environment(drag=0.05, table=Table(height=0.01, friction=0.3)),
         horizon=2.0,
     )
-    # one end strikes first and the cable slides and bows before it lies: 1 mm of difference grows to a centimetre
-    dropped = converged(falling) if tilt < 0.2 else predict(falling)
+    # one end strikes first and the cable slides and bows before it lies: 1 mm of difference grows to a centimetre, and
+    # whether two grids agree in the end is chance
+    dropped = predict(falling) if tilt else converged(falling)
     assert dropped.status in ("converged", "max_iterations")
     z = dropped.surface.positions(np.linspace(0, 1, 101), [2.0])[0, :, 2]
     np.testing.assert_allclose(z, 0.01, atol=DEEPEST)
