@@ -184,10 +184,10 @@ class Tables(NamedTuple):
 
     `*_first` (p,): index of the first of the four control points at each point; `*_b1` (p, 4): first derivatives of
     their basis functions [1/m], `*_b2` second [1/m^2], `*_b0` values; `*_w` (p,): weights [m]; `curvature_pairs`: see
-    `pairs.py`. Axial points: one a span
-    and two in an end span whose end direction is free (selective reduced integration, docs/model.md). Curvature and
-    body points: three a span. Contact nodes: every span in parts of one length, with their ends; none where contact is
-    off. `mass` (n, 4): integrals of b_i b_{i+d} du [m]; `weight` (n,): integrals of b_i du [m].
+    `pairs.py`. Axial points: one a span and two in an end span whose end direction is free (selective reduced
+    integration, docs/model.md). Curvature and body points: three a span. Contact nodes: every span in parts of one
+    length, with their ends; none where contact is off. `mass` (n, 4): integrals of b_i b_{i+d} du [m]; `weight` (n,):
+    integrals of b_i du [m].
     """
 
     axial_u: Any

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.kernels.banded import clear
 from dlocore.kernels.compile import kernel, law
 
 # of control point i, then of j: A its basis function, B the first and C the second derivative
@@ -56,3 +57,19 @@ def add_one(row: Any, products: Any, by: int, value: float) -> None:
     single = products[by]
     for r in range(len(row)):
         row[r] += value * single[r]
+
+
+@law
+def add_span(nc: int, K: Any, k: int, sums: Any) -> None:
+    """Add the blocks of a span from control point k on to the band K, and clear their `sums`.
+
+    Row nc d + e of `sums` (nc nc, PAIRS) is the entry of coordinate d of control point i and coordinate e of j.
+    """
+    pair = 0
+    for j in range(4):
+        for i in range(j, 4):
+            for e in range(nc):
+                for d in range(e if i == j else 0, nc):
+                    K[nc * (k + j) + e, nc * (i - j) + d - e] += sums[nc * d + e, pair]
+            pair += 1
+    clear(sums)

@@ -9,10 +9,9 @@ import numpy as np
 
 from dlocore.effects.base import Symmetric, Vector
 from dlocore.effects.laws import DAMPING, axial_energy, axial_stress, body_force, curvature_energy, curvature_stress
-from dlocore.kernels.banded import clear
 from dlocore.kernels.basis import row_of
 from dlocore.kernels.compile import kernel, law
-from dlocore.kernels.pairs import PAIRS, add_derivatives
+from dlocore.kernels.pairs import PAIRS, add_derivatives, add_span
 from dlocore.kernels.strain import space_curvature, space_curvature_rate, space_moment, transport
 
 STRAIGHT = (0.0, 0.0, 0.0)  # the stress-free curvature without a twist coordinate
@@ -145,14 +144,7 @@ def curvature(
                     _column_product(J, 1, d, SJ, 1, e),
                 )
         if n + 1 == len(weights) or firsts[n + 1] != k:
-            pair = 0
-            for j in range(4):
-                for i in range(j, 4):
-                    for e in range(3):
-                        for d in range(e if i == j else 0, 3):
-                            K[3 * (k + j) + e, 3 * (i - j) + d - e] += sums[3 * d + e, pair]
-                    pair += 1
-            clear(sums)
+            add_span(3, K, k, sums)
 
 
 @law

@@ -28,10 +28,9 @@ from dlocore.effects.laws import (
     twist_memory,
     twist_stress,
 )
-from dlocore.kernels.banded import clear
 from dlocore.kernels.basis import basis, find_span, row_of
 from dlocore.kernels.compile import kernel, law
-from dlocore.kernels.pairs import AA, AB, AC, BA, CA, PAIRS, add_angles, add_derivatives, add_one
+from dlocore.kernels.pairs import AA, AB, AC, BA, CA, PAIRS, add_angles, add_derivatives, add_one, add_span
 from dlocore.kernels.space import combine, vector
 from dlocore.kernels.strain import space_curvature, transport, twist_increment
 
@@ -149,7 +148,7 @@ def curvature(
                 for i in range(j, 16):
                     row[i - j] += stiffness * mean[j] * mean[i]
             if until == len(weights) or firsts[until] != k:
-                _add_span(K, k, sums)
+                add_span(4, K, k, sums)
         n = until
 
 
@@ -284,19 +283,6 @@ def _derivatives(
         (by_spin * spin[2] + by_t * t[2] - h / length * director[2]) / length,
     )
     return first, (director[0] / length, director[1] / length, director[2] / length)
-
-
-@law
-def _add_span(K: Any, k: int, sums: Any) -> None:
-    """Add the blocks of a span from control point k on to the band K, and clear their `sums`."""
-    pair = 0
-    for j in range(4):
-        for i in range(j, 4):
-            for e in range(4):
-                for d in range(e if i == j else 0, 4):
-                    K[4 * (k + j) + e, 4 * (i - j) + d - e] += sums[4 * d + e, pair]
-            pair += 1
-    clear(sums)
 
 
 @kernel
