@@ -167,10 +167,9 @@ async def listed(
 async def read(id: str, request: Request, service: TheService) -> Response:
     """Return the prediction as it was answered; while there is none (yet), its state and its iterations so far."""
     form = negotiated(request.headers.get("accept"), FORMS)
-    document = await anyio.to_thread.run_sync(service.document, id)
+    document, job = await _found(service, service.document, id)
     if document is not None:
         return await prediction_response(document, form, partial(service.material, id))
-    job = service.jobs.get(id)
     if job is None:
         raise no_run(id)
     if form != JSON:
@@ -241,8 +240,16 @@ async def part(service: Service, read: Callable[[str], bytes | None], id: str) -
     Raises:
         ProblemError: 404 where there is no such run, 409 where it has no answer or is not stored.
     """
-    content = await anyio.to_thread.run_sync(read, id)
+    content, job = await _found(service, read, id)
     if content is None:
-        job = service.jobs.get(id)
         raise no_run(id) if job is None else not_done(job)
     return content
+
+
+async def _found(service: Service, read: Callable[[str], bytes | None], id: str) -> tuple[bytes | None, Job | None]:
+    """Return what `read` finds of the run `id`, and its job, also where the job ends while one looks."""
+    job = service.jobs.get(id)
+    content = await anyio.to_thread.run_sync(read, id)
+    if content is None and job is not None and job.state == "done":
+        content = await anyio.to_thread.run_sync(read, id)
+    return content, service.jobs.get(id)

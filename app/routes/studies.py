@@ -108,6 +108,8 @@ async def read(id: str, request: Request, service: TheService) -> Response:
     job = service.measurements.get(id)
     if job is None or job.kind != KIND:
         raise _no_study(id)
+    if job.state == "done":  # it ended while one looked
+        return Response(job.document, media_type=JSON)
     return _state(job.summary(), 202)
 
 

@@ -14,6 +14,7 @@ from fastapi.testclient import TestClient
 
 from app import jobs
 from app.main import create_app
+from app.service import Service
 from app.settings import Settings
 from tests.app.conftest import paper_scene, start
 from tests.app.live import Live, serving
@@ -91,6 +92,34 @@ def test_a_prediction_that_is_not_to_be_stored_is_not(client: TestClient) -> Non
     assert client.get("/v1/predictions").json()["total"] == before
     assert client.delete(taken.headers["location"]).status_code == 204
     the_problem(client.get(taken.headers["location"]), 404)
+
+
+@pytest.mark.parametrize("store", [True, False], ids=["stored", "not stored"])
+def test_an_answer_that_comes_while_one_looks_for_it_is_given(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch, store: bool
+) -> None:
+    service: Service = client.app.state.service  # type: ignore[attr-defined]
+    read = service.document
+
+    def late(id: str) -> bytes | None:
+        """Find nothing yet, and be done with it only when the answer is there."""
+        found = read(id)
+        give_up = time.monotonic() + 60
+        while found is None and unfinished(id):
+            assert time.monotonic() < give_up
+            time.sleep(0.01)
+        return found
+
+    def unfinished(id: str) -> bool:
+        job = service.jobs.get(id)
+        return not (read(id) if job is None else job.finished.is_set())
+
+    address = client.post(f"/v1/predictions?store={store}", json=SLOW, headers=ASYNC).headers["location"]
+    monkeypatch.setattr(service, "document", late)
+    found = client.get(address)
+    assert found.status_code == 200
+    assert found.json()["status"] == "converged"
+    assert client.delete(address).status_code == 204
 
 
 def test_a_running_solve_is_cancelled_at_once_and_then_removed(client: TestClient) -> None:
