@@ -76,8 +76,9 @@ def march_level(
 ) -> Level:
     """March on one grid; where the motion calls for effects that were left out, again with them.
 
-    On a `rough` grid, which another follows, strands that meet may do so because of the grid. A march of this grid that
-    is `known` is not done again. Contact begins as stiff as the level `before` had to make it.
+    On a `rough` grid, which another follows, strands that meet may do so because of the grid: it is left open. A march
+    of this grid that is `known` is done again only for what was left open. Contact begins as stiff as the level
+    `before` had to make it.
     """
     called = dict(problem.called_for)
     while True:
@@ -85,10 +86,12 @@ def march_level(
             size = Size(max(size.n_u, smallest_n_u(problem)), max(size.n_t, smallest_n_t(problem)), size.steps)
         stiffness = 1.0 if before is None or before.posed is not problem else hardness(before)
         level = known or run_level(problem, *size, monitor, rho=rho, free_knots=free_knots, hardness=stiffness)
-        known = None
-        new = {} if level.motion.stopped == "time" else called_for(level)
-        if rough:
-            new.pop("self_contact", None)
+        if known is not None:
+            new, known = dict(known.left_open), None
+        else:
+            new = {} if level.motion.stopped == "time" else called_for(level)
+        if rough and "self_contact" in new:
+            level = replace(level, left_open={"self_contact": new.pop("self_contact")})
         if not new:
             return level
         record_level(problem, replace(level, note=f"calls for {', '.join(new)}"), monitor)

@@ -429,13 +429,16 @@ def fit_missed(knots: Any, times: Any, Q: Any, C: Any, dimensions: int) -> Any:
     first, table = basis_rows(knots, times, 0)
     out = np.zeros(len(times))
     for s in range(len(times)):
-        b = table[s, 0]
+        b0, b1, b2, b3 = table[s, 0, 0], table[s, 0, 1], table[s, 0, 2], table[s, 0, 3]
         g = first[s]
+        most, total = 0.0, 0.0
         for i in range(Q.shape[1]):
             for d in range(dimensions):
-                fitted = b[0] * C[g, i, d] + b[1] * C[g + 1, i, d] + b[2] * C[g + 2, i, d] + b[3] * C[g + 3, i, d]
+                fitted = b0 * C[g, i, d] + b1 * C[g + 1, i, d] + b2 * C[g + 2, i, d] + b3 * C[g + 3, i, d]
                 away = abs(Q[s, i, d] - fitted)
-                out[s] = max(out[s], away) if away == away else np.inf
+                most = max(most, away)
+                total += away
+        out[s] = most if total == total else np.inf
     return out
 
 

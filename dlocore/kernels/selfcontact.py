@@ -26,6 +26,7 @@ _DRAWN = 0.05  # eps
 _SLACK = 0.9  # of a distance that is skipped along the cable: a strained cable is longer
 _TOO_NEAR = 0.5  # of the diameter: no step brings strands from farther away nearer than this
 _LOOK = 1e-3  # diameters: the least way between two looks at a gap
+_WIDE = 8.0  # times the distance of interest, up to which it is told how far apart strands are
 _WINDOW = 8  # control points of a segment, at most
 _ROOM = 4096  # reduced entries of a pair, at most: held control points may follow many free ones
 
@@ -488,15 +489,31 @@ def turning_states(states: Any, nd: int, angle: float) -> Any:
 
 @kernel
 def nearest_of(states: Any, which: Any, first: Any, b: Any, u: Any, nd: int, separation: float, cap: float) -> float:
-    """Return the smallest `nearest` of the states `which` of (k, n, nc), at nodes with rows `first` (m,), b (m, 4)."""
+    """Return the smallest `nearest` of the states `which` of (k, n, nc), at nodes with rows `first` (m,), b (m, 4).
+
+    No point moves farther than the control point that moves most. So states that lie so close to one whose strands are
+    far apart that they can't have come nearer than what was found are not looked at.
+    """
     best = cap
+    wide = _WIDE * cap
     x = np.empty((len(u), nd))
+    seen, apart = -1, 0.0  # the state last looked at, and how far apart its strands are, at most `wide`
     for k in which:
+        if seen >= 0:
+            moved = 0.0
+            for n in range(states.shape[1]):
+                square = 0.0
+                for d in range(nd):
+                    square += (states[k, n, d] - states[seen, n, d]) ** 2
+                moved = max(moved, square)
+            if apart - 2.0 * np.sqrt(moved) >= best:
+                continue
         for n in range(len(u)):
             for d in range(nd):
                 value = 0.0
                 for i in range(4):
                     value += b[n, i] * states[k, first[n] + i, d]
                 x[n, d] = value
-        best = min(best, nearest(x, u, separation, best))
+        seen, apart = k, nearest(x, u, separation, wide)
+        best = min(best, apart)
     return best

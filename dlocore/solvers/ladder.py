@@ -1,6 +1,7 @@
 """March on finer and finer grids until two of them agree."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -48,6 +49,7 @@ class Level:
         missed: what the time spline misses of the march [m], but for moments such as a start that springs away.
         change: largest distance to the level before [m], infinite at the first.
         note: what was found on it, in words.
+        left_open: effects that it called for, and why, which a finer grid may do without.
     """
 
     posed: Problem
@@ -58,6 +60,7 @@ class Level:
     missed: float
     change: float
     note: str = ""
+    left_open: Mapping[str, str] = field(default_factory=dict)
 
 
 class Size(NamedTuple):
@@ -172,9 +175,9 @@ def extrapolated(change: float, before: float) -> float:
 
 def sample(level: Level, u: Floats, t: Floats) -> Floats:
     """Return the surface of a level on a grid of u (k,) and t (m,); (m, k, nc) [m]."""
-    return _matrix(level.knots_t, t) @ np.einsum(
-        "ki,jid->jkd", _matrix(level.motion.grid.knots, u), level.control
-    ).reshape(len(level.control), -1)
+    n_t, n_u, nc = level.control.shape
+    shapes = (_matrix(level.knots_t, t) @ level.control.reshape(n_t, n_u * nc)).reshape(len(t), n_u, nc)
+    return np.asarray(_matrix(level.motion.grid.knots, u) @ shapes)
 
 
 def _matrix(knots: Floats, x: Floats) -> Floats:

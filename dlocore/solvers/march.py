@@ -29,7 +29,6 @@ from dlocore.report import WindowForces
 from dlocore.scene import Grasp
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.stretch import enter
-from dlocore.spline import design_matrix
 
 Floats = NDArray[np.float64]
 
@@ -392,8 +391,9 @@ def refined(motion: March, knots_t: Floats, tolerance: float) -> tuple[Floats, M
     swings past its states. There the states half-way through the steps are added to the motion, and knots beside them.
     """
     for _ in range(_REFINEMENTS):
-        off = missed(motion, knots_t, fit(motion, knots_t))
-        between = _halved(motion, knots_t, tolerance)
+        control = fit(motion, knots_t)
+        off = missed(motion, knots_t, control)
+        between = _halved(motion, knots_t, control, tolerance)
         breaks = np.unique(knots_t)
         span = np.clip(np.searchsorted(breaks, motion.times, side="right") - 1, 0, len(breaks) - 2)
         new = []
@@ -410,16 +410,19 @@ def refined(motion: March, knots_t: Floats, tolerance: float) -> tuple[Floats, M
 
 def missed(motion: March, knots_t: Floats, control: Floats) -> Floats:
     """Return by how much the time spline of `control` (n_t, n_u, nc) misses each state (steps + 1,) [m]."""
-    return np.asarray(fit_missed(knots_t, motion.times, motion.states, control, min(3, control.shape[2])))
+    return _missed(knots_t, motion.times, motion.states, control)
 
 
-def _halved(motion: March, knots_t: Floats, tolerance: float) -> March:
+def _missed(knots_t: Floats, times: Floats, states: Floats, control: Floats) -> Floats:
+    return np.asarray(fit_missed(knots_t, times, states, control, min(3, control.shape[2])))
+
+
+def _halved(motion: March, knots_t: Floats, control: Floats, tolerance: float) -> March:
     """Return the motion with states half-way through those steps where the spline leaves the chord of the states."""
     times, states = motion.times, motion.states
     middle = 0.5 * (times[1:] + times[:-1])
     chord = 0.5 * (states[1:] + states[:-1])
-    fitted = np.tensordot(design_matrix(knots_t, middle), fit(motion, knots_t), axes=1)
-    away = np.abs(fitted - chord)[..., :3].max(axis=(1, 2))
+    away = _missed(knots_t, middle, chord, control)
     split = np.flatnonzero((away > tolerance) & (np.diff(times) > 0.2 * np.median(np.diff(times))))
     if len(split) == 0:
         return motion
