@@ -61,13 +61,13 @@ class SplineSurface:
         Returns:
             (k_t, k_u, 4) [m, m, m, rad], per m^du s^dt.
         """
-        along = design_matrix(self.knots_u, np.atleast_1d(u), du)
-        over = design_matrix(self.knots_t, np.atleast_1d(t), dt)
-        return np.einsum("tj,jic,ui->tuc", over, self.control_points, along, optimize=True)
+        return np.asarray(design_matrix(self.knots_u, np.atleast_1d(u), du) @ self.states(t, dt))
 
-    def states(self, t: ArrayLike) -> Floats:
-        """Return the control points of the spatial spline at times `t` (k,) [s]; (k, n_u, 4)."""
-        return np.einsum("tj,jic->tic", design_matrix(self.knots_t, np.atleast_1d(t)), self.control_points)
+    def states(self, t: ArrayLike, dt: int = 0) -> Floats:
+        """Return the control points of the spatial spline, or their derivatives, at times `t` (k,) [s]; (k, n_u, 4)."""
+        n_t, n_u, columns = self.control_points.shape
+        over = design_matrix(self.knots_t, np.atleast_1d(t), dt)
+        return (over @ self.control_points.reshape(n_t, n_u * columns)).reshape(-1, n_u, columns)
 
     def positions(self, u: ArrayLike, t: ArrayLike) -> Floats:
         """Return r on the grid of `t` and `u`; (k_t, k_u, 3) [m]."""
