@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.again import Again, march_again
 from dlocore.cost import Cost
 from dlocore.discretisation import smallest_n_u
 from dlocore.errors import SceneError
@@ -35,6 +36,7 @@ SAFETY = 1.5  # times the distance to a finer march: what a slowly converging mo
 def predict(
     scene: Scene,
     *,
+    like: Prediction | None = None,
     on_iteration: OnIteration | None = None,
     deadline: float | None = None,
     cancelled: Callable[[], bool] | None = None,
@@ -44,6 +46,9 @@ def predict(
 
     Args:
         scene: what to predict.
+        like: a prediction of a scene much like this one, a target moved by centimetres say: its grid and its error
+            estimate are taken on, which saves the search for them. Where the two differ too much for that this one is
+            solved from the beginning, and `message` says why.
         on_iteration: called after every iteration, or refinement level, with its record.
         deadline: time allowed [s]; after it the best iterate is returned with status "time_limit".
         cancelled: asked between iterations; where it returns True the solve stops.
@@ -58,8 +63,18 @@ def predict(
         Cancelled: `cancelled` returned True.
     """
     monitor = Monitor(on_iteration, deadline, cancelled)
-    problem = pose(scene)
-    quality = scene.quality
+    if like is None:
+        return _solved(pose(scene), monitor, cost)
+    problem = pose(scene, None if like.level is None else like.level.posed.called_for)
+    again = march_again(problem, like, monitor)
+    if isinstance(again, Again):
+        return _solved(problem, monitor, cost, again)
+    fresh = _solved(pose(scene), monitor, cost)
+    return replace(fresh, message=f"{fresh.message} Solved from the beginning: {again}")
+
+
+def _solved(problem: Problem, monitor: Monitor, cost: Cost | None, again: Again | None = None) -> Prediction:
+    quality = problem.scene.quality
     method = quality.method
     if method == "reference":
         from dlocore.reference.solve import reference  # its compiled code is for those who ask for it
@@ -67,10 +82,12 @@ def predict(
         return reference(problem, monitor)
     if method == "auto":
         method = automatic_method(problem)
-    if method == "march":
-        outcome = climb(problem, quality, monitor, cost) if quality.n_u is None else _given(problem, quality, monitor)
-        return _answer(monitor, "march", outcome)
-    return _least_squares(problem, quality, monitor, method)
+    if method != "march":
+        return _least_squares(problem, quality, monitor, method, again)
+    if again is not None:
+        return _answer(monitor, method, _as_before(again, monitor), judged=again.judged)
+    outcome = climb(problem, quality, monitor, cost) if quality.n_u is None else _given(problem, quality, monitor)
+    return _answer(monitor, method, outcome)
 
 
 def automatic_method(problem: Problem) -> Method:
@@ -83,12 +100,25 @@ def automatic_method(problem: Problem) -> Method:
     return "spacetime" if problem.scene.quality.n_u is not None and smooth else "march"
 
 
-def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method: str) -> Prediction:
+def _as_before(again: Again, monitor: Monitor) -> Outcome:
+    """Return the march on the grid of one like it as an answer, with the estimate of that one."""
+    level = again.level
+    record_level(level.problem, level, monitor)
+    status, message = march_status(level.problem, level)
+    return Outcome(level, status, message + again.said, again.errors)
+
+
+def _least_squares(
+    problem: Problem, quality: Quality, monitor: Monitor, method: str, again: Again | None
+) -> Prediction:
     """Solve on the given grid by the weighted least squares from a march, or by the printed scheme from rest."""
     assert quality.n_u is not None
     assert quality.n_t is not None
-    _check_n_t(problem, quality.n_t)
-    level = march_level(problem, Size(quality.n_u, quality.n_t, given_steps(quality.n_t)), monitor)
+    if again is None:
+        _check_n_t(problem, quality.n_t)
+        level = march_level(problem, Size(quality.n_u, quality.n_t, given_steps(quality.n_t)), monitor)
+    else:
+        level = again.level
     problem = level.problem
     if level.motion.stopped or level.motion.largest_strain > TORN:
         return _answer(monitor, "march", Outcome(level, *march_status(problem, level), None))
@@ -140,6 +170,9 @@ def _least_squares(problem: Problem, quality: Quality, monitor: Monitor, method:
         message += " The iterates grew beyond all bounds; the surface is that of a march."
         control, left = level.control, level.motion.update
     level = replace(level, control=control)
+    if again is not None:
+        errors = None if again.errors is None else {**again.errors, "iteration": left}
+        return _answer(monitor, method, Outcome(level, status, message + again.said, errors), forces, again.judged)
     estimate, doubt = _companion(problem, quality, level, monitor) if method != "paper" or converged else (None, "")
     errors = None if estimate is None else {"grid": estimate, "iteration": left}
     return _answer(monitor, method, Outcome(level, status, message + doubt, errors), forces)
@@ -200,6 +233,7 @@ def _answer(
     method: str,
     outcome: Outcome,
     forces: tuple[WindowForces, ...] | None = None,
+    judged: Level | None = None,
 ) -> Prediction:
     level = outcome.level
     problem = level.problem
@@ -236,6 +270,8 @@ def _answer(
         ),
         start_energy=elastic_energy(problem, grid, grid.start, grid.history),
         start_fit=problem.start.fit_rms,
+        level=level,
+        judged=judged or level,
     )
 
 

@@ -14,6 +14,7 @@ from dlocore.scene import Scene
 def predict_many(
     scenes: Iterable[Scene],
     *,
+    like: Prediction | None = None,
     threads: int | None = None,
     deadline: float | None = None,
     cancelled: Callable[[], bool] | None = None,
@@ -24,6 +25,7 @@ def predict_many(
 
     Args:
         scenes: what to predict.
+        like: a prediction of a scene much like them all, as in `predict`.
         threads: solves at once; by default as many as there are processors for this process.
         deadline: time allowed for each scene [s], as in `predict`.
         cancelled: asked between iterations of every solve; where it returns True all stop.
@@ -43,7 +45,7 @@ def predict_many(
 
     def solve(scene: Scene) -> Prediction | SceneError:
         try:
-            return predict(scene, deadline=deadline, cancelled=stopped)
+            return predict(scene, like=like, deadline=deadline, cancelled=stopped)
         except SceneError as error:
             return error
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from dlocore.errors import number
 from dlocore.scene import ControlPoints, Material, Scene
 from dlocore.spline import SplineSurface, design_matrix
+
+if TYPE_CHECKING:
+    from dlocore.solvers.ladder import Level
 
 Floats = NDArray[np.float64]
 Status = Literal["converged", "max_iterations", "stalled", "time_limit"]
@@ -178,6 +181,8 @@ class Prediction:
         accuracy: method, estimated error, time.
         start_energy: elastic energy stored in the start shape [J].
         start_fit: root mean square distance of the start from the given points [m]; 0 where it was given exactly.
+        level: the march behind it, on whose grid another may go on (`predict(..., like=...)`); None of a reference.
+        judged: the march whose error was estimated: `level`, or one like it.
     """
 
     scene: Scene
@@ -191,6 +196,8 @@ class Prediction:
     report_grasps: Callable[[], tuple[GraspReaction, ...]] = field(repr=False)
     report_effects: Callable[[SplineSurface], tuple[EffectReport, ...]] = field(repr=False)
     report_material: Callable[[], MaterialMotion | None] = field(repr=False)
+    level: "Level | None" = field(default=None, repr=False)
+    judged: "Level | None" = field(default=None, repr=False)
 
     @cached_property
     def grasps(self) -> tuple[GraspReaction, ...]:

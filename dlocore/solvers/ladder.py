@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from dlocore.discretisation import smallest_n_u
 from dlocore.effects.contact import DEEPEST
+from dlocore.grid import Grid
 from dlocore.kernels.basis import basis_rows
 from dlocore.problem import Problem, stiffer
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, fit, march, missed, refined, smallest_n_t, time_knots
@@ -29,6 +31,7 @@ CREDIBLE_STRAIN = 0.02  # axial: a march that stretches the cable more is tried 
 _STIFFER = 5  # times that contact is made stiffer on one grid
 _MISSED = 0.01  # of the diameter: what the time spline may miss of a motion with contact
 _MOST_OF_THE_TIME = 0.95
+_SAMPLES = 33  # along the cable and over time at which surfaces are compared
 _STIFFENING = 10.0  # at most each time
 _YIELDING = 0.8  # of the depth, at most, is left by a stiffer contact where it is one of stiffness
 FINER = 1.5  # times n_u, n_t and the steps of a given grid: the march that its error is estimated with
@@ -36,11 +39,20 @@ _CHANGE_COUNTS = 0.75  # share of a refinement's change that may be left: benchm
 ACCEPT = 0.55  # of the target: an answer with a smaller estimated error is believed
 
 
+class Size(NamedTuple):
+    """Size of a grid: control points along the cable and in time, and steps of the march."""
+
+    n_u: int
+    n_t: int
+    steps: int
+
+
 @dataclass(frozen=True, eq=False)
 class Level:
     """A march on one grid and its spline.
 
     Attributes:
+        size: of the grid, as it was asked for.
         posed: what was to be solved.
         problem: what was solved: contact may have been made stiffer.
         motion: the march.
@@ -52,6 +64,7 @@ class Level:
         left_open: effects that it called for, and why, which a finer grid may do without.
     """
 
+    size: Size
     posed: Problem
     problem: Problem
     motion: March
@@ -62,13 +75,14 @@ class Level:
     note: str = ""
     left_open: Mapping[str, str] = field(default_factory=dict)
 
-
-class Size(NamedTuple):
-    """Size of a grid: control points along the cable and in time, and steps of the march."""
-
-    n_u: int
-    n_t: int
-    steps: int
+    @cached_property
+    def samples(self) -> Floats:
+        """The surface at 33 evenly spaced times and 33 places along the cable (33, 33, nc) [m]."""
+        n_t, n_u, nc = self.control.shape
+        over, along = (
+            _matrix(knots, np.linspace(0.0, knots[-1], _SAMPLES)) for knots in (self.knots_t, self.motion.grid.knots)
+        )
+        return np.asarray(along @ (over @ self.control.reshape(n_t, n_u * nc)).reshape(_SAMPLES, n_u, nc))
 
 
 def stretched(problem: Problem, level: int) -> Size:
@@ -97,6 +111,8 @@ def run_level(
     booked: bool = True,
     free_knots: bool = False,
     hardness: float = 1.0,
+    grid: Grid | None = None,
+    knots_t: Floats | None = None,
 ) -> Level:
     """March on one grid and fit the time spline.
 
@@ -108,12 +124,16 @@ def run_level(
         booked: whether to book the time by phase.
         free_knots: whether to add time knots where the cable strikes something.
         hardness: times that contact is stiffer to begin with, as it had to be made on a grid before.
+        grid: with the start on it, where it is known.
+        knots_t: time knots to begin with, where they are known.
     """
     posed = problem
     if hardness > 1.0:
         problem = stiffer(problem, hardness)
-    grid = start_grid(problem, n_u, monitor)
-    knots_t = time_knots(problem, n_t)
+    if grid is None:
+        grid = start_grid(problem, n_u, monitor)
+    if knots_t is None:
+        knots_t = time_knots(problem, n_t)
     assert knots_t is not None, "the caller asks for enough control points"
     if booked:
         monitor.phase("setup")
@@ -148,7 +168,8 @@ def run_level(
     off = np.sort(missed(motion, knots_t, control))
     if booked:
         monitor.phase("fit")
-    return Level(posed, problem, motion, knots_t, control, float(off[int(_MOST_OF_THE_TIME * (len(off) - 1))]), np.inf)
+    most = float(off[int(_MOST_OF_THE_TIME * (len(off) - 1))])
+    return Level(Size(n_u, n_t, steps), posed, problem, motion, knots_t, control, most, np.inf)
 
 
 def hardness(level: Level) -> float:
@@ -173,13 +194,6 @@ def extrapolated(change: float, before: float) -> float:
     return _CHANGE_COUNTS * change * max(1.0, contraction / (1.0 - contraction))
 
 
-def sample(level: Level, u: Floats, t: Floats) -> Floats:
-    """Return the surface of a level on a grid of u (k,) and t (m,); (m, k, nc) [m]."""
-    n_t, n_u, nc = level.control.shape
-    shapes = (_matrix(level.knots_t, t) @ level.control.reshape(n_t, n_u * nc)).reshape(len(t), n_u, nc)
-    return np.asarray(_matrix(level.motion.grid.knots, u) @ shapes)
-
-
 def _matrix(knots: Floats, x: Floats) -> Floats:
     first, table = basis_rows(knots, x, 0)
     out = np.zeros((len(x), len(knots) - 4))
@@ -189,8 +203,5 @@ def _matrix(knots: Floats, x: Floats) -> Floats:
 
 def distance(a: Level, b: Level, problem: Problem) -> float:
     """Return the largest distance between the surfaces of two levels [m]."""
-    u = np.linspace(0.0, problem.scene.cable.length, 33)
-    t = np.linspace(0.0, problem.horizon, 33)
-    nc = problem.nc
-    away = (sample(a, u, t) - sample(b, u, t)).reshape(-1, nc)[:, : problem.plane.dimensions]
-    return float(np.sqrt((away * away).sum(axis=1).max()))
+    away = (a.samples - b.samples)[..., : problem.plane.dimensions]
+    return float(np.sqrt((away * away).sum(axis=-1).max()))

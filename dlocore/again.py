@@ -1,0 +1,152 @@
+"""Solve again what was solved before and has moved a little: on the grid that was found for it.
+
+A planner, and a hand that drags a target, ask for many motions that hardly differ. The search for a grid, the start at
+rest on it and the estimate of its error are much the same for all of them, and most of the cost. They are kept here:
+one march is left (docs/accuracy.md, "Much the same again").
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from dlocore.paths import Waypoints
+from dlocore.plane import Plane
+from dlocore.prediction import Prediction
+from dlocore.problem import Problem
+from dlocore.refinement import MISSED_COUNTS, march_status
+from dlocore.review import called_for
+from dlocore.scene import Grasp
+from dlocore.solvers.ladder import Level, distance, hardness, run_level
+from dlocore.solvers.march import events_of
+from dlocore.solvers.monitor import Monitor
+
+_NOT_OF_THE_GRID = ("neglected", "iteration")  # parts of an estimate that each solve has of its own
+_ROUNDING = 1e-14  # of the coordinates of a plane that is found from points
+NEAR = 0.05  # of the length: motions that lie closer have errors alike (benchmarks.again)
+
+
+@dataclass(frozen=True, eq=False)
+class Again:
+    """A march on the grid of one like it.
+
+    Attributes:
+        level: the march.
+        judged: the one like it whose error was estimated.
+        errors: the parts of that estimate [m], None where there is none.
+    """
+
+    level: Level
+    judged: Level
+    errors: Mapping[str, float] | None
+
+    @property
+    def said(self) -> str:
+        """What to say of the estimate, in words."""
+        if self.errors is None:
+            return ""
+        return f" On the grid of a motion {self.level.change * 1e3:.2g} mm away, whose error was estimated."
+
+
+def march_again(problem: Problem, like: Prediction, monitor: Monitor) -> Again | str:
+    """March a problem on the grid of a prediction like it.
+
+    Args:
+        problem: with the effects that the other has called for.
+        like: the other.
+        monitor: that of the solve.
+
+    Returns:
+        The march, or why the problem has to be solved from the beginning.
+    """
+    if like.level is None or like.judged is None:
+        return "The prediction before has no march."
+    before = like.level
+    objection = _objection(problem, like, before.posed)
+    if objection:
+        return objection
+    grid = before.motion.grid if _starts_alike(problem, before.posed) else None
+    free_knots = problem.scene.quality.n_u is None
+    level = run_level(
+        problem, *before.size, monitor, rho=before.motion.rho, free_knots=free_knots, hardness=hardness(before),
+        grid=grid, knots_t=before.knots_t,
+    )  # fmt: skip
+    level = replace(level, change=distance(like.judged, level, problem), note="on the grid of a motion like it")
+    if level.motion.stopped == "time":
+        return Again(level, like.judged, None)
+    length = problem.scene.cable.length
+    status, message = march_status(level.problem, level)
+    if status != "converged":
+        return message
+    if not level.change <= NEAR * length:
+        return f"The motion is {level.change * 1e3:.2g} mm from the one whose error was estimated."
+    calls = called_for(level)
+    if calls:
+        return f"It calls for {', '.join(calls)}: {'; '.join(calls.values())}."
+    errors = {name: error for name, error in like.accuracy.error_parts.items() if name not in _NOT_OF_THE_GRID}
+    if errors and like.accuracy.method == "march":
+        errors[list(errors)[-1]] += max(0.0, MISSED_COUNTS * level.missed - sum(errors.values()))
+    return Again(level, like.judged, errors or None)
+
+
+def _objection(problem: Problem, like: Prediction, before: Problem) -> str:
+    """Return why a problem is none like the one before, "" where it is."""
+    scene, other = problem.scene, before.scene
+    if like.status != "converged":
+        return "The prediction before did not converge."
+    if scene.quality != other.quality:
+        return "Another accuracy or grid is asked for."
+    if scene.cable.length != other.cable.length:
+        return "The cable has another length."
+    if problem.nc != before.nc or not _in_one_plane(problem.plane, before.plane):
+        return "It moves in other dimensions or another plane."
+    if problem.on_table != before.on_table or any(
+        choice.active != before.choices[name].active for name, choice in problem.choices.items()
+    ):
+        return "Other effects are simulated."
+    if problem.horizon != before.horizon or not _same(events_of(problem), events_of(before)):
+        return "Paths, grasps or the prediction begin or end at other times."
+    return ""
+
+
+def _in_one_plane(a: Plane, b: Plane) -> bool:
+    """Tell whether two solves have the same coordinates, but for rounding."""
+    return a.axes.shape == b.axes.shape and all(
+        float(np.abs(x - y).max()) <= _ROUNDING for x, y in ((a.axes, b.axes), (a.origin, b.origin))
+    )
+
+
+def _starts_alike(problem: Problem, before: Problem) -> bool:
+    """Tell whether the motion begins in the same state on the same knots."""
+    scene, other = problem.scene, before.scene
+    return (
+        len(scene.grasps) == len(other.grasps)
+        and all(_grasp_alike(a, b) for a, b in zip(scene.grasps, other.grasps, strict=True))
+        and [load.u for load in scene.loads] == [load.u for load in other.loads]
+        and (not scene.shape.settle or _same(scene.loads, other.loads))
+        and _same(problem.obstacles, before.obstacles)
+        and all(_same(getattr(scene, name), getattr(other, name)) for name in ("cable", "shape", "environment"))
+    )
+
+
+def _grasp_alike(a: Grasp, b: Grasp) -> bool:
+    """Tell whether two grasps close on the same place of a start in the same way."""
+    placed = (a.u, a.hold, a.start, a.release_time) == (b.u, b.hold, b.start, b.release_time)
+    led = isinstance(a.path, Waypoints) or isinstance(b.path, Waypoints)  # to its first point at once
+    return placed and (not led or _same(a.path, b.path))
+
+
+def _same(a: Any, b: Any) -> bool:
+    """Tell whether two values, parts of scenes or arrays are the same in all they hold."""
+    if a is b:
+        return True
+    if type(a) is not type(b):
+        return False
+    if is_dataclass(a):
+        return all(_same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
+    if isinstance(a, tuple | list):
+        return len(a) == len(b) and all(_same(x, y) for x, y in zip(a, b, strict=True))
+    if isinstance(a, np.ndarray):
+        return bool(np.array_equal(a, b))
+    return bool(a == b)
