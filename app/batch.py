@@ -23,7 +23,7 @@ AHEAD = 4  # lines that may be ready before the one that is due, for each worker
 
 
 async def predict_all(
-    service: Service, scenes: list[Any], emit: Emit, *, store: bool, order: Literal["index", "finished"]
+    service: Service, scenes: list[Any], emit: Emit, *, store: bool, like: str, order: Literal["index", "finished"]
 ) -> None:
     """Predict `scenes` and emit a line of JSON for each; when cancelled, cancel those under way.
 
@@ -32,6 +32,7 @@ async def predict_all(
         scenes: requests as data, right or wrong.
         emit: takes a line; it is waited for, so that a slow client slows the batch down.
         store: whether to keep the runs.
+        like: id of a run that all go on from; "": none.
         order: in that of the scenes, or as they finish.
     """
     waiting: dict[int, bytes] = {}
@@ -53,7 +54,7 @@ async def predict_all(
 
     async def work() -> None:
         for index in indices:
-            line = await _line(service, index, scenes[index], store)
+            line = await _line(service, index, scenes[index], store, like)
             if order == "index":
                 await deliver(index, line)
             else:
@@ -65,12 +66,12 @@ async def predict_all(
             tasks.start_soon(work)
 
 
-async def _line(service: Service, index: int, data: Any, store: bool) -> bytes:
+async def _line(service: Service, index: int, data: Any, store: bool, like: str) -> bytes:
     id = new_id()
     RUN.set(id)
     try:
         request, scene = await anyio.to_thread.run_sync(_scene, service, data)
-        prediction = await service.solve(scene, Event(), on_start=lambda: None, on_iteration=_pass)
+        prediction = await service.solve(scene, Event(), like=like, on_start=lambda: None, on_iteration=_pass)
 
         def keep() -> bytes:
             return service.keep(prediction, request, orjson.dumps(data), id, store)

@@ -4,7 +4,7 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from threading import Event
 from typing import Annotated
 
@@ -19,6 +19,7 @@ from app.logs import RUN
 from app.measurements import Measurement, Measurements, Work
 from app.metrics import Metrics
 from app.problems import ProblemError, problem_of
+from app.recent import Recent
 from app.runs import RunStore
 from app.schemas import PredictionRequest, from_prediction, to_scene
 from app.schemas.response import iteration_document
@@ -39,6 +40,7 @@ class Service:
         worker: the worker threads.
         metrics: what is counted.
         jobs: predictions that no stored run stands for.
+        recent: the last predictions, from which others may go on.
         measurements: calibrations and studies under way.
         ready: whether the solver is compiled.
     """
@@ -48,6 +50,7 @@ class Service:
     worker: Worker
     metrics: Metrics
     jobs: Jobs = field(default_factory=Jobs)
+    recent: Recent = field(default_factory=Recent)
     measurements: Measurements = field(default_factory=Measurements)
     ready: bool = field(default=False)
     _tasks: TaskGroup | None = field(init=False, default=None)
@@ -95,32 +98,40 @@ class Service:
         if self.worker.closed:
             raise ProblemError(503, "shutting-down", "The service is shutting down.", headers={"Retry-After": "5"})
 
-    async def submit(self, request: PredictionRequest, raw: bytes, *, store: bool) -> Job:
+    async def submit(self, request: PredictionRequest, raw: bytes, *, store: bool, like: str = "") -> Job:
         """Take up a prediction and return it as it is waiting.
 
         Args:
             request: the valid request.
             raw: the same as it was sent.
             store: whether to keep the run.
+            like: id of a run to go on from; "": none.
 
         Raises:
             SceneError: the scene is impossible.
-            ProblemError: 429 or 503.
+            ProblemError: 404 where there is no run `like`, 429 or 503.
         """
         self.check_ready()
+        await self.check_known(like)
         scene = await anyio.to_thread.run_sync(to_scene, request, self.runs.motion)
         self.worker.admit()
         assert self._tasks is not None
         job = Job(store)
         RUN.set(job.id)
         self.jobs.add(job)
-        self._tasks.start_soon(self._work, job, scene, request, raw)
+        self._tasks.start_soon(self._work, job, scene, request, raw, like)
         return job
 
-    async def _work(self, job: Job, scene: Scene, request: PredictionRequest, raw: bytes) -> None:
+    async def check_known(self, like: str) -> None:
+        """Raise a 404 problem where `like` is neither "" nor the id of a run."""
+        known = not like or self.recent.get(like) is not None
+        if not known and await anyio.to_thread.run_sync(self.runs.document, like) is None:
+            raise ProblemError(404, "no-such-run", f"like: There is no run {like[:64]!r}; it may have been removed.")
+
+    async def _work(self, job: Job, scene: Scene, request: PredictionRequest, raw: bytes, like: str) -> None:
         try:
             with job.scope:
-                prediction = await self._solved(job, scene)
+                prediction = await self._solved(job, scene, like)
                 limit = self.settings.time_limit
                 job.beyond_limit = prediction.status == "time_limit" and prediction.accuracy.wall_time >= limit
                 document = await anyio.to_thread.run_sync(self.keep, prediction, request, raw, job.id, job.store)
@@ -158,26 +169,30 @@ class Service:
         self._tasks.start_soon(self.measurements.run, measurement, work, lambda: self.worker.admitted > 0)
         return measurement
 
-    async def _solved(self, job: Job, scene: Scene) -> Prediction:
+    async def _solved(self, job: Job, scene: Scene, like: str) -> Prediction:
         loop = asyncio.get_running_loop()
 
         def report(iteration: Iteration) -> None:
             loop.call_soon_threadsafe(job.add, iteration_document(iteration))
 
-        return await self.solve(scene, job.cancelled, on_start=job.begin, on_iteration=report)
+        return await self.solve(scene, job.cancelled, like=like, on_start=job.begin, on_iteration=report)
 
     async def solve(
         self,
         scene: Scene,
         cancelled: Event,
         *,
+        like: str = "",
         on_start: Callable[[], None],
         on_iteration: Callable[[Iteration], None],
     ) -> Prediction:
-        """Predict `scene` in a worker thread as `Worker.solve` does; count it and write it to the log."""
+        """Predict `scene` in a worker thread as `Worker.solve` does, from the run `like` if any; count and log it."""
         method = scene.quality.method
+        before = self.recent.get(like) if like else None
         try:
-            prediction = await self.worker.solve(scene, cancelled, on_start=on_start, on_iteration=on_iteration)
+            prediction = await self.worker.solve(
+                scene, cancelled, like=before, on_start=on_start, on_iteration=on_iteration
+            )
         except SceneError:
             self.metrics.ended("refused", method)
             raise
@@ -187,6 +202,11 @@ class Service:
         except Exception:
             self.metrics.ended("failed", method)
             raise
+        if like and before is None:
+            message = (
+                f"{prediction.message} Solved from the beginning: The prediction before is not in memory any more."
+            )
+            prediction = replace(prediction, message=message)
         self.metrics.solved(prediction)
         accuracy = prediction.accuracy
         _log.info(
@@ -196,7 +216,8 @@ class Service:
         return prediction
 
     def keep(self, prediction: Prediction, request: PredictionRequest, raw: bytes, id: str, store: bool) -> bytes:
-        """Return the answer as JSON, and store it where that is asked for; for any thread."""
+        """Return the answer as JSON, store it where that is asked for, and remember it; for any thread."""
+        self.recent.add(id, prediction)
         u, t = request.output.samples_u, request.output.samples_t
         if not store:
             document = {**from_prediction(prediction, id, u, t), "links": None}

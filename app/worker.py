@@ -89,6 +89,7 @@ class Worker:
         scene: Scene,
         cancelled: Event,
         *,
+        like: Prediction | None = None,
         on_start: Callable[[], None] = _nothing,
         on_iteration: Callable[[Iteration], None] = _nothing,
     ) -> Prediction:
@@ -97,6 +98,7 @@ class Worker:
         Args:
             scene: the scene.
             cancelled: set it to stop the solve.
+            like: a prediction to go on from.
             on_start: called when a worker is free.
             on_iteration: called in the worker thread after every iteration.
 
@@ -113,6 +115,7 @@ class Worker:
                     return await self._run(
                         lambda: predict(
                             scene,
+                            like=like,
                             on_iteration=on_iteration,
                             deadline=self.time_limit,
                             cancelled=cancelled.is_set,

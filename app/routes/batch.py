@@ -23,7 +23,7 @@ _LINE = {"itemSchema": {"$ref": "#/components/schemas/BatchLine"}}
     summary="Predict many scenes",
     responses={
         200: {"description": "One JSON object a line, see `BatchLine`.", "content": {LINES: _LINE}},
-        **described.failures(401, 406, 413, 415, 422, 429, 503),
+        **described.failures(401, 404, 406, 413, 415, 422, 429, 503),
     },
 )
 async def batch(
@@ -38,11 +38,14 @@ async def batch(
     scenes = wanted.scenes()
     check_size(len(scenes), service.settings.max_batch, "scenes")
     service.check_ready()
+    await service.check_known(wanted.root.like)
     service.worker.admit()
 
     async def produce(emit: Emit) -> None:
         try:
-            await predict_all(service, scenes, emit, store=wanted.root.store, order=wanted.root.order)
+            await predict_all(
+                service, scenes, emit, store=wanted.root.store, like=wanted.root.like, order=wanted.root.order
+            )
         finally:
             service.worker.release()
 

@@ -22,6 +22,7 @@ from app.problems import ProblemError
 from app.routes import described
 from app.routes.body import JsonRoute, calling_when_gone
 from app.schemas import EXAMPLES, PredictionList, PredictionRequest
+from app.schemas.base import LIKE, RunId
 from app.service import Service, TheService
 from dlocore.prediction import Status
 
@@ -51,6 +52,7 @@ async def predict(
     scene: Annotated[PredictionRequest, Body(openapi_examples=EXAMPLES)],
     service: TheService,
     store: Annotated[bool, Query(description="Whether to keep the run.", examples=[True])] = True,
+    like: Annotated[RunId, Query(description=LIKE, examples=[""])] = "",
     prefer: Annotated[
         str | None,
         Header(description=described.PREFER, examples=["respond-async", "respond-async, wait=5"]),
@@ -63,7 +65,7 @@ async def predict(
     """
     form = negotiated(request.headers.get("accept"), (*FORMS, EVENTS))
     wishes = preferences(prefer)
-    job = await service.submit(scene, await request.body(), store=store)
+    job = await service.submit(scene, await request.body(), store=store, like=like)
     if form == EVENTS:
         response = events.of_job(job, service, cancel=not wishes.respond_async)
     elif wishes.respond_async:
@@ -117,8 +119,8 @@ async def listed(
     limit: Annotated[int, Query(ge=1, le=1000, description="At most so many.", examples=[20])] = 20,
     offset: Annotated[int, Query(ge=0, le=10**9, description="Pass over so many newer ones.", examples=[0])] = 0,
     cursor: Annotated[
-        str,
-        Query(pattern="^[0-9a-f]{28}$|^$", description="Only runs older than the one with this id, as in `next`."),
+        RunId,
+        Query(description="Only runs older than the one with this id, as in `next`."),
     ] = "",
     status: Annotated[list[Status] | None, Query(description="Only runs with one of these.")] = None,
     method: Annotated[
@@ -192,6 +194,7 @@ async def remove(id: str, service: TheService) -> Response:
         if job.state != "done":
             return _state(job, 200 if job.finished.is_set() else 202)
     known = service.jobs.forget(id)
+    service.recent.forget(id)
     if not await anyio.to_thread.run_sync(service.runs.delete, id) and not known:
         raise no_run(id)
     return Response(status_code=204)

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 from fastapi.openapi.models import Example
 from pydantic import BaseModel, Discriminator, Field, RootModel, Tag
 
-from app.schemas.base import Flag, Model
+from app.schemas.base import LIKE, Flag, Model, RunId
 from app.schemas.request import PAPER, TWO_GRIPPERS
 from app.schemas.response import PredictionResponse, ProblemDocument
 
@@ -14,6 +14,7 @@ _MOST = 100_000  # a service may allow less: DLO_MAX_BATCH
 
 class _Batch(Model):
     store: Flag = Field(default=False, description="Whether to keep the runs.", examples=[False])
+    like: RunId = Field(default="", description=LIKE, examples=[""])
     order: Literal["index", "finished"] = Field(
         default="index",
         description="Lines in the order of the scenes, each as soon as all before it are done; or as they finish.",

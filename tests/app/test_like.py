@@ -1,0 +1,79 @@
+"""Predictions that go on from others: by address, in batches, and where there is nothing to go on from."""
+
+import json
+from typing import Any
+
+from fastapi.testclient import TestClient
+
+from app.recent import Recent
+from app.service import Service
+from dlocore import Prediction, predict
+from tests.app.conftest import paper_scene
+from tests.app.test_bad_requests import the_problem
+from tests.solver.scenes import march
+from tests.solver.scenes import paper_scene as solver_scene
+
+TARGET = {"target_error": 0.001}
+KEPT = "On the grid of a motion"
+AFRESH = "Solved from the beginning"
+
+
+def moved(by: float) -> dict[str, Any]:
+    scene = paper_scene(quality=TARGET)
+    scene["primitives"][0]["path"]["displacement"] = [0.0, 0.5 + by, 0.0]
+    return scene
+
+
+def test_a_prediction_goes_on_from_another_stored_or_not(client: TestClient) -> None:
+    for store in ("true", "false"):
+        first = client.post(f"/v1/predictions?store={store}", json=moved(0.0)).json()
+        found = client.post(f"/v1/predictions?like={first['id']}", json=moved(0.01))
+        assert found.status_code == 201, found.text
+        document = found.json()
+        assert KEPT in document["message"]
+        assert document["accuracy"]["n_u"] == first["accuracy"]["n_u"]
+        assert len(document["iterations"]) == 1 < len(first["iterations"])
+        further = client.post(f"/v1/predictions?like={document['id']}&store=false", json=moved(0.02)).json()
+        assert KEPT in further["message"]
+
+
+def test_a_batch_goes_on_from_one(client: TestClient) -> None:
+    first = client.post("/v1/predictions", json=moved(0.0)).json()
+    body = {"scenes": [moved(0.005), moved(0.01)], "like": first["id"]}
+    lines = client.post("/v1/predictions:batch", json=body).text.splitlines()
+    assert all(KEPT in json.loads(line)["result"]["message"] for line in lines)
+    assert len(lines) == 2
+
+
+def test_what_is_forgotten_is_solved_from_the_beginning_and_says_so(client: TestClient) -> None:
+    service: Service = client.app.state.service  # type: ignore[attr-defined]
+    first = client.post("/v1/predictions", json=moved(0.0)).json()
+    service.recent.forget(first["id"])
+    found = client.post(f"/v1/predictions?like={first['id']}", json=moved(0.01)).json()
+    assert found["status"] == "converged"
+    assert f"{AFRESH}: The prediction before is not in memory any more." in found["message"]
+
+
+def test_an_id_that_is_none_is_refused(client: TestClient) -> None:
+    gone = client.post("/v1/predictions", json=moved(0.0)).json()["id"]
+    assert client.delete(f"/v1/predictions/{gone}").status_code == 204
+    for like, status in ((gone, 404), ("0" * 28, 404), ("../../etc", 422), ("x" * 28, 422)):
+        the_problem(client.post("/v1/predictions", params={"like": like}, json=moved(0.0)), status)
+        body = {"scenes": [moved(0.0)], "like": like}
+        the_problem(client.post("/v1/predictions:batch", json=body), status)
+
+
+def test_the_oldest_are_forgotten_when_there_are_too_many() -> None:
+    prediction: Prediction = predict(solver_scene(0.25, quality=march(9, 13)))
+    assert prediction.level is not None
+    room = Recent(most=int(3.9 * prediction.level.motion.states.nbytes))
+    for id in ("a", "b", "c"):
+        room.add(id, prediction)
+    assert room.get("c") is prediction
+    assert room.get("a") is None
+    for _ in range(100):  # one that is added again takes its place only once
+        room.add("c", prediction)
+    assert room.get("b") is prediction
+    room.forget("c")
+    room.forget("c")
+    assert room.get("c") is None

@@ -1,0 +1,189 @@
+"""Predictions like others: on the grid that was found before, with its estimate, or from the beginning and said so."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dlocore import (
+    Environment,
+    Grasp,
+    Move,
+    Prediction,
+    Quality,
+    Scene,
+    SceneError,
+    Sphere,
+    Straight,
+    predict,
+    predict_many,
+)
+from tests.solver.scenes import WEIGHTLESS, apart, cable, march, paper_scene, samples
+from tests.solver.test_two_grippers import hanging
+
+AFRESH = "Solved from the beginning: "
+
+
+def moved(scene: Scene, *way: float) -> Scene:
+    """Return the scene with the last grasp's target moved by a way [m]."""
+    *others, last = scene.grasps
+    assert isinstance(last.path, Move)
+    target = np.asarray(last.path.displacement) + way
+    return replace(scene, grasps=(*others, replace(last, path=replace(last.path, displacement=tuple(target)))))
+
+
+def same(a: Prediction, b: Prediction) -> bool:
+    return np.array_equal(a.surface.control_points, b.surface.control_points)
+
+
+@pytest.fixture(scope="module")
+def paper() -> Prediction:
+    return predict(paper_scene(0.25, quality=march(9, 13, estimate=True)))
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        paper_scene(0.25, quality=march(9, 13, estimate=True)),
+        paper_scene(0.25, quality=Quality(n_u=9, n_t=13, delta=1e-6)),
+        hanging("clamp"),
+        replace(paper_scene(0.5), environment=WEIGHTLESS, quality=march(13, 19, estimate=True)),
+    ],
+    ids=["march", "least squares", "settled, with twist", "in a plane of its own"],
+)
+def test_a_target_moved_a_little_is_solved_on_the_grid_before(scene):
+    before = predict(scene)
+    new = moved(scene, 0.004, 0.008, 0.0)
+    again, fresh = predict(new, like=before), predict(new)
+    assert again.status == "converged", again.message
+    assert AFRESH not in again.message
+    assert (again.accuracy.n_u, again.accuracy.n_t) == (before.accuracy.n_u, before.accuracy.n_t)
+    for name in ("grid", "space", "time"):
+        assert again.accuracy.error_parts.get(name) == before.accuracy.error_parts.get(name)
+    # where the ladder ends on the same grid for both the answers differ by the tolerances of their solves
+    assert fresh.accuracy.n_u == again.accuracy.n_u
+    assert apart(again.surface, fresh.surface).max() < 1e-6
+    assert [g.reaction[-1] for g in again.grasps] == [pytest.approx(g.reaction[-1], abs=1e-5) for g in fresh.grasps]
+
+
+def test_the_least_squares_goes_on_without_a_companion():
+    before = predict(paper_scene(0.25))
+    again = predict(moved(before.scene, 0.0, 0.01, 0.0), like=before)
+    assert again.accuracy.method == "spacetime"
+    assert "estimate" not in again.accuracy.phases
+
+
+def longer(scene: Scene) -> Scene:
+    (g,) = scene.grasps
+    return replace(scene, grasps=(replace(g, path=replace(g.path, duration=1.7)),), horizon=None)
+
+
+DIFFERENT: dict[str, tuple[Any, str]] = {
+    "accuracy": (lambda s: replace(s, quality=march(11, 13)), "accuracy or grid"),
+    "length": (lambda s: replace(s, cable=cable(length=1.1)), "length"),
+    "times": (longer, "other times"),
+    "effects": (lambda s: replace(s, environment=replace(s.environment, drag=0.0)), "effects"),
+    "out of the plane": (lambda s: moved(s, 0.0, 0.0, 0.05), "dimensions"),
+    "far away": (lambda s: moved(s, 0.0, 0.1, 0.0), "mm from the one"),
+    "no march": (lambda s: replace(s, quality=Quality(method="reference", target_error=0.05)), "accuracy or grid"),
+}
+
+
+@pytest.mark.parametrize("name", DIFFERENT)
+def test_what_differs_too_much_is_solved_from_the_beginning_and_says_why(paper, name):
+    change, why = DIFFERENT[name]
+    new = change(paper.scene)
+    again, fresh = predict(new, like=paper), predict(new)
+    said, reason = again.message.split(AFRESH)
+    assert said.strip() == fresh.message
+    assert why in reason
+    assert same(again, fresh)
+    assert again.accuracy.error_parts == fresh.accuracy.error_parts
+
+
+def test_a_prediction_without_a_march_or_without_an_answer_is_no_start(paper):
+    reference = predict(replace(paper.scene, quality=Quality(method="reference", target_error=0.05)))
+    assert "has no march" in predict(paper.scene, like=reference).message
+    pushed = replace(
+        paper.scene,
+        environment=WEIGHTLESS,
+        grasps=(Grasp(u=0.0), Grasp(u=1.0, path=Move(displacement=(-0.3, 0.0, 0.0), duration=1.0))),
+    )
+    torn = predict(pushed)
+    assert torn.status != "converged"
+    assert "did not converge" in predict(pushed, like=torn).message
+
+
+def test_many_small_steps_away_end_in_a_new_estimate(paper):
+    known, scene = paper, paper.scene
+    fresh = 0
+    for _ in range(6):
+        scene = moved(scene, 0.0, 0.01, 0.0)
+        known = predict(scene, like=known)
+        fresh += AFRESH in known.message
+    # the estimate is that of a motion 5 cm away at most, and a target 1 cm away moves the end by 1.3 cm: 3 of 1 cm
+    assert fresh == 1
+    assert known.judged is not paper.level
+
+
+def test_another_start_is_put_on_the_grid_anew(paper):
+    other = replace(paper.scene, shape=Straight(direction=(1.0, 0.02, 0.0)))
+    again, fresh = predict(other, like=paper), predict(other)
+    assert AFRESH not in again.message
+    assert apart(again.surface, fresh.surface).max() < 1e-6
+
+
+def test_another_stiffness_is_taken(paper):
+    other = replace(paper.scene, cable=cable(bending_stiffness=1.1e-3))
+    again, fresh = predict(other, like=paper), predict(other)
+    assert AFRESH not in again.message
+    assert apart(again.surface, fresh.surface).max() < 1e-6
+    assert apart(again.surface, paper.surface).max() > 1e-4
+
+
+def test_an_effect_that_the_new_motion_calls_for_is_simulated():
+    scene = paper_scene(0.25, quality=march(13, 19, estimate=True))
+    u, t = samples(scene)
+    most = predict(scene).surface.curvature(u, t).max()  # [1/m]
+    soft = replace(scene, cable=cable(yield_strain=1.02 * most * 0.0025, memory_rate=10.0))
+    before = predict(soft)
+    again = predict(moved(soft, 0.0, 0.03, 0.0), like=before)
+    yields = [next(r.active for r in p.effects if r.name == "plasticity") for p in (before, again)]
+    assert yields == [False, True]
+    assert "calls for plasticity" in again.message.split(AFRESH)[1]
+
+
+def test_contact_goes_on_from_the_stiffness_and_the_knots_that_it_needed():
+    ball = Sphere(center=(0.2, 0.3, 0.0), radius=0.1)
+    scene = Scene(
+        cable=cable(bending_stiffness=1e-2),
+        shape=Straight(),
+        grasps=(Grasp(u=0.5, path=Move(displacement=(0.0, 0.4, 0.0), duration=1.6)),),
+        environment=Environment(gravity=(0.0, 0.0, 0.0), drag=0.5, obstacles=(ball,)),
+        quality=Quality(target_error=5e-3),
+    )
+    before = predict(scene)
+    assert before.status == "converged"
+    new = moved(scene, 0.0, 0.01, 0.0)
+    again, fresh = predict(new, like=before), predict(new)
+    assert AFRESH not in again.message
+    assert again.accuracy.n_t >= before.accuracy.n_t
+    both = again.accuracy.error_estimate + fresh.accuracy.error_estimate
+    assert apart(again.surface, fresh.surface).max() < both
+
+
+def test_many_go_on_from_one(paper):
+    scenes = [moved(paper.scene, 0.0, 0.002 * i, 0.0) for i in range(6)]
+    found = predict_many(scenes, like=paper, threads=2)
+    for scene, each in zip(scenes, found, strict=True):
+        assert not isinstance(each, SceneError)
+        assert same(each, predict(scene, like=paper))
+
+
+def test_a_bad_scene_is_refused_as_ever(paper):
+    with pytest.raises(SceneError, match="primitives"):
+        predict(
+            replace(paper.scene, grasps=(Grasp(u=0.0), Grasp(u=1.0, path=Move(displacement=(1.0, 0, 0), duration=1)))),
+            like=paper,
+        )
