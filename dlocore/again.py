@@ -15,15 +15,16 @@ from dlocore.paths import Waypoints
 from dlocore.plane import Plane
 from dlocore.prediction import Prediction
 from dlocore.problem import Problem
-from dlocore.refinement import MISSED_COUNTS, march_status
 from dlocore.review import called_for
 from dlocore.scene import Grasp
 from dlocore.solvers.ladder import Level, distance, hardness, run_level
 from dlocore.solvers.march import events_of
 from dlocore.solvers.monitor import Monitor
+from dlocore.whole_march import MISSED_COUNTS, march_status
 
 _NOT_OF_THE_GRID = ("neglected", "iteration")  # parts of an estimate that each solve has of its own
 _ROUNDING = 1e-14  # of the coordinates of a plane that is found from points
+_UNSURE = 10.0  # times the distance, as a part of the length: by so much an estimate grows away from where it was made
 NEAR = 0.05  # of the length: motions that lie closer have errors alike (benchmarks.again)
 
 
@@ -33,12 +34,12 @@ class Again:
 
     Attributes:
         level: the march.
-        judged: the one like it whose error was estimated.
+        judged: the prediction like it whose error was estimated.
         errors: the parts of that estimate [m], None where there is none.
     """
 
     level: Level
-    judged: Level
+    judged: Prediction
     errors: Mapping[str, float] | None
 
     @property
@@ -60,21 +61,21 @@ def march_again(problem: Problem, like: Prediction, monitor: Monitor) -> Again |
     Returns:
         The march, or why the problem has to be solved from the beginning.
     """
-    if like.level is None or like.judged is None:
+    judged, before = like.judged or like, like.level
+    if before is None or judged.level is None:
         return "The prediction before has no march."
-    before = like.level
     objection = _objection(problem, like, before.posed)
     if objection:
         return objection
     grid = before.motion.grid if _starts_alike(problem, before.posed) else None
     free_knots = problem.scene.quality.n_u is None
     level = run_level(
-        problem, *before.size, monitor, rho=before.motion.rho, free_knots=free_knots, hardness=hardness(before),
-        grid=grid, knots_t=before.knots_t,
+        problem, *before.size, monitor, rho=before.motion.rho, free_knots=free_knots,
+        hardness=hardness(judged.level), grid=grid, knots_t=judged.level.knots_t,
     )  # fmt: skip
-    level = replace(level, change=distance(like.judged, level, problem), note="on the grid of a motion like it")
+    level = replace(level, change=distance(judged.level, level, problem), note="on the grid of a motion like it")
     if level.motion.stopped == "time":
-        return Again(level, like.judged, None)
+        return Again(level, judged, None)
     length = problem.scene.cable.length
     status, message = march_status(level.problem, level)
     if status != "converged":
@@ -84,10 +85,15 @@ def march_again(problem: Problem, like: Prediction, monitor: Monitor) -> Again |
     calls = called_for(level)
     if calls:
         return f"It calls for {', '.join(calls)}: {'; '.join(calls.values())}."
-    errors = {name: error for name, error in like.accuracy.error_parts.items() if name not in _NOT_OF_THE_GRID}
+    unsure = 1.0 + _UNSURE * level.change / length
+    parts = judged.accuracy.error_parts.items()
+    errors = {name: unsure * error for name, error in parts if name not in _NOT_OF_THE_GRID}
     if errors and like.accuracy.method == "march":
         errors[list(errors)[-1]] += max(0.0, MISSED_COUNTS * level.missed - sum(errors.values()))
-    return Again(level, like.judged, errors or None)
+    target = problem.scene.quality.target_error
+    if target is not None and sum(errors.values()) > target:
+        return f"Its estimated error of {sum(errors.values()) * 1e3:.2g} mm is above the target."
+    return Again(level, judged, errors or None)
 
 
 def _objection(problem: Problem, like: Prediction, before: Problem) -> str:

@@ -15,7 +15,7 @@ from dlocore.frames import material_of
 from dlocore.prediction import Accuracy, MaterialMotion, OnIteration, Prediction, Status
 from dlocore.problem import Problem, pose
 from dlocore.progress import record, record_level, surface_at
-from dlocore.refinement import MISSED_COUNTS, TORN, Outcome, climb, march_level, march_status
+from dlocore.refinement import climb
 from dlocore.report import WindowForces, effect_reports, elastic_energy, reactions
 from dlocore.review import neglected, objections
 from dlocore.scene import Method, Quality, Scene
@@ -25,6 +25,7 @@ from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.paper import solve_as_printed
 from dlocore.solvers.spacetime import solve
 from dlocore.spline import uniform_knots
+from dlocore.whole_march import MISSED_COUNTS, TORN, Outcome, march_level, march_status
 
 Floats = NDArray[np.float64]
 
@@ -233,7 +234,7 @@ def _answer(
     method: str,
     outcome: Outcome,
     forces: tuple[WindowForces, ...] | None = None,
-    judged: Level | None = None,
+    judged: Prediction | None = None,
 ) -> Prediction:
     level = outcome.level
     problem = level.problem
@@ -271,7 +272,7 @@ def _answer(
         start_energy=elastic_energy(problem, grid, grid.start, grid.history),
         start_fit=problem.start.fit_rms,
         level=level,
-        judged=judged or level,
+        judged=judged,
     )
 
 

@@ -182,7 +182,7 @@ class Prediction:
         start_energy: elastic energy stored in the start shape [J].
         start_fit: root mean square distance of the start from the given points [m]; 0 where it was given exactly.
         level: the march behind it, on whose grid another may go on (`predict(..., like=...)`); None of a reference.
-        judged: the march whose error was estimated: `level`, or one like it.
+        judged: the prediction like it whose error estimate it took on; None where its own error was estimated.
     """
 
     scene: Scene
@@ -197,7 +197,7 @@ class Prediction:
     report_effects: Callable[[SplineSurface], tuple[EffectReport, ...]] = field(repr=False)
     report_material: Callable[[], MaterialMotion | None] = field(repr=False)
     level: "Level | None" = field(default=None, repr=False)
-    judged: "Level | None" = field(default=None, repr=False)
+    judged: "Prediction | None" = field(default=None, repr=False)
 
     @cached_property
     def grasps(self) -> tuple[GraspReaction, ...]:

@@ -1,20 +1,14 @@
 """Marches refined until two of them agree: the whole grid first, then the direction that still errs."""
 
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from dlocore.budget import first_level, growth
 from dlocore.cost import Cost
-from dlocore.discretisation import smallest_n_u
 from dlocore.errors import SceneError
-from dlocore.kernels.assembly import slopes
-from dlocore.prediction import Status
-from dlocore.problem import Problem, pose
+from dlocore.problem import Problem
 from dlocore.progress import record_level
-from dlocore.review import called_for
 from dlocore.scene import Quality
 from dlocore.solvers.ladder import (
     ACCEPT,
@@ -24,24 +18,18 @@ from dlocore.solvers.ladder import (
     Size,
     distance,
     extrapolated,
-    hardness,
-    run_level,
     stretched,
 )
-from dlocore.solvers.march import RHO, STRONGLY_DAMPED, smallest_n_t
+from dlocore.solvers.march import RHO, STRONGLY_DAMPED
 from dlocore.solvers.monitor import Monitor, TimeIsUp
+from dlocore.whole_march import MISSED_COUNTS, Outcome, is_folded, march_level, march_status
 
 AUTO_TARGET = 2e-3  # of the length: the error that quality "auto" aims at
 AUTO_ENOUGH = 1e-2  # of the length: the estimated error with which it is content where the finest grids reach no closer
 ROUGH = 0.05  # of the length: two grids that differ more are in no order yet: the next is marched with strong damping
-TOO_DEEP = 0.25  # of the diameter, in the table, an obstacle or itself
-TORN = 0.2  # axial strain: no cable of this kind follows
-FOLDED = 0.4  # of |r'| between the points that watch over the length: less is a fold that no energy sees
-_LOOKS = 12  # states of a motion that are searched for folds
 MOST_WORK = 4e6  # control points times steps of one march in the plane; each coordinate more costs twice the time
 CONTACT_COSTS = 2  # times as much work counts with contact, which takes more of the time of a step
 AUTO_SHARE = 0.25  # of it for who asked for no target
-MISSED_COUNTS = 3.0  # what the time spline misses of its march, times this, is the least that the error may be
 _MOST_POINTS = 220  # along the cable
 _FINER = {"space": 1.5, "time": 2.0}
 _FINE_IN_TIME = 0.3  # of the target: a time spline that misses its march by less keeps its knots as the steps halve
@@ -53,50 +41,6 @@ _FAILURES = 2  # refinements in time of a march that found no equilibrium
 
 # by direction, "space", "time" or "both": how far its two last refinements moved the surface [m]
 Changes = dict[str, tuple[float, float]]
-
-
-class Outcome(NamedTuple):
-    """A level of refinement, what to say of it, and the parts of its estimated error [m], or None."""
-
-    level: Level
-    status: Status
-    message: str
-    errors: Mapping[str, float] | None
-
-
-def march_level(
-    problem: Problem,
-    size: Size,
-    monitor: Monitor,
-    rho: float = RHO,
-    free_knots: bool = False,
-    rough: bool = False,
-    known: Level | None = None,
-    before: Level | None = None,
-) -> Level:
-    """March on one grid; where the motion calls for effects that were left out, again with them.
-
-    On a `rough` grid, which another follows, strands that meet may do so because of the grid: it is left open. A march
-    of this grid that is `known` is done again only for what was left open. Contact begins as stiff as the level
-    `before` had to make it.
-    """
-    called = dict(problem.called_for)
-    while True:
-        if free_knots:
-            size = Size(max(size.n_u, smallest_n_u(problem)), max(size.n_t, smallest_n_t(problem)), size.steps)
-        stiffness = 1.0 if before is None or before.posed is not problem else hardness(before)
-        level = known or run_level(problem, *size, monitor, rho=rho, free_knots=free_knots, hardness=stiffness)
-        if known is not None:
-            new, known = dict(known.left_open), None
-        else:
-            new = {} if level.motion.stopped == "time" else called_for(level)
-        if rough and "self_contact" in new:
-            level = replace(level, left_open={"self_contact": new.pop("self_contact")})
-        if not new:
-            return level
-        record_level(problem, replace(level, note=f"calls for {', '.join(new)}"), monitor)
-        called |= new
-        problem = pose(problem.scene, called)
 
 
 def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | None = None) -> Outcome:
@@ -114,109 +58,208 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
     tries reach no closer, an estimate of AUTO_ENOUGH is success; the message says how far the grids agree.
     """
     length = problem.scene.cable.length
-    target = quality.target_error or AUTO_TARGET * length
-    enough = quality.target_error or AUTO_ENOUGH * length
-    most_work = MOST_WORK * (AUTO_SHARE if quality.target_error is None else 1.0)
-    budget = quality.time_budget or np.inf
+    return _Climb(
+        problem=problem,
+        monitor=monitor,
+        cost=cost,
+        target=quality.target_error or AUTO_TARGET * length,
+        enough=quality.target_error or AUTO_ENOUGH * length,
+        most_work=MOST_WORK * (AUTO_SHARE if quality.target_error is None else 1.0),
+        budget=quality.time_budget or np.inf,
+        number=0 if quality.time_budget is None else first_level(problem, cost, quality.time_budget),
+    ).outcome()
+
+
+@dataclass(kw_only=True)
+class _Climb:
+    """One climb, and how far it has come.
+
+    Attributes:
+        problem: what is solved now; motions may call for more effects.
+        monitor: that of the solve.
+        cost: what solves cost on this machine, where it is known.
+        target: error that is aimed at [m].
+        enough: estimated error that is success where no finer grid is left [m].
+        most_work: of one march, see MOST_WORK.
+        budget: time allowed [s], infinite where none was given.
+        number: of the grids that refine space and time together, this one included.
+        direction: in which the grid at hand is finer than the best one: "both", "space" or "time".
+        best: the finest march so far that is to be believed.
+        changes: how far refinements moved the surface.
+        estimate: error of the best one [m].
+        rho: spectral radius of the next march.
+        failures: marches in a row that found less than the best one.
+    """
+
+    problem: Problem
+    monitor: Monitor
+    cost: Cost | None
+    target: float
+    enough: float
+    most_work: float
+    budget: float
+    number: int
+    direction: str = "both"
     best: Level | None = None
-    estimate = np.inf
-    rho = RHO
-    number = 0 if quality.time_budget is None else first_level(problem, cost, quality.time_budget)
-    size: Size | None = stretched(problem, number)
-    direction = "both"
-    changes: Changes = {}
-    failures = 0  # in a row
-    while size is not None:
-        began = monitor.elapsed()
-        try:
-            if best is not None:
-                monitor.check()
-            level = march_level(problem, size, monitor, rho, free_knots=True, rough=True, before=best)
-            if best is not None and level.posed is problem:
-                level = replace(level, change=distance(best, level, problem))
-                if level.change <= ROUGH * length:  # so strands do not meet because of the grid
-                    level = march_level(problem, size, monitor, rho, free_knots=True, known=level)
-            if level.posed is not problem:
-                best, changes, estimate = None, {}, np.inf  # another motion: the grid before says nothing about it
-            problem = level.posed  # a rough grid may have needed contact that is too stiff for a fine one
-        except TimeIsUp:
-            break
-        except SceneError:  # a start that finds no rest on few control points may do so on more
-            number += 1
-            if best is not None or number == len(LEVELS):
-                raise
-            size = stretched(problem, number)
-            continue
-        if best is not None:
-            if _is_worse(level, best):
-                failures += 1
-                more = _affordable(_finer(size, "space" if _is_folded(best) else "time", True), problem, most_work)
-                if failures <= _FAILURES and level.motion.stopped != "time" and quality.time_budget is None and more:
-                    record_level(problem, level, monitor)
+    changes: Changes = field(default_factory=dict)
+    estimate: float = np.inf
+    rho: float = RHO
+    failures: int = 0
+
+    def outcome(self) -> Outcome:
+        """March until an answer is found, and return it."""
+        size: Size | None = stretched(self.problem, self.number)
+        while size is not None:
+            began = self.monitor.elapsed()
+            try:
+                level = self._march(size)
+            except TimeIsUp:
+                break
+            except SceneError:  # a start that finds no rest on few control points may do so on more
+                self.number += 1
+                if self.best is not None or self.number == len(LEVELS):
+                    raise
+                size = stretched(self.problem, self.number)
+                continue
+            if self.best is not None:
+                more = self._after_failure(level, self.best, size)
+                if more is not None:
+                    record_level(self.problem, level, self.monitor)
                     size = more
                     continue
-            if level.motion.stopped and not best.motion.stopped:
-                if estimate <= enough:
-                    break
-                status, message = march_status(problem, level)
-                errors = _parts(changes, best) or ({"grid": best.change} if np.isfinite(best.change) else None)
-                return Outcome(best, status, f"A finer grid was not finished: {message}", errors)
-            changes[direction] = _as_by_half(level, best), changes.get(direction, (np.inf, np.inf))[0]
-            estimate = max(_error(changes), MISSED_COUNTS * level.missed)
-            rough = level.change > ROUGH * length
-            if rough or number < len(LEVELS):  # later on two marches would differ by their damping
-                rho = STRONGLY_DAMPED if rough else RHO
-        record_level(problem, level, monitor)
-        best, failures = level, 0
-        status, message = march_status(problem, level)
+                if level.motion.stopped and not self.best.motion.stopped:
+                    return self._unfinished(level, self.best)
+                self._weigh(level, self.best)
+            record_level(self.problem, level, self.monitor)
+            self.best, self.failures = level, 0
+            status, message = march_status(self.problem, level)
+            if level.motion.stopped == "time":
+                return Outcome(level, status, message, None)
+            unfolds = self._affordable(_finer(size, "space", False)) if is_folded(level) else None
+            if self.estimate <= ACCEPT * self.target and self.budget == np.inf and unfolds is None:
+                agreed = self._agreed(level) if status == "converged" else message
+                return Outcome(level, status, agreed, _parts(self.changes, level))
+            finer = self._next(level, size, unfolds)
+            if finer is not None and not self._in_time(size, finer, self.monitor.elapsed() - began):
+                return self._within_budget(level)
+            size = finer
+        return self._ended()
+
+    def _march(self, size: Size) -> Level:
+        """March on the next grid; where its motion calls for another effect, forget the grids before."""
+        before = self.best
+        if before is not None:
+            self.monitor.check()
+        level = march_level(self.problem, size, self.monitor, self.rho, free_knots=True, rough=True, before=before)
+        if before is not None and level.posed is self.problem:
+            level = replace(level, change=distance(before, level, self.problem))
+            if not self._is_rough(level):  # so strands do not meet because of the grid
+                level = march_level(self.problem, size, self.monitor, self.rho, free_knots=True, known=level)
+        if level.posed is not self.problem:
+            self.best, self.changes, self.estimate = None, {}, np.inf  # another motion
+        self.problem = level.posed  # a rough grid may have needed contact that is too stiff for a fine one
+        return level
+
+    def _is_rough(self, level: Level) -> bool:
+        return not level.change <= ROUGH * self.problem.scene.cable.length
+
+    def _after_failure(self, level: Level, best: Level, size: Size) -> Size | None:
+        """Return the size to try where a finer grid failed, None where it did not, or was tried often enough."""
+        if not _is_worse(level, best):
+            return None
+        self.failures += 1
+        if self.failures > _FAILURES or level.motion.stopped == "time" or self.budget < np.inf:
+            return None
+        return self._affordable(_finer(size, "space" if is_folded(best) else "time", True))
+
+    def _weigh(self, level: Level, best: Level) -> None:
+        """Note how far a level moved the surface, what error that points to, and how to damp the next march."""
+        before = self.changes.get(self.direction, (np.inf, np.inf))[0]
+        self.changes[self.direction] = _as_by_half(level, best), before
+        self.estimate = max(_error(self.changes), MISSED_COUNTS * level.missed)
+        rough = self._is_rough(level)
+        if rough or self.number < len(LEVELS):  # later on two marches would differ by their damping
+            self.rho = STRONGLY_DAMPED if rough else RHO
+
+    def _next(self, level: Level, size: Size, unfolds: Size | None) -> Size | None:
+        """Return the next size, None where no finer grid is worth its time; `unfolds` is for a motion that folds."""
+        self.number += 1
+        if self.number < len(LEVELS):
+            finer = stretched(self.problem, self.number)  # more may have been needed
+            return finer._replace(n_u=max(finer.n_u, size.n_u), steps=max(finer.steps, size.steps))
+        if unfolds is not None:
+            self.direction = "space"
+            if "both" in self.changes:
+                self.changes.setdefault(
+                    "time", self.changes["both"]
+                )  # of space, grids that agree on a fold tell nothing
+            return unfolds
+        trembles = MISSED_COUNTS * level.missed > _FINE_IN_TIME * self.target
+        sizes = {direction: self._affordable(_finer(size, direction, trembles)) for direction in _FINER}
+        self.direction = "time" if MISSED_COUNTS * level.missed > _error(self.changes) else _worst(self.changes)
+        moved_by = self.changes.get(self.direction, (0.0, 0.0))
+        if sizes[self.direction] is None and extrapolated(*moved_by) < self.target:
+            # may still bring the sum of both below it
+            self.direction = next(direction for direction in _FINER if direction != self.direction)
+        hope = _AT_BEST ** self._left(sizes[self.direction])
+        return None if hope * moved_by[0] > self.enough else sizes[self.direction]
+
+    def _affordable(self, size: Size) -> Size | None:
+        """Return a size, or None where a march of it takes too long."""
+        touches = self.problem.contact is not None or self.problem.self_contact is not None
+        work = size.n_u * size.steps * 2 ** (self.problem.nc - 2) * (CONTACT_COSTS if touches else 1)
+        return size if size.n_u <= _MOST_POINTS and work <= self.most_work else None
+
+    def _left(self, size: Size | None) -> int:
+        """Return how many refinements in the direction are left, from a size on."""
+        count = 0
+        while size is not None:
+            count += 1
+            size = self._affordable(_finer(size, self.direction, False))
+        return count
+
+    def _in_time(self, size: Size, finer: Size, spent: float) -> bool:
+        """Tell whether the next grid is done within the budget, if one of `size` took a time `spent` [s]."""
+        return not growth(self.problem, self.cost, size, finer) * spent > self.budget - self.monitor.elapsed()
+
+    def _agreed(self, level: Level) -> str:
+        return f"Two grids agree to {level.change * 1e3:.2g} mm, target {self.target * 1e3:.2g} mm."
+
+    def _within_budget(self, level: Level) -> Outcome:
+        """Return the best that the budget allows."""
+        if not np.isfinite(level.change):
+            return Outcome(level, "time_limit", f"{self.budget * 1e3:.3g} ms allow one grid, unchecked.", None)
         moved = f"the last refinement moved the surface by {level.change * 1e3:.2g} mm"
-        if level.motion.stopped == "time":
-            return Outcome(level, status, message, None)
-        folded = _is_folded(level)
-        unfolds = _affordable(_finer(size, "space", False), problem, most_work) if folded else None
-        if estimate <= ACCEPT * target and quality.time_budget is None and unfolds is None:
-            agreed = f"Two grids agree to {level.change * 1e3:.2g} mm, target {target * 1e3:.2g} mm."
-            return Outcome(level, status, agreed if status == "converged" else message, _parts(changes, level))
-        number += 1
-        next_size: Size | None
-        if number < len(LEVELS):
-            next_size = stretched(problem, number)
-            # more may have been needed
-            next_size = next_size._replace(n_u=max(next_size.n_u, size.n_u), steps=max(next_size.steps, size.steps))
-        elif unfolds is not None:
-            direction, next_size = "space", unfolds
-            if "both" in changes:
-                changes.setdefault("time", changes["both"])  # of space, grids that agree on a fold tell nothing
-        else:
-            trembles = MISSED_COUNTS * level.missed > _FINE_IN_TIME * target
-            finer = {d: _affordable(_finer(size, d, trembles), problem, most_work) for d in _FINER}
-            direction = "time" if MISSED_COUNTS * level.missed > _error(changes) else _worst(changes)
-            moved_by = changes.get(direction, (0.0, 0.0))
-            if finer[direction] is None and extrapolated(*moved_by) < target:
-                direction = next(d for d in _FINER if d != direction)  # may still bring the sum of both below it
-            next_size = finer[direction]
-            hope = _AT_BEST ** _left(next_size, direction, problem, most_work)
-            if next_size is not None and hope * moved_by[0] > enough:
-                next_size = None
-        spent = monitor.elapsed() - began
-        if next_size is not None and growth(problem, cost, size, next_size) * spent > budget - monitor.elapsed():
-            if not np.isfinite(level.change):
-                return Outcome(level, "time_limit", f"{budget * 1e3:.3g} ms allow one grid, unchecked.", None)
-            return Outcome(level, status, f"The best grid in {budget * 1e3:.3g} ms; {moved}.", _parts(changes, level))
-        size = next_size
-    assert best is not None
-    status, message = march_status(problem, best)
-    moved = f"the last refinement moved the surface by {best.change * 1e3:.3g} mm, target {target * 1e3:.3g} mm"
-    advice = "Allow a larger target_error, more time or a shorter motion."
-    if status == "converged" and estimate <= enough:
-        message = f"Two grids agree to {best.change * 1e3:.2g} mm, target {target * 1e3:.2g} mm."
-        if estimate > target:
-            message += f" No finer grid was tried; the estimated error of {estimate * 1e3:.2g} mm is above the target."
-    elif status == "converged" and monitor.remaining() <= 0:
-        status, message = "time_limit", f"The time limit passed; {moved}. {advice}"
-    elif status == "converged":
-        status, message = "max_iterations", f"No finer grid; {moved}. {advice}"
-    return Outcome(best, status, message, _parts(changes, best))
+        message = f"The best grid in {self.budget * 1e3:.3g} ms; {moved}."
+        return Outcome(level, march_status(self.problem, level)[0], message, _parts(self.changes, level))
+
+    def _unfinished(self, level: Level, best: Level) -> Outcome:
+        """Return the best one, where a finer grid was not finished."""
+        if self.estimate <= self.enough:
+            return self._ended()
+        status, message = march_status(self.problem, level)
+        errors = _parts(self.changes, best) or ({"grid": best.change} if np.isfinite(best.change) else None)
+        return Outcome(best, status, f"A finer grid was not finished: {message}", errors)
+
+    def _ended(self) -> Outcome:
+        """Return the best one, where no finer grid is to be tried or the time is up."""
+        best = self.best
+        assert best is not None
+        status, message = march_status(self.problem, best)
+        moved = (
+            f"the last refinement moved the surface by {best.change * 1e3:.3g} mm, target {self.target * 1e3:.3g} mm"
+        )
+        advice = "Allow a larger target_error, more time or a shorter motion."
+        if status == "converged" and self.estimate <= self.enough:
+            message = self._agreed(best)
+            if self.estimate > self.target:
+                above = f"the estimated error of {self.estimate * 1e3:.2g} mm is above the target."
+                message += f" No finer grid was tried; {above}"
+        elif status == "converged" and self.monitor.remaining() <= 0:
+            status, message = "time_limit", f"The time limit passed; {moved}. {advice}"
+        elif status == "converged":
+            status, message = "max_iterations", f"No finer grid; {moved}. {advice}"
+        return Outcome(best, status, message, _parts(self.changes, best))
 
 
 def _is_worse(level: Level, best: Level) -> bool:
@@ -251,22 +294,6 @@ def _finer(size: Size, direction: str, trembles: bool) -> Size:
     return size._replace(n_t=round(ratio * size.n_t) if trembles else size.n_t, steps=round(ratio * size.steps))
 
 
-def _affordable(size: Size, problem: Problem, most_work: float) -> Size | None:
-    """Return a size, or None where a march of it takes too long."""
-    touches = problem.contact is not None or problem.self_contact is not None
-    work = size.n_u * size.steps * 2 ** (problem.nc - 2) * (CONTACT_COSTS if touches else 1)
-    return size if size.n_u <= _MOST_POINTS and work <= most_work else None
-
-
-def _left(size: Size | None, direction: str, problem: Problem, most_work: float) -> int:
-    """Return how many refinements in a direction are left, from a size on."""
-    count = 0
-    while size is not None:
-        count += 1
-        size = _affordable(_finer(size, direction, False), problem, most_work)
-    return count
-
-
 def _worst(changes: Changes) -> str:
     """Return the direction to refine: time, then space, then that which erred more."""
     unknown = [direction for direction in ("time", "space") if direction not in changes]
@@ -291,45 +318,3 @@ def _parts(changes: Changes, level: Level) -> dict[str, float] | None:
         last = list(parts)[-1]
         parts[last] += unseen
     return parts
-
-
-def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
-    """Return the status of a march, and what it says, in words."""
-    motion = level.motion
-    if not motion.stopped and motion.largest_strain > TORN:
-        strain = f"The motion strains the cable along itself by {motion.largest_strain:.0%}, which no cable follows."
-        advice = "Bring the grasps no farther apart than the cable between them, or make the motion slower."
-        push = "A straight cable pushed along itself has no side to buckle to: start it slightly bent."
-        return "stalled", f"{strain} {advice} {push}"
-    if _is_folded(level):
-        least, most = _slopes(level)
-        seen = f"|r'| is {least:.2g} to {most:.2g} within a span"
-        return "stalled", f"The cable is folded finer than its control points can show: {seen}. Take more of them."
-    deep = motion.deepest / problem.scene.cable.diameter
-    if not motion.stopped and deep > TOO_DEEP:
-        pushed = f"The cable is pressed {deep:.0%} of its diameter into the table, an obstacle or itself."
-        return "stalled", f"{pushed} Take finer grids, or a motion that does not jam it."
-    if not motion.stopped:
-        split = f", {motion.split} of them in smaller steps" if motion.split else ""
-        return "converged", f"Every time step found its equilibrium{split}."
-    reached = motion.times[motion.reached]
-    rest = f"The surface stands still after {reached:.4g} s of {problem.horizon:.4g} s."
-    if motion.stopped == "time":
-        return "time_limit", f"The time limit passed. {rest} Allow more time or a coarser grid."
-    return (
-        "stalled",
-        f"A time step found no equilibrium. {rest} Allow more control points, or a slower or smoother motion.",
-    )
-
-
-def _is_folded(level: Level) -> bool:
-    """Tell whether a whole motion folds the cable within a span: grids may agree on that, and it is none of a cable."""
-    least, most = _slopes(level)
-    return not level.motion.stopped and not (least >= FOLDED and most <= 2.0 - FOLDED)
-
-
-def _slopes(level: Level) -> tuple[float, float]:
-    """Return the smallest and the largest |r'| at the curvature points of some states of a motion."""
-    tables, states = level.motion.grid.tables, level.motion.states
-    least, largest = slopes(states, max(1, len(states) // _LOOKS), tables.curvature_first, tables.curvature_b1)
-    return float(least), float(largest)

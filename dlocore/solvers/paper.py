@@ -102,7 +102,7 @@ def _equations(
     n_t, n_u, nc = control.shape
     size, free = n_u * nc, window.free
     K, dense = np.empty((size, 4 * nc)), np.empty((size, size))
-    unit, density, dragged = window.unit_mass, window.problem.mass_density(), window.problem.drag_coefficient()
+    unit, density, dragged = window.grid.tables.mass, window.problem.mass_density(), window.problem.drag_coefficient()
     M, N = (_dense_band(factor * unit, nc) for factor in (density, dragged))
     f, state = np.empty((n_u, nc)), np.empty((3, n_u, nc))
     J = np.zeros((len(first) * free, (n_t - 2) * free))

@@ -106,7 +106,6 @@ class WindowSolver:
         self.span = (window.end - window.begin) / len(spans)
         self.active, self.parameters = problem.law_table()
         self.parameters[0, 0] = axial_stiffness
-        self.unit_mass = grid.tables.mass
         self.applied = applied_forces(problem, grid, self.times)
         fine = np.linspace(window.begin, window.end, 6 * len(spans) + 1)
         self.histories = motion.behind(self.times)
@@ -141,7 +140,7 @@ class WindowSolver:
         for begin in range(0, len(self.times), points):
             self.monitor.check()
             value += normal_equations(
-                self.axes, control, self.first, self.table, self.weights, self.span, self.unit_mass,
+                self.axes, control, self.first, self.table, self.weights, self.span, self.grid.tables.mass,
                 self.problem.mass_density(), self.problem.drag_coefficient(), self.grid.tables, self.active,
                 self.parameters, self.histories, self.applied, self.held.elimination, A, right, forces, tangent, begin,
                 min(begin + points, len(self.times)),

@@ -1,0 +1,107 @@
+"""One march that has all the effects its motion calls for, and what is to be said of it."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+from dlocore.discretisation import smallest_n_u
+from dlocore.kernels.assembly import slopes
+from dlocore.prediction import Status
+from dlocore.problem import Problem, pose
+from dlocore.progress import record_level
+from dlocore.review import called_for
+from dlocore.solvers.ladder import Level, Size, hardness, run_level
+from dlocore.solvers.march import RHO, smallest_n_t
+from dlocore.solvers.monitor import Monitor
+
+TOO_DEEP = 0.25  # of the diameter, in the table, an obstacle or itself
+TORN = 0.2  # axial strain: no cable of this kind follows
+FOLDED = 0.4  # of |r'| between the points that watch over the length: less is a fold that no energy sees
+_LOOKS = 12  # states of a motion that are searched for folds
+MISSED_COUNTS = 3.0  # what the time spline misses of its march, times this, is the least that the error may be
+
+
+class Outcome(NamedTuple):
+    """A level of refinement, what to say of it, and the parts of its estimated error [m], or None."""
+
+    level: Level
+    status: Status
+    message: str
+    errors: Mapping[str, float] | None
+
+
+def march_level(
+    problem: Problem,
+    size: Size,
+    monitor: Monitor,
+    rho: float = RHO,
+    free_knots: bool = False,
+    rough: bool = False,
+    known: Level | None = None,
+    before: Level | None = None,
+) -> Level:
+    """March on one grid; where the motion calls for effects that were left out, again with them.
+
+    On a `rough` grid, which another follows, strands that meet may do so because of the grid: it is left open. A march
+    of this grid that is `known` is done again only for what was left open. Contact begins as stiff as the level
+    `before` had to make it.
+    """
+    called = dict(problem.called_for)
+    while True:
+        if free_knots:
+            size = Size(max(size.n_u, smallest_n_u(problem)), max(size.n_t, smallest_n_t(problem)), size.steps)
+        stiffness = 1.0 if before is None or before.posed is not problem else hardness(before)
+        level = known or run_level(problem, *size, monitor, rho=rho, free_knots=free_knots, hardness=stiffness)
+        if known is not None:
+            new, known = dict(known.left_open), None
+        else:
+            new = {} if level.motion.stopped == "time" else called_for(level)
+        if rough and "self_contact" in new:
+            level = replace(level, left_open={"self_contact": new.pop("self_contact")})
+        if not new:
+            return level
+        record_level(problem, replace(level, note=f"calls for {', '.join(new)}"), monitor)
+        called |= new
+        problem = pose(problem.scene, called)
+
+
+def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
+    """Return the status of a march, and what it says, in words."""
+    motion = level.motion
+    if not motion.stopped and motion.largest_strain > TORN:
+        strain = f"The motion strains the cable along itself by {motion.largest_strain:.0%}, which no cable follows."
+        advice = "Bring the grasps no farther apart than the cable between them, or make the motion slower."
+        push = "A straight cable pushed along itself has no side to buckle to: start it slightly bent."
+        return "stalled", f"{strain} {advice} {push}"
+    if is_folded(level):
+        least, most = _slopes(level)
+        seen = f"|r'| is {least:.2g} to {most:.2g} within a span"
+        return "stalled", f"The cable is folded finer than its control points can show: {seen}. Take more of them."
+    deep = motion.deepest / problem.scene.cable.diameter
+    if not motion.stopped and deep > TOO_DEEP:
+        pushed = f"The cable is pressed {deep:.0%} of its diameter into the table, an obstacle or itself."
+        return "stalled", f"{pushed} Take finer grids, or a motion that does not jam it."
+    if not motion.stopped:
+        split = f", {motion.split} of them in smaller steps" if motion.split else ""
+        return "converged", f"Every time step found its equilibrium{split}."
+    reached = motion.times[motion.reached]
+    rest = f"The surface stands still after {reached:.4g} s of {problem.horizon:.4g} s."
+    if motion.stopped == "time":
+        return "time_limit", f"The time limit passed. {rest} Allow more time or a coarser grid."
+    return (
+        "stalled",
+        f"A time step found no equilibrium. {rest} Allow more control points, or a slower or smoother motion.",
+    )
+
+
+def is_folded(level: Level) -> bool:
+    """Tell whether a whole motion folds the cable within a span: grids may agree on that, and it is none of a cable."""
+    least, most = _slopes(level)
+    return not level.motion.stopped and not (least >= FOLDED and most <= 2.0 - FOLDED)
+
+
+def _slopes(level: Level) -> tuple[float, float]:
+    """Return the smallest and the largest |r'| at the curvature points of some states of a motion."""
+    tables, states = level.motion.grid.tables, level.motion.states
+    least, largest = slopes(states, max(1, len(states) // _LOOKS), tables.curvature_first, tables.curvature_b1)
+    return float(least), float(largest)
