@@ -73,21 +73,21 @@ def march_again(problem: Problem, like: Prediction, monitor: Monitor) -> Again |
         problem, *before.size, monitor, rho=before.motion.rho, free_knots=free_knots,
         hardness=hardness(judged.level), grid=grid, knots_t=judged.level.knots_t,
     )  # fmt: skip
-    level = replace(level, change=distance(judged.level, level, problem), note="on the grid of a motion like it")
+    parts = {n: error for n, error in judged.accuracy.error_parts.items() if n not in _NOT_OF_THE_GRID}
+    change = distance(judged.level, level, problem) if parts else np.inf
+    level = replace(level, change=change, note="on the grid of a motion like it")
     if level.motion.stopped == "time":
         return Again(level, judged, None)
     length = problem.scene.cable.length
     status, message = march_status(level.problem, level)
     if status != "converged":
         return message
-    if not level.change <= NEAR * length:
-        return f"The motion is {level.change * 1e3:.2g} mm from the one whose error was estimated."
+    if parts and not change <= NEAR * length:
+        return f"The motion is {change * 1e3:.2g} mm from the one whose error was estimated."
     calls = called_for(level)
     if calls:
         return f"It calls for {', '.join(calls)}: {'; '.join(calls.values())}."
-    unsure = 1.0 + _UNSURE * level.change / length
-    parts = judged.accuracy.error_parts.items()
-    errors = {name: unsure * error for name, error in parts if name not in _NOT_OF_THE_GRID}
+    errors = {name: (1.0 + _UNSURE * change / length) * error for name, error in parts.items()}
     if errors and like.accuracy.method == "march":
         errors[list(errors)[-1]] += max(0.0, MISSED_COUNTS * level.missed - sum(errors.values()))
     target = problem.scene.quality.target_error
