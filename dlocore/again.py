@@ -24,7 +24,6 @@ from dlocore.whole_march import MISSED_COUNTS, march_status
 
 _NOT_OF_THE_GRID = ("neglected", "iteration")  # parts of an estimate that each solve has of its own
 _ROUNDING = 1e-14  # of the coordinates of a plane that is found from points
-_UNSURE = 10.0  # times the distance, as a part of the length: by so much an estimate grows away from where it was made
 NEAR = 0.05  # of the length: motions that lie closer have errors alike (benchmarks.again)
 
 
@@ -73,8 +72,8 @@ def march_again(problem: Problem, like: Prediction, monitor: Monitor) -> Again |
         problem, *before.size, monitor, rho=before.motion.rho, free_knots=free_knots,
         hardness=hardness(judged.level), grid=grid, knots_t=judged.level.knots_t,
     )  # fmt: skip
-    parts = {n: error for n, error in judged.accuracy.error_parts.items() if n not in _NOT_OF_THE_GRID}
-    change = distance(judged.level, level, problem) if parts else np.inf
+    errors = {n: error for n, error in judged.accuracy.error_parts.items() if n not in _NOT_OF_THE_GRID}
+    change = distance(judged.level, level, problem) if errors else np.inf
     level = replace(level, change=change, note="on the grid of a motion like it")
     if level.motion.stopped == "time":
         return Again(level, judged, None)
@@ -82,12 +81,11 @@ def march_again(problem: Problem, like: Prediction, monitor: Monitor) -> Again |
     status, message = march_status(level.problem, level)
     if status != "converged":
         return message
-    if parts and not change <= NEAR * length:
+    if errors and not change <= NEAR * length:
         return f"The motion is {change * 1e3:.2g} mm from the one whose error was estimated."
     calls = called_for(level)
     if calls:
         return f"It calls for {', '.join(calls)}: {'; '.join(calls.values())}."
-    errors = {name: (1.0 + _UNSURE * change / length) * error for name, error in parts.items()}
     if errors and like.accuracy.method == "march":
         errors[list(errors)[-1]] += max(0.0, MISSED_COUNTS * level.missed - sum(errors.values()))
     target = problem.scene.quality.target_error

@@ -66,16 +66,6 @@ def _products(X: Any, Y: Any, symmetric: bool, out: Any) -> None:
 
 
 @kernel
-def _transposed_times(X: Any, y: Any, out: Any) -> None:
-    """Write X' y (m,) for y (n,)."""
-    out[:] = 0.0
-    for i in range(X.shape[0]):
-        s = y[i]
-        for c in range(X.shape[1]):
-            out[c] += s * X[i, c]
-
-
-@kernel
 def states_at(first: Any, table: Any, C: Any, out: Any) -> None:
     """Write q, v and a (3, n, nc) of the control points C (n_t, n, nc) with basis `table` (3, 4) from `first`."""
     out[:] = 0.0
@@ -91,7 +81,7 @@ def states_at(first: Any, table: Any, C: Any, out: Any) -> None:
 def normal_equations(
     axes: Any, C: Any, first: Any, table: Any, weights: Any, h: float, unit: Any, density: float, dragged: float,
     tables: Any, active: Any, p: Any, histories: Any, applied: Any, e: Any, A: Any, right: Any, forces: Any,
-    tangent: bool, begin: int, end: int,
+    matrix: bool, begin: int, end: int,
 ) -> float:  # fmt: skip
     """Add points to the normal equations of the weighted least squares at C; return their part of the objective [J].
 
@@ -100,7 +90,7 @@ def normal_equations(
 
     Masses and linear drag are parts of B, and K+ = G - B - 2/h N, so that by the control point with basis function c
     G^-1 dR = c I + d S + e V, with S = G^-1 B, V = G^-1 N and numbers d, e. The products of three matrices serve all
-    pairs of control points, and B S and S' B S are symmetric.
+    pairs of control points, and B S and S' B S are symmetric. The right side alone takes none: S' y = B G^-1 y.
 
     Args:
         axes: (0, 1), (0, 1, 2) or (0, 1, 2, 3).
@@ -112,10 +102,9 @@ def normal_equations(
         histories: `History` with arrays (1 or k, ...), what lies behind each collocation point.
         applied: (1 or k, n, nc) [N].
         e: elimination of the held degrees of freedom.
-        A, right: normal matrix, banded ((n_t - 2) free, 4 free), and right side, which are added to; untouched where
-            `tangent` is False.
+        A, right: normal matrix, banded ((n_t - 2) free, 4 free), and right side, which are added to.
         forces: (k, held) residual at the held degrees of freedom: the forces that hold them [N]; written.
-        tangent: whether A and right are wanted.
+        matrix: whether A is wanted; else it is left alone.
         begin, end: collocation points to add.
     """
     nc = len(axes)
@@ -129,14 +118,16 @@ def normal_equations(
     weight = 12.0 / (h * h) * density + 2.0 / h * dragged
     add_scalar_band(nc, unit, weight, full)
     reduce_matrix(e, full, B)
-    S, P, Q = np.empty((free, free)), np.empty((free, free)), np.empty((free, free))
-    dense = np.empty((free, free))
-    band_to_dense(B, dense)
+    many = free if matrix else 0
+    S, P, Q = np.empty((many, many)), np.empty((many, many)), np.empty((many, many))
+    dense = np.empty((many, many))
+    if matrix:
+        band_to_dense(B, dense)
     viscous = has_viscosity(active)
-    wide = free if viscous else 0
+    wide = many if viscous else 0
     V, BV, SBV, VBV = np.empty((wide, wide)), np.empty((wide, wide)), np.empty((wide, wide)), np.empty((wide, wide))
-    gradient = np.empty((2, free))
-    r, y = np.empty((free, 1)), np.empty((free, 1))
+    r, y, z = np.empty((free, 1)), np.empty((free, 1)), np.empty((free, 1))
+    Bz, Nz = np.empty((free, 1)), np.zeros((free, 1))  # S' y and V' y
     state = np.empty((3, n, nc))
     objective = 0.0
     total = np.sum(weights)
@@ -162,30 +153,35 @@ def normal_equations(
         _times_band(B, r, y)
         share = weights[k] / total
         objective += share * np.sum(r * y)
-        if not tangent:
-            continue
-        S[:] = dense
-        solve_rows(G, S)
-        _times_band(B, S, P)
-        _products(S, P, True, Q)
-        _transposed_times(S, y[:, 0], gradient[0])
+        z[:] = y
+        solve_rows(G, z)
+        _times_band(B, z, Bz)
         if viscous:
-            band_to_dense(N, V)
-            solve_rows(G, V)
-            _times_band(B, V, BV)
-            _products(S, BV, False, SBV)
-            _products(V, BV, True, VBV)
-            _transposed_times(V, y[:, 0], gradient[1])
+            _times_band(N, z, Nz)
         for j in range(4):
             column = (first[k] + j - 2) * free
             if column < 0:
                 continue
             cj, dj, ej = _parts(table[k, :, j], density / weight, dragged / weight, h)
             for c in range(free):
-                right[column + c] += share * (cj * y[c, 0] + dj * gradient[0, c])
-            if viscous:
-                for c in range(free):
-                    right[column + c] += share * ej * gradient[1, c]
+                right[column + c] += share * (cj * y[c, 0] + dj * Bz[c, 0] + ej * Nz[c, 0])
+        if not matrix:
+            continue
+        S[:] = dense
+        solve_rows(G, S)
+        _times_band(B, S, P)
+        _products(S, P, True, Q)
+        if viscous:
+            band_to_dense(N, V)
+            solve_rows(G, V)
+            _times_band(B, V, BV)
+            _products(S, BV, False, SBV)
+            _products(V, BV, True, VBV)
+        for j in range(4):
+            column = (first[k] + j - 2) * free
+            if column < 0:
+                continue
+            cj, dj, ej = _parts(table[k, :, j], density / weight, dragged / weight, h)
             for i in range(j, 4):
                 ci, di, ei = _parts(table[k, :, i], density / weight, dragged / weight, h)
                 cc, cd, dd = share * cj * ci, share * (cj * di + dj * ci), share * dj * di

@@ -31,6 +31,8 @@ Floats = NDArray[np.float64]
 MAX_ITERATIONS = 40
 _CHUNK = 1.5e7  # about the multiplications between two looks at the clock
 _HISTORY = 4  # iterates that Anderson acceleration combines
+_FRESH = 2  # iterations that have their own normal matrix, at least
+_SHRINKS = 0.5  # of the update before: where an update is larger, the next iteration has its own, too
 _DAMPING = 1e-6  # of the diagonal of normal equations that lost their positive factors to rounding
 _LARGEST_STEP = 0.25  # of the length, in one control point: beyond it a step is shortened
 LARGEST_STRAIN = 0.003  # that the bounded axial stiffness allows under the largest tension of the march
@@ -129,36 +131,43 @@ class WindowSolver:
             place_held(self.held.elimination, self.offsets[j], control[j].reshape(-1))
         return control
 
-    def objective(self, control: Floats, tangent: bool) -> tuple[float, Floats, Floats, Floats]:
-        """Return the objective, eq. 16 [m^2], the normal matrix, its right side and the holding forces at `control`."""
+    def objective(self, control: Floats, matrix: bool) -> tuple[float, Floats, Floats, Floats]:
+        """Return the objective, eq. 16 [m^2], the normal matrix, its right side and the holding forces at `control`.
+
+        Without `matrix` the normal matrix is left out, which is most of the work.
+        """
         size = (len(control) - 2) * self.free
-        A = np.zeros((size, 4 * self.free) if tangent else (1, 1))  # lazily: a large one is not cleared at once
+        A = np.zeros((size, 4 * self.free) if matrix else (1, 1))  # lazily: a large one is not cleared at once
         right = np.zeros(size)
         forces = np.empty((len(self.times), len(self.held.elimination.held)))
         value = 0.0
-        points = max(1, round(_CHUNK / self.free**3)) if tangent else len(self.times)
+        points = max(1, round(_CHUNK / self.free**3)) if matrix else len(self.times)
         for begin in range(0, len(self.times), points):
             self.monitor.check()
             value += normal_equations(
                 self.axes, control, self.first, self.table, self.weights, self.span, self.grid.tables.mass,
                 self.problem.mass_density(), self.problem.drag_coefficient(), self.grid.tables, self.active,
-                self.parameters, self.histories, self.applied, self.held.elimination, A, right, forces, tangent, begin,
+                self.parameters, self.histories, self.applied, self.held.elimination, A, right, forces, matrix, begin,
                 min(begin + points, len(self.times)),
             )  # fmt: skip
         weight = 12.0 * self.problem.mass_density() / self.span**2 + 2.0 * self.problem.drag_coefficient() / self.span
         return value / (weight * self.problem.scene.cable.length), A, right, forces
 
-    def step(self, A: Floats, right: Floats, damping: float) -> tuple[Floats, bool]:
-        """Return the step -(A + damping diag A)^-1 right, and whether the factors were positive; A is spoilt."""
+    def factor(self, A: Floats, damping: float) -> bool:
+        """Write the factors of A + damping diag A to A; return whether they are positive."""
         A[:, 0] *= 1.0 + damping
         columns = max(1, round(_CHUNK / A.shape[1] ** 2))
         for start in range(0, len(A), columns):
             self.monitor.check()
             if factor_columns(A, start, min(start + columns, len(A))) >= 0:
-                return np.zeros(len(right)), False
+                return False
+        return True
+
+    def step(self, factors: Floats, right: Floats) -> Floats:
+        """Return the step -A^-1 right of all control points (n, n_u, nc), from the factors of A."""
         x = -right
-        solve_factored(A, x)
-        return x, True
+        solve_factored(factors, x)
+        return self.expand(x)
 
     def expand(self, x: Floats) -> Floats:
         """Return the change (n, n_u, nc) of all control points for a step x of the free ones."""
@@ -254,23 +263,26 @@ def _window_fit(motion: March, window: Window) -> Floats:
 def _iterate(
     solver: WindowSolver, control: Floats, delta: float, monitor: Monitor, on_step: OnStep
 ) -> tuple[Floats, float]:
-    """Iterate one window; return its control points and the norm of the last update [m]."""
+    """Iterate one window; return its control points and the norm of the last update [m].
+
+    As long as updates shrink, the normal matrix of an iterate before serves, and an iteration takes a fraction of the
+    time; it is the right side that has to be its own.
+    """
     largest = _LARGEST_STEP * solver.problem.scene.cable.length
     points: list[Floats] = []
     steps: list[Floats] = []
     best = (np.inf, control)
+    factors: Floats | None = None
+    damping, before = 0.0, np.inf
     for _ in range(MAX_ITERATIONS):
         monitor.check()
-        value, A, right, _ = solver.objective(control, True)
-        if not np.isfinite(value):
+        if factors is None:
+            value, factors, right, damping = _linearised(solver, control)
+        else:
+            value, _, right, _ = solver.objective(control, False)
+        if factors is None or not np.isfinite(value):
             break
-        x, positive = solver.step(A, right, 0.0)
-        damping = 0.0
-        if not positive:
-            _, A, right, _ = solver.objective(control, True)
-            damping = _DAMPING
-            x, positive = solver.step(A, right, damping)
-        step = solver.expand(x)
+        step = solver.step(factors, right)
         update = float(np.linalg.norm(step))
         if not np.isfinite(update):
             break
@@ -287,7 +299,25 @@ def _iterate(
         del points[: -_HISTORY - 1], steps[: -_HISTORY - 1]
         control = _accelerate(points, steps).reshape(control.shape)
         on_step(control, update, float(np.sqrt(value)), damping, length)
+        if not update < _SHRINKS * before or len(points) < _FRESH:
+            factors = None
+        before = update
     return best[1], best[0]
+
+
+def _linearised(solver: WindowSolver, control: Floats) -> tuple[float, Floats | None, Floats, float]:
+    """Return the objective, the factors of the normal matrix, its right side, and the damping that it took.
+
+    There are no factors where the matrix is not positive even with damping.
+    """
+    damping = 0.0
+    while True:
+        value, A, right, _ = solver.objective(control, True)
+        if np.isfinite(value) and solver.factor(A, damping):
+            return value, A, right, damping
+        if damping > 0.0 or not np.isfinite(value):
+            return value, None, right, damping
+        damping = _DAMPING
 
 
 def _accelerate(points: list[Floats], steps: list[Floats]) -> Floats:

@@ -53,7 +53,7 @@ def dense(solver: WindowSolver, control: Floats) -> tuple[float, Floats, Floats]
     Z = np.array([solver.expand(row)[2].ravel() for row in np.eye((n_t - 2) * solver.free)[: solver.free]]).T
     band, full = np.zeros((n_u * nc, 4 * nc)), np.empty((n_u * nc, n_u * nc))
     for o in range(4):
-        band[:, o * nc] = np.repeat(solver.unit_mass[:, o], nc)
+        band[:, o * nc] = np.repeat(solver.grid.tables.mass[:, o], nc)
     band_to_dense(band, full)
     problem, h = solver.problem, solver.span
     M, C = (Z.T @ (factor * full) @ Z for factor in (problem.mass_density(), problem.drag_coefficient()))
@@ -101,6 +101,9 @@ def test_the_normal_equations_are_those_of_the_dense_matrices(table: Table | Non
     assert value * unit == pytest.approx(expected, rel=1e-8)
     np.testing.assert_allclose(A, lower, atol=1e-8 * np.abs(lower).max())
     np.testing.assert_allclose(right, gradient, atol=1e-8 * np.abs(gradient).max())
+    without_matrix = solver.objective(control, False)
+    assert without_matrix[0] == value
+    np.testing.assert_array_equal(without_matrix[2], right)
 
 
 @pytest.mark.parametrize(("size", "width"), [(40, 12), (41, 12), (43, 12), (9, 12), (30, 3)])
