@@ -22,11 +22,14 @@ def document_of_identification(found: Identification) -> dict[str, Any]:
     """Return an identification as JSON-ready data: the cable and drag as scenes take them, and how they are known."""
     candidate = found.candidate
     cable = candidate.cable
-    names = ("length", "diameter", "linear_density", "bending_stiffness", "axial_stiffness", "torsional_stiffness")
+    names = (
+        "length", "diameter", "linear_density", "bending_stiffness", "axial_stiffness", "torsional_stiffness",
+        "bending_damping", "axial_damping",
+    )  # fmt: skip
     document: dict[str, Any] = {
         "status": found.status,
         "message": found.message,
-        "cable": {**{n: getattr(cable, n) for n in names}, "bending_damping": cable.bending_damping},
+        "cable": {n: getattr(cable, n) for n in names},
         "environment": {
             "drag": candidate.environment.drag,
             "drag_quadratic": candidate.environment.drag_quadratic,

@@ -137,7 +137,7 @@ class Rod:
 
     @staticmethod
     def of(scene: Scene, grid: Floats, start: Start) -> "Rod":
-        """Return the rod of `scene`; a switched-off effect has a zero coefficient.
+        """Return the rod of `scene`; a switched-off effect has a zero coefficient, and so has the damping of stretch.
 
         Raises:
             ValueError: the scene has something that this rod doesn't model.

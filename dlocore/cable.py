@@ -16,7 +16,8 @@ class Cable:
     Give each stiffness itself, or `youngs_modulus` and `shear_modulus` and the solid round section gives it
     (EA = E pi D^2/4, EI = E pi D^4/64, GJ = G pi D^4/32; docs/model.md eq. 2). Real wires do not follow the isotropic
     rule between EI and GJ, so they are independent. Where nothing is given, EA = 16 EI/D^2 (the solid section of the
-    same EI) and GJ = EI (measured wires lie at 0.8 to 1.6).
+    same EI) and GJ = EI (measured wires lie at 0.8 to 1.6). The axial damping that is not given lets waves of stretch
+    die out as fast as they can: 2 L/pi sqrt(mu EA), critical for the slowest one (docs/model.md eq. 7a).
 
     Args:
         length: L [m], 0.01 to 1000.
@@ -29,6 +30,7 @@ class Cable:
         shear_modulus: G [Pa].
         bending_damping: internal damping on the rate of curvature [N m^2 s].
         torsional_damping: internal damping on the rate of twist [N m^2 s].
+        axial_damping: eta_e, internal damping on the rate of the axial strain [N s]; 0: waves of stretch ring on.
         yield_strain: the paper's eps_M in bending, a strain of the outermost fibre: the cable yields at the curvature
             2 eps_M/D (docs/model.md). None: elastic in bending.
         yield_twist: eps_M in twist, a shear of the outermost fibre: it yields at the twist rate 2 eps_M/D.
@@ -51,6 +53,7 @@ class Cable:
     shear_modulus: float | None = None
     bending_damping: float = 0.0
     torsional_damping: float = 0.0
+    axial_damping: float | None = None
     yield_strain: float | None = None
     yield_twist: float | None = None
     yield_stretch: float | None = None
@@ -87,6 +90,10 @@ class Cable:
             )
         put("bending_damping", number("bending_damping", self.bending_damping, at_least=0.0, unit="N m^2 s"))
         put("torsional_damping", number("torsional_damping", self.torsional_damping, at_least=0.0, unit="N m^2 s"))
+        axial_damping = self.axial_damping
+        if axial_damping is None:
+            axial_damping = 2 * length / math.pi * math.sqrt(self.linear_density * cast(float, self.axial_stiffness))
+        put("axial_damping", number("axial_damping", axial_damping, at_least=0.0, unit="N s"))
         yields = ("yield_strain", "yield_twist", "yield_stretch")
         for name in yields:
             if getattr(self, name) is not None:

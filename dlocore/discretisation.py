@@ -82,14 +82,14 @@ def grid_on(problem: Problem, knots: Floats) -> Grid:
 
 def _no_history(problem: Problem, tables: Tables) -> History:
     points, nc = len(tables.curvature_w), problem.nc
-    kept = points if problem.keeps_history else 0
+    kept = points if problem.keeps_curvature else 0
     columns = {2: 2, 3: 9, 4: PAST}[nc]
     rubs = problem.friction is not None
     lies = rubs and problem.on_table
     return History(
         memory=np.zeros((points, 2 if nc == 2 else 6)),
         past=np.zeros((kept, columns)),
-        axial=np.zeros((len(tables.axial_w), 2)),
+        axial=np.zeros((len(tables.axial_w), 3)),
         stick=np.zeros((len(tables.contact_w) if rubs else 0, 6)),
         slide=np.zeros((len(tables.body_w) if lies else 0, 2)),
     )

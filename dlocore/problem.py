@@ -18,10 +18,10 @@ from dlocore.effects.drag import LinearDrag, QuadraticDrag
 from dlocore.effects.friction import Friction
 from dlocore.effects.gravity import Gravity
 from dlocore.effects.inertia import Inertia
-from dlocore.effects.laws import keeps_history
+from dlocore.effects.laws import keeps_curvature, keeps_history
 from dlocore.effects.plasticity import BendingMemory, StretchMemory, TwistMemory
 from dlocore.effects.selfcontact import SelfContact
-from dlocore.effects.stretch import Stretch
+from dlocore.effects.stretch import Stretch, StretchDamping
 from dlocore.effects.twist import Twist
 from dlocore.errors import SceneError
 from dlocore.obstacles import Box, Cylinder, Obstacle
@@ -60,6 +60,7 @@ class Problem:
     drag: LinearDrag | None
     gravity: Gravity | None
     stretch: Stretch
+    stretch_damping: StretchDamping | None
     bend: Bend | None
     damping: Damping | None
     quadratic_drag: QuadraticDrag | None
@@ -131,6 +132,11 @@ class Problem:
         return bool(keeps_history(self._law_table[0]))
 
     @cached_property
+    def keeps_curvature(self) -> bool:
+        """Whether a law reads the curvature or the frames of earlier steps."""
+        return bool(keeps_curvature(self._law_table[0]))
+
+    @cached_property
     def _law_table(self) -> tuple[NDArray[np.int64], Floats]:
         active = np.zeros(laws.COUNT, np.int64)
         parameters = np.zeros((laws.COUNT + len(self.obstacles), laws.PARAMETERS))
@@ -151,6 +157,7 @@ class Problem:
             (laws.TABLE, self.table),
             (laws.FRICTION, self.friction),
             (laws.SELF_CONTACT, self.self_contact),
+            (laws.STRETCH_DAMPING, self.stretch_damping),
         )
         for row, effect in effects:
             if effect is not None:
@@ -257,6 +264,10 @@ def pose(scene: Scene, called_for: Mapping[str, str] | None = None) -> Problem:
         drag=LinearDrag(environment.drag) if active("drag", environment.drag > 0) else None,
         gravity=Gravity(cable.linear_density, cast(Floats, environment.gravity)) if active("gravity") else None,
         stretch=Stretch(cast(float, cable.axial_stiffness)),
+        # without inertia there are no waves to damp
+        stretch_damping=StretchDamping(cast(float, cable.axial_damping))
+        if active("inertia", cast(float, cable.axial_damping) > 0)
+        else None,
         bend=Bend(cast(float, cable.bending_stiffness)) if active("bend") else None,
         damping=Damping(cable.bending_damping, cable.length, twisted)
         if active("damping", cable.bending_damping > 0)

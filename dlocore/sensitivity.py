@@ -44,12 +44,16 @@ _STRAYED = 1e-8  # of the length: a step left with more than this was not follow
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """A smooth stretch of a known motion: its steps, from `first` to `last`, and their factors."""
+    """A smooth stretch of a known motion: its steps, from `first` to `last`, and their factors.
+
+    Its first step is one by backward Euler where it begins with a jump.
+    """
 
     begin: float
     end: float
     first: int
     last: int
+    jumps: bool
     factors: Floats
 
 
@@ -101,13 +105,13 @@ def factored(problem: Problem, motion: March) -> KnownMotion:
         factors = np.empty((last - first, free, entry.held.elimination.width))
         part = np.ascontiguousarray(states[first : last + 1])
         found = factor_steps(
-            problem.axes, h, motion.rho, part, v, a, mass, drag, grid.tables, active, parameters, history,
+            problem.axes, entry.jumps, h, motion.rho, part, v, a, mass, drag, grid.tables, active, parameters, history,
             entry.held.elimination, factors,
         )  # fmt: skip
         if found < 0:
             raise ValueError("the tangent of a step is singular")
         softened += int(found)
-        stretches.append(Stretch(begin, end, first, last, factors))
+        stretches.append(Stretch(begin, end, first, last, entry.jumps, factors))
     return KnownMotion(motion, tuple(stretches), softened)
 
 
@@ -147,9 +151,9 @@ def beside(known: KnownMotion, problem: Problem, grid: Grid) -> tuple[Floats, Fl
         v, a, G = entry.v.copy(), entry.a.copy(), entry.G.copy()
         applied = applied_forces(problem, grid, times[first : last + 1])
         left = follow_steps(
-            problem.axes, h, known.motion.rho, _FOLLOWED * length, known.motion.states[first : last + 1],
-            stretch.factors, states[first : last + 1], v, a, G, mass, drag, grid.tables, active, parameters, history,
-            applied, entry.held.elimination, entry.offsets,
+            problem.axes, stretch.jumps, h, known.motion.rho, _FOLLOWED * length,
+            known.motion.states[first : last + 1], stretch.factors, states[first : last + 1], v, a, G, mass, drag,
+            grid.tables, active, parameters, history, applied, entry.held.elimination, entry.offsets,
         )  # fmt: skip
         if not left <= _STRAYED * length:
             raise ValueError(f"the motion beside it can't be followed: a step was left with {left:.2g} m")

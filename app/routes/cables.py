@@ -20,6 +20,7 @@ class CablePreset(BaseModel):
     axial_stiffness: float = Field(description="EA [N].", examples=[640.0])
     torsional_stiffness: float = Field(description="GJ [N m^2].", examples=[1e-3])
     bending_damping: float = Field(description="Internal damping on the rate of curvature [N m^2 s].", examples=[1e-4])
+    axial_damping: float = Field(description="Internal damping on the rate of the axial strain [N s].", examples=[3.6])
 
 
 class CablePresets(BaseModel):

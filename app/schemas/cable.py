@@ -49,6 +49,15 @@ class CableModel(Model):
     torsional_damping: Number = Field(
         default=0.0, ge=0.0, description="Internal damping on the rate of twist [N m^2 s].", examples=[0.0]
     )
+    axial_damping: Number | None = Field(
+        default=None,
+        ge=0.0,
+        description=(
+            "Internal damping on the rate of the axial strain [N s]; absent: 2 L/pi sqrt(mu EA), which damps the "
+            "slowest wave of stretch critically; 0: waves of stretch ring on."
+        ),
+        examples=[3.6],
+    )
     yield_strain: Number | None = _yield(
         "Bending strain of the outermost fibre at which the cable yields, eps_M: the curvature 2 eps_M/D", 0.01
     )

@@ -60,7 +60,10 @@ class Tracked:
         """Return the scene of the shown window: its start, its grippers' paths, the cable as it is known."""
         scene = self._replay.scene(self.candidate)
         shape, cable, surroundings = cast(ControlPoints, scene.shape), scene.cable, scene.environment
-        names = ("length", "diameter", "linear_density", "bending_stiffness", "axial_stiffness", "bending_damping")
+        names = (
+            "length", "diameter", "linear_density", "bending_stiffness", "axial_stiffness", "bending_damping",
+            "axial_damping",
+        )  # fmt: skip
         start: dict[str, Any] = {
             "kind": "control_points",
             "control_points": _rounded(cast(Floats, shape.control_points)),

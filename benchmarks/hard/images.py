@@ -74,7 +74,7 @@ def seen(scene: Scene, image: Image) -> Scene:
     scales = {
         "length": a, "diameter": a, "linear_density": c / a, "bending_stiffness": stiffness, "axial_stiffness": force,
         "torsional_stiffness": stiffness, "bending_damping": stiffness * b, "torsional_damping": stiffness * b,
-        "memory_rate": 1.0 / b,
+        "axial_damping": force * b, "memory_rate": 1.0 / b,
     }  # fmt: skip
     cable = {f.name: getattr(scene.cable, f.name) for f in fields(scene.cable)}
     cable |= {name: scale * cable[name] for name, scale in scales.items() if cable[name] is not None}

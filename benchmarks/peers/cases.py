@@ -77,10 +77,15 @@ class Case:
         return rod.sample(self.scene, nodes, positions, self.places)
 
 
+def cable(bending: float) -> Cable:
+    """Return the cable of all cases; no peer damps its stretch, and the judging rod does not."""
+    return Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=bending, axial_damping=0.0)
+
+
 def planar(bending: float, grasp: float) -> Scene:
     """Return the paper's case: a straight cable without weight, moved 0.5 m sideways in 1.6 s at one grasp."""
     return Scene(
-        cable=Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=bending),
+        cable=cable(bending),
         shape=Straight(),
         grasps=(Grasp(u=grasp, path=Move(displacement=(0.0, 0.5, 0.0), duration=1.6)),),
         environment=Environment(gravity=WEIGHTLESS, drag=0.05),
@@ -113,7 +118,7 @@ def _settled(grasps: tuple[Grasp, Grasp], sag: Callable[[Floats], Floats]) -> Sc
         return float(np.linalg.norm(np.diff(points(depth), axis=0), axis=1).sum()) - 1.0
 
     scene = Scene(
-        cable=Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-3),
+        cable=cable(1e-3),
         shape=Points(points=points(brentq(excess, 0.01, 4.0))),
         grasps=grasps,
         environment=Environment(drag=0.1),

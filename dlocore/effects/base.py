@@ -6,7 +6,7 @@ An effect is a frozen dataclass of parameters with a `site`, the place where its
 site       the law is given               the law gives
 ========== ============================== ============================================================================
 field      -                              constant coefficients of linear terms: density, drag, weight per unit length
-axial      strain e                       tension N and modulus dN/de
+axial      strain e, its rate, its memory tension N, modulus dN/de, viscosity dN/d(rate)
 curvature  kappa, its rate, its memory    moment M, stiffness dM/dkappa, viscosity dM/d(rate)
 twist      tau, its rate, its memory      torque T, stiffness dT/dtau, viscosity dT/d(rate)
 body       position, velocity             force per unit length, minus its derivatives by position and by velocity

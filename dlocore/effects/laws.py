@@ -18,9 +18,9 @@ from dlocore.kernels.compile import law
 
 (
     STRETCH, BEND, DAMPING, QUADRATIC_DRAG, TWIST, TWIST_DAMPING, BENDING_MEMORY, TWIST_MEMORY, STRETCH_MEMORY, CONTACT,
-    TABLE, FRICTION, SELF_CONTACT,
-) = range(13)  # fmt: skip
-COUNT = 13  # of compiled laws
+    TABLE, FRICTION, SELF_CONTACT, STRETCH_DAMPING,
+) = range(14)  # fmt: skip
+COUNT = 14  # of compiled laws
 PARAMETERS = ROW  # room for parameters of one law, or for an obstacle
 
 _NO_VECTOR = (0.0, 0.0, 0.0)
@@ -28,13 +28,18 @@ _NO_TANGENT = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @law
+def keeps_curvature(active: Any) -> bool:
+    """Tell whether a law reads the curvature or the frames of earlier steps."""
+    return bool(active[DAMPING] or active[TWIST] or active[BENDING_MEMORY])
+
+
+@law
 def keeps_history(active: Any) -> bool:
     """Tell whether a law reads what earlier steps left behind."""
     return bool(
-        active[DAMPING]
-        or active[TWIST]
-        or active[BENDING_MEMORY]
+        keeps_curvature(active)
         or active[STRETCH_MEMORY]
+        or active[STRETCH_DAMPING]
         or active[FRICTION]
         or active[CONTACT]
     )
@@ -52,7 +57,12 @@ def has_kinks(active: Any) -> bool:
 def has_viscosity(active: Any) -> bool:
     """Tell whether a law depends on velocities, or rates of strain, other than by the drag matrix."""
     return bool(
-        active[DAMPING] or active[QUADRATIC_DRAG] or active[TWIST_DAMPING] or active[CONTACT] or active[FRICTION]
+        active[DAMPING]
+        or active[QUADRATIC_DRAG]
+        or active[TWIST_DAMPING]
+        or active[STRETCH_DAMPING]
+        or active[CONTACT]
+        or active[FRICTION]
     )
 
 
@@ -74,11 +84,14 @@ def axial_memory(active: Any, p: Any, strain: float, memory: float, last: float,
 
 
 @law
-def axial_stress(active: Any, p: Any, strain: float, memory: float, last: float, h: float) -> tuple[float, float]:
-    """Return the tension [N] and its derivative by the strain [N]."""
+def axial_stress(
+    active: Any, p: Any, strain: float, rate: float, memory: float, last: float, h: float
+) -> tuple[float, float, float]:
+    """Return the tension [N] of the active laws and its derivatives by the strain [N] and by its rate [N s]."""
     free, change = axial_memory(active, p, strain, memory, last, h)
     N, modulus = tension(p[STRETCH, 0], strain - free)
-    return N, modulus * (1.0 - change)
+    viscosity = p[STRETCH_DAMPING, 0] if active[STRETCH_DAMPING] else 0.0
+    return N + viscosity * rate, modulus * (1.0 - change), viscosity
 
 
 @law

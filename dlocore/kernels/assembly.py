@@ -13,7 +13,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dlocore.effects.laws import BEND, CONTACT, DAMPING, FRICTION, QUADRATIC_DRAG, STRETCH_MEMORY, axial_memory
+from dlocore.effects.laws import (
+    BEND,
+    CONTACT,
+    DAMPING,
+    FRICTION,
+    QUADRATIC_DRAG,
+    STRETCH_DAMPING,
+    STRETCH_MEMORY,
+    axial_memory,
+)
 from dlocore.kernels import contact, plane, space, twisted
 from dlocore.kernels.banded import clear
 from dlocore.kernels.basis import row_of
@@ -31,7 +40,7 @@ class History(NamedTuple):
             (curvature), 3 in space (two curvatures of the sections and the twist rate) [1/m].
         past: (points, 2, 9 or 16) strain, and with twist frames, of the last steps: see `plane.remember`,
             `space.remember`, `twisted.py`; (0, ...) where no law reads it.
-        axial: (axial points, 2) stress-free axial strain, and the axial strain of the last step.
+        axial: (axial points, 3) stress-free axial strain, and the axial strain of the two last steps.
         stick: (contact nodes, 6) anchor of the friction there, and position at the last step [m]; (0, 6) without.
         slide: (body points, 2) anchor of the friction of a cable that lies on the table [m]; (0, 2) without.
     """
@@ -74,13 +83,13 @@ def assemble(
         clear(K)
     bends = active[BEND] or active[DAMPING]
     if len(axes) == 2:
-        plane.axial(q, tables, active, p, history.axial, rates[3], scales, tangent, f, K)
+        plane.axial(q, v, tables, active, p, history.axial, rates, scales, tangent, f, K)
         if bends:
             plane.curvature(q, v, tables, active, p, history.memory, history.past, rates, scales, tangent, f, K)
         if active[QUADRATIC_DRAG]:
             plane.body(q, v, tables, active, p, scales, tangent, f, K)
     else:
-        space.axial(len(axes), q, tables, active, p, history.axial, rates[3], scales, tangent, f, K)
+        space.axial(len(axes), q, v, tables, active, p, history.axial, rates, scales, tangent, f, K)
         if len(axes) == 4:
             twisted.curvature(q, v, tables, active, p, history.memory, history.past, rates, scales, tangent, f, K)
         elif bends:
@@ -107,7 +116,7 @@ def remember(axes: Any, q: Any, tables: Any, active: Any, p: Any, history: Any, 
         deepest = contact.remember(len(axes), q, tables, active, p, history.stick, loose)
     if active[FRICTION] and p[FRICTION, 2] > 0.0:
         contact.drag_anchors(len(axes), q, tables, p, history.slide, loose)
-    if active[STRETCH_MEMORY]:
+    if active[STRETCH_MEMORY] or active[STRETCH_DAMPING]:
         for n in range(len(tables.axial_w)):
             square = 0.0
             for d in range(min(len(axes), 3)):
@@ -118,6 +127,7 @@ def remember(axes: Any, q: Any, tables: Any, active: Any, p: Any, history: Any, 
             strain = np.sqrt(square) - 1.0
             free, _ = axial_memory(active, p, strain, history.axial[n, 0], history.axial[n, 1], h)
             history.axial[n, 0] = free
+            history.axial[n, 2] = history.axial[n, 1]
             history.axial[n, 1] = strain
     if len(axes) == 2:
         plane.remember(q, tables, active, p, history.memory, history.past, h)

@@ -57,8 +57,8 @@ def constrained_mass_solve(nc: int, mass: Any, e: Any, held: Any, right: Any) ->
 
 @kernel
 def march_steps(
-    axes: Any, start: int, stop: int, begin: int, h: float, rho: float, tolerance: float, Q: Any, v: Any, a: Any,
-    G: Any, mass: Any, drag: Any, tables: Any, active: Any, p: Any, history: Any, applied: Any, e: Any,
+    axes: Any, start: int, stop: int, begin: int, jumps: bool, h: float, rho: float, tolerance: float, Q: Any, v: Any,
+    a: Any, G: Any, mass: Any, drag: Any, tables: Any, active: Any, p: Any, history: Any, applied: Any, e: Any,
     offsets: Any, reactions: Any, log: Any, info: Any,
 ) -> None:  # fmt: skip
     """Advance from step `start` to `stop` by the generalised-alpha method (Chung and Hulbert, 1993).
@@ -72,6 +72,7 @@ def march_steps(
         axes: (0, 1), (0, 1, 2) or (0, 1, 2, 3).
         start, stop: step numbers.
         begin: first step of the smooth stretch of motion that `start` lies in.
+        jumps: whether that stretch begins with a jump, of which a and G tell nothing that lasts for a step.
         h: time step [s].
         rho: spectral radius at infinite frequency, 0 (strong damping of the unresolved) to 1 (none).
         tolerance: on the estimated error of the Newton iteration [m], largest component.
@@ -100,9 +101,9 @@ def march_steps(
     to_v = gamma / (beta * h)
     touches = bool(active[CONTACT])
     tight = bool(active[SELF_CONTACT])
-    attempts = 4 if touches or tight else 2
-    # steps to come by backward Euler; the first one, as the acceleration at the start knows of no contact yet
-    dull = 1 if touches and start == begin else 0
+    # steps to come by backward Euler; the first one, where the acceleration at the start knows of no contact yet, or
+    # is that of the instant of a jump
+    dull = 1 if (touches or jumps) and start == begin else 0
     free = size - len(e.held)
     largest = 10.0 * np.sum(tables.weight)  # an update of ten lengths is divergence
     K = np.empty((size, 4 * nc))
@@ -132,6 +133,7 @@ def march_steps(
         # backward differences for the rate of curvature: its force then has a potential, and an exact tangent
         rates = (1.5 / h, -2.0 / h, 0.5 / h, h) if k - begin > 1 else (1.0 / h, -1.0 / h, 0.0, h)
         first = 2 if dull > 0 else 0
+        attempts = 4 if touches or tight or dull > 0 else 2
         dull -= 1
         converged = False
         for attempt in range(attempts):  # plain and robust; where the cable strikes something, both by backward Euler
@@ -155,7 +157,7 @@ def march_steps(
                     elif k - begin > 2:
                         q1[i, d] = 3.0 * q0[i, d] - 3.0 * Q[k - 2, i, d] + Q[k - 3, i, d]
                     else:
-                        q1[i, d] = q0[i, d] + h * v[i, d] + 0.5 * h * h * a[i, d]
+                        q1[i, d] = q0[i, d] + h * v[i, d] + (0.0 if late else 0.5 * h * h * a[i, d])
             place_held(e, offsets[k], q1.ravel())
             for i in range(n):
                 for d in range(nc):

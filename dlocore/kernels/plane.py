@@ -11,6 +11,7 @@ import numpy as np
 from dlocore.effects.laws import (
     BENDING_MEMORY,
     DAMPING,
+    STRETCH_DAMPING,
     axial_energy,
     axial_stress,
     body_force,
@@ -43,10 +44,12 @@ def _add_block(K: Any, k: int, i: int, j: int, xx: float, xy: float, yx: float, 
 
 @kernel
 def axial(
-    q: Any, tables: Any, active: Any, p: Any, past: Any, h: float, scales: Any, tangent: bool, f: Any, K: Any
+    q: Any, v: Any, tables: Any, active: Any, p: Any, past: Any, rates: Any, scales: Any, tangent: bool, f: Any, K: Any
 ) -> None:
-    """Add the forces and tangents of the axial site."""
-    elastic, _, geometric = scales
+    """Add the forces and tangents of the axial site; `past` holds the stress-free strain and that of two steps."""
+    elastic, viscous, geometric = scales
+    if viscous != 0.0 and rates[0] != 0.0:
+        viscous = rates[0]
     firsts, b1, weights = tables.axial_first, tables.axial_b1, tables.axial_w
     for n in range(len(weights)):
         k, w = firsts[n], weights[n]
@@ -54,7 +57,13 @@ def axial(
         x, y = _combine(q, k, b)
         square = x * x + y * y
         length = np.sqrt(square)
-        tension, modulus = axial_stress(active, p, length - 1.0, past[n, 0], past[n, 1], h)
+        strain, rate = length - 1.0, 0.0
+        if active[STRETCH_DAMPING] and rates[0] != 0.0:
+            rate = rates[0] * strain + rates[1] * past[n, 1] + rates[2] * past[n, 2]
+        elif active[STRETCH_DAMPING]:
+            vx, vy = _combine(v, k, b)
+            rate = (x * vx + y * vy) / length
+        tension, modulus, viscosity = axial_stress(active, p, strain, rate, past[n, 0], past[n, 1], rates[3])
         gx, gy = w * tension * x / length, w * tension * y / length
         for i in range(4):
             f[k + i, 0] += b[i] * gx
@@ -62,7 +71,7 @@ def axial(
         if tangent:
             # the part of the stress is positive only in tension
             stress = w * (geometric * tension if geometric != 0.0 else elastic * max(tension, 0.0)) / length
-            along = (w * elastic * modulus - stress) / square
+            along = (w * (elastic * modulus + viscous * viscosity) - stress) / square
             xx, xy, yy = along * x * x + stress, along * x * y, along * y * y + stress
             for j in range(4):
                 for i in range(j, 4):

@@ -19,8 +19,13 @@ _ITERATIONS = 40
 
 
 @kernel
-def newmark(rho: float, h: float) -> Any:
-    """Return (alpha_m, alpha_f, gamma, to_a, to_v, carry) of a generalised-alpha step, as in `march_steps`."""
+def newmark(rho: float, h: float, late: bool) -> Any:
+    """Return (alpha_m, alpha_f, gamma, to_a, to_v, carry) of a step, as in `march_steps`.
+
+    It is one of generalised alpha, or where it is `late` of backward Euler.
+    """
+    if late:
+        return 0.0, 0.0, 1.0, 1.0 / (h * h), 1.0 / h, 0.0
     alpha_m = (2.0 * rho - 1.0) / (rho + 1.0)
     alpha_f = rho / (rho + 1.0)
     gamma = 0.5 - alpha_m + alpha_f
@@ -30,13 +35,13 @@ def newmark(rho: float, h: float) -> Any:
 
 @kernel
 def factor_steps(
-    axes: Any, h: float, rho: float, Q: Any, v: Any, a: Any, mass: Any, drag: Any, tables: Any, active: Any, p: Any,
-    history: Any, e: Any, factors: Any,
+    axes: Any, jumps: bool, h: float, rho: float, Q: Any, v: Any, a: Any, mass: Any, drag: Any, tables: Any,
+    active: Any, p: Any, history: Any, e: Any, factors: Any,
 ) -> int:  # fmt: skip
     """Write the factors (steps, free, e.width) of the tangent of every step of a marched motion Q (steps + 1, n, nc).
 
-    v, a (n, nc) and `history` are those at its first state; at its last on return. Where a tangent is not positive
-    its positive semidefinite part is taken.
+    v, a (n, nc) and `history` are those at its first state; at its last on return. Where it `jumps` there, the first
+    step is one by backward Euler. Where a tangent is not positive its positive semidefinite part is taken.
 
     Returns:
         the number of steps at which that was so, or -1 where even that part could not be factorised.
@@ -44,13 +49,13 @@ def factor_steps(
     nc = len(axes)
     n = Q.shape[1]
     size = n * nc
-    al_m, al_f, gm, ta, tv, carry = newmark(rho, h)
     K = np.empty((size, 4 * nc))
     f = np.empty((n, nc))
     v1 = np.empty((n, nc))
     keeps = keeps_history(active)
     softened = 0
     for k in range(1, len(Q)):
+        al_m, al_f, gm, ta, tv, carry = newmark(rho, h, jumps and k == 1)
         q0, q1 = Q[k - 1], Q[k]
         rates = (1.5 / h, -2.0 / h, 0.5 / h, h) if k > 1 else (1.0 / h, -1.0 / h, 0.0, h)
         for i in range(n):
@@ -79,8 +84,8 @@ def factor_steps(
 
 @kernel
 def follow_steps(
-    axes: Any, h: float, rho: float, tolerance: float, known: Any, factors: Any, Q: Any, v: Any, a: Any, G: Any,
-    mass: Any, drag: Any, tables: Any, active: Any, p: Any, history: Any, applied: Any, e: Any, offsets: Any,
+    axes: Any, jumps: bool, h: float, rho: float, tolerance: float, known: Any, factors: Any, Q: Any, v: Any, a: Any,
+    G: Any, mass: Any, drag: Any, tables: Any, active: Any, p: Any, history: Any, applied: Any, e: Any, offsets: Any,
 ) -> float:  # fmt: skip
     """Write to Q (steps + 1, n, nc) the motion beside the `known` one whose first state is Q[0].
 
@@ -94,7 +99,6 @@ def follow_steps(
     nc = len(axes)
     n = Q.shape[1]
     size = n * nc
-    al_m, al_f, gm, ta, _, carry = newmark(rho, h)
     K = np.empty((1, 1))
     f = np.empty((n, nc))
     R = np.empty((n, nc))
@@ -107,6 +111,7 @@ def follow_steps(
     keeps = keeps_history(active)
     worst = 0.0
     for k in range(1, len(Q)):
+        al_m, al_f, gm, ta, _, carry = newmark(rho, h, jumps and k == 1)
         load = applied[min(k, len(applied) - 1)]
         q0 = Q[k - 1]
         rates = (1.5 / h, -2.0 / h, 0.5 / h, h) if k > 1 else (1.0 / h, -1.0 / h, 0.0, h)

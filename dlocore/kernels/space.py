@@ -8,7 +8,15 @@ from typing import Any
 import numpy as np
 
 from dlocore.effects.base import Symmetric, Vector
-from dlocore.effects.laws import DAMPING, axial_energy, axial_stress, body_force, curvature_energy, curvature_stress
+from dlocore.effects.laws import (
+    DAMPING,
+    STRETCH_DAMPING,
+    axial_energy,
+    axial_stress,
+    body_force,
+    curvature_energy,
+    curvature_stress,
+)
 from dlocore.kernels.basis import row_of
 from dlocore.kernels.compile import kernel, law
 from dlocore.kernels.pairs import PAIRS, add_derivatives, add_span
@@ -44,10 +52,13 @@ def add_symmetric(nc: int, K: Any, k: int, i: int, j: int, s: float, H: Symmetri
 
 @kernel
 def axial(
-    nc: int, q: Any, tables: Any, active: Any, p: Any, past: Any, h: float, scales: Any, tangent: bool, f: Any, K: Any
-) -> None:
-    """Add the forces and tangents of the axial site."""
-    elastic, _, geometric = scales
+    nc: int, q: Any, v: Any, tables: Any, active: Any, p: Any, past: Any, rates: Any, scales: Any, tangent: bool,
+    f: Any, K: Any,
+) -> None:  # fmt: skip
+    """Add the forces and tangents of the axial site; `past` holds the stress-free strain and that of two steps."""
+    elastic, viscous, geometric = scales
+    if viscous != 0.0 and rates[0] != 0.0:
+        viscous = rates[0]
     firsts, b1, weights = tables.axial_first, tables.axial_b1, tables.axial_w
     for n in range(len(weights)):
         k, w = firsts[n], weights[n]
@@ -55,7 +66,13 @@ def axial(
         x, y, z = combine(q, k, b)
         square = x * x + y * y + z * z
         length = np.sqrt(square)
-        tension, modulus = axial_stress(active, p, length - 1.0, past[n, 0], past[n, 1], h)
+        strain, rate = length - 1.0, 0.0
+        if active[STRETCH_DAMPING] and rates[0] != 0.0:
+            rate = rates[0] * strain + rates[1] * past[n, 1] + rates[2] * past[n, 2]
+        elif active[STRETCH_DAMPING]:
+            vx, vy, vz = combine(v, k, b)
+            rate = (x * vx + y * vy + z * vz) / length
+        tension, modulus, viscosity = axial_stress(active, p, strain, rate, past[n, 0], past[n, 1], rates[3])
         g = w * tension / length
         for i in range(4):
             f[k + i, 0] += b[i] * g * x
@@ -64,7 +81,7 @@ def axial(
         if tangent:
             # the part of the stress is positive only in tension
             stress = w * (geometric * tension if geometric != 0.0 else elastic * max(tension, 0.0)) / length
-            s = (w * elastic * modulus - stress) / square
+            s = (w * (elastic * modulus + viscous * viscosity) - stress) / square
             H = (s * x * x + stress, s * y * y + stress, s * z * z + stress, s * x * y, s * x * z, s * y * z)
             for j in range(4):
                 for i in range(j, 4):

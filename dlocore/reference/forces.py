@@ -3,7 +3,7 @@
     M v' + internal forces + drag - weight - load - contact = 0
 
 with the internal forces of the energy: EA/2 e^2 h of each edge, (EI |kappa - kappa_0|^2 + GJ (tau - tau_0)^2) w/2 of
-each hinge, with damping on their rates (docs/model.md eq. 7 to 9) and the memory of eq. 20, whose rate the same
+each hinge, with damping on their rates (docs/model.md eq. 7, 7a and 9) and the memory of eq. 20, whose rate the same
 Runge-Kutta method integrates.
 """
 
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from dlocore.reference.body import (
+    AXIAL_DAMPING,
     BEND_DAMPING,
     CLAMP,
     CONTACT_DAMPING,
@@ -81,8 +82,15 @@ def returned(trial: float, threshold: float, pace: float) -> tuple[float, float]
 
 
 @compiled
-def add_edges(body: Any, axial: Any, pace: float, t: Any, lengths: Any, memory: Any, R: Any, K: Any, mode: int) -> None:
-    """Add the axial forces to R (n, 4), where `mode` > 0 their tangent to the band K, if it is 2 without thrust."""
+def add_edges(
+    body: Any, v: Any, axial: Any, implicit: float, t: Any, lengths: Any, memory: Any, R: Any, K: Any, mode: int
+) -> None:
+    """Add the axial forces to R (n, 4), where `mode` > 0 their tangent to the band K, if it is 2 without thrust.
+
+    The tangent leaves out that the rate of strain changes as an edge with a velocity across it turns: that part is not
+    symmetric.
+    """
+    pace = body.law[MEMORY_RATE] * implicit
     for e in range(len(body.rest)):
         if body.kind[e] != REAL:
             continue
@@ -91,8 +99,11 @@ def add_edges(body: Any, axial: Any, pace: float, t: Any, lengths: Any, memory: 
         kept, slope = returned(abs(trial), body.law[YIELD_STRETCH], pace)
         memory[e] = strain - np.copysign(kept, trial)
         soft = body.law[SOFTENED]
-        N = body.law[EA] * (strain - soft * memory[e])
-        modulus = body.law[EA] * (1.0 - soft * (1.0 - slope))
+        rate = 0.0
+        for i in range(3):
+            rate += (v[e + 1, i] - v[e, i]) * t[e, i] / body.rest[e]
+        N = body.law[EA] * (strain - soft * memory[e]) + body.law[AXIAL_DAMPING] * rate
+        modulus = body.law[EA] * (1.0 - soft * (1.0 - slope)) + body.law[AXIAL_DAMPING] / implicit
         for i in range(3):
             R[e, i] -= N * t[e, i]
             R[e + 1, i] += N * t[e, i]

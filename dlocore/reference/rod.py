@@ -151,6 +151,7 @@ def _laws(problem: Problem, stiffening: float, firmness: float) -> Floats:
     law[places.EA] = cast(float, cable.axial_stiffness)
     law[places.EI] = cast(float, cable.bending_stiffness) if on("bend") else 0.0
     law[places.GJ] = cast(float, cable.torsional_stiffness)
+    law[places.AXIAL_DAMPING] = cast(float, cable.axial_damping)
     if on("damping"):
         law[places.BEND_DAMPING], law[places.TWIST_DAMPING] = cable.bending_damping, cable.torsional_damping
     if on("drag"):

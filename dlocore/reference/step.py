@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from dlocore.reference.banded import factor, solve
-from dlocore.reference.body import CLAMP, GYRATION, MEMORY_RATE, REAL, State
+from dlocore.reference.body import CLAMP, GYRATION, REAL, State
 from dlocore.reference.compile import compiled
 from dlocore.reference.forces import add_contact, add_drag, add_edges, add_hinges, frames
 
@@ -130,7 +130,7 @@ def take_step(
                             K[k * dims + d, 0] = body.mass[k, d] / (implicit * implicit) if free else 1.0
                 use = mode if refactor else 0
                 add_edges(
-                    body, axial, body.law[MEMORY_RATE] * implicit, after.t, lengths, after.axial, R, K, use,
+                    body, v, axial, implicit, after.t, lengths, after.axial, R, K, use,
                 )  # fmt: skip
                 add_hinges(
                     body, v, state.turn, memory, implicit, after.t, after.a, b, lengths, tangent_rate, after.turn,

@@ -261,8 +261,8 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
                 break
             until = min(at + _CHUNK, last)
             march_steps(
-                axes, at, until, smooth, h, rho, tolerance, states, v, a, G, mass, drag, grid.tables, active,
-                parameters, history, applied, e, offsets, reactions, log, info,
+                axes, at, until, smooth, entry.jumps, h, rho, tolerance, states, v, a, G, mass, drag, grid.tables,
+                active, parameters, history, applied, e, offsets, reactions, log, info,
             )  # fmt: skip
             at = until
             failed = int(info[FAILED_STEP])
@@ -279,9 +279,9 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
                 inner_reactions = np.zeros((parts + 1, len(e.held)))
                 kept = [x.copy() for x in (v, a, G, *history)]
                 march_steps(
-                    axes, 0, parts, 0, h / parts, STRONGLY_DAMPED, tolerance, inner_states, v, a, G, mass, drag,
-                    grid.tables, active, parameters, history, applied_forces(problem, grid, inner), e, inner_offsets,
-                    inner_reactions, log[:0], info,
+                    axes, 0, parts, 0, entry.jumps and at == first, h / parts, STRONGLY_DAMPED, tolerance, inner_states,
+                    v, a, G, mass, drag, grid.tables, active, parameters, history,
+                    applied_forces(problem, grid, inner), e, inner_offsets, inner_reactions, log[:0], info,
                 )  # fmt: skip
                 if info[FAILED_STEP] < 0:
                     states[failed], reactions[failed] = inner_states[-1], inner_reactions[-1]

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.discretisation import applied_forces
+from dlocore.effects import laws
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.assembly import times_scalar_band
@@ -107,7 +108,8 @@ class WindowSolver:
         self.first, self.table = basis_rows(window.knots, self.times, 2)
         self.span = (window.end - window.begin) / len(spans)
         self.active, self.parameters = problem.law_table()
-        self.parameters[0, 0] = axial_stiffness
+        self.parameters[laws.STRETCH, 0] = axial_stiffness
+        self.active[laws.STRETCH_DAMPING] = 0  # so soft a cable has no waves of stretch that need damping
         self.applied = applied_forces(problem, grid, self.times)
         fine = np.linspace(window.begin, window.end, 6 * len(spans) + 1)
         self.histories = motion.behind(self.times)

@@ -14,6 +14,8 @@ from dlocore.scene import Grasp
 
 Floats = NDArray[np.float64]
 
+_JUMPS = 1e-6  # of the length, on what a jump of the velocity is in a step: less is rounding
+_LEAPS = 0.01  # of the length, which the acceleration at the beginning would take the cable in the first step
 _NEAR = 1e-3 * np.arange(3.0)  # of a step: for velocity and acceleration of the paths at the beginning
 
 
@@ -28,6 +30,7 @@ class Entry:
         v: the same, zero where inertia is left out.
         a: (n_u, nc) [m/s^2] consistent acceleration.
         G: (n_u, nc) [N] forces f + C v - load.
+        jumps: whether the velocity jumps, so that the acceleration is that of the instant alone.
     """
 
     held: Held
@@ -36,6 +39,7 @@ class Entry:
     v: Floats
     a: Floats
     G: Floats
+    jumps: bool
 
 
 def enter(
@@ -63,4 +67,7 @@ def enter(
         parameters, history, load, held.elimination, held.offsets[:3], h * _NEAR[1], problem.inertia is not None,
     )  # fmt: skip
     started = closed.copy() if problem.inertia is not None else np.zeros_like(closed)
-    return Entry(held, held.offsets[3:], closed, started, a, G)
+    length, points = problem.scene.cable.length, slice(problem.plane.dimensions)
+    jumps = h * np.abs(closed - v)[:, points].max() > _JUMPS * length
+    leaps = 0.5 * h * h * np.abs(a)[:, points].max() > _LEAPS * length
+    return Entry(held, held.offsets[3:], closed, started, a, G, bool(jumps and leaps))

@@ -80,6 +80,7 @@ CASES: list[tuple[dict[str, Any], str, Any, str]] = [
     (PAPER, "cable.diameter", 0.9, "cable.diameter"),
     (PAPER, "cable.bending_stiffness", -1e-3, "cable.bending_stiffness"),
     (PAPER, "cable.bending_damping", -1, "cable.bending_damping"),
+    (PAPER, "cable.axial_damping", -1, "cable.axial_damping"),
     (PAPER, "environment.drag", -0.1, "environment.drag"),
     (PAPER, "environment.gravity", [0, 0, -1e5], "environment.gravity"),
     (PAPER, "primitives.0.path.duration", 0, "primitives[0].path.duration"),

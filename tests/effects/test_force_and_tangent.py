@@ -11,7 +11,7 @@ from dlocore.effects import laws
 from dlocore.effects.bend import Bend
 from dlocore.effects.damping import EPSILON, Damping
 from dlocore.effects.drag import QuadraticDrag
-from dlocore.effects.stretch import Stretch
+from dlocore.effects.stretch import Stretch, StretchDamping
 from dlocore.kernels.assembly import NO_RATES, History, assemble, remember, stored_energy
 from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, Tables, build_tables, graded_knots
 from dlocore.spline import design_matrix
@@ -20,6 +20,7 @@ Floats = NDArray[np.float64]
 N_U, LENGTH = 9, 1.0
 LAWS = {
     "stretch": (laws.STRETCH, Stretch(640.0)),
+    "stretch damping": (laws.STRETCH_DAMPING, StretchDamping(3.0)),
     "bend": (laws.BEND, Bend(1e-3)),
     "damping": (laws.DAMPING, Damping(2e-3, LENGTH)),
     "quadratic drag": (laws.QUADRATIC_DRAG, QuadraticDrag(0.3)),
@@ -88,7 +89,7 @@ def body(name: str, nc: int, n_u: int = N_U, rest: float = 0.0) -> Body:
     if name.endswith("memory") and nc == 2:
         memory[:] = rest or 3.0
     past = np.zeros((len(memory), 2 if nc == 2 else 9))
-    history = History(memory, past, np.zeros((len(tables.axial_w), 2)), np.zeros((0, 6)), np.zeros((0, 2)))
+    history = History(memory, past, np.zeros((len(tables.axial_w), 3)), np.zeros((0, 6)), np.zeros((0, 2)))
     return Body(nc, knots, tables, active, parameters, history)
 
 
@@ -271,7 +272,7 @@ def test_quadratic_drag_at_rest_is_smooth():
     assert not b.tangent(q, 0 * q, (0.0, 1.0, 0.0)).any()
 
 
-def power_of_bending(b: Body, q: Floats, v: Floats) -> float:
+def power(b: Body, q: Floats, v: Floats) -> float:
     return float((b.forces(q, v) * v).sum())
 
 
@@ -283,7 +284,7 @@ def test_damping_takes_eta_times_rate_of_curvature_squared(nc):
     q = control_points_of(b, circle(3.0))
     v = (control_points_of(b, circle(3.0 + step)) - control_points_of(b, circle(3.0 - step))) / (2 * step) * rate
     # the spline's curvature, as above
-    assert power_of_bending(b, q, v) == pytest.approx(2e-3 * rate**2 * LENGTH, rel=2e-4)
+    assert power(b, q, v) == pytest.approx(2e-3 * rate**2 * LENGTH, rel=2e-4)
 
 
 @DIMENSIONS
@@ -296,12 +297,43 @@ def test_damping_does_no_work_in_a_rigid_swing(nc):
         in_space = np.zeros((N_U, 3))
         in_space[:, :nc] = q
         v = np.ascontiguousarray((np.cross(spin, in_space) + rng.normal(size=3))[:, :nc])
-        power = power_of_bending(b, q, v)
+        taken = power(b, q, v)
         if nc == 2:
-            assert abs(power) < 1e-12  # rounding
+            assert abs(taken) < 1e-12  # rounding
         else:
             # near zero curvature the whole rate costs: eta/2 eps^2 |spin|^2 a length at most (docs/model.md eq. 9)
-            assert 0.0 <= power <= 2e-3 * (EPSILON / LENGTH) ** 2 * (spin @ spin) * LENGTH * 1.5
+            assert 0.0 <= taken <= 2e-3 * (EPSILON / LENGTH) ** 2 * (spin @ spin) * LENGTH * 1.5
+
+
+@DIMENSIONS
+def test_axial_damping_takes_its_coefficient_times_the_rate_of_strain_squared(nc):
+    # a straight cable that lengthens at 2/s: N = 3 N s x 2/s
+    b = body("stretch damping", nc)
+    q = np.zeros((N_U, nc))
+    q[:, 0] = greville(b.knots)
+    assert power(b, q, 2.0 * q) == pytest.approx(3.0 * 2.0**2 * LENGTH, rel=1e-12)  # rounding
+
+
+@DIMENSIONS
+def test_axial_damping_does_no_work_in_a_rigid_swing(nc):
+    b = body("stretch damping", nc)
+    for seed in range(5):
+        q, _ = bent(nc, seed=seed)
+        spin = np.array([1.0, -2.0, 3.0]) if nc == 3 else np.array([0.0, 0.0, 5.0])
+        in_space = np.zeros((N_U, 3))
+        in_space[:, :nc] = q
+        v = np.ascontiguousarray((np.cross(spin, in_space) + np.array([0.3, -2.0, 0.6]))[:, :nc])
+        assert abs(power(b, q, v)) < 1e-12  # rounding
+
+
+@DIMENSIONS
+def test_axial_damping_by_differences_has_a_potential(nc):
+    # so its tangent, material and geometric, is all of dF/dq
+    q, v = bent(nc)
+    h = 0.01
+    b = body("stretch damping", nc).after(h, q - 0.02 * v, q - 0.01 * v)
+    K = b.tangent(q, v, (1.0, 1.5 / h, 1.0))
+    np.testing.assert_allclose(differences(lambda x: b.forces(x, v), q, 1e-6), K, atol=1e-7 * np.abs(K).max())
 
 
 def test_damping_by_differences_has_a_potential_in_the_plane():
@@ -314,15 +346,25 @@ def test_damping_by_differences_has_a_potential_in_the_plane():
 
 
 @DIMENSIONS
-def test_damping_by_differences_tends_to_that_by_velocity(nc):
+@pytest.mark.parametrize("name", ["damping", "stretch damping"])
+def test_damping_by_differences_tends_to_that_by_velocity(name, nc):
     q, v = bent(nc)
-    exact = body("damping", nc).forces(q, v)
+    exact = body(name, nc).forces(q, v)
     errors = []
     for h in (1e-3, 5e-4):
-        f = body("damping", nc).after(h, q - 2 * h * v, q - h * v).forces(q, v)
+        f = body(name, nc).after(h, q - 2 * h * v, q - h * v).forces(q, v)
         errors.append(np.abs(f - exact).max() / np.abs(exact).max())
     assert errors[1] < 1e-3
     assert 1.8 < np.log2(errors[0] / errors[1]) < 2.2  # second order
+
+
+@DIMENSIONS
+def test_axial_damping_by_differences_does_no_work_in_a_rigid_turn(nc):
+    q, _ = bent(nc)
+    h = 1e-2
+    turned = [q @ Rotation.from_rotvec([0.0, 0.0, k * h * 5.0]).as_matrix()[:nc, :nc].T for k in (-2, -1, 0)]
+    b = body("stretch damping", nc).after(h, *turned[:2])
+    assert np.abs(b.forces(turned[2], 0 * q)).max() < 1e-10  # rounding / h, however long the step
 
 
 @DIMENSIONS
@@ -334,7 +376,7 @@ def test_damping_by_differences_does_no_work_in_a_rigid_turn(nc):
     b = body("damping", nc).after(h, *turned[:2])
     v = (turned[2] - turned[1]) / h
     bound = 1e-9 if nc == 2 else 1.5 * 2e-3 * (EPSILON / LENGTH) ** 2 * (spin @ spin) * LENGTH  # rounding / h; as above
-    assert abs(power_of_bending(b, q, v)) < bound
+    assert abs(power(b, q, v)) < bound
 
 
 @DIMENSIONS

@@ -35,7 +35,7 @@ class Body:
             self.p[row, : len(effect.parameters())] = effect.parameters()
         points = len(self.tables.curvature_w)
         memory = np.tile([2.0, -1.0, 0.7, 2.0, -1.0, 0.7], (points, 1)) * remembered
-        axial = np.zeros((len(self.tables.axial_w), 2))
+        axial = np.zeros((len(self.tables.axial_w), 3))
         self.history = History(memory, np.zeros((points, PAST)), axial, np.zeros((0, 6)), np.zeros((0, 2)))
 
     def carry_frames(self, q: Floats) -> None:

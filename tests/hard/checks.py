@@ -8,7 +8,6 @@ from dlocore import Prediction, SceneError, predict
 
 # What the solver does not do yet, and why; docs/stability.md lists them too. Strict: one that is mended has to leave.
 OPEN = {
-    "cusp in the points": "the corner springs away from t = 0 in waves that steps of one size do not resolve",
     "half a metre in 50 ms": "the wave that the jerk sends along the cable cracks like a whip at its end",
     "heavy cable": "the free end whips; the finest grid is not fine enough",
     "bending stiffness of 1e minus 6": "so limp that the finest grids tried still differ by 5 per cent",

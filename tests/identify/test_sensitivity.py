@@ -50,22 +50,41 @@ def test_the_gripper_moves_with_its_displacement(found: np.ndarray) -> None:
     np.testing.assert_allclose(sensed([0.3], T)[0, :, 0, 1], expected, atol=2e-3)
 
 
+def by_differences(scene: Scene, name: str) -> np.ndarray:
+    """Return the derivative by differences of marches over 1e-3 of the value, right to about its square."""
+    from dlocore.sensitivity import _number, _with
+
+    value = _number(scene, name)
+    width = 10 * STEP * value
+    ends = [predict(_with(scene, name, value + sign * width)).surface(U, T)[..., :3] for sign in (1.0, -1.0)]
+    return np.asarray((ends[0] - ends[1]) / (2.0 * width))
+
+
 @pytest.mark.parametrize("index", range(len(NAMES)), ids=NAMES)
 def test_derivatives_are_those_of_marches_solved_to_rounding(
     index: int, found: np.ndarray, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from dlocore.sensitivity import _number, _with
-
-    # whole marches, with a Newton tolerance so far below the change that their difference is a derivative
+    # a Newton tolerance so far below the change that the difference of marches is a derivative
     monkeypatch.setattr(marching, "TOLERANCE", 1e-13)
-    name = NAMES[index]
-    value = _number(scene(), name)
-    width = 10 * STEP * value
-    ends = [predict(_with(scene(), name, value + sign * width)).surface(U, T)[..., :3] for sign in (1.0, -1.0)]
-    difference = (ends[0] - ends[1]) / (2.0 * width)
-    # central differences over 1e-3 of the value are right to about its square; the largest derivative sets the scale
-    scale = np.abs(difference).max()
+    difference = by_differences(scene(), NAMES[index])
+    scale = np.abs(difference).max()  # the largest derivative
     np.testing.assert_allclose(found[index], difference, atol=2e-5 * scale)
+
+
+@pytest.mark.parametrize("name", ["cable.axial_damping", "cable.axial_stiffness", "grasps[0].path.displacement[1]"])
+def test_derivatives_after_a_jump_are_those_of_marches_with_the_same_first_step(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # soft, so that its damping matters, and jerked, so that the first step is one by backward Euler
+    jerk = Move(displacement=(0.3, 0.4, 0.0), duration=1.0, profile="linear")
+    cable = Cable.preset("paper", axial_stiffness=20.0, axial_damping=2.0)
+    jerked = scene(cable=cable, grasps=(Grasp(u=1.0, path=jerk),))
+    sensed = sensitivities(predict(jerked), [name])
+    assert sensed.exact == (True,), sensed.reason
+    monkeypatch.setattr(marching, "TOLERANCE", 1e-13)
+    difference = by_differences(jerked, name)
+    # a change of the damping by 1e-3 moves it by 1e-6 m, of which rounding and tolerances of 1e-10 m are 1e-4
+    np.testing.assert_allclose(sensed(U, T)[0], difference, atol=1e-3 * np.abs(difference).max())
 
 
 def test_contact_is_differentiated_by_whole_marches_and_said_so() -> None:

@@ -41,7 +41,7 @@ def test_a_wire_bent_and_let_go_keeps_what_is_beyond_the_threshold(space):
         effects={"twist": "on"} if space else {},
         horizon=6.0,
     )
-    found = motion(scene, 12, 1e-6)
+    found = motion(scene, 12, 1e-7)
     material = material_of(found, samples(found))
     threshold = 2 * 0.01 / 0.01
     kept = (most - threshold) / (1 + hardening)
