@@ -28,7 +28,7 @@ from dlocore.problem import Problem
 from dlocore.report import WindowForces
 from dlocore.scene import Grasp
 from dlocore.solvers.monitor import Monitor, TimeIsUp
-from dlocore.solvers.stretch import enter
+from dlocore.solvers.stretch import Entry, enter
 
 Floats = NDArray[np.float64]
 
@@ -207,107 +207,182 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
     Raises:
         Cancelled: the caller asked to stop.
     """
-    axes, nc = problem.axes, problem.nc
     marks = marks_of(problem)
     counts = step_counts(marks, steps)
-    times = _times(marks, counts)
-    active, parameters = problem.law_table()
     if problem.inertia is None or problem.contact is not None or problem.friction is not None:
         rho = STRONGLY_DAMPED  # forces that jump are balanced at the end of each step
-    unit_mass = grid.tables.mass
-    mass = unit_mass * problem.mass_density()
-    drag = unit_mass * problem.drag_coefficient()
-    applied = applied_forces(problem, grid, times)
-    tolerance = _tolerance(problem, problem.horizon / len(times))
-    states = np.empty((len(times), grid.n_u, nc))
-    states[0] = grid.start
-    v = grid.velocity.copy()
-    velocity = v
-    info = np.zeros(3)
-    info[FAILED_STEP] = -1
-    starts: Starts = {}
-    forces: list[WindowForces] = []
-    reached, stopped, split = 0, "", 0
-    history = grid.past()
-    log = _empty_log(problem, grid, len(times))
-    if len(log):
-        note(axes, history, log[0])
+    walk = _Walk(problem, grid, monitor, _times(marks, counts), rho)
     first = 0
     for begin, end, count in zip(marks[:-1], marks[1:], counts, strict=True):
-        last = first + count
-        h = (end - begin) / count
+        walk.go(begin, end, first, first + count)
+        if walk.stopped:
+            break
+        first += count
+    return walk.ended()
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretch:
+    """A stretch of smooth motion under way: v, a and G (n_u, nc) are those at the step reached.
+
+    Attributes:
+        h: time step [s].
+        first, last: its steps.
+        grasps: that hold in it.
+        entry: how it begins.
+        v, a, G: velocity [m/s], acceleration [m/s^2] and forces [N], see `march_steps`.
+        offsets: (steps + 1, held) prescribed part of the held degrees of freedom [m].
+        reactions: (steps + 1, held) forces that hold them [N].
+    """
+
+    h: float
+    first: int
+    last: int
+    grasps: list[Grasp]
+    entry: Entry
+    v: Floats
+    a: Floats
+    G: Floats
+    offsets: Floats
+    reactions: Floats
+
+
+class _Walk:
+    """A march under way.
+
+    Args:
+        problem: what is solved.
+        grid: its space discretisation, with the start on it.
+        monitor: that of the solve.
+        times: (steps + 1,) [s].
+        rho: spectral radius.
+    """
+
+    def __init__(self, problem: Problem, grid: Grid, monitor: Monitor, times: Floats, rho: float) -> None:
+        self._problem, self._grid, self._monitor, self._times, self._rho = problem, grid, monitor, times, rho
+        self._laws = problem.law_table()
+        self._mass = grid.tables.mass * problem.mass_density()
+        self._drag = grid.tables.mass * problem.drag_coefficient()
+        self._applied = applied_forces(problem, grid, times)
+        self._tolerance = _tolerance(problem, problem.horizon / len(times))
+        self._states = np.empty((len(times), grid.n_u, problem.nc))
+        self._states[0] = grid.start
+        self._v = self._velocity = grid.velocity.copy()
+        self._info = np.zeros(3)
+        self._info[FAILED_STEP] = -1
+        self._starts: Starts = {}
+        self._forces: list[WindowForces] = []
+        self._history = grid.past()
+        self._log = _empty_log(problem, grid, len(times))
+        if len(self._log):
+            note(problem.axes, self._history, self._log[0])
+        self._reached, self._split = 0, 0
+        self.stopped = ""  # why it ended early
+
+    def go(self, begin: float, end: float, first: int, last: int) -> None:
+        """Walk through the stretch from `begin` to `end` [s], steps `first` to `last`, or until it has to stop."""
+        stretch = self._enter(begin, end, first, last)
+        at, smooth = first, first  # the step reached, and the first of the smooth steps that it is one of
+        while at < last and not self.stopped:
+            try:
+                self._monitor.check()
+            except TimeIsUp:
+                self.stopped = "time"
+                break
+            until = min(at + _CHUNK, last)
+            failed = self._steps(
+                stretch, at, until, smooth, stretch.entry.jumps, stretch.h, self._rho, self._states, self._applied,
+                stretch.offsets, stretch.reactions, self._log,
+            )  # fmt: skip
+            if failed < 0:
+                at = until
+            elif self._in_smaller_steps(stretch, failed):
+                at = smooth = failed
+            else:
+                at, self.stopped = failed - 1, "step"
+        self._reached, self._v = at, stretch.v
+        _to_ends_of_steps(stretch.reactions[first : at + 1], self._rho / (1.0 + self._rho))
+        part = slice(first, last + 1)
+        self._forces.append(
+            WindowForces(stretch.entry.held, self._times[part], stretch.reactions[part], self._states[part])
+        )
+
+    def ended(self) -> March:
+        """Return the march, whose last state stays where it stopped early."""
+        reached, states, log = self._reached, self._states, self._log
+        states[reached + 1 :] = states[reached]
+        log[reached + 1 :] = log[reached : reached + 1]
+        return March(
+            self._grid, self._times, states, self._velocity, tuple(self._forces), self._history, log, reached,
+            self.stopped, self._rho, self._split, self._grid.largest_strain(states), float(self._info[LEFT]),
+            float(self._info[DEEPEST]),
+        )  # fmt: skip
+
+    def _enter(self, begin: float, end: float, first: int, last: int) -> _Stretch:
+        """Close the grasps of a stretch; what friction holds leans on it from the beginning."""
+        problem, grid, times = self._problem, self._grid, self._times
+        h = (end - begin) / (last - first)
         grasps = closed_grasps(problem, begin, end)
-        load = applied[min(first, len(applied) - 1)]
-        entry = enter(problem, grid, grasps, starts, times[first : last + 1], h, states[first], v, history, load)
-        held, v, a, G, e = entry.held, entry.v, entry.a, entry.G, entry.held.elimination
+        load = self._applied[min(first, len(self._applied) - 1)]
+        entry = enter(
+            problem, grid, grasps, self._starts, times[first : last + 1], h, self._states[first], self._v,
+            self._history, load,
+        )  # fmt: skip
+        e, a = entry.held.elimination, entry.a
         if first == 0:
-            velocity = entry.closed
-        if problem.friction is not None and problem.table is not None and first == 0:
-            _lean_on_table(problem, grid, a, history)
-        if problem.friction is not None and problem.friction.lying > 0 and first == 0:
-            a = _lean_on_anchors(problem, grid, v, a, mass, e, G, history)
-            if problem.inertia is None:
-                a = np.zeros_like(v)
+            self._velocity = entry.closed
+            if problem.friction is not None and problem.table is not None:
+                _lean_on_table(problem, grid, a, self._history)
+            if problem.friction is not None and problem.friction.lying > 0:
+                a = _lean_on_anchors(problem, grid, entry.v, a, self._mass, e, entry.G, self._history)
+                if problem.inertia is None:
+                    a = np.zeros_like(entry.v)
         offsets = np.zeros((len(times), len(e.held)))
         offsets[first : last + 1] = entry.offsets
         reactions = np.zeros((len(times), len(e.held)))
-        reactions[first] = (times_scalar_band(mass, a) + G).reshape(-1)[e.held]
-        at, smooth = first, first  # the step reached, and the first of the smooth stretch that it lies in
-        while at < last and not stopped:
-            try:
-                monitor.check()
-            except TimeIsUp:
-                stopped = "time"
-                break
-            until = min(at + _CHUNK, last)
-            march_steps(
-                axes, at, until, smooth, entry.jumps, h, rho, tolerance, states, v, a, G, mass, drag, grid.tables,
-                active, parameters, history, applied, e, offsets, reactions, log, info,
+        reactions[first] = (times_scalar_band(self._mass, a) + entry.G).reshape(-1)[e.held]
+        return _Stretch(h, first, last, grasps, entry, entry.v, a, entry.G, offsets, reactions)
+
+    def _steps(
+        self, stretch: _Stretch, start: int, stop: int, begin: int, jumps: bool, h: float, rho: float, states: Floats,
+        applied: Floats, offsets: Floats, reactions: Floats, log: Floats,
+    ) -> int:  # fmt: skip
+        """Take the steps from `start` to `stop`, as `march_steps` does; return the one that failed, or -1."""
+        march_steps(
+            self._problem.axes, start, stop, begin, jumps, h, rho, self._tolerance, states, stretch.v, stretch.a,
+            stretch.G, self._mass, self._drag, self._grid.tables, *self._laws, self._history, applied,
+            stretch.entry.held.elimination, offsets, reactions, log, self._info,
+        )  # fmt: skip
+        failed = int(self._info[FAILED_STEP])
+        self._info[FAILED_STEP] = -1
+        return failed
+
+    def _in_smaller_steps(self, stretch: _Stretch, failed: int) -> bool:
+        """Take a step that found no equilibrium in smaller ones, which damp what they can't resolve, if they do."""
+        states, times, at = self._states, self._times, failed - 1
+        jumps = stretch.entry.jumps and at == stretch.first
+        under_way = (stretch.v, stretch.a, stretch.G, *self._history)
+        kept = [x.copy() for x in under_way]
+        for parts in _SPLITS:
+            inner = np.linspace(times[at], times[failed], parts + 1)
+            offsets = hold(self._problem, self._grid, stretch.grasps, inner, self._starts, states[at]).offsets
+            inner_states = np.empty((parts + 1, *states.shape[1:]))
+            inner_states[0] = states[at]
+            reactions = np.zeros((parts + 1, stretch.reactions.shape[1]))
+            applied = applied_forces(self._problem, self._grid, inner)
+            found = self._steps(
+                stretch, 0, parts, 0, jumps, stretch.h / parts, STRONGLY_DAMPED, inner_states, applied, offsets,
+                reactions, self._log[:0],
             )  # fmt: skip
-            at = until
-            failed = int(info[FAILED_STEP])
-            if failed < 0:
-                continue
-            # no equilibrium: this step in smaller ones, which damp what they can't resolve
-            info[FAILED_STEP] = -1
-            at = failed - 1
-            for parts in _SPLITS:
-                inner = np.linspace(times[at], times[failed], parts + 1)
-                inner_offsets = hold(problem, grid, grasps, inner, starts, states[at]).offsets
-                inner_states = np.empty((parts + 1, *states.shape[1:]))
-                inner_states[0] = states[at]
-                inner_reactions = np.zeros((parts + 1, len(e.held)))
-                kept = [x.copy() for x in (v, a, G, *history)]
-                march_steps(
-                    axes, 0, parts, 0, entry.jumps and at == first, h / parts, STRONGLY_DAMPED, tolerance, inner_states,
-                    v, a, G, mass, drag, grid.tables, active, parameters, history,
-                    applied_forces(problem, grid, inner), e, inner_offsets, inner_reactions, log[:0], info,
-                )  # fmt: skip
-                if info[FAILED_STEP] < 0:
-                    states[failed], reactions[failed] = inner_states[-1], inner_reactions[-1]
-                    if len(log):
-                        note(axes, history, log[failed])
-                    at = smooth = failed
-                    split += 1
-                    break
-                info[FAILED_STEP] = -1
-                for x, before in zip((v, a, G, *history), kept, strict=True):
-                    x[:] = before
-            else:
-                stopped = "step"
-        reached = at
-        _to_ends_of_steps(reactions[first : reached + 1], rho / (1.0 + rho))
-        part = slice(first, last + 1)
-        forces.append(WindowForces(held, times[part], reactions[part], states[part]))
-        if stopped:
-            break
-        first = last
-    states[reached + 1 :] = states[reached]
-    log[reached + 1 :] = log[reached : reached + 1]
-    return March(
-        grid, times, states, velocity, tuple(forces), history, log, reached, stopped, rho, split,
-        grid.largest_strain(states), float(info[LEFT]), float(info[DEEPEST]),
-    )  # fmt: skip
+            if found < 0:
+                states[failed], stretch.reactions[failed] = inner_states[-1], reactions[-1]
+                if len(self._log):
+                    note(self._problem.axes, self._history, self._log[failed])
+                self._split += 1
+                return True
+            for x, before in zip(under_way, kept, strict=True):
+                x[:] = before
+        return False
 
 
 def _tolerance(problem: Problem, step: float) -> float:
