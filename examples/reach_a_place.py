@@ -1,0 +1,54 @@
+"""Where must the gripper go, so that the free end of a cable on a table comes to rest at a place?
+
+Newton's method over the gripper's target: every prediction after the first goes on from the one before it
+(`predict(..., like=...)`), which takes a part of the time.
+
+Usage: python examples/reach_a_place.py
+"""
+
+import time
+
+import numpy as np
+
+import dlocore as dlo
+
+GOAL = np.array([0.75, -0.01])  # [m] for the end at u = 1 m
+STEP = 0.005  # [m] of the differences
+FARTHEST = 0.1  # [m] from one target to the next
+
+
+def scene(target: np.ndarray) -> dlo.Scene:
+    """Return the cable, gripped at 0.25 m and moved by `target` (2,) [m]."""
+    path = dlo.Move(displacement=(*target, 0.0), duration=1.6)
+    return dlo.Scene(
+        cable=dlo.Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-2),
+        shape=dlo.Straight(),
+        grasps=[dlo.Grasp(u=0.25, path=path)],
+        environment=dlo.Environment(drag=0.5, table=dlo.Table()),
+        quality=dlo.Quality(target_error=0.001),
+    )
+
+
+def end_of(prediction: dlo.Prediction) -> np.ndarray:
+    """Return where the free end is at the end of the motion (2,) [m]."""
+    surface = prediction.surface
+    return surface.positions([1.0], [surface.horizon])[0, 0, :2]
+
+
+target = np.array([0.0, 0.3])
+known = None
+dlo.warm_up()
+for number in range(12):
+    began = time.perf_counter()
+    known = dlo.predict(scene(target), like=known)
+    miss = end_of(known) - GOAL
+    took = 1e3 * (time.perf_counter() - began)
+    off = 1e3 * np.linalg.norm(miss)
+    print(f"{number}: target ({target[0]:.3f}, {target[1]:.3f}) m, missed by {off:.1f} mm, {took:.1f} ms")
+    if np.linalg.norm(miss) < 1e-3:
+        break
+    beside = dlo.predict_many([scene(target + STEP * axis) for axis in np.eye(2)], like=known)
+    jacobian = np.column_stack([(end_of(p) - end_of(known)) / STEP for p in beside])
+    step = -np.linalg.solve(jacobian, miss)
+    target = target + step * min(1.0, FARTHEST / float(np.linalg.norm(step)))
+print(known.message)
