@@ -66,9 +66,10 @@ def march_steps(
     """Advance from step `start` to `stop` by the generalised-alpha method (Chung and Hulbert, 1993).
 
     M [(1 - alpha_m) a1 + alpha_m a0] + (1 - alpha_f) G1 + alpha_f G0 = 0 with G = f(q, v) + C v - F, and Newmark's
-    relations between q, v and a. The first Newton step of a time step has the full tangent, later ones its factors. A
-    step that does not converge so, or whose tangent is not positive, is done again with the positive semidefinite part
-    of the tangent where needed and a line search on the work of the residual.
+    relations between q, v and a. The first Newton step of a time step has the full tangent, later ones its factors, and
+    are corrected by earlier ones where the band can't hold all of the tangent. A step that does not converge so, or
+    whose tangent is not positive, is done again with the positive semidefinite part of the tangent where needed and a
+    line search on the work of the residual.
 
     Args:
         axes: (0, 1), (0, 1, 2) or (0, 1, 2, 3).
@@ -134,11 +135,11 @@ def march_steps(
     first_contraction, first_update = 1.0, 1.0  # of the first update of a step, as last measured
     # the acceleration at the start knows of no damping yet, which would make too much of it
     bent = 0.0 if mixes else 0.5
-    mixing, known = room(free if mixes else 0), -1
+    mixing, differences = room(free if mixes else 0), -1
     for k in range(start + 1, stop + 1):
         load = applied[min(k, len(applied) - 1)]
         q0 = Q[k - 1]
-        # backward differences for the rate of curvature: its force then has a potential, and an exact tangent
+        # backward differences for the rate of curvature: in the plane its force has a potential, and an exact tangent
         rates = (1.5 / h, -2.0 / h, 0.5 / h, h) if k - begin > 1 else (1.0 / h, -1.0 / h, 0.0, h)
         first = 2 if dull > 0 else 0
         attempts = 4 if touches or tight or dull > 0 else 2
@@ -220,7 +221,7 @@ def march_steps(
                 else:
                     solve(A, trial_x)
                 if mixes:
-                    known = mixed(mixing, -1 if refactor else known, trial_x)
+                    differences = mixed(mixing, -1 if refactor else differences, trial_x)
                 expand_vector(e, trial_x, change)
                 update = 0.0  # largest step of a control point, the same in every frame
                 for i in range(n):

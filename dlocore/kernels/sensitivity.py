@@ -111,7 +111,7 @@ def follow_steps(
     change = np.empty(size)
     keeps = keeps_history(active)
     mixes = nc == 3 and bool(active[DAMPING])  # its tangent is not complete
-    mixing, known_steps = room(len(x) if mixes else 0), -1
+    mixing, differences = room(len(x) if mixes else 0), -1
     worst = 0.0
     for k in range(1, len(Q)):
         al_m, al_f, gm, ta, _, carry = newmark(rho, h, jumps and k == 1)
@@ -138,9 +138,7 @@ def follow_steps(
             reduce_vector(e, R.ravel(), x)
             solve(factors[k - 1], x)
             if mixes:
-                x *= -1.0
-                known_steps = mixed(mixing, -1 if it == 0 else known_steps, x)
-                x *= -1.0
+                differences = mixed(mixing, -1 if it == 0 else differences, x)
             expand_vector(e, x, change)
             previous = left
             left = 0.0
