@@ -221,7 +221,6 @@ class _Motion:
             hinges.second,
             hinges.per_length,
             hinges.rest,
-            hinges.eps,
             rod.axial,
             rod.bending,
             rod.bending_damping,

@@ -49,16 +49,8 @@ def bend_plane(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def bend_space(
-    t: Any, inverse: Any, rate: Any, q: Any, first: Any, second: Any, per_length: Any, eps: Any, EI: float, eta: float
-) -> None:
-    """Add to the edge forces `q` (3, e) [N] those of all hinges in space, where the angle has no sign.
-
-    The damping is that of the model on D = t_b - t_a, the discrete curvature times l: the moment on D is
-    eta/l (eps^2 D* + D (D.D')/cos^2(phi/2)) / (|D|^2 + eps^2), with `eps` (hinges,) the passage near zero curvature
-    times l and D* the part of D' across the mean tangent. The cosine makes the radial part the rate of phi itself.
-    """
-    moment = np.zeros(3)
+def bend_space(t: Any, inverse: Any, q: Any, first: Any, second: Any, per_length: Any, EI: float) -> None:
+    """Add to the edge forces `q` (3, e) [N] the elastic ones of all hinges in space, where the angle has no sign."""
     for j in range(len(first)):
         a, b = first[j], second[j]
         less, more = 0.0, 0.0
@@ -72,25 +64,99 @@ def bend_space(
         for d in range(3):
             q[d, a] -= stiff * inverse[a] * (t[d, b] - cosine * t[d, a])
             q[d, b] -= stiff * inverse[b] * (t[d, a] - cosine * t[d, b])
-        if eta > 0.0:
-            square = eps[j] * eps[j]
-            radial, turned = 0.0, 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _binormal(a: Any, b: Any, out: Any) -> None:
+    """Write 2 a x b/(1 + a . b) of two unit vectors."""
+    s = 2.0 / (1.0 + a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+    out[0], out[1], out[2] = (
+        s * (a[1] * b[2] - a[2] * b[1]),
+        s * (a[2] * b[0] - a[0] * b[2]),
+        s * (a[0] * b[1] - a[1] * b[0]),
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def damp_space(t: Any, inverse: Any, rate: Any, q: Any, first: Any, second: Any, per_length: Any, eta: float) -> None:
+    """Add to the edge forces `q` (3, e) [N] those of the damping of all hinges in space.
+
+    It is that of the model (docs/model.md eq. 9) on D = t_b - t_a, the discrete curvature times l, as sections see it
+    that do not twist: hinges stand across the mean tangent m, and from one to the next sections spin by the change of
+    the angle by which carrying along the rod and in time differ. The spin of all of them is that of the least power.
+    Along D the rate is that of the angle phi itself, across it that of a vector of this length. The torque that keeps
+    the sections from twisting acts on m.
+    """
+    hinges = len(first)
+    m, dm = np.empty((hinges, 3)), np.empty((hinges, 3))  # mean tangent and its rate
+    D, A = np.empty((hinges, 3)), np.empty((hinges, 3))  # D and its rate
+    size, stretch = np.empty(hinges), np.empty(hinges)  # |t_a + t_b|, and (phi/|D|)^2
+    side, binormal = np.empty(3), np.empty(3)
+    spin, power, square = 0.0, 0.0, 0.0
+    for j in range(hinges):
+        a, b = first[j], second[j]
+        more, less, turned, along = 0.0, 0.0, 0.0, 0.0
+        for d in range(3):
+            m[j, d], dm[j, d] = t[d, b] + t[d, a], rate[d, b] + rate[d, a]
+            D[j, d], A[j, d] = t[d, b] - t[d, a], rate[d, b] - rate[d, a]
+            more += m[j, d] ** 2
+            less += D[j, d] ** 2
+        size[j] = np.sqrt(more)
+        sine = np.sqrt(less * more)
+        stretch[j] = (turning_angle(0.5 * sine, 0.25 * (more - less)) ** 2 / less) if less > 1e-24 else 1.0
+        for d in range(3):
+            m[j, d] /= size[j]
+            turned += m[j, d] * A[j, d]
+            along += m[j, d] * dm[j, d]
+        for d in range(3):
+            A[j, d] -= turned * m[j, d]
+            dm[j, d] = (dm[j, d] - along * m[j, d]) / size[j]
+        if j > 0:
+            _binormal(m[j - 1], m[j], binormal)
             for d in range(3):
-                radial += (t[d, b] - t[d, a]) * (rate[d, b] - rate[d, a])
-                turned += (t[d, b] + t[d, a]) * (rate[d, b] - rate[d, a])
-            radial *= 4.0 / more
-            turned /= more
-            scale = eta * per_length[j] / (less + square)
-            along_a, along_b = 0.0, 0.0
+                spin -= 0.5 * binormal[d] * (dm[j - 1, d] + dm[j, d])
+        w = per_length[j] * stretch[j]
+        for d in range(3):
+            side[d] = m[j, d - 2] * D[j, d - 1] - m[j, d - 1] * D[j, d - 2]
+        for d in range(3):
+            A[j, d] -= spin * side[d]
+            power += w * side[d] * A[j, d]
+            square += w * side[d] * side[d]
+    spin = power / square if square > 0.0 else 0.0
+    torque = 0.0
+    for j in range(hinges):
+        a, b = first[j], second[j]
+        less, radial = 0.0, 0.0
+        for d in range(3):
+            side[d] = m[j, d - 2] * D[j, d - 1] - m[j, d - 1] * D[j, d - 2]
+            A[j, d] -= spin * side[d]
+            less += D[j, d] ** 2
+            radial += D[j, d] * A[j, d]
+        # 1/cos^2(phi/2) - (phi/|D|)^2, over |D|^2: phi^2/6 to second order
+        more = (4.0 / size[j] ** 2 - stretch[j]) / less if less > 1e-8 else 1.0 / 6.0
+        if j > 0:
+            _binormal(m[j - 1], m[j], binormal)
+            for k in (j - 1, j):
+                along = 0.0
+                for d in range(3):
+                    along += binormal[d] * m[k, d]
+                for d in range(3):
+                    # the force on m, on to the two tangents and their edges
+                    on = -0.5 * torque * (binormal[d] - along * m[k, d]) / size[k]
+                    dm[k, d] = dm[k, d] + on if k < j else on
+        else:
             for d in range(3):
-                turn = t[d, b] - t[d, a]
-                across = rate[d, b] - rate[d, a] - turned * (t[d, b] + t[d, a])
-                moment[d] = scale * (square * across + turn * radial)
-                along_a += moment[d] * t[d, a]
-                along_b += moment[d] * t[d, b]
+                dm[j, d] = 0.0
+        for d in range(3):
+            A[j, d] = eta * per_length[j] * (stretch[j] * A[j, d] + more * radial * D[j, d])
+            torque += side[d] * A[j, d]
+    for j in range(hinges):
+        for column, sign in ((first[j], -1.0), (second[j], 1.0)):
+            along = 0.0
             for d in range(3):
-                q[d, a] -= inverse[a] * (moment[d] - along_a * t[d, a])
-                q[d, b] += inverse[b] * (moment[d] - along_b * t[d, b])
+                along += (sign * A[j, d] + dm[j, d]) * t[d, column]
+            for d in range(3):
+                q[d, column] += inverse[column] * (sign * A[j, d] + dm[j, d] - along * t[d, column])
 
 
 def _build(dims: int) -> Callable[..., float]:
@@ -109,7 +175,6 @@ def _build(dims: int) -> Callable[..., float]:
         second: Any,
         per_length: Any,
         rest: Any,
-        eps: Any,
         EA: float,
         EI: float,
         eta: float,
@@ -172,7 +237,9 @@ def _build(dims: int) -> Callable[..., float]:
                 if dims == 2:
                     bend_plane(t, inverse, rate, q, first, second, per_length, rest, EI, eta)
                 else:
-                    bend_space(t, inverse, rate, q, first, second, per_length, eps, EI, eta)
+                    bend_space(t, inverse, q, first, second, per_length, EI)
+                    if eta > 0.0:
+                        damp_space(t, inverse, rate, q, first, second, per_length, eta)
                 for d in range(dims):
                     force[d, 0] = q[d, 0]
                     for k in range(1, edges):

@@ -11,7 +11,6 @@ from dlocore.spline import design_matrix, uniform_knots
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-NEAR_STRAIGHT = 0.1  # curvature times L below which the model's damping takes the whole rate (docs/model.md eq. 9)
 SAFETY = 0.8  # of the stability limit of the time step
 
 
@@ -26,13 +25,12 @@ class Start:
 
 @dataclass(frozen=True)
 class Hinges:
-    """What the bending acts on: joined columns, 1/l [1/m], rest angles [rad], and the damping's passage near zero."""
+    """What the bending acts on: joined columns, 1/l [1/m], and rest angles [rad]."""
 
     first: Integers
     second: Integers
     per_length: Floats
     rest: Floats
-    eps: Floats
 
 
 @dataclass(frozen=True)
@@ -208,7 +206,7 @@ class Rod:
             held = [np.asarray(hold.directions(np.array([hold.grasp.start]))[0])[list(self.axes)] for hold in holds]
             t = np.concatenate([np.diff(self.start, axis=1), np.reshape(held, (-1, len(self.axes))).T], axis=1)
             rest = np.arctan2(t[0, a] * t[1, b] - t[1, a] * t[0, b], t[0, a] * t[0, b] + t[1, a] * t[1, b])
-        return Hinges(a, b, 1.0 / length, rest, NEAR_STRAIGHT * length / self.grid[-1])
+        return Hinges(a, b, 1.0 / length, rest)
 
     def direction(self, x: Floats, node: int) -> Floats:
         """Return the direction of the cable `x` (dims, n) at a node, of second order in h; (3,)."""

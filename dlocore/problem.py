@@ -269,9 +269,7 @@ def pose(scene: Scene, called_for: Mapping[str, str] | None = None) -> Problem:
         if active("inertia", cast(float, cable.axial_damping) > 0)
         else None,
         bend=Bend(cast(float, cable.bending_stiffness)) if active("bend") else None,
-        damping=Damping(cable.bending_damping, cable.length, twisted)
-        if active("damping", cable.bending_damping > 0)
-        else None,
+        damping=Damping(cable.bending_damping) if active("damping", cable.bending_damping > 0) else None,
         quadratic_drag=QuadraticDrag(environment.drag_quadratic)
         if active("drag", environment.drag_quadratic > 0)
         else None,

@@ -159,7 +159,7 @@ def _forces(problem: Problem) -> dict[str, Force]:
 
     def damping(q: Floats, v: Floats, a: Floats, level: Level) -> Floats:
         active, parameters = problem.law_table()
-        law = Damping(scene.cable.bending_damping, scene.cable.length, problem.twist is not None)
+        law = Damping(scene.cable.bending_damping)
         with_damping, table = active * 0, parameters.copy()
         with_damping[laws.DAMPING], with_damping[laws.TWIST] = 1, active[laws.TWIST]
         table[laws.DAMPING, :2] = law.parameters()

@@ -1,13 +1,8 @@
-"""Internal damping on the rate of curvature, so that a rigid swing costs nothing (docs/model.md eq. 9).
+"""Internal damping on the rate of curvature that the sections see, so that a rigid swing costs nothing.
 
-With a twist coordinate the rate is that of the two curvatures in the frame of the sections, and of the twist rate.
-Without one the spin of the sections about the tangent is free, and only the radial part of the rate
-costs: kappa_t . kappa/|kappa|. Near zero curvature that direction is undefined; there the whole rate costs, with a
-smooth passage at |kappa| of about `EPSILON`/L: the dissipation density is
-
-    eta/2 (eps^2 |kappa_t|^2 + (kappa . kappa_t)^2) / (|kappa|^2 + eps^2)  [W/m],
-
-in the plane, where kappa has one component, exactly eta/2 kappa_t^2.
+With the sections' frames turning as they do, the dissipation density is eta/2 |kappa_t|^2 (docs/model.md eq. 9): with a
+twist coordinate the rate is that of the two curvatures in the frame of the sections, and of the twist rate; without one
+it is that of sections that do not twist (`kernels/bishop.py`); in the plane, that of the one curvature.
 """
 
 from dataclasses import dataclass
@@ -16,24 +11,18 @@ from typing import ClassVar
 from dlocore.effects.base import Effect, Site, Symmetric, Vector
 from dlocore.kernels.compile import law
 
-EPSILON = 0.1  # times 1/L: a cable bent to less than a tenth of a radian over its length
-
 
 @dataclass(frozen=True)
 class Damping(Effect):
-    """Bending damping eta [N m^2 s], the length L [m] that scales the passage near zero curvature, and whether the
-    curvature is that in the frame of the sections, whose whole rate costs.
-    """
+    """Bending damping eta [N m^2 s]."""
 
     name: ClassVar[str] = "damping"
     site: ClassVar[Site] = "curvature"
     bending_damping: float
-    length: float
-    of_sections: bool = False
 
     def parameters(self) -> tuple[float, ...]:
-        """Return (eta, eps^2)."""
-        return (self.bending_damping, 1e12 if self.of_sections else (EPSILON / self.length) ** 2)
+        """Return the damping."""
+        return (self.bending_damping,)
 
 
 @dataclass(frozen=True)
@@ -50,15 +39,6 @@ class TwistDamping(Effect):
 
 
 @law
-def damping_moment(eta: float, epsilon2: float, kappa: Vector, rate: Vector) -> tuple[Vector, Symmetric]:
-    """Return M = V kappa_t and V = eta (eps^2 I + kappa kappa') / (|kappa|^2 + eps^2), which is positive definite."""
-    x, y, z = kappa
-    scale = eta / (epsilon2 + x * x + y * y + z * z)
-    along = x * rate[0] + y * rate[1] + z * rate[2]
-    moment = (
-        scale * (epsilon2 * rate[0] + x * along),
-        scale * (epsilon2 * rate[1] + y * along),
-        scale * (epsilon2 * rate[2] + z * along),
-    )
-    diagonal = (scale * (epsilon2 + x * x), scale * (epsilon2 + y * y), scale * (epsilon2 + z * z))
-    return moment, (*diagonal, scale * x * y, scale * x * z, scale * y * z)
+def damping_moment(eta: float, rate: Vector) -> tuple[Vector, Symmetric]:
+    """Return M = eta kappa_t and its derivative by the rate."""
+    return (eta * rate[0], eta * rate[1], eta * rate[2]), (eta, eta, eta, 0.0, 0.0, 0.0)

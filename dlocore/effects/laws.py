@@ -139,7 +139,7 @@ def curvature_stress(
                 -EI * change[3], -EI * change[4], -EI * change[5],
             )  # fmt: skip
     if active[DAMPING]:
-        damping, viscosity = damping_moment(p[DAMPING, 0], p[DAMPING, 1], kappa, rate)
+        damping, viscosity = damping_moment(p[DAMPING, 0], rate)
         moment = (moment[0] + damping[0], moment[1] + damping[1], moment[2] + damping[2])
     return moment, stiffness, viscosity
 

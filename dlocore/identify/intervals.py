@@ -131,11 +131,7 @@ def _shaken(search: "Search", state: "State", scale: Floats) -> Floats:
 
 
 def _refined(search: "Search", state: "State", scale: Floats) -> Floats:
-    """Return the gradient of the misfit that a net twice as fine and half the step give.
-
-    A few more control points would not tell: in space, bending damping without twist is not smooth where the cable is
-    straight, and the motion converges slowly with the net.
-    """
+    """Return the gradient of the misfit that a net twice as fine and half the step give."""
     resolution = search.resolution
     finer = replace(resolution, n_u=2 * resolution.n_u - DEGREE, step=0.5 * resolution.step)
     total = np.zeros(len(search.chosen))

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.effects.laws import CONTACT, SELF_CONTACT, has_kinks, keeps_history
+from dlocore.effects.laws import CONTACT, DAMPING, SELF_CONTACT, has_kinks, keeps_history
 from dlocore.kernels.assembly import (
     NO_RATES,
     add_scalar_band,
@@ -18,11 +18,13 @@ from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_mat
 from dlocore.kernels.basis import basis_rows
 from dlocore.kernels.compile import brief, kernel
 from dlocore.kernels.contact import strikes
+from dlocore.kernels.mixing import mixed, room
 from dlocore.kernels.selfcontact import clear_way, closing, factor_wide, place_nodes, press, solve_wide, widen
 
 FAILED_STEP, LEFT, DEEPEST = range(3)  # places in `info`
 _REFRESH = 0.1  # contraction of the updates above which the old factors no longer serve
 _PLAIN_ITERATIONS = 8  # Newton iterations before a step is done again with a line search
+_MIXED_ITERATIONS = 80  # with mixing, which learns from iterations with the same factors
 _ROBUST_ITERATIONS = 60
 _STRIKE = 0.02  # [m/s]: a node that comes faster to what it touches would bounce, by an amount that steps decide
 _DULL = 3  # steps by backward Euler, of which the cable does not bounce
@@ -64,9 +66,10 @@ def march_steps(
     """Advance from step `start` to `stop` by the generalised-alpha method (Chung and Hulbert, 1993).
 
     M [(1 - alpha_m) a1 + alpha_m a0] + (1 - alpha_f) G1 + alpha_f G0 = 0 with G = f(q, v) + C v - F, and Newmark's
-    relations between q, v and a. The first Newton step of a time step has the full tangent, later ones its factors. A
-    step that does not converge so, or whose tangent is not positive, is done again with the positive semidefinite part
-    of the tangent where needed and a line search on the work of the residual.
+    relations between q, v and a. The first Newton step of a time step has the full tangent, later ones its factors, and
+    are corrected by earlier ones where the band can't hold all of the tangent. A step that does not converge so, or
+    whose tangent is not positive, is done again with the positive semidefinite part of the tangent where needed and a
+    line search on the work of the residual.
 
     Args:
         axes: (0, 1), (0, 1, 2) or (0, 1, 2, 3).
@@ -104,6 +107,9 @@ def march_steps(
     # steps to come by backward Euler; the first one, where the acceleration at the start knows of no contact yet, or
     # is that of the instant of a jump
     dull = 1 if (touches or jumps) and start == begin else 0
+    # the tangent of this damping is not complete; across kinks earlier iterations teach nothing
+    mixes = nc == 3 and bool(active[DAMPING]) and not exact and not tight
+    plain_iterations = _MIXED_ITERATIONS if mixes else _PLAIN_ITERATIONS
     free = size - len(e.held)
     largest = 10.0 * np.sum(tables.weight)  # an update of ten lengths is divergence
     K = np.empty((size, 4 * nc))
@@ -127,10 +133,13 @@ def march_steps(
     S = np.empty((free if tight else 0, free if tight else 0))
     pairs, wide, depth, share = 0, False, 0.0, 1.0
     first_contraction, first_update = 1.0, 1.0  # of the first update of a step, as last measured
+    # the acceleration at the start knows of no damping yet, which would make too much of it
+    bent = 0.0 if mixes else 0.5
+    mixing, differences = room(free if mixes else 0), -1
     for k in range(start + 1, stop + 1):
         load = applied[min(k, len(applied) - 1)]
         q0 = Q[k - 1]
-        # backward differences for the rate of curvature: its force then has a potential, and an exact tangent
+        # backward differences for the rate of curvature: in the plane its force has a potential, and an exact tangent
         rates = (1.5 / h, -2.0 / h, 0.5 / h, h) if k - begin > 1 else (1.0 / h, -1.0 / h, 0.0, h)
         first = 2 if dull > 0 else 0
         attempts = 4 if touches or tight or dull > 0 else 2
@@ -157,7 +166,7 @@ def march_steps(
                     elif k - begin > 2:
                         q1[i, d] = 3.0 * q0[i, d] - 3.0 * Q[k - 2, i, d] + Q[k - 3, i, d]
                     else:
-                        q1[i, d] = q0[i, d] + h * v[i, d] + (0.0 if late else 0.5 * h * h * a[i, d])
+                        q1[i, d] = q0[i, d] + h * v[i, d] + (0.0 if late else bent * h * h * a[i, d])
             place_held(e, offsets[k], q1.ravel())
             for i in range(n):
                 for d in range(nc):
@@ -172,12 +181,12 @@ def march_steps(
                         converged = False
                         continue  # what is held passes through a strand
             # --- iterate
-            limit = _PLAIN_ITERATIONS if not robust else _ROBUST_ITERATIONS
+            limit = plain_iterations if not robust else _ROBUST_ITERATIONS
             fresh = False
             converged = False
             previous = np.inf
             for it in range(limit):
-                refactor = robust or not fresh
+                refactor = (robust and not mixes) or not fresh
                 scales = (1.0, tv, 1.0) if refactor else (0.0, 0.0, 0.0)
                 assemble(axes, q1, v1, tables, active, p, history, rates, scales, f, K)
                 if tight:
@@ -211,6 +220,8 @@ def march_steps(
                     solve_wide(S, row_end, trial_x)
                 else:
                     solve(A, trial_x)
+                if mixes:
+                    differences = mixed(mixing, -1 if refactor else differences, trial_x)
                 expand_vector(e, trial_x, change)
                 update = 0.0  # largest step of a control point, the same in every frame
                 for i in range(n):
@@ -225,10 +236,11 @@ def march_steps(
                 if tight and robust:
                     place_nodes(q1 + step_change, tables, x2)
                     found, length = clear_way(x1, x2, tables.contact_u, p[SELF_CONTACT, 0], p[SELF_CONTACT, 4], found)
+                work = 0.0
                 if robust and update > tolerance:
-                    work = 0.0
                     for i in range(free):
                         work += trial_x[i] * x[i]
+                if work < 0.0:
                     # the work of the residual along the step rises through zero where the step's potential is least
                     low, low_work, high, high_work = 0.0, work, length, 0.0
                     for search in range(_LINE_SEARCH):
@@ -270,7 +282,9 @@ def march_steps(
                     info[LEFT] = max(info[LEFT], left)
                     converged = True
                     break
-                if not robust:
+                if mixes:
+                    fresh = length == 1.0
+                elif not robust:
                     if update > 2.0 * previous:
                         break
                     fresh = contraction <= _REFRESH

@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.effects.laws import keeps_history
+from dlocore.effects.laws import DAMPING, keeps_history
 from dlocore.kernels.assembly import assemble, remember
 from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_matrix, reduce_vector, solve
 from dlocore.kernels.compile import kernel
 from dlocore.kernels.march import _effective, _residual
+from dlocore.kernels.mixing import mixed, room
 
 _ITERATIONS = 40
 
@@ -109,6 +110,8 @@ def follow_steps(
     x = np.empty(size - len(e.held))
     change = np.empty(size)
     keeps = keeps_history(active)
+    mixes = nc == 3 and bool(active[DAMPING])  # its tangent is not complete
+    mixing, differences = room(len(x) if mixes else 0), -1
     worst = 0.0
     for k in range(1, len(Q)):
         al_m, al_f, gm, ta, _, carry = newmark(rho, h, jumps and k == 1)
@@ -134,6 +137,8 @@ def follow_steps(
                 break
             reduce_vector(e, R.ravel(), x)
             solve(factors[k - 1], x)
+            if mixes:
+                differences = mixed(mixing, -1 if it == 0 else differences, x)
             expand_vector(e, x, change)
             previous = left
             left = 0.0

@@ -18,9 +18,10 @@ from dlocore.effects.laws import (
     curvature_stress,
 )
 from dlocore.kernels.basis import row_of
+from dlocore.kernels.bishop import BEND, LENGTH, STATE, TANGENT, H, carry, rate_by_steps, rate_by_velocity, torques
 from dlocore.kernels.compile import kernel, law
 from dlocore.kernels.pairs import PAIRS, add_derivatives, add_span
-from dlocore.kernels.strain import space_curvature, space_curvature_rate, space_moment, transport
+from dlocore.kernels.strain import space_curvature, space_curvature_rate, space_moment, vector
 
 STRAIGHT = (0.0, 0.0, 0.0)  # the stress-free curvature without a twist coordinate
 
@@ -89,6 +90,32 @@ def axial(
 
 
 @kernel
+def _write_state(q: Any, tables: Any, state: Any) -> None:
+    """Write l, h, t and kappa of the curvature points (points, 8)."""
+    for n in range(len(state)):
+        k = tables.curvature_first[n]
+        a, c = combine(q, k, row_of(tables.curvature_b1, n)), combine(q, k, row_of(tables.curvature_b2, n))
+        length, h, t, kappa = space_curvature(a, c)
+        state[n, LENGTH], state[n, H] = length, h
+        for d in range(3):
+            state[n, TANGENT + d], state[n, BEND + d] = t[d], kappa[d]
+
+
+@kernel
+def _write_rate(v: Any, tables: Any, state: Any, turning: Any, rate: Any) -> None:
+    """Write the rates of the tangent and of the curvature as sections that do not spin see them (points, 3)."""
+    for n in range(len(state)):
+        k = tables.curvature_first[n]
+        a, c = combine(v, k, row_of(tables.curvature_b1, n)), combine(v, k, row_of(tables.curvature_b2, n))
+        length, t = state[n, LENGTH], vector(state, n, TANGENT)
+        change = space_curvature_rate(length, state[n, H], t, vector(state, n, BEND), a, c)
+        along = a[0] * t[0] + a[1] * t[1] + a[2] * t[2]
+        for d in range(3):
+            turning[n, d] = (a[d] - along * t[d]) / length
+            rate[n, d] = change[d]
+
+
+@kernel
 def curvature(
     q: Any, v: Any, tables: Any, active: Any, p: Any, past: Any, rates: Any, scales: Any, tangent: bool, f: Any,
     K: Any,
@@ -96,7 +123,8 @@ def curvature(
     """Add the forces and tangents of the curvature site; `past` holds kappa of two steps and t of the last (points, 9).
 
     With J = -h P / l^2 - kappa t' / l by r', and P / l by r'', the derivatives of kappa, the material part of the
-    tangent is J' S J; the geometric part is M . d2kappa.
+    tangent is J' S J; the geometric part is M . d2kappa. Of damping, what the spin of the sections depends on, all of
+    the cable, and the torque that keeps them from twisting are in the forces only.
     """
     elastic, viscous, geometric = scales
     if viscous != 0.0 and rates[0] != 0.0:
@@ -106,22 +134,29 @@ def curvature(
     sums = np.zeros((9 if tangent else 0, PAIRS))  # over a span, of the blocks' entries
     J, SJ = np.empty((2, 3, 3)), np.empty((2, 3, 3))  # of kappa by r' and by r''
     S = np.empty((3, 3))
+    damped = len(weights) if active[DAMPING] else 0
+    state, rate, by_torque = np.empty((damped, STATE)), np.empty((damped, 3)), np.empty((damped, 3))
+    if damped:
+        _write_state(q, tables, state)
+        if rates[0] != 0.0:
+            rate_by_steps(weights, state, past, rates, rate)
+        else:
+            _write_rate(v, tables, state, by_torque, rate)
+            rate_by_velocity(weights, state, by_torque, rate)
+        torques(weights, state, p[DAMPING, 0], rate, by_torque)
     for n in range(len(weights)):
         k, w = firsts[n], weights[n]
         b, c = row_of(b1, n), row_of(b2, n)
-        length, h, t, kappa = space_curvature(combine(q, k, b), combine(q, k, c))
-        rate = (0.0, 0.0, 0.0)
-        if active[DAMPING] and rates[0] != 0.0:
-            last = transport(vector(past, n, 6), t, vector(past, n, 0))
-            before = transport(vector(past, n, 6), t, vector(past, n, 3))
-            rate = (
-                rates[0] * kappa[0] + rates[1] * last[0] + rates[2] * before[0],
-                rates[0] * kappa[1] + rates[1] * last[1] + rates[2] * before[1],
-                rates[0] * kappa[2] + rates[1] * last[2] + rates[2] * before[2],
-            )
-        elif active[DAMPING]:
-            rate = space_curvature_rate(length, h, t, kappa, combine(v, k, b), combine(v, k, c))
-        M, stiffness, viscosity = curvature_stress(active, p, kappa, rate, STRAIGHT, STRAIGHT, STRAIGHT, 0.0)
+        change = (0.0, 0.0, 0.0)
+        if damped:
+            length, h, t, kappa = state[n, LENGTH], state[n, H], vector(state, n, TANGENT), vector(state, n, BEND)
+            change = vector(rate, n, 0)
+            for i in range(4):
+                for d in range(3):
+                    f[k + i, d] += b[i] * by_torque[n, d]
+        else:
+            length, h, t, kappa = space_curvature(combine(q, k, b), combine(q, k, c))
+        M, stiffness, viscosity = curvature_stress(active, p, kappa, change, STRAIGHT, STRAIGHT, STRAIGHT, 0.0)
         g, u = space_moment(length, h, t, kappa, M)
         for i in range(4):
             bi, ci = w * b[i], w * c[i]
@@ -169,24 +204,20 @@ def _column_product(X: Any, o: int, d: int, Y: Any, p: int, e: int) -> float:
     return X[o, 0, d] * Y[p, 0, e] + X[o, 1, d] * Y[p, 1, e] + X[o, 2, d] * Y[p, 2, e]
 
 
-@law
-def vector(table: Any, n: int, at: int) -> Vector:
-    """Return three columns from `at` on of row n."""
-    return table[n, at], table[n, at + 1], table[n, at + 2]
-
-
 @kernel
 def remember(q: Any, tables: Any, past: Any) -> None:
     """Make kappa and t of q the last ones in `past` (points, 9), and the last kappa, carried along, the one before."""
-    for n in range(len(past)):
-        k = tables.curvature_first[n]
-        a = combine(q, k, row_of(tables.curvature_b1, n))
-        _, _, t, kappa = space_curvature(a, combine(q, k, row_of(tables.curvature_b2, n)))
-        before = transport(vector(past, n, 6), t, vector(past, n, 0))
+    points = len(past)
+    state, before = np.empty((points, STATE)), np.empty((points, 3))
+    if points == 0:
+        return
+    _write_state(q, tables, state)
+    carry(tables.curvature_w, state, past, 1.0, 1.0, 0.0, before)
+    for n in range(points):
         for d in range(3):
-            past[n, 3 + d] = before[d]
-            past[n, d] = kappa[d]
-            past[n, 6 + d] = t[d]
+            past[n, 3 + d] = before[n, d]
+            past[n, d] = state[n, BEND + d]
+            past[n, 6 + d] = state[n, TANGENT + d]
 
 
 @kernel

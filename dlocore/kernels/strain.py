@@ -9,10 +9,18 @@ A moment M conjugate to kappa gives generalised forces g1, g2 conjugate to r', r
 J'SJ, positive semidefinite, and a geometric part M . d2kappa. In space M and kappa are vectors across the tangent.
 """
 
+from typing import Any
+
 import numpy as np
 
 from dlocore.effects.base import Vector
 from dlocore.kernels.compile import law
+
+
+@law
+def vector(table: Any, n: int, at: int) -> Vector:
+    """Return three columns from `at` on of row n."""
+    return table[n, at], table[n, at + 1], table[n, at + 2]
 
 
 @law

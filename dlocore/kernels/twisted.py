@@ -31,8 +31,8 @@ from dlocore.effects.laws import (
 from dlocore.kernels.basis import basis, find_span, row_of
 from dlocore.kernels.compile import kernel, law
 from dlocore.kernels.pairs import AA, AB, AC, BA, CA, PAIRS, add_angles, add_derivatives, add_one, add_span
-from dlocore.kernels.space import combine, vector
-from dlocore.kernels.strain import space_curvature, transport, twist_increment
+from dlocore.kernels.space import combine
+from dlocore.kernels.strain import space_curvature, transport, twist_increment, vector
 
 TANGENT, BEND, DIRECTOR, FRAME, LAST, BEFORE = 0, 3, 6, 9, 10, 13  # columns of `past`
 TWIST_RATE = LAST + 2

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from dlocore.effects import laws
 from dlocore.effects.bend import Bend
-from dlocore.effects.damping import EPSILON, Damping
+from dlocore.effects.damping import Damping
 from dlocore.effects.drag import QuadraticDrag
 from dlocore.effects.stretch import Stretch, StretchDamping
 from dlocore.kernels.assembly import NO_RATES, History, assemble, remember, stored_energy
@@ -22,7 +22,7 @@ LAWS = {
     "stretch": (laws.STRETCH, Stretch(640.0)),
     "stretch damping": (laws.STRETCH_DAMPING, StretchDamping(3.0)),
     "bend": (laws.BEND, Bend(1e-3)),
-    "damping": (laws.DAMPING, Damping(2e-3, LENGTH)),
+    "damping": (laws.DAMPING, Damping(2e-3)),
     "quadratic drag": (laws.QUADRATIC_DRAG, QuadraticDrag(0.3)),
 }
 ELASTIC = ["stretch", "bend", "bend with memory"]
@@ -141,7 +141,13 @@ def test_damping_matrix_is_the_derivative_of_the_force_by_velocity(name, nc):
     C = b.tangent(q, v, (0.0, 1.0, 0.0))
     # rounding of the force over the step; |v| v has a third derivative where v is small
     scale = max(np.abs(C).max(), 1e-3)
-    np.testing.assert_allclose(differences(lambda x: b.forces(q, x), v, 1e-6), C, atol=2e-7 * scale)
+    exact = differences(lambda x: b.forces(q, x), v, 1e-6)
+    if nc == 3 and b.active[laws.DAMPING]:
+        # the spin of the sections, which depends on all of the cable, is not in the band (test_damping_in_space.py)
+        np.testing.assert_allclose(exact, exact.T, atol=2e-7 * scale)
+        assert np.linalg.eigvalsh(exact)[0] > -2e-7 * scale * len(C)
+    else:
+        np.testing.assert_allclose(exact, C, atol=2e-7 * scale)
 
 
 @DIMENSIONS
@@ -297,12 +303,7 @@ def test_damping_does_no_work_in_a_rigid_swing(nc):
         in_space = np.zeros((N_U, 3))
         in_space[:, :nc] = q
         v = np.ascontiguousarray((np.cross(spin, in_space) + rng.normal(size=3))[:, :nc])
-        taken = power(b, q, v)
-        if nc == 2:
-            assert abs(taken) < 1e-12  # rounding
-        else:
-            # near zero curvature the whole rate costs: eta/2 eps^2 |spin|^2 a length at most (docs/model.md eq. 9)
-            assert 0.0 <= taken <= 2e-3 * (EPSILON / LENGTH) ** 2 * (spin @ spin) * LENGTH * 1.5
+        assert abs(power(b, q, v)) < 1e-12  # rounding
 
 
 @DIMENSIONS
@@ -375,8 +376,7 @@ def test_damping_by_differences_does_no_work_in_a_rigid_turn(nc):
     turned = [q @ Rotation.from_rotvec(k * h * spin).as_matrix()[:nc, :nc].T for k in (-2, -1, 0)]
     b = body("damping", nc).after(h, *turned[:2])
     v = (turned[2] - turned[1]) / h
-    bound = 1e-9 if nc == 2 else 1.5 * 2e-3 * (EPSILON / LENGTH) ** 2 * (spin @ spin) * LENGTH  # rounding / h; as above
-    assert abs(power(b, q, v)) < bound
+    assert abs(power(b, q, v)) < 1e-9  # rounding / h
 
 
 @DIMENSIONS
@@ -390,6 +390,9 @@ def test_energy_and_forces_are_continuous_at_zero_curvature(shape, nc):
         q[:, 1] = 0.1 * np.sin(2 * np.pi * q[:, 0])
     rng = np.random.default_rng(11)
     v = rng.normal(0.0, 0.5, q.shape)
+    if nc == 3 and shape == "straight":
+        # of a straight cable as a whole only steps tell how it got there, and with it how its sections spin
+        b = b.after(0.01, q - 0.02 * v, q - 0.01 * v)
     f, energy = b.forces(q, v), b.energy(q)
     K = b.tangent(q, v, (1.0, 37.0, 1.0))
     for size in (1e-12, 1e-9, 1e-6):

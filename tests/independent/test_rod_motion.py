@@ -165,7 +165,7 @@ def test_damping_of_strong_bending_in_space_is_that_in_the_plane():
     spatial = simulate(scene(TILTED, 1e-4), elements=32)[2] @ TILTED
     effect = np.abs(planar - free).max()
     assert effect > 0.01
-    # in the plane the rate has a radial part only, so both are the same sums but for eps^2 (1/cos^2 - 1)
+    # the same sums, but for the series of phi/|D| where it is small
     assert np.abs(spatial - planar).max() < 1e-4 * effect
 
 
