@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.effects import laws
 from dlocore.grid import Grid
 from dlocore.holding import Held, Starts, close_grasps, hold
 from dlocore.kernels.assembly import History
@@ -15,7 +16,6 @@ from dlocore.scene import Grasp
 Floats = NDArray[np.float64]
 
 _JUMPS = 1e-6  # of the length, on what a jump of the velocity is in a step: less is rounding
-_LEAPS = 0.01  # of the length, which the acceleration at the beginning would take the cable in the first step
 _NEAR = 1e-3 * np.arange(3.0)  # of a step: for velocity and acceleration of the paths at the beginning
 
 
@@ -28,8 +28,8 @@ class Entry:
         offsets: (k, held) [m] its prescribed part at the times of the stretch.
         closed: (n_u, nc) [m/s] velocity as the grasps close.
         v: the same, zero where inertia is left out.
-        a: (n_u, nc) [m/s^2] consistent acceleration.
-        G: (n_u, nc) [N] forces f + C v - load.
+        a: (n_u, nc) [m/s^2] consistent acceleration, and
+        G: (n_u, nc) [N] forces f + C v - load, both without the damping of stretch but at the start of the motion.
         jumps: whether the velocity jumps, so that the acceleration is that of the instant alone.
     """
 
@@ -62,12 +62,13 @@ def enter(
     close_grasps(problem, grid, grasps, starts, q)
     held = hold(problem, grid, grasps, np.concatenate([times[0] + h * _NEAR, times]), starts, q)
     active, parameters = problem.law_table()
+    if times[0] > 0.0:  # the rate of a strain that hardly changes is lost in what steps leave of the velocities
+        active[laws.STRETCH_DAMPING] = 0
     closed, a, G = begin_stretch(
         problem.axes, q, v, grid.tables.mass, problem.mass_density(), problem.drag_coefficient(), grid.tables, active,
         parameters, history, load, held.elimination, held.offsets[:3], h * _NEAR[1], problem.inertia is not None,
     )  # fmt: skip
     started = closed.copy() if problem.inertia is not None else np.zeros_like(closed)
-    length, points = problem.scene.cable.length, slice(problem.plane.dimensions)
-    jumps = h * np.abs(closed - v)[:, points].max() > _JUMPS * length
-    leaps = 0.5 * h * h * np.abs(a)[:, points].max() > _LEAPS * length
-    return Entry(held, held.offsets[3:], closed, started, a, G, bool(jumps and leaps))
+    away = np.abs(closed - v)[:, : problem.plane.dimensions].max()
+    jumps = problem.inertia is not None and h * away > _JUMPS * problem.scene.cable.length
+    return Entry(held, held.offsets[3:], closed, started, a, G, bool(jumps))

@@ -88,9 +88,10 @@ def test_a_cable_that_snaps_through_converges_with_its_steps():
     assert np.abs(fine - middle).max() < 2e-3
 
 
-@pytest.mark.parametrize("index", [132, 160])
-def test_motions_after_a_jump_of_an_undamped_cable_converge(index):
-    scene = draw(2, index).make()
+@pytest.mark.parametrize(("seed", "index"), [(2, 132), (2, 160), (1, 148)])
+def test_motions_after_a_jump_or_a_release_of_an_undamped_cable_converge(seed, index):
+    # 1:148: the rate of strain from velocities, at the release, threw it half a metre off
+    scene = draw(seed, index).make()
     found = predict(replace(scene, quality=Quality(target_error=scene.quality.target_error)))
     assert found.status == "converged", found.message
 
