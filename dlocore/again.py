@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.events import events_of
 from dlocore.paths import Waypoints
 from dlocore.plane import Plane
 from dlocore.prediction import Prediction
@@ -18,7 +19,6 @@ from dlocore.problem import Problem
 from dlocore.review import called_for
 from dlocore.scene import Grasp
 from dlocore.solvers.ladder import Level, distance, hardness, run_level
-from dlocore.solvers.march import events_of
 from dlocore.solvers.monitor import Monitor
 from dlocore.whole_march import MISSED_COUNTS, march_status
 

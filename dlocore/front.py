@@ -11,6 +11,7 @@ from dlocore.again import Again, march_again
 from dlocore.cost import Cost
 from dlocore.discretisation import smallest_n_u
 from dlocore.errors import SceneError
+from dlocore.events import smallest_n_t
 from dlocore.frames import material_of
 from dlocore.prediction import Accuracy, MaterialMotion, OnIteration, Prediction, Status
 from dlocore.problem import Problem, pose
@@ -20,7 +21,6 @@ from dlocore.report import WindowForces, effect_reports, elastic_energy, reactio
 from dlocore.review import neglected, objections
 from dlocore.scene import Method, Quality, Scene
 from dlocore.solvers.ladder import FINER, Level, Size, distance, given_steps, run_level
-from dlocore.solvers.march import smallest_n_t
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.paper import solve_as_printed
 from dlocore.solvers.spacetime import solve

@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 from dlocore.discretisation import smallest_n_u
 from dlocore.errors import SceneError
+from dlocore.events import smallest_n_t
 from dlocore.front import automatic_method
 from dlocore.prediction import EffectReport
 from dlocore.problem import pose
 from dlocore.report import planned_effects
 from dlocore.scene import Scene
 from dlocore.solvers.ladder import FINER, Size, given_steps, stretched
-from dlocore.solvers.march import smallest_n_t
 
 # Medians measured on one 2-core cloud machine of 2026; they tell the order of the time it takes.
 _MARCH = {2: 9e-7, 3: 2.2e-6, 4: 3.1e-6}  # [s] per step and control point, by coordinates

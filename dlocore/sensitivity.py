@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dlocore.discretisation import applied_forces
 from dlocore.errors import SceneError
+from dlocore.events import closed_grasps, marks_of, step_counts, time_knots
 from dlocore.grid import Grid
 from dlocore.holding import Starts
 from dlocore.kernels.march import fit_time
@@ -28,7 +29,7 @@ from dlocore.prediction import Prediction
 from dlocore.problem import Problem, pose
 from dlocore.report import surface_of
 from dlocore.scene import Scene
-from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, closed_grasps, march, marks_of, step_counts, time_knots
+from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, march
 from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.stretch import Entry, enter
 from dlocore.spline import SplineSurface

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dlocore.discretisation import applied_forces, make_grid, smallest_n_u
 from dlocore.errors import SceneError, number
+from dlocore.events import closed_grasps
 from dlocore.frames import free_of_frames
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
@@ -18,7 +19,6 @@ from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
 from dlocore.report import WindowForces, elastic_energy, reactions
 from dlocore.scene import Grasp, Scene
-from dlocore.solvers.march import closed_grasps
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.spline import design_matrix
 

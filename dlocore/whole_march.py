@@ -5,13 +5,14 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from dlocore.discretisation import smallest_n_u
+from dlocore.events import smallest_n_t
 from dlocore.kernels.assembly import slopes
 from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
 from dlocore.progress import record_level
 from dlocore.review import called_for
 from dlocore.solvers.ladder import Level, Size, hardness, run_level
-from dlocore.solvers.march import RHO, smallest_n_t
+from dlocore.solvers.march import RHO
 from dlocore.solvers.monitor import Monitor
 
 TOO_DEEP = 0.25  # of the diameter, in the table, an obstacle or itself

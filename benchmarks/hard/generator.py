@@ -19,8 +19,8 @@ from benchmarks.hard.surroundings import (
 )
 from dlocore import Move, Quality, Scene
 from dlocore.discretisation import smallest_n_u
+from dlocore.events import events_of, smallest_n_t
 from dlocore.problem import pose
-from dlocore.solvers.march import events_of, smallest_n_t
 
 IMPOSSIBLE = 0.05  # share of scenes that no cable can follow
 

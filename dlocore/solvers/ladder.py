@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from dlocore.discretisation import smallest_n_u
 from dlocore.effects.contact import DEEPEST
+from dlocore.events import smallest_n_t, time_knots
 from dlocore.grid import Grid
 from dlocore.kernels.basis import basis_rows
 from dlocore.problem import Problem, stiffer
-from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, fit, march, missed, refined, smallest_n_t, time_knots
+from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, march
 from dlocore.solvers.monitor import Monitor
+from dlocore.solvers.timefit import fit, missed, refined
 from dlocore.statics import start_grid
 
 Floats = NDArray[np.float64]

@@ -1,29 +1,25 @@
 """The compiled march: implicit steps of the spatial spline, fitted by the time spline."""
 
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.discretisation import applied_forces
 from dlocore.effects.friction import SLIP_SPEED
+from dlocore.events import closed_grasps, marks_of, step_counts, step_times
 from dlocore.grid import Grid
 from dlocore.holding import Starts, hold
 from dlocore.kernels.assembly import History, note, times_scalar_band
 from dlocore.kernels.banded import Elimination
-from dlocore.kernels.basis import graded_knots
 from dlocore.kernels.march import (
     DEEPEST,
     FAILED_STEP,
     LEFT,
     constrained_mass_solve,
-    fit_missed,
-    fit_time,
     march_steps,
 )
 from dlocore.kernels.twisted import PAST
-from dlocore.paths import Move, Waypoints
 from dlocore.problem import Problem
 from dlocore.report import WindowForces
 from dlocore.scene import Grasp
@@ -39,23 +35,9 @@ STRONGLY_DAMPED = 0.0
 TOLERANCE = 1e-8  # of the length, on the error that the Newton iterations of a step leave
 LEAST_TOLERANCE = 1e-11
 COARSE = 1 / 256  # of the period of a cable that swings: of shorter steps the tolerance goes with their square
-_REFINEMENTS = 8  # of the time knots: each halves spans
 _RESTS = 0.05  # of the diameter above the table: nearer to it the cable rests on it
 _CHUNK = 256  # steps between looks at the clock
 _SPLITS = (4, 16, 64)  # parts of a step that found no equilibrium
-
-
-@dataclass(frozen=True, eq=False)
-class Event:
-    """A time at which the motion is not smooth, and how much of it jumps.
-
-    Attributes:
-        time: [s].
-        multiplicity: of the time knot there: 1 smooth, 2 acceleration jumps, 3 velocity jumps.
-    """
-
-    time: float
-    multiplicity: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,78 +111,6 @@ class March:
         return History(memory, np.ascontiguousarray(past), axial, start.stick, start.slide)
 
 
-def events_of(problem: Problem) -> list[Event]:
-    """Return the events inside the horizon, by time."""
-    found: dict[float, int] = {}
-
-    def add(time: float, multiplicity: int) -> None:
-        if 0.0 < time < problem.horizon * (1 - 1e-9):
-            found[time] = max(found.get(time, 0), multiplicity)
-
-    for g in problem.scene.grasps:
-        add(g.start, 3)
-        if g.release_time is not None:
-            add(g.release_time, 2)
-        released = np.inf if g.release_time is None else g.release_time
-        end = g.start + g.path.duration
-        if g.path.duration and end < released:
-            add(end, _smoothness(g, g.path.duration))
-        if isinstance(g.path, Waypoints):
-            add(g.start + float(np.asarray(g.path.times)[0]), 2)
-    return [Event(t, found[t]) for t in sorted(found)]
-
-
-def _smoothness(grasp: Grasp, end: float) -> int:
-    if isinstance(grasp.path, Move):
-        return {"minimum_jerk": 1, "cubic": 2, "linear": 3}[grasp.path.profile]
-    return 3
-
-
-def time_knots(problem: Problem, n_t: int) -> Floats | None:
-    """Return the time knots (n_t + 4,) [s] with a knot at every event, or None where n_t is too small for them."""
-    events = events_of(problem)
-    times = np.array([e.time for e in events])
-    multiplicity = np.array([e.multiplicity for e in events], dtype=np.int64)
-    knots = graded_knots(n_t, problem.horizon, times, multiplicity, np.zeros(len(events)), np.ones(len(events)))
-    return knots if len(knots) else None
-
-
-def smallest_n_t(problem: Problem) -> int:
-    """Return the least number of control points in time that has a knot at every event."""
-    return max(5, 4 + sum(e.multiplicity for e in events_of(problem)))
-
-
-def closed_grasps(problem: Problem, begin: float, end: float) -> list[Grasp]:
-    """Return the grasps that hold all through the times `begin` to `end` [s]."""
-    middle = 0.5 * (begin + end)
-    return [
-        g for g in problem.scene.grasps if g.start <= middle and (g.release_time is None or g.release_time > middle)
-    ]
-
-
-def marks_of(problem: Problem) -> list[float]:
-    """Return the times [s] between which the motion is smooth: its beginning, its events and its end."""
-    return [0.0, *[e.time for e in events_of(problem)], problem.horizon]
-
-
-def step_counts(marks: list[float], steps: int) -> list[int]:
-    """Return the time steps of each stretch between the marks, about `steps` in all, more where marks lie close."""
-    if len(marks) == 2:
-        return [steps]
-    return [max(8, steps // (2 * len(marks)), round(steps * (b - a) / marks[-1])) for a, b in pairwise(marks)]
-
-
-def _times(marks: list[float], counts: list[int]) -> Floats:
-    """Return the times (steps + 1,) [s] of a march with so many steps between each two marks."""
-    times = np.zeros(sum(counts) + 1)
-    first = 0
-    for (a, b), count in zip(pairwise(marks), counts, strict=True):
-        times[first : first + count] = a + (b - a) / count * np.arange(count)
-        first += count
-        times[first] = b
-    return times
-
-
 def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: float = RHO) -> March:
     """March the motion of a problem on `grid` in about `steps` equal steps, more where events lie close.
 
@@ -211,7 +121,7 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
     counts = step_counts(marks, steps)
     if problem.inertia is None or problem.contact is not None or problem.friction is not None:
         rho = STRONGLY_DAMPED  # forces that jump are balanced at the end of each step
-    walk = _Walk(problem, grid, monitor, _times(marks, counts), rho)
+    walk = _Walk(problem, grid, monitor, step_times(marks, counts), rho)
     first = 0
     for begin, end, count in zip(marks[:-1], marks[1:], counts, strict=True):
         walk.go(begin, end, first, first + count)
@@ -457,59 +367,3 @@ def _to_ends_of_steps(reactions: Floats, lag: float) -> None:
         rate = reactions[2:] - reactions[1:-1]
         reactions[1:-1] += lag * rate
         reactions[-1] += lag * rate[-1]
-
-
-def refined(motion: March, knots_t: Floats, tolerance: float) -> tuple[Floats, March]:
-    """Return time knots, more where the time spline misses the motion by more than `tolerance` [m], and what to fit.
-
-    Where a cable strikes something its velocity jumps, and a spline without knots there goes on into the obstacle, or
-    swings past its states. There the states half-way through the steps are added to the motion, and knots beside them.
-    """
-    for _ in range(_REFINEMENTS):
-        control = fit(motion, knots_t)
-        off = missed(motion, knots_t, control)
-        between = _halved(motion, knots_t, control, tolerance)
-        breaks = np.unique(knots_t)
-        span = np.clip(np.searchsorted(breaks, motion.times, side="right") - 1, 0, len(breaks) - 2)
-        new = []
-        for k in np.unique(span[off > tolerance]):
-            inside = motion.times[(motion.times > breaks[k] + 1e-12) & (motion.times < breaks[k + 1] - 1e-12)]
-            if len(inside) > 1:
-                new.append(inside[len(inside) // 2])
-        if not new and between is motion:
-            break
-        knots_t = np.sort(np.concatenate([knots_t, new]))
-        motion = between
-    return knots_t, motion
-
-
-def missed(motion: March, knots_t: Floats, control: Floats) -> Floats:
-    """Return by how much the time spline of `control` (n_t, n_u, nc) misses each state (steps + 1,) [m]."""
-    return _missed(knots_t, motion.times, motion.states, control)
-
-
-def _missed(knots_t: Floats, times: Floats, states: Floats, control: Floats) -> Floats:
-    return np.asarray(fit_missed(knots_t, times, states, control, min(3, control.shape[2])))
-
-
-def _halved(motion: March, knots_t: Floats, control: Floats, tolerance: float) -> March:
-    """Return the motion with states half-way through those steps where the spline leaves the chord of the states."""
-    times, states = motion.times, motion.states
-    middle = 0.5 * (times[1:] + times[:-1])
-    chord = 0.5 * (states[1:] + states[:-1])
-    away = _missed(knots_t, middle, chord, control)
-    split = np.flatnonzero((away > tolerance) & (np.diff(times) > 0.2 * np.median(np.diff(times))))
-    if len(split) == 0:
-        return motion
-    return replace(
-        motion,
-        times=np.insert(times, split + 1, middle[split]),
-        states=np.insert(states, split + 1, chord[split], axis=0),
-    )
-
-
-def fit(motion: March, knots_t: Floats) -> Floats:
-    """Return control points (n_t, n_u, nc) [m] of the time spline fitted to a marched motion."""
-    steps, n_u, nc = motion.states.shape
-    flat = fit_time(knots_t, motion.times, motion.states.reshape(steps, n_u * nc), motion.velocity.reshape(-1))
-    return flat.reshape(len(knots_t) - 4, n_u, nc)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from dlocore.discretisation import applied_forces
 from dlocore.effects import laws
+from dlocore.events import closed_grasps, events_of
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.assembly import times_scalar_band
@@ -24,7 +25,7 @@ from dlocore.kernels.march import constrained_mass_solve, fit_time
 from dlocore.problem import Problem
 from dlocore.report import WindowForces
 from dlocore.scene import Grasp
-from dlocore.solvers.march import March, closed_grasps, events_of
+from dlocore.solvers.march import March
 from dlocore.solvers.monitor import Monitor
 
 Floats = NDArray[np.float64]

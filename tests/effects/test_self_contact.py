@@ -12,12 +12,12 @@ from dlocore import Cable, Environment, Grasp, Move, Points, Prediction, Quality
 from dlocore.discretisation import make_grid
 from dlocore.effects import laws
 from dlocore.effects.selfcontact import APART, nearest_strands
+from dlocore.events import closed_grasps
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.banded import Elimination, elimination, factor, reduce_matrix, solve
 from dlocore.kernels.selfcontact import clear_way, factor_wide, press, solve_wide, widen
 from dlocore.problem import Problem, pose
-from dlocore.solvers.march import closed_grasps
 
 Floats = NDArray[np.float64]
 DIAMETER = 0.005  # [m]

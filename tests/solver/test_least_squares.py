@@ -5,14 +5,16 @@ import pytest
 from numpy.typing import NDArray
 
 from dlocore import Cable, Environment, Grasp, Move, Points, Scene, Table
+from dlocore.events import closed_grasps, time_knots
 from dlocore.holding import Starts, close_grasps
 from dlocore.kernels.assembly import NO_RATES, assemble, history_at
 from dlocore.kernels.banded import factor, factor_columns
 from dlocore.kernels.leastsquares import band_to_dense, states_at
 from dlocore.problem import pose
-from dlocore.solvers.march import closed_grasps, fit, march, time_knots
+from dlocore.solvers.march import march
 from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.spacetime import WindowSolver, windows_of
+from dlocore.solvers.timefit import fit
 from dlocore.statics import start_grid
 
 Floats = NDArray[np.float64]

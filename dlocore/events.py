@@ -1,0 +1,99 @@
+"""When a motion is not smooth, and what follows from that: its stretches, their steps, and the knots in time."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.kernels.basis import graded_knots
+from dlocore.paths import Move, Waypoints
+from dlocore.problem import Problem
+from dlocore.scene import Grasp
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """A time at which the motion is not smooth, and how much of it jumps.
+
+    Attributes:
+        time: [s].
+        multiplicity: of the time knot there: 1 smooth, 2 acceleration jumps, 3 velocity jumps.
+    """
+
+    time: float
+    multiplicity: int
+
+
+def events_of(problem: Problem) -> list[Event]:
+    """Return the events inside the horizon, by time."""
+    found: dict[float, int] = {}
+
+    def add(time: float, multiplicity: int) -> None:
+        if 0.0 < time < problem.horizon * (1 - 1e-9):
+            found[time] = max(found.get(time, 0), multiplicity)
+
+    for g in problem.scene.grasps:
+        add(g.start, 3)
+        if g.release_time is not None:
+            add(g.release_time, 2)
+        released = np.inf if g.release_time is None else g.release_time
+        end = g.start + g.path.duration
+        if g.path.duration and end < released:
+            add(end, _smoothness(g, g.path.duration))
+        if isinstance(g.path, Waypoints):
+            add(g.start + float(np.asarray(g.path.times)[0]), 2)
+    return [Event(t, found[t]) for t in sorted(found)]
+
+
+def _smoothness(grasp: Grasp, end: float) -> int:
+    if isinstance(grasp.path, Move):
+        return {"minimum_jerk": 1, "cubic": 2, "linear": 3}[grasp.path.profile]
+    return 3
+
+
+def time_knots(problem: Problem, n_t: int) -> Floats | None:
+    """Return the time knots (n_t + 4,) [s] with a knot at every event, or None where n_t is too small for them."""
+    events = events_of(problem)
+    times = np.array([e.time for e in events])
+    multiplicity = np.array([e.multiplicity for e in events], dtype=np.int64)
+    knots = graded_knots(n_t, problem.horizon, times, multiplicity, np.zeros(len(events)), np.ones(len(events)))
+    return knots if len(knots) else None
+
+
+def smallest_n_t(problem: Problem) -> int:
+    """Return the least number of control points in time that has a knot at every event."""
+    return max(5, 4 + sum(e.multiplicity for e in events_of(problem)))
+
+
+def closed_grasps(problem: Problem, begin: float, end: float) -> list[Grasp]:
+    """Return the grasps that hold all through the times `begin` to `end` [s]."""
+    middle = 0.5 * (begin + end)
+    return [
+        g for g in problem.scene.grasps if g.start <= middle and (g.release_time is None or g.release_time > middle)
+    ]
+
+
+def marks_of(problem: Problem) -> list[float]:
+    """Return the times [s] between which the motion is smooth: its beginning, its events and its end."""
+    return [0.0, *[e.time for e in events_of(problem)], problem.horizon]
+
+
+def step_counts(marks: list[float], steps: int) -> list[int]:
+    """Return the time steps of each stretch between the marks, about `steps` in all, more where marks lie close."""
+    if len(marks) == 2:
+        return [steps]
+    return [max(8, steps // (2 * len(marks)), round(steps * (b - a) / marks[-1])) for a, b in pairwise(marks)]
+
+
+def step_times(marks: list[float], counts: list[int]) -> Floats:
+    """Return the times (steps + 1,) [s] of a march with so many steps between each two marks."""
+    times = np.zeros(sum(counts) + 1)
+    first = 0
+    for (a, b), count in zip(pairwise(marks), counts, strict=True):
+        times[first : first + count] = a + (b - a) / count * np.arange(count)
+        first += count
+        times[first] = b
+    return times

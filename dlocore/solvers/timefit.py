@@ -1,0 +1,69 @@
+"""The time spline of a march: fitted to its states, with more knots where the cable strikes something."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.kernels.march import fit_missed, fit_time
+from dlocore.solvers.march import March
+
+Floats = NDArray[np.float64]
+
+_REFINEMENTS = 8  # of the time knots: each halves spans
+
+
+def refined(motion: March, knots_t: Floats, tolerance: float) -> tuple[Floats, March]:
+    """Return time knots, more where the time spline misses the motion by more than `tolerance` [m], and what to fit.
+
+    Where a cable strikes something its velocity jumps, and a spline without knots there goes on into the obstacle, or
+    swings past its states. There the states half-way through the steps are added to the motion, and knots beside them.
+    """
+    for _ in range(_REFINEMENTS):
+        control = fit(motion, knots_t)
+        off = missed(motion, knots_t, control)
+        between = _halved(motion, knots_t, control, tolerance)
+        breaks = np.unique(knots_t)
+        span = np.clip(np.searchsorted(breaks, motion.times, side="right") - 1, 0, len(breaks) - 2)
+        new = []
+        for k in np.unique(span[off > tolerance]):
+            inside = motion.times[(motion.times > breaks[k] + 1e-12) & (motion.times < breaks[k + 1] - 1e-12)]
+            if len(inside) > 1:
+                new.append(inside[len(inside) // 2])
+        if not new and between is motion:
+            break
+        knots_t = np.sort(np.concatenate([knots_t, new]))
+        motion = between
+    return knots_t, motion
+
+
+def missed(motion: March, knots_t: Floats, control: Floats) -> Floats:
+    """Return by how much the time spline of `control` (n_t, n_u, nc) misses each state (steps + 1,) [m]."""
+    return _missed(knots_t, motion.times, motion.states, control)
+
+
+def _missed(knots_t: Floats, times: Floats, states: Floats, control: Floats) -> Floats:
+    return np.asarray(fit_missed(knots_t, times, states, control, min(3, control.shape[2])))
+
+
+def _halved(motion: March, knots_t: Floats, control: Floats, tolerance: float) -> March:
+    """Return the motion with states half-way through those steps where the spline leaves the chord of the states."""
+    times, states = motion.times, motion.states
+    middle = 0.5 * (times[1:] + times[:-1])
+    chord = 0.5 * (states[1:] + states[:-1])
+    away = _missed(knots_t, middle, chord, control)
+    split = np.flatnonzero((away > tolerance) & (np.diff(times) > 0.2 * np.median(np.diff(times))))
+    if len(split) == 0:
+        return motion
+    return replace(
+        motion,
+        times=np.insert(times, split + 1, middle[split]),
+        states=np.insert(states, split + 1, chord[split], axis=0),
+    )
+
+
+def fit(motion: March, knots_t: Floats) -> Floats:
+    """Return control points (n_t, n_u, nc) [m] of the time spline fitted to a marched motion."""
+    steps, n_u, nc = motion.states.shape
+    flat = fit_time(knots_t, motion.times, motion.states.reshape(steps, n_u * nc), motion.velocity.reshape(-1))
+    return flat.reshape(len(knots_t) - 4, n_u, nc)
