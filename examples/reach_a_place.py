@@ -3,11 +3,14 @@
 Newton's method over the gripper's target: every prediction after the first goes on from the one before it
 (`predict(..., like=...)`), which takes a part of the time.
 
-Usage: python examples/reach_a_place.py
+Usage: python examples/reach_a_place.py [PICTURE]
 """
 
+import sys
 import time
+from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import dlocore as dlo
@@ -15,6 +18,7 @@ import dlocore as dlo
 GOAL = np.array([0.75, -0.01])  # [m] for the end at u = 1 m
 STEP = 0.005  # [m] of the differences
 FARTHEST = 0.1  # [m] from one target to the next
+BLUE, ORANGE, GREY = "#0072B2", "#E69F00", "#999999"  # Okabe-Ito
 
 
 def scene(target: np.ndarray) -> dlo.Scene:
@@ -38,6 +42,8 @@ def end_of(prediction: dlo.Prediction) -> np.ndarray:
 target = np.array([0.0, 0.3])
 known = None
 dlo.warm_up()
+figure, axes = plt.subplots(figsize=(7, 4.4), layout="constrained")
+u = np.linspace(0.0, 1.0, 201)
 for number in range(12):
     began = time.perf_counter()
     known = dlo.predict(scene(target), like=known)
@@ -45,10 +51,21 @@ for number in range(12):
     took = 1e3 * (time.perf_counter() - began)
     off = 1e3 * np.linalg.norm(miss)
     print(f"{number}: target ({target[0]:.3f}, {target[1]:.3f}) m, missed by {off:.1f} mm, {took:.1f} ms")
-    if np.linalg.norm(miss) < 1e-3:
+    x, y, _ = known.surface.positions(u, [known.surface.horizon])[0].T
+    arrived = off < 1.0
+    color = BLUE if arrived else GREY
+    axes.plot(x, y, color=color, linewidth=2.2 if arrived else 1.2)
+    axes.annotate(str(number), (x[-1], y[-1]), (4, 4), textcoords="offset points", color=color)
+    if arrived:
         break
     beside = dlo.predict_many([scene(target + STEP * axis) for axis in np.eye(2)], like=known)
     jacobian = np.column_stack([(end_of(p) - end_of(known)) / STEP for p in beside])
     step = -np.linalg.solve(jacobian, miss)
     target = target + step * min(1.0, FARTHEST / float(np.linalg.norm(step)))
 print(known.message)
+axes.plot(*GOAL, "+", color=ORANGE, markersize=16, markeredgewidth=2.5, label="where the free end is to be")
+axes.plot(x[50], y[50], "o", color=BLUE, label="the gripper")
+axes.set(xlabel="x [m]", ylabel="y [m]", title="The cable after each motion that was tried", aspect="equal")
+axes.legend(fontsize=8)
+axes.grid(alpha=0.25)
+figure.savefig(Path(sys.argv[1]) if len(sys.argv) > 1 else "reach-a-place.png", dpi=110)

@@ -13,6 +13,7 @@ PICTURES = {
     "bend_around_a_peg.py": ("peg.png", ["peg.png"]),
     "paper_figures.py": ("", ["paper-fig1.png", "paper-fig2.png"]),
     "point_cloud.py": ("cloud.png", ["cloud.png"]),
+    "reach_a_place.py": ("reach.png", ["reach.png"]),
     "two_grippers.py": ("grippers.png", ["grippers.png"]),
 }
 
