@@ -95,7 +95,7 @@ def factored(problem: Problem, motion: March) -> KnownMotion:
         raise ValueError(objection(problem, motion))
     grid, states = motion.grid, motion.states
     active, parameters = problem.law_table()
-    mass, drag = grid.tables.mass * problem.mass_density(), grid.tables.mass * problem.drag_coefficient()
+    density, dragged = problem.mass_density(), problem.drag_coefficient()
     history, starts, stretches = grid.past(), cast(Starts, {}), []
     v, softened = grid.velocity.copy(), 0
     for begin, end, first, last in _stretches(problem, motion.times):
@@ -106,8 +106,8 @@ def factored(problem: Problem, motion: March) -> KnownMotion:
         factors = np.empty((last - first, free, entry.held.elimination.width))
         part = np.ascontiguousarray(states[first : last + 1])
         found = factor_steps(
-            problem.axes, entry.jumps, h, motion.rho, part, v, a, mass, drag, grid.tables, active, parameters, history,
-            entry.held.elimination, factors,
+            problem.axes, entry.jumps, h, motion.rho, part, v, a, density, dragged, grid.tables, active, parameters,
+            history, entry.held.elimination, factors,
         )  # fmt: skip
         if found < 0:
             raise ValueError("the tangent of a step is singular")
@@ -134,7 +134,7 @@ def beside(known: KnownMotion, problem: Problem, grid: Grid) -> tuple[Floats, Fl
     states[0] = grid.start
     times = known.motion.times.copy()
     active, parameters = problem.law_table()
-    mass, drag = grid.tables.mass * problem.mass_density(), grid.tables.mass * problem.drag_coefficient()
+    density, dragged = problem.mass_density(), problem.drag_coefficient()
     history, starts, v = grid.past(), cast(Starts, {}), grid.velocity.copy()
     length = problem.scene.cable.length
     velocity = v
@@ -153,7 +153,7 @@ def beside(known: KnownMotion, problem: Problem, grid: Grid) -> tuple[Floats, Fl
         applied = applied_forces(problem, grid, times[first : last + 1])
         left = follow_steps(
             problem.axes, stretch.jumps, h, known.motion.rho, _FOLLOWED * length,
-            known.motion.states[first : last + 1], stretch.factors, states[first : last + 1], v, a, G, mass, drag,
+            known.motion.states[first : last + 1], stretch.factors, states[first : last + 1], v, a, G, density, dragged,
             grid.tables, active, parameters, history, applied, entry.held.elimination, entry.offsets,
         )  # fmt: skip
         if not left <= _STRAYED * length:

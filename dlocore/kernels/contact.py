@@ -15,7 +15,7 @@ from dlocore.effects.distance import signed_distance
 from dlocore.effects.friction import friction
 from dlocore.effects.laws import CONTACT, COUNT, FRICTION, TABLE
 from dlocore.kernels.basis import row_of
-from dlocore.kernels.compile import kernel, law
+from dlocore.kernels.compile import kernel, law, part
 
 _UP = (0.0, 0.0, 1.0)
 _ANY = (0.0, 0.0, 0.0)
@@ -80,7 +80,7 @@ def _mixed(a: float, A: Symmetric, b: float, B: Symmetric) -> Symmetric:
     )  # fmt: skip
 
 
-@kernel
+@part
 def contact(
     nc: int, q: Any, v: Any, tables: Any, active: Any, p: Any, stick: Any, h: float, scales: Any, tangent: bool, f: Any,
     K: Any,
@@ -209,7 +209,7 @@ def remember(nc: int, q: Any, tables: Any, active: Any, p: Any, stick: Any, loos
     return deepest
 
 
-@kernel
+@part
 def lying(
     nc: int, q: Any, v: Any, tables: Any, p: Any, slide: Any, h: float, scales: Any, tangent: bool, f: Any, K: Any
 ) -> None:

@@ -18,11 +18,13 @@ from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_mat
 from dlocore.kernels.basis import basis_rows
 from dlocore.kernels.compile import brief, kernel
 from dlocore.kernels.contact import strikes
+from dlocore.kernels.inertia import both_sides, effective, padded, residual
 from dlocore.kernels.mixing import mixed, room
+from dlocore.kernels.predictor import differences_of, predict_by, shift
 from dlocore.kernels.selfcontact import clear_way, closing, factor_wide, place_nodes, press, solve_wide, widen
 
 FAILED_STEP, LEFT, DEEPEST = range(3)  # places in `info`
-_REFRESH = 0.1  # contraction of the updates above which the old factors no longer serve
+_REFRESH = 0.2  # contraction of the updates above which the old factors no longer serve
 _PLAIN_ITERATIONS = 8  # Newton iterations before a step is done again with a line search
 _MIXED_ITERATIONS = 80  # with mixing, which learns from iterations with the same factors
 _ROBUST_ITERATIONS = 60
@@ -60,8 +62,8 @@ def constrained_mass_solve(nc: int, mass: Any, e: Any, held: Any, right: Any) ->
 @kernel
 def march_steps(
     axes: Any, start: int, stop: int, begin: int, jumps: bool, h: float, rho: float, tolerance: float, Q: Any, v: Any,
-    a: Any, G: Any, mass: Any, drag: Any, tables: Any, active: Any, p: Any, history: Any, applied: Any, e: Any,
-    offsets: Any, reactions: Any, log: Any, info: Any,
+    a: Any, G: Any, density: float, dragged: float, tables: Any, active: Any, p: Any, history: Any, applied: Any,
+    e: Any, offsets: Any, reactions: Any, log: Any, info: Any,
 ) -> None:  # fmt: skip
     """Advance from step `start` to `stop` by the generalised-alpha method (Chung and Hulbert, 1993).
 
@@ -81,7 +83,8 @@ def march_steps(
         tolerance: on the estimated error of the Newton iteration [m], largest component.
         Q: (steps + 1, n, nc) control points; written from start + 1 to stop.
         v, a, G: (n, nc) velocity, acceleration and G at step `start`; at `stop` on return.
-        mass, drag: (n, 4) scalar bands, times density [kg/m] and drag coefficient [N s/m^2].
+        density: linear density [kg/m], of the mass matrix.
+        dragged: drag coefficient [N s/m^2], of the drag matrix.
         history: what earlier steps left behind; read and written where a law keeps it.
         applied: (1 or steps + 1, n, nc) applied forces [N].
         e: elimination of the held degrees of freedom.
@@ -117,6 +120,8 @@ def march_steps(
     f = np.empty((n, nc))
     R = np.empty((n, nc))
     weighted = np.empty((n, nc))
+    unit = tables.mass
+    rows, stacked = both_sides(unit), padded(n, nc)
     x = np.empty(free)
     trial_x = np.empty(free)
     change = np.empty(size)
@@ -136,9 +141,11 @@ def march_steps(
     # the acceleration at the start knows of no damping yet, which would make too much of it
     bent = 0.0 if mixes else 0.5
     mixing, differences = room(free if mixes else 0), -1
+    past = differences_of(Q[begin : start + 1])
     for k in range(start + 1, stop + 1):
         load = applied[min(k, len(applied) - 1)]
         q0 = Q[k - 1]
+        order = predict_by(past, k - begin)
         # backward differences for the rate of curvature: in the plane its force has a potential, and an exact tangent
         rates = (1.5 / h, -2.0 / h, 0.5 / h, h) if k - begin > 1 else (1.0 / h, -1.0 / h, 0.0, h)
         first = 2 if dull > 0 else 0
@@ -155,16 +162,17 @@ def march_steps(
             tv = 1.0 / h if late else to_v
             carry = 0.0 if late else 0.5 / beta - 1.0
             gm = 1.0 if late else gamma
-            inertia = (1.0 - al_m) * ta
+            inertia = (1.0 - al_m) * ta * density
             # predict
             for i in range(n):
                 for d in range(nc):
                     if robust:
                         q1[i, d] = q0[i, d]
-                    elif k - begin > 3:
-                        q1[i, d] = 4.0 * (q0[i, d] + Q[k - 3, i, d]) - 6.0 * Q[k - 2, i, d] - Q[k - 4, i, d]
-                    elif k - begin > 2:
-                        q1[i, d] = 3.0 * q0[i, d] - 3.0 * Q[k - 2, i, d] + Q[k - 3, i, d]
+                    elif order > 0:
+                        ahead = past[0, i, d]
+                        for m in range(1, order):
+                            ahead += past[m, i, d]
+                        q1[i, d] = ahead
                     else:
                         q1[i, d] = q0[i, d] + h * v[i, d] + (0.0 if late else bent * h * h * a[i, d])
             place_held(e, offsets[k], q1.ravel())
@@ -191,10 +199,10 @@ def march_steps(
                 assemble(axes, q1, v1, tables, active, p, history, rates, scales, f, K)
                 if tight:
                     found, pairs, depth = press(q1, v1, tables, p, x1, found, f)
-                _residual(mass, drag, al_m, al_f, a, a1, v1, load, G, f, weighted, R)
+                residual(nc, rows, density, dragged, al_m, al_f, a, a1, v1, load, G, f, R, stacked)
                 reduce_vector(e, R.ravel(), x)
                 if refactor:
-                    _effective(nc, K, mass, drag, inertia, 1.0 - al_f, tv)
+                    effective(nc, K, unit, inertia, 1.0 - al_f, (1.0 - al_f) * tv * dragged)
                     reduce_matrix(e, K, A)
                     wide = pairs > 0
                     if wide:
@@ -204,7 +212,7 @@ def march_steps(
                         if not robust:
                             break
                         assemble(axes, q1, v1, tables, active, p, history, rates, (1.0, tv, 0.0), f, K)
-                        _effective(nc, K, mass, drag, inertia, 1.0 - al_f, tv)
+                        effective(nc, K, unit, inertia, 1.0 - al_f, (1.0 - al_f) * tv * dragged)
                         for i in range(size):
                             K[i, 0] *= 1.0 + 1e-10
                         reduce_matrix(e, K, A)
@@ -250,7 +258,7 @@ def march_steps(
                         assemble(axes, q2, v2, tables, active, p, history, rates, (0.0, 0.0, 0.0), f, K)
                         if tight:
                             found, pairs, depth = press(q2, v2, tables, p, x2, found, f)
-                        _residual(mass, drag, al_m, al_f, a, a2, v2, load, G, f, weighted, R)
+                        residual(nc, rows, density, dragged, al_m, al_f, a, a2, v2, load, G, f, R, stacked)
                         reduce_vector(e, R.ravel(), x)
                         after = 0.0
                         for i in range(free):
@@ -315,7 +323,7 @@ def march_steps(
             if tight:
                 found, pairs, depth = press(q1, v1, tables, p, x1, found, f)
                 info[DEEPEST] = max(info[DEEPEST], depth)
-            _residual(mass, drag, al_m, al_f, a, a1, v1, load, G, f, weighted, R)
+            residual(nc, rows, density, dragged, al_m, al_f, a, a1, v1, load, G, f, R, stacked)
         if keeps:
             info[DEEPEST] = max(info[DEEPEST], remember(axes, q1, tables, active, p, history, h, False))
             if len(log) > 0:
@@ -335,7 +343,7 @@ def march_steps(
             for i in range(n):
                 for d in range(nc):
                     weighted[i, d] = 0.0
-            multiply_scalar_band(mass, step_change, inertia, weighted)
+            multiply_scalar_band(unit, step_change, inertia, weighted)
             for i in range(n):
                 for d in range(nc):
                     f[i, d] += (moved[i * nc + d] - weighted[i, d]) / (1.0 - al_f)
@@ -347,55 +355,7 @@ def march_steps(
                 G[i, d] = f[i, d]
                 v[i, d] = v1[i, d]
                 a[i, d] = a1[i, d]
-
-
-@kernel
-def _residual(
-    mass: Any,
-    drag: Any,
-    alpha_m: float,
-    alpha_f: float,
-    a: Any,
-    a1: Any,
-    v1: Any,
-    load: Any,
-    G: Any,
-    f: Any,
-    w: Any,
-    R: Any,
-) -> None:
-    """Turn f into G1 = f + C v1 - load, and write the residual R; w is overwritten."""
-    n, nc = f.shape
-    for i in range(n):
-        for d in range(nc):
-            w[i, d] = (1.0 - alpha_m) * a1[i, d] + alpha_m * a[i, d]
-            f[i, d] += drag[i, 0] * v1[i, d] - load[i, d]
-            R[i, d] = mass[i, 0] * w[i, d]
-    for o in range(1, 4):  # both products with bands in one pass
-        for i in range(n - o):
-            m, c = mass[i, o], drag[i, o]
-            for d in range(nc):
-                f[i, d] += c * v1[i + o, d]
-                f[i + o, d] += c * v1[i, d]
-                R[i, d] += m * w[i + o, d]
-                R[i + o, d] += m * w[i, d]
-    for i in range(n):
-        for d in range(nc):
-            R[i, d] += (1.0 - alpha_f) * f[i, d] + alpha_f * G[i, d]
-
-
-@kernel
-def _effective(nc: int, K: Any, mass: Any, drag: Any, inertia: float, share: float, to_v: float) -> None:
-    """Turn K into the tangent of a step: inertia M + share (K + to_v C)."""
-    size, width = K.shape
-    for j in range(size):
-        for o in range(width):
-            K[j, o] *= share
-    for i in range(len(mass)):
-        for o in range(min(4, len(mass) - i)):
-            value = inertia * mass[i, o] + share * to_v * drag[i, o]
-            for d in range(nc):
-                K[i * nc + d, o * nc] += value
+        shift(past, q1)
 
 
 @brief

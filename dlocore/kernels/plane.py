@@ -20,7 +20,7 @@ from dlocore.effects.laws import (
     curvature_stress,
 )
 from dlocore.kernels.basis import row_of
-from dlocore.kernels.compile import kernel, law
+from dlocore.kernels.compile import kernel, law, part
 from dlocore.kernels.strain import plane_curvature, plane_hessian
 
 
@@ -42,7 +42,7 @@ def _add_block(K: Any, k: int, i: int, j: int, xx: float, xy: float, yx: float, 
         K[column + 1, offset - 1] += xy
 
 
-@kernel
+@part
 def axial(
     q: Any, v: Any, tables: Any, active: Any, p: Any, past: Any, rates: Any, scales: Any, tangent: bool, f: Any, K: Any
 ) -> None:
@@ -79,7 +79,7 @@ def axial(
                     _add_block(K, k, i, j, s * xx, s * xy, s * xy, s * yy)
 
 
-@kernel
+@part
 def curvature(
     q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any, tangent: bool,
     f: Any, K: Any,
@@ -159,7 +159,7 @@ def remember(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h
         past[n, 0] = kappa
 
 
-@kernel
+@part
 def body(q: Any, v: Any, tables: Any, active: Any, p: Any, scales: Any, tangent: bool, f: Any, K: Any) -> None:
     """Subtract the forces, and add the tangents, of the body site."""
     elastic, viscous, _ = scales

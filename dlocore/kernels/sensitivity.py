@@ -13,7 +13,7 @@ from dlocore.effects.laws import DAMPING, keeps_history
 from dlocore.kernels.assembly import assemble, remember
 from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_matrix, reduce_vector, solve
 from dlocore.kernels.compile import kernel
-from dlocore.kernels.march import _effective, _residual
+from dlocore.kernels.inertia import both_sides, effective, padded, residual
 from dlocore.kernels.mixing import mixed, room
 
 _ITERATIONS = 40
@@ -36,7 +36,7 @@ def newmark(rho: float, h: float, late: bool) -> Any:
 
 @kernel
 def factor_steps(
-    axes: Any, jumps: bool, h: float, rho: float, Q: Any, v: Any, a: Any, mass: Any, drag: Any, tables: Any,
+    axes: Any, jumps: bool, h: float, rho: float, Q: Any, v: Any, a: Any, density: float, dragged: float, tables: Any,
     active: Any, p: Any, history: Any, e: Any, factors: Any,
 ) -> int:  # fmt: skip
     """Write the factors (steps, free, e.width) of the tangent of every step of a marched motion Q (steps + 1, n, nc).
@@ -67,7 +67,8 @@ def factor_steps(
         for attempt in range(3):
             geometric = 1.0 if attempt == 0 else 0.0
             assemble(axes, q1, v1, tables, active, p, history, rates, (1.0, tv, geometric), f, K)
-            _effective(nc, K, mass, drag, (1.0 - al_m) * ta, 1.0 - al_f, tv)
+            share = 1.0 - al_f
+            effective(nc, K, tables.mass, (1.0 - al_m) * ta * density, share, share * tv * dragged)
             if attempt == 2:
                 for i in range(size):
                     K[i, 0] *= 1.0 + 1e-10
@@ -86,7 +87,8 @@ def factor_steps(
 @kernel
 def follow_steps(
     axes: Any, jumps: bool, h: float, rho: float, tolerance: float, known: Any, factors: Any, Q: Any, v: Any, a: Any,
-    G: Any, mass: Any, drag: Any, tables: Any, active: Any, p: Any, history: Any, applied: Any, e: Any, offsets: Any,
+    G: Any, density: float, dragged: float, tables: Any, active: Any, p: Any, history: Any, applied: Any, e: Any,
+    offsets: Any,
 ) -> float:  # fmt: skip
     """Write to Q (steps + 1, n, nc) the motion beside the `known` one whose first state is Q[0].
 
@@ -103,7 +105,7 @@ def follow_steps(
     K = np.empty((1, 1))
     f = np.empty((n, nc))
     R = np.empty((n, nc))
-    weighted = np.empty((n, nc))
+    rows, stacked = both_sides(tables.mass), padded(n, nc)
     v1 = np.empty((n, nc))
     a1 = np.empty((n, nc))
     q1 = np.empty((n, nc))
@@ -132,7 +134,7 @@ def follow_steps(
                     a1[i, d] = ta * (q1[i, d] - q0[i, d] - h * v[i, d]) - carry * a[i, d]
                     v1[i, d] = v[i, d] + h * ((1.0 - gm) * a[i, d] + gm * a1[i, d])
             assemble(axes, q1, v1, tables, active, p, history, rates, (0.0, 0.0, 0.0), f, K)
-            _residual(mass, drag, al_m, al_f, a, a1, v1, load, G, f, weighted, R)
+            residual(nc, rows, density, dragged, al_m, al_f, a, a1, v1, load, G, f, R, stacked)
             if it > 0 and (left <= tolerance or left > 10.0 * previous):
                 break
             reduce_vector(e, R.ravel(), x)

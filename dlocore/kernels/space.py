@@ -19,8 +19,8 @@ from dlocore.effects.laws import (
 )
 from dlocore.kernels.basis import row_of
 from dlocore.kernels.bishop import BEND, LENGTH, STATE, TANGENT, H, carry, rate_by_steps, rate_by_velocity, torques
-from dlocore.kernels.compile import kernel, law
-from dlocore.kernels.pairs import PAIRS, add_derivatives, add_span
+from dlocore.kernels.compile import kernel, law, part
+from dlocore.kernels.pairs import BB, BC, CB, CC, add_point, add_span, no_blocks
 from dlocore.kernels.strain import space_curvature, space_curvature_rate, space_moment, vector
 
 STRAIGHT = (0.0, 0.0, 0.0)  # the stress-free curvature without a twist coordinate
@@ -51,7 +51,7 @@ def add_symmetric(nc: int, K: Any, k: int, i: int, j: int, s: float, H: Symmetri
         K[column + 2, offset - 1] += s * H[5]
 
 
-@kernel
+@part
 def axial(
     nc: int, q: Any, v: Any, tables: Any, active: Any, p: Any, past: Any, rates: Any, scales: Any, tangent: bool,
     f: Any, K: Any,
@@ -115,7 +115,7 @@ def _write_rate(v: Any, tables: Any, state: Any, turning: Any, rate: Any) -> Non
             rate[n, d] = change[d]
 
 
-@kernel
+@part
 def curvature(
     q: Any, v: Any, tables: Any, active: Any, p: Any, past: Any, rates: Any, scales: Any, tangent: bool, f: Any,
     K: Any,
@@ -131,7 +131,7 @@ def curvature(
         viscous = rates[0]
     firsts, b1, b2, weights = tables.curvature_first, tables.curvature_b1, tables.curvature_b2, tables.curvature_w
     pairs = tables.curvature_pairs
-    sums = np.zeros((9 if tangent else 0, PAIRS))  # over a span, of the blocks' entries
+    blocks = no_blocks(3)
     J, SJ = np.empty((2, 3, 3)), np.empty((2, 3, 3))  # of kappa by r' and by r''
     S = np.empty((3, 3))
     damped = len(weights) if active[DAMPING] else 0
@@ -187,16 +187,14 @@ def curvature(
                 by_first = 3.0 * dot * t[d] * t[e] + 2.0 * h / length * Mt - 0.5 * (M[d] * kappa[e] + kappa[d] * M[e])
                 if d == e:
                     by_first -= dot
-                add_derivatives(
-                    sums[3 * d + e],
-                    pairs[n],
-                    scale * by_first + _column_product(J, 0, d, SJ, 0, e),
-                    _column_product(J, 0, d, SJ, 1, e) - scale * Mt,
-                    _column_product(J, 1, d, SJ, 0, e) - scale * Mt,
-                    _column_product(J, 1, d, SJ, 1, e),
-                )
+                at = 3 * e + d
+                blocks[BB, at] = scale * by_first + _column_product(J, 0, d, SJ, 0, e)
+                blocks[BC, at] = _column_product(J, 0, d, SJ, 1, e) - scale * Mt
+                blocks[CB, at] = _column_product(J, 1, d, SJ, 0, e) - scale * Mt
+                blocks[CC, at] = _column_product(J, 1, d, SJ, 1, e)
+        add_point(blocks, pairs[n])
         if n + 1 == len(weights) or firsts[n + 1] != k:
-            add_span(3, K, k, sums)
+            add_span(3, K, k, blocks)
 
 
 @law
@@ -220,7 +218,7 @@ def remember(q: Any, tables: Any, past: Any) -> None:
             past[n, 6 + d] = state[n, TANGENT + d]
 
 
-@kernel
+@part
 def body(nc: int, q: Any, v: Any, tables: Any, active: Any, p: Any, scales: Any, tangent: bool, f: Any, K: Any) -> None:
     """Subtract the forces, and add the tangents, of the body site."""
     elastic, viscous, _ = scales

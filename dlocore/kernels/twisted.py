@@ -29,14 +29,16 @@ from dlocore.effects.laws import (
     twist_stress,
 )
 from dlocore.kernels.basis import basis, find_span, row_of
-from dlocore.kernels.compile import kernel, law
-from dlocore.kernels.pairs import AA, AB, AC, BA, CA, PAIRS, add_angles, add_derivatives, add_one, add_span
+from dlocore.kernels.compile import kernel, law, part
+from dlocore.kernels.pairs import AA, AB, AC, BA, BB, BC, CA, CB, CC, PAIRS, SUMS, add_point, add_span, no_blocks
 from dlocore.kernels.space import combine
 from dlocore.kernels.strain import space_curvature, transport, twist_increment, vector
 
 TANGENT, BEND, DIRECTOR, FRAME, LAST, BEFORE = 0, 3, 6, 9, 10, 13  # columns of `past`
 TWIST_RATE = LAST + 2
 PAST = 16
+LENGTH, ALONG, NOW, KAPPA, SPIN = 0, 1, 2, 5, 8  # columns of a point's geometry: |r'|, t . r'', t, kappa, spin
+LOCAL = 11
 Row = tuple[float, float, float, float]  # of basis functions
 _STEPS = 8  # of the transport along the cable between two curvature points
 
@@ -112,7 +114,7 @@ def mean_over_spans(tables: Any) -> Any:
     return shares / shares.sum(axis=1, keepdims=True)
 
 
-@kernel
+@part
 def curvature(
     q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any, tangent: bool,
     f: Any, K: Any,
@@ -126,16 +128,17 @@ def curvature(
     firsts, weights, pairs = tables.curvature_first, tables.curvature_w, tables.curvature_pairs
     b0, b1, b2 = tables.body_b0, tables.curvature_b1, tables.curvature_b2
     mean = np.empty(16)  # of the derivative of the twist rate over a span
-    sums = np.zeros((16 if tangent else 0, PAIRS))  # over a span, of the blocks' entries
+    local = np.empty((len(weights), LOCAL))
+    blocks = no_blocks(4)
     n = 0
     while n < len(weights):
         k, until = firsts[n], _span_end(firsts, n)
-        tau = _mean_twist(q, k, weights, b1, b2, past, n, until, p[TWIST, 1], mean)
+        tau = _mean_twist(q, k, weights, b1, b2, past, n, until, p[TWIST, 1], mean, local)
         torque, stiffness = 0.0, 0.0
         for m in range(n, until):
             T, S = _point(
                 q, v, k, weights[m], row_of(b0, m), row_of(b1, m), row_of(b2, m), pairs, active, p, memory, past, rates,
-                scales, tangent, m, tau, mean, f, sums,
+                scales, tangent, m, tau, mean, local, f, blocks,
             )  # fmt: skip
             torque += T
             stiffness += S
@@ -148,16 +151,17 @@ def curvature(
                 for i in range(j, 16):
                     row[i - j] += stiffness * mean[j] * mean[i]
             if until == len(weights) or firsts[until] != k:
-                add_span(4, K, k, sums)
+                add_span(4, K, k, blocks)
         n = until
 
 
 @law
 def _mean_twist(
-    q: Any, k: int, weights: Any, b1: Any, b2: Any, past: Any, n: int, until: int, inverse: float, mean: Any
-) -> float:
+    q: Any, k: int, weights: Any, b1: Any, b2: Any, past: Any, n: int, until: int, inverse: float, mean: Any,
+    local: Any,
+) -> float:  # fmt: skip
     """Return the mean twist rate [rad/m] of the points n to `until`, and write its derivative (16,) by x, y, z, fourth
-    of the four control points.
+    of the four control points, and the geometry of the points to `local` (points, LOCAL).
     """
     for j in range(16):
         mean[j] = 0.0
@@ -166,6 +170,9 @@ def _mean_twist(
         w, b, c = weights[m], row_of(b1, m), row_of(b2, m)
         length, h, t, kappa = space_curvature(combine(q, k, b), combine(q, k, c))
         increment, spin, by_t = twist_increment(vector(past, m, TANGENT), vector(past, m, BEND), t, kappa)
+        local[m, LENGTH], local[m, ALONG] = length, h
+        for d in range(3):
+            local[m, NOW + d], local[m, KAPPA + d], local[m, SPIN + d] = t[d], kappa[d], spin[d]
         tau += w * (inverse * _angle(q, k, b) + past[m, FRAME] + increment)
         width += w
         turned = _dot(by_t, t) + _dot(spin, kappa)
@@ -182,7 +189,7 @@ def _mean_twist(
 @law
 def _point(
     q: Any, v: Any, k: int, w: float, a: Row, b: Row, c: Row, pairs: Any, active: Any, p: Any, memory: Any, past: Any,
-    rates: Any, scales: Any, tangent: bool, n: int, tau: float, mean: Any, f: Any, sums: Any,
+    rates: Any, scales: Any, tangent: bool, n: int, tau: float, mean: Any, local: Any, f: Any, blocks: Any,
 ) -> tuple[float, float]:  # fmt: skip
     """Add the forces of the bends of a point, and its share in the blocks of its span, but for that of the twist rate.
 
@@ -193,10 +200,9 @@ def _point(
     if viscous != 0.0 and rates[0] != 0.0:
         viscous = rates[0]
     inverse = p[TWIST, 1]
-    length, h, t, kappa = space_curvature(combine(q, k, b), combine(q, k, c))
-    t0 = vector(past, n, TANGENT)
-    m1, m2 = _directors(t0, t, vector(past, n, DIRECTOR), inverse * _angle(q, k, a))
-    spin = twist_increment(t0, vector(past, n, BEND), t, kappa)[1]
+    length, h, t = local[n, LENGTH], local[n, ALONG], vector(local, n, NOW)
+    kappa, spin = vector(local, n, KAPPA), vector(local, n, SPIN)
+    m1, m2 = _directors(vector(past, n, TANGENT), t, vector(past, n, DIRECTOR), inverse * _angle(q, k, a))
     k1, k2 = _dot(kappa, m1), _dot(kappa, m2)
     O1, P1 = _derivatives(length, h, m1, k2, spin, -k1, t)
     O2, P2 = _derivatives(length, h, m2, -k1, spin, -k2, t)
@@ -255,20 +261,25 @@ def _point(
             by_first -= 1.5 * T * (kb[d] * t[e] + t[d] * kb[e])
             if d == e:
                 by_first -= dot
-            add_derivatives(
-                sums[4 * d + e],
-                products,
-                scale * by_first + O1[d] * SO1 + O2[d] * SO2,
-                cross[d][e] - scale * Mt + O1[d] * SP1 + O2[d] * SP2,
-                -cross[d][e] - scale * Mt + P1[d] * SO1 + P2[d] * SO2,
-                P1[d] * SP1 + P2[d] * SP2,
-            )
-        by_first = A1 * SO1 + A2 * SO2 - turn * (h / length * N[e] + along * t[e])
-        by_second = A1 * SP1 + A2 * SP2 + turn * N[e]
-        add_angles(sums[12 + e], products, AB, by_first, AC, by_second)
-        add_angles(sums[4 * e + 3], products, BA, by_first, CA, by_second)
+            at = 4 * e + d
+            blocks[BB, at] = scale * by_first + O1[d] * SO1 + O2[d] * SO2
+            blocks[BC, at] = cross[d][e] - scale * Mt + O1[d] * SP1 + O2[d] * SP2
+            blocks[CB, at] = -cross[d][e] - scale * Mt + P1[d] * SO1 + P2[d] * SO2
+            blocks[CC, at] = P1[d] * SP1 + P2[d] * SP2
+    add_point(blocks, products)
+    for e in range(3):
+        # S times the derivatives by coordinate e, against the angle
+        by_first = A1 * (S11 * O1[e] + S12 * O2[e]) + A2 * (S12 * O1[e] + S22 * O2[e])
+        by_second = A1 * (S11 * P1[e] + S12 * P2[e]) + A2 * (S12 * P1[e] + S22 * P2[e])
+        by_first -= turn * (h / length * N[e] + along * t[e])
+        by_second += turn * N[e]
+        for pair in range(PAIRS):
+            of = products[pair]
+            blocks[SUMS + pair, 4 * e + 3] += by_first * of[AB] + by_second * of[AC]
+            blocks[SUMS + pair, 12 + e] += by_first * of[BA] + by_second * of[CA]
     angular = S11 * A1 * A1 + 2.0 * S12 * A1 * A2 + S22 * A2 * A2 - w * geometric * inverse * inverse * dot
-    add_one(sums[15], products, AA, angular)
+    for pair in range(PAIRS):
+        blocks[SUMS + pair, 15] += angular * products[pair, AA]
     return w * T, w * (elastic * twist_stiffness + viscous * twist_viscosity)
 
 

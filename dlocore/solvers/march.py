@@ -32,9 +32,9 @@ Floats = NDArray[np.float64]
 # undamped motion energy grows without bounds; 0.5 holds nearly always, 0 always (docs/model.md).
 RHO = 0.5
 STRONGLY_DAMPED = 0.0
-TOLERANCE = 1e-8  # of the length, on the error that the Newton iterations of a step leave
-LEAST_TOLERANCE = 1e-11
-COARSE = 1 / 256  # of the period of a cable that swings: of shorter steps the tolerance goes with their square
+TOLERANCE = 1e-8  # of the length, on the error that the Newton iterations of a step of COARSE leave
+LEAST_TOLERANCE, MOST_TOLERANCE = 1e-11, 1e-7
+COARSE = 1 / 256  # of the period of a cable that swings: the tolerance goes with the square of the step
 _RESTS = 0.05  # of the diameter above the table: nearer to it the cable rests on it
 _CHUNK = 256  # steps between looks at the clock
 _SPLITS = (4, 16, 64)  # parts of a step that found no equilibrium
@@ -172,7 +172,6 @@ class _Walk:
         self._problem, self._grid, self._monitor, self._times, self._rho = problem, grid, monitor, times, rho
         self._laws = problem.law_table()
         self._mass = grid.tables.mass * problem.mass_density()
-        self._drag = grid.tables.mass * problem.drag_coefficient()
         self._applied = applied_forces(problem, grid, times)
         self._tolerance = _tolerance(problem, problem.horizon / len(times))
         self._states = np.empty((len(times), grid.n_u, problem.nc))
@@ -260,8 +259,8 @@ class _Walk:
         """Take the steps from `start` to `stop`, as `march_steps` does; return the one that failed, or -1."""
         march_steps(
             self._problem.axes, start, stop, begin, jumps, h, rho, self._tolerance, states, stretch.v, stretch.a,
-            stretch.G, self._mass, self._drag, self._grid.tables, *self._laws, self._history, applied,
-            stretch.entry.held.elimination, offsets, reactions, log, self._info,
+            stretch.G, self._problem.mass_density(), self._problem.drag_coefficient(), self._grid.tables, *self._laws,
+            self._history, applied, stretch.entry.held.elimination, offsets, reactions, log, self._info,
         )  # fmt: skip
         failed = int(self._info[FAILED_STEP])
         self._info[FAILED_STEP] = -1
@@ -302,10 +301,10 @@ def _tolerance(problem: Problem, step: float) -> float:
     with kinks are not solved for more closely, as steps would fail at them.
     """
     length = problem.scene.cable.length
-    if problem.contact is not None or problem.friction is not None or problem.self_contact is not None:
-        return TOLERANCE * length
-    short = min(1.0, step / (COARSE * 2.0 * float(np.sqrt(length))))
-    return max(LEAST_TOLERANCE, TOLERANCE * short**2) * length
+    of_coarse = step / (COARSE * 2.0 * float(np.sqrt(length)))
+    kinks = problem.contact is not None or problem.friction is not None or problem.self_contact is not None
+    least = TOLERANCE if kinks else LEAST_TOLERANCE
+    return float(np.clip(TOLERANCE * of_coarse**2, least, MOST_TOLERANCE)) * length
 
 
 def _lean_on_anchors(
