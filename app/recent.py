@@ -45,10 +45,11 @@ class Recent:
 
 
 def _size(prediction: Prediction) -> int:
-    """Return about how many bytes a prediction holds."""
+    """Return about how many bytes a prediction holds; that whose error estimate it took on counts with each."""
+    others = 0 if prediction.judged is None else _size(prediction.judged)
     if prediction.level is None:
-        return prediction.surface.control_points.nbytes
+        return others + prediction.surface.control_points.nbytes
     motion = prediction.level.motion
     forces = sum(window.forces.nbytes for window in motion.forces)
     iterates = len(prediction.iterations) * prediction.level.control.nbytes
-    return motion.states.nbytes + motion.log.nbytes + forces + iterates
+    return others + motion.states.nbytes + motion.log.nbytes + forces + iterates

@@ -77,3 +77,14 @@ def test_the_oldest_are_forgotten_when_there_are_too_many() -> None:
     room.forget("c")
     room.forget("c")
     assert room.get("c") is None
+
+
+def test_what_an_answer_took_its_error_estimate_from_counts_with_it() -> None:
+    before: Prediction = predict(solver_scene(0.25, quality=march(9, 13)))
+    again = predict(solver_scene(0.25, quality=march(9, 13)), like=before)
+    assert before.level is not None
+    assert again.judged is before
+    room = Recent(most=int(3.9 * before.level.motion.states.nbytes))
+    for id in ("a", "b"):
+        room.add(id, again)
+    assert room.get("a") is None

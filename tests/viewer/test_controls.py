@@ -53,6 +53,8 @@ GRIPPER = ("primitives", 0)
         ({"GJ [10⁻³ N m²]": 2.0}, ("cable", "torsional_stiffness"), 0.002),
         ({"EA [N]": 500.0}, ("cable", "axial_stiffness"), 500.0),
         ({"Damping [10⁻³ N m² s]": 0.1}, ("cable", "bending_damping"), 1e-4),
+        ({"Twist damping [10⁻³ N m² s]": 0.2}, ("cable", "torsional_damping"), 2e-4),
+        ({"Stretch damping [N s]": 1.5}, ("cable", "axial_damping"), 1.5),
         ({"Yields at strain [%]": 1.0}, ("cable", "yield_strain"), 0.01),
         ({"Yields at strain [%]": 1.0, "Memory rate [1/s]": 20.0}, ("cable", "memory_rate"), 20.0),
         ({"Stress-free shape": "initial"}, ("cable", "rest_shape"), "initial"),

@@ -31,7 +31,13 @@ class CableForm(Form):
             with gui.add_folder("More of the cable", expand_by_default=False):
                 self._torsion = gui.add_number("GJ [10⁻³ N m²]", 1.0, min=1e-6, max=1e9, step=0.01)
                 self._stretch = gui.add_number("EA [N]", 1.0, min=1e-3, max=1e12, step=1.0)
-                self._damping = gui.add_number("Damping [10⁻³ N m² s]", 0.0, min=0.0, max=1e9, step=0.01)
+                self._damping = gui.add_number(
+                    "Damping [10⁻³ N m² s]", 0.0, min=0.0, max=1e9, step=0.01, hint="Of bending"
+                )
+                self._torsion_damping = gui.add_number("Twist damping [10⁻³ N m² s]", 0.0, min=0.0, max=1e9, step=0.01)
+                self._stretch_damping = gui.add_number(
+                    "Stretch damping [N s]", 0.0, min=0.0, max=1e9, step=0.01, hint="0: waves of stretch ring on"
+                )
                 self._yield = gui.add_number(
                     "Yields at strain [%]", 0.0, min=0.0, max=1000.0, step=0.1, hint="Of its outermost fibre; 0: never"
                 )
@@ -47,6 +53,10 @@ class CableForm(Form):
         self._bind(self._torsion, lambda d: self._with(d, "torsional_stiffness", 1e-3 * self._torsion.value))
         self._bind(self._stretch, lambda d: self._with(d, "axial_stiffness", float(self._stretch.value)))
         self._bind(self._damping, lambda d: self._with(d, "bending_damping", 1e-3 * self._damping.value))
+        self._bind(
+            self._torsion_damping, lambda d: self._with(d, "torsional_damping", 1e-3 * self._torsion_damping.value)
+        )
+        self._bind(self._stretch_damping, lambda d: self._with(d, "axial_damping", float(self._stretch_damping.value)))
         self._bind(self._yield, lambda d: self._with_yield(d, 1e-2 * self._yield.value))
         self._bind(self._rate, lambda d: self._with(d, "memory_rate", float(self._rate.value)))
         self._bind(self._rest, self._with_rest)
@@ -95,6 +105,8 @@ class CableForm(Form):
         show_value(self._torsion, _shown(1e3, cable.torsional_stiffness))
         show_value(self._stretch, _shown(1.0, cable.axial_stiffness))
         show_value(self._damping, _shown(1e3, cable.bending_damping))
+        show_value(self._torsion_damping, _shown(1e3, cable.torsional_damping))
+        show_value(self._stretch_damping, _shown(1.0, cable.axial_damping))
         show_value(self._yield, _shown(1e2, cable.yield_strain or 0.0))
         show_value(self._rate, cable.memory_rate or PLASTIC_RATE)
         show_if(self._rate, cable.memory_rate is not None)
