@@ -104,7 +104,7 @@ def _write_history(problem: Problem, grid: Grid) -> None:
     if problem.start.material is not None:
         _write_stretch(grid, history, problem.start.material)
     if problem.keeps_history:
-        remember(problem.axes, grid.start, grid.tables, *problem.law_table(), history, 0.0, True)
+        remember(problem.axes, grid.start, grid.tables, *problem.laws, history, 0.0, True)
 
 
 def start_director(problem: Problem) -> Floats:

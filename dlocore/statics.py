@@ -251,7 +251,10 @@ def _carry(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, t:
     order = sorted(grasps, key=lambda g: g.u)
     dimensions = problem.plane.dimensions
     shift = np.array(
-        [problem.position(g, np.array([t]), starts[g][0])[0] - grid.at(q, g.u)[:dimensions] for g in order]
+        [
+            problem.plane.points(g.path.at(np.array([t - g.start]), starts[g][0])[0]) - grid.at(q, g.u)[:dimensions]
+            for g in order
+        ]
     )
     middle = (grid.knots[1:-3] + grid.knots[2:-2] + grid.knots[3:-1]) / 3  # of the control points
     for d in range(dimensions):
@@ -260,7 +263,7 @@ def _carry(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, t:
 
 def _unbalanced(problem: Problem, grid: Grid, history: History, q: Floats, applied: Floats) -> Floats:
     """Return the forces (n_u, nc) [N] on the control points q that nothing balances but what holds them."""
-    active, parameters = problem.law_table()
+    active, parameters = problem.laws
     f, nothing = np.empty_like(q), np.empty((1, 1))
     assemble(
         problem.axes, q, np.zeros_like(q), grid.tables, active, parameters, history, NO_RATES, (0.0, 0.0, 0.0), f,
