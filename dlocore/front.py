@@ -269,7 +269,7 @@ def _answer(
             dimensions_reason=problem.plane.reason,
             phases=dict(monitor.phases),
         ),
-        start_energy=elastic_energy(problem, grid, grid.start, grid.history),
+        find_start_energy=partial(elastic_energy, problem, grid, grid.start, grid.history),
         start_fit=problem.start.fit_rms,
         level=level,
         judged=judged,

@@ -1,5 +1,6 @@
 """Which effects a scene calls for, and the reason for each: from the scene, and from what a result has shown."""
 
+import math
 from collections.abc import Mapping
 from typing import NamedTuple, cast
 
@@ -49,7 +50,7 @@ def choose(
     """
     cable, environment = scene.cable, scene.environment
     table = environment.table is not None
-    heavy = bool(np.any(cast(Floats, environment.gravity) != 0))
+    heavy = bool(cast(Floats, environment.gravity).any())
     drags = environment.drag > 0 or environment.drag_quadratic > 0
     damps = cable.bending_damping > 0 or cable.torsional_damping > 0
     plastic = any(x is not None for x in (cable.yield_strain, cable.yield_twist, cable.yield_stretch))
@@ -73,7 +74,7 @@ def choose(
     }
     if on_table and heavy:
         gravity = cast(Floats, environment.gravity)
-        slopes = bool(np.any(gravity[:2] != 0))
+        slopes = bool(gravity[:2].any())
         found["gravity"] = Choice(slopes, "the table slopes" if slopes else "the table carries the weight")
     if not table:
         found["table"] = Choice(False, "there is none")
@@ -83,15 +84,11 @@ def choose(
         found["plasticity"] = Choice(False, "the cable is elastic: no yield strain is given")
     for name, reason in called_for.items():
         found[name] = Choice(True, reason)
-    present = {name for name, choice in found.items() if choice.active} | {"inertia"}
-    present.add("self_contact")
-    if plastic:
-        present.add("plasticity")
-    for name in found:
-        switch = scene.effects.get(name, "auto")
-        if switch == "off":
+    optional = ("inertia", "self_contact", "plasticity") if plastic else ("inertia", "self_contact")
+    for name, switch in scene.effects.items():
+        if name != "twist" and switch == "off":
             found[name] = Choice(False, "switched off in the scene")
-        elif switch == "on" and name in present and not found[name].active:
+        elif name in optional and switch == "on" and not found[name].active:
             found[name] = Choice(True, "switched on in the scene")
     found["twist"] = _twist(scene, start, dimensions, bent, found["plasticity"].active, found["damping"].active)
     return {name: found[name] for name in EFFECTS}
@@ -104,12 +101,12 @@ def _inertia(scene: Scene, start: StartCurve, on_table: bool) -> Choice:
     smooth = all(m.profile != "linear" for m in moves) and len(moves) > 0
     lasting = all(isinstance(g.path, Move | Still) and g.start == 0.0 and not g.release_time for g in scene.grasps)
     rubs = environment.drag > 0 or (environment.table is not None and environment.table.friction > 0)
-    heavy = not on_table and bool(np.any(cast(Floats, environment.gravity) != 0))
+    heavy = not on_table and bool(cast(Floats, environment.gravity).any())
     held = rubs or heavy or len(scene.grasps) > 1
     if smooth and lasting and held and start.velocity is None and not scene.loads:
         stiffness = cast(float, cable.bending_stiffness) * (1.875 / cable.length) ** 4
         gravity = float(np.linalg.norm(cast(Floats, environment.gravity))) if heavy else 0.0
-        period = 2.0 * np.pi / np.sqrt(stiffness / cable.linear_density + gravity / cable.length)
+        period = 2.0 * math.pi / math.sqrt(stiffness / cable.linear_density + gravity / cable.length)
         shortest = min(m.duration for m in moves)
         if shortest > SLOW * period:
             reason = f"the motion is slow: {shortest:.3g} s against a first natural period of {period:.2g} s"
