@@ -71,7 +71,7 @@ def predict(
     if isinstance(again, Again):
         return _solved(problem, monitor, cost, again)
     fresh = _solved(pose(scene), monitor, cost)
-    return replace(fresh, message=f"{fresh.message} Solved from the beginning: {again}")
+    return replace(fresh, said=f"{fresh.said} Solved from the beginning: {again}")
 
 
 def _solved(problem: Problem, monitor: Monitor, cost: Cost | None, again: Again | None = None) -> Prediction:
@@ -245,11 +245,10 @@ def _answer(
     if outcome.errors is not None:
         errors = {**outcome.errors, "neglected": left_out}
         errors.setdefault("iteration", level.motion.update)
-    message = " ".join([outcome.message, *[f"Note: {objection}." for objection in objections(level)]])
     return Prediction(
         scene=problem.scene,
         status=outcome.status,
-        message=message,
+        said=outcome.message,
         surface=surface,
         report_grasps=partial(reactions, problem, grid, level.motion.forces if forces is None else forces),
         report_effects=partial(effect_reports, problem, grid, partial(_material, problem, level)),
@@ -269,6 +268,7 @@ def _answer(
             dimensions_reason=problem.plane.reason,
             phases=dict(monitor.phases),
         ),
+        find_objections=partial(objections, level),
         find_start_energy=partial(elastic_energy, problem, grid, grid.start, grid.history),
         start_fit=problem.start.fit_rms,
         level=level,

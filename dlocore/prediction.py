@@ -178,11 +178,12 @@ class Prediction:
     Attributes:
         scene: what was asked.
         status: "converged", or why not; never a success word for a failure.
-        message: the status in words, and what to do about it.
+        said: the status in words, and what to do about it.
         surface: the bivariate spline q(u, t).
         grasps: reaction of each grasp, in the scene's order.
         effects: what was simulated and why.
-        start_energy: elastic energy stored in the start shape [J]. These three are functions of the rest, evaluated
+        message: what is said, and what effects that the scene switches off would have done.
+        start_energy: elastic energy stored in the start shape [J]. These four are functions of the rest, evaluated
             when they are first read.
         iterations: how the solve went.
         accuracy: method, estimated error, time.
@@ -193,7 +194,7 @@ class Prediction:
 
     scene: Scene
     status: Status
-    message: str
+    said: str
     surface: SplineSurface
     iterations: tuple[Iteration, ...]
     accuracy: Accuracy
@@ -201,9 +202,15 @@ class Prediction:
     report_grasps: Callable[[], tuple[GraspReaction, ...]] = field(repr=False)
     report_effects: Callable[[SplineSurface], tuple[EffectReport, ...]] = field(repr=False)
     report_material: Callable[[], MaterialMotion | None] = field(repr=False)
+    find_objections: Callable[[], list[str]] = field(repr=False)
     find_start_energy: Callable[[], float] = field(repr=False)
     level: "Level | None" = field(default=None, repr=False)
     judged: "Prediction | None" = field(default=None, repr=False)
+
+    @cached_property
+    def message(self) -> str:
+        """The status in words, what to do about it, and what effects that the scene switches off would have done."""
+        return " ".join([self.said, *[f"Note: {objection}." for objection in self.find_objections()]])
 
     @cached_property
     def grasps(self) -> tuple[GraspReaction, ...]:

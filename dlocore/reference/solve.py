@@ -162,7 +162,7 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
     return Prediction(
         scene=problem.scene,
         status=status,
-        message=message,
+        said=message,
         surface=fitted.surface,
         iterations=tuple(monitor.iterations),
         accuracy=Accuracy(
@@ -187,6 +187,7 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
         ),
         report_effects=lambda surface: _effects(refined, surface),
         report_material=lambda: material_of(motion, last.taken),
+        find_objections=list,
     )
 
 
