@@ -76,7 +76,7 @@ def off_the_table(scene: Scene, start: StartCurve, met: tuple[int, ...]) -> str:
         return "contact with the table is switched on in the scene"
     if scene.effects.get("twist", "auto") == "on":
         return "twist is switched on in the scene"
-    off = float(np.abs(start.control_points[:, 2] - table.height).max())
+    off = max(abs(z - table.height) for z in start.heights)
     if not off <= TABLE_TOLERANCE:
         return f"the cable starts up to {off:.3g} m above it"
     if cast(Floats, environment.gravity)[2] > 0:
@@ -112,7 +112,7 @@ def lay_on_table(scene: Scene, start: StartCurve) -> StartCurve:
     """Return the start at the table's height."""
     table = scene.environment.table
     assert table is not None
-    if (start.control_points[:, 2] == table.height).all():
+    if start.heights == (table.height, table.height):
         return start
     flat = start.control_points.copy()
     flat[:, 2] = table.height

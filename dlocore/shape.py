@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import cast
 
 import numpy as np
@@ -22,6 +23,7 @@ Floats = NDArray[np.float64]
 
 SPEED_RANGE = (0.5, 1.5)  # of |r'|: a coarse spline of a hairpin stays within, evenly spaced control points don't
 SAME_ANGLE = 1e-9  # [rad]
+_ONE_SPAN = uniform_knots(4, 1.0)
 _THIRDS = np.linspace(0.0, 1.0, 4)[:, None]
 GAUSS = ((np.polynomial.legendre.leggauss(4)[0] + 1) / 2, np.polynomial.legendre.leggauss(4)[1] / 2)  # on [0, 1]
 
@@ -64,6 +66,12 @@ class StartCurve(SplineCurve):
     theta: SplineCurve | None = None
     material: Material | None = None
 
+    @cached_property
+    def heights(self) -> tuple[float, float]:
+        """Heights of the lowest and the highest control point, between which the curve lies [m]."""
+        z = self.control_points[:, 2].tolist()
+        return min(z), max(z)
+
 
 def _plain(x: Floats) -> Floats:
     """Return x, or a copy of it, as an array of the one kind that the kernels are compiled for."""
@@ -87,7 +95,7 @@ def _straight(shape: Straight, length: float) -> StartCurve:
     start, direction = cast(Floats, shape.start), cast(Floats, shape.direction)
     control = start + length * _THIRDS * (direction / math.sqrt(direction @ direction))
     velocity = _velocity(shape.velocity, length, lambda rows: np.linspace(0.0, length, rows), exact=True)
-    return StartCurve(knots=uniform_knots(4, length), control_points=control, velocity=velocity, length_given=length)
+    return StartCurve(knots=length * _ONE_SPAN, control_points=control, velocity=velocity, length_given=length)
 
 
 def _given(shape: ControlPoints, length: float) -> StartCurve:

@@ -170,7 +170,7 @@ class _Walk:
 
     def __init__(self, problem: Problem, grid: Grid, monitor: Monitor, times: Floats, rho: float) -> None:
         self._problem, self._grid, self._monitor, self._times, self._rho = problem, grid, monitor, times, rho
-        self._laws = problem.law_table()
+        self._laws = problem.laws
         self._mass = grid.tables.mass * problem.mass_density()
         self._applied = applied_forces(problem, grid, times)
         self._tolerance = _tolerance(problem, problem.horizon / len(times))
