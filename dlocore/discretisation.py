@@ -10,8 +10,9 @@ from dlocore.effects import laws
 from dlocore.errors import SceneError
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
-from dlocore.kernels.assembly import History, remember
+from dlocore.kernels.assembly import History
 from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, Tables, build_tables, graded_knots
+from dlocore.kernels.entry import remember_start
 from dlocore.kernels.relax import relax
 from dlocore.kernels.twisted import DIRECTOR, PAST, start_frames
 from dlocore.paths import Waypoints
@@ -102,7 +103,7 @@ def _write_history(problem: Problem, grid: Grid) -> None:
     if problem.start.material is not None:
         _write_stretch(grid, history, problem.start.material)
     if problem.keeps_history:
-        remember(problem.axes, grid.start, grid.tables, *problem.laws, history, 0.0, True)
+        remember_start(problem.axes, grid.start, grid.tables, *problem.laws, history)
 
 
 def start_director(problem: Problem) -> Floats:

@@ -10,6 +10,7 @@ from dlocore.discretisation import make_grid
 from dlocore.grid import Grid
 from dlocore.holding import Held, Starts, close_grasps, hold
 from dlocore.kernels.banded import place_held
+from dlocore.kernels.entry import to_ends_of_steps
 from dlocore.paths import Path, Still
 from dlocore.problem import Problem, pose
 
@@ -112,3 +113,12 @@ def test_a_path_begins_at_the_point_and_along_the_unit_tangent_of_the_cable():
         point, slope = problem.start(g.u)[0], problem.start(g.u, 1)[0]
         assert np.abs(starts[g][0] - point).max() < ROUNDING
         assert np.abs(starts[g][1] - slope / np.linalg.norm(slope)).max() < ROUNDING
+
+
+def test_forces_of_steps_are_brought_to_their_ends():
+    # what grows evenly is known at the ends of the steps from the second on, and the first keeps its own
+    lag, grows = 0.3, np.linspace(2.0, 7.0, 6)[:, None] * [1.0, -2.0]
+    forces = np.vstack([np.full((2, 2), 9.0), grows[:1], grows[1:] - lag * (grows[1] - grows[0]), np.full((1, 2), 5.0)])
+    to_ends_of_steps(forces, 2, 7, lag)
+    assert np.abs(forces[2:8] - grows).max() < ROUNDING
+    assert (forces[[0, 1, 8]] == [[9.0, 9.0], [9.0, 9.0], [5.0, 5.0]]).all()
