@@ -316,8 +316,9 @@ def warm_up() -> None:
                 effects={"twist": twist, "plasticity": plastic},
                 quality=quality,
             )
-            predict(scene)
-            predict(replace(scene, effects={"twist": twist, "obstacles": "off"}))
+            for effects in (scene.effects, {"twist": twist, "obstacles": "off"}):
+                answer = predict(replace(scene, effects=effects))
+                _ = answer.message, answer.start_energy, [i.energy for i in answer.iterations]  # found as they are read
         equilibrium(scene, n_u=9)
     loop = np.column_stack([np.cos(np.linspace(0.0, 7.0, 9)), np.sin(np.linspace(0.0, 7.0, 9)), 0.1 * u[:9, 0]])
     nearest_strands(uniform_knots(9, 1.0), loop[None], 3, 0.01, 0.03)
