@@ -113,10 +113,11 @@ def unpack(request: dict[str, Any], document: dict[str, Any], nets: bytes) -> Ru
     iterations = tuple(
         Iteration(
             number=shown["number"],
-            **{name: float(values[k]) for name, values in scalars.items()},
+            **{name: float(values[k]) for name, values in scalars.items() if name != "energy"},
             n_u=shown["n_u"],
             n_t=shown["n_t"],
             find_surface=partial(iterates.__getitem__, k),
+            find_energy=partial(float, scalars["energy"][k]),
             note=shown["note"],
         )
         for k, shown in enumerate(document["iterations"])

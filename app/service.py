@@ -203,10 +203,8 @@ class Service:
             self.metrics.ended("failed", method)
             raise
         if like and before is None:
-            message = (
-                f"{prediction.message} Solved from the beginning: The prediction before is not in memory any more."
-            )
-            prediction = replace(prediction, message=message)
+            why = "Solved from the beginning: The prediction before is not in memory any more."
+            prediction = replace(prediction, said=f"{prediction.said} {why}")
         self.metrics.solved(prediction)
         accuracy = prediction.accuracy
         _log.info(

@@ -60,8 +60,8 @@ def check_above(scene: Scene, start: StartCurve) -> None:
     """Refuse a start, a grasp or an obstacle that is inside the table."""
     table = scene.environment.table
     assert table is not None
-    lowest = float(start.control_points[:, 2].min())
-    if not lowest >= table.height - TABLE_TOLERANCE:  # else the curve, which lies in their convex hull, is above too
+    lowest = start.heights[0]
+    if not lowest >= table.height - TABLE_TOLERANCE:
         lowest = float(start(np.linspace(0.0, scene.cable.length, 101))[:, 2].min())
     if not lowest >= table.height - TABLE_TOLERANCE:
         reason = f"The start is {table.height - lowest:.3g} m below a cable that lies on the table"

@@ -10,8 +10,9 @@ from dlocore.effects import laws
 from dlocore.errors import SceneError
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
-from dlocore.kernels.assembly import History, remember
+from dlocore.kernels.assembly import History
 from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, Tables, build_tables, graded_knots
+from dlocore.kernels.entry import remember_start
 from dlocore.kernels.relax import relax
 from dlocore.kernels.twisted import DIRECTOR, PAST, start_frames
 from dlocore.paths import Waypoints
@@ -69,12 +70,10 @@ def grid_on(problem: Problem, knots: Floats) -> Grid:
     theta = None if curve.theta is None else fit_to_knots(curve.theta, knots)[:, 0]
     start = np.ascontiguousarray(problem.coordinates(fit_to_knots(curve, knots), theta))
     given = velocity_to_knots(curve, knots)
-    velocity = np.zeros_like(start) if given is None else np.ascontiguousarray(problem.rates(given))
+    velocity = np.zeros(start.shape) if given is None else np.ascontiguousarray(problem.rates(given))
     grid = Grid(knots, tables, _no_history(problem, tables), start, velocity)
     waypoints = any(g.start == 0.0 and isinstance(g.path, Waypoints) for g in problem.scene.grasps)
     if waypoints or len(curve.control_points) > 4:
-        if problem.twist is not None:
-            start_frames(knots, start, tables, start_director(problem), grid.history.past)
         grid = replace(grid, start=consistent_start(problem, grid))
     _write_history(problem, grid)
     return grid
@@ -104,7 +103,7 @@ def _write_history(problem: Problem, grid: Grid) -> None:
     if problem.start.material is not None:
         _write_stretch(grid, history, problem.start.material)
     if problem.keeps_history:
-        remember(problem.axes, grid.start, grid.tables, *problem.law_table(), history, 0.0, True)
+        remember_start(problem.axes, grid.start, grid.tables, *problem.laws, history)
 
 
 def start_director(problem: Problem) -> Floats:
@@ -256,23 +255,25 @@ def _planar_memory(problem: Problem, sections: Floats, director: Floats, tangent
 def consistent_start(problem: Problem, grid: Grid) -> Floats:
     """Return start control points (n_u, nc) of unit speed that pass exactly through the held points of the curve.
 
-    What the knots leave inside the table or an obstacle is pushed out.
+    What the knots leave inside the table or an obstacle is pushed out. The angle of the sections plays no part.
     """
+    line = problem if problem.twist is None else replace(problem, twist=None)
+    history = grid.history if line is problem else _no_history(line, grid.tables)
+    start = np.ascontiguousarray(grid.start[:, : line.nc])
     grasps = [g for g in problem.scene.grasps if g.start == 0.0]
     starts: Starts = {}
     close_grasps(problem, grid, grasps, starts, None)
-    held = hold(problem, grid, grasps, np.zeros(1), starts, grid.start)
-    active, parameters = problem.law_table()
+    held = hold(line, grid, grasps, np.zeros(1), starts, start)
+    active, parameters = line.law_table()
     kept = [laws.STRETCH, laws.CONTACT, laws.TABLE]
     active[[row for row in range(laws.COUNT) if row not in kept]] = 0
     strength = 1e-3 * parameters[0, 0] * (grid.n_u / problem.scene.cable.length) ** 2
-    q = grid.start.copy()
+    q = start.copy()
     relax(
-        problem.axes, q, grid.start.copy(), strength, np.zeros_like(q), grid.tables, active, parameters, grid.history,
-        held.elimination, held.offsets[0], 1e-10 * problem.scene.cable.length, 50,
+        line.axes, q, start, strength, np.zeros_like(q), grid.tables, active, parameters, history, held.elimination,
+        held.offsets[0], 1e-10 * problem.scene.cable.length, 50,
     )  # fmt: skip
-    q[:, 3:] = grid.start[:, 3:]  # the angle of the sections is none of its business
-    return q
+    return np.concatenate([q, grid.start[:, line.nc :]], axis=1)
 
 
 def applied_forces(problem: Problem, grid: Grid, t: Floats) -> Floats:

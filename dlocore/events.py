@@ -59,7 +59,8 @@ def time_knots(problem: Problem, n_t: int) -> Floats | None:
     events = events_of(problem)
     times = np.array([e.time for e in events])
     multiplicity = np.array([e.multiplicity for e in events], dtype=np.int64)
-    knots = graded_knots(n_t, problem.horizon, times, multiplicity, np.zeros(len(events)), np.ones(len(events)))
+    even = np.zeros(len(events))
+    knots = graded_knots(n_t, problem.horizon, times, multiplicity, even, even)
     return knots if len(knots) else None
 
 

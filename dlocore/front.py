@@ -71,7 +71,7 @@ def predict(
     if isinstance(again, Again):
         return _solved(problem, monitor, cost, again)
     fresh = _solved(pose(scene), monitor, cost)
-    return replace(fresh, message=f"{fresh.message} Solved from the beginning: {again}")
+    return replace(fresh, said=f"{fresh.said} Solved from the beginning: {again}")
 
 
 def _solved(problem: Problem, monitor: Monitor, cost: Cost | None, again: Again | None = None) -> Prediction:
@@ -245,11 +245,10 @@ def _answer(
     if outcome.errors is not None:
         errors = {**outcome.errors, "neglected": left_out}
         errors.setdefault("iteration", level.motion.update)
-    message = " ".join([outcome.message, *[f"Note: {objection}." for objection in objections(level)]])
     return Prediction(
         scene=problem.scene,
         status=outcome.status,
-        message=message,
+        said=outcome.message,
         surface=surface,
         report_grasps=partial(reactions, problem, grid, level.motion.forces if forces is None else forces),
         report_effects=partial(effect_reports, problem, grid, partial(_material, problem, level)),
@@ -269,7 +268,8 @@ def _answer(
             dimensions_reason=problem.plane.reason,
             phases=dict(monitor.phases),
         ),
-        start_energy=elastic_energy(problem, grid, grid.start, grid.history),
+        find_objections=partial(objections, level),
+        find_start_energy=partial(elastic_energy, problem, grid, grid.start, grid.history),
         start_fit=problem.start.fit_rms,
         level=level,
         judged=judged,
@@ -316,8 +316,9 @@ def warm_up() -> None:
                 effects={"twist": twist, "plasticity": plastic},
                 quality=quality,
             )
-            predict(scene)
-            predict(replace(scene, effects={"twist": twist, "obstacles": "off"}))
+            for effects in (scene.effects, {"twist": twist, "obstacles": "off"}):
+                answer = predict(replace(scene, effects=effects))
+                _ = answer.message, answer.start_energy, [i.energy for i in answer.iterations]  # found as they are read
         equilibrium(scene, n_u=9)
     loop = np.column_stack([np.cos(np.linspace(0.0, 7.0, 9)), np.sin(np.linspace(0.0, 7.0, 9)), 0.1 * u[:9, 0]])
     nearest_strands(uniform_knots(9, 1.0), loop[None], 3, 0.01, 0.03)

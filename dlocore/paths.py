@@ -22,6 +22,7 @@ _PROFILES: dict[str, Callable[[Floats], Floats]] = {
     "linear": lambda x: x,
     "cubic": lambda x: x**2 * (3 - 2 * x),
 }
+_NUMBERS = {name: number for number, name in enumerate(_PROFILES)}
 MAX_WAYPOINTS = 100_000
 
 
@@ -33,6 +34,11 @@ class Still:
     def duration(self) -> float:
         """Time until the path ends [s]."""
         return 0.0
+
+    @property
+    def line(self) -> tuple[float, ...]:
+        """Duration, number of the profile and displacement of a straight move."""
+        return (1.0, 0, 0.0, 0.0, 0.0)
 
     def at(self, t: Floats, start: Floats) -> Floats:
         """Positions at times `t` (k,) [s] of a grasp that began at `start` (3,) [m]; (k, 3) [m]."""
@@ -66,6 +72,11 @@ class Move:
         if self.rotation is not None:
             object.__setattr__(self, "rotation", array("rotation", self.rotation, shape=(3,), unit="rad"))
         choice("profile", self.profile, tuple(_PROFILES))
+
+    @property
+    def line(self) -> tuple[float, ...]:
+        """Duration [s], number of the profile and displacement [m] of a straight move."""
+        return (self.duration, _NUMBERS[self.profile], *cast(Floats, self.displacement).tolist())
 
     def at(self, t: Floats, start: Floats) -> Floats:
         """Positions at times `t` (k,) [s] of a grasp that began at `start` (3,) [m]; (k, 3) [m]."""
@@ -145,6 +156,10 @@ class Waypoints:
     def duration(self) -> float:
         """Time until the path ends [s]."""
         return float(cast(Floats, self.times)[-1])
+
+    @property
+    def line(self) -> None:
+        """None: no straight move."""
 
     def _clip(self, t: Floats) -> Floats:
         times = cast(Floats, self.times)

@@ -6,13 +6,14 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.paths import Move, Waypoints
+from dlocore.paths import Move, Path, Waypoints
 from dlocore.scene import Scene
 from dlocore.shape import StartCurve
 
 Floats = NDArray[np.float64]
 
 FLATNESS = 1e-9  # of the length: a start and a motion this close to a plane are planar
+_BEGINNING = np.zeros(1)  # [s]
 TABLE_TOLERANCE = 0.005  # [m]: points seen this close to the table lie on it
 
 
@@ -75,7 +76,7 @@ def off_the_table(scene: Scene, start: StartCurve, met: tuple[int, ...]) -> str:
         return "contact with the table is switched on in the scene"
     if scene.effects.get("twist", "auto") == "on":
         return "twist is switched on in the scene"
-    off = float(np.abs(start.control_points[:, 2] - table.height).max())
+    off = max(abs(z - table.height) for z in start.heights)
     if not off <= TABLE_TOLERANCE:
         return f"the cable starts up to {off:.3g} m above it"
     if cast(Floats, environment.gravity)[2] > 0:
@@ -88,7 +89,7 @@ def off_the_table(scene: Scene, start: StartCurve, met: tuple[int, ...]) -> str:
             return "a grasp lifts the cable off it"
         if isinstance(path, Waypoints) and np.ptp(cast(Floats, path.positions)[:, 2]) > 0:
             return "a grasp lifts the cable off it"
-        turns = path.rotation_at(np.linspace(0, path.duration, 9)) if path.duration else None
+        turns = _turns(path, 9)
         if turns is not None and np.abs(turns[:, 2, :2]).max() > 1e-9:
             return "a grasp turns the cable off its plane"
     for load in scene.loads:
@@ -111,7 +112,7 @@ def lay_on_table(scene: Scene, start: StartCurve) -> StartCurve:
     """Return the start at the table's height."""
     table = scene.environment.table
     assert table is not None
-    if (start.control_points[:, 2] == table.height).all():
+    if start.heights == (table.height, table.height):
         return start
     flat = start.control_points.copy()
     flat[:, 2] = table.height
@@ -120,7 +121,7 @@ def lay_on_table(scene: Scene, start: StartCurve) -> StartCurve:
 
 def find_plane(scene: Scene, start: StartCurve, on_table: bool, met: bool) -> Plane:
     """Decide between two and three coordinates from everything that could move the cable out of a plane."""
-    origin = start.control_points[0]
+    origin = np.array(start.control_points[0])
     if met and not on_table:
         return Plane(np.eye(3), origin, "obstacles are not in the plane of the motion")
     if scene.environment.table is not None and not on_table and scene.effects.get("table", "auto") != "off":
@@ -143,7 +144,7 @@ def find_plane(scene: Scene, start: StartCurve, on_table: bool, met: bool) -> Pl
             spread.append((positions - positions[0]) / length)
             spread.append((positions[:1] - start(grasp.u)) / length)
     gravity = cast(Floats, scene.environment.gravity)
-    if np.any(gravity != 0) and scene.effects.get("gravity", "auto") != "off":
+    if gravity.any() and scene.effects.get("gravity", "auto") != "off":
         spread.append(gravity[None] / np.linalg.norm(gravity))
     for load in scene.loads:
         force = np.atleast_2d(cast(Floats, load.force))
@@ -162,7 +163,7 @@ def find_plane(scene: Scene, start: StartCurve, on_table: bool, met: bool) -> Pl
         return Plane(np.eye(3), origin, "start, motion and forces do not lie in one plane")
     flat_turns = True
     for grasp in scene.grasps:
-        turns = grasp.path.rotation_at(np.linspace(0, grasp.path.duration, 33)) if grasp.path.duration else None
+        turns = _turns(grasp.path, 33)
         if turns is not None and np.abs(turns @ normal - normal).max() > 1e-9:
             flat_turns = False
     if not flat_turns:
@@ -171,6 +172,13 @@ def find_plane(scene: Scene, start: StartCurve, on_table: bool, met: bool) -> Pl
     first = _unit_across(normal)
     second = np.cross(normal, first)
     return Plane(np.array([first, second]), origin, "start, motion and forces lie in one plane")
+
+
+def _turns(path: Path, times: int) -> Floats | None:
+    """Return the rotations (times, 3, 3) of a path at evenly spaced times, or None where it never turns."""
+    if path.rotation_at(_BEGINNING) is None:
+        return None
+    return path.rotation_at(np.linspace(0.0, path.duration, times))
 
 
 def _remembered_bends(start: StartCurve) -> Floats:

@@ -49,32 +49,37 @@ class Iteration:
         residual: root of the weighted mean square of the equations' residual over the whole motion, as a displacement
             [m] (docs/model.md eq. 16); for `paper` a force [N]; for a level of `march` the largest error left
             by Newton's iterations [m].
-        energy: elastic energy at the end of the motion [J].
         wall_time: since the solve began [s].
         damping: Levenberg-Marquardt damping of the step, 0 for a plain one.
         step_length: fraction of the full step that was taken.
         n_u: control points along the cable at this iteration.
         n_t: control points in time.
         find_surface: finds the iterate itself, which `surface` keeps.
+        find_energy: finds the elastic energy at the end of the motion [J], which `energy` keeps.
         note: what happened, in words, e.g. "Gauss-Newton tangent"; empty for a plain iteration.
     """
 
     number: int
     update: float
     residual: float
-    energy: float
     wall_time: float
     damping: float
     step_length: float
     n_u: int
     n_t: int
     find_surface: Callable[[], SplineSurface] = field(repr=False)
+    find_energy: Callable[[], float] = field(repr=False)
     note: str = ""
 
     @cached_property
     def surface(self) -> SplineSurface:
         """The iterate itself."""
         return self.find_surface()
+
+    @cached_property
+    def energy(self) -> float:
+        """Elastic energy at the end of the motion [J]."""
+        return self.find_energy()
 
 
 OnIteration = Callable[[Iteration], None]
@@ -173,13 +178,15 @@ class Prediction:
     Attributes:
         scene: what was asked.
         status: "converged", or why not; never a success word for a failure.
-        message: the status in words, and what to do about it.
+        said: the status in words, and what to do about it.
         surface: the bivariate spline q(u, t).
         grasps: reaction of each grasp, in the scene's order.
-        effects: what was simulated and why. Both are functions of the rest, evaluated when they are first read.
+        effects: what was simulated and why.
+        message: what is said, and what effects that the scene switches off would have done.
+        start_energy: elastic energy stored in the start shape [J]. These four are functions of the rest, evaluated
+            when they are first read.
         iterations: how the solve went.
         accuracy: method, estimated error, time.
-        start_energy: elastic energy stored in the start shape [J].
         start_fit: root mean square distance of the start from the given points [m]; 0 where it was given exactly.
         level: the march behind it, on whose grid another may go on (`predict(..., like=...)`); None of a reference.
         judged: the prediction like it whose error estimate it took on; None where its own error was estimated.
@@ -187,17 +194,23 @@ class Prediction:
 
     scene: Scene
     status: Status
-    message: str
+    said: str
     surface: SplineSurface
     iterations: tuple[Iteration, ...]
     accuracy: Accuracy
-    start_energy: float
     start_fit: float
     report_grasps: Callable[[], tuple[GraspReaction, ...]] = field(repr=False)
     report_effects: Callable[[SplineSurface], tuple[EffectReport, ...]] = field(repr=False)
     report_material: Callable[[], MaterialMotion | None] = field(repr=False)
+    find_objections: Callable[[], list[str]] = field(repr=False)
+    find_start_energy: Callable[[], float] = field(repr=False)
     level: "Level | None" = field(default=None, repr=False)
     judged: "Prediction | None" = field(default=None, repr=False)
+
+    @cached_property
+    def message(self) -> str:
+        """The status in words, what to do about it, and what effects that the scene switches off would have done."""
+        return " ".join([self.said, *[f"Note: {objection}." for objection in self.find_objections()]])
 
     @cached_property
     def grasps(self) -> tuple[GraspReaction, ...]:
@@ -208,6 +221,11 @@ class Prediction:
     def effects(self) -> tuple[EffectReport, ...]:
         """What was simulated and why."""
         return self.report_effects(self.surface)
+
+    @cached_property
+    def start_energy(self) -> float:
+        """Elastic energy stored in the start shape [J]."""
+        return self.find_start_energy()
 
     @cached_property
     def material(self) -> MaterialMotion | None:

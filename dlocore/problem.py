@@ -24,9 +24,10 @@ from dlocore.effects.selfcontact import SelfContact
 from dlocore.effects.stretch import Stretch, StretchDamping
 from dlocore.effects.twist import Twist
 from dlocore.errors import SceneError
+from dlocore.kernels.projection import in_world
 from dlocore.obstacles import Box, Cylinder, Obstacle
 from dlocore.plane import Plane, find_plane, is_straight, lay_on_table, off_the_table
-from dlocore.scene import Grasp, Scene
+from dlocore.scene import Scene
 from dlocore.selection import Choice, choose, reached
 from dlocore.shape import StartCurve, start_curve
 
@@ -80,12 +81,12 @@ class Problem:
         """Predicted time [s]."""
         return cast(float, self.scene.horizon)
 
-    @property
+    @cached_property
     def nc(self) -> int:
         """Number of coordinates of a control point: 2 in the plane, 3 in space, 4 with twist."""
         return self.plane.dimensions + (self.twist is not None)
 
-    @property
+    @cached_property
     def axes(self) -> tuple[int, ...]:
         """(0, 1), (0, 1, 2) or (0, 1, 2, 3), from which the compiled kernels know the number of coordinates."""
         return tuple(range(self.nc))
@@ -107,11 +108,9 @@ class Problem:
 
     def world(self, q: Floats) -> Floats:
         """Return (x, y, z, theta) (..., 4) [m, m, m, rad] of control points q (..., nc)."""
-        out = np.zeros((*q.shape[:-1], 4))
-        out[..., :3] = self.plane.world(q[..., : self.plane.dimensions])
-        if self.twist is not None:
-            out[..., 3] = q[..., 3] / self.twist.radius
-        return out
+        radius = 1.0 if self.twist is None else self.twist.radius
+        flat = in_world(q.reshape(-1, q.shape[-1]), self.plane.origin, self.plane.axes, radius)
+        return np.asarray(flat.reshape((*q.shape[:-1], 4)))
 
     def mass_density(self) -> float:
         """Return the coefficient of the mass matrix [kg/m]; where inertia is off a trace that fixes rigid motion."""
@@ -123,21 +122,22 @@ class Problem:
 
     def law_table(self) -> tuple[NDArray[np.int64], Floats]:
         """Return switches (laws.COUNT,) and parameters (laws.COUNT + obstacles, laws.PARAMETERS) of compiled laws."""
-        active, parameters = self._law_table
+        active, parameters = self.laws
         return active.copy(), parameters.copy()
 
     @cached_property
     def keeps_history(self) -> bool:
         """Whether a law reads what earlier steps left behind."""
-        return bool(keeps_history(self._law_table[0]))
+        return bool(keeps_history(self.laws[0]))
 
     @cached_property
     def keeps_curvature(self) -> bool:
         """Whether a law reads the curvature or the frames of earlier steps."""
-        return bool(keeps_curvature(self._law_table[0]))
+        return bool(keeps_curvature(self.laws[0]))
 
     @cached_property
-    def _law_table(self) -> tuple[NDArray[np.int64], Floats]:
+    def laws(self) -> tuple[NDArray[np.int64], Floats]:
+        """What `law_table` returns, for those who only read it."""
         active = np.zeros(laws.COUNT, np.int64)
         parameters = np.zeros((laws.COUNT + len(self.obstacles), laws.PARAMETERS))
         for i, obstacle in enumerate(self.obstacles):
@@ -188,18 +188,6 @@ class Problem:
     def weight(self) -> Floats:
         """Return the weight per unit length in the solve's coordinates (nc,) [N/m]."""
         return np.zeros(self.nc) if self.gravity is None else self.rates(self.gravity.weight())
-
-    def position(self, grasp: Grasp, t: Floats, start: Floats) -> Floats:
-        """Return the prescribed positions (k, 2 or 3) of `grasp` at times t (k,) [s] of a path begun at `start`."""
-        world = self.plane.world(start)
-        return self.plane.points(grasp.path.at(t - grasp.start, world))
-
-    def direction(self, grasp: Grasp, t: Floats, start: Floats) -> Floats:
-        """Return the prescribed unit tangents (k, 2 or 3) of `grasp` at times t (k,) [s], from `start`."""
-        turns = grasp.path.rotation_at(t - grasp.start)
-        if turns is None:
-            return np.broadcast_to(start, (len(t), self.plane.dimensions))
-        return self.plane.vectors(turns @ self.plane.world_vectors(start))
 
 
 def pose(scene: Scene, called_for: Mapping[str, str] | None = None) -> Problem:
@@ -322,7 +310,7 @@ def _contact_stiffness(scene: Scene) -> float:
 def _is_bent(scene: Scene, start: StartCurve) -> bool:
     """Tell whether the stress-free shape is bent or twisted, so that it matters how the sections are turned."""
     rest, material = scene.cable.rest_shape, start.material
-    if material is not None and bool(np.any(cast(Floats, material.memory))):
+    if material is not None and bool(cast(Floats, material.memory).any()):
         return True
     if material is None and not isinstance(rest, str):
         return True

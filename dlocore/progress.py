@@ -44,13 +44,13 @@ def record(
             number=len(monitor.iterations),
             update=update,
             residual=residual,
-            energy=elastic_energy(problem, grid, np.ascontiguousarray(control[-1]), level.motion.history),
             wall_time=monitor.elapsed(),
             damping=damping,
             step_length=step_length,
             n_u=grid.n_u,
             n_t=len(control),
             find_surface=partial(surface_at, problem, level, control),
+            find_energy=partial(elastic_energy, problem, grid, control[-1], level.motion.history),
             note=note,
         )
     )

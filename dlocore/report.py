@@ -26,8 +26,7 @@ def surface_of(problem: Problem, knots_u: Floats, knots_t: Floats, control: Floa
 
 def elastic_energy(problem: Problem, grid: Grid, q: Floats, history: History) -> float:
     """Return the elastic energy stored in control points q (n_u, nc) [J] with `history` behind them."""
-    active, parameters = problem.law_table()
-    return float(stored_energy(problem.axes, q, grid.tables, active, parameters, history))
+    return float(stored_energy(problem.axes, q, grid.tables, *problem.laws, history))
 
 
 @dataclass(frozen=True, eq=False)

@@ -71,7 +71,7 @@ def objections(level: Level) -> list[str]:
     if "twist" in off and problem.plane.dimensions == 3 and clamps > 1:
         found.append("twist is off, though two grasps hold the orientation of the sections")
     allowed = MATTERS * problem.scene.cable.length
-    for name, force in _forces(problem).items():
+    for name, force in _forces(problem).items() if off else ():
         if name in off:
             moved = _response(level, force)
             if moved > allowed:

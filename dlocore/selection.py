@@ -1,5 +1,6 @@
 """Which effects a scene calls for, and the reason for each: from the scene, and from what a result has shown."""
 
+import math
 from collections.abc import Mapping
 from typing import NamedTuple, cast
 
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from dlocore.effects.distance import distances
 from dlocore.effects.selfcontact import NEAR_START, nearest_strands
-from dlocore.paths import Move, Still
+from dlocore.paths import Move, Waypoints
 from dlocore.scene import EFFECTS, Grasp, Scene
 from dlocore.shape import StartCurve
 
@@ -23,6 +24,23 @@ class Choice(NamedTuple):
 
     active: bool
     reason: str
+
+
+_MOVES = Choice(True, "the cable has mass and moves")
+_DRAGS, _NO_DRAG = Choice(True, "the environment has drag"), Choice(False, "no drag is given")
+_DAMPS = Choice(True, "the cable has internal damping")
+_NO_DAMPING = Choice(False, "no internal damping is given")
+_CARRIED = Choice(False, "the table carries the weight")
+_STRETCHES = Choice(True, "it keeps the cable's length")
+_BENDS = Choice(True, "the cable has bending stiffness")
+_PLANAR = Choice(False, "the motion is planar")
+_YIELDS_NOT = Choice(False, "the motion stays below the strain at which the cable yields")
+_ELASTIC = Choice(False, "the cable is elastic: no yield strain is given")
+_LIES = Choice(True, "the cable lies on it: it carries the weight, the motion is planar")
+_NO_TABLE = Choice(False, "there is none")
+_RUBS = Choice(True, "the cable slides on a rough surface")
+_SMOOTH = Choice(False, "no surface here has friction")
+_LIES_OVER = Choice(False, "on a table one strand can lie over another")
 
 
 def choose(
@@ -49,10 +67,11 @@ def choose(
     """
     cable, environment = scene.cable, scene.environment
     table = environment.table is not None
-    heavy = bool(np.any(cast(Floats, environment.gravity) != 0))
+    down = tuple(cast(Floats, environment.gravity).tolist())
+    heavy = down != (0.0, 0.0, 0.0)
     drags = environment.drag > 0 or environment.drag_quadratic > 0
     damps = cable.bending_damping > 0 or cable.torsional_damping > 0
-    plastic = any(x is not None for x in (cable.yield_strain, cable.yield_twist, cable.yield_stretch))
+    plastic = (cable.yield_strain, cable.yield_twist, cable.yield_stretch) != (None, None, None)
     rough = (
         environment.table is not None and environment.table.friction > 0 and scene.effects.get("table", "auto") != "off"
     ) or any(environment.obstacles[i].friction > 0 for i in met)
@@ -60,38 +79,26 @@ def choose(
     near = f"{len(met)} of {count} are in the cable's reach" if met else "none is near" if count else "there are none"
     found = {
         "inertia": _inertia(scene, start, on_table),
-        "drag": Choice(drags, "the environment has drag" if drags else "no drag is given"),
-        "damping": Choice(damps, "the cable has internal damping" if damps else "no internal damping is given"),
+        "drag": _DRAGS if drags else _NO_DRAG,
+        "damping": _DAMPS if damps else _NO_DAMPING,
         "gravity": Choice(heavy and not on_table, "the cable has weight" if heavy else "there is no gravity"),
-        "stretch": Choice(True, "it keeps the cable's length"),
-        "bend": Choice(True, "the cable has bending stiffness"),
-        "table": Choice(table, "the cable lies on it: it carries the weight, the motion is planar"),
-        "plasticity": Choice(False, "the motion stays below the strain at which the cable yields"),
-        "friction": Choice(rough, "the cable slides on a rough surface" if rough else "no surface here has friction"),
+        "stretch": _STRETCHES,
+        "bend": _BENDS,
+        "table": _NO_TABLE if not table else _LIES if on_table else Choice(True, leaves),
+        "plasticity": _YIELDS_NOT if plastic else _ELASTIC,
+        "friction": _RUBS if rough else _SMOOTH,
         "obstacles": Choice(bool(met), near),
         "self_contact": _self_contact(scene, start, on_table),
     }
     if on_table and heavy:
-        gravity = cast(Floats, environment.gravity)
-        slopes = bool(np.any(gravity[:2] != 0))
-        found["gravity"] = Choice(slopes, "the table slopes" if slopes else "the table carries the weight")
-    if not table:
-        found["table"] = Choice(False, "there is none")
-    elif not on_table:
-        found["table"] = Choice(True, leaves)
-    if not plastic:
-        found["plasticity"] = Choice(False, "the cable is elastic: no yield strain is given")
+        found["gravity"] = _CARRIED if down[:2] == (0.0, 0.0) else Choice(True, "the table slopes")
     for name, reason in called_for.items():
         found[name] = Choice(True, reason)
-    present = {name for name, choice in found.items() if choice.active} | {"inertia"}
-    present.add("self_contact")
-    if plastic:
-        present.add("plasticity")
-    for name in found:
-        switch = scene.effects.get(name, "auto")
-        if switch == "off":
+    optional = ("inertia", "self_contact", "plasticity") if plastic else ("inertia", "self_contact")
+    for name, switch in scene.effects.items():
+        if name != "twist" and switch == "off":
             found[name] = Choice(False, "switched off in the scene")
-        elif switch == "on" and name in present and not found[name].active:
+        elif name in optional and switch == "on" and not found[name].active:
             found[name] = Choice(True, "switched on in the scene")
     found["twist"] = _twist(scene, start, dimensions, bent, found["plasticity"].active, found["damping"].active)
     return {name: found[name] for name in EFFECTS}
@@ -101,26 +108,26 @@ def _inertia(scene: Scene, start: StartCurve, on_table: bool) -> Choice:
     """Choose inertia unless the motion is so slow that the cable goes through equilibria."""
     cable, environment = scene.cable, scene.environment
     moves = [g.path for g in scene.grasps if isinstance(g.path, Move)]
-    smooth = all(m.profile != "linear" for m in moves) and len(moves) > 0
-    lasting = all(isinstance(g.path, Move | Still) and g.start == 0.0 and not g.release_time for g in scene.grasps)
+    smooth = len(moves) > 0 and "linear" not in [m.profile for m in moves]
+    lasting = all([not isinstance(g.path, Waypoints) and g.start == 0.0 and not g.release_time for g in scene.grasps])
     rubs = environment.drag > 0 or (environment.table is not None and environment.table.friction > 0)
-    heavy = not on_table and bool(np.any(cast(Floats, environment.gravity) != 0))
+    heavy = not on_table and bool(cast(Floats, environment.gravity).any())
     held = rubs or heavy or len(scene.grasps) > 1
     if smooth and lasting and held and start.velocity is None and not scene.loads:
         stiffness = cast(float, cable.bending_stiffness) * (1.875 / cable.length) ** 4
         gravity = float(np.linalg.norm(cast(Floats, environment.gravity))) if heavy else 0.0
-        period = 2.0 * np.pi / np.sqrt(stiffness / cable.linear_density + gravity / cable.length)
+        period = 2.0 * math.pi / math.sqrt(stiffness / cable.linear_density + gravity / cable.length)
         shortest = min(m.duration for m in moves)
         if shortest > SLOW * period:
             reason = f"the motion is slow: {shortest:.3g} s against a first natural period of {period:.2g} s"
             return Choice(False, reason)
-    return Choice(True, "the cable has mass and moves")
+    return _MOVES
 
 
 def _self_contact(scene: Scene, start: StartCurve, on_table: bool) -> Choice:
     """Choose contact of the cable with itself where two strands of the start are near each other."""
     if on_table:
-        return Choice(False, "on a table one strand can lie over another")
+        return _LIES_OVER
     diameter, control = scene.cable.diameter, np.ascontiguousarray(start.control_points)
     apart = np.inf
     if len(control) > 4 and scene.effects.get("self_contact", "auto") == "auto":
@@ -160,7 +167,7 @@ def _twist(scene: Scene, start: StartCurve, dimensions: int, bent: bool, plastic
     if switch == "on":
         return Choice(True, "switched on in the scene")
     if dimensions == 2:
-        return Choice(False, "the motion is planar")
+        return _PLANAR
     if bent:
         return Choice(True, "the stress-free shape is bent, and its bends turn with the sections")
     if start.theta is not None:

@@ -1,25 +1,29 @@
 """Initial shapes: the curve a cable lies along at t = 0, and its control points on given knots."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import BSpline, make_interp_spline
-from scipy.linalg import solveh_banded
+from scipy.interpolate import make_interp_spline
 
 from dlocore.errors import SceneError
 from dlocore.fit import MAX_SPANS, check_length, fit_points
-from dlocore.kernels.basis import spline_values
+from dlocore.kernels.basis import GAUSS_4, spline_values
+from dlocore.kernels.holding import place
+from dlocore.kernels.projection import on_knots
 from dlocore.scene import ControlPoints, Material, Points, Shape, Straight
-from dlocore.smoothing import normal_equations, smooth
+from dlocore.smoothing import smooth
 from dlocore.spline import DEGREE, uniform_knots
 
 Floats = NDArray[np.float64]
 
 SPEED_RANGE = (0.5, 1.5)  # of |r'|: a coarse spline of a hairpin stays within, evenly spaced control points don't
 SAME_ANGLE = 1e-9  # [rad]
+_ONE_SPAN = uniform_knots(4, 1.0)
 _THIRDS = np.linspace(0.0, 1.0, 4)[:, None]
 GAUSS = ((np.polynomial.legendre.leggauss(4)[0] + 1) / 2, np.polynomial.legendre.leggauss(4)[1] / 2)  # on [0, 1]
 
@@ -35,6 +39,10 @@ class SplineCurve:
         """Return the value or a derivative, of order up to 3, at `u` (k,) [m]; (k, 3)."""
         at = np.atleast_1d(np.asarray(u, dtype=np.float64))
         return np.asarray(spline_values(_plain(self.knots), _plain(self.control_points), _plain(at), derivative))
+
+    def place(self, u: float) -> Floats:
+        """Return the point [m] and the unit tangent (2, 3) at `u` [m]."""
+        return np.asarray(place(_plain(self.knots), _plain(self.control_points), u, 3))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,6 +66,12 @@ class StartCurve(SplineCurve):
     theta: SplineCurve | None = None
     material: Material | None = None
 
+    @cached_property
+    def heights(self) -> tuple[float, float]:
+        """Heights of the lowest and the highest control point, between which the curve lies [m]."""
+        z = self.control_points[:, 2].tolist()
+        return min(z), max(z)
+
 
 def _plain(x: Floats) -> Floats:
     """Return x, or a copy of it, as an array of the one kind that the kernels are compiled for."""
@@ -79,9 +93,9 @@ def start_curve(shape: Shape, length: float) -> StartCurve:
 
 def _straight(shape: Straight, length: float) -> StartCurve:
     start, direction = cast(Floats, shape.start), cast(Floats, shape.direction)
-    control = start + length * _THIRDS * (direction / np.linalg.norm(direction))
+    control = start + length * _THIRDS * (direction / math.sqrt(direction @ direction))
     velocity = _velocity(shape.velocity, length, lambda rows: np.linspace(0.0, length, rows), exact=True)
-    return StartCurve(knots=uniform_knots(4, length), control_points=control, velocity=velocity, length_given=length)
+    return StartCurve(knots=length * _ONE_SPAN, control_points=control, velocity=velocity, length_given=length)
 
 
 def _given(shape: ControlPoints, length: float) -> StartCurve:
@@ -175,15 +189,7 @@ def fit_to_knots(curve: SplineCurve, knots: Floats) -> Floats:
     keeps the shape and not the unit speed: on 9 control points and uniform knots a 1 m cable along one sine wave is
     strained by 4 % in the middle of a span, on 13 by 0.9 %, on 25 by 0.07 %.
     """
-    if len(curve.control_points) == 4:
-        return _blossom(curve, knots)
-    if np.array_equal(curve.knots, knots):
-        return np.array(curve.control_points)
-    u, width = _gauss_points(knots)
-    design = BSpline.design_matrix(u, knots, DEGREE)
-    first, basis = design.indices[:: DEGREE + 1].astype(np.intp), design.data.reshape(-1, DEGREE + 1).T
-    band, right = normal_equations(first, basis, width, curve(u), len(knots) - DEGREE - 1)
-    return np.ascontiguousarray(solveh_banded(band, right, lower=True))
+    return np.asarray(on_knots(_plain(curve.knots), _plain(curve.control_points), _plain(knots), *GAUSS_4))
 
 
 def _gauss_points(knots: Floats) -> tuple[Floats, Floats]:
@@ -196,13 +202,3 @@ def _gauss_points(knots: Floats) -> tuple[Floats, Floats]:
 def velocity_to_knots(curve: StartCurve, knots: Floats) -> Floats | None:
     """Return the control points [m/s] of the initial velocity on `knots` [m], or None at rest."""
     return None if curve.velocity is None else fit_to_knots(curve.velocity, knots)
-
-
-def _blossom(curve: SplineCurve, knots: Floats) -> Floats:
-    """Return the control points of a single cubic polynomial on any knots: its blossom at each three of them; exact."""
-    length = curve.knots[-1]
-    c = curve.control_points[:, None, :]
-    for i in (1, 2, 3):
-        a = (knots[i : i + len(knots) - 4] / length)[:, None]
-        c = c[:-1] + a * (c[1:] - c[:-1])
-    return c[0]

@@ -29,6 +29,7 @@ TOLERANCE = 1e-10  # of the length, on the last Newton update
 RESTING = 1e-8  # of the length, as near to the equilibrium as a march solves its steps
 UNDRIVEN = 1e-6  # of what weighs on the cable and bends it: a force that drives nothing
 _ROUNDING = 1e-15  # of the axial stiffness: what it makes of a force
+_ROUGH = 1e-5  # of the length: the same of the first relaxation, which others follow; Newton's method leaves its square
 ITERATIONS = 60  # of one relaxation
 ROUNDS = 400  # of relaxations, each held back less by where it started
 Rest = Literal["settled", "restless", "time"]  # at rest; no rest found; the time was up
@@ -180,7 +181,8 @@ def settle(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> Settled
         grasps = closed_grasps(problem, t, t)
         close_grasps(problem, grid, grasps, starts, q)
         held = hold(problem, grid, grasps, np.array([before_t, t]), starts, q)
-        _carry(problem, grid, grasps, starts, t, q)
+        if t > 0.0:
+            _carry(problem, grid, grasps, starts, t, q)
         before_t = t
         applied = applied_forces(problem, grid, np.array([t]))[0]
         strength = springs
@@ -192,15 +194,17 @@ def settle(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> Settled
                 rest = "time"
                 break
             before = q.copy()
+            tolerance = TOLERANCE if strength < springs else _ROUGH
             update, used = relax(
                 axes, q, before, strength, applied, grid.tables, active, parameters, history, held.elimination,
-                held.offsets[-1], TOLERANCE * length, ITERATIONS,
+                held.offsets[-1], tolerance * length, ITERATIONS,
             )  # fmt: skip
             if problem.twist is not None:
                 remember(axes, q, grid.tables, active, parameters, history, 0.0, True)
             moved = float(np.abs(q - before).max())
             resting = update <= RESTING * length  # rounding may keep a stiff cable from TOLERANCE
-            strength *= 0.2 if used <= 12 else 0.5 if resting else 1.0
+            found = update <= max(tolerance, RESTING) * length
+            strength *= 0.2 if used <= 12 else 0.5 if found else 1.0
             near = moved <= RESTING * length
             if resting if near else _only_turns(problem, grid, history, before, q, applied):
                 rest = "settled"
@@ -224,7 +228,7 @@ def _only_turns(problem: Problem, grid: Grid, history: History, before: Floats, 
     A cable that hangs from a point, or between two, may turn about itself: it is in equilibrium at any angle.
     """
     length, dimensions = problem.scene.cable.length, problem.plane.dimensions
-    if _reshaped(before[:, :dimensions], q[:, :dimensions]) > RESTING * length:
+    if not _moved_rigidly(before[:, :dimensions], q[:, :dimensions], RESTING * length):
         return False
     step = q - before
     work = abs(float(np.sum(_unbalanced(problem, grid, history, q, applied) * step)))
@@ -234,11 +238,15 @@ def _only_turns(problem: Problem, grid: Grid, history: History, before: Floats, 
     return work <= force * float(np.abs(step).max())
 
 
-def _reshaped(before: Floats, after: Floats) -> float:
-    """Return how far points (n, 2 or 3) came apart from the best rigid motion of where they were before [m]."""
+def _moved_rigidly(before: Floats, after: Floats, tolerance: float) -> bool:
+    """Tell whether points (n, 2 or 3) lie within a tolerance [m] of a rigid motion of where they were before."""
+    a, b = before - before[0], after - after[0]
+    apart = np.sqrt((a * a).sum(axis=1)) - np.sqrt((b * b).sum(axis=1))
+    if np.abs(apart).max() > 2.0 * before.shape[1] ** 0.5 * tolerance:  # a distance that no such motion leaves
+        return False
     x, y = before - before.mean(axis=0), after - after.mean(axis=0)
     left, _, right = np.linalg.svd(x.T @ y)
-    return float(np.abs(x @ (left @ right) - y).max())
+    return bool(np.abs(x @ (left @ right) - y).max() <= tolerance)
 
 
 def _carry(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, t: float, q: Floats) -> None:
@@ -251,7 +259,10 @@ def _carry(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, t:
     order = sorted(grasps, key=lambda g: g.u)
     dimensions = problem.plane.dimensions
     shift = np.array(
-        [problem.position(g, np.array([t]), starts[g][0])[0] - grid.at(q, g.u)[:dimensions] for g in order]
+        [
+            problem.plane.points(g.path.at(np.array([t - g.start]), starts[g][0])[0]) - grid.at(q, g.u)[:dimensions]
+            for g in order
+        ]
     )
     middle = (grid.knots[1:-3] + grid.knots[2:-2] + grid.knots[3:-1]) / 3  # of the control points
     for d in range(dimensions):
@@ -260,7 +271,7 @@ def _carry(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, t:
 
 def _unbalanced(problem: Problem, grid: Grid, history: History, q: Floats, applied: Floats) -> Floats:
     """Return the forces (n_u, nc) [N] on the control points q that nothing balances but what holds them."""
-    active, parameters = problem.law_table()
+    active, parameters = problem.laws
     f, nothing = np.empty_like(q), np.empty((1, 1))
     assemble(
         problem.axes, q, np.zeros_like(q), grid.tables, active, parameters, history, NO_RATES, (0.0, 0.0, 0.0), f,

@@ -285,7 +285,8 @@ def from_prediction(prediction: Prediction, id: str, samples_u: int = 101, sampl
 
 def iteration_document(iteration: Iteration) -> dict[str, Any]:
     """Return an iteration without its surface, with None where a value is not finite."""
-    document = {f.name: getattr(iteration, f.name) for f in fields(iteration) if f.name != "find_surface"}
+    named = [f.name for f in fields(iteration) if f.name not in ("find_surface", "find_energy")]
+    document = {name: getattr(iteration, name) for name in (*named, "energy")}
     for name in ("update", "residual", "energy", "damping", "step_length"):
         document[name] = _finite(document[name])
     return document

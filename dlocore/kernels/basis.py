@@ -138,7 +138,10 @@ def graded_knots(n: int, length: float, features: Any, multiplicity: Any, power:
             u = a + (b - a) * x * x * (3.0 - 2.0 * x)
             here = 1.0
             for f in range(len(features)):
-                here += ((width[f] + 1.0) / (width[f] + abs(u - features[f]) / length)) ** power[f]
+                if power[f] == 0.0:
+                    here += 1.0
+                else:
+                    here += ((width[f] + 1.0) / (width[f] + abs(u - features[f]) / length)) ** power[f]
             if i > 0:
                 y = (i - 1) / _SAMPLES
                 step = u - (a + (b - a) * y * y * (3.0 - 2.0 * y))
@@ -212,7 +215,8 @@ class Tables(NamedTuple):
 
 
 @kernel
-def _points(knots: Any, rule: Any, weights: Any) -> Any:
+def gauss_points(knots: Any, rule: Any, weights: Any) -> Any:
+    """Return the points u (k,) [m] of a Gauss rule on [-1, 1] in each knot span, and their weights (k,) [m]."""
     spans = 0
     for k in range(3, len(knots) - 4):
         spans += knots[k + 1] > knots[k]
@@ -320,7 +324,7 @@ def build_tables(
     u, axial_w = _axial_points(knots, free_start, free_end, rule2, w2)
     axial_first, table = basis_rows(knots, u, 1)
     axial_b1 = np.ascontiguousarray(table[:, 1])
-    curvature_u, curvature_w = _points(knots, rule3, w3)
+    curvature_u, curvature_w = gauss_points(knots, rule3, w3)
     curvature_first, table = basis_rows(knots, curvature_u, 2)
     b0 = np.ascontiguousarray(table[:, 0])
     b1 = np.ascontiguousarray(table[:, 1])
@@ -331,7 +335,7 @@ def build_tables(
     n = len(knots) - 4
     mass = np.zeros((n, 4))
     weight = np.zeros(n)
-    u4, weights4 = _points(knots, rule4, w4)
+    u4, weights4 = gauss_points(knots, rule4, w4)
     first4, table4 = basis_rows(knots, u4, 0)
     for p in range(len(u4)):
         f = first4[p]

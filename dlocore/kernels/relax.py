@@ -103,6 +103,7 @@ def relax(
         for i in range(size):
             slope += change[i] * f.ravel()[i]
         step = change.reshape((n, nc))
+        after = np.nan
         if update > tolerance:
             for _ in range(_HALVINGS):
                 after = _merit(axes, q - length * step, target, strength, applied, tables, active, p, history, w)
@@ -119,10 +120,14 @@ def relax(
                     if abs(work) <= 0.9 * abs(slope):
                         break
                 length *= 0.5
+                after = np.nan
         q -= length * step
         if len(axes) == 4:
             carry(q, tables, active, p, history.memory, history.past, 0.0)
-        energy = _merit(axes, q, target, strength, applied, tables, active, p, history, w)
         if update <= tolerance:
             return update, it + 1
+        if np.isfinite(after):  # carried frames change nothing but rounding
+            energy = after
+        else:
+            energy = _merit(axes, q, target, strength, applied, tables, active, p, history, w)
     return update, limit

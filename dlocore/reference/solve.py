@@ -1,6 +1,7 @@
 """`method="reference"`: the refined motion of a discrete elastic rod as an ordinary prediction."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -106,13 +107,13 @@ def reference(problem: Problem, monitor: Monitor) -> Prediction:
                 number=len(monitor.iterations),
                 update=level.change,
                 residual=motion.left,
-                energy=_elastic_energy(level, len(motion.states) - 1),
                 wall_time=monitor.elapsed(),
                 damping=0.0,
                 step_length=1.0,
                 n_u=surface.control_points.shape[1],
                 n_t=len(surface.control_points),
                 find_surface=lambda: surface,
+                find_energy=partial(_elastic_energy, level, len(motion.states) - 1),
                 note=f"rod of {len(motion.rod.u) - 1} elements, {motion.steps} steps",
             )
         )
@@ -161,7 +162,7 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
     return Prediction(
         scene=problem.scene,
         status=status,
-        message=message,
+        said=message,
         surface=fitted.surface,
         iterations=tuple(monitor.iterations),
         accuracy=Accuracy(
@@ -178,7 +179,7 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
             dimensions_reason=problem.plane.reason,
             phases=dict(monitor.phases),
         ),
-        start_energy=_elastic_energy(last, 0),
+        find_start_energy=partial(_elastic_energy, last, 0),
         start_fit=problem.start.fit_rms,
         report_grasps=lambda: tuple(
             GraspReaction(g.u, motion.times, motion.forces[i], motion.moments[i])
@@ -186,6 +187,7 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
         ),
         report_effects=lambda surface: _effects(refined, surface),
         report_material=lambda: material_of(motion, last.taken),
+        find_objections=list,
     )
 
 

@@ -166,8 +166,10 @@ def run_level(
     smooth = motion
     if free_knots and (problem.contact is not None or motion.deepest > 0.0):
         knots_t, smooth = refined(motion, knots_t, _MISSED * problem.scene.cable.diameter)
-    control = fit(smooth, knots_t)
-    off = np.sort(missed(motion, knots_t, control))
+    control, off = fit(smooth, knots_t)
+    if smooth is not motion:
+        off = missed(motion, knots_t, control)
+    off = np.sort(off)
     if booked:
         monitor.phase("fit")
     most = float(off[int(_MOST_OF_THE_TIME * (len(off) - 1))])

@@ -12,6 +12,7 @@ from dlocore.grid import Grid
 from dlocore.holding import Starts, hold
 from dlocore.kernels.assembly import History, note, times_scalar_band
 from dlocore.kernels.banded import Elimination
+from dlocore.kernels.entry import to_ends_of_steps
 from dlocore.kernels.march import (
     DEEPEST,
     FAILED_STEP,
@@ -170,7 +171,7 @@ class _Walk:
 
     def __init__(self, problem: Problem, grid: Grid, monitor: Monitor, times: Floats, rho: float) -> None:
         self._problem, self._grid, self._monitor, self._times, self._rho = problem, grid, monitor, times, rho
-        self._laws = problem.law_table()
+        self._laws = problem.laws
         self._mass = grid.tables.mass * problem.mass_density()
         self._applied = applied_forces(problem, grid, times)
         self._tolerance = _tolerance(problem, problem.horizon / len(times))
@@ -210,7 +211,7 @@ class _Walk:
             else:
                 at, self.stopped = failed - 1, "step"
         self._reached, self._v = at, stretch.v
-        _to_ends_of_steps(stretch.reactions[first : at + 1], self._rho / (1.0 + self._rho))
+        to_ends_of_steps(stretch.reactions, first, at, self._rho / (1.0 + self._rho))
         part = slice(first, last + 1)
         self._forces.append(
             WindowForces(stretch.entry.held, self._times[part], stretch.reactions[part], self._states[part])
@@ -355,14 +356,3 @@ def _empty_log(problem: Problem, grid: Grid, times: int) -> Floats:
     columns = PAST + 3 if problem.twist is not None else 1
     rows = len(grid.tables.curvature_w) + (len(grid.tables.axial_w) if problem.stretch_memory is not None else 0)
     return np.zeros((times, rows, columns))
-
-
-def _to_ends_of_steps(reactions: Floats, lag: float) -> None:
-    """Bring the reactions (k, held) of steps 1 to k - 1 to their times, in place.
-
-    A generalised-alpha step balances its forces `lag` steps before its end (alpha_f).
-    """
-    if len(reactions) > 2:
-        rate = reactions[2:] - reactions[1:-1]
-        reactions[1:-1] += lag * rate
-        reactions[-1] += lag * rate[-1]

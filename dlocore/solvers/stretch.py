@@ -9,7 +9,7 @@ from dlocore.effects import laws
 from dlocore.grid import Grid
 from dlocore.holding import Held, Starts, close_grasps, hold
 from dlocore.kernels.assembly import History
-from dlocore.kernels.march import begin_stretch
+from dlocore.kernels.entry import begin
 from dlocore.problem import Problem
 from dlocore.scene import Grasp
 
@@ -61,14 +61,16 @@ def enter(
     """
     close_grasps(problem, grid, grasps, starts, q)
     held = hold(problem, grid, grasps, np.concatenate([times[0] + h * _NEAR, times]), starts, q)
-    active, parameters = problem.law_table()
+    active, parameters = problem.laws
     if times[0] > 0.0:  # the rate of a strain that hardly changes is lost in what steps leave of the velocities
+        active = active.copy()
         active[laws.STRETCH_DAMPING] = 0
-    closed, a, G = begin_stretch(
+    inertial = problem.inertia is not None
+    closed, a, G, away = begin(
         problem.axes, q, v, grid.tables.mass, problem.mass_density(), problem.drag_coefficient(), grid.tables, active,
-        parameters, history, load, held.elimination, held.offsets[:3], h * _NEAR[1], problem.inertia is not None,
+        parameters, history, load, held.elimination, held.offsets[:3], h * _NEAR[1], inertial,
+        problem.plane.dimensions,
     )  # fmt: skip
-    started = closed.copy() if problem.inertia is not None else np.zeros_like(closed)
-    away = np.abs(closed - v)[:, : problem.plane.dimensions].max()
-    jumps = problem.inertia is not None and h * away > _JUMPS * problem.scene.cable.length
-    return Entry(held, held.offsets[3:], closed, started, a, G, bool(jumps))
+    started = closed.copy() if inertial else np.zeros_like(closed)
+    jumps = inertial and h * away > _JUMPS * problem.scene.cable.length
+    return Entry(held, held.offsets[3:], closed, started, a, G, jumps)

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.kernels.march import fit_missed, fit_time
+from dlocore.kernels.march import fit_missed
+from dlocore.kernels.timefit import fitted
 from dlocore.solvers.march import March
 
 Floats = NDArray[np.float64]
@@ -20,8 +21,7 @@ def refined(motion: March, knots_t: Floats, tolerance: float) -> tuple[Floats, M
     swings past its states. There the states half-way through the steps are added to the motion, and knots beside them.
     """
     for _ in range(_REFINEMENTS):
-        control = fit(motion, knots_t)
-        off = missed(motion, knots_t, control)
+        control, off = fit(motion, knots_t)
         between = _halved(motion, knots_t, control, tolerance)
         breaks = np.unique(knots_t)
         span = np.clip(np.searchsorted(breaks, motion.times, side="right") - 1, 0, len(breaks) - 2)
@@ -62,8 +62,7 @@ def _halved(motion: March, knots_t: Floats, control: Floats, tolerance: float) -
     )
 
 
-def fit(motion: March, knots_t: Floats) -> Floats:
-    """Return control points (n_t, n_u, nc) [m] of the time spline fitted to a marched motion."""
-    steps, n_u, nc = motion.states.shape
-    flat = fit_time(knots_t, motion.times, motion.states.reshape(steps, n_u * nc), motion.velocity.reshape(-1))
-    return flat.reshape(len(knots_t) - 4, n_u, nc)
+def fit(motion: March, knots_t: Floats) -> tuple[Floats, Floats]:
+    """Return control points (n_t, n_u, nc) [m] of the time spline fitted to a marched motion, and what it `missed`."""
+    control, off = fitted(knots_t, motion.times, motion.states, motion.velocity, min(3, motion.states.shape[2]))
+    return control, off

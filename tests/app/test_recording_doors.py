@@ -100,7 +100,7 @@ def test_an_iterate_that_grew_beyond_all_bounds_is_not_drawn(tmp_path: Path, los
     prediction = solved(paper_scene(), kept)
     first, *others = prediction.iterations
     surface = replace(first.surface, control_points=np.full_like(first.surface.control_points, lost))
-    broken = replace(first, find_surface=lambda: surface, residual=lost, energy=lost)
+    broken = replace(first, find_surface=lambda: surface, residual=lost, find_energy=lambda: lost)
     path = tmp_path / "run.rrd"
     id = kept.save(paper_scene(), replace(prediction, iterations=(broken, *others)))
     path.write_bytes(kept.recording(id) or b"")

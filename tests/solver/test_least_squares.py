@@ -45,7 +45,7 @@ def window(table: Table | None, twist: str, damping: float) -> tuple[WindowSolve
     solver = WindowSolver(
         problem, grid, part, grasps, starts, grid.start, motion.velocity, motion, 50.0, Monitor(None, None, None)
     )
-    control = fit(motion, knots) + 1e-3 * np.random.default_rng(0).standard_normal((9, 9, problem.nc))
+    control = fit(motion, knots)[0] + 1e-3 * np.random.default_rng(0).standard_normal((9, 9, problem.nc))
     return solver, solver.constrain(control)
 
 

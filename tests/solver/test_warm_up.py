@@ -21,7 +21,8 @@ assert len(before) > 40, before
 for name, scene in catalogue().items():
     for method in ("march", "spacetime"):
         try:
-            predict(replace(scene, quality=Quality(n_u=13, n_t=19, method=method)), deadline=2.0)
+            answer = predict(replace(scene, quality=Quality(n_u=13, n_t=19, method=method)), deadline=2.0)
+            answer.message, answer.start_energy, [i.energy for i in answer.iterations]
         except SceneError as error:
             assert error.field.startswith("quality"), (name, error)  # so small a grid is refused for a few
     new = compiled() - before

@@ -1,0 +1,145 @@
+"""What grasps hold, compiled: their rows, the control points that are solved for them, and where their paths begin."""
+
+from typing import Any
+
+import numpy as np
+
+from dlocore.kernels.banded import elimination
+from dlocore.kernels.basis import basis, find_span
+from dlocore.kernels.compile import brief, kernel
+
+ROW = 13  # numbers that describe a row
+
+
+@brief
+def place(knots: Any, control: Any, u: float, dimensions: int) -> Any:
+    """Return the point and the unit tangent (2, dimensions) at `u` of the spline with control points (n, m)."""
+    table = np.empty((2, 4))
+    span = find_span(knots, u)
+    basis(knots, span, u, 1, table)
+    out = np.zeros((2, dimensions))
+    for order in range(2):
+        for i in range(4):
+            for d in range(dimensions):
+                out[order, d] += table[order, i] * control[span - 3 + i, d]
+    square = 0.0
+    for d in range(dimensions):
+        square += out[1, d] * out[1, d]
+    for d in range(dimensions):
+        out[1, d] /= np.sqrt(square)
+    return out
+
+
+@kernel
+def _progress(profile: int, x: float) -> float:
+    """Return the share of a straight move (`dlocore.paths.Move.line`) that is done at the share x of its time."""
+    x = min(max(x, 0.0), 1.0)
+    if profile == 0:
+        return x * x * x * (10.0 - 15.0 * x + 6.0 * x * x)
+    return x if profile == 1 else x * x * (3.0 - 2.0 * x)
+
+
+@brief
+def hold_rows(
+    knots: Any, nc: int, times: Any, rows: Any, sampled: Any, origin: Any, axes: Any, turned: Any, angles: Any
+) -> Any:
+    """Solve what grasps hold for one control point each (docs/model.md eq. 11, 12).
+
+    Args:
+        knots: (n + 4,) [m].
+        nc: number of coordinates of a control point.
+        times: (k,) [s].
+        rows: (r, ROW) what acts on every coordinate of the centreline: where [m], whether it is a direction, whether
+            its grasp holds the direction, the number of its path in `sampled` or -1, begin and duration [s], profile,
+            displacement (3) and value at the beginning (3) in the world. `dlocore/holding.py` writes them.
+        sampled: (m, k, 3) points [m] or unit tangents over time of paths that are no straight moves, in the world.
+        origin, axes: (3,) [m] and (dimensions, 3), of the coordinates of the solve.
+        turned: (m,) [m] where the angle of the section is held.
+        angles: (k, m) [m] the fourth coordinate there.
+
+    Returns:
+        The `Elimination`, the prescribed part (k, held) [m] of the held degrees of freedom, and the inverses (rows,
+        rows) and (m, m) of the rows' pivot blocks.
+    """
+    count, nd = len(rows), len(axes)
+    pivots, inverse, follow = _solved_for(knots, rows[:, 0].copy(), rows[:, 1].copy(), rows[:, 2].copy())
+    none = np.zeros(len(turned))
+    turned_pivots, turned_inverse, turned_follow = _solved_for(knots, turned, none, none)
+    offsets = np.zeros((len(times), count * nd + len(turned)))
+    target = np.empty(3)
+    for s in range(count):
+        row = rows[s]
+        for k in range(len(times)):
+            done = _progress(int(row[6]), (times[k] - row[4]) / row[5])
+            for i in range(3):
+                target[i] = sampled[int(row[3]), k, i] if row[3] >= 0.0 else row[10 + i] + done * row[7 + i]
+                if row[1] == 0.0:
+                    target[i] -= origin[i]
+            for d in range(nd):
+                value = target[0] * axes[d, 0] + target[1] * axes[d, 1] + target[2] * axes[d, 2]
+                for r in range(count):
+                    offsets[k, r * nd + d] += inverse[r, s] * value
+    for s in range(len(turned)):
+        for r in range(len(turned)):
+            for k in range(len(times)):
+                offsets[k, count * nd + r] += turned_inverse[r, s] * angles[k, s]
+    e = elimination(len(knots) - 4, nc, nd, pivots, follow, turned_pivots, turned_follow)
+    return e, offsets, inverse, turned_inverse
+
+
+@kernel
+def _solved_for(knots: Any, u: Any, order: Any, first: Any) -> Any:
+    """Return the pivots of the rows at `u`, the inverse of their block, and how they follow the other control points.
+
+    Pivots are chosen by Gauss elimination, the rows `first` before the others: a held direction has just two control
+    points to choose from, so it chooses before its neighbours do.
+    """
+    rows, n = len(u), len(knots) - 4
+    A = np.zeros((rows, n))
+    table = np.empty((2, 4))
+    for r in range(rows):
+        span, derivative = find_span(knots, u[r]), int(order[r])
+        basis(knots, span, u[r], derivative, table)
+        A[r, span - 3 : span + 1] = table[derivative]
+    work = A.copy()
+    pivots = np.full(rows, -1)
+    for turn in range(2):
+        for r in range(rows):
+            if (first[r] != 0.0) != (turn == 0):
+                continue
+            for s in range(rows):
+                if pivots[s] >= 0:
+                    work[r] -= work[r, pivots[s]] / work[s, pivots[s]] * work[s]
+            pivots[r] = np.argmax(np.abs(work[r]))
+    block = np.empty((rows, rows))
+    for s in range(rows):
+        block[:, s] = A[:, pivots[s]]
+    inverse = _inverse(block)
+    follow = np.zeros((rows, n))
+    for r in range(rows):
+        for s in range(rows):
+            follow[r] -= inverse[r, s] * A[s]
+    for p in pivots:
+        follow[:, p] = 0.0
+    return pivots, inverse, follow
+
+
+@kernel
+def _inverse(block: Any) -> Any:
+    """Return the inverse of a small matrix by Gauss-Jordan elimination with row pivoting; `block` is spoilt."""
+    n = len(block)
+    inverse = np.eye(n)
+    for c in range(n):
+        p = c + np.argmax(np.abs(block[c:, c]))
+        for i in range(n):
+            block[c, i], block[p, i] = block[p, i], block[c, i]
+            inverse[c, i], inverse[p, i] = inverse[p, i], inverse[c, i]
+        scale = 1.0 / block[c, c]
+        block[c] *= scale
+        inverse[c] *= scale
+        for r in range(n):
+            if r != c:
+                factor = block[r, c]
+                block[r] -= factor * block[c]
+                inverse[r] -= factor * inverse[c]
+    return inverse

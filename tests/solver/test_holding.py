@@ -1,0 +1,124 @@
+"""What grasps hold, and where their paths begin: rows of the spline that hold exactly, whatever the rest does."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dlocore import Cable, ControlPoints, Environment, Grasp, Move, Scene, Straight, Waypoints
+from dlocore.discretisation import make_grid
+from dlocore.grid import Grid
+from dlocore.holding import Held, Starts, close_grasps, hold
+from dlocore.kernels.banded import place_held
+from dlocore.kernels.entry import to_ends_of_steps
+from dlocore.paths import Path, Still
+from dlocore.problem import Problem, pose
+
+CABLE = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-3)
+TIMES = np.array([0.0, 0.1, 0.35, 0.8, 1.5])  # before, in and after the paths, which take 0.5 s to 1 s
+ROUNDING = 1e-13  # of coordinates of a metre, through an elimination of six rows
+WAY = (0.1, -0.05, 0.2)
+POINTS = np.array([[0.5, 0.0, 0.0], [0.6, 0.1, 0.05], [0.6, 0.15, 0.0]])
+
+
+def scene(*grasps: Grasp, planar: bool = False) -> Scene:
+    """Return a straight cable along x that is held so, without weight in the plane."""
+    gravity = (0.0, 0.0, 0.0) if planar else (0.0, 0.0, -9.81)
+    return Scene(
+        cable=CABLE, shape=Straight(), grasps=grasps, environment=Environment(gravity=gravity), horizon=TIMES[-1]
+    )
+
+
+def held_in(scene: Scene, n_u: int = 17) -> tuple[Problem, Grid, Held]:
+    problem = pose(scene)
+    grid = make_grid(problem, n_u)
+    starts: Starts = {}
+    close_grasps(problem, grid, list(scene.grasps), starts, None)
+    return problem, grid, hold(problem, grid, list(scene.grasps), TIMES, starts, grid.start)
+
+
+def world_at(problem: Problem, grid: Grid, q: np.ndarray, u: float, derivative: int) -> np.ndarray:
+    x = grid.at(q, u, derivative)[: problem.plane.dimensions]
+    return problem.plane.world(x) if derivative == 0 else problem.plane.world_vectors(x)
+
+
+PATHS: dict[str, Path] = {
+    "still": Still(),
+    "minimum jerk": Move(displacement=WAY, duration=0.8),
+    "cubic": Move(displacement=WAY, duration=1.0, profile="cubic"),
+    "linear": Move(displacement=WAY, duration=0.5, profile="linear"),
+    "waypoints": Waypoints(times=[0.0, 0.5, 1.0], positions=POINTS),
+}
+
+
+@pytest.mark.parametrize("path", PATHS.values(), ids=PATHS.keys())
+@pytest.mark.parametrize("hold", ["point", "tangent", "clamp"])
+def test_the_spline_passes_where_the_path_is_whatever_the_free_control_points_do(path, hold):
+    problem, grid, held = held_in(scene(Grasp(u=0.5, hold=hold, path=path), Grasp(u=0.9)))
+    random = np.random.default_rng(0)
+    for k, t in enumerate(TIMES):
+        q = random.standard_normal(grid.start.shape)
+        place_held(held.elimination, held.offsets[k], q.ravel())
+        wanted = path.at(np.array([t]), np.array([0.5, 0.0, 0.0]))[0]
+        assert np.abs(world_at(problem, grid, q, 0.5, 0) - wanted).max() < ROUNDING
+        assert np.abs(world_at(problem, grid, q, 0.9, 0) - [0.9, 0.0, 0.0]).max() < ROUNDING
+        if hold != "point":
+            assert np.abs(world_at(problem, grid, q, 0.5, 1) - [1.0, 0.0, 0.0]).max() < 100 * ROUNDING  # per span
+
+
+@pytest.mark.parametrize("u", [0.0, 0.5, 1.0])
+def test_a_held_direction_turns_with_the_gripper(u):
+    turn = np.array([0.0, 0.3, 0.9])
+    path = Move(displacement=WAY, duration=1.0, rotation=turn)
+    problem, grid, held = held_in(scene(Grasp(u=u, hold="tangent", path=path)))
+    random = np.random.default_rng(1)
+    for k, t in enumerate(TIMES):
+        q = random.standard_normal(grid.start.shape)
+        place_held(held.elimination, held.offsets[k], q.ravel())
+        rotation = path.rotation_at(np.array([t]))
+        assert rotation is not None
+        assert np.abs(world_at(problem, grid, q, u, 1) - rotation[0] @ [1.0, 0.0, 0.0]).max() < 100 * ROUNDING
+
+
+def test_in_the_plane_rows_hold_in_its_coordinates():
+    path = Move(displacement=(-0.1, 0.2, 0.0), duration=1.0)
+    problem, grid, held = held_in(scene(Grasp(u=0.3, hold="tangent"), Grasp(u=0.7, path=path), planar=True))
+    assert problem.nc == 2
+    q = np.random.default_rng(2).standard_normal(grid.start.shape)
+    place_held(held.elimination, held.offsets[2], q.ravel())
+    assert np.abs(world_at(problem, grid, q, 0.3, 1) - [1.0, 0.0, 0.0]).max() < 100 * ROUNDING
+    wanted = path.at(TIMES[2:3], np.array([0.7, 0.0, 0.0]))[0]
+    assert np.abs(world_at(problem, grid, q, 0.7, 0) - wanted).max() < ROUNDING
+
+
+def test_the_inverse_solves_the_rows_for_their_pivots():
+    grasps = (Grasp(u=0.2, hold="tangent"), Grasp(u=0.25), Grasp(u=0.6, hold="clamp"))
+    problem, grid, held = held_in(scene(*grasps), n_u=25)
+    nd = problem.plane.dimensions
+    pivots = held.elimination.held[: len(held.rows) * nd : nd] // problem.nc
+    rows = np.zeros((len(held.rows), grid.n_u))
+    for r, (i, derivative) in enumerate(held.rows):
+        first, b = grid.rows(grasps[i].u, derivative)
+        rows[r, first : first + 4] = b
+    assert np.abs(held.inverse @ rows[:, pivots] - np.eye(len(rows))).max() < 100 * ROUNDING
+
+
+def test_a_path_begins_at_the_point_and_along_the_unit_tangent_of_the_cable():
+    control = np.array([[0.0, 0, 0], [0.166, 0.04, 0], [0.5, 0.0, 0.03], [0.83, 0.03, 0.05], [1.0, 0.0, 0.05]])
+    bent = replace(scene(Grasp(u=0.37, hold="tangent")), shape=ControlPoints(control_points=control))
+    problem = pose(bent)
+    starts: Starts = {}
+    close_grasps(problem, make_grid(problem, 9), list(bent.grasps), starts, None)
+    for g in bent.grasps:
+        point, slope = problem.start(g.u)[0], problem.start(g.u, 1)[0]
+        assert np.abs(starts[g][0] - point).max() < ROUNDING
+        assert np.abs(starts[g][1] - slope / np.linalg.norm(slope)).max() < ROUNDING
+
+
+def test_forces_of_steps_are_brought_to_their_ends():
+    # what grows evenly is known at the ends of the steps from the second on, and the first keeps its own
+    lag, grows = 0.3, np.linspace(2.0, 7.0, 6)[:, None] * [1.0, -2.0]
+    forces = np.vstack([np.full((2, 2), 9.0), grows[:1], grows[1:] - lag * (grows[1] - grows[0]), np.full((1, 2), 5.0)])
+    to_ends_of_steps(forces, 2, 7, lag)
+    assert np.abs(forces[2:8] - grows).max() < ROUNDING
+    assert (forces[[0, 1, 8]] == [[9.0, 9.0], [9.0, 9.0], [5.0, 5.0]]).all()
