@@ -12,6 +12,7 @@ from dlocore.discretisation import corners, make_grid
 from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.banded import reduce_matrix
 from dlocore.problem import pose
+from dlocore.refinement import AUTO_ENOUGH
 from dlocore.shape import start_curve
 from dlocore.solvers.ladder import hardness, run_level
 from dlocore.solvers.march import march as take_steps
@@ -85,6 +86,16 @@ def test_a_target_is_reached_by_more_steps_where_only_time_errs():
     found = predict(swinging(Quality(target_error=2e-3)))
     assert found.status == "converged"
     assert found.accuracy.steps > 10 * found.accuracy.n_u
+
+
+def test_auto_goes_as_far_as_the_target_that_it_is_content_with():
+    # a stiff arc on a table that springs straight: a sixteenth of a target's work leaves it at 1.6 % of the length
+    scene = draw(2, 80).make()
+    found = predict(scene)
+    assert found.status == "converged"
+    estimate = found.accuracy.error_estimate
+    assert estimate is not None
+    assert estimate < AUTO_ENOUGH * scene.cable.length
 
 
 def jerked(n_t: int) -> Scene:
