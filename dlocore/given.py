@@ -34,7 +34,8 @@ def march_given(problem: Problem, n_u: int, n_t: int, monitor: Monitor) -> Level
             break
         record_level(level.problem, level, monitor)
         level = march_level(problem, size._replace(steps=more * size.steps), monitor, watch=watch)
-        level = replace(level, mended=_said(first, size.steps, watch))
+        note = f"{level.size.steps} steps" + (", watched at more points" if watch else "")
+        level = replace(level, note=note, mended=_said(first, size.steps, watch))
         status = given_status(evenly_fitted(level))[0]
         if status == "converged" or (status == "max_iterations" and not is_folded(first)):
             return level

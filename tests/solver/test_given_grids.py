@@ -30,6 +30,7 @@ def test_a_cable_that_folds_on_a_given_grid_is_marched_on_points_between_which_i
     found = predict(scene)
     assert found.status == "converged"
     assert "watched at more points" in found.message
+    assert "watched at more points" in found.iterations[-1].note
     assert found.iterations[-1].n_u == quality.n_u
     breaks = np.unique(found.surface.knots_u)
     u = np.concatenate([np.linspace(a, b, 9) for a, b in pairwise(breaks)])
