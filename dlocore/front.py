@@ -13,6 +13,7 @@ from dlocore.discretisation import smallest_n_u
 from dlocore.errors import SceneError
 from dlocore.events import smallest_n_t
 from dlocore.frames import material_of
+from dlocore.given import evenly_fitted, given_status, march_given
 from dlocore.prediction import Accuracy, MaterialMotion, OnIteration, Prediction, Status
 from dlocore.problem import Problem, pose
 from dlocore.progress import record, record_level, surface_at
@@ -20,16 +21,15 @@ from dlocore.refinement import climb
 from dlocore.report import WindowForces, effect_reports, elastic_energy, reactions
 from dlocore.review import neglected, objections
 from dlocore.scene import Method, Quality, Scene
-from dlocore.solvers.ladder import FINER, Level, Size, distance, given_steps, run_level
+from dlocore.solvers.ladder import FINER, Level, distance, run_level
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.paper import solve_as_printed
 from dlocore.solvers.spacetime import solve
 from dlocore.spline import uniform_knots
-from dlocore.whole_march import MISSED_COUNTS, TORN, Outcome, march_level, march_status
+from dlocore.whole_march import MISSED_COUNTS, TORN, Outcome, march_status
 
 Floats = NDArray[np.float64]
 
-MISSED = 0.02  # of the length: a time spline that misses its march by more is no answer
 _TOO_LATE = " The time limit passed before its error was estimated."
 SAFETY = 1.5  # times the distance to a finer march: what a slowly converging motion may be off beyond it
 
@@ -117,7 +117,7 @@ def _least_squares(
     assert quality.n_t is not None
     if again is None:
         _check_n_t(problem, quality.n_t)
-        level = march_level(problem, Size(quality.n_u, quality.n_t, given_steps(quality.n_t)), monitor)
+        level = march_given(problem, quality.n_u, quality.n_t, monitor)
     else:
         level = again.level
     problem = level.problem
@@ -156,9 +156,10 @@ def _least_squares(
     if problem.self_contact is not None:
         message += " The least squares does not know of contact of the cable with itself; method march does."
     if not converged and method == "spacetime":
+        level = evenly_fitted(level)
         control, forces, left = level.control, None, level.motion.update
         if quality.method == "auto":
-            method, status, found = "march", *march_status(problem, level)
+            method, status, found = "march", *given_status(level)
             spent = monitor.phases["spacetime"]
             message = (
                 f"{found} The least squares did not converge in {count} iterations, which took {spent * 1e3:.3g} ms: "
@@ -192,7 +193,7 @@ def _companion(problem: Problem, quality: Quality, level: Level, monitor: Monito
     n_t = max(smallest_n_t(problem), round(FINER * quality.n_t))
     try:
         monitor.check()
-        finer = run_level(problem, n_u, n_t, round(FINER * given_steps(quality.n_t)), monitor, booked=False)
+        finer = run_level(problem, n_u, n_t, round(FINER * level.size.steps), monitor, booked=False)
     except TimeIsUp:
         return None, _TOO_LATE
     monitor.phase("estimate")
@@ -215,17 +216,13 @@ def _given(problem: Problem, quality: Quality, monitor: Monitor) -> Outcome:
     assert quality.n_u is not None
     assert quality.n_t is not None
     _check_n_t(problem, quality.n_t)
-    level = march_level(problem, Size(quality.n_u, quality.n_t, given_steps(quality.n_t)), monitor)
+    level = evenly_fitted(march_given(problem, quality.n_u, quality.n_t, monitor))
     problem = level.problem
     record_level(problem, level, monitor)
     estimate, doubt = _companion(problem, quality, level, monitor)
     if estimate is not None:
         estimate = max(estimate, MISSED_COUNTS * level.missed)
-    status, message = march_status(problem, level)
-    off = level.missed
-    if status == "converged" and off > MISSED * problem.scene.cable.length:
-        status = "max_iterations"
-        message += f" The time spline of {quality.n_t} control points misses them by {off * 1e3:.2g} mm. Raise n_t."
+    status, message = given_status(level)
     return Outcome(level, status, message + doubt, None if estimate is None else {"grid": estimate})
 
 

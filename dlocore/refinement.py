@@ -27,10 +27,11 @@ from dlocore.whole_march import MISSED_COUNTS, Outcome, is_folded, march_level, 
 AUTO_TARGET = 2e-3  # of the length: the error that quality "auto" aims at
 AUTO_ENOUGH = 1e-2  # of the length: the estimated error with which it is content where the finest grids reach no closer
 ROUGH = 0.05  # of the length: two grids that differ more are in no order yet: the next is marched with strong damping
-MOST_WORK = 4e6  # control points times steps of one march in the plane; each coordinate more costs twice the time
+MOST_WORK = 1.6e7  # control points times steps of one march in the plane; each coordinate more costs twice the time
+MOST_FRAMES = 1.3e6  # the same of a motion with twist, which keeps the frames of its sections: 0.6 GB of them
 CONTACT_COSTS = 2  # times as much work counts with contact, which takes more of the time of a step
-AUTO_SHARE = 0.25  # of it for who asked for no target
-_MOST_POINTS = 220  # along the cable
+AUTO_SHARE = 1 / 16  # of it for who asked for no target, once the estimated error is AUTO_ENOUGH
+_MOST_POINTS = 400  # along the cable
 _FINER = {"space": 1.5, "time": 2.0}
 _FINE_IN_TIME = 0.3  # of the target: a time spline that misses its march by less keeps its knots as the steps halve
 _AT_BEST = 0.2  # of an error, is left by one refinement: what is still too much after all of them is not begun
@@ -54,8 +55,9 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
     two grids can show looks alike on both. A march that finds no equilibrium is tried with more steps before it is
     given up. Within a time budget the first grid is the one that what solves cost on this machine allows.
 
-    A target that was asked for has to be met. Quality "auto" aims at AUTO_TARGET, and where the finest grids that it
-    tries reach no closer, an estimate of AUTO_ENOUGH is success; the message says how far the grids agree.
+    A target that was asked for has to be met. Quality "auto" aims at AUTO_TARGET with a share of that work, and where
+    it reaches no closer with it, an estimate of AUTO_ENOUGH is success, for which it does all of the work that a target
+    is worth; the message says how far the grids agree.
     """
     length = problem.scene.cable.length
     return _Climb(
@@ -64,7 +66,6 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
         cost=cost,
         target=quality.target_error or AUTO_TARGET * length,
         enough=quality.target_error or AUTO_ENOUGH * length,
-        most_work=MOST_WORK * (AUTO_SHARE if quality.target_error is None else 1.0),
         budget=quality.time_budget or np.inf,
         number=0 if quality.time_budget is None else first_level(problem, cost, quality.time_budget),
     ).outcome()
@@ -80,7 +81,6 @@ class _Climb:
         cost: what solves cost on this machine, where it is known.
         target: error that is aimed at [m].
         enough: estimated error that is success where no finer grid is left [m].
-        most_work: of one march, see MOST_WORK.
         budget: time allowed [s], infinite where none was given.
         number: of the grids that refine space and time together, this one included.
         direction: in which the grid at hand is finer than the best one: "both", "space" or "time".
@@ -96,7 +96,6 @@ class _Climb:
     cost: Cost | None
     target: float
     enough: float
-    most_work: float
     budget: float
     number: int
     direction: str = "both"
@@ -208,7 +207,10 @@ class _Climb:
         """Return a size, or None where a march of it takes too long."""
         touches = self.problem.contact is not None or self.problem.self_contact is not None
         work = size.n_u * size.steps * 2 ** (self.problem.nc - 2) * (CONTACT_COSTS if touches else 1)
-        return size if size.n_u <= _MOST_POINTS and work <= self.most_work else None
+        content = self.enough > self.target and self.estimate <= self.enough
+        most = MOST_WORK * (AUTO_SHARE if content else 1.0)
+        fits = self.problem.twist is None or size.n_u * size.steps <= MOST_FRAMES
+        return size if fits and size.n_u <= _MOST_POINTS and work <= most else None
 
     def _left(self, size: Size | None) -> int:
         """Return how many refinements in the direction are left, from a size on."""

@@ -40,19 +40,22 @@ def march_level(
     rough: bool = False,
     known: Level | None = None,
     before: Level | None = None,
+    watch: bool = False,
 ) -> Level:
     """March on one grid; where the motion calls for effects that were left out, again with them.
 
     On a `rough` grid, which another follows, strands that meet may do so because of the grid: it is left open. A march
     of this grid that is `known` is done again only for what was left open. Contact begins as stiff as the level
-    `before` had to make it.
+    `before` had to make it. With `watch` the cable can't fold within a span, see `run_level`.
     """
     called = dict(problem.called_for)
     while True:
         if free_knots:
             size = Size(max(size.n_u, smallest_n_u(problem)), max(size.n_t, smallest_n_t(problem)), size.steps)
         stiffness = 1.0 if before is None or before.posed is not problem else hardness(before)
-        level = known or run_level(problem, *size, monitor, rho=rho, free_knots=free_knots, hardness=stiffness)
+        level = known or run_level(
+            problem, *size, monitor, rho=rho, free_knots=free_knots, hardness=stiffness, watch=watch
+        )
         if known is not None:
             new, known = dict(known.left_open), None
         else:
@@ -84,7 +87,7 @@ def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
         return "stalled", f"{pushed} Take finer grids, or a motion that does not jam it."
     if not motion.stopped:
         split = f", {motion.split} of them in smaller steps" if motion.split else ""
-        return "converged", f"Every time step found its equilibrium{split}."
+        return "converged", f"Every time step found its equilibrium{split}.{level.mended}"
     reached = motion.times[motion.reached]
     rest = f"The surface stands still after {reached:.4g} s of {problem.horizon:.4g} s."
     if motion.stopped == "time":

@@ -28,6 +28,7 @@ _TOO_NEAR = 0.5  # of the diameter: no step brings strands from farther away nea
 _LOOK = 1e-3  # diameters: the least way between two looks at a gap
 _WIDE = 8.0  # times the distance of interest, up to which it is told how far apart strands are
 _WINDOW = 8  # control points of a segment, at most
+_BLOCK = 16  # segments that are looked at as one before each of them is
 _ROOM = 4096  # reduced entries of a pair, at most: held control points may follow many free ones
 
 
@@ -104,6 +105,35 @@ def _middles(x: Any) -> Any:
 
 
 @kernel
+def _blocks(middle: Any, half: Any) -> Any:
+    """Return centres (k, 3) and radii (k,) [m] of balls around blocks of segments with these middles and half lengths.
+
+    Half lengths may hold more than that; the radii are sums of all they hold and the way from the centre.
+    """
+    last = len(half)
+    count = (last + _BLOCK - 1) // _BLOCK
+    center = np.empty((count, 3))
+    radius = np.zeros(count)
+    for n in range(count):
+        a, b = n * _BLOCK, min((n + 1) * _BLOCK, last)
+        for d in range(3):
+            center[n, d] = 0.5 * (middle[a, d] + middle[b - 1, d])
+        for i in range(a, b):
+            square = 0.0
+            for d in range(3):
+                square += (middle[i, d] - center[n, d]) ** 2
+            radius[n] = max(radius[n], np.sqrt(square) + half[i])
+    return center, radius
+
+
+@law
+def _apart(x: Any, a: int, b: int) -> float:
+    """Return the distance of two of the points x (k, 3)."""
+    u, v, w = x[a, 0] - x[b, 0], x[a, 1] - x[b, 1], x[a, 2] - x[b, 2]
+    return np.sqrt(u * u + v * v + w * w)
+
+
+@kernel
 def near_pairs(x: Any, u: Any, radius: float, separation: float, found: Any) -> Any:
     """Return (found, count): pairs of segments of the nodes x (k, 2 or 3) that may be nearer than `radius` [m].
 
@@ -120,25 +150,36 @@ def near_pairs(x: Any, u: Any, radius: float, separation: float, found: Any) -> 
     ahead = _SLACK / longest_part(u)
     middle, half = _middles(x)
     longest = np.max(half)
+    center, around = _blocks(middle, half)
+    near = np.empty(len(around), np.int64)
     j0 = 0
-    for i in range(last):
-        while j0 < last and u[j0] - u[i + 1] < separation:
-            j0 += 1
-        j = j0
-        reach = radius + half[i] + longest
-        while j < last:
-            a, b, c = middle[i, 0] - middle[j, 0], middle[i, 1] - middle[j, 1], middle[i, 2] - middle[j, 2]
-            square = a * a + b * b + c * c
-            if square > reach * reach:
-                j += max(1, int(ahead * (np.sqrt(square) - reach)))
-                continue
-            if count == len(found):
-                larger = np.empty((2 * len(found) + 16, 2), np.int64)
-                larger[:count] = found
-                found = larger
-            found[count, 0], found[count, 1] = i, j
-            count += 1
-            j += 1
+    for block in range(len(around)):
+        nears = 0
+        for other in range(block, len(around)):
+            if not _apart(center, block, other) > radius + around[block] + around[other]:
+                near[nears] = other
+                nears += 1
+        for i in range(block * _BLOCK, min((block + 1) * _BLOCK, last)):
+            while j0 < last and u[j0] - u[i + 1] < separation:
+                j0 += 1
+            j = j0
+            reach = radius + half[i] + longest
+            for n in range(nears):
+                j = max(j, near[n] * _BLOCK)
+                end = min((near[n] + 1) * _BLOCK, last)
+                while j < end:
+                    a, b, c = middle[i, 0] - middle[j, 0], middle[i, 1] - middle[j, 1], middle[i, 2] - middle[j, 2]
+                    square = a * a + b * b + c * c
+                    if square > reach * reach:
+                        j += max(1, int(ahead * (np.sqrt(square) - reach)))
+                        continue
+                    if count == len(found):
+                        larger = np.empty((2 * len(found) + 16, 2), np.int64)
+                        larger[:count] = found
+                        found = larger
+                    found[count, 0], found[count, 1] = i, j
+                    count += 1
+                    j += 1
     return found, count
 
 
@@ -362,6 +403,63 @@ def solve_wide(S: Any, end: Any, x: Any) -> None:
 
 
 @kernel
+def meeting_pairs(x0: Any, x1: Any, u: Any, near: float, separation: float, found: Any) -> Any:
+    """Return (found, count): pairs of segments that may come nearer than `near` [m] as nodes go straight from x0 to x1.
+
+    Strands that move together stay apart: only how far two segments move against each other counts. That, as their
+    distance, grows at most so fast as one goes along the cable, so that from a clear one the next are skipped. The
+    count is -1 where the nodes go beyond all bounds.
+
+    Args:
+        x0, x1: nodes (k, 2 or 3) [m].
+        u, separation, found: see `near_pairs`.
+    """
+    middle, half = _middles(x0)
+    moved, turned = _middles(x1 - x0)
+    last = len(half)
+    reach, slope = 0.0, 0.0
+    for j in range(last):
+        half[j] += turned[j]
+        reach = max(reach, half[j])
+        if j > 0:
+            slope = max(slope, _apart(middle, j, j - 1) + _apart(moved, j, j - 1))
+        if not half[j] < np.inf:
+            return found, -1
+    center, around = _blocks(middle, half)
+    way, stray = _blocks(moved, np.zeros(last))
+    near_by = np.empty(len(around), np.int64)
+    count = 0
+    j0 = 0
+    for block in range(len(around)):
+        nears = 0
+        for other in range(block, len(around)):
+            room = near + around[block] + around[other] + stray[block] + stray[other]
+            if not _apart(center, block, other) - _apart(way, block, other) > room:
+                near_by[nears] = other
+                nears += 1
+        for i in range(block * _BLOCK, min((block + 1) * _BLOCK, last)):
+            while j0 < last and u[j0] - u[i + 1] < separation:
+                j0 += 1
+            j = j0
+            for n in range(nears):
+                j = max(j, near_by[n] * _BLOCK)
+                end = min((near_by[n] + 1) * _BLOCK, last)
+                while j < end:
+                    clear = _apart(middle, i, j) - _apart(moved, i, j) - near - half[i] - reach
+                    if clear > 0.0:
+                        j += max(1, int(clear / slope))
+                        continue
+                    if count == len(found):
+                        larger = np.empty((2 * len(found) + 16, 2), np.int64)
+                        larger[:count] = found
+                        found = larger
+                    found[count, 0], found[count, 1] = i, j
+                    count += 1
+                    j += 1
+    return found, count
+
+
+@kernel
 def clear_way(x0: Any, x1: Any, u: Any, diameter: float, separation: float, found: Any) -> Any:
     """Return (found, share): how far, 0 to 1, the nodes may go from x0 straight to x1 without strands passing strands.
 
@@ -369,15 +467,11 @@ def clear_way(x0: Any, x1: Any, u: Any, diameter: float, separation: float, foun
     fifth nearer still. Distances change at most as fast as the nodes move against each other, which is how far one may
     look ahead.
     """
-    farthest = 0.0
-    for n in range(len(x0)):
-        square = 0.0
-        for d in range(x0.shape[1]):
-            square += (x1[n, d] - x0[n, d]) ** 2
-        farthest = max(farthest, square)
     share = 1.0
     near = _TOO_NEAR * diameter
-    found, count = near_pairs(x0, u, near + 2.0 * np.sqrt(farthest), separation, found)
+    found, count = meeting_pairs(x0, x1, u, near, separation, found)
+    if count < 0:
+        return found, 0.0
     for c in range(count):
         i, j = found[c, 0], found[c, 1]
         r0, a0, b0 = _vector(x0, i, j), _vector(x0, i + 1, i), _vector(x0, j + 1, j)

@@ -16,7 +16,8 @@ from dlocore.kernels.basis import basis_rows
 from dlocore.problem import Problem, stiffer
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, march
 from dlocore.solvers.monitor import Monitor
-from dlocore.solvers.timefit import fit, missed, refined
+from dlocore.solvers.timefit import fit, largest, missed, refined
+from dlocore.solvers.watched import watched
 from dlocore.statics import start_grid
 
 Floats = NDArray[np.float64]
@@ -32,7 +33,6 @@ LEVELS = (
 CREDIBLE_STRAIN = 0.02  # axial: a march that stretches the cable more is tried again with strong damping
 _STIFFER = 5  # times that contact is made stiffer on one grid
 _MISSED = 0.01  # of the diameter: what the time spline may miss of a motion with contact
-_MOST_OF_THE_TIME = 0.95
 _SAMPLES = 33  # along the cable and over time at which surfaces are compared
 _STIFFENING = 10.0  # at most each time
 _YIELDING = 0.8  # of the depth, at most, is left by a stiffer contact where it is one of stiffness
@@ -64,6 +64,7 @@ class Level:
         change: largest distance to the level before [m], infinite at the first.
         note: what was found on it, in words.
         left_open: effects that it called for, and why, which a finer grid may do without.
+        mended: what was done differently from other marches on a given grid as it failed on that one, in words.
     """
 
     size: Size
@@ -76,6 +77,7 @@ class Level:
     change: float
     note: str = ""
     left_open: Mapping[str, str] = field(default_factory=dict)
+    mended: str = ""
 
     @cached_property
     def samples(self) -> Floats:
@@ -113,6 +115,7 @@ def run_level(
     booked: bool = True,
     free_knots: bool = False,
     hardness: float = 1.0,
+    watch: bool = False,
     grid: Grid | None = None,
     knots_t: Floats | None = None,
 ) -> Level:
@@ -126,6 +129,7 @@ def run_level(
         booked: whether to book the time by phase.
         free_knots: whether to add time knots where the cable strikes something.
         hardness: times that contact is stiffer to begin with, as it had to be made on a grid before.
+        watch: watch over the stretch at more points, between which the cable can't fold.
         grid: with the start on it, where it is known.
         knots_t: time knots to begin with, where they are known.
     """
@@ -134,6 +138,7 @@ def run_level(
         problem = stiffer(problem, hardness)
     if grid is None:
         grid = start_grid(problem, n_u, monitor)
+        grid = watched(grid) if watch else grid
     if knots_t is None:
         knots_t = time_knots(problem, n_t)
     assert knots_t is not None, "the caller asks for enough control points"
@@ -169,11 +174,9 @@ def run_level(
     control, off = fit(smooth, knots_t)
     if smooth is not motion:
         off = missed(motion, knots_t, control)
-    off = np.sort(off)
     if booked:
         monitor.phase("fit")
-    most = float(off[int(_MOST_OF_THE_TIME * (len(off) - 1))])
-    return Level(Size(n_u, n_t, steps), posed, problem, motion, knots_t, control, most, np.inf)
+    return Level(Size(n_u, n_t, steps), posed, problem, motion, knots_t, control, largest(off), np.inf)
 
 
 def hardness(level: Level) -> float:

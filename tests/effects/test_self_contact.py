@@ -16,7 +16,15 @@ from dlocore.events import closed_grasps
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.banded import Elimination, elimination, factor, reduce_matrix, solve
-from dlocore.kernels.selfcontact import clear_way, factor_wide, press, solve_wide, widen
+from dlocore.kernels.selfcontact import (
+    clear_way,
+    factor_wide,
+    meeting_pairs,
+    near_pairs,
+    press,
+    solve_wide,
+    widen,
+)
 from dlocore.problem import Problem, pose
 
 Floats = NDArray[np.float64]
@@ -350,6 +358,40 @@ def test_strands_on_their_way_stop_before_they_pass(nd: int) -> None:
         left = gap - 0.05 * share
         # it stops within a tenth of where the gap is half a diameter
         assert 0.4 * DIAMETER <= left <= 0.51 * DIAMETER
+
+
+@pytest.mark.parametrize("nd", [2, 3])
+def test_no_pair_of_segments_that_meets_on_the_way_is_skipped(nd: int) -> None:
+    random = np.random.default_rng(21)
+    count, separation = 120, 4.0 * DIAMETER
+    u = DIAMETER * np.arange(count)
+    z = np.linspace(0.0, 1.0, 9)[:, None, None]
+    i, j = np.triu_indices(count - 1, 1)
+    strands = u[j] - u[i + 1] >= separation
+    i, j = i[strands], j[strands]
+    found = 0
+    for _ in range(5):
+        # a crumpled cable, and one that it becomes: each segment a diameter long
+        turned = random.normal(0.0, 1.0, (count, nd))
+        ends = [turned, turned + random.normal(0.0, 0.2, (count, nd))]
+        before, after = (DIAMETER * np.cumsum(t / np.linalg.norm(t, axis=1, keepdims=True), axis=0) for t in ends)
+        room = np.empty((1, 2), np.int64)
+        pairs, many = meeting_pairs(before, after, u, 0.5 * DIAMETER, separation, room)
+        still, few = near_pairs(before, u, DIAMETER, separation, room)
+        listed, near = np.zeros((2, count, count), bool)
+        listed[pairs[:many, 0], pairs[:many, 1]] = True
+        near[still[:few, 0], still[:few, 1]] = True
+        way = before + z * (after - before)
+        # ends and middles of the segments alone: no nearer than the segments are
+        own = [way[:, i], way[:, i + 1], 0.5 * (way[:, i] + way[:, i + 1])]
+        other = [way[:, j], way[:, j + 1], 0.5 * (way[:, j] + way[:, j + 1])]
+        gaps = np.min([np.linalg.norm(a - b, axis=2) for a in own for b in other], axis=0)
+        met = gaps.min(axis=0) <= 0.5 * DIAMETER
+        assert np.all(listed[i, j] | ~met)
+        assert np.all(near[i, j] | (gaps[0] > DIAMETER))
+        found += int(met.sum())
+        assert many < len(i) // 2  # most are left out
+    assert found > 0
 
 
 def test_the_smallest_distance_of_strands_is_found() -> None:

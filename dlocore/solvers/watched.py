@@ -1,0 +1,41 @@
+"""A grid on which the cable can't fold within a span: its stretch is watched at more points."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from dlocore.grid import Grid
+from dlocore.kernels.assembly import History
+from dlocore.kernels.basis import GAUSS_3, Tables, basis_rows
+
+_SHARE = 0.3  # of the axial stiffness, at the points added: a fifth still leaves folds, more locks the bending more
+
+
+def watched(grid: Grid) -> Grid:
+    """Return a grid whose axial points see folds within a span too.
+
+    As many axial points as control points have strains leave it open how |r'| runs between them (docs/model.md,
+    selective reduced integration): a limp cable folds there at no cost of energy, on control points too few for its
+    bends. Three Gauss points more a span bear a third of the axial stiffness, the others the rest. That holds the
+    bending back, so it is for grids on which the cable folds without.
+    """
+    tables, breaks = grid.tables, np.unique(grid.knots)
+    half, (rule, weights) = 0.5 * np.diff(breaks)[:, None], GAUSS_3
+    more = (breaks[:-1, None] + half * (1.0 + rule)).ravel()
+    first, rows = basis_rows(grid.knots, more, 1)
+    u = np.concatenate([tables.axial_u, more])
+    order = np.argsort(u, kind="stable")
+
+    def merged(own: np.ndarray, added: np.ndarray) -> np.ndarray:
+        return np.ascontiguousarray(np.concatenate([own, added])[order])
+
+    finer: Tables = tables._replace(
+        axial_u=u[order],
+        axial_first=merged(tables.axial_first, first),
+        axial_b1=merged(tables.axial_b1, rows[:, 1]),
+        axial_w=merged((1.0 - _SHARE) * tables.axial_w, _SHARE * (half * weights).ravel()),
+    )
+    behind = [np.interp(finer.axial_u, tables.axial_u, column) for column in grid.history.axial.T]
+    past = grid.past()
+    history = History(past.memory, past.past, np.ascontiguousarray(np.transpose(behind)), past.stick, past.slide)
+    return replace(grid, tables=finer, history=history)
