@@ -12,7 +12,7 @@ from dlocore.discretisation import smallest_n_u
 from dlocore.effects.contact import DEEPEST
 from dlocore.events import smallest_n_t, time_knots
 from dlocore.grid import Grid
-from dlocore.kernels.basis import basis_rows
+from dlocore.kernels.timefit import sampled
 from dlocore.problem import Problem, stiffer
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, march
 from dlocore.solvers.monitor import Monitor
@@ -82,11 +82,7 @@ class Level:
     @cached_property
     def samples(self) -> Floats:
         """The surface at 33 evenly spaced times and 33 places along the cable (33, 33, nc) [m]."""
-        n_t, n_u, nc = self.control.shape
-        over, along = (
-            _matrix(knots, np.linspace(0.0, knots[-1], _SAMPLES)) for knots in (self.knots_t, self.motion.grid.knots)
-        )
-        return np.asarray(along @ (over @ self.control.reshape(n_t, n_u * nc)).reshape(_SAMPLES, n_u, nc))
+        return np.asarray(sampled(self.knots_t, self.motion.grid.knots, self.control, _SAMPLES))
 
 
 def stretched(problem: Problem, level: int) -> Size:
@@ -199,13 +195,6 @@ def extrapolated(change: float, before: float) -> float:
     """
     contraction = min(change / before, 0.9) if np.isfinite(before) and before > 0 else 0.0
     return _CHANGE_COUNTS * change * max(1.0, contraction / (1.0 - contraction))
-
-
-def _matrix(knots: Floats, x: Floats) -> Floats:
-    first, table = basis_rows(knots, x, 0)
-    out = np.zeros((len(x), len(knots) - 4))
-    np.put_along_axis(out, first[:, None] + np.arange(4), table[:, 0], axis=1)
-    return out
 
 
 def distance(a: Level, b: Level, problem: Problem) -> float:
