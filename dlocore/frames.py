@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dlocore.discretisation import start_director
 from dlocore.grid import Grid
-from dlocore.kernels.march import fit_time
+from dlocore.kernels.timefit import fit_time
 from dlocore.kernels.twisted import mean_over_spans, twist_rates
 from dlocore.prediction import MaterialMotion
 from dlocore.problem import Problem

@@ -23,8 +23,8 @@ from dlocore.errors import SceneError
 from dlocore.events import closed_grasps, marks_of, step_counts, time_knots
 from dlocore.grid import Grid
 from dlocore.holding import Starts
-from dlocore.kernels.march import fit_time
 from dlocore.kernels.sensitivity import factor_steps, follow_steps
+from dlocore.kernels.timefit import fit_time
 from dlocore.prediction import Prediction
 from dlocore.problem import Problem, pose
 from dlocore.report import surface_of

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dlocore.effects.base import Effect, Site
 from dlocore.effects.contact import PASSAGE, critical_damping
 from dlocore.kernels.basis import basis_rows
-from dlocore.kernels.selfcontact import nearest_of, turning_states
+from dlocore.kernels.strands import nearest_of, turning_states
 
 Floats = NDArray[np.float64]
 

@@ -39,11 +39,9 @@ def _compiled(function: Callable[..., Any], *, nogil: bool) -> Any:
     return compiled
 
 
-def part(function: Callable[..., Any]) -> Any:
-    """Compile a part of a kernel into it: handing over a table, which is a hundred numbers, takes longer than some."""
-    return numba.njit(error_model="numpy", forceinline=True)(function)
-
-
 def law(function: Callable[..., Any]) -> Any:
     """Compile a pointwise law that is inlined into the kernels."""
     return numba.njit(error_model="numpy", forceinline=True)(function)
+
+
+part = law  # of a kernel, into it: handing over a table, which is a hundred numbers, takes longer than some parts

@@ -5,9 +5,13 @@ To hand it over for microseconds would let another thread's solve take it for as
 
 from typing import Any
 
-from dlocore.kernels.assembly import remember
+import numpy as np
+
+from dlocore.effects.laws import SELF_CONTACT, keeps_history
+from dlocore.kernels.assembly import NO_RATES, assemble, multiply_scalar_band, remember, times_scalar_band
 from dlocore.kernels.compile import brief
-from dlocore.kernels.march import begin_stretch
+from dlocore.kernels.march import constrained_mass_solve
+from dlocore.kernels.selfcontact import press
 
 
 @brief
@@ -17,19 +21,47 @@ def remember_start(axes: Any, q: Any, tables: Any, active: Any, p: Any, history:
 
 
 @brief
-def begin(
+def begin_stretch(
     axes: Any, q: Any, v: Any, unit: Any, density: float, dragged: float, tables: Any, active: Any, p: Any,
     history: Any, load: Any, e: Any, near: Any, h: float, inertial: bool, dimensions: int,
 ) -> Any:  # fmt: skip
-    """Return what `begin_stretch` does, and by how much a component of the centreline's velocity jumps [m/s]."""
-    closed, a, G = begin_stretch(
-        axes, q, v, unit, density, dragged, tables, active, p, history, load, e, near, h, inertial
-    )
-    away = 0.0
+    """Return velocity, acceleration and G = f + C v - load, each (n, nc), where a smooth stretch begins, and its jump.
+
+    The velocity is what the last one, v, becomes as the grasps close; the acceleration is consistent with the forces.
+    The jump is the largest change of a component of the centreline's velocity [m/s].
+
+    Args:
+        q: (n, nc) [m] the state.
+        unit: (n, 4) mass matrix of unit density; `density` [kg/m] and `dragged` [N s/m^2] are those of the cable.
+        near: (3, held) [m] prescribed part of what is held at the beginning, h and 2 h later.
+        h: [s], short.
+        dimensions: of the centreline.
+        inertial: False where the cable goes through equilibria: it has no velocity that counts, and no acceleration.
+    """
+    nc = len(axes)
+    rate = (4.0 * near[1] - 3.0 * near[0] - near[2]) / (2.0 * h)
+    closed = constrained_mass_solve(nc, unit, e, rate, times_scalar_band(unit, v))
+    jump = 0.0
     for i in range(len(v)):
         for d in range(dimensions):
-            away = max(away, abs(closed[i, d] - v[i, d]))
-    return closed, a, G, away
+            jump = max(jump, abs(closed[i, d] - v[i, d]))
+    v = closed if inertial else np.zeros_like(closed)
+    G = np.empty_like(v)
+    K = np.empty((1, 1))
+    assemble(axes, q, v, tables, active, p, history, NO_RATES, (0.0, 0.0, 0.0), G, K)
+    if active[SELF_CONTACT]:
+        x = np.empty((len(tables.contact_w), min(nc, 3)))
+        press(q, v, tables, p, x, np.empty((64, 2), np.int64), G)
+    if keeps_history(active):
+        remember(axes, q, tables, active, p, history, 0.0, False)
+    multiply_scalar_band(dragged * unit, v, 1.0, G)
+    for i in range(len(G)):
+        for d in range(nc):
+            G[i, d] -= load[i, d]
+    if not inertial:
+        return closed, np.zeros_like(v), G, jump
+    held_acceleration = (near[2] - 2.0 * near[1] + near[0]) / (h * h)
+    return closed, constrained_mass_solve(nc, density * unit, e, held_acceleration, -G), G, jump
 
 
 @brief

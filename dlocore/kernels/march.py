@@ -1,4 +1,4 @@
-"""The compiled march: generalised-alpha steps of the spatial spline, and the time spline fitted to them."""
+"""The compiled march: generalised-alpha steps of the spatial spline."""
 
 from typing import Any
 
@@ -6,22 +6,20 @@ import numpy as np
 
 from dlocore.effects.laws import CONTACT, DAMPING, SELF_CONTACT, has_kinks, keeps_history
 from dlocore.kernels.assembly import (
-    NO_RATES,
     add_scalar_band,
     assemble,
     multiply_scalar_band,
     note,
     remember,
-    times_scalar_band,
 )
-from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_matrix, reduce_vector, solve, solve_rows
-from dlocore.kernels.basis import basis_rows
+from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_matrix, reduce_vector, solve
 from dlocore.kernels.compile import brief, kernel
 from dlocore.kernels.contact import strikes
 from dlocore.kernels.inertia import both_sides, effective, padded, residual
 from dlocore.kernels.mixing import mixed, room
 from dlocore.kernels.predictor import differences_of, predict_by, shift
-from dlocore.kernels.selfcontact import clear_way, closing, factor_wide, place_nodes, press, solve_wide, widen
+from dlocore.kernels.selfcontact import closing, factor_wide, place_nodes, press, solve_wide, widen
+from dlocore.kernels.strands import clear_way
 
 FAILED_STEP, LEFT, DEEPEST = range(3)  # places in `info`
 _REFRESH = 0.2  # contraction of the updates above which the old factors no longer serve
@@ -356,108 +354,3 @@ def march_steps(
                 v[i, d] = v1[i, d]
                 a[i, d] = a1[i, d]
         shift(past, q1)
-
-
-@brief
-def begin_stretch(
-    axes: Any, q: Any, v: Any, unit: Any, density: float, dragged: float, tables: Any, active: Any, p: Any,
-    history: Any, load: Any, e: Any, near: Any, h: float, inertial: bool,
-) -> Any:  # fmt: skip
-    """Return velocity, acceleration and G = f + C v - load, each (n, nc), where a smooth stretch begins.
-
-    The velocity is what the last one, v, becomes as the grasps close; the acceleration is consistent with the forces.
-
-    Args:
-        q: (n, nc) [m] the state.
-        unit: (n, 4) mass matrix of unit density; `density` [kg/m] and `dragged` [N s/m^2] are those of the cable.
-        near: (3, held) [m] prescribed part of what is held at the beginning, h and 2 h later.
-        h: [s], short.
-        inertial: False where the cable goes through equilibria: it has no velocity that counts, and no acceleration.
-    """
-    nc = len(axes)
-    rate = (4.0 * near[1] - 3.0 * near[0] - near[2]) / (2.0 * h)
-    closed = constrained_mass_solve(nc, unit, e, rate, times_scalar_band(unit, v))
-    v = closed if inertial else np.zeros_like(closed)
-    G = np.empty_like(v)
-    K = np.empty((1, 1))
-    assemble(axes, q, v, tables, active, p, history, NO_RATES, (0.0, 0.0, 0.0), G, K)
-    if active[SELF_CONTACT]:
-        x = np.empty((len(tables.contact_w), min(nc, 3)))
-        press(q, v, tables, p, x, np.empty((64, 2), np.int64), G)
-    if keeps_history(active):
-        remember(axes, q, tables, active, p, history, 0.0, False)
-    multiply_scalar_band(dragged * unit, v, 1.0, G)
-    for i in range(len(G)):
-        for d in range(nc):
-            G[i, d] -= load[i, d]
-    if not inertial:
-        return closed, np.zeros_like(v), G
-    held_acceleration = (near[2] - 2.0 * near[1] + near[0]) / (h * h)
-    return closed, constrained_mass_solve(nc, density * unit, e, held_acceleration, -G), G
-
-
-@brief
-def fit_missed(knots: Any, times: Any, Q: Any, C: Any, dimensions: int) -> Any:
-    """Return by how much the time spline of C (n_t, n, nc) misses each of the states Q (k, n, nc) at `times` [m].
-
-    The largest difference of the first so many coordinates counts.
-    """
-    first, table = basis_rows(knots, times, 0)
-    out = np.zeros(len(times))
-    for s in range(len(times)):
-        b0, b1, b2, b3 = table[s, 0, 0], table[s, 0, 1], table[s, 0, 2], table[s, 0, 3]
-        g = first[s]
-        most, total = 0.0, 0.0
-        for i in range(Q.shape[1]):
-            for d in range(dimensions):
-                fitted = b0 * C[g, i, d] + b1 * C[g + 1, i, d] + b2 * C[g + 2, i, d] + b3 * C[g + 3, i, d]
-                away = abs(Q[s, i, d] - fitted)
-                most = max(most, away)
-                total += away
-        out[s] = most if total == total else np.inf
-    return out
-
-
-@kernel
-def fit_time(knots: Any, times: Any, Q: Any, v0: Any) -> Any:
-    """Return control points (n_t, m) of the time spline fitted to the states Q (k, m) at `times`.
-
-    Least squares weighted by the time each state stands for; the first two control points give the initial position
-    and velocity exactly, the last the final position.
-    """
-    n = len(knots) - 4
-    k, m = Q.shape
-    C = np.empty((n, m))
-    C[0] = Q[0]
-    C[1] = Q[0] + v0 * ((knots[4] - knots[1]) / 3.0)
-    C[n - 1] = Q[k - 1]
-    size = n - 3
-    A = np.zeros((size, 4))
-    right = np.zeros((size, m))
-    first, table = basis_rows(knots, times, 0)
-    for s in range(1, k - 1):
-        w = 0.5 * (times[s + 1] - times[s - 1])
-        b = table[s, 0]
-        for i in range(4):
-            row = first[s] + i - 2
-            if row < 0 or row >= size:
-                continue
-            share = w * b[i]
-            for c in range(m):
-                right[row, c] += share * Q[s, c]
-            for j in range(4):
-                column = first[s] + j - 2
-                if column < 0 or column == size:  # given
-                    for c in range(m):
-                        right[row, c] -= share * b[j] * C[column + 2, c]
-                elif j >= i:
-                    A[row, column - row] += share * b[j]
-    trace = 0.0
-    for i in range(size):
-        trace += A[i, 0]
-    for i in range(size):
-        A[i, 0] += 1e-13 * trace
-    factor(A)
-    solve_rows(A, right)
-    C[2 : n - 1] = right
-    return C

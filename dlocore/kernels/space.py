@@ -131,7 +131,7 @@ def curvature(
         viscous = rates[0]
     firsts, b1, b2, weights = tables.curvature_first, tables.curvature_b1, tables.curvature_b2, tables.curvature_w
     pairs = tables.curvature_pairs
-    blocks = no_blocks(3)
+    blocks = no_blocks(3 if tangent else 0)
     J, SJ = np.empty((2, 3, 3)), np.empty((2, 3, 3))  # of kappa by r' and by r''
     S = np.empty((3, 3))
     damped = len(weights) if active[DAMPING] else 0

@@ -4,12 +4,79 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.kernels.banded import factor, solve_rows
 from dlocore.kernels.basis import basis_rows
-from dlocore.kernels.compile import brief
-from dlocore.kernels.march import fit_missed, fit_time
+from dlocore.kernels.compile import brief, kernel
+
+
+@kernel
+def fit_time(knots: Any, times: Any, Q: Any, v0: Any) -> Any:
+    """Return control points (n_t, m) of the time spline fitted to the states Q (k, m) at `times`.
+
+    Least squares weighted by the time each state stands for; the first two control points give the initial position
+    and velocity exactly, the last the final position.
+    """
+    n = len(knots) - 4
+    k, m = Q.shape
+    C = np.empty((n, m))
+    C[0] = Q[0]
+    C[1] = Q[0] + v0 * ((knots[4] - knots[1]) / 3.0)
+    C[n - 1] = Q[k - 1]
+    size = n - 3
+    A = np.zeros((size, 4))
+    right = np.zeros((size, m))
+    first, table = basis_rows(knots, times, 0)
+    for s in range(1, k - 1):
+        w = 0.5 * (times[s + 1] - times[s - 1])
+        b = table[s, 0]
+        for i in range(4):
+            row = first[s] + i - 2
+            if row < 0 or row >= size:
+                continue
+            share = w * b[i]
+            for c in range(m):
+                right[row, c] += share * Q[s, c]
+            for j in range(4):
+                column = first[s] + j - 2
+                if column < 0 or column == size:  # given
+                    for c in range(m):
+                        right[row, c] -= share * b[j] * C[column + 2, c]
+                elif j >= i:
+                    A[row, column - row] += share * b[j]
+    trace = 0.0
+    for i in range(size):
+        trace += A[i, 0]
+    for i in range(size):
+        A[i, 0] += 1e-13 * trace
+    factor(A)
+    solve_rows(A, right)
+    C[2 : n - 1] = right
+    return C
 
 
 @brief
+def fit_missed(knots: Any, times: Any, Q: Any, C: Any, dimensions: int) -> Any:
+    """Return by how much the time spline of C (n_t, n, nc) misses each of the states Q (k, n, nc) at `times` [m].
+
+    The largest difference of the first so many coordinates counts.
+    """
+    first, table = basis_rows(knots, times, 0)
+    out = np.zeros(len(times))
+    for s in range(len(times)):
+        b0, b1, b2, b3 = table[s, 0, 0], table[s, 0, 1], table[s, 0, 2], table[s, 0, 3]
+        g = first[s]
+        most, total = 0.0, 0.0
+        for i in range(Q.shape[1]):
+            for d in range(dimensions):
+                fitted = b0 * C[g, i, d] + b1 * C[g + 1, i, d] + b2 * C[g + 2, i, d] + b3 * C[g + 3, i, d]
+                away = abs(Q[s, i, d] - fitted)
+                most = max(most, away)
+                total += away
+        out[s] = most if total == total else np.inf
+    return out
+
+
+@kernel
 def fitted(knots: Any, times: Any, states: Any, v0: Any, dimensions: int) -> Any:
     """Return control points (n_t, n, nc) as `fit_time` fits to the states (k, n, nc), and their `fit_missed` (k,)."""
     steps, n, nc = states.shape

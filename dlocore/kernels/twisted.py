@@ -129,7 +129,7 @@ def curvature(
     b0, b1, b2 = tables.body_b0, tables.curvature_b1, tables.curvature_b2
     mean = np.empty(16)  # of the derivative of the twist rate over a span
     local = np.empty((len(weights), LOCAL))
-    blocks = no_blocks(4)
+    blocks = no_blocks(4 if tangent else 0)
     n = 0
     while n < len(weights):
         k, until = firsts[n], _span_end(firsts, n)

@@ -21,7 +21,8 @@ from dlocore.kernels.banded import expand_rows, factor_columns, place_held
 from dlocore.kernels.banded import solve as solve_factored
 from dlocore.kernels.basis import GAUSS_2, basis_rows
 from dlocore.kernels.leastsquares import normal_equations
-from dlocore.kernels.march import constrained_mass_solve, fit_time
+from dlocore.kernels.march import constrained_mass_solve
+from dlocore.kernels.timefit import fit_time
 from dlocore.problem import Problem
 from dlocore.report import WindowForces
 from dlocore.scene import Grasp

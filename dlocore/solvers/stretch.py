@@ -9,7 +9,7 @@ from dlocore.effects import laws
 from dlocore.grid import Grid
 from dlocore.holding import Held, Starts, close_grasps, hold
 from dlocore.kernels.assembly import History
-from dlocore.kernels.entry import begin
+from dlocore.kernels.entry import begin_stretch
 from dlocore.problem import Problem
 from dlocore.scene import Grasp
 
@@ -66,11 +66,11 @@ def enter(
         active = active.copy()
         active[laws.STRETCH_DAMPING] = 0
     inertial = problem.inertia is not None
-    closed, a, G, away = begin(
+    closed, a, G, jump = begin_stretch(
         problem.axes, q, v, grid.tables.mass, problem.mass_density(), problem.drag_coefficient(), grid.tables, active,
         parameters, history, load, held.elimination, held.offsets[:3], h * _NEAR[1], inertial,
         problem.plane.dimensions,
     )  # fmt: skip
     started = closed.copy() if inertial else np.zeros_like(closed)
-    jumps = inertial and h * away > _JUMPS * problem.scene.cable.length
+    jumps = inertial and h * jump > _JUMPS * problem.scene.cable.length
     return Entry(held, held.offsets[3:], closed, started, a, G, jumps)

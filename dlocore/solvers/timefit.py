@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.kernels.march import fit_missed
-from dlocore.kernels.timefit import fitted
+from dlocore.kernels.timefit import fit_missed, fitted
 from dlocore.solvers.march import March
 
 Floats = NDArray[np.float64]

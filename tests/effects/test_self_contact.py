@@ -16,15 +16,8 @@ from dlocore.events import closed_grasps
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.banded import Elimination, elimination, factor, reduce_matrix, solve
-from dlocore.kernels.selfcontact import (
-    clear_way,
-    factor_wide,
-    meeting_pairs,
-    near_pairs,
-    press,
-    solve_wide,
-    widen,
-)
+from dlocore.kernels.selfcontact import factor_wide, press, solve_wide, widen
+from dlocore.kernels.strands import clear_way, meeting_pairs, near_pairs
 from dlocore.problem import Problem, pose
 
 Floats = NDArray[np.float64]
