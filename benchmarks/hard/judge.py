@@ -100,9 +100,9 @@ def disturbed(prediction: Prediction, scene: Scene, deadline: float) -> float | 
     """Return how far a start that is bent by DISTURBED takes the motion, of the length; None where no march tells.
 
     More than WRONG: the scene does not determine its motion. Three marches on one grid, as fine as the finest that the
-    prediction tried, as coarse steps damp what would grow. Their start is as it is, or
-    bent by some half waves; only where each finds its equilibria and keeps the cable's length. A cable pushed exactly
-    along itself has no side to go to and does neither: there the two bent ones are compared with each other.
+    prediction tried, as coarse steps damp what would grow. Their start is as it is, or bent by some half waves; only
+    where each finds its equilibria and keeps the cable's length. A cable pushed exactly along itself has no side to go
+    to and does neither: there the two bent ones are compared with each other.
     """
     found = {e.name: e.reason for e in prediction.effects if e.active}
     problem = pose(scene, found)

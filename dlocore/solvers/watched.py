@@ -16,7 +16,7 @@ def watched(grid: Grid) -> Grid:
 
     As many axial points as control points have strains leave it open how |r'| runs between them (docs/model.md,
     selective reduced integration): a limp cable folds there at no cost of energy, on control points too few for its
-    bends. Three Gauss points more a span bear a third of the axial stiffness, the others the rest. That holds the
+    bends. Three Gauss points more a span bear three tenths of the axial stiffness, the others the rest. That holds the
     bending back, so it is for grids on which the cable folds without.
     """
     tables, breaks = grid.tables, np.unique(grid.knots)
