@@ -4,7 +4,6 @@ A path's clock starts when its grasp does (`Grasp.grasp_time`, t = 0 by default)
 its last a path stands still.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, cast
 
@@ -16,13 +15,12 @@ from dlocore.errors import SceneError, array, choice, number
 Floats = NDArray[np.float64]
 Profile = Literal["minimum_jerk", "linear", "cubic"]
 
-# position s(x) on 0 <= x <= 1
-_PROFILES: dict[str, Callable[[Floats], Floats]] = {
-    "minimum_jerk": lambda x: x**3 * (10 - 15 * x + 6 * x**2),
-    "linear": lambda x: x,
-    "cubic": lambda x: x**2 * (3 - 2 * x),
+# coefficients of x to x^5 of the position s(x) on 0 <= x <= 1
+_PROFILES: dict[str, tuple[float, ...]] = {
+    "minimum_jerk": (0.0, 0.0, 10.0, -15.0, 6.0),
+    "linear": (1.0, 0.0, 0.0, 0.0, 0.0),
+    "cubic": (0.0, 3.0, -2.0, 0.0, 0.0),
 }
-_NUMBERS = {name: number for number, name in enumerate(_PROFILES)}
 MAX_WAYPOINTS = 100_000
 
 
@@ -37,8 +35,8 @@ class Still:
 
     @property
     def line(self) -> tuple[float, ...]:
-        """Duration, number of the profile and displacement of a straight move."""
-        return (1.0, 0, 0.0, 0.0, 0.0)
+        """Duration, profile and displacement of a straight move."""
+        return (1.0, *_PROFILES["linear"], 0.0, 0.0, 0.0)
 
     def at(self, t: Floats, start: Floats) -> Floats:
         """Positions at times `t` (k,) [s] of a grasp that began at `start` (3,) [m]; (k, 3) [m]."""
@@ -75,12 +73,18 @@ class Move:
 
     @property
     def line(self) -> tuple[float, ...]:
-        """Duration [s], number of the profile and displacement [m] of a straight move."""
-        return (self.duration, _NUMBERS[self.profile], *cast(Floats, self.displacement).tolist())
+        """Duration [s], coefficients of x to x^5 of the profile, and displacement [m] of a straight move."""
+        return (self.duration, *_PROFILES[self.profile], *cast(Floats, self.displacement).tolist())
+
+    def _share(self, t: Floats) -> Floats:
+        """Return the share of the way that is done at times `t` (k,) [s]."""
+        x = np.clip(t / self.duration, 0.0, 1.0)
+        a, b, c, d, e = _PROFILES[self.profile]
+        return np.asarray(x * (a + x * (b + x * (c + x * (d + x * e)))))
 
     def at(self, t: Floats, start: Floats) -> Floats:
         """Positions at times `t` (k,) [s] of a grasp that began at `start` (3,) [m]; (k, 3) [m]."""
-        s = _PROFILES[self.profile](np.clip(t / self.duration, 0.0, 1.0))
+        s = self._share(t)
         return start + s[:, None] * cast(Floats, self.displacement)
 
     def rotation_at(self, t: Floats) -> Floats | None:
@@ -89,7 +93,7 @@ class Move:
             return None
         from scipy.spatial.transform import Rotation  # slow to import, and seldom needed
 
-        s = _PROFILES[self.profile](np.clip(t / self.duration, 0.0, 1.0))
+        s = self._share(t)
         return Rotation.from_rotvec(s[:, None] * cast(Floats, self.rotation)).as_matrix()
 
     def spin(self, t: Floats, tangents: Floats) -> Floats:
@@ -99,7 +103,7 @@ class Move:
         """
         if self.rotation is None:
             return np.zeros(len(t) - 1)
-        s = _PROFILES[self.profile](np.clip(t / self.duration, 0.0, 1.0))
+        s = self._share(t)
         return np.diff(s) * float(tangents[0] @ cast(Floats, self.rotation))
 
 

@@ -8,7 +8,7 @@ from dlocore.kernels.banded import elimination
 from dlocore.kernels.basis import basis, find_span
 from dlocore.kernels.compile import brief, kernel
 
-ROW = 13  # numbers that describe a row
+ROW = 17  # numbers that describe a row
 
 
 @brief
@@ -30,15 +30,6 @@ def place(knots: Any, control: Any, u: float, dimensions: int) -> Any:
     return out
 
 
-@kernel
-def _progress(profile: int, x: float) -> float:
-    """Return the share of a straight move (`dlocore.paths.Move.line`) that is done at the share x of its time."""
-    x = min(max(x, 0.0), 1.0)
-    if profile == 0:
-        return x * x * x * (10.0 - 15.0 * x + 6.0 * x * x)
-    return x if profile == 1 else x * x * (3.0 - 2.0 * x)
-
-
 @brief
 def hold_rows(
     knots: Any, nc: int, times: Any, rows: Any, sampled: Any, origin: Any, axes: Any, turned: Any, angles: Any
@@ -50,8 +41,9 @@ def hold_rows(
         nc: number of coordinates of a control point.
         times: (k,) [s].
         rows: (r, ROW) what acts on every coordinate of the centreline: where [m], whether it is a direction, whether
-            its grasp holds the direction, the number of its path in `sampled` or -1, begin and duration [s], profile,
-            displacement (3) and value at the beginning (3) in the world. `dlocore/holding.py` writes them.
+            its grasp holds the direction, the number of its path in `sampled` or -1, begin [s], the straight move
+            (`dlocore.paths.Move.line`: duration [s], profile (5) and displacement (3)) and value at the beginning (3)
+            in the world. `dlocore/holding.py` writes them.
         sampled: (m, k, 3) points [m] or unit tangents over time of paths that are no straight moves, in the world.
         origin, axes: (3,) [m] and (dimensions, 3), of the coordinates of the solve.
         turned: (m,) [m] where the angle of the section is held.
@@ -70,9 +62,10 @@ def hold_rows(
     for s in range(count):
         row = rows[s]
         for k in range(len(times)):
-            done = _progress(int(row[6]), (times[k] - row[4]) / row[5])
+            x = min(max((times[k] - row[4]) / row[5], 0.0), 1.0)
+            done = x * (row[6] + x * (row[7] + x * (row[8] + x * (row[9] + x * row[10]))))
             for i in range(3):
-                target[i] = sampled[int(row[3]), k, i] if row[3] >= 0.0 else row[10 + i] + done * row[7 + i]
+                target[i] = sampled[int(row[3]), k, i] if row[3] >= 0.0 else row[14 + i] + done * row[11 + i]
                 if row[1] == 0.0:
                     target[i] -= origin[i]
             for d in range(nd):
