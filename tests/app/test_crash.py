@@ -166,15 +166,15 @@ def test_a_store_killed_at_any_moment_has_whole_runs_only(tmp_path: Path) -> Non
         with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None
             assert process.stdout.readline() == "ready\n"
-            time.sleep(moments.uniform(0.3, 0.9))
+            first = process.stdout.readline()  # so that one is kept, however busy the machine is
+            time.sleep(moments.uniform(0.0, 0.6))
             process.kill()
-            kept = process.stdout.read().split()
+            kept = [first.strip(), *process.stdout.read().split()]
         interrupted += bool(leftovers(data))
         ids = check_store(RunStore(Settings(data_dir=data, max_runs=60)), tmp_path)
         assert leftovers(data) == []
         assert len(ids) <= 60  # the cap holds through all the kills
         whole = [id for id in kept if len(id) == 28]  # the last may have been cut
-        assert whole
         newest = sorted(whole)[-20:]  # well inside the cap: four threads may finish out of order
         assert set(newest) <= set(ids)
     assert interrupted > 0  # else no kill came while a run was being written, and nothing was tested
