@@ -20,7 +20,7 @@ from dlocore.solvers.ladder import (
     extrapolated,
     stretched,
 )
-from dlocore.solvers.march import RHO, STRONGLY_DAMPED
+from dlocore.solvers.march import MOST_FRAMES, RHO, STRONGLY_DAMPED
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.whole_march import MISSED_COUNTS, Outcome, is_folded, march_level, march_status
 
@@ -28,7 +28,7 @@ AUTO_TARGET = 2e-3  # of the length: the error that quality "auto" aims at
 AUTO_ENOUGH = 1e-2  # of the length: the estimated error with which it is content where the finest grids reach no closer
 ROUGH = 0.05  # of the length: two grids that differ more are in no order yet: the next is marched with strong damping
 MOST_WORK = 1.6e7  # control points times steps of one march in the plane; each coordinate more costs twice the time
-MOST_FRAMES = 1.3e6  # the same of a motion with twist, which keeps the frames of its sections: 0.6 GB of them
+_FRAMES = 3  # a control point in time, at least, that are kept of a motion with twist: what its time spline needs
 CONTACT_COSTS = 2  # times as much work counts with contact, which takes more of the time of a step
 AUTO_SHARE = 1 / 16  # of it for who asked for no target, once the estimated error is AUTO_ENOUGH
 _MOST_POINTS = 400  # along the cable
@@ -209,7 +209,7 @@ class _Climb:
         work = size.n_u * size.steps * 2 ** (self.problem.nc - 2) * (CONTACT_COSTS if touches else 1)
         content = self.enough > self.target and self.estimate <= self.enough
         most = MOST_WORK * (AUTO_SHARE if content else 1.0)
-        fits = self.problem.twist is None or size.n_u * size.steps <= MOST_FRAMES
+        fits = self.problem.twist is None or _FRAMES * size.n_t * size.n_u <= MOST_FRAMES
         return size if fits and size.n_u <= _MOST_POINTS and work <= most else None
 
     def _left(self, size: Size | None) -> int:
