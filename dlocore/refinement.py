@@ -12,10 +12,10 @@ from dlocore.progress import record_level
 from dlocore.scene import Quality
 from dlocore.solvers.ladder import (
     ACCEPT,
-    CREDIBLE_STRAIN,
     LEVELS,
     Level,
     Size,
+    credible_after,
     distance,
     extrapolated,
     stretched,
@@ -176,9 +176,8 @@ class _Climb:
         before = self.changes.get(self.direction, (np.inf, np.inf))[0]
         self.changes[self.direction] = _as_by_half(level, best), before
         self.estimate = max(_error(self.changes), MISSED_COUNTS * level.missed)
-        rough = self._is_rough(level)
-        if rough or self.number < len(LEVELS):  # later on two marches would differ by their damping
-            self.rho = STRONGLY_DAMPED if rough else RHO
+        if self.number < len(LEVELS):  # later on two marches would differ by their damping
+            self.rho = STRONGLY_DAMPED if self._is_rough(level) else RHO
 
     def _next(self, level: Level, size: Size, unfolds: Size | None) -> Size | None:
         """Return the next size, None where no finer grid is worth its time; `unfolds` is for a motion that folds."""
@@ -200,6 +199,8 @@ class _Climb:
         if sizes[self.direction] is None and extrapolated(*moved_by) < self.target:
             # may still bring the sum of both below it
             self.direction = next(direction for direction in _FINER if direction != self.direction)
+        if self.direction == "time":
+            self.rho = RHO  # of the two marches that are compared then, the strongly damped one errs by far more
         hope = _AT_BEST ** self._left(sizes[self.direction])
         return None if hope * moved_by[0] > self.enough else sizes[self.direction]
 
@@ -265,8 +266,8 @@ class _Climb:
 
 
 def _is_worse(level: Level, best: Level) -> bool:
-    """Tell whether a finer grid failed, or strained the cable beyond belief, and the one before did not."""
-    torn = level.motion.largest_strain > CREDIBLE_STRAIN >= best.motion.largest_strain
+    """Tell whether a finer grid failed, or strained the cable beyond belief, and the one before by far less."""
+    torn = level.motion.largest_strain > credible_after(best)
     failed = bool(level.motion.stopped) and not best.motion.stopped
     stalled = march_status(level.problem, level)[0] != "converged" == march_status(best.problem, best)[0]
     return torn or failed or stalled
