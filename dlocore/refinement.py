@@ -176,8 +176,9 @@ class _Climb:
         before = self.changes.get(self.direction, (np.inf, np.inf))[0]
         self.changes[self.direction] = _as_by_half(level, best), before
         self.estimate = max(_error(self.changes), MISSED_COUNTS * level.missed)
-        if self.number < len(LEVELS):  # later on two marches would differ by their damping
-            self.rho = STRONGLY_DAMPED if self._is_rough(level) else RHO
+        rough = self._is_rough(level)
+        if self.number < len(LEVELS) or (rough and self.problem.self_contact is not None):
+            self.rho = STRONGLY_DAMPED if rough else RHO  # later on two marches would differ by their damping
 
     def _next(self, level: Level, size: Size, unfolds: Size | None) -> Size | None:
         """Return the next size, None where no finer grid is worth its time; `unfolds` is for a motion that folds."""
@@ -199,8 +200,9 @@ class _Climb:
         if sizes[self.direction] is None and extrapolated(*moved_by) < self.target:
             # may still bring the sum of both below it
             self.direction = next(direction for direction in _FINER if direction != self.direction)
-        if self.direction == "time":
-            self.rho = RHO  # of the two marches that are compared then, the strongly damped one errs by far more
+        if self.direction == "time" and self.problem.self_contact is None:
+            # on the same steps strongly damped marches err by far more; but strands that strike each other rebound less
+            self.rho = RHO
         hope = _AT_BEST ** self._left(sizes[self.direction])
         return None if hope * moved_by[0] > self.enough else sizes[self.direction]
 
