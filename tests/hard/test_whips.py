@@ -34,7 +34,7 @@ def test_strain_that_passes_the_credible_by_a_hair_is_no_failure(whip: Problem):
 
 
 def test_strong_damping_ends_with_the_first_refinement_in_time_alone(whip: Problem):
-    # on the same steps a strongly damped march errs some seven times as much
+    # on the same steps a strongly damped march errs several times as much
     change = 2.0 * ROUGH * whip.scene.cable.length
     size = Size(33, 49, 192)
     level = replace(run_level(whip, *size, Monitor(None, None), rho=STRONGLY_DAMPED), change=change)
