@@ -277,12 +277,12 @@ def _material(problem: Problem, level: Level) -> MaterialMotion | None:
     motion = level.motion
     if len(motion.log) == 0 and not np.any(motion.grid.history.memory):
         return None
-    memory, axial = motion.memory, motion.axial_memory
+    kept, memory, axial = motion.logged, motion.memory, motion.axial_memory
     if len(motion.log) == 0:
-        memory = np.broadcast_to(motion.grid.history.memory[:, :1], (len(motion.times), len(motion.history.memory), 1))
+        memory = np.broadcast_to(motion.grid.history.memory[:, :1], (len(kept), len(motion.history.memory), 1))
     if len(motion.log) == 0 or axial.shape[1] == 0:
-        axial = np.broadcast_to(motion.grid.history.axial[:, 0], (len(motion.times), len(motion.history.axial)))
-    return material_of(problem, motion.grid, motion.times, motion.states, memory, axial)
+        axial = np.broadcast_to(motion.grid.history.axial[:, 0], (len(kept), len(motion.history.axial)))
+    return material_of(problem, motion.grid, motion.times[kept], motion.states[kept], memory, axial)
 
 
 def warm_up() -> None:

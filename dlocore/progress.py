@@ -58,6 +58,6 @@ def record(
 
 def surface_at(problem: Problem, level: Level, control: Floats) -> SplineSurface:
     """Return the surface of control points (n_t, n_u, nc) on the knots of a level."""
-    grid = level.motion.grid
-    free = free_control(problem, grid, level.knots_t, control, level.motion.times, level.motion.frames)
+    motion, grid = level.motion, level.motion.grid
+    free = free_control(problem, grid, level.knots_t, control, motion.times[motion.logged], motion.frames)
     return surface_of(problem, grid.knots, level.knots_t, free)

@@ -12,15 +12,15 @@ from dlocore.progress import record_level
 from dlocore.scene import Quality
 from dlocore.solvers.ladder import (
     ACCEPT,
-    CREDIBLE_STRAIN,
     LEVELS,
     Level,
     Size,
+    credible_after,
     distance,
     extrapolated,
     stretched,
 )
-from dlocore.solvers.march import RHO, STRONGLY_DAMPED
+from dlocore.solvers.march import MOST_FRAMES, RHO, STRONGLY_DAMPED
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.whole_march import MISSED_COUNTS, Outcome, is_folded, march_level, march_status
 
@@ -28,7 +28,7 @@ AUTO_TARGET = 2e-3  # of the length: the error that quality "auto" aims at
 AUTO_ENOUGH = 1e-2  # of the length: the estimated error with which it is content where the finest grids reach no closer
 ROUGH = 0.05  # of the length: two grids that differ more are in no order yet: the next is marched with strong damping
 MOST_WORK = 1.6e7  # control points times steps of one march in the plane; each coordinate more costs twice the time
-MOST_FRAMES = 1.3e6  # the same of a motion with twist, which keeps the frames of its sections: 0.6 GB of them
+_FRAMES = 3  # a control point in time, at least, that are kept of a motion with twist: what its time spline needs
 CONTACT_COSTS = 2  # times as much work counts with contact, which takes more of the time of a step
 AUTO_SHARE = 1 / 16  # of it for who asked for no target, once the estimated error is AUTO_ENOUGH
 _MOST_POINTS = 400  # along the cable
@@ -177,8 +177,8 @@ class _Climb:
         self.changes[self.direction] = _as_by_half(level, best), before
         self.estimate = max(_error(self.changes), MISSED_COUNTS * level.missed)
         rough = self._is_rough(level)
-        if rough or self.number < len(LEVELS):  # later on two marches would differ by their damping
-            self.rho = STRONGLY_DAMPED if rough else RHO
+        if self.number < len(LEVELS) or (rough and self.problem.self_contact is not None):
+            self.rho = STRONGLY_DAMPED if rough else RHO  # later on two marches would differ by their damping
 
     def _next(self, level: Level, size: Size, unfolds: Size | None) -> Size | None:
         """Return the next size, None where no finer grid is worth its time; `unfolds` is for a motion that folds."""
@@ -200,6 +200,9 @@ class _Climb:
         if sizes[self.direction] is None and extrapolated(*moved_by) < self.target:
             # may still bring the sum of both below it
             self.direction = next(direction for direction in _FINER if direction != self.direction)
+        if self.direction == "time" and self.problem.self_contact is None:
+            # on the same steps strongly damped marches err by far more; but strands that strike each other rebound less
+            self.rho = RHO
         hope = _AT_BEST ** self._left(sizes[self.direction])
         return None if hope * moved_by[0] > self.enough else sizes[self.direction]
 
@@ -209,7 +212,7 @@ class _Climb:
         work = size.n_u * size.steps * 2 ** (self.problem.nc - 2) * (CONTACT_COSTS if touches else 1)
         content = self.enough > self.target and self.estimate <= self.enough
         most = MOST_WORK * (AUTO_SHARE if content else 1.0)
-        fits = self.problem.twist is None or size.n_u * size.steps <= MOST_FRAMES
+        fits = self.problem.twist is None or _FRAMES * size.n_t * size.n_u <= MOST_FRAMES
         return size if fits and size.n_u <= _MOST_POINTS and work <= most else None
 
     def _left(self, size: Size | None) -> int:
@@ -265,8 +268,8 @@ class _Climb:
 
 
 def _is_worse(level: Level, best: Level) -> bool:
-    """Tell whether a finer grid failed, or strained the cable beyond belief, and the one before did not."""
-    torn = level.motion.largest_strain > CREDIBLE_STRAIN >= best.motion.largest_strain
+    """Tell whether a finer grid failed, or strained the cable beyond belief, and the one before by far less."""
+    torn = level.motion.largest_strain > credible_after(best)
     failed = bool(level.motion.stopped) and not best.motion.stopped
     stalled = march_status(level.problem, level)[0] != "converged" == march_status(best.problem, best)[0]
     return torn or failed or stalled

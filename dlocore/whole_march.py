@@ -11,7 +11,7 @@ from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
 from dlocore.progress import record_level
 from dlocore.review import called_for
-from dlocore.solvers.ladder import Level, Size, hardness, run_level
+from dlocore.solvers.ladder import CREDIBLE_STRAIN, Level, Size, credible_after, hardness, run_level
 from dlocore.solvers.march import RHO
 from dlocore.solvers.monitor import Monitor
 
@@ -46,15 +46,18 @@ def march_level(
 
     On a `rough` grid, which another follows, strands that meet may do so because of the grid: it is left open. A march
     of this grid that is `known` is done again only for what was left open. Contact begins as stiff as the level
-    `before` had to make it. With `watch` the cable can't fold within a span, see `run_level`.
+    `before` had to make it, and strains are believed that are not far above its own. With `watch` the cable can't fold
+    within a span, see `run_level`.
     """
     called = dict(problem.called_for)
     while True:
         if free_knots:
             size = Size(max(size.n_u, smallest_n_u(problem)), max(size.n_t, smallest_n_t(problem)), size.steps)
-        stiffness = 1.0 if before is None or before.posed is not problem else hardness(before)
+        stiffness, credible = 1.0, CREDIBLE_STRAIN
+        if before is not None and before.posed is problem:
+            stiffness, credible = hardness(before), credible_after(before)
         level = known or run_level(
-            problem, *size, monitor, rho=rho, free_knots=free_knots, hardness=stiffness, watch=watch
+            problem, *size, monitor, rho=rho, free_knots=free_knots, hardness=stiffness, credible=credible, watch=watch
         )
         if known is not None:
             new, known = dict(known.left_open), None

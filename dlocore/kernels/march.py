@@ -57,6 +57,15 @@ def constrained_mass_solve(nc: int, mass: Any, e: Any, held: Any, right: Any) ->
     return x + change.reshape((n, nc))
 
 
+@brief
+def row_of_step(k: int, states: int, rows: int) -> int:
+    """Return the row of a log that step k writes: of every so many steps, and of the last, the last one stays in it."""
+    if rows == states:
+        return k
+    every = -(-(states - 1) // (rows - 1))
+    return -(-k // every)
+
+
 @kernel
 def march_steps(
     axes: Any, start: int, stop: int, begin: int, jumps: bool, h: float, rho: float, tolerance: float, Q: Any, v: Any,
@@ -88,7 +97,7 @@ def march_steps(
         e: elimination of the held degrees of freedom.
         offsets: (steps + 1, held) their prescribed part [m].
         reactions: (steps + 1, held) forces that hold them [N]; written.
-        log: (steps + 1, points, columns) of each step the frames and the memory, see `note`; or (0, 0, 0).
+        log: (rows, points, columns) of the steps of `row_of_step` the frames and the memory, see `note`; or (0, 0, 0).
         info: (3,) the step that found no equilibrium, or -1, the largest error that Newton's iterations left [m], and
             the largest depth in an obstacle or the table [m].
     """
@@ -325,7 +334,7 @@ def march_steps(
         if keeps:
             info[DEEPEST] = max(info[DEEPEST], remember(axes, q1, tables, active, p, history, h, False))
             if len(log) > 0:
-                note(axes, history, log[k])
+                note(axes, history, log[row_of_step(k, len(Q), len(log))])
         # the last update is not in R and f yet
         if anew:
             for i in range(size):

@@ -31,6 +31,7 @@ LEVELS = (
     (33, 49, 192),
 )
 CREDIBLE_STRAIN = 0.02  # axial: a march that stretches the cable more is tried again with strong damping
+TEARS = 1.5  # times the strain of another march: what strains a cable so much more does it for want of steps
 _STIFFER = 5  # times that contact is made stiffer on one grid
 _MISSED = 0.01  # of the diameter: what the time spline may miss of a motion with contact
 _SAMPLES = 33  # along the cable and over time at which surfaces are compared
@@ -111,6 +112,7 @@ def run_level(
     booked: bool = True,
     free_knots: bool = False,
     hardness: float = 1.0,
+    credible: float = CREDIBLE_STRAIN,
     watch: bool = False,
     grid: Grid | None = None,
     knots_t: Floats | None = None,
@@ -118,13 +120,14 @@ def run_level(
     """March on one grid and fit the time spline.
 
     A march that found no equilibrium, or stretched the cable beyond belief, is done again with strong numerical
-    damping, or without where it had it, and the better one is kept.
+    damping, or without where it had it, and kept where it comes farther or strains the cable by far less.
 
     Args:
         rho: spectral radius of the march.
         booked: whether to book the time by phase.
         free_knots: whether to add time knots where the cable strikes something.
         hardness: times that contact is stiffer to begin with, as it had to be made on a grid before.
+        credible: axial strain up to which a march is believed.
         watch: watch over the stretch at more points, between which the cable can't fold.
         grid: with the start on it, where it is known.
         knots_t: time knots to begin with, where they are known.
@@ -157,10 +160,11 @@ def run_level(
         if (again.reached, -again.deepest) < (motion.reached, -_YIELDING * motion.deepest):
             break  # what is this deep was not pushed in
         problem, motion = harder, again
-    doubtful = motion.stopped == "step" or motion.largest_strain > CREDIBLE_STRAIN
+    doubtful = motion.stopped == "step" or motion.largest_strain > credible
     if doubtful and (rho > STRONGLY_DAMPED or motion.stopped == "step"):
         again = march(problem, grid, steps, monitor, rho=RHO if rho == STRONGLY_DAMPED else STRONGLY_DAMPED)
-        if (again.reached, -again.largest_strain) > (motion.reached, -motion.largest_strain):
+        less = TEARS * again.largest_strain < motion.largest_strain
+        if again.reached > motion.reached or (again.reached == motion.reached and less):
             motion = again
     if booked:
         monitor.phase("march")
@@ -185,6 +189,11 @@ def hardness(level: Level) -> float:
         return 1.0
     allowed = DEEPEST * level.problem.scene.cable.diameter
     return max(1.0, solved.stiffness / posed.stiffness * min(1.0, 2.0 * level.motion.deepest / allowed))
+
+
+def credible_after(level: Level) -> float:
+    """Return the axial strain up to which a march on the grid after a level is believed."""
+    return max(CREDIBLE_STRAIN, TEARS * level.motion.largest_strain)
 
 
 def extrapolated(change: float, before: float) -> float:

@@ -19,6 +19,7 @@ from dlocore.kernels.march import (
     LEFT,
     constrained_mass_solve,
     march_steps,
+    row_of_step,
 )
 from dlocore.kernels.twisted import PAST
 from dlocore.problem import Problem
@@ -38,6 +39,7 @@ LEAST_TOLERANCE, MOST_TOLERANCE = 1e-11, 1e-7
 COARSE = 1 / 256  # of the period of a cable that swings: the tolerance goes with the square of the step
 _RESTS = 0.05  # of the diameter above the table: nearer to it the cable rests on it
 _CHUNK = 256  # steps between looks at the clock
+MOST_FRAMES = 1_300_000  # control points times steps of which a motion with twist keeps the frames: 0.6 GB of them
 _SPLITS = (4, 16, 64)  # parts of a step that found no equilibrium
 
 
@@ -52,8 +54,8 @@ class March:
         velocity: (n_u, nc) [m/s] just after t = 0.
         forces: what holds the cable between each two events.
         history: what the motion leaves behind at its end.
-        log: frames and memory at the times (steps + 1, points, columns), see `kernels.assembly.note`; (0, 0, 0) where
-            nothing is kept.
+        log: frames and memory at the steps `logged` (rows, points, columns), see `kernels.assembly.note`; (0, 0, 0)
+            where nothing is kept.
         reached: last step that found equilibrium.
         stopped: why it ended there: "" (the end), "step" (no equilibrium) or "time" (deadline).
         rho: spectral radius it was marched with.
@@ -79,18 +81,27 @@ class March:
     deepest: float
 
     @property
+    def logged(self) -> NDArray[np.int64]:
+        """Steps (rows,) that the rows of the log are of; all where nothing is kept."""
+        steps = np.arange(len(self.times))
+        if len(self.log) == 0:
+            return steps
+        every = -(-steps[-1] // (len(self.log) - 1))
+        return np.append(steps[:-1:every], steps[-1])
+
+    @property
     def frames(self) -> Floats:
-        """Frames of the curvature points at the times (steps + 1, points, PAST); no columns without twist."""
+        """Frames of the curvature points at the steps `logged` (rows, points, PAST); no columns without twist."""
         return self.log[:, : len(self.grid.tables.curvature_w), : self.log.shape[2] - self._remembered]
 
     @property
     def memory(self) -> Floats:
-        """Stress-free strain of the curvature points at the times (steps + 1, points, 1 in the plane or 3)."""
+        """Stress-free strain of the curvature points at the steps `logged` (rows, points, 1 in the plane or 3)."""
         return self.log[:, : len(self.grid.tables.curvature_w), self.log.shape[2] - self._remembered :]
 
     @property
     def axial_memory(self) -> Floats:
-        """Stress-free axial strain at the times (steps + 1, axial points); no columns where none is kept."""
+        """Stress-free axial strain at the steps `logged` (rows, axial points); no columns where none is kept."""
         return np.asarray(self.log[:, len(self.grid.tables.curvature_w) :, :1].sum(axis=2))
 
     @property
@@ -102,7 +113,7 @@ class March:
         start = self.grid.history
         if len(self.log) == 0:
             return History(start.memory[None], start.past[None], start.axial[None], start.stick, start.slide)
-        at = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 1)
+        at = np.clip(np.searchsorted(self.times[self.logged], times, side="right") - 1, 0, len(self.log) - 1)
         memory = np.broadcast_to(start.memory, (len(at), *start.memory.shape)).copy()
         memory[..., : self._remembered] = self.memory[at]
         past = self.frames[at] if self.frames.shape[2] else np.zeros((len(at), *start.past.shape))
@@ -221,7 +232,9 @@ class _Walk:
         """Return the march, whose last state stays where it stopped early."""
         reached, states, log = self._reached, self._states, self._log
         states[reached + 1 :] = states[reached]
-        log[reached + 1 :] = log[reached : reached + 1]
+        if len(log):
+            last = row_of_step(reached, len(states), len(log))
+            log[last + 1 :] = log[last]
         return March(
             self._grid, self._times, states, self._velocity, tuple(self._forces), self._history, log, reached,
             self.stopped, self._rho, self._split, self._grid.largest_strain(states), float(self._info[LEFT]),
@@ -287,7 +300,8 @@ class _Walk:
             if found < 0:
                 states[failed], stretch.reactions[failed] = inner_states[-1], reactions[-1]
                 if len(self._log):
-                    note(self._problem.axes, self._history, self._log[failed])
+                    row = row_of_step(failed, len(states), len(self._log))
+                    note(self._problem.axes, self._history, self._log[row])
                 self._split += 1
                 return True
             for x, before in zip(under_way, kept, strict=True):
@@ -354,5 +368,6 @@ def _empty_log(problem: Problem, grid: Grid, times: int) -> Floats:
     if all(effect is None for effect in kept):
         return np.zeros((0, 0, 0))
     columns = PAST + 3 if problem.twist is not None else 1
-    rows = len(grid.tables.curvature_w) + (len(grid.tables.axial_w) if problem.stretch_memory is not None else 0)
-    return np.zeros((times, rows, columns))
+    points = len(grid.tables.curvature_w) + (len(grid.tables.axial_w) if problem.stretch_memory is not None else 0)
+    every = -(-times * grid.n_u // MOST_FRAMES) if problem.twist is not None else 1
+    return np.zeros((1 - -(times - 1) // every, points, columns))
