@@ -30,6 +30,7 @@ LEVELS = (
     (13, 19, 80),
     (19, 28, 160),
     (28, 41, 320),
+    (41, 60, 640),
 )
 CREDIBLE_STRAIN = 0.02  # axial: a march that stretches the cable more is tried again with strong damping
 _STIFFER = 5  # times that contact is made stiffer on one grid
