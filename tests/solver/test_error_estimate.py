@@ -96,7 +96,7 @@ def test_the_estimate_on_a_given_grid_is_honest(scene: Scene, n_u: int, n_t: int
     found = predict(replace(scene, quality=march(n_u, n_t, estimate=True)))
     truth = predict(replace(scene, quality=march(65, 193)))
     error = apart(found.surface, truth.surface).max()
-    assert LOW < (found.accuracy.error_estimate or 0.0) / error < HIGH
+    assert 1.0 < (found.accuracy.error_estimate or 0.0) / error < HIGH  # measured: 1.9 to 3.7
 
 
 def grid_points(size: Size) -> int:
