@@ -51,7 +51,7 @@ def stretch_points(rule: tuple[Any, Any]) -> Callable[..., Any]:
         half = 0.5 * np.diff(spans)
         u = (spans[:-1, None] + half[:, None] * (1.0 + rule[0])).ravel()
         first, table = basis_rows(knots, u, 1)
-        rows = {"axial_first": first, "axial_b1": np.ascontiguousarray(table[:, 1])}
+        rows = {"axial_u": u, "axial_first": first, "axial_b1": np.ascontiguousarray(table[:, 1])}
         return build_tables(knots, *arguments)._replace(**rows, axial_w=(half[:, None] * rule[1]).ravel())
 
     return build
