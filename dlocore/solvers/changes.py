@@ -8,7 +8,7 @@ from dlocore.solvers.ladder import Level
 from dlocore.solvers.march import STRONGLY_DAMPED
 
 _LEFT = 0.45  # of what twice as many steps moved the surface by, is left; 1/3 in theory: benchmarks.estimate
-_LEFT_DAMPED = 0.8  # the same of strongly damped steps, as forces with kinks ask for; they are of first order in part
+_LEFT_DAMPED = 0.9  # the same of strongly damped steps, as forces with kinks ask for; 1 were they of first order
 _LEFT_ALONG = 0.75  # the same of half as many control points again
 _MOST_LEFT = 1.5  # times the last change: what is believed of changes that hardly shrink
 _MORE = 1.1  # times as many steps: fewer are as many
