@@ -10,7 +10,6 @@ import os
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
 
 from collections.abc import Callable
-from functools import partial
 from itertools import product
 from typing import Any
 from unittest.mock import patch
@@ -19,8 +18,21 @@ import numpy as np
 
 from benchmarks.machine import machine_line
 from benchmarks.paper_case import errors, paper_scene, reference
-from dlocore import Cable, Environment, Grasp, Move, Quality, Scene, Straight, discretisation, energies, front, predict
+from dlocore import (
+    Cable,
+    Environment,
+    Grasp,
+    Move,
+    Quality,
+    Scene,
+    Straight,
+    discretisation,
+    energies,
+    predict,
+    whole_march,
+)
 from dlocore.kernels.basis import GAUSS_2, basis_rows, build_tables, graded_knots
+from dlocore.solvers.ladder import run_level
 from dlocore.spline import uniform_knots
 
 GAUSS_1 = np.polynomial.legendre.leggauss(1)
@@ -39,7 +51,7 @@ def stretch_points(rule: tuple[Any, Any]) -> Callable[..., Any]:
         half = 0.5 * np.diff(spans)
         u = (spans[:-1, None] + half[:, None] * (1.0 + rule[0])).ravel()
         first, table = basis_rows(knots, u, 1)
-        rows = {"axial_first": first, "axial_b1": np.ascontiguousarray(table[:, 1])}
+        rows = {"axial_u": u, "axial_first": first, "axial_b1": np.ascontiguousarray(table[:, 1])}
         return build_tables(knots, *arguments)._replace(**rows, axial_w=(half[:, None] * rule[1]).ravel())
 
     return build
@@ -57,16 +69,20 @@ def ungraded(n: int, length: float, features: Any, multiplicity: Any, power: Any
 
 def damped(rho: float) -> dict[str, Any]:
     """Return the change to a march of spectral radius `rho`."""
-    return {"run_level": partial(front.run_level, rho=rho)}
+
+    def run(*arguments: Any, **options: Any) -> Any:
+        return run_level(*arguments, **{**options, "rho": rho})
+
+    return {"run_level": run}
 
 
 CHOICES: dict[str, tuple[Any, dict[str, Any]]] = {
-    "as it is": (front, {"FINER": front.FINER}),
+    "as it is": (whole_march, {"run_level": run_level}),
     "stretch: 1 point in every span": (discretisation, {"build_tables": stretch_points(GAUSS_1)}),
     "stretch: 2 points in every span": (discretisation, {"build_tables": stretch_points(GAUSS_2)}),
     "knots: at the grasp, not graded": (discretisation, {"graded_knots": ungraded}),
     "knots: uniform": (discretisation, {"graded_knots": uniform}),
-    **{f"steps: rho = {rho:g}": (front, damped(rho)) for rho in RADII},
+    **{f"steps: rho = {rho:g}": (whole_march, damped(rho)) for rho in RADII},
 }
 
 
@@ -97,7 +113,7 @@ def print_energies() -> None:
     )
     print("energy but that of stretch at 1, 2, 5 and 10 s over that at 0.5 s: a stiff cable let go at 0.4 s, undamped")
     for rho in RADII:
-        with patch.multiple(front, **damped(rho)):
+        with patch.multiple(whole_march, **damped(rho)):
             surface = predict(scene).surface
         parts = energies(scene, surface, TIMES)
         energy = parts["kinetic"] + parts["bend"]  # the fit in time does not resolve the waves of the stretch

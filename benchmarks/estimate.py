@@ -167,11 +167,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenes", nargs="+", metavar="NAME", help="only scenes whose name contains one of these")
     parser.add_argument("--random", type=int, default=40, help="random scenes (default 40)")
+    parser.add_argument("--first", type=int, default=0, help="seed of the first of them (default 0)")
     parser.add_argument("--truths", type=Path, metavar="FOLDER", help="keep the converged motions there")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every answer there")
     options = parser.parse_args()
     warm_up()
-    scenes = catalogue() | {f"random {seed}": random_scene(seed) for seed in range(options.random)}
+    seeds = range(options.first, options.first + options.random)
+    scenes = catalogue() | {f"random {seed}": random_scene(seed) for seed in seeds}
     if options.scenes:
         scenes = {n: s for n, s in scenes.items() if any(part in n for part in options.scenes)}
     found: list[Row] = []

@@ -4,7 +4,7 @@ from dlocore.cost import Cost
 from dlocore.problem import Problem
 from dlocore.solvers.ladder import LEVELS, Size, stretched
 
-GROWTH = 2.5  # of the time from one grid to the next, where nothing is known of this machine
+GROWTH = 3.0  # of the time from one grid to the next, where nothing is known of this machine
 _KEPT = 0.8  # of the budget: what the model may be sure of, as it knows nothing of the motion
 
 

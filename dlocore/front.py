@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.again import Again, march_again
+from dlocore.companion import by_coarser, by_finer
 from dlocore.cost import Cost
-from dlocore.discretisation import smallest_n_u
 from dlocore.errors import SceneError
 from dlocore.events import smallest_n_t
 from dlocore.frames import material_of
@@ -21,7 +21,7 @@ from dlocore.refinement import climb
 from dlocore.report import WindowForces, effect_reports, elastic_energy, reactions
 from dlocore.review import neglected, objections
 from dlocore.scene import Method, Quality, Scene
-from dlocore.solvers.ladder import FINER, Level, distance, run_level
+from dlocore.solvers.ladder import Level
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.paper import solve_as_printed
 from dlocore.solvers.spacetime import solve
@@ -29,9 +29,6 @@ from dlocore.spline import uniform_knots
 from dlocore.whole_march import MISSED_COUNTS, TORN, Outcome, march_status
 
 Floats = NDArray[np.float64]
-
-_TOO_LATE = " The time limit passed before its error was estimated."
-SAFETY = 1.5  # times the distance to a finer march: what a slowly converging motion may be off beyond it
 
 
 def predict(
@@ -175,33 +172,10 @@ def _least_squares(
     if again is not None:
         errors = None if again.errors is None else {**again.errors, "iteration": left}
         return _answer(monitor, method, Outcome(level, status, message + again.said, errors), forces, again.judged)
-    estimate, doubt = _companion(problem, quality, level, monitor) if method != "paper" or converged else (None, "")
+    known = quality.estimate and (method != "paper" or converged)
+    estimate, doubt = by_finer(problem, level, monitor) if known else (None, "")
     errors = None if estimate is None else {"grid": estimate, "iteration": left}
     return _answer(monitor, method, Outcome(level, status, message + doubt, errors), forces)
-
-
-def _companion(problem: Problem, quality: Quality, level: Level, monitor: Monitor) -> tuple[float | None, str]:
-    """Return the error estimate [m], or None and why there is none, in words.
-
-    It is the distance to a march on a grid half as fine again, with a margin.
-    """
-    assert quality.n_u is not None
-    assert quality.n_t is not None
-    if not quality.estimate or level.motion.stopped:
-        return None, ""
-    n_u = max(smallest_n_u(problem), round(FINER * quality.n_u))
-    n_t = max(smallest_n_t(problem), round(FINER * quality.n_t))
-    try:
-        monitor.check()
-        finer = run_level(problem, n_u, n_t, round(FINER * level.size.steps), monitor, booked=False)
-    except TimeIsUp:
-        return None, _TOO_LATE
-    monitor.phase("estimate")
-    if finer.motion.stopped == "time":
-        return None, _TOO_LATE
-    if finer.motion.stopped:
-        return None, " Its error is not known: the finer march to compare it with found no equilibrium."
-    return SAFETY * distance(level, finer, problem), ""
 
 
 def _check_n_t(problem: Problem, n_t: int) -> None:
@@ -219,7 +193,7 @@ def _given(problem: Problem, quality: Quality, monitor: Monitor) -> Outcome:
     level = evenly_fitted(march_given(problem, quality.n_u, quality.n_t, monitor))
     problem = level.problem
     record_level(problem, level, monitor)
-    estimate, doubt = _companion(problem, quality, level, monitor)
+    estimate, doubt = by_coarser(problem, level, monitor) if quality.estimate else (None, "")
     if estimate is not None:
         estimate = max(estimate, MISSED_COUNTS * level.missed)
     status, message = given_status(level)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from dlocore.companion import coarser, finer
 from dlocore.discretisation import smallest_n_u
 from dlocore.errors import SceneError
 from dlocore.events import smallest_n_t
@@ -10,7 +11,7 @@ from dlocore.prediction import EffectReport
 from dlocore.problem import pose
 from dlocore.report import planned_effects
 from dlocore.scene import Scene
-from dlocore.solvers.ladder import FINER, Size, given_steps, stretched
+from dlocore.solvers.ladder import Size, given_steps, stretched
 
 # Medians measured on one 2-core cloud machine of 2026; they tell the order of the time it takes.
 _MARCH = {2: 9e-7, 3: 2.2e-6, 4: 3.1e-6}  # [s] per step and control point, by coordinates
@@ -68,7 +69,8 @@ def plan(scene: Scene) -> Plan:
                 raise SceneError(f"quality.{name}", given, f"at least {least} in this scene")
         marches = [Size(n_u, n_t, steps)]
         if quality.estimate:
-            marches.append(Size(round(FINER * n_u), round(FINER * n_t), round(FINER * steps)))
+            coarse = coarser(problem, marches[0]) if method == "march" else None
+            marches.append(coarse or finer(problem, marches[0]))
     dimensions = problem.plane.dimensions
     if method == "reference":
         n_u, n_t, steps = _RODS[-1][0] + 1, _RODS[-1][1] + 1, _RODS[-1][1]

@@ -10,6 +10,7 @@ from dlocore.errors import SceneError
 from dlocore.problem import Problem
 from dlocore.progress import record_level
 from dlocore.scene import Quality
+from dlocore.solvers.changes import Change, weighed
 from dlocore.solvers.ladder import (
     ACCEPT,
     LEVELS,
@@ -17,7 +18,6 @@ from dlocore.solvers.ladder import (
     Size,
     credible_after,
     distance,
-    extrapolated,
     stretched,
 )
 from dlocore.solvers.march import MOST_FRAMES, RHO, STRONGLY_DAMPED
@@ -35,13 +35,10 @@ _MOST_POINTS = 400  # along the cable
 _FINER = {"space": 1.5, "time": 2.0}
 _FINE_IN_TIME = 0.3  # of the target: a time spline that misses its march by less keeps its knots as the steps halve
 _AT_BEST = 0.2  # of an error, is left by one refinement: what is still too much after all of them is not begun
-_MORE = 1.1  # times as many steps: fewer are as many
-_DAMPED_LEAVE = 1.5  # times the error that half as many steps again leave without strong damping: benchmarks.estimate
 _FAILURES = 2  # refinements in time of a march that found no equilibrium
 
 
-# by direction, "space", "time" or "both": how far its two last refinements moved the surface [m]
-Changes = dict[str, tuple[float, float]]
+Changes = dict[str, Change]  # by direction, "space", "time" or "both": how far its last refinement moved the surface
 
 
 def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | None = None) -> Outcome:
@@ -173,8 +170,7 @@ class _Climb:
 
     def _weigh(self, level: Level, best: Level) -> None:
         """Note how far a level moved the surface, what error that points to, and how to damp the next march."""
-        before = self.changes.get(self.direction, (np.inf, np.inf))[0]
-        self.changes[self.direction] = _as_by_half(level, best), before
+        self.changes[self.direction] = weighed(level, best, self.changes.get(self.direction))
         self.estimate = max(_error(self.changes), MISSED_COUNTS * level.missed)
         rough = self._is_rough(level)
         if self.number < len(LEVELS) or (rough and self.problem.self_contact is not None):
@@ -196,15 +192,15 @@ class _Climb:
         trembles = MISSED_COUNTS * level.missed > _FINE_IN_TIME * self.target
         sizes = {direction: self._affordable(_finer(size, direction, trembles)) for direction in _FINER}
         self.direction = "time" if MISSED_COUNTS * level.missed > _error(self.changes) else _worst(self.changes)
-        moved_by = self.changes.get(self.direction, (0.0, 0.0))
-        if sizes[self.direction] is None and extrapolated(*moved_by) < self.target:
+        change = self.changes.get(self.direction)
+        if sizes[self.direction] is None and (change is None or change.error < self.target):
             # may still bring the sum of both below it
             self.direction = next(direction for direction in _FINER if direction != self.direction)
         if self.direction == "time" and self.problem.self_contact is None:
             # on the same steps strongly damped marches err by far more; but strands that strike each other rebound less
             self.rho = RHO
         hope = _AT_BEST ** self._left(sizes[self.direction])
-        return None if hope * moved_by[0] > self.enough else sizes[self.direction]
+        return None if change is not None and hope * change.moved > self.enough else sizes[self.direction]
 
     def _affordable(self, size: Size) -> Size | None:
         """Return a size, or None where a march of it takes too long."""
@@ -275,22 +271,6 @@ def _is_worse(level: Level, best: Level) -> bool:
     return torn or failed or stalled
 
 
-def _as_by_half(level: Level, before: Level) -> float:
-    """Return how far a level would lie from the one before [m] if its steps were half as many again, or more.
-
-    The errors of the steps are of second order: 1.25 of that of a level is what half as many steps again take away
-    from it, 0.78 what a third as many do. Strongly damped steps, as forces with kinks ask for, are of first order in
-    part: unless there are twice as many, they leave more.
-    """
-    more = len(level.motion.times) / len(before.motion.times)
-    if more <= _MORE:
-        return level.change
-    counts = max(1.0, 1.25 / (more**2 - 1.0))
-    if level.motion.rho == STRONGLY_DAMPED:
-        counts *= min(_DAMPED_LEAVE, max(1.0, 0.5 * _DAMPED_LEAVE / (more - 1.0)))
-    return counts * level.change
-
-
 def _finer(size: Size, direction: str, trembles: bool) -> Size:
     """Return the next size in a direction; more time knots go with more steps only where the motion `trembles`."""
     ratio = _FINER[direction]
@@ -302,14 +282,14 @@ def _finer(size: Size, direction: str, trembles: bool) -> Size:
 def _worst(changes: Changes) -> str:
     """Return the direction to refine: time, then space, then that which erred more."""
     unknown = [direction for direction in ("time", "space") if direction not in changes]
-    return unknown[0] if unknown else max(_FINER, key=lambda direction: extrapolated(*changes[direction]))
+    return unknown[0] if unknown else max(_FINER, key=lambda direction: changes[direction].error)
 
 
 def _error(changes: Changes) -> float:
     """Return the error [m] that the changes point to: of the whole grid, or of both directions once both are known."""
     if all(direction in changes for direction in _FINER):
-        return float(sum(extrapolated(*changes[direction]) for direction in _FINER))
-    return extrapolated(*changes["both"]) if "both" in changes else np.inf
+        return sum(changes[direction].error for direction in _FINER)
+    return changes["both"].error if "both" in changes else np.inf
 
 
 def _parts(changes: Changes, level: Level) -> dict[str, float] | None:
@@ -317,7 +297,7 @@ def _parts(changes: Changes, level: Level) -> dict[str, float] | None:
     if not np.isfinite(_error(changes)):
         return None
     known = list(_FINER) if all(direction in changes for direction in _FINER) else ["both"]
-    parts = {"grid" if direction == "both" else direction: extrapolated(*changes[direction]) for direction in known}
+    parts = {"grid" if direction == "both" else direction: changes[direction].error for direction in known}
     unseen = MISSED_COUNTS * level.missed - sum(parts.values())
     if unseen > 0.0:  # what the time spline misses of its march is told by no other grid
         last = list(parts)[-1]

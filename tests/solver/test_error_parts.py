@@ -22,7 +22,7 @@ SLOW = replace(
     ("scene", "quality", "names"),
     [
         (SCENE, Quality(), {"grid", "iteration", "neglected"}),
-        (SCENE, Quality(target_error=2e-5), {"space", "time", "iteration", "neglected"}),
+        (SCENE, Quality(target_error=5e-6), {"space", "time", "iteration", "neglected"}),
         (SCENE, Quality(time_budget=0.5), None),
         (SCENE, Quality(n_u=9, n_t=13, method="march"), {"grid", "iteration", "neglected"}),
         (SCENE, Quality(n_u=9, n_t=13, method="spacetime"), {"grid", "iteration", "neglected"}),

@@ -1,0 +1,56 @@
+"""What error the change from one grid to a finer one points to."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dlocore.solvers.ladder import Level
+from dlocore.solvers.march import STRONGLY_DAMPED
+
+_LEFT = 0.45  # of what twice as many steps moved the surface by, is left; 1/3 in theory: benchmarks.estimate
+_LEFT_DAMPED = 0.9  # the same of strongly damped steps, as forces with kinks ask for; 1 were they of first order
+_LEFT_ALONG = 0.75  # the same of half as many control points again
+_MOST_LEFT = 1.5  # times the last change: what is believed of changes that hardly shrink
+_MORE = 1.1  # times as many steps: fewer are as many
+
+
+class Change(NamedTuple):
+    """How far a refinement moved the surface.
+
+    Attributes:
+        moved: by this one, as if it had twice the steps at least [m].
+        before: by the one before it in the same direction [m], infinite where there is none.
+        left: share of it that is left in theory, or more.
+    """
+
+    moved: float
+    before: float
+    left: float
+
+    @property
+    def error(self) -> float:
+        """The error [m] that it points to.
+
+        Where changes shrink by less than expected from one refinement to the next, the sum of those to come is larger
+        than the share that is left in theory: c/(1 - c), c = moved/before.
+        """
+        contraction = self.moved / self.before if 0.0 < self.before < np.inf else 0.0
+        to_come = contraction / (1.0 - contraction) if contraction < 1.0 else np.inf
+        return self.moved * max(self.left, min(to_come, _MOST_LEFT))
+
+
+def weighed(level: Level, before: Level, last: Change | None) -> Change:
+    """Return the change from one level to the next, which has more steps, more control points or both.
+
+    Args:
+        level: the finer one.
+        before: the coarser one.
+        last: the change of the refinement before in the same direction.
+    """
+    moved_before = np.inf if last is None else last.moved
+    more = len(level.motion.times) / len(before.motion.times)
+    if more <= _MORE:
+        return Change(level.change, moved_before, _LEFT_ALONG)
+    # the errors of the steps are of second order: what twice as many take away is three times what they leave
+    counts = max(1.0, 3.0 / (more**2 - 1.0))
+    return Change(counts * level.change, moved_before, _LEFT_DAMPED if level.motion.rho == STRONGLY_DAMPED else _LEFT)

@@ -1,0 +1,135 @@
+"""What marches on two grids tell of the error of one of them."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from benchmarks.robot_scenes import random_scene
+from dlocore import Cable, Environment, Grasp, Move, Prediction, Quality, Scene, Straight, Table, predict
+from dlocore.companion import coarser, finer
+from dlocore.problem import pose
+from dlocore.solvers.changes import Change, weighed
+from dlocore.solvers.ladder import LEVELS, Level, Size, distance, given_steps, run_level
+from dlocore.solvers.march import STRONGLY_DAMPED
+from dlocore.solvers.monitor import Monitor
+from tests.solver.scenes import apart, march, paper_scene
+
+LOW, HIGH = 0.5, 5.0  # of an honest ratio of estimate and error
+
+
+def marched(n_u: int, steps: int, **options: float) -> Level:
+    """Return the march of the paper's case on a grid, with as many time knots whatever its steps."""
+    return run_level(pose(paper_scene(0.25)), n_u, 37, steps, Monitor(), **options)
+
+
+def told(level: Level, before: Level, last: Change | None = None) -> Change:
+    return weighed(replace(level, change=distance(level, before, level.problem)), before, last)
+
+
+def test_twice_the_steps_tell_the_error_that_they_leave():
+    coarse, fine, truth = (marched(17, steps) for steps in (64, 128, 2048))
+    left = distance(fine, truth, fine.problem)
+    # a third of the change in theory, as the errors are of second order; 0.45 is counted
+    assert left < told(fine, coarse).error < 2.0 * left
+
+
+@pytest.mark.parametrize("steps", [80, 96, 108])
+def test_what_a_refinement_in_time_tells_is_much_the_same_however_fine_it_is(steps: int):
+    fine = marched(17, 128)
+    by_half, by_less = told(fine, marched(17, 64)), told(fine, marched(17, steps))
+    assert by_less.error == pytest.approx(by_half.error, rel=0.25)  # the order is two but for higher terms
+
+
+def test_strongly_damped_steps_leave_a_larger_share_of_a_change():
+    plain = told(marched(13, 128), marched(13, 64))
+    damped = told(*(marched(13, steps, rho=STRONGLY_DAMPED) for steps in (128, 64)))
+    assert damped.left > 1.5 * plain.left
+
+
+def test_changes_that_hardly_shrink_leave_the_sum_of_those_to_come():
+    # 1, 1/2, 1/4, ... go on to add up to the last one; a quarter each time to a third of it, below what is counted
+    assert Change(1.0, 2.0, 0.45).error == pytest.approx(1.0)
+    assert Change(1.0, 4.0, 0.45).error == pytest.approx(0.45)
+    assert Change(1.0, np.inf, 0.45).error == pytest.approx(0.45)
+    assert Change(1.0, 1.01, 0.45).error == Change(1.0, 0.5, 0.45).error > 1.0  # no order is left to go by
+    assert Change(1.0, 0.0, 0.45).error == pytest.approx(0.45)
+
+
+def test_each_level_leaves_as_much_of_an_error_in_time_as_of_one_along_the_cable():
+    for (n_u, _, steps), (more_u, _, more_steps) in pairwise(LEVELS):
+        in_time = 1.0 / ((more_steps / steps) ** 2 - 1.0)
+        along = 1.0 / ((more_u / n_u) ** 4 - 1.0)
+        assert along == pytest.approx(in_time, rel=0.2)  # whole numbers of control points
+
+
+@pytest.mark.parametrize("EI", [1e-2, 1e-3])
+@pytest.mark.parametrize("u", [0.0, 0.25, 0.5, 0.8])
+@pytest.mark.parametrize("hold", ["point", "tangent"])
+def test_a_target_is_met_and_its_estimate_honest(u: float, EI: float, hold: str):
+    scene = paper_scene(u, EI, hold=hold, quality=Quality(target_error=1e-3))
+    found, truth = predict(scene), predict(replace(scene, quality=march(65, 129)))
+    error = apart(found.surface, truth.surface).max()
+    assert found.status == "converged"
+    assert error < 1e-3
+    assert LOW < (found.accuracy.error_estimate or 0.0) / error < HIGH
+
+
+RUBBING = Scene(
+    cable=Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-2),
+    shape=Straight(),
+    grasps=(Grasp(u=0.25, path=Move(displacement=(0.0, 0.3, 0.0), duration=1.6)),),
+    environment=Environment(drag=0.05, table=Table(friction=0.2)),
+)
+HANGING = Scene(
+    cable=Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-2),
+    shape=Straight(direction=(0.0, 0.0, -1.0)),
+    grasps=(Grasp(u=0.0, hold="tangent", path=Move(displacement=(0.2, 0.1, 0.0), duration=1.0)),),
+    environment=Environment(drag=0.2),
+)
+
+
+@pytest.mark.parametrize("scene", [paper_scene(0.25), RUBBING, HANGING], ids=["sliding", "rubbing", "hanging"])
+@pytest.mark.parametrize(("n_u", "n_t"), [(9, 13), (13, 19), (21, 31)])
+def test_the_estimate_on_a_given_grid_is_honest(scene: Scene, n_u: int, n_t: int):
+    found = predict(replace(scene, quality=march(n_u, n_t, estimate=True)))
+    truth = predict(replace(scene, quality=march(65, 193)))
+    error = apart(found.surface, truth.surface).max()
+    assert 1.0 < (found.accuracy.error_estimate or 0.0) / error < HIGH  # measured: 1.9 to 3.7
+
+
+def grid_points(size: Size) -> int:
+    return size.n_u * size.steps
+
+
+@pytest.mark.parametrize(("n_u", "n_t"), [(7, 10), (9, 13), (13, 19), (33, 65)])
+def test_a_march_on_a_given_grid_is_compared_with_one_of_less_than_half_the_work(n_u: int, n_t: int):
+    size = Size(n_u, n_t, given_steps(n_t))
+    other = coarser(pose(paper_scene(0.25)), size)
+    assert other is not None
+    assert grid_points(other) < 0.45 * grid_points(size)
+
+
+def test_a_grid_with_no_room_for_a_coarser_one_is_compared_with_a_finer_one():
+    problem = pose(paper_scene(0.25))
+    least = Size(5, 9, 48)
+    assert coarser(problem, least) is None
+    assert all(more > given for more, given in zip(finer(problem, least), least, strict=True))
+    found = predict(paper_scene(0.25, quality=march(5, 9, estimate=True)))
+    assert found.accuracy.error_estimate is not None
+
+
+def test_a_coarser_march_that_folds_is_replaced_by_a_finer_one():
+    # slack between two grippers: seven control points fold it within a span, nine do not
+    def estimated(n_u: int, n_t: int) -> Prediction:
+        return predict(replace(random_scene(51), quality=march(n_u, n_t, estimate=True)))
+
+    level = estimated(9, 13).level
+    assert level is not None
+    size = coarser(level.problem, level.size)
+    assert size is not None
+    assert "folded" in predict(replace(random_scene(51), quality=march(size.n_u, size.n_t))).message
+    other = run_level(level.problem, *finer(level.problem, level.size), Monitor())
+    found = estimated(9, 13).accuracy.error_parts["grid"]
+    assert found == pytest.approx(1.5 * distance(level, other, level.problem), rel=1e-9)  # the same two marches
