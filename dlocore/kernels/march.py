@@ -20,9 +20,12 @@ from dlocore.kernels.mixing import mixed, room
 from dlocore.kernels.predictor import differences_of, predict_by, shift
 from dlocore.kernels.selfcontact import closing, factor_wide, place_nodes, press, solve_wide, widen
 from dlocore.kernels.strands import clear_way
+from dlocore.kernels.tension import assume_last, keep, point_on
 
 FAILED_STEP, LEFT, DEEPEST = range(3)  # places in `info`
 _REFRESH = 0.2  # contraction of the updates above which the old factors no longer serve
+_UNMEASURED = 8  # steps in a row that end with their first update, as the contraction that was last measured allows
+_DOUBT = 3.0  # times that contraction it may be
 _PLAIN_ITERATIONS = 8  # Newton iterations before a step is done again with a line search
 _MIXED_ITERATIONS = 80  # with mixing, which learns from iterations with the same factors
 _ROBUST_ITERATIONS = 60
@@ -110,6 +113,7 @@ def march_steps(
     dull = 1 if (touches or jumps) and start == begin else 0
     # the tangent of this damping is not complete; across kinks earlier iterations teach nothing
     mixes = nc == 3 and bool(active[DAMPING]) and not exact and not tight
+    smooth = not mixes and not exact and not tight
     plain_iterations = _MIXED_ITERATIONS if mixes else _PLAIN_ITERATIONS
     free = size - len(e.held)
     largest = 10.0 * np.sum(tables.weight)  # an update of ten lengths is divergence
@@ -135,7 +139,7 @@ def march_steps(
     row_end = np.empty(free if tight else 0, np.int64)
     S = np.empty((free if tight else 0, free if tight else 0))
     pairs, wide, depth, share = 0, False, 0.0, 1.0
-    first_contraction, first_update = 1.0, 1.0  # of the first update of a step, as last measured
+    first_contraction, first_update, unmeasured = 1.0, 1.0, _UNMEASURED  # of the first update of a step, as measured
     # the acceleration at the start knows of no damping yet, which would make too much of it
     bent = 0.0 if mixes else 0.5
     mixing, differences = room(free if mixes else 0), -1
@@ -186,6 +190,7 @@ def march_steps(
                     if share < 1.0:
                         converged = False
                         continue  # what is held passes through a strand
+            assume_last(history.tension, not robust)
             # --- iterate
             limit = plain_iterations if not robust else _ROBUST_ITERATIONS
             fresh = False
@@ -269,6 +274,8 @@ def march_steps(
                             low, low_work = length, after
                         share = low_work / (low_work - high_work) if np.isfinite(high_work) else 0.5
                         length = low + min(max(share, 0.1), 0.9) * (high - low)
+                if not robust or update <= tolerance:  # a line search looks at other states
+                    point_on(nc, q1, step_change, tables, history.tension)
                 for i in range(n):
                     for d in range(nc):
                         s = length * step_change[i, d]
@@ -282,8 +289,10 @@ def march_steps(
                     left *= min(1.0, contraction / (1.0 - contraction + 1e-300))
                 else:  # as that of a first update lately was; of Newton's method it is in proportion to the update
                     contraction = min(first_contraction * max(1.0, update / first_update), 0.5)
+                    if not robust and smooth and unmeasured < _UNMEASURED:
+                        left *= _DOUBT * contraction / (1.0 - contraction)
                 if it == 1:
-                    first_contraction, first_update = contraction, previous
+                    first_contraction, first_update, unmeasured = contraction, previous, 0
                 if left <= tolerance and length == 1.0:
                     info[LEFT] = max(info[LEFT], left)
                     converged = True
@@ -315,6 +324,8 @@ def march_steps(
         if not converged:
             info[FAILED_STEP] = k
             return
+        keep(history.tension)
+        unmeasured += 1
         anew = exact or pairs > 0
         if anew:  # where the law has kinks
             assemble(axes, q1, v1, tables, active, p, history, rates, (0.0, 0.0, 0.0), f, K)

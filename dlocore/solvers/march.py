@@ -20,6 +20,7 @@ from dlocore.kernels.march import (
     constrained_mass_solve,
     march_steps,
 )
+from dlocore.kernels.tension import COLUMNS
 from dlocore.kernels.twisted import PAST
 from dlocore.problem import Problem
 from dlocore.report import WindowForces
@@ -101,7 +102,7 @@ class March:
         """Return what lies behind the motion at the times (k,) [s]: a `History` with arrays (1 or k, ...)."""
         start = self.grid.history
         if len(self.log) == 0:
-            return History(start.memory[None], start.past[None], start.axial[None], start.stick, start.slide)
+            return start._replace(memory=start.memory[None], past=start.past[None], axial=start.axial[None])
         at = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 1)
         memory = np.broadcast_to(start.memory, (len(at), *start.memory.shape)).copy()
         memory[..., : self._remembered] = self.memory[at]
@@ -109,7 +110,7 @@ class March:
         axial = np.broadcast_to(start.axial, (len(at), *start.axial.shape)).copy()
         if self.axial_memory.shape[1]:
             axial[..., 0] = self.axial_memory[at]
-        return History(memory, np.ascontiguousarray(past), axial, start.stick, start.slide)
+        return start._replace(memory=memory, past=np.ascontiguousarray(past), axial=axial)
 
 
 def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: float = RHO) -> March:
@@ -182,7 +183,7 @@ class _Walk:
         self._info[FAILED_STEP] = -1
         self._starts: Starts = {}
         self._forces: list[WindowForces] = []
-        self._history = grid.past()
+        self._history = grid.past()._replace(tension=np.full((len(grid.tables.axial_w), COLUMNS), np.nan))
         self._log = _empty_log(problem, grid, len(times))
         if len(self._log):
             note(problem.axes, self._history, self._log[0])

@@ -37,5 +37,5 @@ def watched(grid: Grid) -> Grid:
     )
     behind = [np.interp(finer.axial_u, tables.axial_u, column) for column in grid.history.axial.T]
     past = grid.past()
-    history = History(past.memory, past.past, np.ascontiguousarray(np.transpose(behind)), past.stick, past.slide)
+    history = past._replace(axial=np.ascontiguousarray(np.transpose(behind)))
     return replace(grid, tables=finer, history=history)
