@@ -17,6 +17,7 @@ from dlocore.kernels.compile import brief, kernel
 from dlocore.kernels.contact import strikes
 from dlocore.kernels.inertia import both_sides, effective, padded, residual
 from dlocore.kernels.mixing import mixed, room
+from dlocore.kernels.narrow import ROOM, factor_step, solve_step
 from dlocore.kernels.predictor import differences_of, predict_by, shift
 from dlocore.kernels.selfcontact import closing, factor_wide, place_nodes, press, solve_wide, widen
 from dlocore.kernels.strands import clear_way
@@ -118,14 +119,14 @@ def march_steps(
     free = size - len(e.held)
     largest = 10.0 * np.sum(tables.weight)  # an update of ten lengths is divergence
     K = np.empty((size, 4 * nc))
-    A = np.empty((free, e.width))
+    A = np.zeros((free + ROOM, e.width))
     f = np.empty((n, nc))
     R = np.empty((n, nc))
     weighted = np.empty((n, nc))
     unit = tables.mass
     rows, stacked = both_sides(unit), padded(n, nc)
     x = np.empty(free)
-    trial_x = np.empty(free)
+    trial_x = np.zeros(free + ROOM)
     change = np.empty(size)
     moved = np.empty(size)
     step_change = change.reshape((n, nc))
@@ -210,8 +211,8 @@ def march_steps(
                     wide = pairs > 0
                     if wide:
                         part = (1.0 - al_f, (1.0 - al_f) * tv, 1.0 - al_f)
-                        widen(nc, v1, tables, p, x1, found, pairs, part, e, A, row_end, S)
-                    if (factor_wide(S, row_end) if wide else factor(A)) >= 0:
+                        widen(nc, v1, tables, p, x1, found, pairs, part, e, A[:free], row_end, S)
+                    if (factor_wide(S, row_end) if wide else factor_step(A, free)) >= 0:
                         if not robust:
                             break
                         assemble(axes, q1, v1, tables, active, p, history, rates, (1.0, tv, 0.0), f, K)
@@ -221,18 +222,18 @@ def march_steps(
                         reduce_matrix(e, K, A)
                         if wide:
                             part = (1.0 - al_f, (1.0 - al_f) * tv, 0.0)
-                            widen(nc, v1, tables, p, x1, found, pairs, part, e, A, row_end, S)
-                        if (factor_wide(S, row_end) if wide else factor(A)) >= 0:
+                            widen(nc, v1, tables, p, x1, found, pairs, part, e, A[:free], row_end, S)
+                        if (factor_wide(S, row_end) if wide else factor_step(A, free)) >= 0:
                             break
                     fresh = True
                 for i in range(free):
                     trial_x[i] = -x[i]
                 if wide:
-                    solve_wide(S, row_end, trial_x)
+                    solve_wide(S, row_end, trial_x[:free])
                 else:
-                    solve(A, trial_x)
+                    solve_step(A, free, trial_x)
                 if mixes:
-                    differences = mixed(mixing, -1 if refactor else differences, trial_x)
+                    differences = mixed(mixing, -1 if refactor else differences, trial_x[:free])
                 expand_vector(e, trial_x, change)
                 update = 0.0  # largest step of a control point, the same in every frame
                 for i in range(n):

@@ -1,10 +1,10 @@
 """The tension that the tangent of a step takes: not that of the strain at hand, but the one that it points to.
 
 The predicted state of a step is off by less than 1e-4 of the length, and yet strained by so much that the tension of a
-cable that hardly stretches is wrong many times over. Its part of the tangent, tension times the second derivative of the
-strain, would spoil the first Newton iteration, and with it the need for no more than one. So tension is an unknown of
-its own there (mixed integration points: Magisano, Leonetti and Garcea, 2017): the first iteration of a step takes that
-of the last step, each further one what the one before made of it,
+cable that hardly stretches is wrong many times over. Its part of the tangent, tension times the second derivative of
+the strain, would spoil the first Newton iteration, and with it the need for no more than one. So tension is an unknown
+of its own there (mixed integration points: Magisano, Leonetti and Garcea, 2017): the first iteration of a step takes
+that of the last step, each further one what the one before made of it,
 
     N = N(e) + dN/de  t . dr',
 

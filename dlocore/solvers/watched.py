@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 
 from dlocore.grid import Grid
-from dlocore.kernels.assembly import History
 from dlocore.kernels.basis import GAUSS_3, Tables, basis_rows
 
 _SHARE = 0.3  # of the axial stiffness, at the points added: a fifth still leaves folds, more locks the bending more
