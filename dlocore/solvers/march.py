@@ -31,7 +31,7 @@ from dlocore.solvers.stretch import Entry, enter
 Floats = NDArray[np.float64]
 
 # Spectral radius at infinite frequency. 0.9 is a little more accurate where the motion is smooth, but in stiff,
-# undamped motion energy grows without bounds; 0.5 holds nearly always, 0 always (docs/model.md).
+# undamped motion energy grows; with 0.5 it hardly ever does, with 0 never (docs/model.md).
 RHO = 0.5
 STRONGLY_DAMPED = 0.0
 TOLERANCE = 1e-8  # of the length, on the error that the Newton iterations of a step of COARSE leave
