@@ -10,7 +10,7 @@ from dlocore.kernels.pairs import pair_products
 GAUSS_2 = np.polynomial.legendre.leggauss(2)
 GAUSS_3 = np.polynomial.legendre.leggauss(3)
 GAUSS_4 = np.polynomial.legendre.leggauss(4)
-_SAMPLES = 64  # of the knot density in one segment
+_SAMPLES = 256  # of the knot density in one segment
 
 
 @kernel

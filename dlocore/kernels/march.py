@@ -114,7 +114,7 @@ def march_steps(
     dull = 1 if (touches or jumps) and start == begin else 0
     # the tangent of this damping is not complete; across kinks earlier iterations teach nothing
     mixes = nc == 3 and bool(active[DAMPING]) and not exact and not tight
-    smooth = not mixes and not exact and not tight
+    smooth = not mixes and not exact
     plain_iterations = _MIXED_ITERATIONS if mixes else _PLAIN_ITERATIONS
     free = size - len(e.held)
     largest = 10.0 * np.sum(tables.weight)  # an update of ten lengths is divergence
@@ -155,11 +155,15 @@ def march_steps(
         attempts = 4 if touches or tight or dull > 0 else 2
         dull -= 1
         converged = False
-        for attempt in range(attempts):  # plain and robust; where the cable strikes something, both by backward Euler
-            if attempt < first:
-                continue
+        # plain and robust; where the cable strikes something, both by backward Euler; plain ones first with the tension
+        # of the last step, then with that at hand
+        for turn in range(2 * attempts):
+            attempt = turn // 2
             robust = attempt % 2 == 1
             late = attempt >= 2
+            assumes = turn % 2 == 0 and not robust
+            if attempt < first or (robust and turn % 2 == 1):
+                continue
             al_m, al_f = (0.0, 0.0) if late else (alpha_m, alpha_f)
             ta = 1.0 / (h * h) if late else to_a
             tv = 1.0 / h if late else to_v
@@ -191,7 +195,7 @@ def march_steps(
                     if share < 1.0:
                         converged = False
                         continue  # what is held passes through a strand
-            assume_last(history.tension, not robust)
+            assume_last(history.tension, assumes)
             # --- iterate
             limit = plain_iterations if not robust else _ROBUST_ITERATIONS
             fresh = False
@@ -275,8 +279,6 @@ def march_steps(
                             low, low_work = length, after
                         share = low_work / (low_work - high_work) if np.isfinite(high_work) else 0.5
                         length = low + min(max(share, 0.1), 0.9) * (high - low)
-                if not robust or update <= tolerance:  # a line search looks at other states
-                    point_on(nc, q1, step_change, tables, history.tension)
                 for i in range(n):
                     for d in range(nc):
                         s = length * step_change[i, d]
@@ -290,13 +292,15 @@ def march_steps(
                     left *= min(1.0, contraction / (1.0 - contraction + 1e-300))
                 else:  # as that of a first update lately was; of Newton's method it is in proportion to the update
                     contraction = min(first_contraction * max(1.0, update / first_update), 0.5)
-                    if not robust and smooth and unmeasured < _UNMEASURED:
+                    if not robust and smooth and pairs == 0 and unmeasured < _UNMEASURED:
                         left *= _DOUBT * contraction / (1.0 - contraction)
                 if it == 1:
                     first_contraction, first_update, unmeasured = contraction, previous, 0
-                if left <= tolerance and length == 1.0:
+                converged = left <= tolerance and length == 1.0
+                if converged or assumes:
+                    point_on(nc, q1, step_change, tables, history.tension)
+                if converged:
                     info[LEFT] = max(info[LEFT], left)
-                    converged = True
                     break
                 if mixes:
                     fresh = length == 1.0

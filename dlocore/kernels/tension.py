@@ -39,7 +39,7 @@ def assume_last(kept: Any, known: bool) -> None:
 
 @part
 def point_on(nc: int, q: Any, change: Any, tables: Any, kept: Any) -> None:
-    """Take the tension that the change (n, nc) [m] of q, where forces and tangent were last assembled, points to."""
+    """Take the tension that a change (n, nc) [m] to q points to from where forces and tangent were last assembled."""
     for n in range(len(kept)):
         k = tables.axial_first[n]
         b = row_of(tables.axial_b1, n)
@@ -47,7 +47,7 @@ def point_on(nc: int, q: Any, change: Any, tables: Any, kept: Any) -> None:
         for d in range(min(nc, 3)):
             slope, turn = 0.0, 0.0
             for i in range(4):
-                slope += b[i] * q[k + i, d]
+                slope += b[i] * (q[k + i, d] - change[k + i, d])
                 turn += b[i] * change[k + i, d]
             square += slope * slope
             along += slope * turn

@@ -80,7 +80,7 @@ def test_the_tension_is_pointed_to_to_first_order(around: Environment) -> None:
     missed = []
     for step in (1e-4, 1e-5):
         cable.force(q)
-        point_on(q.shape[1], q, step * change, cable.tables, cable.kept)
+        point_on(q.shape[1], q + step * change, step * change, cable.tables, cable.kept)
         pointed = cable.kept[:, ASSUMED].copy()
         cable.force(q + step * change)
         missed.append(np.abs(cable.kept[:, AT_HAND] - pointed).max())
