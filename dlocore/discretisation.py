@@ -91,6 +91,7 @@ def _no_history(problem: Problem, tables: Tables) -> History:
         axial=np.zeros((len(tables.axial_w), 3)),
         stick=np.zeros((len(tables.contact_w) if rubs else 0, 6)),
         slide=np.zeros((len(tables.body_w) if lies else 0, 2)),
+        tension=np.zeros((0, 4)),
     )
 
 

@@ -43,6 +43,7 @@ class History(NamedTuple):
         axial: (axial points, 3) stress-free axial strain, and the axial strain of the two last steps.
         stick: (contact nodes, 6) anchor of the friction there, and position at the last step [m]; (0, 6) without.
         slide: (body points, 2) anchor of the friction of a cable that lies on the table [m]; (0, 2) without.
+        tension: (axial points, 4) what the tangent of a march knows of the tension, see `tension.py`; (0, 4) elsewhere.
     """
 
     memory: Any
@@ -50,13 +51,15 @@ class History(NamedTuple):
     axial: Any
     stick: Any
     slide: Any
+    tension: Any
 
 
 @kernel
 def history_at(histories: Any, k: int) -> Any:
     """Return the `History` of time k from one with arrays (1 or more times, ...)."""
     at = min(k, len(histories.memory) - 1)
-    return History(histories.memory[at], histories.past[at], histories.axial[at], histories.stick, histories.slide)
+    h = histories
+    return History(h.memory[at], h.past[at], h.axial[at], h.stick, h.slide, h.tension)
 
 
 @kernel
@@ -83,13 +86,14 @@ def assemble(
         clear(K)
     bends = active[BEND] or active[DAMPING]
     if len(axes) == 2:
-        plane.axial(q, v, tables, active, p, history.axial, rates, scales, tangent, f, K)
+        plane.axial(q, v, tables, active, p, history.axial, history.tension, rates, scales, tangent, f, K)
         if bends:
             plane.curvature(q, v, tables, active, p, history.memory, history.past, rates, scales, tangent, f, K)
         if active[QUADRATIC_DRAG]:
             plane.body(q, v, tables, active, p, scales, tangent, f, K)
     else:
-        space.axial(len(axes), q, v, tables, active, p, history.axial, rates, scales, tangent, f, K)
+        past, tension = history.axial, history.tension
+        space.axial(len(axes), q, v, tables, active, p, past, tension, rates, scales, tangent, f, K)
         if len(axes) == 4:
             twisted.curvature(q, v, tables, active, p, history.memory, history.past, rates, scales, tangent, f, K)
         elif bends:

@@ -19,44 +19,28 @@ def basis(knots: Any, span: int, x: float, order: int, out: Any) -> None:
 
     `span` is the index k with knots[k] <= x <= knots[k+1] (Cox-de Boor; Piegl and Tiller, The NURBS Book, A2.3).
     """
-    ndu = np.empty((4, 4))
-    left = np.empty(4)
-    right = np.empty(4)
-    ndu[0, 0] = 1.0
-    for j in range(1, 4):
-        left[j] = x - knots[span + 1 - j]
-        right[j] = knots[span + j] - x
-        saved = 0.0
-        for r in range(j):
-            ndu[j, r] = right[r + 1] + left[j - r]
-            ratio = ndu[r, j - 1] / ndu[j, r]
-            ndu[r, j] = saved + right[r + 1] * ratio
-            saved = left[j - r] * ratio
-        ndu[j, j] = saved
-    for j in range(4):
-        out[0, j] = ndu[j, 3]
-    a = np.empty((2, 4))
-    for r in range(4):
-        s1, s2 = 0, 1
-        a[0, 0] = 1.0
-        factor = 3.0
-        for k in range(1, order + 1):
-            d = 0.0
-            rk, pk = r - k, 3 - k
-            if r >= k:
-                a[s2, 0] = a[s1, 0] / ndu[pk + 1, rk]
-                d = a[s2, 0] * ndu[rk, pk]
-            j1 = 1 if rk >= -1 else -rk
-            j2 = k - 1 if r - 1 <= pk else 3 - r
-            for j in range(j1, j2 + 1):
-                a[s2, j] = (a[s1, j] - a[s1, j - 1]) / ndu[pk + 1, rk + j]
-                d += a[s2, j] * ndu[rk + j, pk]
-            if r <= pk:
-                a[s2, k] = -a[s1, k - 1] / ndu[pk + 1, r]
-                d += a[s2, k] * ndu[r, pk]
-            out[k, r] = d * factor
-            factor *= pk
-            s1, s2 = s2, s1
+    h1, h2, h3 = x - knots[span], x - knots[span - 1], x - knots[span - 2]
+    g1, g2, g3 = knots[span + 1] - x, knots[span + 2] - x, knots[span + 3] - x
+    # over the length of their support, functions of degree 0, 1 and 2
+    w = 1.0 / (g1 + h1)
+    w0, w1 = g1 * w / (g1 + h2), h1 * w / (g2 + h1)
+    b0, b1, b2 = g1 * w0 / (g1 + h3), (h2 * w0 + g2 * w1) / (g2 + h2), h1 * w1 / (g3 + h1)
+    out[0, 0], out[0, 1], out[0, 2], out[0, 3] = g1 * b0, h3 * b0 + g2 * b1, h2 * b1 + g3 * b2, h1 * b2
+    if order > 0:
+        _write_differences(b0, b1, b2, out[1])
+    if order > 1:
+        c0, c1, c2 = -2.0 * w0 / (g1 + h3), 2.0 * (w0 - w1) / (g2 + h2), 2.0 * w1 / (g3 + h1)
+        _write_differences(c0, c1, c2, out[2])
+    if order > 2:
+        v0, v1 = -w / (g1 + h2), w / (g2 + h1)
+        c0, c1, c2 = -2.0 * v0 / (g1 + h3), 2.0 * (v0 - v1) / (g2 + h2), 2.0 * v1 / (g3 + h1)
+        _write_differences(c0, c1, c2, out[3])
+
+
+@law
+def _write_differences(a: float, b: float, c: float, out: Any) -> None:
+    """Write the derivatives of the cubic functions, from the quadratic ones over their support."""
+    out[0], out[1], out[2], out[3] = -3.0 * a, 3.0 * (a - b), 3.0 * (b - c), 3.0 * c
 
 
 @kernel

@@ -17,12 +17,16 @@ from dlocore.kernels.compile import brief, kernel
 from dlocore.kernels.contact import strikes
 from dlocore.kernels.inertia import both_sides, effective, padded, residual
 from dlocore.kernels.mixing import mixed, room
+from dlocore.kernels.narrow import ROOM, factor_step, solve_step
 from dlocore.kernels.predictor import differences_of, predict_by, shift
 from dlocore.kernels.selfcontact import closing, factor_wide, place_nodes, press, solve_wide, widen
 from dlocore.kernels.strands import clear_way
+from dlocore.kernels.tension import assume_last, keep, point_on
 
 FAILED_STEP, LEFT, DEEPEST = range(3)  # places in `info`
 _REFRESH = 0.2  # contraction of the updates above which the old factors no longer serve
+_UNMEASURED = 8  # steps in a row that end with their first update, as the contraction that was last measured allows
+_DOUBT = 3.0  # times that contraction it may be
 _PLAIN_ITERATIONS = 8  # Newton iterations before a step is done again with a line search
 _MIXED_ITERATIONS = 80  # with mixing, which learns from iterations with the same factors
 _ROBUST_ITERATIONS = 60
@@ -119,18 +123,19 @@ def march_steps(
     dull = 1 if (touches or jumps) and start == begin else 0
     # the tangent of this damping is not complete; across kinks earlier iterations teach nothing
     mixes = nc == 3 and bool(active[DAMPING]) and not exact and not tight
+    smooth = not mixes and not exact
     plain_iterations = _MIXED_ITERATIONS if mixes else _PLAIN_ITERATIONS
     free = size - len(e.held)
     largest = 10.0 * np.sum(tables.weight)  # an update of ten lengths is divergence
     K = np.empty((size, 4 * nc))
-    A = np.empty((free, e.width))
+    A = np.zeros((free + ROOM, e.width))
     f = np.empty((n, nc))
     R = np.empty((n, nc))
     weighted = np.empty((n, nc))
     unit = tables.mass
     rows, stacked = both_sides(unit), padded(n, nc)
     x = np.empty(free)
-    trial_x = np.empty(free)
+    trial_x = np.zeros(free + ROOM)
     change = np.empty(size)
     moved = np.empty(size)
     step_change = change.reshape((n, nc))
@@ -144,7 +149,7 @@ def march_steps(
     row_end = np.empty(free if tight else 0, np.int64)
     S = np.empty((free if tight else 0, free if tight else 0))
     pairs, wide, depth, share = 0, False, 0.0, 1.0
-    first_contraction, first_update = 1.0, 1.0  # of the first update of a step, as last measured
+    first_contraction, first_update, unmeasured = 1.0, 1.0, _UNMEASURED  # of the first update of a step, as measured
     # the acceleration at the start knows of no damping yet, which would make too much of it
     bent = 0.0 if mixes else 0.5
     mixing, differences = room(free if mixes else 0), -1
@@ -159,11 +164,15 @@ def march_steps(
         attempts = 4 if touches or tight or dull > 0 else 2
         dull -= 1
         converged = False
-        for attempt in range(attempts):  # plain and robust; where the cable strikes something, both by backward Euler
-            if attempt < first:
-                continue
+        # plain and robust; where the cable strikes something, both by backward Euler; plain ones first with the tension
+        # of the last step, then with that at hand
+        for turn in range(2 * attempts):
+            attempt = turn // 2
             robust = attempt % 2 == 1
             late = attempt >= 2
+            assumes = turn % 2 == 0 and not robust
+            if attempt < first or (robust and turn % 2 == 1):
+                continue
             al_m, al_f = (0.0, 0.0) if late else (alpha_m, alpha_f)
             ta = 1.0 / (h * h) if late else to_a
             tv = 1.0 / h if late else to_v
@@ -195,6 +204,7 @@ def march_steps(
                     if share < 1.0:
                         converged = False
                         continue  # what is held passes through a strand
+            assume_last(history.tension, assumes)
             # --- iterate
             limit = plain_iterations if not robust else _ROBUST_ITERATIONS
             fresh = False
@@ -214,8 +224,8 @@ def march_steps(
                     wide = pairs > 0
                     if wide:
                         part = (1.0 - al_f, (1.0 - al_f) * tv, 1.0 - al_f)
-                        widen(nc, v1, tables, p, x1, found, pairs, part, e, A, row_end, S)
-                    if (factor_wide(S, row_end) if wide else factor(A)) >= 0:
+                        widen(nc, v1, tables, p, x1, found, pairs, part, e, A[:free], row_end, S)
+                    if (factor_wide(S, row_end) if wide else factor_step(A, free)) >= 0:
                         if not robust:
                             break
                         assemble(axes, q1, v1, tables, active, p, history, rates, (1.0, tv, 0.0), f, K)
@@ -225,18 +235,18 @@ def march_steps(
                         reduce_matrix(e, K, A)
                         if wide:
                             part = (1.0 - al_f, (1.0 - al_f) * tv, 0.0)
-                            widen(nc, v1, tables, p, x1, found, pairs, part, e, A, row_end, S)
-                        if (factor_wide(S, row_end) if wide else factor(A)) >= 0:
+                            widen(nc, v1, tables, p, x1, found, pairs, part, e, A[:free], row_end, S)
+                        if (factor_wide(S, row_end) if wide else factor_step(A, free)) >= 0:
                             break
                     fresh = True
                 for i in range(free):
                     trial_x[i] = -x[i]
                 if wide:
-                    solve_wide(S, row_end, trial_x)
+                    solve_wide(S, row_end, trial_x[:free])
                 else:
-                    solve(A, trial_x)
+                    solve_step(A, free, trial_x)
                 if mixes:
-                    differences = mixed(mixing, -1 if refactor else differences, trial_x)
+                    differences = mixed(mixing, -1 if refactor else differences, trial_x[:free])
                 expand_vector(e, trial_x, change)
                 update = 0.0  # largest step of a control point, the same in every frame
                 for i in range(n):
@@ -291,11 +301,15 @@ def march_steps(
                     left *= min(1.0, contraction / (1.0 - contraction + 1e-300))
                 else:  # as that of a first update lately was; of Newton's method it is in proportion to the update
                     contraction = min(first_contraction * max(1.0, update / first_update), 0.5)
+                    if not robust and smooth and pairs == 0 and unmeasured < _UNMEASURED:
+                        left *= _DOUBT * contraction / (1.0 - contraction)
                 if it == 1:
-                    first_contraction, first_update = contraction, previous
-                if left <= tolerance and length == 1.0:
+                    first_contraction, first_update, unmeasured = contraction, previous, 0
+                converged = left <= tolerance and length == 1.0
+                if converged or assumes:
+                    point_on(nc, q1, step_change, tables, history.tension)
+                if converged:
                     info[LEFT] = max(info[LEFT], left)
-                    converged = True
                     break
                 if mixes:
                     fresh = length == 1.0
@@ -324,6 +338,8 @@ def march_steps(
         if not converged:
             info[FAILED_STEP] = k
             return
+        keep(history.tension)
+        unmeasured += 1
         anew = exact or pairs > 0
         if anew:  # where the law has kinks
             assemble(axes, q1, v1, tables, active, p, history, rates, (0.0, 0.0, 0.0), f, K)

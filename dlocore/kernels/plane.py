@@ -22,6 +22,7 @@ from dlocore.effects.laws import (
 from dlocore.kernels.basis import row_of
 from dlocore.kernels.compile import kernel, law, part
 from dlocore.kernels.strain import plane_curvature, plane_hessian
+from dlocore.kernels.tension import AT_HAND, MODULUS, assumed
 
 
 @law
@@ -44,9 +45,13 @@ def _add_block(K: Any, k: int, i: int, j: int, xx: float, xy: float, yx: float, 
 
 @part
 def axial(
-    q: Any, v: Any, tables: Any, active: Any, p: Any, past: Any, rates: Any, scales: Any, tangent: bool, f: Any, K: Any
-) -> None:
-    """Add the forces and tangents of the axial site; `past` holds the stress-free strain and that of two steps."""
+    q: Any, v: Any, tables: Any, active: Any, p: Any, past: Any, kept: Any, rates: Any, scales: Any, tangent: bool,
+    f: Any, K: Any,
+) -> None:  # fmt: skip
+    """Add the forces and tangents of the axial site.
+
+    `past` holds the stress-free strain and that of two steps, `kept` what the tangent of a march knows of the tension.
+    """
     elastic, viscous, geometric = scales
     if viscous != 0.0 and rates[0] != 0.0:
         viscous = rates[0]
@@ -64,13 +69,16 @@ def axial(
             vx, vy = _combine(v, k, b)
             rate = (x * vx + y * vy) / length
         tension, modulus, viscosity = axial_stress(active, p, strain, rate, past[n, 0], past[n, 1], rates[3])
+        if len(kept) > 0:
+            kept[n, AT_HAND], kept[n, MODULUS] = tension, modulus + rates[0] * viscosity
         gx, gy = w * tension * x / length, w * tension * y / length
         for i in range(4):
             f[k + i, 0] += b[i] * gx
             f[k + i, 1] += b[i] * gy
         if tangent:
             # the part of the stress is positive only in tension
-            stress = w * (geometric * tension if geometric != 0.0 else elastic * max(tension, 0.0)) / length
+            pull = assumed(kept, n, tension) if geometric != 0.0 else tension
+            stress = w * (geometric * pull if geometric != 0.0 else elastic * max(pull, 0.0)) / length
             along = (w * (elastic * modulus + viscous * viscosity) - stress) / square
             xx, xy, yy = along * x * x + stress, along * x * y, along * y * y + stress
             for j in range(4):

@@ -22,6 +22,7 @@ from dlocore.kernels.bishop import BEND, LENGTH, STATE, TANGENT, H, carry, rate_
 from dlocore.kernels.compile import kernel, law, part
 from dlocore.kernels.pairs import BB, BC, CB, CC, add_point, add_span, no_blocks
 from dlocore.kernels.strain import space_curvature, space_curvature_rate, space_moment, vector
+from dlocore.kernels.tension import AT_HAND, MODULUS, assumed
 
 STRAIGHT = (0.0, 0.0, 0.0)  # the stress-free curvature without a twist coordinate
 
@@ -53,10 +54,13 @@ def add_symmetric(nc: int, K: Any, k: int, i: int, j: int, s: float, H: Symmetri
 
 @part
 def axial(
-    nc: int, q: Any, v: Any, tables: Any, active: Any, p: Any, past: Any, rates: Any, scales: Any, tangent: bool,
-    f: Any, K: Any,
+    nc: int, q: Any, v: Any, tables: Any, active: Any, p: Any, past: Any, kept: Any, rates: Any, scales: Any,
+    tangent: bool, f: Any, K: Any,
 ) -> None:  # fmt: skip
-    """Add the forces and tangents of the axial site; `past` holds the stress-free strain and that of two steps."""
+    """Add the forces and tangents of the axial site.
+
+    `past` holds the stress-free strain and that of two steps, `kept` what the tangent of a march knows of the tension.
+    """
     elastic, viscous, geometric = scales
     if viscous != 0.0 and rates[0] != 0.0:
         viscous = rates[0]
@@ -74,6 +78,8 @@ def axial(
             vx, vy, vz = combine(v, k, b)
             rate = (x * vx + y * vy + z * vz) / length
         tension, modulus, viscosity = axial_stress(active, p, strain, rate, past[n, 0], past[n, 1], rates[3])
+        if len(kept) > 0:
+            kept[n, AT_HAND], kept[n, MODULUS] = tension, modulus + rates[0] * viscosity
         g = w * tension / length
         for i in range(4):
             f[k + i, 0] += b[i] * g * x
@@ -81,7 +87,8 @@ def axial(
             f[k + i, 2] += b[i] * g * z
         if tangent:
             # the part of the stress is positive only in tension
-            stress = w * (geometric * tension if geometric != 0.0 else elastic * max(tension, 0.0)) / length
+            pull = assumed(kept, n, tension) if geometric != 0.0 else tension
+            stress = w * (geometric * pull if geometric != 0.0 else elastic * max(pull, 0.0)) / length
             s = (w * (elastic * modulus + viscous * viscosity) - stress) / square
             H = (s * x * x + stress, s * y * y + stress, s * z * z + stress, s * x * y, s * x * z, s * y * z)
             for j in range(4):

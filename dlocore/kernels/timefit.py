@@ -16,6 +16,32 @@ def fit_time(knots: Any, times: Any, Q: Any, v0: Any) -> Any:
     Least squares weighted by the time each state stands for; the first two control points give the initial position
     and velocity exactly, the last the final position.
     """
+    first, table = basis_rows(knots, times, 0)
+    return _fit(knots, first, table, times, Q, v0)
+
+
+@brief
+def fit_missed(knots: Any, times: Any, Q: Any, C: Any, dimensions: int) -> Any:
+    """Return by how much the time spline of C (n_t, n, nc) misses each of the states Q (k, n, nc) at `times` [m].
+
+    The largest difference of the first so many coordinates counts.
+    """
+    first, table = basis_rows(knots, times, 0)
+    return _missed(first, table, Q, C, dimensions)
+
+
+@kernel
+def fitted(knots: Any, times: Any, states: Any, v0: Any, dimensions: int) -> Any:
+    """Return control points (n_t, n, nc) as `fit_time` fits to the states (k, n, nc), and their `fit_missed` (k,)."""
+    steps, n, nc = states.shape
+    first, table = basis_rows(knots, times, 0)
+    flat = _fit(knots, first, table, times, states.reshape((steps, n * nc)), v0.reshape(n * nc))
+    control = flat.reshape((len(knots) - 4, n, nc))
+    return control, _missed(first, table, states, control, dimensions)
+
+
+@kernel
+def _fit(knots: Any, first: Any, table: Any, times: Any, Q: Any, v0: Any) -> Any:
     n = len(knots) - 4
     k, m = Q.shape
     C = np.empty((n, m))
@@ -25,7 +51,6 @@ def fit_time(knots: Any, times: Any, Q: Any, v0: Any) -> Any:
     size = n - 3
     A = np.zeros((size, 4))
     right = np.zeros((size, m))
-    first, table = basis_rows(knots, times, 0)
     for s in range(1, k - 1):
         w = 0.5 * (times[s + 1] - times[s - 1])
         b = table[s, 0]
@@ -54,15 +79,10 @@ def fit_time(knots: Any, times: Any, Q: Any, v0: Any) -> Any:
     return C
 
 
-@brief
-def fit_missed(knots: Any, times: Any, Q: Any, C: Any, dimensions: int) -> Any:
-    """Return by how much the time spline of C (n_t, n, nc) misses each of the states Q (k, n, nc) at `times` [m].
-
-    The largest difference of the first so many coordinates counts.
-    """
-    first, table = basis_rows(knots, times, 0)
-    out = np.zeros(len(times))
-    for s in range(len(times)):
+@kernel
+def _missed(first: Any, table: Any, Q: Any, C: Any, dimensions: int) -> Any:
+    out = np.zeros(len(Q))
+    for s in range(len(Q)):
         b0, b1, b2, b3 = table[s, 0, 0], table[s, 0, 1], table[s, 0, 2], table[s, 0, 3]
         g = first[s]
         most, total = 0.0, 0.0
@@ -74,15 +94,6 @@ def fit_missed(knots: Any, times: Any, Q: Any, C: Any, dimensions: int) -> Any:
                 total += away
         out[s] = most if total == total else np.inf
     return out
-
-
-@kernel
-def fitted(knots: Any, times: Any, states: Any, v0: Any, dimensions: int) -> Any:
-    """Return control points (n_t, n, nc) as `fit_time` fits to the states (k, n, nc), and their `fit_missed` (k,)."""
-    steps, n, nc = states.shape
-    flat = fit_time(knots, times, states.reshape((steps, n * nc)), v0.reshape(n * nc))
-    control = flat.reshape((len(knots) - 4, n, nc))
-    return control, fit_missed(knots, times, states, control, dimensions)
 
 
 @brief

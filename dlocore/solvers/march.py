@@ -21,6 +21,7 @@ from dlocore.kernels.march import (
     march_steps,
     row_of_step,
 )
+from dlocore.kernels.tension import COLUMNS
 from dlocore.kernels.twisted import PAST
 from dlocore.problem import Problem
 from dlocore.report import WindowForces
@@ -31,7 +32,7 @@ from dlocore.solvers.stretch import Entry, enter
 Floats = NDArray[np.float64]
 
 # Spectral radius at infinite frequency. 0.9 is a little more accurate where the motion is smooth, but in stiff,
-# undamped motion energy grows without bounds; 0.5 holds nearly always, 0 always (docs/model.md).
+# undamped motion energy grows; with 0.5 it hardly ever does, with 0 never (docs/model.md).
 RHO = 0.5
 STRONGLY_DAMPED = 0.0
 TOLERANCE = 1e-8  # of the length, on the error that the Newton iterations of a step of COARSE leave
@@ -112,7 +113,7 @@ class March:
         """Return what lies behind the motion at the times (k,) [s]: a `History` with arrays (1 or k, ...)."""
         start = self.grid.history
         if len(self.log) == 0:
-            return History(start.memory[None], start.past[None], start.axial[None], start.stick, start.slide)
+            return start._replace(memory=start.memory[None], past=start.past[None], axial=start.axial[None])
         at = np.clip(np.searchsorted(self.times[self.logged], times, side="right") - 1, 0, len(self.log) - 1)
         memory = np.broadcast_to(start.memory, (len(at), *start.memory.shape)).copy()
         memory[..., : self._remembered] = self.memory[at]
@@ -120,7 +121,7 @@ class March:
         axial = np.broadcast_to(start.axial, (len(at), *start.axial.shape)).copy()
         if self.axial_memory.shape[1]:
             axial[..., 0] = self.axial_memory[at]
-        return History(memory, np.ascontiguousarray(past), axial, start.stick, start.slide)
+        return start._replace(memory=memory, past=np.ascontiguousarray(past), axial=axial)
 
 
 def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: float = RHO) -> March:
@@ -193,7 +194,7 @@ class _Walk:
         self._info[FAILED_STEP] = -1
         self._starts: Starts = {}
         self._forces: list[WindowForces] = []
-        self._history = grid.past()
+        self._history = grid.past()._replace(tension=np.full((len(grid.tables.axial_w), COLUMNS), np.nan))
         self._log = _empty_log(problem, grid, len(times))
         if len(self._log):
             note(problem.axes, self._history, self._log[0])

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 
 from dlocore.grid import Grid
-from dlocore.kernels.assembly import History
 from dlocore.kernels.basis import GAUSS_3, Tables, basis_rows
 
 _SHARE = 0.3  # of the axial stiffness, at the points added: a fifth still leaves folds, more locks the bending more
@@ -37,5 +36,5 @@ def watched(grid: Grid) -> Grid:
     )
     behind = [np.interp(finer.axial_u, tables.axial_u, column) for column in grid.history.axial.T]
     past = grid.past()
-    history = History(past.memory, past.past, np.ascontiguousarray(np.transpose(behind)), past.stick, past.slide)
+    history = past._replace(axial=np.ascontiguousarray(np.transpose(behind)))
     return replace(grid, tables=finer, history=history)

@@ -35,7 +35,7 @@ class Damped:
         points = len(self.tables.curvature_w)
         history = History(
             np.zeros((points, 6)), np.zeros((points, 9)), np.zeros((len(self.tables.axial_w), 3)), np.zeros((0, 6)),
-            np.zeros((0, 2)),
+            np.zeros((0, 2)), np.zeros((0, 4)),
         )  # fmt: skip
         for x in past:
             remember(AXES, x, self.tables, self.active, self.parameters, history, 0.0, False)

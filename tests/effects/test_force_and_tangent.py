@@ -89,7 +89,8 @@ def body(name: str, nc: int, n_u: int = N_U, rest: float = 0.0) -> Body:
     if name.endswith("memory") and nc == 2:
         memory[:] = rest or 3.0
     past = np.zeros((len(memory), 2 if nc == 2 else 9))
-    history = History(memory, past, np.zeros((len(tables.axial_w), 3)), np.zeros((0, 6)), np.zeros((0, 2)))
+    none = np.zeros((0, 6)), np.zeros((0, 2)), np.zeros((0, 4))
+    history = History(memory, past, np.zeros((len(tables.axial_w), 3)), *none)
     return Body(nc, knots, tables, active, parameters, history)
 
 

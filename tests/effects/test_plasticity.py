@@ -148,9 +148,11 @@ def test_below_the_yield_curvature_nothing_is_remembered_and_nothing_changes():
     elastic = predict(bending(turn, 2.5, cable=cable()))
     if plastic.material is not None:
         assert not plastic.material.memory.any()
+    # the same equations, but for what Newton's method is known to leave of them, and rounding
+    left = sum(found.level.motion.update for found in (plastic, elastic) if found.level is not None)
     np.testing.assert_allclose(
-        plastic.surface.control_points, elastic.surface.control_points, atol=1e-12
-    )  # the same equations: rounding
+        plastic.surface.control_points, elastic.surface.control_points, rtol=0, atol=left + 1e-12
+    )
     assert elastic.material is None
 
 

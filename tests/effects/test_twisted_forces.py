@@ -36,7 +36,9 @@ class Body:
         points = len(self.tables.curvature_w)
         memory = np.tile([2.0, -1.0, 0.7, 2.0, -1.0, 0.7], (points, 1)) * remembered
         axial = np.zeros((len(self.tables.axial_w), 3))
-        self.history = History(memory, np.zeros((points, PAST)), axial, np.zeros((0, 6)), np.zeros((0, 2)))
+        self.history = History(
+            memory, np.zeros((points, PAST)), axial, np.zeros((0, 6)), np.zeros((0, 2)), np.zeros((0, 4))
+        )
 
     def carry_frames(self, q: Floats) -> None:
         start_frames(self.knots, q, self.tables, np.array([0.0, 1.0, 0.2]), self.history.past)

@@ -106,7 +106,7 @@ def jerked(n_t: int) -> Scene:
 
 
 def test_auto_answers_with_the_march_where_the_least_squares_fails():
-    scene = jerked(33)
+    scene = jerked(41)
     auto, asked = predict(scene), predict(replace(scene, quality=replace(scene.quality, method="spacetime")))
     assert asked.status == "max_iterations"
     assert asked.accuracy.method == "spacetime"
