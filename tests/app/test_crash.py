@@ -175,6 +175,7 @@ def test_a_store_killed_at_any_moment_has_whole_runs_only(tmp_path: Path) -> Non
         assert leftovers(data) == []
         assert len(ids) <= 60  # the cap holds through all the kills
         whole = [id for id in kept if len(id) == 28]  # the last may have been cut
+        assert whole
         newest = sorted(whole)[-20:]  # well inside the cap: four threads may finish out of order
         assert set(newest) <= set(ids)
     assert interrupted > 0  # else no kill came while a run was being written, and nothing was tested
