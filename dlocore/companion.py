@@ -19,16 +19,13 @@ _TOO_LATE = " The time limit passed before its error was estimated."
 
 def coarser(problem: Problem, size: Size) -> Size | None:
     """Return the size of the march that the error of one on a given grid is estimated with, None where it is finer."""
-    n_u = max(smallest_n_u(problem), round(COARSER * size.n_u))
-    n_t = max(smallest_n_t(problem), round(COARSER * size.n_t))
-    return Size(n_u, n_t, round(FEWER * size.steps)) if n_u <= _ROOM * size.n_u and n_t <= _ROOM * size.n_t else None
+    other = _resized(problem, size, COARSER, FEWER)
+    return other if other.n_u <= _ROOM * size.n_u and other.n_t <= _ROOM * size.n_t else None
 
 
 def finer(problem: Problem, size: Size) -> Size:
     """Return the size of a grid half as fine again."""
-    n_u = max(smallest_n_u(problem), round(FINER * size.n_u))
-    n_t = max(smallest_n_t(problem), round(FINER * size.n_t))
-    return Size(n_u, n_t, round(FINER * size.steps))
+    return _resized(problem, size, FINER, FINER)
 
 
 def by_coarser(problem: Problem, level: Level, monitor: Monitor) -> tuple[float | None, str]:
@@ -59,6 +56,13 @@ def by_finer(problem: Problem, level: Level, monitor: Monitor) -> tuple[float | 
     if other.motion.stopped:
         return None, " Its error is not known: the finer march to compare it with found no equilibrium."
     return _SAFETY * distance(level, other, problem), ""
+
+
+def _resized(problem: Problem, size: Size, points: float, steps: float) -> Size:
+    """Return so many times the control points, but as many as the problem needs, and so many times the steps."""
+    n_u = max(smallest_n_u(problem), round(points * size.n_u))
+    n_t = max(smallest_n_t(problem), round(points * size.n_t))
+    return Size(n_u, n_t, round(steps * size.steps))
 
 
 def _marched(problem: Problem, size: Size, level: Level, monitor: Monitor) -> tuple[Level | None, str]:

@@ -14,6 +14,7 @@ from dlocore.kernels.assembly import History
 from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, Tables, build_tables, graded_knots
 from dlocore.kernels.entry import remember_start
 from dlocore.kernels.relax import relax
+from dlocore.kernels.tension import COLUMNS
 from dlocore.kernels.twisted import DIRECTOR, PAST, start_frames
 from dlocore.paths import Waypoints
 from dlocore.problem import Problem
@@ -91,7 +92,7 @@ def _no_history(problem: Problem, tables: Tables) -> History:
         axial=np.zeros((len(tables.axial_w), 3)),
         stick=np.zeros((len(tables.contact_w) if rubs else 0, 6)),
         slide=np.zeros((len(tables.body_w) if lies else 0, 2)),
-        tension=np.zeros((0, 4)),
+        tension=np.zeros((0, COLUMNS)),
     )
 
 
