@@ -1,6 +1,7 @@
 """A grid for a problem: knots, basis tables, held degrees of freedom and the start on them."""
 
 from dataclasses import replace
+from functools import partial
 from typing import cast
 
 import numpy as np
@@ -65,19 +66,22 @@ def make_grid(problem: Problem, n_u: int) -> Grid:
 
 def grid_on(problem: Problem, knots: Floats) -> Grid:
     """Return the grid of a problem on given knots (n_u + 4,) [m], with the start shape on it."""
-    free_start, free_end = _free_ends(problem)
-    tables = build_tables(knots, free_start, free_end, *GAUSS_2, *GAUSS_3, *GAUSS_4, problem.contact_spacing())
     curve = problem.start
     theta = None if curve.theta is None else fit_to_knots(curve.theta, knots)[:, 0]
     start = np.ascontiguousarray(problem.coordinates(fit_to_knots(curve, knots), theta))
     given = velocity_to_knots(curve, knots)
     velocity = np.zeros(start.shape) if given is None else np.ascontiguousarray(problem.rates(given))
-    grid = Grid(knots, tables, _no_history(problem, tables), start, velocity)
+    grid = Grid(knots, start, velocity, partial(_tables_of, problem), partial(_history_of, problem))
     waypoints = any(g.start == 0.0 and isinstance(g.path, Waypoints) for g in problem.scene.grasps)
     if waypoints or len(curve.control_points) > 4:
-        grid = replace(grid, start=consistent_start(problem, grid))
-    _write_history(problem, grid)
+        start, tables = consistent_start(problem, grid), grid.tables
+        grid = replace(grid, start=start, find_tables=lambda knots: tables)
     return grid
+
+
+def _tables_of(problem: Problem, knots: Floats) -> Tables:
+    rules = (*GAUSS_2, *GAUSS_3, *GAUSS_4)
+    return cast(Tables, build_tables(knots, *free_ends(problem), *rules, problem.contact_spacing()))
 
 
 def _no_history(problem: Problem, tables: Tables) -> History:
@@ -96,9 +100,9 @@ def _no_history(problem: Problem, tables: Tables) -> History:
     )
 
 
-def _write_history(problem: Problem, grid: Grid) -> None:
-    """Write what the start of a grid has behind it: its stress-free strain, and frames without twist along it."""
-    history = grid.history
+def _history_of(problem: Problem, grid: Grid) -> History:
+    """Return what the start of a grid has behind it: its stress-free strain, and frames without twist along it."""
+    history = _no_history(problem, grid.tables)
     if problem.twist is not None:
         start_frames(grid.knots, grid.start, grid.tables, start_director(problem), history.past)
     history.memory[:] = _memory(problem, grid, history)
@@ -106,6 +110,7 @@ def _write_history(problem: Problem, grid: Grid) -> None:
         _write_stretch(grid, history, problem.start.material)
     if problem.keeps_history:
         remember_start(problem.axes, grid.start, grid.tables, *problem.laws, history)
+    return history
 
 
 def start_director(problem: Problem) -> Floats:
@@ -162,11 +167,11 @@ def _features(problem: Problem, bends: list[float]) -> tuple[Floats, NDArray[np.
         if all(abs(u - v) > BEND * length for v in found):
             found[u] = (1, *_CORNER)
     order = sorted(found)
-    columns = np.array([found[u] for u in order]).reshape(-1, 3)
-    return np.array(order, float), columns[:, 0].astype(np.int64), columns[:, 1].copy(), columns[:, 2].copy()
+    multiplicities, powers, widths = ([found[u][i] for u in order] for i in range(3))
+    return np.array(order, float), np.array(multiplicities, np.int64), np.array(powers, float), np.array(widths, float)
 
 
-def _free_ends(problem: Problem) -> tuple[bool, bool]:
+def free_ends(problem: Problem) -> tuple[bool, bool]:
     """Return whether the direction of the cable is free, at least for a time, at its two ends."""
     length = problem.scene.cable.length
 
@@ -260,7 +265,7 @@ def consistent_start(problem: Problem, grid: Grid) -> Floats:
     What the knots leave inside the table or an obstacle is pushed out. The angle of the sections plays no part.
     """
     line = problem if problem.twist is None else replace(problem, twist=None)
-    history = grid.history if line is problem else _no_history(line, grid.tables)
+    history = _no_history(line, grid.tables)
     start = np.ascontiguousarray(grid.start[:, : line.nc])
     grasps = [g for g in problem.scene.grasps if g.start == 0.0]
     starts: Starts = {}

@@ -46,15 +46,14 @@ def free_of_frames(problem: Problem, grid: Grid, states: Floats, frames: Floats)
 
 
 def free_control(problem: Problem, grid: Grid, knots_t: Floats, control: Floats, times: Floats, log: Floats) -> Floats:
-    """Return control points (n_t, n_u, nc) of a motion with theta against a frame without twist along the cable.
+    """Return control points (n_t, n_u, 4) of a motion with theta against a frame without twist along the cable.
 
     Args:
         control: (n_t, n_u, nc), with theta against frames carried in time.
         times: (k,) [s].
         log: those frames at the times (k, points, >= 16).
     """
-    if problem.twist is None:
-        return control
+    assert problem.twist is not None
     over = design_matrix(knots_t, times)
     states = free_of_frames(problem, grid, np.tensordot(over, control, axes=1), log)
     rate = 3.0 * (control[1, :, 3] - control[0, :, 3]) / (knots_t[4] - knots_t[1])

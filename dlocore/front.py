@@ -14,7 +14,7 @@ from dlocore.errors import SceneError
 from dlocore.events import smallest_n_t
 from dlocore.frames import material_of
 from dlocore.given import evenly_fitted, given_status, march_given
-from dlocore.prediction import Accuracy, MaterialMotion, OnIteration, Prediction, Status
+from dlocore.prediction import Accuracy, GraspReaction, MaterialMotion, OnIteration, Prediction, Status
 from dlocore.problem import Problem, pose
 from dlocore.progress import record, record_level, surface_at
 from dlocore.refinement import climb
@@ -221,7 +221,7 @@ def _answer(
         status=outcome.status,
         said=outcome.message,
         surface=surface,
-        report_grasps=partial(reactions, problem, grid, level.motion.forces if forces is None else forces),
+        report_grasps=partial(_reactions, level, forces),
         report_effects=partial(effect_reports, problem, grid, partial(_material, problem, level)),
         report_material=partial(_material, problem, level),
         iterations=tuple(monitor.iterations),
@@ -240,11 +240,20 @@ def _answer(
             phases=dict(monitor.phases),
         ),
         find_objections=partial(objections, level),
-        find_start_energy=partial(elastic_energy, problem, grid, grid.start, grid.history),
+        find_start_energy=partial(_start_energy, level),
         start_fit=problem.start.fit_rms,
         level=level,
         judged=judged,
     )
+
+
+def _reactions(level: Level, forces: tuple[WindowForces, ...] | None) -> tuple[GraspReaction, ...]:
+    return reactions(level.problem, level.motion.grid, level.motion.forces if forces is None else forces)
+
+
+def _start_energy(level: Level) -> float:
+    grid = level.motion.grid
+    return elastic_energy(level.problem, grid, grid.start, grid.history)
 
 
 def _material(problem: Problem, level: Level) -> MaterialMotion | None:

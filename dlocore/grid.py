@@ -1,6 +1,9 @@
 """A space discretisation: knots, basis tables, the start on them and what lies behind it."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,17 +20,43 @@ class Grid:
 
     Attributes:
         knots: (n_u + 4,) [m].
-        tables: basis functions at the quadrature points.
-        history: what the start has behind it: stress-free strain, frames. Kernels write to it: pass `past()`.
         start: control points at t = 0 (n_u, nc) [m].
         velocity: their given velocities, before grasps close (n_u, nc) [m/s].
+        find_tables: finds `tables` of the knots, and
+        find_history: `history` of the grid, as they are first read.
+        watched: the tables have more points than the knots ask for, see `solvers/watched.py`.
     """
 
     knots: Floats
-    tables: Tables
-    history: History
     start: Floats
     velocity: Floats
+    find_tables: Callable[[Floats], Tables] = field(repr=False)
+    find_history: Callable[[Self], History] = field(repr=False)
+    watched: bool = False
+
+    @cached_property
+    def tables(self) -> Tables:
+        """Basis functions at the quadrature points."""
+        return self.find_tables(self.knots)
+
+    @cached_property
+    def history(self) -> History:
+        """What the start has behind it: stress-free strain, frames. Kernels write to it: pass `past()`."""
+        return self.find_history(self)
+
+    def changed(
+        self, *, start: Floats | None = None, tables: Tables | None = None, history: History | None = None
+    ) -> "Grid":
+        """Return the grid with another start, other tables, or something else behind it; the rest as it is."""
+        kept_tables, kept_history = tables or self.tables, history or self.history
+        return Grid(
+            self.knots,
+            self.start if start is None else start,
+            self.velocity,
+            lambda knots: kept_tables,
+            lambda grid: kept_history,
+            self.watched or tables is not None,
+        )
 
     def past(self) -> History:
         """Return a copy of the history, to be carried on."""

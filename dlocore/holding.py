@@ -74,6 +74,26 @@ def hold(problem: Problem, grid: Grid, grasps: list[Grasp], t: Floats, starts: S
     theta(t) is held likewise: the angle it has in q (n_u, nc), the state at t[0], and how much the gripper has turned
     about the cable since, against the frames that are carried from each of the times to the next.
     """
+    rows, table, sampled = constraint_rows(grasps, t, starts)
+    turned = tuple(i for i, g in enumerate(grasps) if g.hold == "clamp") if problem.twist is not None else ()
+    places, angles = _NOWHERE, np.empty((len(t), len(turned)))
+    if problem.twist is not None and turned:
+        places = np.array([grasps[i].u for i in turned])
+        for r, i in enumerate(turned):
+            g = grasps[i]
+            angles[:, r] = grid.at(q, g.u)[3] + problem.twist.radius * spin_of(g, t, starts[g][1])
+    elimination, offsets, inverse, turned_inverse = hold_rows(
+        grid.knots, problem.nc, t, table, sampled, problem.plane.origin, problem.plane.axes, places, angles
+    )
+    return Held(tuple(grasps), elimination, offsets, rows, inverse, turned, turned_inverse)
+
+
+def constraint_rows(
+    grasps: list[Grasp], t: Floats, starts: Starts
+) -> tuple[tuple[tuple[int, int], ...], Floats, Floats]:
+    """Return what `grasps` hold of the centreline: (grasp, derivative) of each row, and `rows` and `sampled` of
+    `kernels.holding.hold_rows`.
+    """
     rows: list[tuple[int, int]] = []
     table: list[tuple[float, ...]] = []
     sampled: list[Floats] = []
@@ -92,18 +112,7 @@ def hold(problem: Problem, grid: Grid, grasps: list[Grasp], t: Floats, starts: S
                 sampled.append(turns @ starts[g][1])
             rows.append((i, 1))
             table.append((g.u, 1, directed, number, g.start, *_STILL, *begun[1]))
-    turned = tuple(i for i, g in enumerate(grasps) if g.hold == "clamp") if problem.twist is not None else ()
-    places, angles = _NOWHERE, np.empty((len(t), len(turned)))
-    if problem.twist is not None and turned:
-        places = np.array([grasps[i].u for i in turned])
-        for r, i in enumerate(turned):
-            g = grasps[i]
-            angles[:, r] = grid.at(q, g.u)[3] + problem.twist.radius * spin_of(g, t, starts[g][1])
-    elimination, offsets, inverse, turned_inverse = hold_rows(
-        grid.knots, problem.nc, t, np.array(table).reshape(-1, ROW), np.array(sampled).reshape(-1, len(t), 3),
-        problem.plane.origin, problem.plane.axes, places, angles,
-    )  # fmt: skip
-    return Held(tuple(grasps), elimination, offsets, tuple(rows), inverse, turned, turned_inverse)
+    return tuple(rows), np.array(table).reshape(-1, ROW), np.array(sampled).reshape(-1, len(t), 3)
 
 
 def spin_of(grasp: Grasp, t: Floats, direction: Floats) -> Floats:

@@ -59,5 +59,6 @@ def record(
 def surface_at(problem: Problem, level: Level, control: Floats) -> SplineSurface:
     """Return the surface of control points (n_t, n_u, nc) on the knots of a level."""
     motion, grid = level.motion, level.motion.grid
-    free = free_control(problem, grid, level.knots_t, control, motion.times[motion.logged], motion.frames)
-    return surface_of(problem, grid.knots, level.knots_t, free)
+    if problem.twist is not None:
+        control = free_control(problem, grid, level.knots_t, control, motion.times[motion.logged], motion.frames)
+    return surface_of(problem, grid.knots, level.knots_t, control)

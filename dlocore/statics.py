@@ -1,7 +1,7 @@
 """Static equilibrium alone: the paper's remark after eq. (20), the equations without M and N."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -152,7 +152,7 @@ def start_grid(problem: Problem, n_u: int, monitor: Monitor) -> Grid:
     if rest == "restless":
         allowed = "false, or a start that grasps hold in an equilibrium"
         raise SceneError("shape.settle", True, allowed, "The start did not come to rest")
-    return replace(grid, start=q, history=history)
+    return grid.changed(start=q, history=history)
 
 
 def settle(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> Settled:

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 from dlocore.discretisation import smallest_n_u
 from dlocore.events import smallest_n_t
-from dlocore.kernels.assembly import slopes
 from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
 from dlocore.progress import record_level
@@ -18,7 +17,6 @@ from dlocore.solvers.monitor import Monitor
 TOO_DEEP = 0.25  # of the diameter, in the table, an obstacle or itself
 TORN = 0.2  # axial strain: no cable of this kind follows
 FOLDED = 0.4  # of |r'| between the points that watch over the length: less is a fold that no energy sees
-_LOOKS = 12  # states of a motion that are searched for folds
 MISSED_COUNTS = 3.0  # what the time spline misses of its march, times this, is the least that the error may be
 
 
@@ -81,7 +79,7 @@ def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
         push = "A straight cable pushed along itself has no side to buckle to: start it slightly bent."
         return "stalled", f"{strain} {advice} {push}"
     if is_folded(level):
-        least, most = _slopes(level)
+        least, most = motion.slopes
         seen = f"|r'| is {least:.2g} to {most:.2g} within a span"
         return "stalled", f"The cable is folded finer than its control points can show: {seen}. Take more of them."
     deep = motion.deepest / problem.scene.cable.diameter
@@ -103,12 +101,5 @@ def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
 
 def is_folded(level: Level) -> bool:
     """Tell whether a whole motion folds the cable within a span: grids may agree on that, and it is none of a cable."""
-    least, most = _slopes(level)
+    least, most = level.motion.slopes
     return not level.motion.stopped and not (least >= FOLDED and most <= 2.0 - FOLDED)
-
-
-def _slopes(level: Level) -> tuple[float, float]:
-    """Return the smallest and the largest |r'| at the curvature points of some states of a motion."""
-    tables, states = level.motion.grid.tables, level.motion.states
-    least, largest = slopes(states, max(1, len(states) // _LOOKS), tables.curvature_first, tables.curvature_b1)
-    return float(least), float(largest)

@@ -118,7 +118,7 @@ def disturbed(prediction: Prediction, scene: Scene, deadline: float) -> float | 
         waves = np.sin(u * [1.0, 2.0, 3.0]) @ np.random.default_rng(seed).normal(size=(3, problem.plane.dimensions)) / 2
         start = grid.start.copy()
         start[:, : waves.shape[1]] += DISTURBED * scene.cable.length * waves * (seed > 0)
-        motion = march(problem, replace(grid, start=start), steps, monitor)
+        motion = march(problem, grid.changed(start=start), steps, monitor)
         if motion.stopped or motion.largest_strain > MOST_STRAIN:
             if seed > 0:
                 return None

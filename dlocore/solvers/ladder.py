@@ -16,6 +16,7 @@ from dlocore.kernels.timefit import sampled
 from dlocore.problem import Problem, stiffer
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, march
 from dlocore.solvers.monitor import Monitor
+from dlocore.solvers.smooth import march_smooth
 from dlocore.solvers.timefit import fit, largest, missed, refined
 from dlocore.solvers.watched import watched
 from dlocore.statics import start_grid
@@ -143,7 +144,8 @@ def run_level(
     assert knots_t is not None, "the caller asks for enough control points"
     if booked:
         monitor.phase("setup")
-    motion = march(problem, grid, steps, monitor, rho=rho)
+    plain = None if grid.watched else march_smooth(problem, grid, steps, knots_t, monitor, rho)
+    motion = march(problem, grid, steps, monitor, rho=rho) if plain is None else plain[0]
     if hardness > 1.0 and motion.stopped == "step":  # too stiff for this grid
         problem = posed
         motion = march(problem, grid, steps, monitor, rho=rho)
@@ -171,7 +173,10 @@ def run_level(
     smooth = motion
     if free_knots and (problem.contact is not None or motion.deepest > 0.0):
         knots_t, smooth = refined(motion, knots_t, _MISSED * problem.scene.cable.diameter)
-    control, off = fit(smooth, knots_t)
+    if plain is not None and motion is plain[0]:
+        _, control, off = plain
+    else:
+        control, off = fit(smooth, knots_t)
     if smooth is not motion:
         off = missed(motion, knots_t, control)
     if booked:

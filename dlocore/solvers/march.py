@@ -1,6 +1,9 @@
 """The compiled march: implicit steps of the spatial spline, fitted by the time spline."""
 
-from dataclasses import dataclass
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +13,7 @@ from dlocore.effects.friction import SLIP_SPEED
 from dlocore.events import closed_grasps, marks_of, step_counts, step_times
 from dlocore.grid import Grid
 from dlocore.holding import Starts, hold
-from dlocore.kernels.assembly import History, note, times_scalar_band
+from dlocore.kernels.assembly import History, note, slopes, times_scalar_band
 from dlocore.kernels.banded import Elimination
 from dlocore.kernels.entry import to_ends_of_steps
 from dlocore.kernels.march import (
@@ -39,9 +42,10 @@ TOLERANCE = 1e-8  # of the length, on the error that the Newton iterations of a 
 LEAST_TOLERANCE, MOST_TOLERANCE = 1e-11, 1e-7
 COARSE = 1 / 256  # of the period of a cable that swings: the tolerance goes with the square of the step
 _RESTS = 0.05  # of the diameter above the table: nearer to it the cable rests on it
-_CHUNK = 256  # steps between looks at the clock
+CHUNK = 256  # steps between looks at the clock
 MOST_FRAMES = 1_300_000  # control points times steps of which a motion with twist keeps the frames: 0.6 GB of them
 _SPLITS = (4, 16, 64)  # parts of a step that found no equilibrium
+_LOOKS = 12  # states of a motion, at least, that are searched for folds
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +57,6 @@ class March:
         times: (steps + 1,) [s].
         states: (steps + 1, n_u, nc) control points at those times.
         velocity: (n_u, nc) [m/s] just after t = 0.
-        forces: what holds the cable between each two events.
         history: what the motion leaves behind at its end.
         log: frames and memory at the steps `logged` (rows, points, columns), see `kernels.assembly.note`; (0, 0, 0)
             where nothing is kept.
@@ -62,15 +65,16 @@ class March:
         rho: spectral radius it was marched with.
         split: steps that found equilibrium only in smaller ones.
         largest_strain: largest |axial strain| of the motion.
+        slopes: least and largest |r'| at the curvature points of some of its states.
         update: largest error left by the Newton iterations of a step, as estimated [m].
         deepest: largest depth of the cable in an obstacle or the table [m].
+        find_forces: finds `forces`, as they are first read.
     """
 
     grid: Grid
     times: Floats
     states: Floats
     velocity: Floats
-    forces: tuple[WindowForces, ...]
     history: History
     log: Floats
     reached: int
@@ -78,8 +82,15 @@ class March:
     rho: float
     split: int
     largest_strain: float
+    slopes: tuple[float, float]
     update: float
     deepest: float
+    find_forces: Callable[[], tuple[WindowForces, ...]] = field(repr=False)
+
+    @cached_property
+    def forces(self) -> tuple[WindowForces, ...]:
+        """What holds the cable between each two events."""
+        return self.find_forces()
 
     @property
     def logged(self) -> NDArray[np.int64]:
@@ -186,7 +197,7 @@ class _Walk:
         self._laws = problem.laws
         self._mass = grid.tables.mass * problem.mass_density()
         self._applied = applied_forces(problem, grid, times)
-        self._tolerance = _tolerance(problem, problem.horizon / len(times))
+        self._tolerance = tolerance_of(problem, problem.horizon / len(times))
         self._states = np.empty((len(times), grid.n_u, problem.nc))
         self._states[0] = grid.start
         self._v = self._velocity = grid.velocity.copy()
@@ -211,7 +222,7 @@ class _Walk:
             except TimeIsUp:
                 self.stopped = "time"
                 break
-            until = min(at + _CHUNK, last)
+            until = min(at + CHUNK, last)
             failed = self._steps(
                 stretch, at, until, smooth, stretch.entry.jumps, stretch.h, self._rho, self._states, self._applied,
                 stretch.offsets, stretch.reactions, self._log,
@@ -236,11 +247,26 @@ class _Walk:
         if len(log):
             last = row_of_step(reached, len(states), len(log))
             log[last + 1 :] = log[last]
+        grid, forces = self._grid, tuple(self._forces)
+        tables, every = grid.tables, every_of(len(states))
+        least, most = slopes(states, every, tables.curvature_first, tables.curvature_b1)
         return March(
-            self._grid, self._times, states, self._velocity, tuple(self._forces), self._history, log, reached,
-            self.stopped, self._rho, self._split, self._grid.largest_strain(states), float(self._info[LEFT]),
-            float(self._info[DEEPEST]),
-        )  # fmt: skip
+            grid=grid,
+            times=self._times,
+            states=states,
+            velocity=self._velocity,
+            history=self._history,
+            log=log,
+            reached=reached,
+            stopped=self.stopped,
+            rho=self._rho,
+            split=self._split,
+            largest_strain=grid.largest_strain(states),
+            slopes=(float(least), float(most)),
+            update=float(self._info[LEFT]),
+            deepest=float(self._info[DEEPEST]),
+            find_forces=lambda: forces,
+        )
 
     def _enter(self, begin: float, end: float, first: int, last: int) -> _Stretch:
         """Close the grasps of a stretch; what friction holds leans on it from the beginning."""
@@ -310,17 +336,22 @@ class _Walk:
         return False
 
 
-def _tolerance(problem: Problem, step: float) -> float:
+def every_of(states: int) -> int:
+    """Return of how many states of a motion one is searched for folds."""
+    return max(1, states // _LOOKS)
+
+
+def tolerance_of(problem: Problem, step: float) -> float:
     """Return the error that Newton's iterations may leave in a step [m].
 
     Over a short step it is an acceleration, of which the tension of a cable that hardly stretches makes noise. Forces
     with kinks are not solved for more closely, as steps would fail at them.
     """
     length = problem.scene.cable.length
-    of_coarse = step / (COARSE * 2.0 * float(np.sqrt(length)))
+    of_coarse = step / (COARSE * 2.0 * math.sqrt(length))
     kinks = problem.contact is not None or problem.friction is not None or problem.self_contact is not None
     least = TOLERANCE if kinks else LEAST_TOLERANCE
-    return float(np.clip(TOLERANCE * of_coarse**2, least, MOST_TOLERANCE)) * length
+    return min(max(TOLERANCE * of_coarse**2, least), MOST_TOLERANCE) * length
 
 
 def _lean_on_anchors(

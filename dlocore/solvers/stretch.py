@@ -15,8 +15,8 @@ from dlocore.scene import Grasp
 
 Floats = NDArray[np.float64]
 
-_JUMPS = 1e-6  # of the length, on what a jump of the velocity is in a step: less is rounding
-_NEAR = 1e-3 * np.arange(3.0)  # of a step: for velocity and acceleration of the paths at the beginning
+JUMPS = 1e-6  # of the length, on what a jump of the velocity is in a step: less is rounding
+NEAR = 1e-3 * np.arange(3.0)  # of a step: for velocity and acceleration of the paths at the beginning
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ def enter(
         load: (n_u, nc) applied forces at its beginning [N].
     """
     close_grasps(problem, grid, grasps, starts, q)
-    held = hold(problem, grid, grasps, np.concatenate([times[0] + h * _NEAR, times]), starts, q)
+    held = hold(problem, grid, grasps, np.concatenate([times[0] + h * NEAR, times]), starts, q)
     active, parameters = problem.laws
     if times[0] > 0.0:  # the rate of a strain that hardly changes is lost in what steps leave of the velocities
         active = active.copy()
@@ -68,9 +68,9 @@ def enter(
     inertial = problem.inertia is not None
     closed, a, G, jump = begin_stretch(
         problem.axes, q, v, grid.tables.mass, problem.mass_density(), problem.drag_coefficient(), grid.tables, active,
-        parameters, history, load, held.elimination, held.offsets[:3], h * _NEAR[1], inertial,
+        parameters, history, load, held.elimination, held.offsets[:3], h * NEAR[1], inertial,
         problem.plane.dimensions,
     )  # fmt: skip
     started = closed.copy() if inertial else np.zeros_like(closed)
-    jumps = inertial and h * jump > _JUMPS * problem.scene.cable.length
+    jumps = inertial and h * jump > JUMPS * problem.scene.cable.length
     return Entry(held, held.offsets[3:], closed, started, a, G, jumps)

@@ -1,7 +1,5 @@
 """A grid on which the cable can't fold within a span: its stretch is watched at more points."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from dlocore.grid import Grid
@@ -37,4 +35,4 @@ def watched(grid: Grid) -> Grid:
     behind = [np.interp(finer.axial_u, tables.axial_u, column) for column in grid.history.axial.T]
     past = grid.past()
     history = past._replace(axial=np.ascontiguousarray(np.transpose(behind)))
-    return replace(grid, tables=finer, history=history)
+    return grid.changed(tables=finer, history=history)

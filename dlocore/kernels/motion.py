@@ -1,0 +1,93 @@
+"""A whole smooth motion in the plane in one call: most of the time of a short march goes into what passes between."""
+
+from typing import Any
+
+import numpy as np
+
+from dlocore.effects.laws import keeps_curvature, keeps_history
+from dlocore.kernels.assembly import History, slopes
+from dlocore.kernels.basis import build_tables
+from dlocore.kernels.compile import kernel
+from dlocore.kernels.entry import begin_stretch, remember_start, to_ends_of_steps
+from dlocore.kernels.holding import hold_rows
+from dlocore.kernels.march import march_steps
+from dlocore.kernels.tension import COLUMNS
+from dlocore.kernels.timefit import fitted
+
+STRAIN, LEAST_SLOPE, MOST_SLOPE, SEEN = 3, 4, 5, 6  # places in `info` after those of `march_steps`, and their number
+
+
+@kernel
+def smooth_motion(
+    axes: Any, knots: Any, free_start: bool, free_end: bool, rule2: Any, w2: Any, rule3: Any, w3: Any, rule4: Any,
+    w4: Any, start: Any, velocity: Any, memory: Any, times: Any, near: Any, rows: Any, sampled: Any, origin: Any,
+    directions: Any, knots_t: Any, active: Any, p: Any, density: float, dragged: float, weight: Any, rho: float,
+    tolerance: float, least_jump: float, every: int, info: Any,
+) -> Any:  # fmt: skip
+    """March a smooth motion in the plane from its start, and fit the time spline to it.
+
+    It is `build_tables`, `remember_start`, `hold_rows`, `begin_stretch`, `march_steps`, `to_ends_of_steps` and `fitted`
+    one after the other: see there for what is not said here.
+
+    Args:
+        axes: (0, 1).
+        start, velocity: (n, 2) [m, m/s] of the control points at t = 0.
+        memory: (points, 2) stress-free curvature and its natural value, (0, 2) for a straight one [1/m].
+        times: (steps + 1 + near,) [s] `near` times at the beginning, for velocity and acceleration of the paths, and
+            those of the steps.
+        rows, sampled: what is held at `times`.
+        origin, directions: (3,) [m] and (2, 3), of the coordinates of the solve.
+        weight: (2,) [N/m] per unit length.
+        least_jump: of the velocity, in a step, that counts as a jump [m].
+        every: of how many states one is searched for folds.
+        info: (SEEN,) as in `march_steps`, and the largest axial strain of the motion, and the least and the largest
+            |r'| at the curvature points.
+
+    Returns:
+        The states (steps + 1, n, 2) [m], the velocity (n, 2) [m/s] as the grasps close, the forces (steps + 1, held)
+        [N] that hold them, what lies behind the motion at its end, the control points (n_t, n, 2) [m] of the time
+        spline and what it misses each state by (steps + 1,) [m].
+    """
+    tables = build_tables(knots, free_start, free_end, rule2, w2, rule3, w3, rule4, w4, np.inf)
+    n, nc = start.shape
+    points, stretched = len(tables.curvature_w), len(tables.axial_w)
+    history = History(
+        memory.copy() if len(memory) > 0 else np.zeros((points, 2)),
+        np.zeros((points if keeps_curvature(active) else 0, 2)),
+        np.zeros((stretched, 3)),
+        np.zeros((0, 6)),
+        np.zeros((0, 2)),
+        np.full((stretched, COLUMNS), np.nan),
+    )
+    if keeps_history(active):
+        remember_start(axes, start, tables, active, p, history)
+    nowhere, unturned = np.empty(0), np.empty((len(times), 0))
+    e, offsets, _, _ = hold_rows(knots, nc, times, rows, sampled, origin, directions, nowhere, unturned)
+    load = np.empty((1, n, nc))
+    for i in range(n):
+        for d in range(nc):
+            load[0, i, d] = tables.weight[i] * weight[d]
+    steps = len(times) - near - 1
+    h = times[near + 1] - times[near]
+    closed, a, G, jump = begin_stretch(
+        axes, start, velocity, tables.mass, density, dragged, tables, active, p, history, load[0], e, offsets[:near],
+        times[1] - times[0], True, nc,
+    )  # fmt: skip
+    reactions = np.zeros((steps + 1, len(e.held)))
+    for k in range(len(e.held)):
+        i, d = e.held[k] // nc, e.held[k] % nc
+        reactions[0, k] = G[i, d]
+        for o in range(-min(3, i), min(4, n - i)):
+            reactions[0, k] += density * tables.mass[min(i, i + o), abs(o)] * a[i + o, d]
+    states = np.empty((steps + 1, n, nc))
+    states[0] = start
+    march_steps(
+        axes, 0, steps, 0, h * jump > least_jump, h, rho, tolerance, states, closed.copy(), a, G, density, dragged,
+        tables, active, p, history, load, e, offsets[near:], reactions, np.zeros((0, 0, 0)), info,
+    )  # fmt: skip
+    to_ends_of_steps(reactions, 0, steps, rho / (1.0 + rho))
+    control, off = fitted(knots_t, times[near:], states, closed, nc)
+    least, most = slopes(states, 1, tables.axial_first, tables.axial_b1)
+    info[STRAIN] = max(0.0, most - 1.0, 1.0 - least)
+    info[LEAST_SLOPE], info[MOST_SLOPE] = slopes(states, every, tables.curvature_first, tables.curvature_b1)
+    return states, closed, reactions, history, control, off

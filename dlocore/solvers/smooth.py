@@ -1,0 +1,109 @@
+"""The march of a smooth motion in the plane, in one compiled call: the plainest motions, and the most frequent."""
+
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.discretisation import free_ends
+from dlocore.events import closed_grasps, marks_of
+from dlocore.grid import Grid
+from dlocore.holding import Starts, close_grasps, constraint_rows, hold
+from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4
+from dlocore.kernels.march import FAILED_STEP, LEFT
+from dlocore.kernels.motion import LEAST_SLOPE, MOST_SLOPE, SEEN, STRAIN, smooth_motion
+from dlocore.problem import Problem
+from dlocore.report import WindowForces
+from dlocore.scene import Grasp
+from dlocore.solvers.march import CHUNK, March, every_of, tolerance_of
+from dlocore.solvers.monitor import Monitor, TimeIsUp
+from dlocore.solvers.stretch import JUMPS, NEAR
+
+Floats = NDArray[np.float64]
+
+_STRAIGHT = np.empty((0, 2))
+_NO_LOG = np.zeros((0, 0, 0))
+
+
+def march_smooth(
+    problem: Problem, grid: Grid, steps: int, knots_t: Floats, monitor: Monitor, rho: float
+) -> tuple[March, Floats, Floats] | None:
+    """March a motion without events in the plane, and fit the time spline to it.
+
+    Args:
+        knots_t: (n_t + 4,) [s] of the time spline.
+        rho: spectral radius.
+
+    Returns:
+        What `march` and `fit` return, and None where they have to do it: where there is more to the motion, it takes
+        so long that the clock is to be looked at in between, or a step found no equilibrium.
+
+    Raises:
+        Cancelled: the caller asked to stop.
+    """
+    marks = marks_of(problem)
+    if not _is_plain(problem) or len(marks) > 2 or steps > CHUNK:
+        return None
+    try:
+        monitor.check()
+    except TimeIsUp:
+        return None
+    h = problem.horizon / steps
+    times = np.concatenate([h * NEAR, h * np.arange(steps + 1)])
+    times[-1] = problem.horizon
+    grasps = closed_grasps(problem, 0.0, problem.horizon)
+    starts: Starts = {}
+    close_grasps(problem, grid, grasps, starts, grid.start)
+    _, rows, sampled = constraint_rows(grasps, times, starts)
+    straight = problem.scene.cable.rest_shape == "straight"
+    info = np.zeros(SEEN)
+    info[FAILED_STEP] = -1
+    states, closed, forces, history, control, off = smooth_motion(
+        problem.axes, grid.knots, *free_ends(problem), *GAUSS_2, *GAUSS_3, *GAUSS_4, grid.start, grid.velocity,
+        _STRAIGHT if straight else grid.history.memory, times, len(NEAR), rows, sampled, problem.plane.origin,
+        problem.plane.axes, knots_t, *problem.laws, problem.mass_density(), problem.drag_coefficient(),
+        problem.weight(), rho, tolerance_of(problem, problem.horizon / (steps + 1)),
+        JUMPS * problem.scene.cable.length, every_of(steps + 1), info,
+    )  # fmt: skip
+    if info[FAILED_STEP] >= 0:
+        return None
+    times = times[len(NEAR) :]
+    motion = March(
+        grid=grid,
+        times=times,
+        states=states,
+        velocity=closed,
+        find_forces=partial(_forces, problem, grid, grasps, starts, times, forces, states),
+        history=history,
+        log=_NO_LOG,
+        reached=steps,
+        stopped="",
+        rho=rho,
+        split=0,
+        largest_strain=float(info[STRAIN]),
+        slopes=(float(info[LEAST_SLOPE]), float(info[MOST_SLOPE])),
+        update=float(info[LEFT]),
+        deepest=0.0,
+    )
+    return motion, control, off
+
+
+def _is_plain(problem: Problem) -> bool:
+    """Tell whether a motion is in the plane and has inertia, and neither loads, contact nor anything that yields."""
+    return (
+        problem.nc == 2
+        and problem.inertia is not None
+        and problem.contact is None
+        and problem.friction is None
+        and problem.self_contact is None
+        and problem.bending_memory is None
+        and problem.stretch_memory is None
+        and problem.start.material is None
+        and not problem.scene.loads
+    )
+
+
+def _forces(
+    problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, times: Floats, forces: Floats, states: Floats
+) -> tuple[WindowForces, ...]:
+    return (WindowForces(hold(problem, grid, grasps, times, starts, grid.start), times, forces, states),)
