@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import nnls
 
 Floats = NDArray[np.float64]
 
@@ -139,6 +138,8 @@ def fitted_rates(samples: Sequence[Sample]) -> dict[int, Rates]:
 
 def _nonnegative(rows: ArrayLike, times: ArrayLike) -> list[float]:
     """Return the non-negative factors (k,) of rows (m, k) that meet times (m,) with the least relative errors."""
+    from scipy.optimize import nnls  # slow to import, and a prediction needs none
+
     matrix = np.asarray(rows, float) / np.asarray(times, float)[:, None]
     scale = np.abs(matrix).max(axis=0)
     factors, _ = nnls(matrix / scale, np.ones(len(matrix)))

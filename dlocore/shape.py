@@ -8,15 +8,12 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import make_interp_spline
 
 from dlocore.errors import SceneError
-from dlocore.fit import MAX_SPANS, check_length, fit_points
 from dlocore.kernels.basis import GAUSS_4, spline_values
 from dlocore.kernels.holding import place
 from dlocore.kernels.projection import on_knots
 from dlocore.scene import ControlPoints, Material, Points, Shape, Straight
-from dlocore.smoothing import smooth
 from dlocore.spline import DEGREE, uniform_knots
 
 Floats = NDArray[np.float64]
@@ -99,6 +96,8 @@ def _straight(shape: Straight, length: float) -> StartCurve:
 
 
 def _given(shape: ControlPoints, length: float) -> StartCurve:
+    from dlocore.fit import check_length  # slow to import, as those below, and a straight cable needs none
+
     control, angles = np.split(cast(Floats, shape.control_points), [3], axis=1)
     knots = uniform_knots(len(control), length) if shape.knots is None else cast(Floats, shape.knots)
     speed, width = _speed(SplineCurve(knots=knots, control_points=control))
@@ -139,6 +138,8 @@ def _fitted(shape: Points, length: float) -> StartCurve:
     instead, it costs 10 to 16 mm rms for 5 % of a 1 m cable, as much as continuing the curve beyond its ends would
     where the points are off scale; but the points are said to cover the whole cable.
     """
+    from dlocore.fit import fit_points
+
     points = cast(Floats, shape.points)
     middle = points.mean(axis=0)
     fit = fit_points(points - middle, length)
@@ -173,6 +174,11 @@ def _velocity(
     velocity = cast(Floats, given)
     if velocity.ndim == 1:
         return SplineCurve(knots=uniform_knots(4, length), control_points=np.tile(velocity, (4, 1)))
+    from scipy.interpolate import make_interp_spline
+
+    from dlocore.fit import MAX_SPANS
+    from dlocore.smoothing import smooth
+
     u, mean = at(len(velocity)), velocity.mean(axis=0)
     if exact:
         spline = make_interp_spline(u, velocity - mean, k=DEGREE)
