@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.events import events_of
 from dlocore.paths import Waypoints
 from dlocore.plane import Plane
 from dlocore.prediction import Prediction
@@ -109,7 +108,7 @@ def _objection(problem: Problem, like: Prediction, before: Problem) -> str:
         choice.active != before.choices[name].active for name, choice in problem.choices.items()
     ):
         return "Other effects are simulated."
-    if problem.horizon != before.horizon or not _same(events_of(problem), events_of(before)):
+    if problem.horizon != before.horizon or not _same(problem.events, before.events):
         return "Paths, grasps or the prediction begin or end at other times."
     return ""
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from dlocore.effects import laws
 from dlocore.errors import SceneError
+from dlocore.features import find_features, free_ends
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.assembly import History
@@ -24,14 +25,8 @@ from dlocore.shape import SplineCurve, fit_to_knots, start_curve, velocity_to_kn
 
 Floats = NDArray[np.float64]
 
-# Grading of the knots towards a feature: exponent and width. An interior point force makes r''' jump and bends sharply
-# beside it; at an end or at a held direction a weaker grading serves better (docs/model.md).
-_INTERIOR = (0.6, 0.02)
-_END = (0.3, 0.04)
-_SAME = 1e-9  # of the length: features this close are one
 # A start that turns by SHARP [rad] within BEND of the length to either side of a point, which is many times as much as
 # it turns elsewhere, has knots graded towards that point: the corner would be another one on every grid.
-_CORNER = (1.0, 0.01)
 SHARP = 1.0
 BEND = 0.02
 _ELSEWHERE = 4.0  # times the median curvature
@@ -40,9 +35,7 @@ _MOST_CORNERS = 4
 
 def smallest_n_u(problem: Problem) -> int:
     """Return the least number of control points that has a knot at every grasp and load."""
-    features, multiplicity, _, _ = _features(problem, [])
-    inside = [m for u, m in zip(features, multiplicity, strict=True) if 0 < u < problem.scene.cable.length]
-    return max(5, 4 + sum(inside))
+    return problem.features.least
 
 
 def make_grid(problem: Problem, n_u: int) -> Grid:
@@ -53,13 +46,12 @@ def make_grid(problem: Problem, n_u: int) -> Grid:
     """
     cable = problem.scene.cable
     bends = corners(problem.start, cable.length)
-    features, multiplicity, power, width = _features(problem, bends)
-    knots = graded_knots(n_u, cable.length, features, multiplicity, power, width)
+    features = find_features(problem.scene, bends, BEND * cable.length) if bends else problem.features
+    knots = graded_knots(n_u, cable.length, *features[:4])
     if len(knots) == 0 and bends:
-        features, multiplicity, power, width = _features(problem, [])
-        knots = graded_knots(n_u, cable.length, features, multiplicity, power, width)
+        knots = graded_knots(n_u, cable.length, *problem.features[:4])
     if len(knots) == 0:
-        reason = f"{len(features)} grasps and loads need a knot each"
+        reason = f"{len(problem.features.u)} grasps and loads need a knot each"
         raise SceneError("quality.n_u", n_u, f"at least {smallest_n_u(problem)} in this scene", reason)
     return grid_on(problem, knots)
 
@@ -81,7 +73,7 @@ def grid_on(problem: Problem, knots: Floats) -> Grid:
 
 def _tables_of(problem: Problem, knots: Floats) -> Tables:
     rules = (*GAUSS_2, *GAUSS_3, *GAUSS_4)
-    return cast(Tables, build_tables(knots, *free_ends(problem), *rules, problem.contact_spacing()))
+    return cast(Tables, build_tables(knots, *free_ends(problem.scene), *rules, problem.contact_spacing()))
 
 
 def _no_history(problem: Problem, tables: Tables) -> History:
@@ -149,39 +141,6 @@ def corners(curve: SplineCurve, length: float) -> list[float]:
         if all(abs(u[k] - v) > 2.0 * BEND * length for v in found):
             found.append(float(u[k]))
     return found
-
-
-def _features(problem: Problem, bends: list[float]) -> tuple[Floats, NDArray[np.int64], Floats, Floats]:
-    """Return sorted coordinates of grasps, loads and bends, knot multiplicities, grading exponents and widths."""
-    length = problem.scene.cable.length
-    found: dict[float, tuple[int, float, float]] = {}
-    places = [(g.u, 1 if g.hold == "point" else 2) for g in problem.scene.grasps]
-    places += [(load.u, 1) for load in problem.scene.loads]
-    for place, multiplicity in places:
-        u = next((v for v in found if abs(v - place) <= _SAME * length), place)
-        at_end = min(u, length - u) <= _SAME * length
-        power, width = _END if at_end or multiplicity == 2 else _INTERIOR
-        before = found.get(u, (0, 0.0, 1.0))
-        found[u] = (max(before[0], multiplicity), max(before[1], power), min(before[2], width))
-    for u in bends:
-        if all(abs(u - v) > BEND * length for v in found):
-            found[u] = (1, *_CORNER)
-    order = sorted(found)
-    multiplicities, powers, widths = ([found[u][i] for u in order] for i in range(3))
-    return np.array(order, float), np.array(multiplicities, np.int64), np.array(powers, float), np.array(widths, float)
-
-
-def free_ends(problem: Problem) -> tuple[bool, bool]:
-    """Return whether the direction of the cable is free, at least for a time, at its two ends."""
-    length = problem.scene.cable.length
-
-    def free(end: float) -> bool:
-        for g in problem.scene.grasps:
-            if abs(g.u - end) <= _SAME * length and g.hold != "point":
-                return g.start > 0 or g.release_time is not None
-        return True
-
-    return free(0.0), free(length)
 
 
 def plane_curvature_of(tables: Tables, q: Floats) -> Floats:

@@ -2,14 +2,17 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.kernels.basis import graded_knots
 from dlocore.paths import Move, Waypoints
-from dlocore.problem import Problem
-from dlocore.scene import Grasp
+from dlocore.scene import Grasp, Scene
+
+if TYPE_CHECKING:
+    from dlocore.problem import Problem
 
 Floats = NDArray[np.float64]
 
@@ -27,15 +30,16 @@ class Event:
     multiplicity: int
 
 
-def events_of(problem: Problem) -> list[Event]:
-    """Return the events inside the horizon, by time."""
+def find_events(scene: Scene) -> tuple[Event, ...]:
+    """Return the events inside the horizon of a scene, by time."""
     found: dict[float, int] = {}
+    latest = cast(float, scene.horizon) * (1 - 1e-9)
 
     def add(time: float, multiplicity: int) -> None:
-        if 0.0 < time < problem.horizon * (1 - 1e-9):
+        if 0.0 < time < latest:
             found[time] = max(found.get(time, 0), multiplicity)
 
-    for g in problem.scene.grasps:
+    for g in scene.grasps:
         add(g.start, 3)
         if g.release_time is not None:
             add(g.release_time, 2)
@@ -45,7 +49,7 @@ def events_of(problem: Problem) -> list[Event]:
             add(end, _smoothness(g, g.path.duration))
         if isinstance(g.path, Waypoints):
             add(g.start + float(np.asarray(g.path.times)[0]), 2)
-    return [Event(t, found[t]) for t in sorted(found)]
+    return tuple(Event(t, found[t]) for t in sorted(found))
 
 
 def _smoothness(grasp: Grasp, end: float) -> int:
@@ -54,9 +58,9 @@ def _smoothness(grasp: Grasp, end: float) -> int:
     return 3
 
 
-def time_knots(problem: Problem, n_t: int) -> Floats | None:
+def time_knots(problem: "Problem", n_t: int) -> Floats | None:
     """Return the time knots (n_t + 4,) [s] with a knot at every event, or None where n_t is too small for them."""
-    events = events_of(problem)
+    events = problem.events
     times = np.array([e.time for e in events])
     multiplicity = np.array([e.multiplicity for e in events], dtype=np.int64)
     even = np.zeros(len(events))
@@ -64,12 +68,12 @@ def time_knots(problem: Problem, n_t: int) -> Floats | None:
     return knots if len(knots) else None
 
 
-def smallest_n_t(problem: Problem) -> int:
+def smallest_n_t(problem: "Problem") -> int:
     """Return the least number of control points in time that has a knot at every event."""
-    return max(5, 4 + sum(e.multiplicity for e in events_of(problem)))
+    return max(5, 4 + sum(e.multiplicity for e in problem.events))
 
 
-def closed_grasps(problem: Problem, begin: float, end: float) -> list[Grasp]:
+def closed_grasps(problem: "Problem", begin: float, end: float) -> list[Grasp]:
     """Return the grasps that hold all through the times `begin` to `end` [s]."""
     middle = 0.5 * (begin + end)
     return [
@@ -77,9 +81,9 @@ def closed_grasps(problem: Problem, begin: float, end: float) -> list[Grasp]:
     ]
 
 
-def marks_of(problem: Problem) -> list[float]:
+def marks_of(problem: "Problem") -> list[float]:
     """Return the times [s] between which the motion is smooth: its beginning, its events and its end."""
-    return [0.0, *[e.time for e in events_of(problem)], problem.horizon]
+    return [0.0, *[e.time for e in problem.events], problem.horizon]
 
 
 def step_counts(marks: list[float], steps: int) -> list[int]:

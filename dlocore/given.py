@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from dlocore.events import events_of
 from dlocore.prediction import Status
 from dlocore.problem import Problem
 from dlocore.progress import record_level
@@ -55,7 +54,7 @@ def evenly_fitted(level: Level) -> Level:
     motion, problem = level.motion, level.problem
     if motion.stopped or not level.missed > MISSED * problem.scene.cable.length:
         return level
-    knots_t = evened(motion, level.knots_t, np.array([event.time for event in events_of(problem)]))
+    knots_t = evened(motion, level.knots_t, np.array([event.time for event in problem.events]))
     control, off = fit(motion, knots_t)
     return replace(level, knots_t=knots_t, control=control, missed=largest(off))
 

@@ -24,6 +24,8 @@ from dlocore.effects.selfcontact import SelfContact
 from dlocore.effects.stretch import Stretch, StretchDamping
 from dlocore.effects.twist import Twist
 from dlocore.errors import SceneError
+from dlocore.events import Event, find_events
+from dlocore.features import Features, find_features
 from dlocore.kernels.projection import in_world
 from dlocore.obstacles import Box, Cylinder, Obstacle
 from dlocore.plane import Plane, find_plane, is_straight, lay_on_table, off_the_table
@@ -80,6 +82,16 @@ class Problem:
     def horizon(self) -> float:
         """Predicted time [s]."""
         return cast(float, self.scene.horizon)
+
+    @cached_property
+    def features(self) -> Features:
+        """Where along the cable knots are needed, but for sharp bends of the start."""
+        return find_features(self.scene)
+
+    @cached_property
+    def events(self) -> tuple[Event, ...]:
+        """The events inside the horizon, by time."""
+        return find_events(self.scene)
 
     @cached_property
     def nc(self) -> int:

@@ -19,7 +19,7 @@ from benchmarks.hard.surroundings import (
 )
 from dlocore import Move, Quality, Scene
 from dlocore.discretisation import smallest_n_u
-from dlocore.events import events_of, smallest_n_t
+from dlocore.events import smallest_n_t
 from dlocore.problem import pose
 
 IMPOSSIBLE = 0.05  # share of scenes that no cable can follow
@@ -121,7 +121,7 @@ def _draw_quality(r: Rng, d: Draft, small: bool) -> None:
         if kind == "grid":
             n_u, n_t = min(n_u, 21), min(n_t, 33)
     problem = pose(d.scene())
-    if method == "paper" and events_of(problem):
+    if method == "paper" and problem.events:
         method = "march"  # the printed scheme has one smooth motion
     n_u, n_t = max(n_u, smallest_n_u(problem)), max(n_t, smallest_n_t(problem))
     d.quality = Quality(n_u=n_u, n_t=n_t, delta=max(delta, 1e-10), method=method)  # type: ignore[arg-type]

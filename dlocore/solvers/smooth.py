@@ -5,8 +5,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.discretisation import free_ends
 from dlocore.events import closed_grasps, marks_of
+from dlocore.features import free_ends
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, constraint_rows, hold
 from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4
@@ -59,7 +59,7 @@ def march_smooth(
     info = np.zeros(SEEN)
     info[FAILED_STEP] = -1
     states, closed, forces, history, control, off = smooth_motion(
-        problem.axes, grid.knots, *free_ends(problem), *GAUSS_2, *GAUSS_3, *GAUSS_4, grid.start, grid.velocity,
+        problem.axes, grid.knots, *free_ends(problem.scene), *GAUSS_2, *GAUSS_3, *GAUSS_4, grid.start, grid.velocity,
         _STRAIGHT if straight else grid.history.memory, times, len(NEAR), rows, sampled, problem.plane.origin,
         problem.plane.axes, knots_t, *problem.laws, problem.mass_density(), problem.drag_coefficient(),
         problem.weight(), rho, tolerance_of(problem, problem.horizon / (steps + 1)),

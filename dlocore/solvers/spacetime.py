@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dlocore.discretisation import applied_forces
 from dlocore.effects import laws
-from dlocore.events import closed_grasps, events_of
+from dlocore.events import closed_grasps
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.assembly import times_scalar_band
@@ -54,7 +54,7 @@ class Window:
 
 def windows_of(problem: Problem, knots_t: Floats) -> list[Window]:
     """Split the time knots into windows at the events where velocity or acceleration jumps."""
-    cuts = [e for e in events_of(problem) if e.multiplicity > 1]
+    cuts = [e for e in problem.events if e.multiplicity > 1]
     marks = [0.0, *[e.time for e in cuts], problem.horizon]
     windows = []
     for i, (a, b) in enumerate(pairwise(marks)):

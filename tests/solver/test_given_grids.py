@@ -9,7 +9,7 @@ import pytest
 from benchmarks.hard.generator import draw
 from dlocore import predict
 from dlocore.discretisation import make_grid
-from dlocore.events import events_of, time_knots
+from dlocore.events import time_knots
 from dlocore.given import MISSED, evenly_fitted, given_status
 from dlocore.problem import pose
 from dlocore.solvers.ladder import Size, given_steps
@@ -90,7 +90,7 @@ def test_time_knots_go_where_a_spline_of_given_size_misses_its_march():
     assert knots is not None
     assert len(moved.knots_t) == len(knots)
     assert np.all(np.diff(moved.knots_t) >= 0.0)
-    for event in events_of(problem):
+    for event in problem.events:
         assert np.sum(moved.knots_t == event.time) == event.multiplicity
     found = predict(scene)
     assert found.status == "converged"

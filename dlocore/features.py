@@ -1,0 +1,80 @@
+"""Where along the cable knots are needed: at grasps, loads and sharp bends, and closer beside them."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.scene import Scene
+
+Floats = NDArray[np.float64]
+
+# Grading of the knots towards a feature: exponent and width. An interior point force makes r''' jump and bends sharply
+# beside it; at an end or at a held direction a weaker grading serves better (docs/model.md).
+_INTERIOR = (0.6, 0.02)
+_END = (0.3, 0.04)
+_CORNER = (1.0, 0.01)  # a start that turns sharply: the corner would be another one on every grid
+SAME = 1e-9  # of the length: features this close are one
+
+
+class Features(NamedTuple):
+    """Places that knots are needed at and graded towards, as `kernels.basis.graded_knots` takes them.
+
+    Attributes:
+        u: (m,) [m], sorted.
+        multiplicity: of the knot at each (m,).
+        power, width: grading exponent, and width in parts of the length (m,).
+        least: number of control points that has them all.
+    """
+
+    u: Floats
+    multiplicity: NDArray[np.int64]
+    power: Floats
+    width: Floats
+    least: int
+
+
+def find_features(scene: Scene, bends: Sequence[float] = (), apart: float = 0.0) -> Features:
+    """Return the features of a scene, with those sharp `bends` [m] of its start that lie farther `apart` from others.
+
+    Args:
+        bends: (k,) [m].
+        apart: [m].
+    """
+    length = scene.cable.length
+    found: dict[float, tuple[int, float, float]] = {}
+    places = [(g.u, 1 if g.hold == "point" else 2) for g in scene.grasps]
+    places += [(load.u, 1) for load in scene.loads]
+    for place, multiplicity in places:
+        u = next((v for v in found if abs(v - place) <= SAME * length), place)
+        at_end = min(u, length - u) <= SAME * length
+        power, width = _END if at_end or multiplicity == 2 else _INTERIOR
+        before = found.get(u, (0, 0.0, 1.0))
+        found[u] = (max(before[0], multiplicity), max(before[1], power), min(before[2], width))
+    for u in bends:
+        if all(abs(u - v) > apart for v in found):
+            found[u] = (1, *_CORNER)
+    order = sorted(found)
+    rows = [found[u] for u in order]
+    inside = sum(row[0] for u, row in zip(order, rows, strict=True) if 0.0 < u < length)
+    return Features(
+        np.array(order, float),
+        np.array([row[0] for row in rows], np.int64),
+        np.array([row[1] for row in rows], float),
+        np.array([row[2] for row in rows], float),
+        max(5, 4 + inside),
+    )
+
+
+def free_ends(scene: Scene) -> tuple[bool, bool]:
+    """Return whether the direction of the cable is free, at least for a time, at its two ends."""
+    length = scene.cable.length
+
+    def free(end: float) -> bool:
+        for g in scene.grasps:
+            if abs(g.u - end) <= SAME * length and g.hold != "point":
+                return g.start > 0 or g.release_time is not None
+        return True
+
+    return free(0.0), free(length)
