@@ -63,8 +63,8 @@ def time_knots(problem: "Problem", n_t: int) -> Floats | None:
     events = problem.events
     times = np.array([e.time for e in events])
     multiplicity = np.array([e.multiplicity for e in events], dtype=np.int64)
-    even = np.zeros(len(events))
-    knots = graded_knots(n_t, problem.horizon, times, multiplicity, even, even)
+    even, wide = np.zeros(len(events)), np.ones(len(events))
+    knots = graded_knots(n_t, problem.horizon, times, multiplicity, even, wide)
     return knots if len(knots) else None
 
 

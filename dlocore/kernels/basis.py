@@ -10,7 +10,8 @@ from dlocore.kernels.pairs import pair_products
 GAUSS_2 = np.polynomial.legendre.leggauss(2)
 GAUSS_3 = np.polynomial.legendre.leggauss(3)
 GAUSS_4 = np.polynomial.legendre.leggauss(4)
-_SAMPLES = 256  # of the knot density in one segment
+_ITERATIONS = 60  # for the place of a knot
+_ROUNDING = 1e-15  # of the length
 
 
 @kernel
@@ -76,6 +77,23 @@ def spline_values(knots: Any, control: Any, u: Any, derivative: int) -> Any:
     return out
 
 
+@kernel
+def _integrated(u: float, length: float, features: Any, power: Any, width: Any) -> tuple[float, float]:
+    """Return the integral of the density of knots up to u [m], but for a constant, and the density there."""
+    total, density = u, 1.0
+    for f in range(len(features)):
+        x = (u - features[f]) / length
+        y, p = width[f] + abs(x), power[f]
+        here = ((width[f] + 1.0) / y) ** p
+        if p == 1.0:
+            part = (width[f] + 1.0) * np.log(y / width[f])
+        else:
+            part = (here * y - ((width[f] + 1.0) / width[f]) ** p * width[f]) / (1.0 - p)
+        total += length * (part if x > 0.0 else -part)
+        density += here
+    return total, density
+
+
 @brief
 def graded_knots(n: int, length: float, features: Any, multiplicity: Any, power: Any, width: Any) -> Any:
     """Return clamped knots for `n` control points on [0, length] with knots at, and graded towards, the features.
@@ -110,28 +128,11 @@ def graded_knots(n: int, length: float, features: Any, multiplicity: Any, power:
     spans = n - 3 - extra
     if spans < m:
         return np.empty(0)
-    cumulative = np.empty((m, _SAMPLES + 1))
     total = np.empty(m)
     for s in range(m):
-        a, b = cuts[s], cuts[s + 1]
-        cumulative[s, 0] = 0.0
-        before = 0.0
-        for i in range(_SAMPLES + 1):
-            # sample points crowd towards both ends of the segment, where the density peaks
-            x = i / _SAMPLES
-            u = a + (b - a) * x * x * (3.0 - 2.0 * x)
-            here = 1.0
-            for f in range(len(features)):
-                if power[f] == 0.0:
-                    here += 1.0
-                else:
-                    here += ((width[f] + 1.0) / (width[f] + abs(u - features[f]) / length)) ** power[f]
-            if i > 0:
-                y = (i - 1) / _SAMPLES
-                step = u - (a + (b - a) * y * y * (3.0 - 2.0 * y))
-                cumulative[s, i] = cumulative[s, i - 1] + 0.5 * (here + before) * step
-            before = here
-        total[s] = cumulative[s, _SAMPLES]
+        before, _ = _integrated(cuts[s], length, features, power, width)
+        after, _ = _integrated(cuts[s + 1], length, features, power, width)
+        total[s] = after - before
     share = np.ones(m, np.int64)
     for _ in range(spans - m):
         worst = 0
@@ -143,14 +144,24 @@ def graded_knots(n: int, length: float, features: Any, multiplicity: Any, power:
     knots[:4] = 0.0
     k = 4
     for s in range(m):
-        a, b = cuts[s], cuts[s + 1]
-        i = 0
+        b, low = cuts[s + 1], cuts[s]
+        before, _ = _integrated(low, length, features, power, width)
         for j in range(1, share[s]):
-            target = total[s] * j / share[s]
-            while cumulative[s, i + 1] < target:
-                i += 1
-            x = (i + (target - cumulative[s, i]) / (cumulative[s, i + 1] - cumulative[s, i])) / _SAMPLES
-            knots[k] = a + (b - a) * x * x * (3.0 - 2.0 * x)
+            target, high = before + total[s] * j / share[s], b
+            u = low + (b - low) / (share[s] - j + 1)
+            for _ in range(_ITERATIONS):  # Newton's, within what the signs leave
+                value, density = _integrated(u, length, features, power, width)
+                if value < target:
+                    low = u
+                else:
+                    high = u
+                new = u - (value - target) / density
+                if not low <= new <= high:
+                    new = 0.5 * (low + high)
+                moved, u = abs(new - u), new
+                if moved <= _ROUNDING * length:
+                    break
+            knots[k] = low = u
             k += 1
         if s < m - 1:
             for _ in range(repeat[s + 1]):

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from dlocore.kernels.banded import factor, solve_rows
-from dlocore.kernels.basis import basis_rows
+from dlocore.kernels.basis import basis_rows, row_of
 from dlocore.kernels.compile import brief, kernel
 
 
@@ -103,17 +103,31 @@ def sampled(knots_t: Any, knots_u: Any, control: Any, count: int) -> Any:
     share = np.arange(count) / (count - 1)
     first_t, over = basis_rows(knots_t, share * knots_t[-1], 0)
     first_u, along = basis_rows(knots_u, share * knots_u[-1], 0)
-    out = np.zeros((count, count, nc))
+    out = np.empty((count, count, nc))
     q = np.empty((n, nc))
     for k in range(count):
-        q[:] = 0.0
-        for j in range(4):
-            b = over[k, 0, j]
-            for i in range(n):
-                for d in range(nc):
-                    q[i, d] += b * control[first_t[k] + j, i, d]
+        f, (b0, b1, b2, b3) = first_t[k], row_of(over[k], 0)
+        for i in range(n):
+            for d in range(nc):
+                own = b0 * control[f, i, d] + b1 * control[f + 1, i, d]
+                q[i, d] = own + b2 * control[f + 2, i, d] + b3 * control[f + 3, i, d]
         for s in range(count):
-            for i in range(4):
-                for d in range(nc):
-                    out[k, s, d] += along[s, 0, i] * q[first_u[s] + i, d]
+            g, (b0, b1, b2, b3) = first_u[s], row_of(along[s], 0)
+            for d in range(nc):
+                out[k, s, d] = b0 * q[g, d] + b1 * q[g + 1, d] + b2 * q[g + 2, d] + b3 * q[g + 3, d]
     return out
+
+
+@brief
+def farthest(a: Any, b: Any, dimensions: int) -> float:
+    """Return the largest distance between the points of a and b (k, m, nc) [m], by the first so many coordinates."""
+    most, total = 0.0, 0.0
+    for k in range(a.shape[0]):
+        for s in range(a.shape[1]):
+            square = 0.0
+            for d in range(dimensions):
+                away = a[k, s, d] - b[k, s, d]
+                square += away * away
+            most = max(most, square)
+            total += square
+    return np.sqrt(most) if total == total else np.nan

@@ -12,7 +12,7 @@ from dlocore.discretisation import smallest_n_u
 from dlocore.effects.contact import DEEPEST
 from dlocore.events import smallest_n_t, time_knots
 from dlocore.grid import Grid
-from dlocore.kernels.timefit import sampled
+from dlocore.kernels.timefit import farthest, sampled
 from dlocore.problem import Problem, stiffer
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, march
 from dlocore.solvers.monitor import Monitor
@@ -203,5 +203,4 @@ def credible_after(level: Level) -> float:
 
 def distance(a: Level, b: Level, problem: Problem) -> float:
     """Return the largest distance between the surfaces of two levels [m]."""
-    away = (a.samples - b.samples)[..., : problem.plane.dimensions]
-    return float(np.sqrt((away * away).sum(axis=-1).max()))
+    return float(farthest(a.samples, b.samples, problem.plane.dimensions))
