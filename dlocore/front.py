@@ -300,6 +300,8 @@ def warm_up() -> None:
                 answer = predict(replace(scene, effects=effects))
                 _ = answer.message, answer.start_energy, [i.energy for i in answer.iterations]  # found as they are read
         equilibrium(scene, n_u=9)
+    smooth = Environment(drag=0.1, table=Table())
+    predict(Scene(cable=Cable.preset("paper"), shape=Points(points=arc), grasps=(grasp,), environment=smooth))
     loop = np.column_stack([np.cos(np.linspace(0.0, 7.0, 9)), np.sin(np.linspace(0.0, 7.0, 9)), 0.1 * u[:9, 0]])
     nearest_strands(uniform_knots(9, 1.0), loop[None], 3, 0.01, 0.03)
     still = Scene(cable=cable, shape=scene.shape, environment=Environment(gravity=(0.0, 0.0, 0.0)), horizon=1e-3)
