@@ -1,8 +1,8 @@
 """What a target error of a millimetre costs: `python -m benchmarks.targets [--repeats N] [--cases]`.
 
-A straight cable of a metre is moved sideways by half a metre in 1.6 s, without weight: three bending stiffnesses, four
-grasps, two drags, held by a point or by its direction too. Times are medians of whole calls of `predict`, on one core;
-the error is the largest distance to a march refined until it stands still.
+A straight cable of a metre on a frictionless table is moved sideways by half a metre in 1.6 s: three bending
+stiffnesses, four grasps, two drags, held by a point or by its direction too. Times are medians of whole calls of
+`predict`, on one core; the error is the largest distance to a march refined until it stands still.
 """
 
 import os
@@ -17,7 +17,7 @@ from itertools import product
 import numpy as np
 
 from benchmarks.machine import machine_line
-from dlocore import Cable, Environment, Grasp, Move, Quality, Scene, Straight, predict, warm_up
+from dlocore import Cable, Environment, Grasp, Move, Quality, Scene, Straight, Table, predict, warm_up
 from dlocore.scene import Hold
 from dlocore.study.judge import finest_march, largest_error
 
@@ -48,7 +48,7 @@ def scene(bending: float, grasp: float, drag: float, hold: Hold) -> Scene:
         cable=Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=bending),
         shape=Straight(),
         grasps=(Grasp(u=grasp, hold=hold, path=Move(displacement=(0.0, 0.5, 0.0), duration=1.6)),),
-        environment=Environment(gravity=(0.0, 0.0, 0.0), drag=drag),
+        environment=Environment(drag=drag, table=Table()),
         quality=Quality(target_error=TARGET),
     )
 
