@@ -55,7 +55,8 @@ def march_smooth(
     starts: Starts = {}
     close_grasps(problem, grid, grasps, starts, grid.start)
     _, rows, sampled = constraint_rows(grasps, times, starts)
-    straight = problem.scene.cable.rest_shape == "straight"
+    rest = problem.scene.cable.rest_shape
+    straight = isinstance(rest, str) and rest == "straight"
     info = np.zeros(SEEN)
     info[FAILED_STEP] = -1
     states, closed, forces, history, control, off = smooth_motion(

@@ -74,6 +74,7 @@ def solved(
         pytest.param(
             replace(SCENE, shape=Points(points=ARC), cable=replace(CABLE, rest_shape="initial")), id="bent by nature"
         ),
+        pytest.param(replace(SCENE, cable=replace(CABLE, rest_shape=ARC)), id="straightened"),
         pytest.param(replace(SCENE, shape=Straight(velocity=(0.0, 0.5, 0.0))), id="thrown"),
         pytest.param(replace(SCENE, cable=replace(CABLE, bending_damping=1e-4)), id="damped"),
         pytest.param(
