@@ -46,19 +46,20 @@ def march_level(
 
     On a `rough` grid, which another follows, strands that meet may do so because of the grid: it is left open. A march
     of this grid that is `known` is done again only for what was left open. Contact begins as stiff as the level
-    `before` had to make it, and strains are believed that are not far above its own. With `watch` the cable can't fold
-    within a span, see `run_level`.
+    `before` had to make it, strains are believed that are not far above its own, and a start that is to settle does so
+    from its start. With `watch` the cable can't fold within a span, see `run_level`.
     """
     called = dict(problem.called_for)
     while True:
         if free_knots:
             size = Size(max(size.n_u, smallest_n_u(problem)), max(size.n_t, smallest_n_t(problem)), size.steps)
-        stiffness, credible = 1.0, CREDIBLE_STRAIN
+        stiffness, credible, like = 1.0, CREDIBLE_STRAIN, None
         if before is not None and before.posed is problem:
-            stiffness, credible = hardness(before), credible_after(before)
+            stiffness, credible, like = hardness(before), credible_after(before), before.motion.grid
         level = known or run_level(
-            problem, *size, monitor, rho=rho, free_knots=free_knots, hardness=stiffness, credible=credible, watch=watch
-        )
+            problem, *size, monitor, rho=rho, free_knots=free_knots, hardness=stiffness, credible=credible,
+            watch=watch, like=like,
+        )  # fmt: skip
         if known is not None:
             new, known = dict(known.left_open), None
         else:

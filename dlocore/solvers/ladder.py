@@ -115,6 +115,7 @@ def run_level(
     credible: float = CREDIBLE_STRAIN,
     watch: bool = False,
     grid: Grid | None = None,
+    like: Grid | None = None,
     knots_t: Floats | None = None,
 ) -> Level:
     """March on one grid and fit the time spline.
@@ -130,13 +131,14 @@ def run_level(
         credible: axial strain up to which a march is believed.
         watch: watch over the stretch at more points, between which the cable can't fold.
         grid: with the start on it, where it is known.
+        like: another of the same problem, from whose start that of this one is settled.
         knots_t: time knots to begin with, where they are known.
     """
     posed = problem
     if hardness > 1.0:
         problem = stiffer(problem, hardness)
     if grid is None:
-        grid = start_grid(problem, n_u, monitor)
+        grid = start_grid(problem, n_u, monitor, like)
         grid = watched(grid) if watch else grid
     if knots_t is None:
         knots_t = time_knots(problem, n_t)
