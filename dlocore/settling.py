@@ -31,7 +31,7 @@ _ROUNDING = 1e-15  # of the axial stiffness: what it makes of a force
 _SPRINGS = 10.0  # times what weighs on the cable and bends it, per length: the springs of the first relaxation
 _CLOSE = 0.05  # of the first update of a relaxation, on the last: the next one follows it
 _WEAK = 2e-3  # of the first springs: those that hold back nothing, and whose relaxations end at TOLERANCE
-_NEARBY = 1e-5  # of them: the springs that a start found on another grid begins with
+_NEARBY = 1e-5  # of them: the springs that a start found on another grid begins with; it needs none as strong as they
 _STRONGEST = 1e6  # times them: the springs that Newton's method alone is tried with
 _STRONGER = 4.0  # times, where it fails
 _ITERATIONS = 60  # of a relaxation with a line search
@@ -119,6 +119,8 @@ def _relaxed(
                 if near:  # and no weaker springs hold it: at rest, if it is not pushed
                     return "settled"
                 strength *= _STRONGER
+                if share < 1.0 and strength > springs:
+                    return "restless"
                 plain = strength <= _STRONGEST * springs
                 continue
             scale = max(1.0, strength / springs)
