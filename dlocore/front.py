@@ -291,7 +291,7 @@ def warm_up() -> None:
                 answer = predict(replace(scene, effects=effects))
                 _ = answer.message, answer.start_energy, [i.energy for i in answer.iterations]  # found as they are read
         equilibrium(scene, n_u=9)
-    hangs = Scene(cable=cable, shape=Straight(direction=(0.0, 0.0, -1.0)), grasps=(Grasp(u=0.0),))
+    hangs = Scene(cable=cable, shape=Straight(direction=(0.0, 0.0, -1.0)), grasps=(Grasp(u=0.0),), horizon=1.0)
     equilibrium(hangs, n_u=9)  # in a plane, without contact
     loop = np.column_stack([np.cos(np.linspace(0.0, 7.0, 9)), np.sin(np.linspace(0.0, 7.0, 9)), 0.1 * u[:9, 0]])
     nearest_strands(uniform_knots(9, 1.0), loop[None], 3, 0.01, 0.03)
