@@ -1,7 +1,6 @@
 """March on finer and finer grids until two of them agree."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -64,7 +63,6 @@ class Level:
         missed: what the time spline misses of the march [m], but for moments such as a start that springs away.
         change: largest distance to the level before [m], infinite at the first.
         note: what was found on it, in words.
-        left_open: effects that it called for, and why, which a finer grid may do without.
         mended: what was done differently from other marches on a given grid as it failed on that one, in words.
     """
 
@@ -77,7 +75,6 @@ class Level:
     missed: float
     change: float
     note: str = ""
-    left_open: Mapping[str, str] = field(default_factory=dict)
     mended: str = ""
 
     @cached_property
