@@ -34,6 +34,7 @@ _WEAK = 2e-3  # of the first springs: those that hold back nothing, and whose re
 _NEARBY = 1e-5  # of them: the springs that a start found on another grid begins with; it needs none as strong as they
 _STRONGEST = 1e6  # times them: the springs that Newton's method alone is tried with
 _STRONGER = 4.0  # times, where it fails
+_COMES_TO_REST = 0.5  # of the relaxation before: a cable that moves less by so much is on its way to rest
 _ITERATIONS = 60  # of a relaxation with a line search
 _ROUGH = 1e-5  # of the length: the tolerance of the first of those, which others follow
 
@@ -101,7 +102,7 @@ def _relaxed(
     load = float(np.linalg.norm(problem.weight()))
     springs = _SPRINGS * (bending / length**4 + load / length) + 1e-9
     strength = searched = share * springs
-    plain, near, weak = problem.contact is None, False, False
+    plain, near, weak, moved = problem.contact is None, False, False, 0.0
     untouched = history._replace(tension=grid.history.tension)
     while rounds > 0:
         try:
@@ -138,11 +139,12 @@ def _relaxed(
         rounds -= 1
         if problem.twist is not None:
             remember(axes, q, tables, active, parameters, history, 0.0, True)
-        moved = scale * float(np.abs(q - before).max())
-        near = moved <= RESTING * length
+        last, moved = moved, float(np.abs(q - before).max())
+        near = scale * moved <= RESTING * length
         if near and update <= RESTING * length:  # rounding may keep a stiff cable from TOLERANCE
             return "settled"
-        if not near and (weak or not plain) and _only_turns(problem, grid, history, before, q, applied):
+        stays = moved > _COMES_TO_REST * last  # a turn that dies out ends where nothing drives it
+        if not near and stays and (weak or not plain) and _only_turns(problem, grid, history, before, q, applied):
             return "settled"
         plain = problem.contact is None
     return "restless"
