@@ -132,8 +132,7 @@ class _Climb:
             if level.motion.stopped == "time":
                 return Outcome(level, status, message, None)
             unfolds = self._affordable(_finer(size, "space", False)) if is_folded(level) else None
-            stuck = level.motion.stopped == "step" and self.number < len(LEVELS) - 1  # alike, as both stand still
-            if self.estimate <= ACCEPT * self.target and self.budget == np.inf and unfolds is None and not stuck:
+            if self.estimate <= ACCEPT * self.target and self.budget == np.inf and unfolds is None:
                 agreed = self._agreed(level) if status == "converged" else message
                 return Outcome(level, status, agreed, _parts(self.changes, level))
             finer = self._next(level, size, unfolds)
