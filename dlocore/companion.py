@@ -71,7 +71,7 @@ def _marched(problem: Problem, size: Size, level: Level, monitor: Monitor) -> tu
         return None, ""
     try:
         monitor.check()
-        other = run_level(problem, *size, monitor, booked=False)
+        other = run_level(problem, *size, monitor, booked=False, like=level.motion.grid)
     except TimeIsUp:
         return None, _TOO_LATE
     monitor.phase("estimate")

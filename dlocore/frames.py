@@ -32,17 +32,30 @@ def free_of_frames(problem: Problem, grid: Grid, states: Floats, frames: Floats)
     """
     if problem.twist is None:
         return states
+    free = states.copy()
+    free[:, :, 3] = angles_of(problem, grid, rates_of(problem, grid, states, frames), states[:, 0, 3])
+    return free
+
+
+def rates_of(problem: Problem, grid: Grid, states: Floats, frames: Floats) -> Floats:
+    """Return the twist rates (k, points) [rad/m] of the states (k, n_u, 4) at the curvature points, see above."""
     tau = np.empty((len(states), len(grid.tables.curvature_w)))
-    _, parameters = problem.law_table()
+    _, parameters = problem.laws
     twist_rates(np.ascontiguousarray(states), grid.tables, parameters, np.ascontiguousarray(frames), tau)
+    return tau
+
+
+def angles_of(problem: Problem, grid: Grid, rates: Floats, first: Floats) -> Floats:
+    """Return the fourth coordinates (k, n_u) [m] of which the first are given (k,) and the slopes are those of twist
+    rates (k, points) [rad/m] against frames without twist.
+    """
+    assert problem.twist is not None, "who asks for angles has some"
     root = np.sqrt(grid.tables.curvature_w)[:, None]
     slopes = np.zeros((len(root), grid.n_u))
     np.put_along_axis(slopes, grid.tables.curvature_first[:, None] + np.arange(4), grid.tables.curvature_b1, axis=1)
     slopes = mean_over_spans(grid.tables) @ slopes  # as the twist rates are
-    free = states.copy()
-    right = problem.twist.radius * tau - states[:, :1, 3] * slopes[:, 0]
-    free[:, 1:, 3] = right * root[:, 0] @ np.linalg.pinv(root * slopes[:, 1:]).T
-    return free
+    right = problem.twist.radius * rates - first[:, None] * slopes[:, 0]
+    return np.concatenate([first[:, None], right * root[:, 0] @ np.linalg.pinv(root * slopes[:, 1:]).T], axis=1)
 
 
 def free_control(problem: Problem, grid: Grid, knots_t: Floats, control: Floats, times: Floats, log: Floats) -> Floats:

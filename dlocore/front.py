@@ -274,7 +274,7 @@ def warm_up() -> None:
     from dlocore.effects.selfcontact import nearest_strands
     from dlocore.obstacles import Sphere
     from dlocore.paths import Move
-    from dlocore.scene import Environment, Grasp, Points, Switch, Table
+    from dlocore.scene import Environment, Grasp, Points, Straight, Switch, Table
     from dlocore.statics import equilibrium
 
     # yields at a bend that is not reached, rubs, and lies beside something: so all that looks for that is compiled, too
@@ -302,6 +302,8 @@ def warm_up() -> None:
         equilibrium(scene, n_u=9)
     smooth = Environment(drag=0.1, table=Table())
     predict(Scene(cable=Cable.preset("paper"), shape=Points(points=arc), grasps=(grasp,), environment=smooth))
+    hangs = Scene(cable=cable, shape=Straight(direction=(0.0, 0.0, -1.0)), grasps=(Grasp(u=0.0),), horizon=1.0)
+    equilibrium(hangs, n_u=9)  # in a plane, without contact
     loop = np.column_stack([np.cos(np.linspace(0.0, 7.0, 9)), np.sin(np.linspace(0.0, 7.0, 9)), 0.1 * u[:9, 0]])
     nearest_strands(uniform_knots(9, 1.0), loop[None], 3, 0.01, 0.03)
     still = Scene(cable=cable, shape=scene.shape, environment=Environment(gravity=(0.0, 0.0, 0.0)), horizon=1e-3)

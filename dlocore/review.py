@@ -31,28 +31,34 @@ MATTERS = 0.001  # of the length: what a neglected effect may move the cable bef
 _LOOKS = 5  # states of each stretch of a motion at which neglected forces are weighed
 
 
-def called_for(level: Level) -> dict[str, str]:
-    """Return the effects that `auto` has left out and the motion calls for, with the reason for each."""
+def called_for(level: Level, strands: bool = True) -> dict[str, str]:
+    """Return the effects that `auto` has left out and the motion calls for, with the reason for each.
+
+    Without `strands` it is left open whether they meet.
+    """
     problem, found = level.problem, {}
     switch = problem.scene.effects.get
     if not problem.choices["plasticity"].active and switch("plasticity", "auto") == "auto":
         found.update(_yields(level))
     if not problem.choices["obstacles"].active and switch("obstacles", "auto") == "auto":
         found.update(_touches(level))
-    credible = not level.motion.stopped and level.motion.largest_strain <= CREDIBLE_STRAIN
-    # a strand that lies on the table can be crossed by another on top of it
-    if (
-        credible
-        and not problem.on_table
-        and not problem.choices["self_contact"].active
-        and switch("self_contact", "auto") == "auto"
-    ):
-        found.update(_meets_itself(level))
+    if strands:
+        found.update(self_contact_called_for(level))
     if problem.inertia is None and switch("inertia", "auto") == "auto":
         moved = neglected(level)
         if moved > MATTERS * problem.scene.cable.length:
             found["inertia"] = f"without it a first solve is {moved * 1e3:.2g} mm off"
     return found
+
+
+def self_contact_called_for(level: Level) -> dict[str, str]:
+    """Return contact of the cable with itself, and why, where `auto` has left it out and the motion calls for it."""
+    problem = level.problem
+    credible = not level.motion.stopped and level.motion.largest_strain <= CREDIBLE_STRAIN
+    left_out = not problem.choices["self_contact"].active
+    automatic = problem.scene.effects.get("self_contact", "auto") == "auto"
+    # a strand that lies on the table can be crossed by another on top of it
+    return _meets_itself(level) if credible and left_out and automatic and not problem.on_table else {}
 
 
 def objections(level: Level) -> list[str]:

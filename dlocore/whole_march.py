@@ -9,7 +9,7 @@ from dlocore.events import smallest_n_t
 from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
 from dlocore.progress import record_level
-from dlocore.review import called_for
+from dlocore.review import called_for, self_contact_called_for
 from dlocore.solvers.ladder import CREDIBLE_STRAIN, Level, Size, credible_after, hardness, run_level
 from dlocore.solvers.march import RHO
 from dlocore.solvers.monitor import Monitor
@@ -42,27 +42,26 @@ def march_level(
 ) -> Level:
     """March on one grid; where the motion calls for effects that were left out, again with them.
 
-    On a `rough` grid, which another follows, strands that meet may do so because of the grid: it is left open. A march
-    of this grid that is `known` is done again only for what was left open. Contact begins as stiff as the level
-    `before` had to make it, and strains are believed that are not far above its own. With `watch` the cable can't fold
-    within a span, see `run_level`.
+    On a `rough` grid, which another follows, strands that meet may do so because of the grid: whether they do is left
+    open. A march of this grid that is `known` is done again only for that. Contact begins as stiff as the level
+    `before` had to make it, strains are believed that are not far above its own, and a start that is to settle does so
+    from its start. With `watch` the cable can't fold within a span, see `run_level`.
     """
     called = dict(problem.called_for)
     while True:
         if free_knots:
             size = Size(max(size.n_u, smallest_n_u(problem)), max(size.n_t, smallest_n_t(problem)), size.steps)
-        stiffness, credible = 1.0, CREDIBLE_STRAIN
+        stiffness, credible, like = 1.0, CREDIBLE_STRAIN, None
         if before is not None and before.posed is problem:
-            stiffness, credible = hardness(before), credible_after(before)
+            stiffness, credible, like = hardness(before), credible_after(before), before.motion.grid
         level = known or run_level(
-            problem, *size, monitor, rho=rho, free_knots=free_knots, hardness=stiffness, credible=credible, watch=watch
-        )
+            problem, *size, monitor, rho=rho, free_knots=free_knots, hardness=stiffness, credible=credible,
+            watch=watch, like=like,
+        )  # fmt: skip
         if known is not None:
-            new, known = dict(known.left_open), None
+            new, known = self_contact_called_for(level), None
         else:
-            new = {} if level.motion.stopped == "time" else called_for(level)
-        if rough and "self_contact" in new:
-            level = replace(level, left_open={"self_contact": new.pop("self_contact")})
+            new = {} if level.motion.stopped == "time" else called_for(level, strands=not rough)
         if not new:
             return level
         record_level(problem, replace(level, note=f"calls for {', '.join(new)}"), monitor)

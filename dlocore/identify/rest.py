@@ -16,8 +16,8 @@ from dlocore.identify.start import start_fit
 from dlocore.problem import pose
 from dlocore.recordings import Recording
 from dlocore.scene import ControlPoints, Grasp, Scene, Switch
+from dlocore.settling import settle
 from dlocore.solvers.monitor import Monitor
-from dlocore.statics import settle
 
 Floats = NDArray[np.float64]
 

@@ -1,4 +1,10 @@
-"""Minimise the stored energy of a held cable: start shapes and static equilibria."""
+"""Minimise the stored energy of a held cable: start shapes and static equilibria.
+
+A step that bends a cable which hardly stretches by more than a thousandth of its length stretches it, to second order,
+by an energy that is more than all else: a line search on the energy creeps. Newton's method with the tension as an
+unknown of its own (`tension.py`) does not, so `descend` has none; `relax` has one, for what has kinks or no tangent to
+rely on.
+"""
 
 from typing import Any
 
@@ -14,8 +20,11 @@ from dlocore.kernels.assembly import (
 )
 from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_matrix, reduce_vector, solve
 from dlocore.kernels.compile import kernel
+from dlocore.kernels.tension import point_on
 from dlocore.kernels.twisted import remember as carry
 
+_PLAIN_ITERATIONS = 8
+_SHRINKS = 0.5  # of the update before, from the third on: more is no convergence
 _HALVINGS = 30
 _DROWNED = 1e-9  # of the energy: differences of it that rounding may make where the cable hardly stretches
 
@@ -131,3 +140,70 @@ def relax(
         else:
             energy = _merit(axes, q, target, strength, applied, tables, active, p, history, w)
     return update, limit
+
+
+@kernel
+def descend(
+    axes: Any, q: Any, strength: float, applied: Any, tables: Any, active: Any, p: Any, history: Any, e: Any,
+    offset: Any, close: float, tolerance: float, resting: float,
+) -> Any:  # fmt: skip
+    """Minimise what `relax` does, with the spring towards q itself, by Newton's method alone; return the same.
+
+    Every tangent has to be positive, so that the cable walks downhill, and updates have to shrink. Where one is not, or
+    they don't, q (n, nc) and `history` are left as they were, and the update is infinite. `history.tension` holds the
+    tension that the first tangent takes, and on return that of q.
+
+    Args:
+        e, offset: elimination and prescribed part of the held degrees of freedom.
+        close: share of the first update, on the last one.
+        tolerance: on the last update, where that is less [m].
+        resting: updates below that need not shrink [m].
+    """
+    nc = len(axes)
+    n = q.shape[0]
+    size = n * nc
+    free = size - len(e.held)
+    K = np.empty((size, 4 * nc))
+    A = np.empty((free, e.width))
+    f = np.empty((n, nc))
+    still = np.zeros((n, nc))
+    x = np.empty(free)
+    change = np.empty(size)
+    step = change.reshape((n, nc))
+    target, past, memory, tension = q.copy(), history.past.copy(), history.memory.copy(), history.tension.copy()
+    place_held(e, offset, q.ravel())
+    largest = 0.25 * np.sum(tables.weight)  # a step no longer than a quarter of the cable
+    enough, previous = tolerance, np.inf
+    it = 0
+    while it < _PLAIN_ITERATIONS:
+        it += 1
+        assemble(axes, q, still, tables, active, p, history, NO_RATES, (1.0, 0.0, 1.0), f, K)
+        add_scalar_band(nc, tables.mass, strength, K)
+        reduce_matrix(e, K, A)
+        if factor(A) >= 0:
+            break
+        f -= applied
+        multiply_scalar_band(tables.mass, q - target, strength, f)
+        reduce_vector(e, f.ravel(), x)
+        for i in range(free):
+            x[i] = -x[i]
+        solve(A, x)
+        expand_vector(e, x, change)
+        update = np.max(np.abs(change))
+        stuck = it > 2 and update > _SHRINKS * previous
+        if not update < largest or (stuck and update > max(enough, resting)):
+            break
+        q += step
+        if nc == 4:
+            carry(q, tables, active, p, history.memory, history.past, 0.0)
+        point_on(nc, q, step, tables, history.tension)
+        if it == 1:
+            enough = max(tolerance, close * update)
+        if update <= enough or stuck:
+            return update, it
+        previous = update
+    q[:] = target
+    history.past[:] = past
+    history.memory[:] = memory
+    history.tension[:] = tension
+    return np.inf, it

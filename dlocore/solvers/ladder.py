@@ -1,7 +1,6 @@
 """March on finer and finer grids until two of them agree."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -65,7 +64,6 @@ class Level:
         missed: what the time spline misses of the march [m], but for moments such as a start that springs away.
         change: largest distance to the level before [m], infinite at the first.
         note: what was found on it, in words.
-        left_open: effects that it called for, and why, which a finer grid may do without.
         mended: what was done differently from other marches on a given grid as it failed on that one, in words.
     """
 
@@ -78,7 +76,6 @@ class Level:
     missed: float
     change: float
     note: str = ""
-    left_open: Mapping[str, str] = field(default_factory=dict)
     mended: str = ""
 
     @cached_property
@@ -116,6 +113,7 @@ def run_level(
     credible: float = CREDIBLE_STRAIN,
     watch: bool = False,
     grid: Grid | None = None,
+    like: Grid | None = None,
     knots_t: Floats | None = None,
 ) -> Level:
     """March on one grid and fit the time spline.
@@ -131,13 +129,14 @@ def run_level(
         credible: axial strain up to which a march is believed.
         watch: watch over the stretch at more points, between which the cable can't fold.
         grid: with the start on it, where it is known.
+        like: another of the same problem, from whose start that of this one is settled.
         knots_t: time knots to begin with, where they are known.
     """
     posed = problem
     if hardness > 1.0:
         problem = stiffer(problem, hardness)
     if grid is None:
-        grid = start_grid(problem, n_u, monitor)
+        grid = start_grid(problem, n_u, monitor, like)
         grid = watched(grid) if watch else grid
     if knots_t is None:
         knots_t = time_knots(problem, n_t)

@@ -1,0 +1,162 @@
+"""Starts that settle: Newton's method alone against a line search, and one grid's start from another's."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.catalogue import catalogue
+from benchmarks.hard.generator import draw
+from dlocore import Cable, Environment, Grasp, Points, Scene, predict
+from dlocore.discretisation import applied_forces, make_grid
+from dlocore.grid import Grid
+from dlocore.holding import Starts, close_grasps, hold
+from dlocore.kernels.relax import descend, relax
+from dlocore.kernels.tension import COLUMNS
+from dlocore.problem import Problem, pose
+from dlocore.regrid import begin_on
+from dlocore.solvers.monitor import Monitor
+from dlocore.spline import design_matrix
+from dlocore.statics import start_grid
+from tests.solver.scenes import WEIGHTLESS, Floats, arc, cable
+from tests.solver.test_handling import spanned_between_two
+from tests.solver.test_two_grippers import hanging
+
+
+def shape_of(problem: Problem, grid: Grid) -> Floats:
+    """Return 65 points along the start of a grid (65, 2 or 3) [m]."""
+    u = np.linspace(0.0, problem.scene.cable.length, 65)
+    return design_matrix(grid.knots, u) @ grid.start[:, : problem.plane.dimensions]
+
+
+def apart(problem: Problem, a: Grid, b: Grid) -> float:
+    """Return the largest distance between two starts, of the cable's length."""
+    away = np.linalg.norm(shape_of(problem, a) - shape_of(problem, b), axis=1)
+    return float(away.max()) / problem.scene.cable.length
+
+
+def relaxed(problem: Problem, springs: float, *, plain: bool) -> tuple[Floats, float]:
+    """Return control points (17, nc) of the given start after one relaxation, and its last update [m]."""
+    grid = make_grid(problem, 17)
+    starts: Starts = {}
+    grasps = list(problem.scene.grasps)
+    close_grasps(problem, grid, grasps, starts, None)
+    q = grid.start.copy()
+    held = hold(problem, grid, grasps, np.zeros(1), starts, q)
+    applied = applied_forces(problem, grid, np.zeros(1))[0]
+    active, parameters = problem.law_table()
+    if plain:
+        history = grid.past()._replace(tension=np.zeros((len(grid.tables.axial_w), COLUMNS)))
+        update, _ = descend(
+            problem.axes, q, springs, applied, grid.tables, active, parameters, history, held.elimination,
+            held.offsets[0], 0.0, 1e-12, 1e-10,
+        )  # fmt: skip
+    else:
+        update, _ = relax(
+            problem.axes, q, grid.start, springs, applied, grid.tables, active, parameters, grid.past(),
+            held.elimination, held.offsets[0], 1e-12, 200,
+        )  # fmt: skip
+    return q, update
+
+
+@pytest.mark.parametrize("hold", ["point", "tangent", "clamp"])
+def test_newtons_method_alone_finds_what_the_line_search_finds(hold):
+    problem = pose(hanging(hold))
+    plain, update = relaxed(problem, 20.0, plain=True)
+    searched, _ = relaxed(problem, 20.0, plain=False)
+    assert update <= 1e-10
+    # both end with updates below 1e-10 m, whose tangents are as good
+    np.testing.assert_allclose(plain, searched, atol=1e-9)
+
+
+def test_newtons_method_alone_leaves_all_as_it_was_where_no_tangent_is_positive():
+    pushed = Points(points=arc(1.0, 0.01)[:, [0, 2, 1]])
+    heavy = Environment(gravity=(-300.0, 0.0, 0.0))  # along the cable, from its far end to the one that is held
+    scene = Scene(cable=cable(), shape=pushed, grasps=(Grasp(u=0.0, hold="tangent"),), environment=heavy, horizon=1.0)
+    problem = pose(scene)
+    q, update = relaxed(problem, 1e-6, plain=True)
+    assert update == np.inf
+    np.testing.assert_array_equal(q, make_grid(problem, 17).start)
+
+
+SETTLED = {
+    "plane": "cable carried high above a table",
+    "space": "two grippers carry a hanging cable",
+    "clamps": "clamped hanging cable with one end moved",
+    "load": "long cable with a hanging load",
+    "three grasps": "heavy electric cable held at three places",
+    "tangents": "white wire between two grippers in space",
+}
+
+
+@pytest.mark.parametrize("name", SETTLED.values(), ids=SETTLED)
+def test_a_start_settled_from_that_of_another_grid_is_the_one_settled_from_the_given_shape(name):
+    problem = pose(catalogue()[name])
+    coarse = start_grid(problem, 13, Monitor())
+    own, handed = start_grid(problem, 22, Monitor()), start_grid(problem, 22, Monitor(), coarse)
+    assert begin_on(problem, make_grid(problem, 22), coarse) is not None
+    assert apart(problem, coarse, own) > 1e-7  # the grids differ, or nothing is shown
+    # rest is found to 1e-8 of the length; the frames of sections are carried another way, to the same
+    assert apart(problem, handed, own) < 1e-7
+
+
+def test_a_start_settles_in_the_equilibrium_of_the_grid_it_is_handed_on_from():
+    bow = arc(1.0, 2.0)[:, [0, 2, 1]]
+    grasps = (Grasp(u=0.0), Grasp(u=1.0))
+    scene = Scene(
+        cable=cable(), shape=Points(points=bow, settle=True), grasps=grasps, environment=WEIGHTLESS, horizon=1.0
+    )
+    problem = pose(scene)
+    up = start_grid(problem, 13, Monitor())
+    ends = up.start[[0, -1]]
+    along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+    rise = (up.start - ends[0]) - np.outer((up.start - ends[0]) @ along, along)
+    down = replace(up, start=up.start - 2.0 * rise)
+    own, handed = start_grid(problem, 22, Monitor()), start_grid(problem, 22, Monitor(), down)
+    assert apart(problem, own, up) < 1e-3  # what 13 control points err by
+    assert apart(problem, handed, down) < 1e-3
+    assert apart(problem, handed, own) > 0.2
+
+
+def test_a_start_that_coarse_grids_fold_is_not_handed_on():
+    # a stiff loop hung from a point straightens and hangs; on 13 control points it stays folded within a span
+    problem = pose(draw(4, 182).make())
+    folded = start_grid(problem, 13, Monitor())
+    own = start_grid(problem, 28, Monitor())
+    assert apart(problem, folded, own) > 0.2
+    assert apart(problem, start_grid(problem, 28, Monitor(), folded), own) < 1e-3
+
+
+def test_a_stiff_loop_that_has_two_equilibria_has_one_start_on_all_grids():
+    # seed 5, scene 160: it stood between its grippers on some grids, and hung on others
+    prediction = predict(draw(5, 160).make())
+    assert prediction.status == "converged", prediction.message
+
+
+@pytest.mark.parametrize("n_u", [9, 13, 22, 41])
+@pytest.mark.parametrize("moved", [0.0, 1e-3, 2e-2])
+def test_a_stiff_wire_that_may_turn_about_itself_settles_on_any_grid_from_any_start_near(n_u, moved):
+    scene = replace(spanned_between_two(), effects={"twist": "on"})
+    points = np.asarray(scene.shape.points)  # type: ignore[union-attr]
+    nearby = points + moved * np.sin(np.outer(np.arange(len(points)), [0.11, 0.07, 0.05]))
+    problem = pose(replace(scene, shape=Points(points=nearby, settle=True)))
+    grid = start_grid(problem, n_u, Monitor())  # a SceneError where it finds no rest
+    bow = shape_of(problem, grid)
+    assert grid.largest_strain(grid.start[None]) < 1e-6  # its forces are some EI/L^2 = 0.02 N, EA is 1e7 N
+    if n_u >= 22:
+        exact = shape_of(problem, start_grid(problem, 65, Monitor()))
+        # it may lie at any angle about the line between its grippers: distances to one of them are the same
+        for end in (6, 51):
+            reach, known = (np.linalg.norm(x - x[end], axis=1) for x in (bow, exact))
+            np.testing.assert_allclose(reach, known, atol=2e-3 * problem.scene.cable.length)
+
+
+def test_a_cable_that_hardly_stretches_settles_as_one_that_stretches_more():
+    # EA L^2/EI = 1e9 and 1e5: what the cable bends is the same but for its strain, some 1e-6 and 1e-2
+    shapes = []
+    for axial in (1e6, 1e3):
+        wire = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-3, axial_stiffness=axial)
+        problem = pose(replace(hanging("point"), cable=wire))
+        shapes.append((problem, start_grid(problem, 28, Monitor())))
+    (problem, stiff), (_, soft) = shapes
+    assert apart(problem, stiff, soft) < 1e-3  # its weight of 0.5 N strains the softer one by 5e-4
