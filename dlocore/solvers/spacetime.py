@@ -104,7 +104,7 @@ class WindowSolver:
         axial_stiffness: float,
         monitor: Monitor,
     ) -> None:
-        self.problem, self.grid, self.window, self.monitor = problem, grid, window, monitor
+        self.problem, self.grid, self.motion, self.monitor = problem, grid, motion, monitor
         self.nc = problem.nc
         self.times, weights, first, table, fine = collocation(window.knots)
         active, parameters = problem.law_table()
@@ -185,10 +185,12 @@ class WindowSolver:
 
     def forces(self, control: Floats) -> Callable[[], WindowForces]:
         """Return what finds what holds the cable at `control`."""
-        return partial(_window_forces, self.held, self.times, self.equations, control)
+        lean = self.equations._replace(histories=None)  # the motion knows them, and is kept
+        return partial(_window_forces, self.held, self.times, lean, self.motion, control)
 
 
-def _window_forces(held: Held, times: Floats, equations: Equations, control: Floats) -> WindowForces:
+def _window_forces(held: Held, times: Floats, lean: Equations, motion: March, control: Floats) -> WindowForces:
+    equations = lean._replace(histories=motion.behind(times))
     return WindowForces(held, times, *holding_forces(equations, control))
 
 
