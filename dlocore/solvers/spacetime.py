@@ -32,7 +32,7 @@ from dlocore.solvers.monitor import Monitor
 
 Floats = NDArray[np.float64]
 
-MAX_ITERATIONS = 40
+MAX_ITERATIONS = 60
 _CHUNK = 1.5e7  # about the multiplications between two looks at the clock
 _HISTORY = 4  # iterates that Anderson acceleration combines
 _FRESH = 2  # iterations that have their own normal matrix, at least; after them a matrix serves twice, at least
