@@ -29,6 +29,7 @@ from dlocore.spline import uniform_knots
 from dlocore.whole_march import MISSED_COUNTS, TORN, Outcome, march_status
 
 Floats = NDArray[np.float64]
+FindForces = tuple[Callable[[], WindowForces], ...]
 
 
 def predict(
@@ -127,11 +128,16 @@ def _least_squares(
         last[0] = control
         record(problem, level, control, update, residual, monitor, damping, length, method)
 
-    forces: tuple[WindowForces, ...] | None = None
+    find_forces: FindForces | None = None
     try:
         if method == "spacetime":
             solved = solve(problem, level.motion, knots_t, quality.delta, monitor, on_step)
-            control, converged, update, forces = solved.control, solved.converged, solved.update, solved.forces
+            control, converged, update, find_forces = (
+                solved.control,
+                solved.converged,
+                solved.update,
+                solved.find_forces,
+            )
         else:
             control, converged, update = solve_as_printed(
                 problem, level.motion, knots_t, quality.delta, monitor, on_step
@@ -154,7 +160,7 @@ def _least_squares(
         message += " The least squares does not know of contact of the cable with itself; method march does."
     if not converged and method == "spacetime":
         level = evenly_fitted(level)
-        control, forces, left = level.control, None, level.motion.update
+        control, find_forces, left = level.control, None, level.motion.update
         if quality.method == "auto":
             method, status, found = "march", *given_status(level)
             spent = monitor.phases["spacetime"]
@@ -171,11 +177,11 @@ def _least_squares(
     level = replace(level, control=control)
     if again is not None:
         errors = None if again.errors is None else {**again.errors, "iteration": left}
-        return _answer(monitor, method, Outcome(level, status, message + again.said, errors), forces, again.judged)
+        return _answer(monitor, method, Outcome(level, status, message + again.said, errors), find_forces, again.judged)
     known = quality.estimate and (method != "paper" or converged)
     estimate, doubt = by_finer(problem, level, monitor) if known else (None, "")
     errors = None if estimate is None else {"grid": estimate, "iteration": left}
-    return _answer(monitor, method, Outcome(level, status, message + doubt, errors), forces)
+    return _answer(monitor, method, Outcome(level, status, message + doubt, errors), find_forces)
 
 
 def _check_n_t(problem: Problem, n_t: int) -> None:
@@ -204,7 +210,7 @@ def _answer(
     monitor: Monitor,
     method: str,
     outcome: Outcome,
-    forces: tuple[WindowForces, ...] | None = None,
+    find_forces: FindForces | None = None,
     judged: Prediction | None = None,
 ) -> Prediction:
     level = outcome.level
@@ -221,7 +227,7 @@ def _answer(
         status=outcome.status,
         said=outcome.message,
         surface=surface,
-        report_grasps=partial(_reactions, level, forces),
+        report_grasps=partial(_reactions, level, find_forces),
         report_effects=partial(effect_reports, problem, grid, partial(_material, problem, level)),
         report_material=partial(_material, problem, level),
         iterations=tuple(monitor.iterations),
@@ -247,8 +253,9 @@ def _answer(
     )
 
 
-def _reactions(level: Level, forces: tuple[WindowForces, ...] | None) -> tuple[GraspReaction, ...]:
-    return reactions(level.problem, level.motion.grid, level.motion.forces if forces is None else forces)
+def _reactions(level: Level, find_forces: FindForces | None) -> tuple[GraspReaction, ...]:
+    windows = level.motion.forces if find_forces is None else tuple(find() for find in find_forces)
+    return reactions(level.problem, level.motion.grid, windows)
 
 
 def _start_energy(level: Level) -> float:

@@ -37,43 +37,6 @@ def factor(A: Any) -> int:
 
 
 @kernel
-def factor_columns(A: Any, start: int, stop: int) -> int:
-    """Factor the columns `start` to `stop` of a wide band A, those before them being factored; return as `factor`.
-
-    They go by fours, so that what lies behind them is passed over a quarter as often.
-    """
-    n, width = A.shape
-    for j in range(start, stop, 4):
-        panel = min(4, stop - j)
-        for p in range(panel):
-            if not A[j + p, 0] > 0.0:
-                return j + p
-            last = min(width, n - j - p)
-            for i in range(1, min(panel - p, last)):
-                ratio = A[j + p, i] / A[j + p, 0]
-                for k in range(i, last):
-                    A[j + p + i, k - i] -= ratio * A[j + p, k]
-        for t in range(panel, min(width - 1 + panel, n - j)):
-            row = A[j + t]
-            common = max(0, min(width - t, n - j - t)) if panel == 4 else 0
-            if common > 0:
-                a0, a1, a2, a3 = A[j, t:], A[j + 1, t - 1 :], A[j + 2, t - 2 :], A[j + 3, t - 3 :]
-                r0, r1, r2, r3 = a0[0] / A[j, 0], a1[0] / A[j + 1, 0], a2[0] / A[j + 2, 0], a3[0] / A[j + 3, 0]
-                for k in range(common):
-                    row[k] -= r0 * a0[k] + r1 * a1[k] + r2 * a2[k] + r3 * a3[k]
-            for p in range(panel):  # the columns do not reach equally far
-                if t - p < width:
-                    rest = A[j + p, t - p :]
-                    ratio = rest[0] / A[j + p, 0]
-                    for k in range(common, min(len(rest), n - j - t)):
-                        row[k] -= ratio * rest[k]
-        for p in range(panel):
-            for i in range(1, min(width, n - j - p)):
-                A[j + p, i] /= A[j + p, 0]
-    return -1
-
-
-@kernel
 def solve(A: Any, x: Any) -> None:
     """Solve L D L' x = b in place with the factors of `factor`."""
     n, width = A.shape
@@ -225,6 +188,13 @@ def place_held(e: Any, offset: Any, q: Any) -> None:
         for s in range(e.start[k], e.start[k + 1]):
             value += e.coefficient[s] * q[e.dof[s]]
         q[e.held[k]] = value
+
+
+@brief
+def place_rows(e: Any, offsets: Any, C: Any, begin: int) -> None:
+    """Set the held degrees of freedom of C[begin:] (n_t, n, nc) from the free ones and `offsets` (n_t, m)."""
+    for j in range(begin, len(C)):
+        place_held(e, offsets[j], C[j].ravel())
 
 
 @kernel

@@ -1,13 +1,69 @@
-"""Compiled blocks of the space-time least squares: residuals and normal equations over all collocation points."""
+"""Compiled normal equations of the space-time least squares, over all collocation points."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from dlocore.effects.laws import has_viscosity
 from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, history_at, multiply_scalar_band
-from dlocore.kernels.banded import factor, reduce_matrix, reduce_vector, solve_rows
-from dlocore.kernels.compile import kernel
+from dlocore.kernels.banded import reduce_matrix, reduce_vector, solve_rows
+from dlocore.kernels.basis import GAUSS_2, basis_rows
+from dlocore.kernels.compile import brief, kernel
+from dlocore.kernels.narrow import ROOM, factor_step, solve_step
+
+POINTS = 2  # collocation points in each time span
+
+
+class Equations(NamedTuple):
+    """The equations of motion at the collocation points of a window.
+
+    Attributes:
+        axes: (0, 1), (0, 1, 2) or (0, 1, 2, 3).
+        first, table: (k,), (k, 3, 4): time basis functions and two derivatives at the points, POINTS in each span.
+        weights: (k,) [s].
+        h: length of a time span [s].
+        unit: (n, 4) mass matrix of unit density; `density` [kg/m] and `dragged` [N s/m^2] are those of the cable.
+        tables: `basis.Tables`.
+        active, p: switches and parameters of the laws.
+        histories: `History` with arrays (1 or k, ...), what lies behind each point.
+        applied: (1 or k, n, nc) [N].
+        e: elimination of the held degrees of freedom.
+    """
+
+    axes: Any
+    first: Any
+    table: Any
+    weights: Any
+    h: float
+    unit: Any
+    density: float
+    dragged: float
+    tables: Any
+    active: Any
+    p: Any
+    histories: Any
+    applied: Any
+    e: Any
+
+
+@brief
+def collocation(knots: Any) -> Any:
+    """Return the Gauss points of the time spans between `knots` [s].
+
+    Returns:
+        the points (k,) [s], POINTS in each span, their weights (k,) [s], first control points (k,) and basis functions
+        with two derivatives (k, 3, 4) there; and even times (6 k / POINTS + 1,) from the first to the last knot.
+    """
+    times, weights = np.empty(POINTS * len(knots)), np.empty(POINTS * len(knots))
+    k = 0
+    for s in range(len(knots) - 1):
+        half = 0.5 * (knots[s + 1] - knots[s])
+        for g in range(POINTS if half > 0.0 else 0):
+            times[k], weights[k] = knots[s] + half * (1.0 + GAUSS_2[0][g]), half * GAUSS_2[1][g]
+            k += 1
+    first, table = basis_rows(knots, times[:k], 2)
+    even = np.linspace(knots[0], knots[-1], 6 * (k // POINTS) + 1)
+    return times[:k].copy(), weights[:k].copy(), first, table, even
 
 
 @kernel
@@ -21,29 +77,62 @@ def band_to_dense(A: Any, out: Any) -> None:
             out[j, j + o] = A[j, o]
 
 
+class Sparse(NamedTuple):
+    """A symmetric matrix: its diagonal (n,), and rows, columns and values (m,) of what is right of it and not zero."""
+
+    diagonal: Any
+    row: Any
+    column: Any
+    value: Any
+
+
 @kernel
-def _times_band(B: Any, X: Any, out: Any) -> None:
-    """Write B X (n, m) for the symmetric banded B (n, width)."""
-    n, width = B.shape
-    m = X.shape[1]
-    out[:] = 0.0
+def _sparse(A: Any) -> Any:
+    """Return the symmetric banded A (n, width) as `Sparse`."""
+    n, width = A.shape
+    row, column, value = np.empty(n * width, np.int64), np.empty(n * width, np.int64), np.empty(n * width)
+    k = 0
     for j in range(n):
-        s = B[j, 0]
-        for c in range(m):
-            out[j, c] += s * X[j, c]
-        for i in range(1, min(width, n - j)):
-            s = B[j, i]
-            for c in range(m):
-                out[j, c] += s * X[j + i, c]
-            for c in range(m):
-                out[j + i, c] += s * X[j, c]
+        for o in range(1, min(width, n - j)):
+            if A[j, o] != 0.0:
+                row[k], column[k], value[k] = j, j + o, A[j, o]
+                k += 1
+    return Sparse(A[:, 0].copy(), row[:k].copy(), column[:k].copy(), value[:k].copy())
 
 
 @kernel
-def _products(X: Any, Y: Any, symmetric: bool, out: Any) -> None:
-    """Write X' Y (m, m), of which half is computed where it is symmetric.
+def _times(B: Any, x: Any, out: Any) -> None:
+    """Write B x (n,) for a `Sparse` B."""
+    for j in range(len(B.diagonal)):
+        out[j] = B.diagonal[j] * x[j]
+    for k in range(len(B.value)):
+        i, j, s = B.row[k], B.column[k], B.value[k]
+        out[i] += s * x[j]
+        out[j] += s * x[i]
 
-    Four rows at a time, to pass less often over the result.
+
+@kernel
+def _times_rows(B: Any, X: Any, out: Any) -> None:
+    """Write B X (n, m) for a `Sparse` B."""
+    n, m = X.shape
+    for j in range(n):
+        s = B.diagonal[j]
+        for c in range(m):
+            out[j, c] = s * X[j, c]
+    for k in range(len(B.value)):
+        i, j, s = B.row[k], B.column[k], B.value[k]
+        for c in range(m):
+            out[i, c] += s * X[j, c]
+        for c in range(m):
+            out[j, c] += s * X[i, c]
+
+
+@kernel
+def _products(X: Any, Y: Any, out: Any) -> None:
+    """Write X' Y (m, m).
+
+    Four rows at a time, to pass less often over the result, and whole rows also where it is symmetric: half rows, that
+    begin anywhere, take longer up to 40 columns and hardly less beyond.
     """
     n, m = X.shape
     out[:] = 0.0
@@ -52,153 +141,145 @@ def _products(X: Any, Y: Any, symmetric: bool, out: Any) -> None:
         for i in range(m):
             row = out[i]
             s0, s1, s2, s3 = X[r, i], X[r + 1, i], X[r + 2, i], X[r + 3, i]
-            for j in range(i if symmetric else 0, m):
+            for j in range(m):
                 row[j] += s0 * y0[j] + s1 * y1[j] + s2 * y2[j] + s3 * y3[j]
     for r in range(n - n % 4, n):
         for i in range(m):
             s = X[r, i]
-            for j in range(i if symmetric else 0, m):
+            for j in range(m):
                 out[i, j] += s * Y[r, j]
-    if symmetric:
-        for i in range(m):
-            for j in range(i):
-                out[i, j] = out[j, i]
 
 
 @kernel
 def states_at(first: Any, table: Any, C: Any, out: Any) -> None:
     """Write q, v and a (3, n, nc) of the control points C (n_t, n, nc) with basis `table` (3, 4) from `first`."""
-    out[:] = 0.0
     for o in range(3):
-        for j in range(4):
-            s = table[o, j]
-            for i in range(out.shape[1]):
-                for d in range(out.shape[2]):
-                    out[o, i, d] += s * C[first + j, i, d]
+        b0, b1, b2, b3 = table[o, 0], table[o, 1], table[o, 2], table[o, 3]
+        for i in range(out.shape[1]):
+            for d in range(out.shape[2]):
+                out[o, i, d] = (
+                    b0 * C[first, i, d] + b1 * C[first + 1, i, d] + b2 * C[first + 2, i, d] + b3 * C[first + 3, i, d]
+                )
 
 
 @kernel
-def normal_equations(
-    axes: Any, C: Any, first: Any, table: Any, weights: Any, h: float, unit: Any, density: float, dragged: float,
-    tables: Any, active: Any, p: Any, histories: Any, applied: Any, e: Any, A: Any, right: Any, forces: Any,
-    matrix: bool, begin: int, end: int,
-) -> float:  # fmt: skip
-    """Add points to the normal equations of the weighted least squares at C; return their part of the objective [J].
+def _add_inertia(eq: Any, k: int, state: Any, moved: Any, f: Any) -> None:
+    """Add inertia, linear drag and applied forces of the point k to the internal forces f (n, nc) [N]."""
+    load = eq.applied[min(k, len(eq.applied) - 1)]
+    for i in range(f.shape[0]):
+        for d in range(f.shape[1]):
+            f[i, d] -= load[i, d]
+            moved[i, d] = eq.density * state[2, i, d] + eq.dragged * state[1, i, d]
+    multiply_scalar_band(eq.unit, moved, 1.0, f)
 
-    The objective is (1/T) sum_k w_k |W_k Z' R_k|^2 with the residual R = M a + C v + f(q, v) - F of the motion at the
-    collocation point k and W'W = G^-1 B G^-1, B = 12/h^2 M + 2/h C, G = B + K+ + 2/h N (docs/model.md eq. 16).
+
+@kernel
+def holding_forces(eq: Any, C: Any) -> Any:
+    """Return what holds the cable at the collocation points (k, held) [N], and their states (k, n, nc) [m]."""
+    nc, n, held = len(eq.axes), C.shape[1], eq.e.held
+    forces, states = np.empty((len(eq.first), len(held))), np.empty((len(eq.first), n, nc))
+    f, K, moved, state = np.empty((n, nc)), np.empty((1, 1)), np.empty((n, nc)), np.empty((3, n, nc))
+    for k in range(len(eq.first)):
+        states_at(eq.first[k], eq.table[k], C, state)
+        history = history_at(eq.histories, k)
+        assemble(eq.axes, state[0], state[1], eq.tables, eq.active, eq.p, history, NO_RATES, (0.0, 0.0, 0.0), f, K)
+        _add_inertia(eq, k, state, moved, f)
+        states[k] = state[0]
+        for i in range(len(held)):
+            forces[k, i] = f[held[i] // nc, held[i] % nc]
+    return forces, states
+
+
+@kernel
+def normal_equations(eq: Any, C: Any, A: Any, right: Any, matrix: bool, begin: int, end: int) -> float:
+    """Add time spans to the normal equations of the weighted least squares at C; return their part of the objective.
+
+    The objective [J] is (1/T) sum_k w_k |W_k Z' R_k|^2 with the residual R = M a + C v + f(q, v) - F of the motion at
+    the collocation point k and W'W = G^-1 B G^-1, B = 12/h^2 M + 2/h C, G = B + K+ + 2/h N (docs/model.md eq. 16).
 
     Masses and linear drag are parts of B, and K+ = G - B - 2/h N, so that by the control point with basis function c
     G^-1 dR = c I + d S + e V, with S = G^-1 B, V = G^-1 N and numbers d, e. The products of three matrices serve all
     pairs of control points, and B S and S' B S are symmetric. The right side alone takes none: S' y = B G^-1 y.
 
     Args:
-        axes: (0, 1), (0, 1, 2) or (0, 1, 2, 3).
+        eq: `Equations`.
         C: control points (n_t, n, nc) [m]; the first two are given.
-        first, table: (k,), (k, 3, 4): time basis functions and two derivatives at the collocation points.
-        weights: (k,) [s].
-        h: length of a time span [s].
-        unit: (n, 4) mass matrix of unit density; `density` [kg/m] and `dragged` [N s/m^2] are those of the cable.
-        histories: `History` with arrays (1 or k, ...), what lies behind each collocation point.
-        applied: (1 or k, n, nc) [N].
-        e: elimination of the held degrees of freedom.
-        A, right: normal matrix, banded ((n_t - 2) free, 4 free), and right side, which are added to.
-        forces: (k, held) residual at the held degrees of freedom: the forces that hold them [N]; written.
+        A, right: normal matrix, (n_t - 2, free, 4 free), see `blocks.py`, and right side, which are added to.
         matrix: whether A is wanted; else it is left alone.
-        begin, end: collocation points to add.
+        begin, end: time spans to add.
     """
-    nc = len(axes)
-    n = C.shape[1]
+    nc, n, e, h = len(eq.axes), C.shape[1], eq.e, eq.h
     size = n * nc
     free = size - len(e.held)
-    f = np.empty((n, nc))
-    full = np.zeros((size, 4 * nc))
-    K = np.empty((size, 4 * nc))
-    N, B, G = np.empty((free, e.width)), np.empty((free, e.width)), np.empty((free, e.width))
-    weight = 12.0 / (h * h) * density + 2.0 / h * dragged
-    add_scalar_band(nc, unit, weight, full)
-    reduce_matrix(e, full, B)
+    f, moved, state = np.empty((n, nc)), np.empty((n, nc)), np.empty((3, n, nc))
+    K = np.zeros((size, 4 * nc))
+    G, N, band = np.zeros((free + ROOM, e.width)), np.zeros((free, e.width)), np.empty((free, e.width))
+    weight = 12.0 / (h * h) * eq.density + 2.0 / h * eq.dragged
+    add_scalar_band(nc, eq.unit, weight, K)
+    reduce_matrix(e, K, band)
+    B = _sparse(band)
     many = free if matrix else 0
-    S, P, Q = np.empty((many, many)), np.empty((many, many)), np.empty((many, many))
-    dense = np.empty((many, many))
+    dense, S = np.empty((many, many)), np.empty((many, many))
+    P, Q = np.empty((POINTS, many, many)), np.empty((POINTS, many, many))
     if matrix:
-        band_to_dense(B, dense)
-    viscous = has_viscosity(active)
+        band_to_dense(band, dense)
+    viscous = has_viscosity(eq.active)
     wide = many if viscous else 0
     V, BV, SBV, VBV = np.empty((wide, wide)), np.empty((wide, wide)), np.empty((wide, wide)), np.empty((wide, wide))
-    r, y, z = np.empty((free, 1)), np.empty((free, 1)), np.empty((free, 1))
-    Bz, Nz = np.empty((free, 1)), np.zeros((free, 1))  # S' y and V' y
-    state = np.empty((3, n, nc))
+    r, y, Bz, Nz = np.zeros(free + ROOM), np.empty(free), np.empty(free), np.zeros(free)  # S' y and V' y
+    parts = np.empty((POINTS, 4, 3))
     objective = 0.0
-    total = np.sum(weights)
-    for k in range(begin, end):
-        states_at(first[k], table[k], C, state)
-        q, v, a = state[0], state[1], state[2]
-        history = history_at(histories, k)
-        assemble(axes, q, v, tables, active, p, history, NO_RATES, (1.0, 0.0, 0.0), f, K)
-        reduce_matrix(e, K, G)
-        G += B
+    total = np.sum(eq.weights)
+    for k in range(POINTS * begin, POINTS * end):
+        states_at(eq.first[k], eq.table[k], C, state)
+        q, v = state[0], state[1]
+        history = history_at(eq.histories, k)
+        assemble(eq.axes, q, v, eq.tables, eq.active, eq.p, history, NO_RATES, (1.0, 0.0, 0.0), f, K)
+        reduce_matrix(e, K, G[:free])
+        for i in range(free):
+            for o in range(e.width):
+                G[i, o] += band[i, o]
         if viscous:
-            assemble(axes, q, v, tables, active, p, history, NO_RATES, (0.0, 1.0, 0.0), f, K)
+            assemble(eq.axes, q, v, eq.tables, eq.active, eq.p, history, NO_RATES, (0.0, 1.0, 0.0), f, K)
             reduce_matrix(e, K, N)
-            G += 2.0 / h * N
-        factor(G)
-        multiply_scalar_band(unit, a, density, f)
-        multiply_scalar_band(unit, v, dragged, f)
-        f -= applied[min(k, len(applied) - 1)]
-        for i in range(len(e.held)):
-            forces[k, i] = f[e.held[i] // nc, e.held[i] % nc]
-        reduce_vector(e, f.ravel(), r[:, 0])
-        solve_rows(G, r)
-        _times_band(B, r, y)
-        share = weights[k] / total
-        objective += share * np.sum(r * y)
-        z[:] = y
-        solve_rows(G, z)
-        _times_band(B, z, Bz)
+            for i in range(free):
+                for o in range(e.width):
+                    G[i, o] += 2.0 / h * N[i, o]
+        factor_step(G, free)
+        _add_inertia(eq, k, state, moved, f)
+        reduce_vector(e, f.ravel(), r[:free])
+        solve_step(G, free, r)
+        _times(B, r, y)
+        share = eq.weights[k] / total
+        for c in range(free):
+            objective += share * r[c] * y[c]
+            r[c] = y[c]
+        solve_step(G, free, r)
+        _times(B, r, Bz)
         if viscous:
-            _times_band(N, z, Nz)
+            _times(_sparse(N), r, Nz)
+        at = k % POINTS
         for j in range(4):
-            column = (first[k] + j - 2) * free
-            if column < 0:
-                continue
-            cj, dj, ej = _parts(table[k, :, j], density / weight, dragged / weight, h)
-            for c in range(free):
-                right[column + c] += share * (cj * y[c, 0] + dj * Bz[c, 0] + ej * Nz[c, 0])
+            cj, dj, ej = _parts(eq.table[k, :, j], eq.density / weight, eq.dragged / weight, h)
+            parts[at, j, 0], parts[at, j, 1], parts[at, j, 2] = cj, dj, ej
+            row = (eq.first[k] + j - 2) * free
+            for c in range(free if row >= 0 else 0):
+                right[row + c] += share * (cj * y[c] + dj * Bz[c] + ej * Nz[c])
         if not matrix:
             continue
         S[:] = dense
-        solve_rows(G, S)
-        _times_band(B, S, P)
-        _products(S, P, True, Q)
+        solve_rows(G[:free], S)
+        _times_rows(B, S, P[at])
+        _products(S, P[at], Q[at])
         if viscous:
             band_to_dense(N, V)
-            solve_rows(G, V)
-            _times_band(B, V, BV)
-            _products(S, BV, False, SBV)
-            _products(V, BV, True, VBV)
-        for j in range(4):
-            column = (first[k] + j - 2) * free
-            if column < 0:
-                continue
-            cj, dj, ej = _parts(table[k, :, j], density / weight, dragged / weight, h)
-            for i in range(j, 4):
-                ci, di, ei = _parts(table[k, :, i], density / weight, dragged / weight, h)
-                cc, cd, dd = share * cj * ci, share * (cj * di + dj * ci), share * dj * di
-                shift = (i - j) * free
-                for c in range(free):
-                    first_d = c if i == j else 0
-                    row = A[column + c, shift - c + first_d : shift - c + free]
-                    Bc, Pc, Qc = dense[c, first_d:], P[c, first_d:], Q[c, first_d:]
-                    for d in range(len(row)):
-                        row[d] += cc * Bc[d] + cd * Pc[d] + dd * Qc[d]
-                if viscous:
-                    ce, ec, ee = share * cj * ei, share * ej * ci, share * ej * ei
-                    de, ed = share * dj * ei, share * ej * di
-                    for c in range(free):
-                        for d in range(c if i == j else 0, free):
-                            value = ce * BV[c, d] + ec * BV[d, c] + de * SBV[c, d] + ed * SBV[d, c] + ee * VBV[c, d]
-                            A[column + c, shift + d - c] += value
+            solve_rows(G[:free], V)
+            _times_rows(B, V, BV)
+            _products(S, BV, SBV)
+            _products(V, BV, VBV)
+            _add_viscous(A, eq.first[k] - 2, share, parts[at], BV, SBV, VBV)
+        if at == POINTS - 1:
+            _add_span(A, eq.first[k] - 2, eq.weights[k + 1 - POINTS : k + 1] / total, parts, dense, P, Q)
     return objective
 
 
@@ -209,3 +290,42 @@ def _parts(basis: Any, mass: float, drag: float, h: float) -> tuple[float, float
     `mass` and `drag` are density and drag coefficient over that of B.
     """
     return basis[0], mass * basis[2] + drag * basis[1] - basis[0], basis[1] - 2.0 / h * basis[0]
+
+
+@kernel
+def _add_span(A: Any, t: int, shares: Any, parts: Any, B: Any, P: Any, Q: Any) -> None:
+    """Add what the two points of a span count in the blocks of its four control points, from the t-th unknown on.
+
+    P and Q (2, free, free) are B S and S' B S at the points.
+    """
+    free = len(B)
+    s0, s1 = shares
+    for j in range(max(0, -t), 4):
+        for i in range(j, 4):
+            (c0, d0), (c1, d1) = (parts[0, j, 0], parts[0, j, 1]), (parts[1, j, 0], parts[1, j, 1])
+            (g0, h0), (g1, h1) = (parts[0, i, 0], parts[0, i, 1]), (parts[1, i, 0], parts[1, i, 1])
+            both = s0 * c0 * g0 + s1 * c1 * g1
+            p0, p1 = s0 * (c0 * h0 + d0 * g0), s1 * (c1 * h1 + d1 * g1)
+            q0, q1 = s0 * d0 * h0, s1 * d1 * h1
+            for c in range(free):
+                row = A[t + j, c, (i - j) * free : (i - j + 1) * free]
+                b, pa, pb, qa, qb = B[c], P[0, c], P[1, c], Q[0, c], Q[1, c]
+                for d in range(free):
+                    row[d] += both * b[d] + p0 * pa[d] + p1 * pb[d] + q0 * qa[d] + q1 * qb[d]
+
+
+@kernel
+def _add_viscous(A: Any, t: int, share: float, parts: Any, BV: Any, SBV: Any, VBV: Any) -> None:
+    """Add what damping counts at a point, as `_add_span` adds the rest."""
+    free = len(BV)
+    VB, VBS = BV.T.copy(), SBV.T.copy()
+    for j in range(max(0, -t), 4):
+        for i in range(j, 4):
+            ce, ec, ee = share * parts[j, 0] * parts[i, 2], share * parts[j, 2] * parts[i, 0], parts[j, 2] * parts[i, 2]
+            de, ed = share * parts[j, 1] * parts[i, 2], share * parts[j, 2] * parts[i, 1]
+            ee *= share
+            for c in range(free):
+                row = A[t + j, c, (i - j) * free : (i - j + 1) * free]
+                a, at, b, bt, w = BV[c], VB[c], SBV[c], VBS[c], VBV[c]
+                for d in range(free):
+                    row[d] += ce * a[d] + ec * at[d] + de * b[d] + ed * bt[d] + ee * w[d]

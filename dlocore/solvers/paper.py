@@ -110,8 +110,8 @@ def _equations(
     R = np.empty(len(first) * free)
     for k in range(len(first)):
         states_at(first[k], table[k], control, state)
-        laws = (window.active, window.parameters, history_at(histories, k), NO_RATES)
-        assemble(window.axes, state[0], state[1], window.grid.tables, *laws, (1.0, 0.0, 1.0), f, K)
+        laws = (window.equations.active, window.equations.p, history_at(histories, k), NO_RATES)
+        assemble(window.equations.axes, state[0], state[1], window.grid.tables, *laws, (1.0, 0.0, 1.0), f, K)
         band_to_dense(K, dense)
         multiply_scalar_band(unit, state[2], density, f)
         multiply_scalar_band(unit, state[1], dragged, f)

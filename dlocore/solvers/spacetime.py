@@ -6,6 +6,7 @@ spline are found by Gauss-Newton iteration from a march, until the update is bel
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -15,12 +16,12 @@ from dlocore.discretisation import applied_forces
 from dlocore.effects import laws
 from dlocore.events import closed_grasps
 from dlocore.grid import Grid
-from dlocore.holding import Starts, close_grasps, hold
+from dlocore.holding import Held, Starts, close_grasps, hold
+from dlocore.kernels.anderson import advance, room
 from dlocore.kernels.assembly import times_scalar_band
-from dlocore.kernels.banded import expand_rows, factor_columns, place_held
-from dlocore.kernels.banded import solve as solve_factored
-from dlocore.kernels.basis import GAUSS_2, basis_rows
-from dlocore.kernels.leastsquares import normal_equations
+from dlocore.kernels.banded import expand_rows, place_rows
+from dlocore.kernels.blocks import REACH, factor_rows
+from dlocore.kernels.leastsquares import POINTS, Equations, collocation, holding_forces, normal_equations
 from dlocore.kernels.march import constrained_mass_solve
 from dlocore.kernels.timefit import fit_time
 from dlocore.problem import Problem
@@ -31,11 +32,11 @@ from dlocore.solvers.monitor import Monitor
 
 Floats = NDArray[np.float64]
 
-MAX_ITERATIONS = 40
+MAX_ITERATIONS = 60
 _CHUNK = 1.5e7  # about the multiplications between two looks at the clock
 _HISTORY = 4  # iterates that Anderson acceleration combines
-_FRESH = 2  # iterations that have their own normal matrix, at least
-_SHRINKS = 0.5  # of the update before: where an update is larger, the next iteration has its own, too
+_FRESH = 2  # iterations that have their own normal matrix, at least; after them a matrix serves twice, at least
+_SHRINKS = 0.7  # of the update before: where an update is larger, the next iteration has its own, too
 _DAMPING = 1e-6  # of the diagonal of normal equations that lost their positive factors to rounding
 _LARGEST_STEP = 0.25  # of the length, in one control point: beyond it a step is shortened
 LARGEST_STRAIN = 0.003  # that the bounded axial stiffness allows under the largest tension of the march
@@ -55,6 +56,8 @@ class Window:
 def windows_of(problem: Problem, knots_t: Floats) -> list[Window]:
     """Split the time knots into windows at the events where velocity or acceleration jumps."""
     cuts = [e for e in problem.events if e.multiplicity > 1]
+    if not cuts:
+        return [Window(0.0, problem.horizon, knots_t, False)]
     marks = [0.0, *[e.time for e in cuts], problem.horizon]
     windows = []
     for i, (a, b) in enumerate(pairwise(marks)):
@@ -101,22 +104,30 @@ class WindowSolver:
         axial_stiffness: float,
         monitor: Monitor,
     ) -> None:
-        self.problem, self.grid, self.window, self.monitor = problem, grid, window, monitor
-        self.nc, self.axes = problem.nc, problem.axes
-        spans = np.flatnonzero(np.diff(window.knots))
-        half = 0.5 * np.diff(window.knots)[spans]
-        self.times = (window.knots[spans][:, None] + half[:, None] * (1 + GAUSS_2[0])).ravel()
-        self.weights = (half[:, None] * GAUSS_2[1]).ravel()
-        self.first, self.table = basis_rows(window.knots, self.times, 2)
-        self.span = (window.end - window.begin) / len(spans)
-        self.active, self.parameters = problem.law_table()
-        self.parameters[laws.STRETCH, 0] = axial_stiffness
-        self.active[laws.STRETCH_DAMPING] = 0  # so soft a cable has no waves of stretch that need damping
-        self.applied = applied_forces(problem, grid, self.times)
-        fine = np.linspace(window.begin, window.end, 6 * len(spans) + 1)
-        self.histories = motion.behind(self.times)
+        self.problem, self.grid, self.motion, self.monitor = problem, grid, motion, monitor
+        self.nc = problem.nc
+        self.times, weights, first, table, fine = collocation(window.knots)
+        active, parameters = problem.law_table()
+        parameters[laws.STRETCH, 0] = axial_stiffness
+        active[laws.STRETCH_DAMPING] = 0  # so soft a cable has no waves of stretch that need damping
         self.held = hold(problem, grid, grasps, fine, starts, start)
         e = self.held.elimination
+        self.equations = Equations(
+            axes=problem.axes,
+            first=first,
+            table=table,
+            weights=weights,
+            h=(window.end - window.begin) * POINTS / len(self.times),
+            unit=grid.tables.mass,
+            density=problem.mass_density(),
+            dragged=problem.drag_coefficient(),
+            tables=grid.tables,
+            active=active,
+            p=parameters,
+            histories=motion.behind(self.times),
+            applied=applied_forces(problem, grid, self.times),
+            e=e,
+        )
         rates = velocity.reshape(-1)[e.held].copy()
         for k in range(len(e.held)):
             for s in range(e.start[k], e.start[k + 1]):
@@ -131,47 +142,39 @@ class WindowSolver:
     def constrain(self, control: Floats) -> Floats:
         """Return control points (n, n_u, nc) whose held degrees of freedom follow the grasps."""
         control = control.copy()
-        for j in range(2, len(control)):
-            place_held(self.held.elimination, self.offsets[j], control[j].reshape(-1))
+        place_rows(self.held.elimination, self.offsets, control, 2)
         return control
 
-    def objective(self, control: Floats, matrix: bool) -> tuple[float, Floats, Floats, Floats]:
-        """Return the objective, eq. 16 [m^2], the normal matrix, its right side and the holding forces at `control`.
+    def objective(self, control: Floats, matrix: bool) -> tuple[float, Floats, Floats]:
+        """Return the objective, eq. 16 [m^2], the normal matrix in blocks, and its right side at `control`.
 
         Without `matrix` the normal matrix is left out, which is most of the work.
         """
-        size = (len(control) - 2) * self.free
-        A = np.zeros((size, 4 * self.free) if matrix else (1, 1))  # lazily: a large one is not cleared at once
-        right = np.zeros(size)
-        forces = np.empty((len(self.times), len(self.held.elimination.held)))
+        count, eq = len(control) - 2, self.equations
+        A = np.zeros(
+            (count if matrix else 0, self.free, REACH * self.free)
+        )  # lazily: a large one is not cleared at once
+        right = np.zeros(count * self.free)
         value = 0.0
-        points = max(1, round(_CHUNK / self.free**3)) if matrix else len(self.times)
-        for begin in range(0, len(self.times), points):
+        spans = len(self.times) // POINTS
+        part = max(1, round(_CHUNK / (POINTS * self.free**3))) if matrix else spans
+        for begin in range(0, spans, part):
             self.monitor.check()
-            value += normal_equations(
-                self.axes, control, self.first, self.table, self.weights, self.span, self.grid.tables.mass,
-                self.problem.mass_density(), self.problem.drag_coefficient(), self.grid.tables, self.active,
-                self.parameters, self.histories, self.applied, self.held.elimination, A, right, forces, matrix, begin,
-                min(begin + points, len(self.times)),
-            )  # fmt: skip
-        weight = 12.0 * self.problem.mass_density() / self.span**2 + 2.0 * self.problem.drag_coefficient() / self.span
-        return value / (weight * self.problem.scene.cable.length), A, right, forces
+            value += normal_equations(eq, control, A, right, matrix, begin, min(begin + part, spans))
+        weight = 12.0 * eq.density / eq.h**2 + 2.0 * eq.dragged / eq.h
+        return value / (weight * self.problem.scene.cable.length), A, right
 
     def factor(self, A: Floats, damping: float) -> bool:
         """Write the factors of A + damping diag A to A; return whether they are positive."""
-        A[:, 0] *= 1.0 + damping
-        columns = max(1, round(_CHUNK / A.shape[1] ** 2))
-        for start in range(0, len(A), columns):
+        if damping > 0.0:
+            A.reshape(len(A), -1)[:, :: A.shape[2] + 1] *= 1.0 + damping
+        size = len(A) * self.free
+        rows = max(1, round(_CHUNK / A.shape[2] ** 2))
+        for start in range(0, size, rows):
             self.monitor.check()
-            if factor_columns(A, start, min(start + columns, len(A))) >= 0:
+            if factor_rows(A, start, min(start + rows, size)) >= 0:
                 return False
         return True
-
-    def step(self, factors: Floats, right: Floats) -> Floats:
-        """Return the step -A^-1 right of all control points (n, n_u, nc), from the factors of A."""
-        x = -right
-        solve_factored(factors, x)
-        return self.expand(x)
 
     def expand(self, x: Floats) -> Floats:
         """Return the change (n, n_u, nc) of all control points for a step x of the free ones."""
@@ -179,6 +182,16 @@ class WindowSolver:
         change = np.zeros((len(steps) + 2, self.grid.n_u, self.nc))
         change[2:] = expand_rows(self.held.elimination, steps, self.grid.n_u * self.nc).reshape(change[2:].shape)
         return change
+
+    def forces(self, control: Floats) -> Callable[[], WindowForces]:
+        """Return what finds what holds the cable at `control`."""
+        lean = self.equations._replace(histories=None)  # the motion knows them, and is kept
+        return partial(_window_forces, self.held, self.times, lean, self.motion, control)
+
+
+def _window_forces(held: Held, times: Floats, lean: Equations, motion: March, control: Floats) -> WindowForces:
+    equations = lean._replace(histories=motion.behind(times))
+    return WindowForces(held, times, *holding_forces(equations, control))
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,13 +202,13 @@ class Solved:
         control: (n_t, n_u, nc) [m].
         converged: the update fell below delta in every window.
         update: the last update norm [m], the largest over the windows.
-        forces: what holds the cable in each window, at its collocation points.
+        find_forces: finds what holds the cable in each window, at its collocation points.
     """
 
     control: Floats
     converged: bool
     update: float
-    forces: tuple[WindowForces, ...]
+    find_forces: tuple[Callable[[], WindowForces], ...]
 
 
 OnStep = Callable[[Floats, float, float, float, float], None]
@@ -243,8 +256,7 @@ def solve(problem: Problem, motion: March, knots_t: Floats, delta: float, monito
 
         control, update = _iterate(solver, control, delta, monitor, show)
         parts.append(control)
-        states = np.einsum("kj,kjid->kid", solver.table[:, 0], control[solver.first[:, None] + np.arange(4)])
-        forces.append(WindowForces(solver.held, solver.times, solver.objective(control, False)[3], states))
+        forces.append(solver.forces(control))
         converged &= update < delta
         worst = max(worst, update)
         q = control[-1]
@@ -254,14 +266,12 @@ def solve(problem: Problem, motion: March, knots_t: Floats, delta: float, monito
 
 def _window_fit(motion: March, window: Window) -> Floats:
     """Return control points (n, n_u, nc) of the march inside a window."""
-    inside = (motion.times >= window.begin - 1e-12) & (motion.times <= window.end + 1e-12)
+    inside = slice(*np.searchsorted(motion.times, (window.begin - 1e-12, window.end + 1e-12)))
     times, states = motion.times[inside], motion.states[inside]
     k, n_u, nc = states.shape
     step = times[1] - times[0]
     v = (4 * states[1] - 3 * states[0] - states[2]) / (2 * step)
-    return fit_time(window.knots, times, np.ascontiguousarray(states.reshape(k, -1)), v.reshape(-1)).reshape(
-        -1, n_u, nc
-    )
+    return fit_time(window.knots, times, states.reshape(k, -1), v.reshape(-1)).reshape(-1, n_u, nc)
 
 
 def _iterate(
@@ -270,42 +280,34 @@ def _iterate(
     """Iterate one window; return its control points and the norm of the last update [m].
 
     As long as updates shrink, the normal matrix of an iterate before serves, and an iteration takes a fraction of the
-    time; it is the right side that has to be its own.
+    time; it is the right side that has to be its own. A fresh matrix serves for the next iteration, too: what the last
+    steps teach mends as much as another one would.
     """
-    largest = _LARGEST_STEP * solver.problem.scene.cable.length
-    points: list[Floats] = []
-    steps: list[Floats] = []
+    limit = _LARGEST_STEP * solver.problem.scene.cable.length
+    last = room(_HISTORY, control.size)
     best = (np.inf, control)
     factors: Floats | None = None
     damping, before = 0.0, np.inf
-    for _ in range(MAX_ITERATIONS):
+    for known in range(MAX_ITERATIONS):
         monitor.check()
+        fresh = factors is None
         if factors is None:
             value, factors, right, damping = _linearised(solver, control)
         else:
-            value, _, right, _ = solver.objective(control, False)
+            value, _, right = solver.objective(control, False)
         if factors is None or not np.isfinite(value):
             break
-        step = solver.step(factors, right)
-        update = float(np.linalg.norm(step))
+        update, length, following = advance(solver.held.elimination, factors, right, control, last, known, limit, delta)
         if not np.isfinite(update):
             break
-        longest = float(np.abs(step).max())
-        length = min(1.0, largest / longest) if longest > 0 else 1.0
-        if update < best[0]:
-            best = (update, control + length * step)
+        on_step(following, update, float(np.sqrt(value)), damping, length)
         if update < delta:
-            control = control + step
-            on_step(control, update, float(np.sqrt(value)), damping, 1.0)
-            return control, update
-        points.append(control.ravel())
-        steps.append(length * step.ravel())
-        del points[: -_HISTORY - 1], steps[: -_HISTORY - 1]
-        control = _accelerate(points, steps).reshape(control.shape)
-        on_step(control, update, float(np.sqrt(value)), damping, length)
-        if not update < _SHRINKS * before or len(points) < _FRESH:
+            return following, update
+        if update < best[0]:
+            best = (update, control + last.steps[0].reshape(control.shape))
+        if known + 1 < _FRESH or not (fresh or update < _SHRINKS * before):
             factors = None
-        before = update
+        control, before = following, update
     return best[1], best[0]
 
 
@@ -316,20 +318,9 @@ def _linearised(solver: WindowSolver, control: Floats) -> tuple[float, Floats | 
     """
     damping = 0.0
     while True:
-        value, A, right, _ = solver.objective(control, True)
+        value, A, right = solver.objective(control, True)
         if np.isfinite(value) and solver.factor(A, damping):
             return value, A, right, damping
         if damping > 0.0 or not np.isfinite(value):
             return value, None, right, damping
         damping = _DAMPING
-
-
-def _accelerate(points: list[Floats], steps: list[Floats]) -> Floats:
-    """Return the next iterate of Anderson acceleration from the last iterates and their steps."""
-    plain = points[-1] + steps[-1]
-    if len(points) < 2:
-        return plain
-    dx = np.diff(points, axis=0).T
-    df = np.diff(steps, axis=0).T
-    mix = np.linalg.lstsq(df, steps[-1], rcond=1e-8)[0]
-    return plain - (dx + df) @ mix

@@ -7,9 +7,11 @@ from numpy.typing import NDArray
 from dlocore import Cable, Environment, Grasp, Move, Points, Scene, Table
 from dlocore.events import closed_grasps, time_knots
 from dlocore.holding import Starts, close_grasps
+from dlocore.kernels.anderson import advance, room
 from dlocore.kernels.assembly import NO_RATES, assemble, history_at
-from dlocore.kernels.banded import factor, factor_columns
-from dlocore.kernels.leastsquares import band_to_dense, states_at
+from dlocore.kernels.banded import elimination
+from dlocore.kernels.blocks import REACH, factor_rows, solve_blocks
+from dlocore.kernels.leastsquares import band_to_dense, holding_forces, states_at
 from dlocore.problem import pose
 from dlocore.solvers.march import march
 from dlocore.solvers.monitor import Monitor
@@ -49,33 +51,34 @@ def window(table: Table | None, twist: str, damping: float) -> tuple[WindowSolve
     return solver, solver.constrain(control)
 
 
-def dense(solver: WindowSolver, control: Floats) -> tuple[float, Floats, Floats]:
-    """Return objective, normal matrix and right side from full matrices, as the equations are written."""
-    nc, (n_t, n_u, _) = solver.nc, control.shape
+def dense(solver: WindowSolver, control: Floats) -> tuple[float, Floats, Floats, Floats]:
+    """Return objective, normal matrix, right side and holding forces from full matrices."""
+    eq, nc, (n_t, n_u, _) = solver.equations, solver.nc, control.shape
     Z = np.array([solver.expand(row)[2].ravel() for row in np.eye((n_t - 2) * solver.free)[: solver.free]]).T
     band, full = np.zeros((n_u * nc, 4 * nc)), np.empty((n_u * nc, n_u * nc))
     for o in range(4):
         band[:, o * nc] = np.repeat(solver.grid.tables.mass[:, o], nc)
     band_to_dense(band, full)
-    problem, h = solver.problem, solver.span
+    problem, h = solver.problem, eq.h
     M, C = (Z.T @ (factor * full) @ Z for factor in (problem.mass_density(), problem.drag_coefficient()))
     B = 12.0 / h**2 * M + 2.0 / h * C
     A, right, value = np.zeros((n_t * solver.free,) * 2), np.zeros(n_t * solver.free), 0.0
     state, f, K, held = np.empty((3, n_u, nc)), np.empty((n_u, nc)), np.empty((n_u * nc, 4 * nc)), np.empty_like(full)
-    for k, (first, basis) in enumerate(zip(solver.first, solver.table, strict=True)):
+    holding = np.empty((len(eq.first), len(eq.e.held)))
+    for k, (first, basis) in enumerate(zip(eq.first, eq.table, strict=True)):
         states_at(first, basis, control, state)
         tangents = []
         for scales in ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0)):
-            history = history_at(solver.histories, k)
-            tables, laws = solver.grid.tables, (solver.active, solver.parameters)
-            assemble(solver.axes, state[0], state[1], tables, *laws, history, NO_RATES, scales, f, K)
+            history = history_at(eq.histories, k)
+            assemble(eq.axes, state[0], state[1], eq.tables, eq.active, eq.p, history, NO_RATES, scales, f, K)
             band_to_dense(K, held)
             tangents.append(Z.T @ held @ Z)
         V, Kp = tangents
         weight = np.linalg.inv(B + Kp + 2.0 / h * V)
-        weight = weight @ B @ weight * solver.weights[k] / solver.weights.sum()
-        force = (f - solver.applied[min(k, len(solver.applied) - 1)]).ravel()
+        weight = weight @ B @ weight * eq.weights[k] / eq.weights.sum()
+        force = (f - eq.applied[min(k, len(eq.applied) - 1)]).ravel()
         force += full @ (problem.mass_density() * state[2] + problem.drag_coefficient() * state[1]).ravel()
+        holding[k] = force[eq.e.held]
         R = Z.T @ force
         J = np.zeros((solver.free, n_t * solver.free))
         for j in range(4):
@@ -85,44 +88,87 @@ def dense(solver: WindowSolver, control: Floats) -> tuple[float, Floats, Floats]
         right += J.T @ weight @ R
         value += float(R @ weight @ R)
     given = 2 * solver.free
-    return value, A[given:, given:], right[given:]
+    return value, A[given:, given:], right[given:], holding
+
+
+def whole(blocks: Floats) -> Floats:
+    """Return the symmetric matrix that blocks as those of `factor_rows` stand for."""
+    count, m, _ = blocks.shape
+    A = np.zeros((count + REACH, m, count + REACH, m))
+    for t in range(count):
+        for o in range(REACH):
+            A[t, :, t + o] = blocks[t, :, o * m : (o + 1) * m]
+    upper = np.triu(A[:count, :, :count].reshape(count * m, count * m))
+    return upper + np.triu(upper, 1).T
 
 
 @pytest.mark.parametrize("damping", [0.0, 2e-4])
 @pytest.mark.parametrize(("table", "twist"), [(Table(), "off"), (None, "off"), (None, "on")], ids=["2", "3", "4"])
 def test_the_normal_equations_are_those_of_the_dense_matrices(table: Table | None, twist: str, damping: float) -> None:
     solver, control = window(table, twist, damping)
-    value, A, right, _ = solver.objective(control, True)
-    problem, h = solver.problem, solver.span
+    value, A, right = solver.objective(control, True)
+    problem, h = solver.problem, solver.equations.h
     unit = (12.0 * problem.mass_density() / h**2 + 2.0 * problem.drag_coefficient() / h) * problem.scene.cable.length
-    expected, full, gradient = dense(solver, control)
-    lower = np.zeros_like(A)
-    for o in range(A.shape[1]):
-        lower[: len(A) - o, o] = np.diagonal(full, -o)
+    expected, full, gradient, holding = dense(solver, control)
     # rounding, of matrices whose stretch is 1e5 times as stiff as their bending
     assert value * unit == pytest.approx(expected, rel=1e-8)
-    np.testing.assert_allclose(A, lower, atol=1e-8 * np.abs(lower).max())
+    np.testing.assert_allclose(whole(A), full, atol=1e-8 * np.abs(full).max())
     np.testing.assert_allclose(right, gradient, atol=1e-8 * np.abs(gradient).max())
     without_matrix = solver.objective(control, False)
     assert without_matrix[0] == value
     np.testing.assert_array_equal(without_matrix[2], right)
+    forces, states = holding_forces(solver.equations, control)
+    np.testing.assert_allclose(forces, holding, atol=1e-8 * np.abs(holding).max())
+    first, table_t = solver.equations.first, solver.equations.table
+    np.testing.assert_allclose(
+        states, np.einsum("kj,kjid->kid", table_t[:, 0], control[first[:, None] + np.arange(4)]), atol=1e-14
+    )
 
 
-@pytest.mark.parametrize(("size", "width"), [(40, 12), (41, 12), (43, 12), (9, 12), (30, 3)])
-@pytest.mark.parametrize("part", [1000, 7, 4])
-def test_columns_by_fours_give_the_factors_of_single_ones(size: int, width: int, part: int) -> None:
-    A = np.random.default_rng(size).standard_normal((size, width))
-    A[:, 0] += 20.0
-    inside = np.arange(width) < size - np.arange(size)[:, None]
-    single, fours = np.where(inside, A, 0.0), np.where(inside, A, 0.0)
-    assert factor(single) == -1
-    for start in range(0, size, part):
-        assert factor_columns(fours, start, min(start + part, size)) == -1
-    np.testing.assert_allclose(fours[inside], single[inside], rtol=1e-12, atol=1e-14)
+@pytest.mark.parametrize(("count", "m"), [(7, 5), (6, 8), (5, 19), (2, 16), (1, 3), (3, 75)])
+@pytest.mark.parametrize("part", [10000, 16, 7])
+def test_blocks_are_solved_as_the_whole_matrix(count: int, m: int, part: int) -> None:
+    rng = np.random.default_rng(m)
+    blocks = rng.standard_normal((count, m, REACH * m))
+    blocks[:, np.arange(m), np.arange(m)] += 10.0 * m
+    A, right = whole(blocks), rng.standard_normal(count * m)
+    for start in range(0, count * m, part):
+        assert factor_rows(blocks, start, min(start + part, count * m)) == -1
+    x = right.copy()
+    solve_blocks(blocks, x)
+    np.testing.assert_allclose(x, np.linalg.solve(A, right), rtol=1e-9)  # rounding; the condition number is below 10
 
 
-def test_columns_by_fours_tell_which_pivot_is_not_positive() -> None:
-    A = np.zeros((20, 6))
-    A[:, 0], A[:, 1] = 1.0, 0.1
-    A[13, 0] = -1.0
-    assert factor_columns(A.copy(), 0, 20) == factor(A.copy()) == 13
+def test_the_factorisation_tells_which_pivot_is_not_positive() -> None:
+    blocks = np.zeros((4, 5, 20))
+    blocks[:, np.arange(5), np.arange(5)] = 1.0
+    blocks[2, 3, 3] = -1.0
+    assert factor_rows(blocks, 0, 20) == 13
+
+
+def test_steps_are_combined_as_least_squares_of_their_differences() -> None:
+    """The next iterate is x + f - (dX + dF) g, with the g for which |f - dF g| is least (Walker and Ni, 2011)."""
+    n_t, n, depth, rng = 6, 3, 2, np.random.default_rng(3)
+    e = elimination(n, 2, 2, np.array([1]), np.zeros((1, n)), np.empty(0, np.int64), np.empty((0, n)))
+    free = n * 2 - 2
+    blocks = np.zeros((n_t - 2, free, REACH * free))
+    blocks[:, np.arange(free), np.arange(free)] = 1.0
+    last = room(depth, n_t * n * 2)
+    points, steps = [], []
+    for known in range(5):
+        control = rng.standard_normal((n_t, n, 2))
+        right = rng.standard_normal((n_t - 2) * free)
+        step = np.zeros((n_t, n, 2))
+        step[2:, [0, 2]] = -right.reshape(n_t - 2, 2, 2)
+        update, share, following = advance(e, blocks, right, control, last, known, 0.5, 0.0)
+        assert update == pytest.approx(np.linalg.norm(step), rel=1e-12)  # rounding, as all below
+        assert share == pytest.approx(0.5 / np.abs(step).max(), rel=1e-12)
+        points.append(control.ravel())
+        steps.append(share * step.ravel())
+        expected = points[-1] + steps[-1]
+        if known > 0:
+            dx, df = (np.diff(a[-depth - 1 :], axis=0).T for a in (points, steps))
+            expected = expected - (dx + df) @ np.linalg.lstsq(df, steps[-1], rcond=None)[0]
+        np.testing.assert_allclose(following.ravel(), expected, atol=1e-12)
+    last_step = advance(e, blocks, 1e-3 * right, control, last, 5, 0.5, 1.0)
+    np.testing.assert_allclose(last_step[2], control + 1e-3 * step, atol=1e-15)
