@@ -24,6 +24,9 @@ def paper_scene(**parts: Any) -> dict[str, Any]:
     return {**contract_scene("paper-fig1"), "quality": "auto", **parts}
 
 
+SLOW = paper_scene(quality={"n_u": 129, "n_t": 257, "method": "march"}, effects={"twist": "on"})  # most of a second
+
+
 def put(scene: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
     """Return a deep copy of `scene` with the value at `path` (keys and indices joined by dots) replaced."""
     scene = json.loads(json.dumps(scene))

@@ -14,13 +14,12 @@ from starlette.websockets import WebSocketDisconnect
 
 from app.main import create_app
 from app.settings import Settings
-from tests.app.conftest import paper_scene, put, start
+from tests.app.conftest import SLOW, paper_scene, put, start
 from tests.app.live import serving
 from tests.app.test_bad_requests import the_problem
 
 TOKEN = "a token that is hard to guess"
 BEARER = {"authorization": f"Bearer {TOKEN}"}
-SLOW = paper_scene(quality={"n_u": 129, "n_t": 513, "method": "march"})  # some tenths of a second
 
 
 @pytest.fixture(scope="module")
@@ -140,7 +139,8 @@ def test_the_log_is_json_with_the_run_and_a_stop_lets_a_solve_finish(tmp_path: P
 
 def test_a_stop_without_grace_cancels(tmp_path: Path) -> None:
     with serving(tmp_path, shutdown_grace="0") as live, httpx.Client(base_url=live.url, timeout=60) as http:
-        http.post("/v1/predictions", json=SLOW, headers={"prefer": "respond-async"})
+        slower = put(SLOW, "quality.n_t", 513)
+        http.post("/v1/predictions", json=slower, headers={"prefer": "respond-async"})
         live.process.send_signal(signal.SIGTERM)
         live.process.wait(timeout=10)
     assert any("cancelling" in line["message"] for line in logged(live.log))

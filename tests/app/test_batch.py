@@ -14,12 +14,11 @@ from fastapi.testclient import TestClient
 from app.main import create_app
 from app.schemas import PredictionResponse
 from app.settings import Settings
-from tests.app.conftest import paper_scene, put, start
+from tests.app.conftest import SLOW, paper_scene, put, start
 from tests.app.live import Live, serving
 from tests.app.test_bad_requests import the_problem
 
 BATCH = "/v1/predictions:batch"
-SLOW = paper_scene(quality={"n_u": 129, "n_t": 513, "method": "march"})  # some tenths of a second
 
 
 def lines(text: str) -> list[dict[str, Any]]:

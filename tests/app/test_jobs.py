@@ -16,13 +16,12 @@ from app import jobs
 from app.main import create_app
 from app.service import Service
 from app.settings import Settings
-from tests.app.conftest import paper_scene, start
+from tests.app.conftest import SLOW, paper_scene, start
 from tests.app.live import Live, serving
 from tests.app.test_bad_requests import the_problem
 
 ASYNC = {"prefer": "respond-async"}
 EVENTS = {"accept": "text/event-stream"}
-SLOW = paper_scene(quality={"n_u": 129, "n_t": 513, "method": "march"})  # some tenths of a second
 
 
 @pytest.fixture(scope="module")

@@ -23,11 +23,10 @@ from app.problems import ProblemError
 from app.schemas import PredictionRequest, to_scene
 from app.settings import Settings
 from app.worker import Worker
-from tests.app.conftest import ROOT, paper_scene, start
+from tests.app.conftest import ROOT, SLOW, paper_scene, start
 from tests.app.test_bad_requests import the_problem
 
 # the finest grid there is: some tenths of a second
-SLOW = paper_scene(quality={"n_u": 129, "n_t": 513, "method": "march"})
 
 
 def scene_of(request: dict[str, Any]) -> Any:
