@@ -23,7 +23,7 @@ run: $(VENV)/.run-installed
 setup: $(VENV)/.dev-installed
 
 compile: $(VENV)/.dev-installed
-	@echo 'Compiling; this takes a minute or two the first time.'
+	@echo 'Compiling; this takes five minutes or so the first time.'
 	$(BIN)/python -c 'import dlocore; dlocore.warm_up()'
 
 test: compile

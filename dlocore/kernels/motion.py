@@ -68,10 +68,11 @@ def smooth_motion(
         for d in range(nc):
             load[0, i, d] = tables.weight[i] * weight[d]
     steps = len(times) - near - 1
+    first, inertial = np.int64(0), np.bool_(True)  # as constants they would have kernels of their own compiled
     h = times[near + 1] - times[near]
     closed, a, G, jump = begin_stretch(
         axes, start, velocity, tables.mass, density, dragged, tables, active, p, history, load[0], e, offsets[:near],
-        times[1] - times[0], True, nc,
+        times[1] - times[0], inertial, nc,
     )  # fmt: skip
     reactions = np.zeros((steps + 1, len(e.held)))
     for k in range(len(e.held)):
@@ -82,10 +83,10 @@ def smooth_motion(
     states = np.empty((steps + 1, n, nc))
     states[0] = start
     march_steps(
-        axes, 0, steps, 0, h * jump > least_jump, h, rho, tolerance, states, closed.copy(), a, G, density, dragged,
-        tables, active, p, history, load, e, offsets[near:], reactions, np.zeros((0, 0, 0)), info,
+        axes, first, steps, first, h * jump > least_jump, h, rho, tolerance, states, closed.copy(), a, G, density,
+        dragged, tables, active, p, history, load, e, offsets[near:], reactions, np.zeros((0, 0, 0)), info,
     )  # fmt: skip
-    to_ends_of_steps(reactions, 0, steps, rho / (1.0 + rho))
+    to_ends_of_steps(reactions, first, steps, rho / (1.0 + rho))
     control, off = fitted(knots_t, times[near:], states, closed, nc)
     least, most = slopes(states, 1, tables.axial_first, tables.axial_b1)
     info[STRAIN] = max(0.0, most - 1.0, 1.0 - least)
