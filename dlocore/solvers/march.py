@@ -42,7 +42,10 @@ TOLERANCE = 1e-8  # of the length, on the error that the Newton iterations of a 
 LEAST_TOLERANCE, MOST_TOLERANCE = 1e-11, 1e-7
 COARSE = 1 / 256  # of the period of a cable that swings: the tolerance goes with the square of the step
 _RESTS = 0.05  # of the diameter above the table: nearer to it the cable rests on it
-CHUNK = 256  # steps between looks at the clock
+CHUNK = 256  # steps between looks at the clock, at most
+_WORK = (
+    2.5e5  # of these steps, at most: times control points and their coordinates squared; some hundredths of a second
+)
 MOST_FRAMES = 1_300_000  # control points times steps of which a motion with twist keeps the frames: 0.6 GB of them
 _SPLITS = (4, 16, 64)  # parts of a step that found no equilibrium
 _LOOKS = 12  # states of a motion, at least, that are searched for folds
@@ -222,7 +225,7 @@ class _Walk:
             except TimeIsUp:
                 self.stopped = "time"
                 break
-            until = min(at + CHUNK, last)
+            until = min(at + chunk_of(self._problem, self._grid), last)
             failed = self._steps(
                 stretch, at, until, smooth, stretch.entry.jumps, stretch.h, self._rho, self._states, self._applied,
                 stretch.offsets, stretch.reactions, self._log,
@@ -334,6 +337,11 @@ class _Walk:
             for x, before in zip(under_way, kept, strict=True):
                 x[:] = before
         return False
+
+
+def chunk_of(problem: Problem, grid: Grid) -> int:
+    """Return how many steps on a grid are taken between looks at the clock."""
+    return min(CHUNK, max(1, int(_WORK / (grid.n_u * problem.nc**2))))
 
 
 def every_of(states: int) -> int:

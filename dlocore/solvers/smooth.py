@@ -15,7 +15,7 @@ from dlocore.kernels.motion import LEAST_SLOPE, MOST_SLOPE, SEEN, STRAIN, smooth
 from dlocore.problem import Problem
 from dlocore.report import WindowForces
 from dlocore.scene import Grasp
-from dlocore.solvers.march import CHUNK, March, every_of, tolerance_of
+from dlocore.solvers.march import March, chunk_of, every_of, tolerance_of
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.stretch import JUMPS, NEAR
 
@@ -42,7 +42,7 @@ def march_smooth(
         Cancelled: the caller asked to stop.
     """
     marks = marks_of(problem)
-    if not _is_plain(problem) or len(marks) > 2 or steps > CHUNK:
+    if not _is_plain(problem) or len(marks) > 2 or steps > chunk_of(problem, grid):
         return None
     try:
         monitor.check()

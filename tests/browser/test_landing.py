@@ -197,7 +197,7 @@ def test_the_plot_is_logarithmic_in_both_directions_and_has_every_point(service,
     assert y0 < y1 < y2  # down the picture: the slower, the better
     assert abs((x1 - x0) - (x2 - x1)) < 1e-6  # a factor of ten each, so the same way [px]; rounding alone
     assert abs((y1 - y0) - (y2 - y1)) < 1e-6
-    assert page.locator("#plot .sign.march").first.evaluate("e => getComputedStyle(e).fill") == BLUE
+    expect(page.locator("#plot .sign.march").first).to_have_css("fill", BLUE)
     expect(page.locator("#plot-finding")).to_have_text("Within 1 mm in 10 ms, within 0.1 mm in 100 ms")
     expect(page.locator("#plot-machine")).to_contain_text("Test processor")
 

@@ -1,5 +1,6 @@
 """A smooth motion marched in one compiled call: it is the march that goes from stretch to stretch."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -137,6 +138,18 @@ def test_what_is_not_smooth_and_plain_is_left_to_the_general_march(scene: Scene)
 def test_a_long_march_looks_at_the_clock_in_between() -> None:
     assert solved(SCENE, n_u=9, steps=CHUNK)[0] is not None
     assert solved(SCENE, n_u=9, steps=CHUNK + 1)[0] is None
+
+
+def test_a_fine_grid_in_space_is_left_for_fewer_steps_between_looks_at_the_clock() -> None:
+    looks: list[float] = []
+
+    def look() -> bool:
+        looks.append(time.perf_counter())
+        return False
+
+    problem = pose(replace(SCENE, effects={"twist": "on"}))
+    march(problem, make_grid(problem, 129), CHUNK, Monitor(cancelled=look))
+    assert len(looks) > 2  # in one go they would take a tenth of a second
 
 
 def test_a_march_whose_time_is_up_is_left_to_the_general_one_which_says_so() -> None:
