@@ -29,7 +29,7 @@ from dlocore.spline import uniform_knots
 from dlocore.whole_march import MISSED_COUNTS, TORN, Outcome, march_status
 
 Floats = NDArray[np.float64]
-FindForces = tuple[Callable[[], WindowForces], ...]
+FindForces = Callable[[], tuple[WindowForces, ...]]
 
 
 def predict(
@@ -132,12 +132,8 @@ def _least_squares(
     try:
         if method == "spacetime":
             solved = solve(problem, level.motion, knots_t, quality.delta, monitor, on_step)
-            control, converged, update, find_forces = (
-                solved.control,
-                solved.converged,
-                solved.update,
-                solved.find_forces,
-            )
+            control, converged, update = solved.control, solved.converged, solved.update
+            find_forces = solved.find_forces
         else:
             control, converged, update = solve_as_printed(
                 problem, level.motion, knots_t, quality.delta, monitor, on_step
@@ -254,7 +250,7 @@ def _answer(
 
 
 def _reactions(level: Level, find_forces: FindForces | None) -> tuple[GraspReaction, ...]:
-    windows = level.motion.forces if find_forces is None else tuple(find() for find in find_forces)
+    windows = level.motion.forces if find_forces is None else find_forces()
     return reactions(level.problem, level.motion.grid, windows)
 
 

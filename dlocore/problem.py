@@ -93,6 +93,11 @@ class Problem:
         """The events inside the horizon, by time."""
         return find_events(self.scene)
 
+    @property
+    def touches(self) -> bool:
+        """Whether the cable touches something, rubs on it or meets itself: forces with kinks."""
+        return self.contact is not None or self.friction is not None or self.self_contact is not None
+
     @cached_property
     def nc(self) -> int:
         """Number of coordinates of a control point: 2 in the plane, 3 in space, 4 with twist."""

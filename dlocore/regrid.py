@@ -29,7 +29,8 @@ def begin_on(problem: Problem, grid: Grid, settled: Grid) -> tuple[Floats, Histo
     if settled.start.shape[1] != problem.nc or not (least >= 1.0 - _FOLDED and most <= 1.0 + _FOLDED):
         return None
     q = grid.start.copy()
-    q[:, :dimensions] = _fitted(settled.knots, settled.start[:, :dimensions], grid.knots)
+    line = SplineCurve(knots=settled.knots, control_points=settled.start[:, :dimensions])
+    q[:, :dimensions] = fit_to_knots(line, grid.knots)
     history = grid.past()
     if problem.twist is not None:
         q[:, 3] = 0.0
@@ -53,7 +54,3 @@ def begin_on(problem: Problem, grid: Grid, settled: Grid) -> tuple[Floats, Histo
     pull = problem.stretch.axial_stiffness * strain
     tension[:, ASSUMED] = np.interp(grid.tables.axial_u, tables.axial_u, pull)
     return q, history._replace(tension=tension)
-
-
-def _fitted(knots: Floats, control_points: Floats, onto: Floats) -> Floats:
-    return fit_to_knots(SplineCurve(knots=knots, control_points=control_points), onto)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from dlocore.effects.laws import keeps_curvature, keeps_history
-from dlocore.kernels.assembly import History, slopes
+from dlocore.kernels.assembly import History, slopes, times_scalar_band
 from dlocore.kernels.basis import build_tables
 from dlocore.kernels.compile import kernel
 from dlocore.kernels.entry import begin_stretch, remember_start, to_ends_of_steps
@@ -75,11 +75,10 @@ def smooth_motion(
         times[1] - times[0], inertial, nc,
     )  # fmt: skip
     reactions = np.zeros((steps + 1, len(e.held)))
+    inertia = times_scalar_band(tables.mass, a)
     for k in range(len(e.held)):
         i, d = e.held[k] // nc, e.held[k] % nc
-        reactions[0, k] = G[i, d]
-        for o in range(-min(3, i), min(4, n - i)):
-            reactions[0, k] += density * tables.mass[min(i, i + o), abs(o)] * a[i + o, d]
+        reactions[0, k] = density * inertia[i, d] + G[i, d]
     states = np.empty((steps + 1, n, nc))
     states[0] = start
     march_steps(

@@ -357,8 +357,7 @@ def tolerance_of(problem: Problem, step: float) -> float:
     """
     length = problem.scene.cable.length
     of_coarse = step / (COARSE * 2.0 * math.sqrt(length))
-    kinks = problem.contact is not None or problem.friction is not None or problem.self_contact is not None
-    least = TOLERANCE if kinks else LEAST_TOLERANCE
+    least = TOLERANCE if problem.touches else LEAST_TOLERANCE
     return min(max(TOLERANCE * of_coarse**2, least), MOST_TOLERANCE) * length
 
 

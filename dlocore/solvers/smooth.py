@@ -94,9 +94,7 @@ def _is_plain(problem: Problem) -> bool:
     return (
         problem.nc == 2
         and problem.inertia is not None
-        and problem.contact is None
-        and problem.friction is None
-        and problem.self_contact is None
+        and not problem.touches
         and problem.bending_memory is None
         and problem.stretch_memory is None
         and problem.start.material is None

@@ -208,7 +208,7 @@ class Solved:
     control: Floats
     converged: bool
     update: float
-    find_forces: tuple[Callable[[], WindowForces], ...]
+    find_forces: Callable[[], tuple[WindowForces, ...]]
 
 
 OnStep = Callable[[Floats, float, float, float, float], None]
@@ -261,7 +261,7 @@ def solve(problem: Problem, motion: March, knots_t: Floats, delta: float, monito
         worst = max(worst, update)
         q = control[-1]
         v = 3 * (control[-1] - control[-2]) / (window.knots[-2] - window.knots[-5])
-    return Solved(join(parts, windows), converged, worst, tuple(forces))
+    return Solved(join(parts, windows), converged, worst, lambda: tuple(find() for find in forces))
 
 
 def _window_fit(motion: March, window: Window) -> Floats:
