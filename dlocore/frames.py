@@ -21,6 +21,7 @@ from dlocore.transport import transported
 Floats = NDArray[np.float64]
 
 MATERIAL_TIMES = 33  # at most, at which the memory of a motion is kept
+_SMOOTH = 1e-3  # of the slopes' own weight: that of the bends of an angle, which decide only what no slope does
 
 
 def free_of_frames(problem: Problem, grid: Grid, states: Floats, frames: Floats) -> Floats:
@@ -48,14 +49,23 @@ def rates_of(problem: Problem, grid: Grid, states: Floats, frames: Floats) -> Fl
 def angles_of(problem: Problem, grid: Grid, rates: Floats, first: Floats) -> Floats:
     """Return the fourth coordinates (k, n_u) [m] of which the first are given (k,) and the slopes are those of twist
     rates (k, points) [rad/m] against frames without twist.
+
+    Their means over the knot spans leave oscillations about the double knot of a clamp inside the cable free, so that
+    of all angles with these slopes it is the smoothest.
     """
     assert problem.twist is not None, "who asks for angles has some"
-    root = np.sqrt(grid.tables.curvature_w)[:, None]
-    slopes = np.zeros((len(root), grid.n_u))
-    np.put_along_axis(slopes, grid.tables.curvature_first[:, None] + np.arange(4), grid.tables.curvature_b1, axis=1)
-    slopes = mean_over_spans(grid.tables) @ slopes  # as the twist rates are
-    right = problem.twist.radius * rates - first[:, None] * slopes[:, 0]
-    return np.concatenate([first[:, None], right * root[:, 0] @ np.linalg.pinv(root * slopes[:, 1:]).T], axis=1)
+    tables = grid.tables
+    weights, firsts = np.asarray(tables.curvature_w), np.asarray(tables.curvature_first)
+    root = np.sqrt(weights)[:, None]
+    slopes, bends = np.zeros((2, len(root), grid.n_u))
+    for order, rows in ((slopes, tables.curvature_b1), (bends, tables.curvature_b2)):
+        np.put_along_axis(order, firsts[:, None] + np.arange(4), rows, axis=1)
+    slopes = mean_over_spans(tables) @ slopes  # as the twist rates are
+    widths = (firsts[:, None] == firsts) @ weights  # of the knot spans
+    rows = np.concatenate([root * slopes, _SMOOTH * widths[:, None] * root * bends])
+    right = np.concatenate([problem.twist.radius * rates * root[:, 0], np.zeros((len(rates), len(root)))], axis=1)
+    right -= first[:, None] * rows[:, 0]
+    return np.concatenate([first[:, None], right @ np.linalg.pinv(rows[:, 1:]).T], axis=1)
 
 
 def free_control(problem: Problem, grid: Grid, knots_t: Floats, control: Floats, times: Floats, log: Floats) -> Floats:
