@@ -42,7 +42,7 @@ def find_events(scene: Scene) -> tuple[Event, ...]:
     for g in scene.grasps:
         add(g.start, 3)
         if g.release_time is not None:
-            add(g.release_time, 2)
+            add(g.release_time, 3)
         released = np.inf if g.release_time is None else g.release_time
         end = g.start + g.path.duration
         if g.path.duration and end < released:

@@ -14,7 +14,8 @@ def fit_time(knots: Any, times: Any, Q: Any, v0: Any) -> Any:
     """Return control points (n_t, m) of the time spline fitted to the states Q (k, m) at `times`.
 
     Least squares weighted by the time each state stands for; the first two control points give the initial position
-    and velocity exactly, the last the final position.
+    and velocity exactly, the last the final position, and one at a triple knot, where the velocity may jump, the state
+    there: what the spline misses on one side of it does not move it on the other.
     """
     first, table = basis_rows(knots, times, 0)
     return _fit(knots, first, table, times, Q, v0)
@@ -44,38 +45,42 @@ def fitted(knots: Any, times: Any, states: Any, v0: Any, dimensions: int) -> Any
 def _fit(knots: Any, first: Any, table: Any, times: Any, Q: Any, v0: Any) -> Any:
     n = len(knots) - 4
     k, m = Q.shape
-    C = np.empty((n, m))
+    C = np.zeros((n, m))
+    given = np.zeros(n, np.bool_)
     C[0] = Q[0]
     C[1] = Q[0] + v0 * ((knots[4] - knots[1]) / 3.0)
     C[n - 1] = Q[k - 1]
-    size = n - 3
-    A = np.zeros((size, 4))
-    right = np.zeros((size, m))
+    given[0] = given[1] = given[n - 1] = True
+    for j in range(4, n - 2):
+        if knots[j] == knots[j + 2]:  # the spline passes through this control point
+            s = np.searchsorted(times, knots[j])
+            if s < k and times[s] == knots[j]:
+                C[j - 1], given[j - 1] = Q[s], True
+    A = np.zeros((n, 4))
     for s in range(1, k - 1):
         w = 0.5 * (times[s + 1] - times[s - 1])
         b = table[s, 0]
         for i in range(4):
-            row = first[s] + i - 2
-            if row < 0 or row >= size:
+            row = first[s] + i
+            if given[row]:
                 continue
             share = w * b[i]
             for c in range(m):
-                right[row, c] += share * Q[s, c]
+                C[row, c] += share * Q[s, c]
             for j in range(4):
-                column = first[s] + j - 2
-                if column < 0 or column == size:  # given
+                column = first[s] + j
+                if given[column]:
                     for c in range(m):
-                        right[row, c] -= share * b[j] * C[column + 2, c]
+                        C[row, c] -= share * b[j] * C[column, c]
                 elif j >= i:
-                    A[row, column - row] += share * b[j]
+                    A[row, j - i] += share * b[j]
     trace = 0.0
-    for i in range(size):
+    for i in range(n):
         trace += A[i, 0]
-    for i in range(size):
-        A[i, 0] += 1e-13 * trace
+    for i in range(n):
+        A[i, 0] = 1.0 if given[i] else A[i, 0] + 1e-13 * trace
     factor(A)
-    solve_rows(A, right)
-    C[2 : n - 1] = right
+    solve_rows(A, C)
     return C
 
 

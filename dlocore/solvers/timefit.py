@@ -13,6 +13,7 @@ Floats = NDArray[np.float64]
 _REFINEMENTS = 8  # of the time knots: each halves spans
 _MOST_OF_THE_TIME = 0.95
 _EVENINGS = 12  # of the time knots
+_STATES = 2  # of the march in a span of the time spline, at least
 _QUIET = 1e-3  # of the largest miss: what a span misses at least, so that none grows without bounds
 
 
@@ -53,11 +54,14 @@ def evened(motion: March, knots_t: Floats, events: Floats) -> Floats:
     """Return as many time knots, closer where the motion is fast, so that the time spline misses it evenly.
 
     The miss of a span goes with the fourth power of its length. Each round shares the spans out so that they would miss
-    as much as each other, and the best knots of all rounds are kept. Knots at the times of events (k,) [s] stay.
+    as much as each other, and the best knots of all rounds are kept. Knots at the times of events (k,) [s] stay. A span
+    without states could go anywhere: where spans would be that short, the motion is too fast for so few steps.
     """
     best = found = knots_t
     least = np.inf
     for _ in range(_EVENINGS):
+        if np.histogram(motion.times, np.unique(found))[0].min() < _STATES:
+            break
         off = fit(motion, found)[1]
         if largest(off) < least:
             best, least = found, largest(off)
