@@ -124,24 +124,21 @@ def curvature(
             S = w * (elastic * stiffness[0] + viscous * viscosity[0])
             H = plane_hessian(ax, ay, cx, cy, kappa)
             M *= geometric
-            xx, xy, yy = M * H[0], M * H[1], M * H[2]  # by r', r'
-            ux, uy, vx, vy = M * H[3], M * H[4], M * H[5], M * H[6]  # by r', r''
+            # second derivatives of the energy by r', by r' (rows) and r'' and by r''
+            s0, s1, s2, s3 = S * J[0], S * J[1], S * J[2], S * J[3]
+            aa, ab, bb = s0 * J[0] + M * H[0], s0 * J[1] + M * H[1], s1 * J[1] + M * H[2]
+            ac, ad, bc, bd = s0 * J[2] + M * H[3], s0 * J[3] + M * H[4], s1 * J[2] + M * H[5], s1 * J[3] + M * H[6]
+            cc, cd, dd = s2 * J[2], s2 * J[3], s3 * J[3]
             for j in range(4):
                 bj, cj = b[j], c[j]
-                Gx, Gy = S * (bj * J[0] + cj * J[2]), S * (bj * J[1] + cj * J[3])
-                # columns of the tangent by r' (rows x, y) and by r''
-                rxx, rxy = bj * xx + cj * ux, bj * xy + cj * uy
-                ryx, ryy = bj * xy + cj * vx, bj * yy + cj * vy
-                sxx, sxy, syx, syy = bj * ux, bj * vx, bj * uy, bj * vy
+                # of the forces by r' and by r'', with respect to control point j: rows, columns x, y
+                pxx, pxy, pyx, pyy = bj * aa + cj * ac, bj * ab + cj * ad, bj * ab + cj * bc, bj * bb + cj * bd
+                rxx, rxy, ryx, ryy = bj * ac + cj * cc, bj * bc + cj * cd, bj * ad + cj * cd, bj * bd + cj * dd
                 for i in range(j, 4):
                     bi, ci = b[i], c[i]
-                    Gi, Gk = bi * J[0] + ci * J[2], bi * J[1] + ci * J[3]
                     _add_block(
                         K, k, i, j,
-                        Gi * Gx + bi * rxx + ci * sxx,
-                        Gi * Gy + bi * rxy + ci * sxy,
-                        Gk * Gx + bi * ryx + ci * syx,
-                        Gk * Gy + bi * ryy + ci * syy,
+                        bi * pxx + ci * rxx, bi * pxy + ci * rxy, bi * pyx + ci * ryx, bi * pyy + ci * ryy,
                     )  # fmt: skip
 
 
