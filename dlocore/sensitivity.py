@@ -100,7 +100,7 @@ def factored(problem: Problem, motion: March) -> KnownMotion:
     v, softened = grid.velocity.copy(), 0
     for begin, end, first, last in _stretches(problem, motion.times):
         h = (end - begin) / (last - first)
-        entry = _enter(problem, grid, starts, motion.times[first : last + 1], begin, h, states[first], v, history)
+        entry = _enter(problem, grid, starts, motion.times, first, last, states[first], v, history)
         v, a = entry.v.copy(), entry.a.copy()
         free = states[0].size - len(entry.held.elimination.held)
         factors = np.empty((last - first, free, entry.held.elimination.width))
@@ -147,7 +147,7 @@ def beside(known: KnownMotion, problem: Problem, grid: Grid) -> tuple[Floats, Fl
         first, last = stretch.first, stretch.last
         times[first : last + 1] = np.linspace(begin, end, last - first + 1)
         h = (end - begin) / (last - first)
-        entry = _enter(problem, grid, starts, times[first : last + 1], begin, h, states[first], v, history)
+        entry = _enter(problem, grid, starts, times, first, last, states[first], v, history)
         velocity = entry.closed if first == 0 else velocity
         v, a, G = entry.v.copy(), entry.a.copy(), entry.G.copy()
         applied = applied_forces(problem, grid, times[first : last + 1])
@@ -168,13 +168,16 @@ def _stretches(problem: Problem, times: Floats) -> list[tuple[float, float, int,
 
 
 def _enter(
-    problem: Problem, grid: Grid, starts: Starts, times: Floats, begin: float, h: float, q: Floats, v: Floats,
+    problem: Problem, grid: Grid, starts: Starts, times: Floats, first: int, last: int, q: Floats, v: Floats,
     history: Any,
 ) -> Entry:  # fmt: skip
-    """Close the grasps of a stretch and return how it begins."""
-    load = applied_forces(problem, grid, times[:1])[0]
-    grasps = closed_grasps(problem, begin, float(times[-1]))
-    return enter(problem, grid, grasps, starts, times, h, np.ascontiguousarray(q), v, history, load)
+    """Close the grasps of the stretch from step `first` to `last` of `times` (steps + 1,) [s]; return how it begins."""
+    own = times[first : last + 1]
+    load = applied_forces(problem, grid, own[:1])[0]
+    grasps = closed_grasps(problem, float(own[0]), float(own[-1]))
+    h = float(own[-1] - own[0]) / (last - first)
+    before = float(times[first] - times[first - 1]) if first > 0 else 0.0
+    return enter(problem, grid, grasps, starts, own, h, before, np.ascontiguousarray(q), v, history, load)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dlocore.effects.laws import SELF_CONTACT, keeps_history
-from dlocore.kernels.assembly import NO_RATES, assemble, multiply_scalar_band, remember, times_scalar_band
+from dlocore.kernels.assembly import assemble, multiply_scalar_band, remember, times_scalar_band
 from dlocore.kernels.compile import brief
 from dlocore.kernels.march import constrained_mass_solve
 from dlocore.kernels.selfcontact import press
@@ -23,16 +23,17 @@ def remember_start(axes: Any, q: Any, tables: Any, active: Any, p: Any, history:
 @brief
 def begin_stretch(
     axes: Any, q: Any, v: Any, unit: Any, density: float, dragged: float, tables: Any, active: Any, p: Any,
-    history: Any, load: Any, e: Any, near: Any, h: float, inertial: bool, dimensions: int,
+    history: Any, rates: Any, load: Any, e: Any, near: Any, h: float, inertial: bool, dimensions: int,
 ) -> Any:  # fmt: skip
     """Return velocity, acceleration and G = f + C v - load, each (n, nc), where a smooth stretch begins, and its jump.
 
     The velocity is what the last one, v, becomes as the grasps close; the acceleration is consistent with the forces.
-    The jump is the largest change of a component of the centreline's velocity [m/s].
+    The jump is the largest change of a component of the centreline's velocity [m/s]; strain resists at the rate before.
 
     Args:
         q: (n, nc) [m] the state.
         unit: (n, 4) mass matrix of unit density; `density` [kg/m] and `dragged` [N s/m^2] are those of the cable.
+        rates: of strain, see `assemble`: from v, or from the last step.
         near: (3, held) [m] prescribed part of what is held at the beginning, h and 2 h later.
         h: [s], short.
         dimensions: of the centreline.
@@ -45,10 +46,11 @@ def begin_stretch(
     for i in range(len(v)):
         for d in range(dimensions):
             jump = max(jump, abs(closed[i, d] - v[i, d]))
-    v = closed if inertial else np.zeros_like(closed)
+    before = v if inertial else np.zeros_like(v)
+    v = closed if inertial else before
     G = np.empty_like(v)
     K = np.empty((1, 1))
-    assemble(axes, q, v, tables, active, p, history, NO_RATES, (0.0, 0.0, 0.0), G, K)
+    assemble(axes, q, before, tables, active, p, history, rates, (0.0, 0.0, 0.0), G, K)
     if active[SELF_CONTACT]:
         x = np.empty((len(tables.contact_w), min(nc, 3)))
         press(q, v, tables, p, x, np.empty((64, 2), np.int64), G)

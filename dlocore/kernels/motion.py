@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from dlocore.effects.laws import keeps_curvature, keeps_history
-from dlocore.kernels.assembly import History, slopes, times_scalar_band
+from dlocore.kernels.assembly import NO_RATES, History, slopes, times_scalar_band
 from dlocore.kernels.basis import build_tables
 from dlocore.kernels.compile import kernel
 from dlocore.kernels.entry import begin_stretch, remember_start, to_ends_of_steps
@@ -71,7 +71,8 @@ def smooth_motion(
     first, inertial = np.int64(0), np.bool_(True)  # as constants they would have kernels of their own compiled
     h = times[near + 1] - times[near]
     closed, a, G, jump = begin_stretch(
-        axes, start, velocity, tables.mass, density, dragged, tables, active, p, history, load[0], e, offsets[:near],
+        axes, start, velocity, tables.mass, density, dragged, tables, active, p, history, NO_RATES, load[0], e,
+        offsets[:near],
         times[1] - times[0], inertial, nc,
     )  # fmt: skip
     reactions = np.zeros((steps + 1, len(e.held)))

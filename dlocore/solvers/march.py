@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,9 @@ STRONGLY_DAMPED = 0.0
 TOLERANCE = 1e-8  # of the length, on the error that the Newton iterations of a step of COARSE leave
 LEAST_TOLERANCE, MOST_TOLERANCE = 1e-11, 1e-7
 COARSE = 1 / 256  # of the period of a cable that swings: the tolerance goes with the square of the step
+_SHORT = 4.0  # times the shortest knot span that is as short as the mean: shorter ones need forces
+_STIFF = 1e6  # EA L^2/EI up to which tension is no noise: that of cables whose EA is not given is mostly below
+_NOISELESS = 1e-4  # of the tolerance, at least
 _RESTS = 0.05  # of the diameter above the table: nearer to it the cable rests on it
 CHUNK = 256  # steps between looks at the clock, at most
 _WORK = (
@@ -200,7 +204,7 @@ class _Walk:
         self._laws = problem.laws
         self._mass = grid.tables.mass * problem.mass_density()
         self._applied = applied_forces(problem, grid, times)
-        self._tolerance = tolerance_of(problem, problem.horizon / len(times))
+        self._tolerance = tolerance_of(problem, grid, problem.horizon / len(times))
         self._states = np.empty((len(times), grid.n_u, problem.nc))
         self._states[0] = grid.start
         self._v = self._velocity = grid.velocity.copy()
@@ -277,8 +281,9 @@ class _Walk:
         h = (end - begin) / (last - first)
         grasps = closed_grasps(problem, begin, end)
         load = self._applied[min(first, len(self._applied) - 1)]
+        before = float(times[first] - times[first - 1]) if first > 0 else 0.0
         entry = enter(
-            problem, grid, grasps, self._starts, times[first : last + 1], h, self._states[first], self._v,
+            problem, grid, grasps, self._starts, times[first : last + 1], h, before, self._states[first], self._v,
             self._history, load,
         )  # fmt: skip
         e, a = entry.held.elimination, entry.a
@@ -349,16 +354,22 @@ def every_of(states: int) -> int:
     return max(1, states // _LOOKS)
 
 
-def tolerance_of(problem: Problem, step: float) -> float:
+def tolerance_of(problem: Problem, grid: Grid, step: float) -> float:
     """Return the error that Newton's iterations may leave in a step [m].
 
-    Over a short step it is an acceleration, of which the tension of a cable that hardly stretches makes noise. Forces
-    with kinks are not solved for more closely, as steps would fail at them.
+    Over a short step it is an acceleration, of which the tension of a cable that hardly stretches makes noise, and so
+    does a short span, or one that is far stiffer along itself than sideways. Forces with kinks are not solved for more
+    closely, as steps would fail at them.
     """
-    length = problem.scene.cable.length
+    cable = problem.scene.cable
+    length = cable.length
     of_coarse = step / (COARSE * 2.0 * math.sqrt(length))
+    breaks = grid.knots[np.flatnonzero(np.diff(grid.knots))]
+    short = min(1.0, _SHORT * len(breaks) * float(np.diff(np.append(breaks, length)).min()) / length)
+    stiff = cast(float, cable.axial_stiffness) * length**2 / cast(float, cable.bending_stiffness)
+    noisy = max(short**2 * min(1.0, _STIFF / stiff), _NOISELESS)
     least = TOLERANCE if problem.touches else LEAST_TOLERANCE
-    return min(max(TOLERANCE * of_coarse**2, least), MOST_TOLERANCE) * length
+    return min(max(TOLERANCE * of_coarse**2 * noisy, least), MOST_TOLERANCE) * length
 
 
 def _lean_on_anchors(

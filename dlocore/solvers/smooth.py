@@ -63,7 +63,7 @@ def march_smooth(
         problem.axes, grid.knots, *free_ends(problem.scene), *GAUSS_2, *GAUSS_3, *GAUSS_4, grid.start, grid.velocity,
         _STRAIGHT if straight else grid.history.memory, times, len(NEAR), rows, sampled, problem.plane.origin,
         problem.plane.axes, knots_t, *problem.laws, problem.mass_density(), problem.drag_coefficient(),
-        problem.weight(), rho, tolerance_of(problem, problem.horizon / (steps + 1)),
+        problem.weight(), rho, tolerance_of(problem, grid, problem.horizon / (steps + 1)),
         JUMPS * problem.scene.cable.length, every_of(steps + 1), info,
     )  # fmt: skip
     if info[FAILED_STEP] >= 0:

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.effects import laws
 from dlocore.grid import Grid
 from dlocore.holding import Held, Starts, close_grasps, hold
-from dlocore.kernels.assembly import History
+from dlocore.kernels.assembly import NO_RATES, History
 from dlocore.kernels.entry import begin_stretch
 from dlocore.problem import Problem
 from dlocore.scene import Grasp
@@ -29,7 +28,7 @@ class Entry:
         closed: (n_u, nc) [m/s] velocity as the grasps close.
         v: the same, zero where inertia is left out.
         a: (n_u, nc) [m/s^2] consistent acceleration, and
-        G: (n_u, nc) [N] forces f + C v - load, both without the damping of stretch but at the start of the motion.
+        G: (n_u, nc) [N] forces f + C v - load.
         jumps: whether the velocity jumps, so that the acceleration is that of the instant alone.
     """
 
@@ -43,8 +42,8 @@ class Entry:
 
 
 def enter(
-    problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, times: Floats, h: float, q: Floats, v: Floats,
-    history: History, load: Floats,
+    problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, times: Floats, h: float, last: float, q: Floats,
+    v: Floats, history: History, load: Floats,
 ) -> Entry:  # fmt: skip
     """Close the grasps of a stretch and return how it begins.
 
@@ -55,20 +54,19 @@ def enter(
         starts: where paths begin; those of grasps that close now are noted.
         times: (k,) [s] of the stretch.
         h: time step [s].
+        last: the time step before it [s], 0 at the start of the motion.
         q, v: (n_u, nc) state and velocity before [m, m/s].
         history: what lies behind; the strain of q is noted in it.
         load: (n_u, nc) applied forces at its beginning [N].
     """
     close_grasps(problem, grid, grasps, starts, q)
     held = hold(problem, grid, grasps, np.concatenate([times[0] + h * NEAR, times]), starts, q)
-    active, parameters = problem.laws
-    if times[0] > 0.0:  # the rate of a strain that hardly changes is lost in what steps leave of the velocities
-        active = active.copy()
-        active[laws.STRETCH_DAMPING] = 0
+    # the rate of a strain that hardly changes is lost in what steps leave of the velocities
+    rates = (1.0 / last, 0.0, -1.0 / last, 0.0) if last > 0.0 else NO_RATES
     inertial = problem.inertia is not None
     closed, a, G, jump = begin_stretch(
-        problem.axes, q, v, grid.tables.mass, problem.mass_density(), problem.drag_coefficient(), grid.tables, active,
-        parameters, history, load, held.elimination, held.offsets[:3], h * NEAR[1], inertial,
+        problem.axes, q, v, grid.tables.mass, problem.mass_density(), problem.drag_coefficient(), grid.tables,
+        *problem.laws, history, rates, load, held.elimination, held.offsets[:3], h * NEAR[1], inertial,
         problem.plane.dimensions,
     )  # fmt: skip
     started = closed.copy() if inertial else np.zeros_like(closed)

@@ -278,6 +278,35 @@ def test_a_release_keeps_the_velocity():
     assert np.linalg.norm(after - before) < 0.1 * np.linalg.norm(before)
 
 
+def test_the_spline_keeps_to_a_path_up_to_the_release_and_to_another_after_it():
+    # what springs away after a release is hard to fit, but not where a gripper is
+    move = Move(displacement=(0.1, 0.0, 0.1), duration=1.0)
+    grasps = (Grasp(u=0.0, path=move), Grasp(u=1.0, path=move, release_time=0.5))
+    scene = Scene(cable=cable(), shape=Points(points=arc(1.0, 2.0)), grasps=grasps, environment=DAMPED, horizon=1.0)
+    surface = predict(scene).surface
+    for g in grasps:
+        t = np.linspace(0.0, g.release_time or 1.0, 101)
+        path = g.path.at(t, surface.positions(g.u, 0.0)[0, 0])
+        assert np.linalg.norm(surface.positions(g.u, t)[:, 0] - path, axis=1).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("profile", "at"), [pytest.param("cubic", 0.6, id="acceleration"), pytest.param("linear", 0.0, id="velocity")]
+)
+def test_the_reaction_is_a_force_of_the_motion_also_where_that_jumps(profile, at):
+    # rates of strain from the velocities that steps leave in a short tip, or that jump, would damp with a ton
+    move = Move(displacement=(0.0, 0.3, 0.0), duration=0.6, profile=profile)
+    stiff = cable(linear_density=0.02, bending_stiffness=0.2, bending_damping=0.01)
+    grasps = (Grasp(u=0.01, hold="clamp", path=move),)
+    found = predict(Scene(cable=stiff, shape=Straight(), grasps=grasps, environment=DAMPED, horizon=1.0))
+    grasp = found.grasps[0]
+    force = np.linalg.norm(grasp.reaction, axis=1)
+    instant = np.flatnonzero(np.abs(grasp.times - at) < 1e-9)
+    around = np.abs(grasp.times - at) < 0.1
+    around[instant] = False
+    assert force[instant].max() < 2.0 * force[around].max()
+
+
 def test_quality_auto_takes_the_march_and_a_given_grid_the_least_squares():
     assert predict(paper_scene(0.0, quality=Quality())).accuracy.method == "march"
     assert predict(paper_scene(0.0)).accuracy.method == "spacetime"
