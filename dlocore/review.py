@@ -28,6 +28,7 @@ Floats = NDArray[np.float64]
 
 CLOSE = 0.01  # of the length: a cable that comes this near to an obstacle left out calls for it
 MATTERS = 0.001  # of the length: what a neglected effect may move the cable before it is worth a word
+_STRAINED = 0.05  # axial strain: few cables bear more
 _LOOKS = 5  # states of each stretch of a motion at which neglected forces are weighed
 
 
@@ -62,8 +63,14 @@ def self_contact_called_for(level: Level) -> dict[str, str]:
 
 
 def objections(level: Level) -> list[str]:
-    """Return what the effects that the scene switches off would have done, in words; those that matter only."""
+    """Return what is to be known of a motion beside its status, in words.
+
+    That is what the effects that the scene switches off would have done, where it matters, and a strain along the cable
+    that few bear.
+    """
     problem, found = level.problem, []
+    if level.motion.largest_strain > _STRAINED:
+        found.append(f"the motion strains the cable by up to {level.motion.largest_strain:.0%} along itself")
     off = {name for name, value in problem.scene.effects.items() if value == "off"}
     for name, test in (("plasticity", _yields), ("obstacles", _touches), ("self_contact", _meets_itself)):
         if name in off:

@@ -14,6 +14,7 @@ from dlocore import (
     Load,
     Move,
     Points,
+    Prediction,
     Quality,
     Scene,
     Straight,
@@ -305,6 +306,20 @@ def test_the_reaction_is_a_force_of_the_motion_also_where_that_jumps(profile, at
     around = np.abs(grasp.times - at) < 0.1
     around[instant] = False
     assert force[instant].max() < 2.0 * force[around].max()
+
+
+def test_an_answer_tells_of_strains_that_few_cables_bear():
+    def hung(stiffness: float) -> Prediction:
+        down = Straight(direction=(0.0, 0.0, -1.0))
+        return predict(Scene(cable=cable(axial_stiffness=stiffness), shape=down, grasps=(Grasp(u=0.0),), horizon=2.0))
+
+    # let go with a weight of 0.49 N
+    firm, soft, softer = hung(100.0), hung(8.0), hung(3.0)
+    assert firm.status == soft.status == "converged"
+    assert "strain" not in firm.message
+    assert "Note: the motion strains the cable by up to 8% along itself." in soft.message
+    assert softer.status == "stalled"
+    assert "which no cable follows" in softer.message
 
 
 def test_quality_auto_takes_the_march_and_a_given_grid_the_least_squares():
