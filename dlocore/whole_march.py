@@ -15,7 +15,7 @@ from dlocore.solvers.march import RHO
 from dlocore.solvers.monitor import Monitor
 
 TOO_DEEP = 0.25  # of the diameter, in the table, an obstacle or itself
-TORN = 0.1  # axial strain: no cable of this kind follows
+TORN = 0.2  # axial strain: no cable of this kind follows
 FOLDED = 0.4  # of |r'| between the points that watch over the length: less is a fold that no energy sees
 MISSED_COUNTS = 3.0  # what the time spline misses of its march, times this, is the least that the error may be
 

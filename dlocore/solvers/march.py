@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import cast
 
 import numpy as np
@@ -42,8 +43,8 @@ STRONGLY_DAMPED = 0.0
 TOLERANCE = 1e-8  # of the length, on the error that the Newton iterations of a step of COARSE leave
 LEAST_TOLERANCE, MOST_TOLERANCE = 1e-11, 1e-7
 COARSE = 1 / 256  # of the period of a cable that swings: the tolerance goes with the square of the step
-_SHORT = 4.0  # times the shortest knot span that is as short as the mean: shorter ones need forces
-_STIFF = 1e6  # EA L^2/EI up to which tension is no noise: that of cables whose EA is not given is mostly below
+_SHORT = 20.0  # times the shortest knot span are the mean, where forces begin to need more than positions do
+_STIFF = 3e6  # EA L^2/EI up to which tension is no noise: that of cables whose EA is not given is mostly below
 _NOISELESS = 1e-4  # of the tolerance, at least
 _RESTS = 0.05  # of the diameter above the table: nearer to it the cable rests on it
 CHUNK = 256  # steps between looks at the clock, at most
@@ -364,8 +365,8 @@ def tolerance_of(problem: Problem, grid: Grid, step: float) -> float:
     cable = problem.scene.cable
     length = cable.length
     of_coarse = step / (COARSE * 2.0 * math.sqrt(length))
-    breaks = grid.knots[np.flatnonzero(np.diff(grid.knots))]
-    short = min(1.0, _SHORT * len(breaks) * float(np.diff(np.append(breaks, length)).min()) / length)
+    spans = [b - a for a, b in pairwise(grid.knots.tolist()) if b > a]
+    short = min(1.0, _SHORT * len(spans) * min(spans) / length)
     stiff = cast(float, cable.axial_stiffness) * length**2 / cast(float, cable.bending_stiffness)
     noisy = max(short**2 * min(1.0, _STIFF / stiff), _NOISELESS)
     least = TOLERANCE if problem.touches else LEAST_TOLERANCE
