@@ -21,7 +21,7 @@ from dlocore.transport import transported
 Floats = NDArray[np.float64]
 
 MATERIAL_TIMES = 33  # at most, at which the memory of a motion is kept
-_SMOOTH = 1e-3  # of the slopes' own weight: that of the bends of an angle, which decide only what no slope does
+_SMOOTH = 0.03  # times the bends of an angle over a span count as its slopes do: little where these decide
 
 
 def free_of_frames(problem: Problem, grid: Grid, states: Floats, frames: Floats) -> Floats:
