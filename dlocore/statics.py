@@ -23,6 +23,7 @@ from dlocore.spline import design_matrix
 Floats = NDArray[np.float64]
 
 LEVELS = (9, 13, 17, 25, 33, 49, 65, 97)
+_FINER = (1.5, 2.0)  # times the control points, with which a start that finds no rest may
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -131,7 +132,8 @@ def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None =
     """Return the grid of a motion's start: settled to equilibrium where the scene asks for it.
 
     Where a grid `like` it, of the same problem, has settled, the start is settled from there: of several equilibria it
-    is the same one, and near.
+    is the same one, and near. Where none has, and this one finds no rest from the given start, it is settled from that
+    of a finer grid.
 
     Raises:
         SceneError: the start was to settle and found no equilibrium.
@@ -139,11 +141,21 @@ def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None =
     grid = make_grid(problem, n_u)
     if not problem.scene.shape.settle:
         return grid
+    found = _settled(problem, grid, monitor, like)
+    for finer in _FINER if like is None else ():
+        if found is None:
+            other = _settled(problem, make_grid(problem, round(finer * n_u)), monitor, None)
+            found = None if other is None else _settled(problem, grid, monitor, other)
+    if found is None:
+        allowed = "false, or a start that grasps hold in an equilibrium"
+        raise SceneError("shape.settle", True, allowed, "The start did not come to rest")
+    return found
+
+
+def _settled(problem: Problem, grid: Grid, monitor: Monitor, like: Grid | None) -> Grid | None:
+    """Return a grid with its start settled, first from that of a grid like it, or None where it finds no rest."""
     begin = None if like is None else begin_on(problem, grid, like)
     q, rest, _, history = settle(problem, grid, 0.0, monitor, begin)
     if begin is not None and rest == "restless":
         q, rest, _, history = settle(problem, grid, 0.0, monitor)
-    if rest == "restless":
-        allowed = "false, or a start that grasps hold in an equilibrium"
-        raise SceneError("shape.settle", True, allowed, "The start did not come to rest")
-    return grid.changed(start=q, history=history)
+    return None if rest == "restless" else grid.changed(start=q, history=history)

@@ -160,3 +160,11 @@ def test_a_cable_that_hardly_stretches_settles_as_one_that_stretches_more():
         shapes.append((problem, start_grid(problem, 28, Monitor())))
     (problem, stiff), (_, soft) = shapes
     assert apart(problem, stiff, soft) < 1e-3  # its weight of 0.5 N strains the softer one by 5e-4
+
+
+def test_a_start_that_finds_no_rest_on_few_control_points_settles_from_more():
+    scene = draw(7, 200).make()  # 27 m that fall to hang from a point beside one end
+    problem = pose(scene)
+    coarse, fine = (start_grid(problem, n_u, Monitor()) for n_u in (9, 19))
+    assert coarse.n_u == 9
+    assert apart(problem, coarse, fine) < 1e-3
