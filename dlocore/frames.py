@@ -65,7 +65,8 @@ def angles_of(problem: Problem, grid: Grid, rates: Floats, first: Floats) -> Flo
     rows = np.concatenate([root * slopes, _SMOOTH * widths[:, None] * root * bends])
     right = np.concatenate([problem.twist.radius * rates * root[:, 0], np.zeros((len(rates), len(root)))], axis=1)
     right -= first[:, None] * rows[:, 0]
-    return np.concatenate([first[:, None], right @ np.linalg.pinv(rows[:, 1:]).T], axis=1)
+    q, r = np.linalg.qr(rows[:, 1:])
+    return np.concatenate([first[:, None], np.linalg.solve(r, q.T @ right.T).T], axis=1)
 
 
 def free_control(problem: Problem, grid: Grid, knots_t: Floats, control: Floats, times: Floats, log: Floats) -> Floats:
