@@ -47,6 +47,9 @@ def run(drawn: Drawn, deadline: float, checked: bool) -> dict[str, Any]:
             record |= compare(prediction, scene, deadline)
         if prediction.status != "converged" or record.get("apart", 0.0) > WRONG:
             record["disturbed"] = disturbed(prediction, scene, deadline)
+        if prediction.status != "converged" and scene.quality.n_u is not None:
+            free = replace(scene, quality=Quality(target_error=WRONG * scene.cable.length))
+            record["free"] = predict(free, deadline=deadline).status
     except SceneError as error:
         record |= {"status": "refused", "message": str(error), "field": error.field}
     except Exception as error:  # whatever it is, it is what this looks for
@@ -127,6 +130,11 @@ def disturbed(prediction: Prediction, scene: Scene, deadline: float) -> float | 
         shapes.append(motion.states[at][:, :, : waves.shape[1]])
     away = max(float(np.linalg.norm(x - shapes[0], axis=-1).max()) for x in shapes[1:])
     return away / scene.cable.length
+
+
+def converges(record: dict[str, Any]) -> bool:
+    """Tell whether a scene converges on the grid that was asked for, or, where that can't show it, on a free one."""
+    return "converged" in (record["status"], record.get("free"))
 
 
 def is_undetermined(record: dict[str, Any]) -> bool:
