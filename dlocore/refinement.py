@@ -85,7 +85,7 @@ class _Climb:
         changes: how far refinements moved the surface.
         estimate: error of the best one [m].
         rho: spectral radius of the next march.
-        failures: marches in a row that found less than the best one.
+        failures: marches in a row that found less than the best one, or no equilibrium as that.
     """
 
     problem: Problem
@@ -127,9 +127,9 @@ class _Climb:
                     return self._unfinished(level, self.best)
                 self._weigh(level, self.best)
             record_level(self.problem, level, self.monitor)
-            self.best, self.failures = level, 0
+            self.best, self.failures = level, self.failures + 1 if level.motion.stopped else 0
             status, message = march_status(self.problem, level)
-            if level.motion.stopped == "time":
+            if level.motion.stopped == "time" or self.failures > len(LEVELS):
                 return Outcome(level, status, message, None)
             unfolds = self._affordable(_finer(size, "space", False)) if is_folded(level) else None
             if self.estimate <= ACCEPT * self.target and self.budget == np.inf and unfolds is None:
@@ -170,6 +170,9 @@ class _Climb:
 
     def _weigh(self, level: Level, best: Level) -> None:
         """Note how far a level moved the surface, what error that points to, and how to damp the next march."""
+        if best.motion.stopped:  # its surface stands still from there on: how far that is from another tells nothing
+            self.changes, self.estimate = {}, np.inf
+            return
         self.changes[self.direction] = weighed(level, best, self.changes.get(self.direction))
         self.estimate = max(_error(self.changes), MISSED_COUNTS * level.missed)
         rough = self._is_rough(level)
@@ -206,7 +209,8 @@ class _Climb:
         """Return a size, or None where a march of it takes too long."""
         touches = self.problem.contact is not None or self.problem.self_contact is not None
         work = size.n_u * size.steps * 2 ** (self.problem.nc - 2) * (CONTACT_COSTS if touches else 1)
-        content = self.enough > self.target and self.estimate <= self.enough
+        success = self.best is None or not is_folded(self.best)
+        content = self.enough > self.target and self.estimate <= self.enough and success
         most = MOST_WORK * (AUTO_SHARE if content else 1.0)
         fits = self.problem.twist is None or _FRAMES * size.n_t * size.n_u <= MOST_FRAMES
         return size if fits and size.n_u <= _MOST_POINTS and work <= most else None

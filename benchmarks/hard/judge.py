@@ -11,11 +11,14 @@ from benchmarks.hard.generator import Drawn
 from benchmarks.hard.laws import measure
 from dlocore import Prediction, Quality, Scene, SceneError, predict
 from dlocore.discretisation import smallest_n_u
-from dlocore.problem import pose
-from dlocore.solvers.ladder import stretched
+from dlocore.given import evenly_fitted, given_status
+from dlocore.problem import Problem, pose
+from dlocore.progress import surface_at
+from dlocore.solvers.ladder import Size, given_steps, stretched
 from dlocore.solvers.march import march
 from dlocore.solvers.monitor import Monitor
 from dlocore.statics import start_grid
+from dlocore.whole_march import march_level
 
 WRONG = 0.01  # of the length: an error that an answer has to tell of
 SURE = 0.3  # of a distance from the refined march: within it the refined marches agree where they can tell
@@ -84,15 +87,17 @@ def compare(prediction: Prediction, scene: Scene, deadline: float) -> dict[str, 
     """Return the distance from a refined march, and how far two refined marches are apart, of the length."""
     accuracy, surface, length = prediction.accuracy, prediction.surface, scene.cable.length
     u, t = np.linspace(0.0, length, 101), np.linspace(0.0, surface.horizon, 65)
+    problem = _posed(prediction, scene)
     found = []
     for finer in (2.0, 3.0):
         n_u = int(np.clip(round(finer * accuracy.n_u), 33, 129 if finer > 2 else 97))
         n_t = int(np.clip(round(finer * accuracy.n_t), 65, 513 if finer > 2 else 385))
-        quality = Quality(n_u=n_u, n_t=n_t, method="march", estimate=False)
-        refined = predict(replace(scene, quality=quality), deadline=deadline)
-        if refined.status != "converged":
-            return {"reference": f"{refined.status}: {refined.message[:120]}"}
-        found.append(refined.surface.positions(u, t))
+        steps = max(given_steps(n_t), round(finer * accuracy.steps))
+        refined = evenly_fitted(march_level(problem, Size(n_u, n_t, steps), Monitor(None, deadline), free_knots=True))
+        status, message = given_status(refined)
+        if status != "converged":
+            return {"reference": f"{status}: {message[:120]}"}
+        found.append(surface_at(refined.problem, refined, refined.control).positions(u, t))
     own = surface.positions(u, t)
     error = float(np.linalg.norm(own - found[1], axis=-1).max()) / length
     apart = float(np.linalg.norm(found[0] - found[1], axis=-1).max()) / length
@@ -107,8 +112,7 @@ def disturbed(prediction: Prediction, scene: Scene, deadline: float) -> float | 
     where each finds its equilibria and keeps the cable's length. A cable pushed exactly along itself has no side to go
     to and does neither: there the two bent ones are compared with each other.
     """
-    found = {e.name: e.reason for e in prediction.effects if e.active}
-    problem = pose(scene, found)
+    problem = _posed(prediction, scene)
     level = stretched(problem, 3)
     n_u = max(50, smallest_n_u(problem), prediction.accuracy.n_u)
     steps = max(8 * level.steps, prediction.accuracy.steps)
@@ -130,6 +134,11 @@ def disturbed(prediction: Prediction, scene: Scene, deadline: float) -> float | 
         shapes.append(motion.states[at][:, :, : waves.shape[1]])
     away = max(float(np.linalg.norm(x - shapes[0], axis=-1).max()) for x in shapes[1:])
     return away / scene.cable.length
+
+
+def _posed(prediction: Prediction, scene: Scene) -> Problem:
+    """Return the problem with the effects that a prediction found to be needed."""
+    return pose(scene, {e.name: e.reason for e in prediction.effects if e.active})
 
 
 def converges(record: dict[str, Any]) -> bool:

@@ -7,6 +7,7 @@ import pytest
 
 from benchmarks.hard.curves import arc, corner, hairpin, helix
 from benchmarks.hard.generator import draw
+from benchmarks.hard.judge import compare
 from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, Sphere, Straight, equilibrium, predict
 from dlocore.discretisation import corners, make_grid
 from dlocore.holding import Starts, close_grasps, hold
@@ -17,6 +18,7 @@ from dlocore.shape import start_curve
 from dlocore.solvers.ladder import hardness, run_level
 from dlocore.solvers.march import march as take_steps
 from dlocore.solvers.monitor import Monitor
+from dlocore.whole_march import is_folded
 from tests.solver.scenes import apart, march, paper_scene, refined
 
 
@@ -219,6 +221,23 @@ def kinked(quality: Quality) -> Scene:
         horizon=0.8,
         quality=quality,
     )  # fmt: skip
+
+
+@pytest.mark.parametrize(("seed", "index"), [(7, 727), (6, 51)])  # grasps half a millimetre apart; a rod springs away
+def test_marches_that_find_no_equilibrium_agree_on_nothing_until_a_finer_one_does(seed: int, index: int):
+    scene = draw(seed, index).make()
+    prediction = predict(scene)
+    assert prediction.status == "converged", prediction.message
+    error = compare(prediction, scene, 60.0)["error"] * scene.cable.length
+    assert error < prediction.accuracy.error_estimate
+
+
+def test_a_fold_is_unfolded_with_all_the_work_that_a_target_is_worth():
+    scene = draw(7, 1458).make()
+    prediction = predict(scene)
+    assert prediction.status == "converged", prediction.message
+    assert prediction.level is not None
+    assert not is_folded(prediction.level)
 
 
 def test_a_sharp_bend_is_the_same_on_coarse_and_fine_grids():
