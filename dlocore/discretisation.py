@@ -44,16 +44,16 @@ def make_grid(problem: Problem, n_u: int) -> Grid:
     Raises:
         SceneError: n_u is too small for the knots that the grasps and loads need.
     """
-    cable = problem.scene.cable
-    bends = corners(problem.start, cable.length)
-    features = find_features(problem.scene, bends, BEND * cable.length) if bends else problem.features
-    knots = graded_knots(n_u, cable.length, *features[:4])
-    if len(knots) == 0 and bends:
-        knots = graded_knots(n_u, cable.length, *problem.features[:4])
-    if len(knots) == 0:
-        reason = f"{len(problem.features.u)} grasps and loads need a knot each"
-        raise SceneError("quality.n_u", n_u, f"at least {smallest_n_u(problem)} in this scene", reason)
-    return grid_on(problem, knots)
+    scene, length = problem.scene, problem.scene.cable.length
+    bends = corners(problem.start, length)
+    # what is left out where there is no room for it: kinks of the angle, then sharp bends
+    for kinks in (True, False) if problem.twist is not None else (False,):
+        for sharp in (bends, []) if bends else ([],):
+            features = find_features(scene, sharp, BEND * length, kinks) if sharp or kinks else problem.features
+            if n_u >= features.least:
+                return grid_on(problem, graded_knots(n_u, length, *features[:4]))
+    reason = f"{len(problem.features.u)} grasps and loads need a knot each"
+    raise SceneError("quality.n_u", n_u, f"at least {smallest_n_u(problem)} in this scene", reason)
 
 
 def grid_on(problem: Problem, knots: Floats) -> Grid:

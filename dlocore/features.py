@@ -25,7 +25,7 @@ class Features(NamedTuple):
         u: (m,) [m], sorted.
         multiplicity: of the knot at each (m,).
         power, width: grading exponent, and width in parts of the length (m,).
-        least: number of control points that has them all.
+        least: number of control points that has them all; with kinks, two spans between any two, as they cost one.
     """
 
     u: Floats
@@ -35,21 +35,23 @@ class Features(NamedTuple):
     least: int
 
 
-def find_features(scene: Scene, bends: Sequence[float] = (), apart: float = 0.0) -> Features:
+def find_features(scene: Scene, bends: Sequence[float] = (), apart: float = 0.0, kinks: bool = False) -> Features:
     """Return the features of a scene, with those sharp `bends` [m] of its start that lie farther `apart` from others.
 
     Args:
         bends: (k,) [m].
         apart: [m].
+        kinks: the angle of the sections may have kinks where directions are held, for which these knots are triple.
     """
     length = scene.cable.length
     found: dict[float, tuple[int, float, float]] = {}
-    places = [(g.u, 1 if g.hold == "point" else 2) for g in scene.grasps]
+    directed = 3 if kinks else 2
+    places = [(g.u, 1 if g.hold == "point" else directed) for g in scene.grasps]
     places += [(load.u, 1) for load in scene.loads]
     for place, multiplicity in places:
         u = next((v for v in found if abs(v - place) <= SAME * length), place)
         at_end = min(u, length - u) <= SAME * length
-        power, width = _END if at_end or multiplicity == 2 else _INTERIOR
+        power, width = _END if at_end or multiplicity > 1 else _INTERIOR
         before = found.get(u, (0, 0.0, 1.0))
         found[u] = (max(before[0], multiplicity), max(before[1], power), min(before[2], width))
     for u in bends:
@@ -57,13 +59,13 @@ def find_features(scene: Scene, bends: Sequence[float] = (), apart: float = 0.0)
             found[u] = (1, *_CORNER)
     order = sorted(found)
     rows = [found[u] for u in order]
-    inside = sum(row[0] for u, row in zip(order, rows, strict=True) if 0.0 < u < length)
+    inside = [row[0] for u, row in zip(order, rows, strict=True) if 0.0 < u < length]
     return Features(
         np.array(order, float),
         np.array([row[0] for row in rows], np.int64),
         np.array([row[1] for row in rows], float),
         np.array([row[2] for row in rows], float),
-        max(5, 4 + inside),
+        max(5, 4 + sum(inside) + (len(inside) + 1 if kinks else 0)),
     )
 
 

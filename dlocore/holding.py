@@ -24,7 +24,8 @@ class Held:
         grasps: those that hold, in the scene's order.
         elimination: for the compiled kernels.
         offsets: (k, held) [m] prescribed part of the held degrees of freedom at the k times.
-        rows: constraint rows for every coordinate of the centreline: (grasp, derivative) in the order of `inverse`.
+        rows: constraint rows for every coordinate of the centreline: (grasp, derivative) in the order of `inverse`, and
+            `SMOOTH` for each triple knot, where the slope does not jump.
         inverse: (rows, rows) inverse of the constraint rows' pivot block.
         turned: the grasps that hold the angle of their section, in the order of `turned_inverse`.
         turned_inverse: the same for the rows that hold theta.
@@ -48,6 +49,7 @@ class Held:
         return reactions[:, len(self.rows) * dimensions :] @ self.turned_inverse
 
 
+SMOOTH = (-1, 1)  # the row of no grasp
 _STILL = Still().line
 _NOWHERE = np.empty(0)
 Starts = dict[Grasp, Floats]  # point and unit tangent (2, 3) in the world where the path of a grasp begins
@@ -85,6 +87,7 @@ def hold(problem: Problem, grid: Grid, grasps: list[Grasp], t: Floats, starts: S
     elimination, offsets, inverse, turned_inverse = hold_rows(
         grid.knots, problem.nc, t, table, sampled, problem.plane.origin, problem.plane.axes, places, angles
     )
+    rows += (SMOOTH,) * (len(inverse) - len(rows))
     return Held(tuple(grasps), elimination, offsets, rows, inverse, turned, turned_inverse)
 
 

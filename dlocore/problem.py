@@ -99,6 +99,14 @@ class Problem:
         return self.contact is not None or self.friction is not None or self.self_contact is not None
 
     @cached_property
+    def kinks(self) -> int:
+        """Number of places inside where the angle of the sections may have a kink, as grasps hold directions there."""
+        if self.twist is None:
+            return 0
+        u, multiplicity = self.features.u, self.features.multiplicity
+        return int(((multiplicity > 1) & (u > 0.0) & (u < self.scene.cable.length)).sum())
+
+    @cached_property
     def nc(self) -> int:
         """Number of coordinates of a control point: 2 in the plane, 3 in space, 4 with twist."""
         return self.plane.dimensions + (self.twist is not None)

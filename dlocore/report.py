@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dlocore.effects.distance import distances
 from dlocore.grid import Grid
-from dlocore.holding import Held
+from dlocore.holding import SMOOTH, Held
 from dlocore.kernels.assembly import History, stored_energy
 from dlocore.prediction import EffectReport, GraspReaction, MaterialMotion
 from dlocore.problem import Problem
@@ -61,6 +61,8 @@ def reactions(problem: Problem, grid: Grid, windows: tuple[WindowForces, ...]) -
         at = part.stop
         multipliers = problem.plane.world_vectors(window.held.multipliers(window.forces, dimensions))
         for row, (i, derivative) in enumerate(window.held.rows):
+            if (i, derivative) == SMOOTH:
+                continue
             g = window.held.grasps[i]
             if derivative == 0:
                 force[g][part] = multipliers[:, row]

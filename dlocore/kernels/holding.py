@@ -9,6 +9,7 @@ from dlocore.kernels.basis import basis, find_span
 from dlocore.kernels.compile import brief, kernel
 
 ROW = 17  # numbers that describe a row
+_JUMP = 2  # in place of a derivative: what the slope jumps by
 
 
 @brief
@@ -36,6 +37,10 @@ def hold_rows(
 ) -> Any:
     """Solve what grasps hold for one control point each (docs/model.md eq. 11, 12).
 
+    At a triple knot inside a spline may have a kink. The angle of the sections has one, where a gripper turns them or
+    their bends jump; the centreline has none, so that a row more holds the jump of its slope at zero, grasp or no
+    grasp.
+
     Args:
         knots: (n + 4,) [m].
         nc: number of coordinates of a control point.
@@ -51,15 +56,21 @@ def hold_rows(
 
     Returns:
         The `Elimination`, the prescribed part (k, held) [m] of the held degrees of freedom, and the inverses (rows,
-        rows) and (m, m) of the rows' pivot blocks.
+        rows) and (m, m) of the rows' pivot blocks; rows are those given, then one for each triple knot.
     """
-    count, nd = len(rows), len(axes)
-    pivots, inverse, follow = _solved_for(knots, rows[:, 0].copy(), rows[:, 1].copy(), rows[:, 2].copy())
+    given, nd = len(rows), len(axes)
+    kinks = _triple_knots(knots)
+    count = given + len(kinks)
+    u, order, first = np.empty(count), np.full(count, _JUMP), np.zeros(count)
+    u[given:] = kinks
+    for r in range(given):
+        u[r], order[r], first[r] = rows[r, 0], int(rows[r, 1]), rows[r, 2]
+    pivots, inverse, follow = _solved_for(knots, u, order, first)
     none = np.zeros(len(turned))
-    turned_pivots, turned_inverse, turned_follow = _solved_for(knots, turned, none, none)
+    turned_pivots, turned_inverse, turned_follow = _solved_for(knots, turned, np.zeros(len(turned), np.int64), none)
     offsets = np.zeros((len(times), count * nd + len(turned)))
     target = np.empty(3)
-    for s in range(count):
+    for s in range(given):
         row = rows[s]
         for k in range(len(times)):
             x = min(max((times[k] - row[4]) / row[5], 0.0), 1.0)
@@ -81,6 +92,18 @@ def hold_rows(
 
 
 @kernel
+def _triple_knots(knots: Any) -> Any:
+    """Return the places (k,) [m] of the triple knots inside."""
+    places = np.empty(len(knots))
+    count = 0
+    for k in range(4, len(knots) - 6):
+        if knots[k] == knots[k + 2]:
+            places[count] = knots[k]
+            count += 1
+    return places[:count].copy()
+
+
+@kernel
 def _solved_for(knots: Any, u: Any, order: Any, first: Any) -> Any:
     """Return the pivots of the rows at `u`, the inverse of their block, and how they follow the other control points.
 
@@ -91,9 +114,12 @@ def _solved_for(knots: Any, u: Any, order: Any, first: Any) -> Any:
     A = np.zeros((rows, n))
     table = np.empty((2, 4))
     for r in range(rows):
-        span, derivative = find_span(knots, u[r]), int(order[r])
+        span, derivative = find_span(knots, u[r]), min(order[r], 1)
         basis(knots, span, u[r], derivative, table)
         A[r, span - 3 : span + 1] = table[derivative]
+        if order[r] == _JUMP:
+            basis(knots, span - 3, u[r], 1, table)
+            A[r, span - 6 : span - 2] -= table[1]
     work = A.copy()
     pivots = np.full(rows, -1)
     for turn in range(2):

@@ -6,10 +6,11 @@ derivative k0 along the cable, a director across it, the twist rate of these fra
 that the smallest rotation carries from t0 to its tangent: nothing is singular where the cable is straight, and theta
 counts turns without end (docs/model.md eq. 19).
 
-The twist rate of a point is the mean over its knot span, but in the two end spans. Where the curvature jumps, the twist
-rate of the carried frames jumps too as the cable swings about its own tangent, and theta, a spline, can't follow: point
-by point the cable would be held back from swinging (membrane locking, of twist). Without the end spans two oscillations
-of theta would be free of energy.
+The twist rate of a point is the mean over its knot span, but in the two end spans and beside a triple knot. Where the
+curvature jumps, the twist rate of the carried frames jumps too as the cable swings about its own tangent. Theta can
+follow at a triple knot, where it may have a kink, but at no other: point by point the cable would be held back from
+swinging (membrane locking, of twist). Without the end spans two oscillations of theta would be free of energy, and
+without those beside a triple knot two more.
 """
 
 from typing import Any
@@ -40,6 +41,7 @@ PAST = 16
 LENGTH, ALONG, NOW, KAPPA, SPIN = 0, 1, 2, 5, 8  # columns of a point's geometry: |r'|, t . r'', t, kappa, spin
 LOCAL = 11
 Row = tuple[float, float, float, float]  # of basis functions
+_TRIPLE = 3  # control points on from one span to the next across a triple knot
 _STEPS = 8  # of the transport along the cable between two curvature points
 
 
@@ -81,11 +83,18 @@ def _strain(q: Any, tables: Any, past: Any, n: int, inverse: float) -> tuple[Vec
 @law
 def _span_end(firsts: Any, n: int) -> int:
     """Return the end of the points over which the twist rate of point n, the first of them, is averaged."""
+    last = len(firsts) - 1
     end = n + 1
-    if firsts[n] != firsts[0] and firsts[n] != firsts[len(firsts) - 1]:
-        while firsts[end] == firsts[n]:
-            end += 1
-    return end
+    if firsts[n] == firsts[0] or firsts[n] == firsts[last]:
+        return end
+    begin = n
+    while firsts[begin - 1] == firsts[n]:
+        begin -= 1
+    until = end
+    while firsts[until] == firsts[n]:
+        until += 1
+    kinked = firsts[n] - firsts[begin - 1] == _TRIPLE or firsts[until] - firsts[n] == _TRIPLE
+    return end if kinked else until
 
 
 @kernel
@@ -109,7 +118,10 @@ def _mean_twists(q: Any, tables: Any, past: Any, inverse: float) -> Any:
 def mean_over_spans(tables: Any) -> Any:
     """Return the matrix (points, points) that takes values at the curvature points to those that the twist rate has."""
     firsts, weights = tables.curvature_first, tables.curvature_w
-    same = (firsts[:, None] == firsts) & (firsts != firsts[0]) & (firsts != firsts[-1])
+    spans = np.unique(firsts)
+    jumps = np.diff(spans) == _TRIPLE
+    alone = spans[np.concatenate([[True], jumps]) | np.concatenate([jumps, [True]])]
+    same = (firsts[:, None] == firsts) & ~np.isin(firsts, alone)
     shares = same * weights + np.diag(~same.any(axis=0) * weights)
     return shares / shares.sum(axis=1, keepdims=True)
 

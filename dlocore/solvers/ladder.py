@@ -89,7 +89,7 @@ def stretched(problem: Problem, level: int) -> Size:
     n_u, n_t, steps = LEVELS[level]
     natural = 2.0 * np.sqrt(problem.scene.cable.length)  # [s]: about the period of a cable that swings
     factor = float(np.clip(problem.horizon / natural, 1.0, 64.0))
-    n_u = max(n_u, smallest_n_u(problem) + 2 * level)
+    n_u = max(n_u, smallest_n_u(problem) + 2 * level) + problem.kinks
     n_t = max(round(n_t * factor), smallest_n_t(problem) + 4 * (level + 1))
     return Size(n_u, n_t, max(round(steps * factor), 3 * n_t))
 

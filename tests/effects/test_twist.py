@@ -1,5 +1,6 @@
 """Twist and clamps against closed forms (docs/model.md): Kirchhoff's rod, Greenhill, Michell, link = twist + writhe."""
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -137,8 +138,7 @@ def test_a_clamp_inside_turns_against_the_twist_of_both_sides():
     assert found.status == "converged", found.message
     left, right = GJ * rotation / place, GJ * rotation / (1 - place)
     moments = [g.moment[-1, 0] for g in found.grasps]
-    # the spline of theta has no kink at a double knot: too stiff by 3.8 % at 13 points, 1.5 % at 25, 0.3 % at 97
-    np.testing.assert_allclose(moments, [-left, left + right, -right], rtol=0.02)
+    np.testing.assert_allclose(moments, [-left, left + right, -right], rtol=0.001)
     theta = found.surface([0.0, 0.15, 0.3, 0.65, 1.0], [1.5])[0, :, 3]
     # linear on each side with a kink at the clamp
     np.testing.assert_allclose(theta - theta[0], rotation * np.array([0.0, 0.5, 1.0, 0.5, 0.0]), atol=0.01 * rotation)
@@ -151,6 +151,40 @@ def twisted_straight(twist: float, **changes: Any) -> Scene:
     shape = spline(u, r, r[-1], r[-1], twist * u)
     values: dict[str, Any] = {"cable": cable(**STIFF), "grasps": (START, Grasp(u=1.0, hold="clamp")), "horizon": 1.0}
     return Scene(shape=shape, environment=WEIGHTLESS, **(values | changes))
+
+
+@pytest.mark.parametrize("hold", ["clamp", "tangent"])
+def test_a_bent_wire_turned_by_its_middle_converges_with_the_square_of_the_span(hold: str):
+    # its sections' angle has a kink where the gripper holds it: with a smooth one 19 points were 50 mm off, 62 were 10
+    bent = cable(rest_shape="initial")
+    move = Move(displacement=(-0.1, 0.1, -0.1), rotation=(0.3, -0.4, 0.2), duration=0.9)
+    scene = Scene(
+        cable=bent,
+        shape=Points(points=arc(1.0, 2.0)),
+        grasps=(Grasp(u=0.6, hold=hold, path=move),),
+        environment=Environment(drag=0.1),
+        effects={"self_contact": "off"},
+    )
+    found = [predict(replace(scene, quality=march(n_u, 60))) for n_u in (19, 38, 76)]
+    u, t = samples(found[0].surface, 65, 33)
+    coarse, middle, fine = (prediction.surface.positions(u, t) for prediction in found)
+    errors = [np.linalg.norm(x - fine, axis=-1).max() for x in (coarse, middle)]
+    assert errors[0] < 6e-3
+    assert errors[1] < errors[0] / 4.0
+
+
+def test_only_the_angle_of_the_sections_has_a_kink():
+    # a gripper takes the wire by its middle, turns it against its clamped end and lets go of it
+    turn = Move(displacement=(0.0, 0.05, 0.0), rotation=(1.0, 0.2, 0.0), duration=0.3)
+    grasps = (START, Grasp(u=0.4, hold="clamp", grasp_time=0.2, release_time=0.6, path=turn))
+    wire = cable(bending_stiffness=0.02, rest_shape="initial")
+    shape = Points(points=arc(1.0, 0.5))
+    found = predict(Scene(cable=wire, shape=shape, grasps=grasps, environment=WEIGHTLESS, quality=march(21, 41)))
+    assert found.status == "converged", found.message
+    times = np.linspace(0.0, found.surface.horizon, 33)
+    before, after = (found.surface([u], times, du=1)[:, 0] for u in (np.nextafter(0.4, 0.0), 0.4))
+    assert np.abs(after - before)[:, :3].max() < 1e-9
+    assert np.abs(after - before)[:, 3].max() > 0.1
 
 
 @pytest.mark.parametrize("hold", ["clamp", "tangent"])

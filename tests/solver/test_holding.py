@@ -8,11 +8,12 @@ import pytest
 from dlocore import Cable, ControlPoints, Environment, Grasp, Move, Scene, Straight, Waypoints
 from dlocore.discretisation import make_grid
 from dlocore.grid import Grid
-from dlocore.holding import Held, Starts, close_grasps, hold
+from dlocore.holding import SMOOTH, Held, Starts, close_grasps, hold
 from dlocore.kernels.banded import place_held
 from dlocore.kernels.entry import to_ends_of_steps
 from dlocore.paths import Path, Still
 from dlocore.problem import Problem, pose
+from dlocore.scene import Hold
 
 CABLE = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-3)
 TIMES = np.array([0.0, 0.1, 0.35, 0.8, 1.5])  # before, in and after the paths, which take 0.5 s to 1 s
@@ -91,15 +92,21 @@ def test_in_the_plane_rows_hold_in_its_coordinates():
     assert np.abs(world_at(problem, grid, q, 0.7, 0) - wanted).max() < ROUNDING
 
 
-def test_the_inverse_solves_the_rows_for_their_pivots():
-    grasps = (Grasp(u=0.2, hold="tangent"), Grasp(u=0.25), Grasp(u=0.6, hold="clamp"))
+@pytest.mark.parametrize(("hold", "kinks"), [("tangent", 0), ("clamp", 2)])  # two clamps hold a twist
+def test_the_inverse_solves_the_rows_for_their_pivots(hold: Hold, kinks: int):
+    grasps = (Grasp(u=0.2, hold=hold), Grasp(u=0.25), Grasp(u=0.6, hold="clamp", path=PATHS["minimum jerk"]))
     problem, grid, held = held_in(scene(*grasps), n_u=25)
     nd = problem.plane.dimensions
     pivots = held.elimination.held[: len(held.rows) * nd : nd] // problem.nc
     rows = np.zeros((len(held.rows), grid.n_u))
-    for r, (i, derivative) in enumerate(held.rows):
+    assert held.rows == ((0, 0), (0, 1), (1, 0), (2, 0), (2, 1), *(SMOOTH,) * kinks)
+    for r, (i, derivative) in enumerate(held.rows[:5]):
         first, b = grid.rows(grasps[i].u, derivative)
         rows[r, first : first + 4] = b
+    for r, u in ((5, 0.2), (6, 0.6))[:kinks]:
+        for at, sign in ((u, 1.0), (np.nextafter(u, 0.0), -1.0)):
+            first, b = grid.rows(at, 1)
+            rows[r, first : first + 4] += sign * b
     assert np.abs(held.inverse @ rows[:, pivots] - np.eye(len(rows))).max() < 100 * ROUNDING
 
 
