@@ -94,7 +94,8 @@ def test_in_the_plane_rows_hold_in_its_coordinates():
 
 @pytest.mark.parametrize(("hold", "kinks"), [("tangent", 0), ("clamp", 2)])  # two clamps hold a twist
 def test_the_inverse_solves_the_rows_for_their_pivots(hold: Hold, kinks: int):
-    grasps = (Grasp(u=0.2, hold=hold), Grasp(u=0.25), Grasp(u=0.6, hold="clamp", path=PATHS["minimum jerk"]))
+    back = Move(displacement=(-0.1, 0.05, 0.02), duration=0.8)
+    grasps = (Grasp(u=0.2, hold=hold), Grasp(u=0.25), Grasp(u=0.6, hold="clamp", path=back))
     problem, grid, held = held_in(scene(*grasps), n_u=25)
     nd = problem.plane.dimensions
     pivots = held.elimination.held[: len(held.rows) * nd : nd] // problem.nc
