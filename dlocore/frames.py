@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dlocore.discretisation import start_director
 from dlocore.grid import Grid
 from dlocore.kernels.timefit import fit_time
-from dlocore.kernels.twisted import mean_over_spans, twist_rates
+from dlocore.kernels.twisted import over_spans, twist_rates
 from dlocore.prediction import MaterialMotion
 from dlocore.problem import Problem
 from dlocore.spline import SplineSurface, design_matrix
@@ -50,8 +50,8 @@ def angles_of(problem: Problem, grid: Grid, rates: Floats, first: Floats) -> Flo
     """Return the fourth coordinates (k, n_u) [m] of which the first are given (k,) and the slopes are those of twist
     rates (k, points) [rad/m] against frames without twist.
 
-    Their means over the knot spans leave oscillations about the double knot of a clamp inside the cable free, so that
-    of all angles with these slopes it is the smoothest.
+    Their means over the knot spans leave oscillations about a double knot inside the cable free, which a grid has that
+    is too coarse for a triple one, so that of all angles with these slopes it is the smoothest.
     """
     assert problem.twist is not None, "who asks for angles has some"
     tables = grid.tables
@@ -60,7 +60,7 @@ def angles_of(problem: Problem, grid: Grid, rates: Floats, first: Floats) -> Flo
     slopes, bends = np.zeros((2, len(root), grid.n_u))
     for order, rows in ((slopes, tables.curvature_b1), (bends, tables.curvature_b2)):
         np.put_along_axis(order, firsts[:, None] + np.arange(4), rows, axis=1)
-    slopes = mean_over_spans(tables) @ slopes  # as the twist rates are
+    slopes = over_spans(tables) @ slopes  # as the twist rates are
     widths = (firsts[:, None] == firsts) @ weights  # of the knot spans
     rows = np.concatenate([root * slopes, _SMOOTH * widths[:, None] * root * bends])
     right = np.concatenate([problem.twist.radius * rates * root[:, 0], np.zeros((len(rates), len(root)))], axis=1)

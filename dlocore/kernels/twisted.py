@@ -6,11 +6,10 @@ derivative k0 along the cable, a director across it, the twist rate of these fra
 that the smallest rotation carries from t0 to its tangent: nothing is singular where the cable is straight, and theta
 counts turns without end (docs/model.md eq. 19).
 
-The twist rate of a point is the mean over its knot span, but in the two end spans and beside a triple knot. Where the
-curvature jumps, the twist rate of the carried frames jumps too as the cable swings about its own tangent. Theta can
-follow at a triple knot, where it may have a kink, but at no other: point by point the cable would be held back from
-swinging (membrane locking, of twist). Without the end spans two oscillations of theta would be free of energy, and
-without those beside a triple knot two more.
+The twist rate of a point is the mean over its knot span, and in the two end spans and beside a triple knot the straight
+line through those of the span: as many conditions as theta has freedoms. Where the curvature jumps, the twist rate of
+the carried frames jumps too as the cable swings about its own tangent. Theta can follow at a triple knot, where it may
+have a kink, but at no other: point by point the cable would be held back from swinging (membrane locking, of twist).
 """
 
 from typing import Any
@@ -82,48 +81,65 @@ def _strain(q: Any, tables: Any, past: Any, n: int, inverse: float) -> tuple[Vec
 
 @law
 def _span_end(firsts: Any, n: int) -> int:
-    """Return the end of the points over which the twist rate of point n, the first of them, is averaged."""
-    last = len(firsts) - 1
+    """Return the end of the points of a knot span, of which n is the first."""
     end = n + 1
-    if firsts[n] == firsts[0] or firsts[n] == firsts[last]:
-        return end
-    begin = n
-    while firsts[begin - 1] == firsts[n]:
-        begin -= 1
-    until = end
-    while firsts[until] == firsts[n]:
-        until += 1
-    kinked = firsts[n] - firsts[begin - 1] == _TRIPLE or firsts[until] - firsts[n] == _TRIPLE
-    return end if kinked else until
+    while end < len(firsts) and firsts[end] == firsts[n]:
+        end += 1
+    return end
+
+
+@law
+def _leans(firsts: Any, n: int, end: int) -> bool:
+    """Tell whether the twist rate is a straight line over the span of the points n to `end`, not its mean."""
+    outer = n == 0 or end == len(firsts)
+    return outer or firsts[n] - firsts[n - 1] == _TRIPLE or firsts[end] - firsts[n] == _TRIPLE
+
+
+@law
+def _middle(u: Any, weights: Any, n: int, end: int) -> tuple[float, float, float]:
+    """Return the middle [m] of the span of the points n to `end`, its width [m] and its second moment [m^3]."""
+    middle, width, moment = 0.0, 0.0, 0.0
+    for m in range(n, end):
+        middle += weights[m] * u[m]
+        width += weights[m]
+    middle /= width
+    for m in range(n, end):
+        moment += weights[m] * (u[m] - middle) ** 2
+    return middle, width, moment
 
 
 @kernel
-def _mean_twists(q: Any, tables: Any, past: Any, inverse: float) -> Any:
-    """Return the twist rate (points,) [rad/m] of q, the mean over each inner knot span."""
+def _span_twists(q: Any, tables: Any, past: Any, inverse: float) -> Any:
+    """Return the twist rate (points,) [rad/m] of q, over each knot span its mean or a straight line."""
     out = np.empty(len(tables.curvature_w))
-    firsts, weights = tables.curvature_first, tables.curvature_w
+    firsts, weights, u = tables.curvature_first, tables.curvature_w, tables.curvature_u
     n = 0
     while n < len(out):
         end = _span_end(firsts, n)
-        mean, width = 0.0, 0.0
+        middle, width, moment = _middle(u, weights, n, end)
+        mean, slope = 0.0, 0.0
         for m in range(n, end):
-            mean += weights[m] * _strain(q, tables, past, m, inverse)[0][2]
-            width += weights[m]
+            tau = _strain(q, tables, past, m, inverse)[0][2]
+            mean += weights[m] / width * tau
+            slope += weights[m] * (u[m] - middle) / moment * tau
+        leans = _leans(firsts, n, end)
         for m in range(n, end):
-            out[m] = mean / width
+            out[m] = mean + (slope * (u[m] - middle) if leans else 0.0)
         n = end
     return out
 
 
-def mean_over_spans(tables: Any) -> Any:
+def over_spans(tables: Any) -> Any:
     """Return the matrix (points, points) that takes values at the curvature points to those that the twist rate has."""
-    firsts, weights = tables.curvature_first, tables.curvature_w
+    firsts, weights, u = tables.curvature_first, tables.curvature_w, tables.curvature_u
+    same = firsts[:, None] == firsts
+    shares = same * weights / (same @ weights)[:, None]
+    x = u - shares @ u
+    slopes = same * (weights * x) / (same @ (weights * x**2))[:, None]
     spans = np.unique(firsts)
-    jumps = np.diff(spans) == _TRIPLE
-    alone = spans[np.concatenate([[True], jumps]) | np.concatenate([jumps, [True]])]
-    same = (firsts[:, None] == firsts) & ~np.isin(firsts, alone)
-    shares = same * weights + np.diag(~same.any(axis=0) * weights)
-    return shares / shares.sum(axis=1, keepdims=True)
+    outer = np.concatenate([[True], np.diff(spans) == _TRIPLE, [True]])
+    leans = np.isin(firsts, spans[outer[:-1] | outer[1:]])
+    return shares + (leans * x)[:, None] * slopes
 
 
 @part
@@ -134,74 +150,97 @@ def curvature(
     """Add the forces and tangents of curvature and twist.
 
     The derivatives of k1 and k2 are O by r', P by r'' and A by theta; that of the twist rate is the mean of its points'
-    over a span. The material part of the tangent is E' S E with the derivatives E by the control points. The
-    geometric part is that at the carried frame: what the carrying adds vanishes with the step.
+    over a span, or their straight line. The material part of the tangent is E' S E with the derivatives E by the
+    control points. The geometric part is that at the carried frame: what the carrying adds vanishes with the step.
     """
     firsts, weights, pairs = tables.curvature_first, tables.curvature_w, tables.curvature_pairs
-    b0, b1, b2 = tables.body_b0, tables.curvature_b1, tables.curvature_b2
-    mean = np.empty(16)  # of the derivative of the twist rate over a span
+    b0, b1, b2, u = tables.body_b0, tables.curvature_b1, tables.curvature_b2, tables.curvature_u
+    mean, slope = np.empty(16), np.empty(16)  # of the derivative of the twist rate over a span
+    own = np.empty(16)  # of that of a point
     local = np.empty((len(weights), LOCAL))
     blocks = no_blocks(4 if tangent else 0)
     n = 0
     while n < len(weights):
         k, until = firsts[n], _span_end(firsts, n)
-        tau = _mean_twist(q, k, weights, b1, b2, past, n, until, p[TWIST, 1], mean, local)
+        middle, width, moment = _middle(u, weights, n, until)
+        leans = _leans(firsts, n, until)
+        tau, rise = _span_twist(
+            q, k, weights, u, b1, b2, past, n, until, p[TWIST, 1], middle, 1.0 / width, 1.0 / moment if leans else 0.0,
+            mean, slope, local,
+        )  # fmt: skip
         torque, stiffness = 0.0, 0.0
         for m in range(n, until):
+            x = u[m] - middle if leans else 0.0
+            for j in range(16):
+                own[j] = mean[j] + x * slope[j]
             T, S = _point(
                 q, v, k, weights[m], row_of(b0, m), row_of(b1, m), row_of(b2, m), pairs, active, p, memory, past, rates,
-                scales, tangent, m, tau, mean, local, f, blocks,
+                scales, tangent, m, tau + x * rise, own, local, f, blocks,
             )  # fmt: skip
             torque += T
             stiffness += S
-        for j in range(4):
-            for d in range(4):
-                f[k + j, d] += torque * mean[4 * j + d]
+            if leans or m == until - 1:
+                _add_twist(k, torque, stiffness, own, tangent, f, K)
+                torque, stiffness = 0.0, 0.0
         if tangent:
-            for j in range(16):
-                row = K[4 * k + j]
-                for i in range(j, 16):
-                    row[i - j] += stiffness * mean[j] * mean[i]
-            if until == len(weights) or firsts[until] != k:
-                add_span(4, K, k, blocks)
+            add_span(4, K, k, blocks)
         n = until
 
 
 @law
-def _mean_twist(
-    q: Any, k: int, weights: Any, b1: Any, b2: Any, past: Any, n: int, until: int, inverse: float, mean: Any,
-    local: Any,
-) -> float:  # fmt: skip
-    """Return the mean twist rate [rad/m] of the points n to `until`, and write its derivative (16,) by x, y, z, fourth
-    of the four control points, and the geometry of the points to `local` (points, LOCAL).
+def _add_twist(k: int, torque: float, stiffness: float, derivative: Any, tangent: bool, f: Any, K: Any) -> None:
+    """Add the force and tangent of a twist rate, or the sum of some alike, with this `derivative` (16,)."""
+    for j in range(4):
+        for d in range(4):
+            f[k + j, d] += torque * derivative[4 * j + d]
+    if tangent:
+        for j in range(16):
+            row, stiff = K[4 * k + j], stiffness * derivative[j]
+            for i in range(j, 16):
+                row[i - j] += stiff * derivative[i]
+
+
+@law
+def _span_twist(
+    q: Any, k: int, weights: Any, u: Any, b1: Any, b2: Any, past: Any, n: int, until: int, inverse: float,
+    middle: float, shared: float, inclined: float, mean: Any, slope: Any, local: Any,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the mean twist rate [rad/m] of the points n to `until` of a span, and its slope [rad/m^2].
+
+    Their derivatives (16,) by x, y, z, fourth of the four control points are written to `mean` and `slope`, and the
+    geometry of the points to `local` (points, LOCAL). `shared` is one over the width of the span, `inclined` one over
+    its second moment, or zero where it has no slope.
     """
     for j in range(16):
-        mean[j] = 0.0
-    tau, width = 0.0, 0.0
+        mean[j] = slope[j] = 0.0
+    tau, rise = 0.0, 0.0
     for m in range(n, until):
-        w, b, c = weights[m], row_of(b1, m), row_of(b2, m)
+        b, c = row_of(b1, m), row_of(b2, m)
+        w, z = shared * weights[m], inclined * weights[m] * (u[m] - middle)
         length, h, t, kappa = space_curvature(combine(q, k, b), combine(q, k, c))
         increment, spin, by_t = twist_increment(vector(past, m, TANGENT), vector(past, m, BEND), t, kappa)
         local[m, LENGTH], local[m, ALONG] = length, h
         for d in range(3):
             local[m, NOW + d], local[m, KAPPA + d], local[m, SPIN + d] = t[d], kappa[d], spin[d]
-        tau += w * (inverse * _angle(q, k, b) + past[m, FRAME] + increment)
-        width += w
+        there = inverse * _angle(q, k, b) + past[m, FRAME] + increment
+        tau += w * there
+        rise += z * there
         turned = _dot(by_t, t) + _dot(spin, kappa)
         for j in range(4):
-            across, along = w * (c[j] - h * b[j] / length) / length, w * b[j] / length
+            across, along = (c[j] - h * b[j] / length) / length, b[j] / length
             for d in range(3):
-                mean[4 * j + d] += across * spin[d] + along * (by_t[d] - turned * t[d])
+                derivative = across * spin[d] + along * (by_t[d] - turned * t[d])
+                mean[4 * j + d] += w * derivative
+                slope[4 * j + d] += z * derivative
             mean[4 * j + 3] += w * inverse * b[j]
-    for j in range(16):
-        mean[j] /= width
-    return tau / width
+            slope[4 * j + 3] += z * inverse * b[j]
+    return tau, rise
 
 
 @law
 def _point(
     q: Any, v: Any, k: int, w: float, a: Row, b: Row, c: Row, pairs: Any, active: Any, p: Any, memory: Any, past: Any,
-    rates: Any, scales: Any, tangent: bool, n: int, tau: float, mean: Any, local: Any, f: Any, blocks: Any,
+    rates: Any, scales: Any, tangent: bool, n: int, tau: float, by_points: Any, local: Any, f: Any, blocks: Any,
 ) -> tuple[float, float]:  # fmt: skip
     """Add the forces of the bends of a point, and its share in the blocks of its span, but for that of the twist rate.
 
@@ -232,7 +271,7 @@ def _point(
         twisting = 0.0
         for j in range(4):
             for d in range(4):
-                twisting += mean[4 * j + d] * v[k + j, d]
+                twisting += by_points[4 * j + d] * v[k + j, d]
         rate = (
             _dot(O1, first) + _dot(P1, second) + A1 * turn, _dot(O2, first) + _dot(P2, second) + A2 * turn, twisting,
         )  # fmt: skip
@@ -312,7 +351,7 @@ def _derivatives(
 def remember(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h: float) -> None:
     """Carry the frames to q, note its strain, and let what yielded in a step h become memory."""
     inverse = p[TWIST, 1]
-    twists = _mean_twists(q, tables, past, inverse)
+    twists = _span_twists(q, tables, past, inverse)
     for n in range(len(past)):
         (k1, k2, _), t, kappa = _strain(q, tables, past, n, inverse)
         strain = (k1, k2, twists[n])
@@ -338,7 +377,7 @@ def remember(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h
 def energy(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any) -> float:
     """Return the stored energy of curvature and twist [J]."""
     total = 0.0
-    twists = _mean_twists(q, tables, past, p[TWIST, 1])
+    twists = _span_twists(q, tables, past, p[TWIST, 1])
     for n in range(len(tables.curvature_w)):
         strain, _, _ = _strain(q, tables, past, n, p[TWIST, 1])
         free = (memory[n, 0], memory[n, 1], 0.0)
@@ -353,7 +392,7 @@ def energy(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any) -> 
 def twist_rates(states: Any, tables: Any, p: Any, frames: Any, out: Any) -> None:
     """Write the twist rate (k, points) [rad/m] of the states (k, n, 4) measured against `frames` (k, points, >= 16)."""
     for s in range(len(states)):
-        out[s] = _mean_twists(states[s], tables, frames[s], p[TWIST, 1])
+        out[s] = _span_twists(states[s], tables, frames[s], p[TWIST, 1])
 
 
 @kernel
