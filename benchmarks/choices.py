@@ -54,16 +54,22 @@ GENERAL = patch.object(ladder, "march_smooth", lambda *_: None)  # the compiled 
 CASES = tuple(product((1e-2, 1e-3), (0.0, 0.25, 0.5, 0.8)))  # EI [N m^2], grasp [m]
 
 
+def gauss_rows(knots: Any, rule: tuple[Any, Any], derivatives: int) -> tuple[Any, Any, Any, Any]:
+    """Return the points of a Gauss rule in every span, their weights, and `basis_rows` there."""
+    spans = np.unique(knots)
+    half = 0.5 * np.diff(spans)[:, None]
+    u = (spans[:-1, None] + half * (1.0 + rule[0])).ravel()
+    return u, (half * rule[1]).ravel(), *basis_rows(knots, u, derivatives)
+
+
 def stretch_points(rule: tuple[Any, Any]) -> Callable[..., Any]:
     """Return a `build_tables` with the same Gauss rule for the stretch in every span."""
 
     def build(knots: Any, *arguments: Any) -> Any:
-        spans = np.unique(knots)
-        half = 0.5 * np.diff(spans)
-        u = (spans[:-1, None] + half[:, None] * (1.0 + rule[0])).ravel()
-        first, table = basis_rows(knots, u, 1)
-        rows = {"axial_u": u, "axial_first": first, "axial_b1": np.ascontiguousarray(table[:, 1])}
-        return build_tables(knots, *arguments)._replace(**rows, axial_w=(half[:, None] * rule[1]).ravel())
+        u, w, first, table = gauss_rows(knots, rule, 1)
+        return build_tables(knots, *arguments)._replace(
+            axial_u=u, axial_w=w, axial_first=first, axial_b1=np.ascontiguousarray(table[:, 1])
+        )
 
     return build
 
@@ -72,13 +78,11 @@ def bending_points(rule: tuple[Any, Any]) -> Callable[..., Any]:
     """Return a `build_tables` with this Gauss rule for the bending in every span; of a motion in the plane."""
 
     def build(knots: Any, *arguments: Any) -> Any:
-        spans = np.unique(knots)
-        half = 0.5 * np.diff(spans)
-        u = (spans[:-1, None] + half[:, None] * (1.0 + rule[0])).ravel()
-        first, table = basis_rows(knots, u, 2)
-        rows = {f"curvature_b{order}": np.ascontiguousarray(table[:, order]) for order in (1, 2)}
-        tables = build_tables(knots, *arguments)._replace(**rows, curvature_u=u, curvature_first=first)
-        return tables._replace(curvature_w=(half[:, None] * rule[1]).ravel())
+        u, w, first, table = gauss_rows(knots, rule, 2)
+        b1, b2 = (np.ascontiguousarray(table[:, order]) for order in (1, 2))
+        return build_tables(knots, *arguments)._replace(
+            curvature_u=u, curvature_w=w, curvature_first=first, curvature_b1=b1, curvature_b2=b2
+        )
 
     return build
 
