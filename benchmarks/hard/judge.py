@@ -16,7 +16,7 @@ from dlocore.problem import Problem, pose
 from dlocore.progress import surface_at
 from dlocore.solvers.ladder import Size, given_steps, stretched
 from dlocore.solvers.march import march
-from dlocore.solvers.monitor import Monitor
+from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.statics import start_grid
 from dlocore.whole_march import march_level
 
@@ -93,7 +93,11 @@ def compare(prediction: Prediction, scene: Scene, deadline: float) -> dict[str, 
         n_u = int(np.clip(round(finer * accuracy.n_u), 33, 129 if finer > 2 else 97))
         n_t = int(np.clip(round(finer * accuracy.n_t), 65, 513 if finer > 2 else 385))
         steps = max(given_steps(n_t), round(finer * accuracy.steps))
-        refined = evenly_fitted(march_level(problem, Size(n_u, n_t, steps), Monitor(None, deadline), free_knots=True))
+        try:
+            level = march_level(problem, Size(n_u, n_t, steps), Monitor(None, deadline), free_knots=True)
+        except TimeIsUp:
+            return {"reference": "time_limit: before the first step"}
+        refined = evenly_fitted(level)
         status, message = given_status(refined)
         if status != "converged":
             return {"reference": f"{status}: {message[:120]}"}
