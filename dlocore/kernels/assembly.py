@@ -26,7 +26,7 @@ from dlocore.effects.laws import (
 from dlocore.kernels import contact, plane, space, twisted
 from dlocore.kernels.banded import clear
 from dlocore.kernels.basis import row_of
-from dlocore.kernels.compile import brief, kernel
+from dlocore.kernels.compile import kernel, leaf
 from dlocore.kernels.strain import space_curvature
 
 NO_RATES = (0.0, 0.0, 0.0, 0.0)  # `rates` of `assemble` where the rate of strain comes from v and nothing yields
@@ -62,7 +62,7 @@ def history_at(histories: Any, k: int) -> Any:
     return History(h.memory[at], h.past[at], h.axial[at], h.stick, h.slide, h.tension)
 
 
-@kernel
+@leaf
 def assemble(
     axes: Any, q: Any, v: Any, tables: Any, active: Any, p: Any, history: Any, rates: Any, scales: Any, f: Any, K: Any
 ) -> None:
@@ -106,7 +106,7 @@ def assemble(
         contact.lying(len(axes), q, v, tables, p, history.slide, rates[3], scales, tangent, f, K)
 
 
-@kernel
+@leaf
 def remember(axes: Any, q: Any, tables: Any, active: Any, p: Any, history: Any, h: float, loose: bool) -> float:
     """Note in `history` the strain of q (n, nc) as that of the last step, of length h, what yielded and slipped in it.
 
@@ -142,7 +142,7 @@ def remember(axes: Any, q: Any, tables: Any, active: Any, p: Any, history: Any, 
     return deepest
 
 
-@kernel
+@leaf
 def note(axes: Any, history: Any, out: Any) -> None:
     """Write to out (points, columns) the frames, in space with twist, and then the memory.
 
@@ -159,7 +159,7 @@ def note(axes: Any, history: Any, out: Any) -> None:
             out[n, frames + d] = history.memory[n, d]
 
 
-@brief
+@leaf
 def stored_energy(axes: Any, q: Any, tables: Any, active: Any, p: Any, history: Any) -> float:
     """Return the elastic energy [J] of the control points q (n, nc)."""
     if len(axes) == 2:
@@ -170,14 +170,14 @@ def stored_energy(axes: Any, q: Any, tables: Any, active: Any, p: Any, history: 
     return total + space.energy(q, tables, active, p)
 
 
-@kernel
+@leaf
 def contact_energy(axes: Any, q: Any, tables: Any, active: Any, p: Any) -> float:
     """Return the potential of contact [J] at the control points q (n, nc)."""
     return contact.energy(len(axes), q, tables, active, p) if active[CONTACT] else 0.0
 
 
-@brief
-def slopes(states: Any, every: int, first: Any, b1: Any) -> Any:
+@leaf
+def slopes(states: Any, every: int, first: Any, b1: Any) -> tuple[float, float]:
     """Return the least and the largest |r'| over every so many of the states (k, n, nc).
 
     It is taken at points with the derivatives b1 (points, 4) of the basis functions from `first` (points,).
@@ -195,7 +195,7 @@ def slopes(states: Any, every: int, first: Any, b1: Any) -> Any:
     return np.sqrt(least), np.sqrt(largest)
 
 
-@kernel
+@leaf
 def largest_curvature(axes: Any, states: Any, tables: Any, memory: Any) -> float:
     """Return the largest |kappa - kappa_0| [1/m] at the curvature points over the states (k, n, nc).
 
@@ -215,7 +215,7 @@ def largest_curvature(axes: Any, states: Any, tables: Any, memory: Any) -> float
     return largest
 
 
-@kernel
+@leaf
 def multiply_scalar_band(band: Any, x: Any, scale: float, out: Any) -> None:
     """Add scale * B x to out (n, nc) for the symmetric banded B (n, 4), which acts alike on every coordinate."""
     n, nc = x.shape
@@ -237,7 +237,7 @@ def times_scalar_band(band: Any, x: Any) -> Any:
     return out
 
 
-@kernel
+@leaf
 def add_scalar_band(nc: int, band: Any, scale: float, K: Any) -> None:
     """Add scale * B to K (n nc, 4 nc) for the symmetric banded B (n, 4), which acts alike on every coordinate."""
     for i in range(len(band)):

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dlocore.kernels.compile import brief, kernel, law
+from dlocore.kernels.compile import brief, kernel, law, leaf
 
 
 @law
@@ -18,7 +18,7 @@ def clear(A: Any) -> None:
             A[i, j] = 0.0
 
 
-@kernel
+@leaf
 def factor(A: Any) -> int:
     """Factor A = L D L' in place; return -1, or the column where a pivot is not positive (A is then spoilt)."""
     n, width = A.shape
@@ -36,7 +36,7 @@ def factor(A: Any) -> int:
     return -1
 
 
-@kernel
+@leaf
 def solve(A: Any, x: Any) -> None:
     """Solve L D L' x = b in place with the factors of `factor`."""
     n, width = A.shape
@@ -50,7 +50,7 @@ def solve(A: Any, x: Any) -> None:
         x[j] = total
 
 
-@kernel
+@leaf
 def solve_rows(A: Any, X: Any) -> None:
     """Solve L D L' X = B in place for the rows of X (n, m), with the factors of `factor`."""
     n, width = A.shape
@@ -68,6 +68,18 @@ def solve_rows(A: Any, X: Any) -> None:
             s = A[j, i]
             for c in range(m):
                 X[j, c] -= s * X[j + i, c]
+
+
+@leaf
+def multiply_band(A: Any, x: Any, out: Any) -> None:
+    """Write A x (n,) of the symmetric banded A."""
+    n, width = A.shape
+    for j in range(n):
+        out[j] = A[j, 0] * x[j]
+    for j in range(n):
+        for o in range(1, min(width, n - j)):
+            out[j + o] += A[j, o] * x[j]
+            out[j] += A[j, o] * x[j + o]
 
 
 class Elimination(NamedTuple):
@@ -145,7 +157,7 @@ def elimination(n: int, nc: int, dimensions: int, pivots: Any, follow: Any, turn
     return Elimination(index, held, start, dof, coefficient, width, entry, place, share)
 
 
-@kernel
+@leaf
 def reduce_vector(e: Any, f: Any, out: Any) -> None:
     """Write Z' f for the full vector f (n nc,)."""
     out[:] = 0.0
@@ -158,7 +170,7 @@ def reduce_vector(e: Any, f: Any, out: Any) -> None:
                 out[e.index[e.dof[s]]] += e.coefficient[s] * f[i]
 
 
-@kernel
+@leaf
 def expand_vector(e: Any, x: Any, out: Any) -> None:
     """Write Z x, the full vector (n nc,) of a change x of the free degrees of freedom."""
     for i in range(len(out)):
@@ -180,7 +192,7 @@ def expand_rows(e: Any, x: Any, n: int) -> Any:
     return out
 
 
-@kernel
+@leaf
 def place_held(e: Any, offset: Any, q: Any) -> None:
     """Set the held degrees of freedom of q (n nc,) from the free ones and `offset` (m,)."""
     for k in range(len(e.held)):
@@ -197,10 +209,32 @@ def place_rows(e: Any, offsets: Any, C: Any, begin: int) -> None:
         place_held(e, offsets[j], C[j].ravel())
 
 
-@kernel
+@leaf
+def holding(e: Any, A: Any, x: Any, R: Any, forces: Any, out: Any) -> None:
+    """Write A x (n nc,), where x solves Z' A x = -Z' R, and the forces R + A x (held,) that hold the held ones.
+
+    Only their rows of the banded A (n nc, 4 nc) are multiplied: the others are what makes Z' (R + A x) = 0.
+    """
+    n, width = A.shape
+    for i in range(n):
+        out[i] = -R[i]
+    for k in range(len(e.held)):
+        row = e.held[k]
+        total = 0.0
+        for j in range(max(0, row - width + 1), row):
+            total += A[j, row - j] * x[j]
+        for o in range(min(width, n - row)):
+            total += A[row, o] * x[row + o]
+        out[row] = total
+        forces[k] = R[row] + total
+        for s in range(e.start[k], e.start[k + 1]):
+            out[e.dof[s]] -= e.coefficient[s] * forces[k]
+
+
+@leaf
 def reduce_matrix(e: Any, A: Any, out: Any) -> None:
     """Write Z' A Z of the banded A (n nc, 4 nc) to the banded out (free, e.width)."""
-    entries, reduced = A.ravel(), out.ravel()
+    entries, reduced = A.reshape(A.size), out.reshape(out.size)
     reduced[:] = 0.0
     for k in range(len(e.share)):
         reduced[e.place[k]] += e.share[k] * entries[e.entry[k]]

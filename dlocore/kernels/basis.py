@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dlocore.kernels.compile import brief, kernel, law
+from dlocore.kernels.compile import brief, kernel, law, leaf
 from dlocore.kernels.pairs import pair_products
 
 GAUSS_2 = np.polynomial.legendre.leggauss(2)
@@ -14,7 +14,7 @@ _ITERATIONS = 60  # for the place of a knot
 _ROUNDING = 1e-15  # of the length
 
 
-@kernel
+@leaf
 def basis(knots: Any, span: int, x: float, order: int, out: Any) -> None:
     """Write the four cubic basis functions of `span` at `x`, with derivatives to `order`, to out (order + 1, 4).
 
@@ -44,7 +44,7 @@ def _write_differences(a: float, b: float, c: float, out: Any) -> None:
     out[0], out[1], out[2], out[3] = -3.0 * a, 3.0 * (a - b), 3.0 * (b - c), 3.0 * c
 
 
-@kernel
+@leaf
 def find_span(knots: Any, x: float) -> int:
     """Return k with knots[k] <= x < knots[k+1], or the last non-empty span at the end."""
     k = len(knots) - 5
@@ -77,7 +77,7 @@ def spline_values(knots: Any, control: Any, u: Any, derivative: int) -> Any:
     return out
 
 
-@kernel
+@leaf
 def _integrated(u: float, length: float, features: Any, power: Any, width: Any) -> tuple[float, float]:
     """Return the integral of the density of knots up to u [m], but for a constant, and the density there."""
     total, density = u, 1.0

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from dlocore.effects.base import Vector
-from dlocore.kernels.compile import kernel, law
+from dlocore.kernels.compile import law, leaf
 from dlocore.kernels.strain import transport, vector
 
 LENGTH, H, TANGENT, BEND = 0, 1, 2, 5  # columns of `state`
@@ -50,7 +50,7 @@ def _spun(x: float, y: float, a0: Vector, b0: Vector, a: Vector, b: Vector) -> t
     return c * x - s * y, c * y + s * x
 
 
-@kernel
+@leaf
 def carry(weights: Any, state: Any, past: Any, now: float, last: float, before: float, out: Any) -> None:
     """Write to out (points, 3) the combination of the two last curvatures in `past`, carried with the sections.
 
@@ -91,7 +91,7 @@ def carry(weights: Any, state: Any, past: Any, now: float, last: float, before: 
             out[n, d] = along * bend[d] + across * side[d]
 
 
-@kernel
+@leaf
 def rate_by_steps(weights: Any, state: Any, past: Any, rates: Any, rate: Any) -> None:
     """Write the rate of curvature (points, 3) as the combination `rates` of its values now and at the last steps."""
     carry(weights, state, past, rates[0], -rates[1], -rates[2], rate)
@@ -100,7 +100,7 @@ def rate_by_steps(weights: Any, state: Any, past: Any, rates: Any, rate: Any) ->
             rate[n, d] = rates[0] * state[n, BEND + d] - rate[n, d]
 
 
-@kernel
+@leaf
 def rate_by_velocity(weights: Any, state: Any, turning: Any, rate: Any) -> None:
     """Take the spin out of the rate of curvature (points, 3) of sections that do not spin.
 
@@ -135,7 +135,7 @@ def _binormal(a: Vector, b: Vector) -> Vector:
     return s * axis[0], s * axis[1], s * axis[2]
 
 
-@kernel
+@leaf
 def torques(weights: Any, state: Any, eta: float, rate: Any, out: Any) -> None:
     """Write the generalised forces (points, 3) by r' of the torque that keeps sections with the moment eta rate from
     twisting: its rate along the cable is the moment's part about t x kappa, and it is zero at both ends.

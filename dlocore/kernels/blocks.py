@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.kernels.compile import kernel, law
+from dlocore.kernels.compile import kernel, law, leaf
 
 REACH = 4  # blocks that the row of one is coupled with, itself among them
 _PANEL = 8  # rows that are subtracted from those below them in one go
@@ -100,7 +100,7 @@ def _ratio(rows: Any, begin: int, size: int, c: int, p: int) -> float:
     return rows[begin + p, c] / rows[begin + p, begin + p] if p < size else 0.0
 
 
-@kernel
+@leaf
 def solve_blocks(A: Any, x: Any) -> None:
     """Solve U' D U x = b in place for x (count m,), with the factors of `factor_rows`."""
     count, m, _ = A.shape
@@ -120,7 +120,7 @@ def solve_blocks(A: Any, x: Any) -> None:
             y[c] = y[c] / row[c] - dot(row[c + 1 : width], y[c + 1 :])
 
 
-@kernel
+@leaf
 def dot(a: Any, b: Any) -> float:
     """Return a' b (n,), of b the first n; in eight sums, which do not wait for each other."""
     n = len(a)

@@ -24,24 +24,32 @@ def kernel(function: Callable[..., Any]) -> Any:
     numba's cache of a function looks only at the age of that function's own file, so a change of a law that is inlined
     into a kernel would go unnoticed. The stamp is therefore the hash of all compiled sources.
     """
-    return _compiled(function, nogil=True)
+    return _compiled(function, nogil=True, _nrt=True)
 
 
 def brief(function: Callable[..., Any]) -> Any:
     """Compile a kernel that takes microseconds, with the GIL: to hand it to another thread and back takes longer."""
-    return _compiled(function, nogil=False)
+    return _compiled(function, nogil=False, _nrt=True)
 
 
-def _compiled(function: Callable[..., Any], *, nogil: bool) -> Any:
-    compiled: Any = numba.njit(cache=True, nogil=nogil, error_model="numpy")(function)
-    if hasattr(compiled, "_cache"):  # not where compilation is switched off for debugging
-        compiled._cache._cache_file._source_stamp = _SOURCE
-    return compiled
+def leaf(function: Callable[..., Any]) -> Any:
+    """Compile a kernel that makes no array and returns none, and so need not count who refers to those it is handed.
+
+    Atomic counts up and down, of every array of every table, take longer than the assembly for a short cable.
+    """
+    return _compiled(function, nogil=False, _nrt=False)
 
 
 def law(function: Callable[..., Any]) -> Any:
-    """Compile a pointwise law that is inlined into the kernels."""
-    return numba.njit(error_model="numpy", forceinline=True)(function)
+    """Compile a pointwise law that is inlined into the kernels, and makes no array either."""
+    return numba.njit(error_model="numpy", forceinline=True, _nrt=False)(function)
 
 
 part = law  # of a kernel, into it: handing over a table, which is a hundred numbers, takes longer than some parts
+
+
+def _compiled(function: Callable[..., Any], **options: bool) -> Any:
+    compiled: Any = numba.njit(cache=True, error_model="numpy", **options)(function)
+    if hasattr(compiled, "_cache"):  # not where compilation is switched off for debugging
+        compiled._cache._cache_file._source_stamp = _SOURCE
+    return compiled

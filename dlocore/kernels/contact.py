@@ -15,7 +15,7 @@ from dlocore.effects.distance import signed_distance
 from dlocore.effects.friction import friction
 from dlocore.effects.laws import CONTACT, COUNT, FRICTION, TABLE
 from dlocore.kernels.basis import row_of
-from dlocore.kernels.compile import kernel, law, part
+from dlocore.kernels.compile import law, leaf, part
 
 _UP = (0.0, 0.0, 1.0)
 _ANY = (0.0, 0.0, 0.0)
@@ -132,7 +132,7 @@ def contact(
         reach = places[n] + _SLACK * nearest
 
 
-@kernel
+@leaf
 def energy(nc: int, q: Any, tables: Any, active: Any, p: Any) -> float:
     """Return the potential of the contact [J]."""
     total = 0.0
@@ -148,7 +148,7 @@ def energy(nc: int, q: Any, tables: Any, active: Any, p: Any) -> float:
     return total
 
 
-@kernel
+@leaf
 def strikes(nc: int, q0: Any, q1: Any, tables: Any, active: Any, p: Any) -> float:
     """Return how far a node has come towards what it newly touches [m], the largest; 0 where nothing is new."""
     most = 0.0
@@ -170,7 +170,7 @@ def strikes(nc: int, q0: Any, q1: Any, tables: Any, active: Any, p: Any) -> floa
     return most
 
 
-@kernel
+@leaf
 def remember(nc: int, q: Any, tables: Any, active: Any, p: Any, stick: Any, loose: bool) -> float:
     """Drag the anchors of the friction behind q, note its positions, and return the largest depth [m].
 
@@ -230,7 +230,7 @@ def lying(
             _add(nc, K, k, b, w, _mixed(elastic, S, viscous, V))
 
 
-@kernel
+@leaf
 def drag_anchors(nc: int, q: Any, tables: Any, p: Any, slide: Any, loose: bool) -> None:
     """Drag the anchors of a lying cable behind q; put them under it where it is `loose`, as at the start."""
     for n in range(len(slide)):

@@ -8,7 +8,7 @@ from dlocore.effects.laws import has_viscosity
 from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, history_at, multiply_scalar_band
 from dlocore.kernels.banded import reduce_matrix, reduce_vector, solve_rows
 from dlocore.kernels.basis import GAUSS_2, basis_rows
-from dlocore.kernels.compile import brief, kernel
+from dlocore.kernels.compile import brief, kernel, leaf
 from dlocore.kernels.narrow import ROOM, factor_step, solve_step
 
 POINTS = 2  # collocation points in each time span
@@ -66,7 +66,7 @@ def collocation(knots: Any) -> Any:
     return times[:k].copy(), weights[:k].copy(), first, table, even
 
 
-@kernel
+@leaf
 def band_to_dense(A: Any, out: Any) -> None:
     """Write the symmetric banded A (n, width) as a full matrix (n, n)."""
     n, width = A.shape
@@ -100,7 +100,7 @@ def _sparse(A: Any) -> Any:
     return Sparse(A[:, 0].copy(), row[:k].copy(), column[:k].copy(), value[:k].copy())
 
 
-@kernel
+@leaf
 def _times(B: Any, x: Any, out: Any) -> None:
     """Write B x (n,) for a `Sparse` B."""
     for j in range(len(B.diagonal)):
@@ -111,7 +111,7 @@ def _times(B: Any, x: Any, out: Any) -> None:
         out[j] += s * x[i]
 
 
-@kernel
+@leaf
 def _times_rows(B: Any, X: Any, out: Any) -> None:
     """Write B X (n, m) for a `Sparse` B."""
     n, m = X.shape
@@ -127,7 +127,7 @@ def _times_rows(B: Any, X: Any, out: Any) -> None:
             out[j, c] += s * X[i, c]
 
 
-@kernel
+@leaf
 def _products(X: Any, Y: Any, out: Any) -> None:
     """Write X' Y (m, m).
 
@@ -150,7 +150,7 @@ def _products(X: Any, Y: Any, out: Any) -> None:
                 out[i, j] += s * Y[r, j]
 
 
-@kernel
+@leaf
 def states_at(first: Any, table: Any, C: Any, out: Any) -> None:
     """Write q, v and a (3, n, nc) of the control points C (n_t, n, nc) with basis `table` (3, 4) from `first`."""
     for o in range(3):
@@ -162,7 +162,7 @@ def states_at(first: Any, table: Any, C: Any, out: Any) -> None:
                 )
 
 
-@kernel
+@leaf
 def _add_inertia(eq: Any, k: int, state: Any, moved: Any, f: Any) -> None:
     """Add inertia, linear drag and applied forces of the point k to the internal forces f (n, nc) [N]."""
     load = eq.applied[min(k, len(eq.applied) - 1)]
@@ -283,7 +283,7 @@ def normal_equations(eq: Any, C: Any, A: Any, right: Any, matrix: bool, begin: i
     return objective
 
 
-@kernel
+@leaf
 def _parts(basis: Any, mass: float, drag: float, h: float) -> tuple[float, float, float]:
     """Return c, d and e of G^-1 dR = c I + d S + e V for `basis` (3,), a basis function and its derivatives.
 
@@ -292,7 +292,7 @@ def _parts(basis: Any, mass: float, drag: float, h: float) -> tuple[float, float
     return basis[0], mass * basis[2] + drag * basis[1] - basis[0], basis[1] - 2.0 / h * basis[0]
 
 
-@kernel
+@leaf
 def _add_span(A: Any, t: int, shares: Any, parts: Any, B: Any, P: Any, Q: Any) -> None:
     """Add what the two points of a span count in the blocks of its four control points, from the t-th unknown on.
 

@@ -12,8 +12,17 @@ from dlocore.kernels.assembly import (
     note,
     remember,
 )
-from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_matrix, reduce_vector, solve
-from dlocore.kernels.compile import brief, kernel
+from dlocore.kernels.banded import (
+    expand_vector,
+    factor,
+    holding,
+    multiply_band,
+    place_held,
+    reduce_matrix,
+    reduce_vector,
+    solve,
+)
+from dlocore.kernels.compile import brief, kernel, leaf
 from dlocore.kernels.contact import strikes
 from dlocore.kernels.inertia import both_sides, effective, padded, residual
 from dlocore.kernels.mixing import mixed, room
@@ -61,7 +70,7 @@ def constrained_mass_solve(nc: int, mass: Any, e: Any, held: Any, right: Any) ->
     return x + change.reshape((n, nc))
 
 
-@brief
+@leaf
 def row_of_step(k: int, states: int, rows: int) -> int:
     """Return the row of a log that step k writes: of every so many steps, and of the last, the last one stays in it."""
     if rows == states:
@@ -131,6 +140,7 @@ def march_steps(
     A = np.zeros((free + ROOM, e.width))
     f = np.empty((n, nc))
     R = np.empty((n, nc))
+    flat = R.reshape(size)
     weighted = np.empty((n, nc))
     unit = tables.mass
     rows, stacked = both_sides(unit), padded(n, nc)
@@ -217,7 +227,7 @@ def march_steps(
                 if tight:
                     found, pairs, depth = press(q1, v1, tables, p, x1, found, f)
                 residual(nc, rows, density, dragged, al_m, al_f, a, a1, v1, load, G, f, R, stacked)
-                reduce_vector(e, R.ravel(), x)
+                reduce_vector(e, flat, x)
                 if refactor:
                     effective(nc, K, unit, inertia, 1.0 - al_f, (1.0 - al_f) * tv * dragged)
                     reduce_matrix(e, K, A)
@@ -276,7 +286,7 @@ def march_steps(
                         if tight:
                             found, pairs, depth = press(q2, v2, tables, p, x2, found, f)
                         residual(nc, rows, density, dragged, al_m, al_f, a, a2, v2, load, G, f, R, stacked)
-                        reduce_vector(e, R.ravel(), x)
+                        reduce_vector(e, flat, x)
                         after = 0.0
                         for i in range(free):
                             after += trial_x[i] * x[i]
@@ -340,8 +350,8 @@ def march_steps(
             return
         keep(history.tension)
         unmeasured += 1
-        anew = exact or pairs > 0
-        if anew:  # where the law has kinks
+        anew = exact or pairs > 0 or work < 0.0  # where the law has kinks, or a line search has looked farther
+        if anew:
             assemble(axes, q1, v1, tables, active, p, history, rates, (0.0, 0.0, 0.0), f, K)
             if tight:
                 found, pairs, depth = press(q1, v1, tables, p, x1, found, f)
@@ -353,16 +363,16 @@ def march_steps(
                 note(axes, history, log[row_of_step(k, len(Q), len(log))])
         # the last update is not in R and f yet
         if anew:
-            for i in range(size):
-                moved[i] = 0.0
+            for i in range(len(e.held)):
+                reactions[k, i] = flat[e.held[i]]
         else:
             # its first order is that of the tangent
-            for i in range(size):
-                moved[i] = K[i, 0] * change[i]
-            for j in range(size):
-                for o in range(1, min(4 * nc, size - j)):
-                    moved[j + o] += K[j, o] * change[j]
-                    moved[j] += K[j, o] * change[j + o]
+            if mixes:
+                multiply_band(K, change, moved)
+                for i in range(len(e.held)):
+                    reactions[k, i] = flat[e.held[i]] + moved[e.held[i]]
+            else:
+                holding(e, K, change, flat, reactions[k], moved)
             for i in range(n):
                 for d in range(nc):
                     weighted[i, d] = 0.0
@@ -370,8 +380,6 @@ def march_steps(
             for i in range(n):
                 for d in range(nc):
                     f[i, d] += (moved[i * nc + d] - weighted[i, d]) / (1.0 - al_f)
-        for i in range(len(e.held)):
-            reactions[k, i] = R[e.held[i] // nc, e.held[i] % nc] + moved[e.held[i]]
         for i in range(n):
             for d in range(nc):
                 Q[k, i, d] = q1[i, d]

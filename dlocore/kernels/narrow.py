@@ -1,7 +1,8 @@
-"""Factorisation and solution of the plane's band of eight: written out, so that rows are kept in registers.
+"""Factorisation and solution of the bands of a march, of a width that the compiler knows.
 
-They are those of `banded.py`, three to four times as fast. The matrix is followed by ROOM rows of zeros and the vector
-by ROOM zeros, which takes the place of a look whether a column ends early.
+They are those of `banded.py`. The plane's band of eight is written out, so that rows are kept in registers, which is
+three to four times as fast; the loops of wider ones are unrolled. The matrix is followed by ROOM rows of zeros and the
+vector by ROOM zeros, which takes the place of a look whether a column ends early.
 """
 
 from typing import Any
@@ -9,13 +10,18 @@ from typing import Any
 from dlocore.kernels.banded import factor, solve
 from dlocore.kernels.compile import law
 
-ROOM = 8  # rows beyond the last
+ROOM = 16  # rows beyond the last
 WIDTH = 8  # of the band that is written out: two coordinates of four control points
+SPACE, TWISTED = 12, 16  # of those in space: three and four coordinates
 
 
 @law
 def factor_step(A: Any, n: int) -> int:
     """Factor the first n columns of A (n + ROOM, width) in place, as `banded.factor` does, and return the same."""
+    if A.shape[1] == TWISTED:
+        return _factor_columns(A, n, TWISTED)
+    if A.shape[1] == SPACE:
+        return _factor_columns(A, n, SPACE)
     if A.shape[1] != WIDTH:
         return int(factor(A[:n]))
     for j in range(n):
@@ -71,6 +77,12 @@ def factor_step(A: Any, n: int) -> int:
 @law
 def solve_step(A: Any, n: int, x: Any) -> None:
     """Solve L D L' x = b in place for the first n of x (n + ROOM,), with the factors of `factor_step`."""
+    if A.shape[1] == TWISTED:
+        _solve_columns(A, n, x, TWISTED)
+        return
+    if A.shape[1] == SPACE:
+        _solve_columns(A, n, x, SPACE)
+        return
     if A.shape[1] != WIDTH:
         solve(A[:n], x[:n])
         return
@@ -93,3 +105,35 @@ def solve_step(A: Any, n: int, x: Any) -> None:
 @law
 def _row(A: Any, j: int) -> tuple[float, float, float, float, float, float, float, float]:
     return A[j, 0], A[j, 1], A[j, 2], A[j, 3], A[j, 4], A[j, 5], A[j, 6], A[j, 7]
+
+
+@law
+def _factor_columns(A: Any, n: int, width: int) -> int:
+    for j in range(n):
+        pivot = A[j, 0]
+        if not pivot > 0.0:
+            return j
+        inverse = 1.0 / pivot
+        for i in range(1, width):
+            ratio = A[j, i] * inverse
+            for k in range(i, width):
+                A[j + i, k - i] -= ratio * A[j, k]
+            # the loop above still needs the unscaled entries of this column to the right of i only
+            A[j, i] = ratio
+    return -1
+
+
+@law
+def _solve_columns(A: Any, n: int, x: Any, width: int) -> None:
+    for j in range(n):
+        s = x[j]
+        for i in range(1, width):
+            x[j + i] -= A[j, i] * s
+        x[j] = s / A[j, 0]
+    for i in range(n, n + width):
+        x[i] = 0.0
+    for j in range(n - 1, -1, -1):
+        total = x[j]
+        for i in range(width - 1, 0, -1):  # the newest one last: the others do not wait for it
+            total -= A[j, i] * x[j + i]
+        x[j] = total

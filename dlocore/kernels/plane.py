@@ -20,7 +20,7 @@ from dlocore.effects.laws import (
     curvature_stress,
 )
 from dlocore.kernels.basis import row_of
-from dlocore.kernels.compile import kernel, law, part
+from dlocore.kernels.compile import law, leaf, part
 from dlocore.kernels.strain import plane_curvature, plane_hessian
 from dlocore.kernels.tension import AT_HAND, MODULUS, assumed
 
@@ -151,7 +151,7 @@ def curvature_at(q: Any, tables: Any, n: int) -> float:
     return plane_curvature(ax, ay, cx, cy)[0]
 
 
-@kernel
+@leaf
 def remember(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h: float) -> None:
     """Make kappa of q the last one in `past` (points, 2), the last one the one before; let what yielded be memory."""
     for n in range(len(past)):
@@ -188,7 +188,7 @@ def body(q: Any, v: Any, tables: Any, active: Any, p: Any, scales: Any, tangent:
                     _add_block(K, k, i, j, s * xx, s * xy, s * xy, s * yy)
 
 
-@kernel
+@leaf
 def energy(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any) -> float:
     """Return the stored energy [J]."""
     total = 0.0

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.kernels.compile import kernel
+from dlocore.kernels.compile import kernel, leaf
 
 ORDERS = 5  # differences at most: of states that are known to a tolerance, higher ones are noise
 
@@ -18,7 +18,7 @@ def differences_of(states: Any) -> Any:
     return past
 
 
-@kernel
+@leaf
 def shift(past: Any, q: Any) -> None:
     """Move the differences on to the next state q (n, nc): past[m] is its m-th backward difference."""
     for i in range(q.shape[0]):
@@ -30,7 +30,7 @@ def shift(past: Any, q: Any) -> None:
                 x -= before
 
 
-@kernel
+@leaf
 def predict_by(past: Any, known: int) -> int:
     """Return how many differences predict the next state best, 0 where fewer than four states are known.
 

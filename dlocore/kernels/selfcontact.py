@@ -20,7 +20,7 @@ import numpy as np
 from dlocore.effects.base import Vector
 from dlocore.effects.contact import pressure
 from dlocore.effects.laws import SELF_CONTACT
-from dlocore.kernels.compile import kernel, law
+from dlocore.kernels.compile import kernel, law, leaf
 from dlocore.kernels.strands import between, between_nodes, closest, dot, near_pairs
 
 _DRAWN = 0.05  # eps
@@ -28,7 +28,7 @@ _WINDOW = 8  # control points of a segment, at most
 _ROOM = 4096  # reduced entries of a pair, at most: held control points may follow many free ones
 
 
-@kernel
+@leaf
 def place_nodes(q: Any, tables: Any, x: Any) -> None:
     """Write the positions x (nodes, 2 or 3) [m] of the contact nodes of the control points q (n, nc)."""
     for n in range(len(x)):
@@ -41,7 +41,7 @@ def place_nodes(q: Any, tables: Any, x: Any) -> None:
 
 
 @law
-def _pair(x: Any, u: Any, D: float, i: int, j: int) -> Any:
+def _pair(x: Any, u: Any, D: float, i: int, j: int) -> tuple[Vector, float, float, float, Vector, Vector, float, float]:
     """Return the vector between the closest points of segments i and j, rho, s, t and the segments' vectors."""
     a, b, r = between_nodes(x, i + 1, i), between_nodes(x, j + 1, j), between_nodes(x, i, j)
     pull_a, pull_b = _DRAWN * min(u[i + 1] - u[i], D) ** 2, _DRAWN * min(u[j + 1] - u[j], D) ** 2
@@ -229,7 +229,7 @@ def widen(
         end[r] = max(end[r], end[r - 1])
 
 
-@kernel
+@leaf
 def factor_wide(S: Any, end: Any) -> int:
     """Factor S = U' D U in place, within its rows' ends; return -1, or the row where a pivot is not positive."""
     for j in range(len(end)):
@@ -244,7 +244,7 @@ def factor_wide(S: Any, end: Any) -> int:
     return -1
 
 
-@kernel
+@leaf
 def solve_wide(S: Any, end: Any, x: Any) -> None:
     """Solve U' D U x = b in place with the factors of `factor_wide`."""
     n = len(end)
@@ -259,7 +259,7 @@ def solve_wide(S: Any, end: Any, x: Any) -> None:
         x[j] = total / S[j, j]
 
 
-@kernel
+@leaf
 def closing(x0: Any, x1: Any, u: Any, D: float, found: Any, count: int) -> float:
     """Return how far, from x0 to x1, a pair that newly touches has come towards each other [m], the largest."""
     most = 0.0

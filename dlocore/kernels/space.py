@@ -19,7 +19,7 @@ from dlocore.effects.laws import (
 )
 from dlocore.kernels.basis import row_of
 from dlocore.kernels.bishop import BEND, LENGTH, STATE, TANGENT, H, carry, rate_by_steps, rate_by_velocity, torques
-from dlocore.kernels.compile import kernel, law, part
+from dlocore.kernels.compile import kernel, law, leaf, part
 from dlocore.kernels.pairs import BB, BC, CB, CC, add_point, add_span, no_blocks
 from dlocore.kernels.strain import space_curvature, space_curvature_rate, space_moment, vector
 from dlocore.kernels.tension import AT_HAND, MODULUS, assumed
@@ -96,7 +96,7 @@ def axial(
                     add_symmetric(nc, K, k, i, j, b[i] * b[j], H)
 
 
-@kernel
+@leaf
 def _write_state(q: Any, tables: Any, state: Any) -> None:
     """Write l, h, t and kappa of the curvature points (points, 8)."""
     for n in range(len(state)):
@@ -108,7 +108,7 @@ def _write_state(q: Any, tables: Any, state: Any) -> None:
             state[n, TANGENT + d], state[n, BEND + d] = t[d], kappa[d]
 
 
-@kernel
+@leaf
 def _write_rate(v: Any, tables: Any, state: Any, turning: Any, rate: Any) -> None:
     """Write the rates of the tangent and of the curvature as sections that do not spin see them (points, 3)."""
     for n in range(len(state)):
@@ -122,7 +122,7 @@ def _write_rate(v: Any, tables: Any, state: Any, turning: Any, rate: Any) -> Non
             rate[n, d] = change[d]
 
 
-@part
+@kernel
 def curvature(
     q: Any, v: Any, tables: Any, active: Any, p: Any, past: Any, rates: Any, scales: Any, tangent: bool, f: Any,
     K: Any,
@@ -133,16 +133,26 @@ def curvature(
     tangent is J' S J; the geometric part is M . d2kappa. Of damping, what the spin of the sections depends on, all of
     the cable, and the torque that keeps them from twisting are in the forces only.
     """
+    damped = len(tables.curvature_w) if active[DAMPING] else 0
+    _add_curvature(
+        q, v, tables, active, p, past, rates, scales, tangent, no_blocks(3 if tangent else 0), np.empty((2, 3, 3)),
+        np.empty((2, 3, 3)), np.empty((3, 3)), np.empty((damped, STATE)), np.empty((damped, 3)), np.empty((damped, 3)),
+        f, K,
+    )  # fmt: skip
+
+
+@part
+def _add_curvature(
+    q: Any, v: Any, tables: Any, active: Any, p: Any, past: Any, rates: Any, scales: Any, tangent: bool, blocks: Any,
+    J: Any, SJ: Any, S: Any, state: Any, rate: Any, by_torque: Any, f: Any, K: Any,
+) -> None:  # fmt: skip
+    """Do the work of `curvature` in the room made there; J holds the derivatives of kappa by r' and by r''."""
     elastic, viscous, geometric = scales
     if viscous != 0.0 and rates[0] != 0.0:
         viscous = rates[0]
     firsts, b1, b2, weights = tables.curvature_first, tables.curvature_b1, tables.curvature_b2, tables.curvature_w
     pairs = tables.curvature_pairs
-    blocks = no_blocks(3 if tangent else 0)
-    J, SJ = np.empty((2, 3, 3)), np.empty((2, 3, 3))  # of kappa by r' and by r''
-    S = np.empty((3, 3))
-    damped = len(weights) if active[DAMPING] else 0
-    state, rate, by_torque = np.empty((damped, STATE)), np.empty((damped, 3)), np.empty((damped, 3))
+    damped = len(state)
     if damped:
         _write_state(q, tables, state)
         if rates[0] != 0.0:
@@ -248,7 +258,7 @@ def body(nc: int, q: Any, v: Any, tables: Any, active: Any, p: Any, scales: Any,
                     add_symmetric(nc, K, k, i, j, w * b[i] * b[j], H)
 
 
-@kernel
+@leaf
 def axial_energies(q: Any, tables: Any, active: Any, p: Any, past: Any) -> float:
     """Return the stored energy of the axial site [J]."""
     total = 0.0
@@ -259,7 +269,7 @@ def axial_energies(q: Any, tables: Any, active: Any, p: Any, past: Any) -> float
     return total
 
 
-@kernel
+@leaf
 def energy(q: Any, tables: Any, active: Any, p: Any) -> float:
     """Return the stored energy of the curvature site [J]."""
     total = 0.0

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from dlocore.effects.base import Vector
-from dlocore.kernels.compile import kernel, law
+from dlocore.kernels.compile import kernel, law, leaf
 
 _SLACK = 0.9  # of a distance that is skipped along the cable: a strained cable is longer
 _TOO_NEAR = 0.5  # of the diameter: no step brings strands from farther away nearer than this
@@ -53,7 +53,7 @@ def between(r: Vector, a: Vector, b: Vector, s: float, t: float) -> Vector:
     return r[0] + s * a[0] - t * b[0], r[1] + s * a[1] - t * b[1], r[2] + s * a[2] - t * b[2]
 
 
-@kernel
+@leaf
 def longest_part(u: Any) -> float:
     """Return the largest distance of neighbours among u (k,)."""
     longest = 0.0
@@ -105,7 +105,7 @@ def _apart(x: Any, a: int, b: int) -> float:
     return np.sqrt(u * u + v * v + w * w)
 
 
-@law
+@kernel
 def _noted(found: Any, count: int, i: int, j: int) -> Any:
     """Return the pairs `found` (room, 2) of which `count` are known, or a larger copy, with one more."""
     if count == len(found):
@@ -297,7 +297,7 @@ def nearest(x: Any, u: Any, separation: float, cap: float) -> float:
     return best
 
 
-@kernel
+@leaf
 def turning(q: Any, nd: int) -> float:
     """Return the total angle [rad] by which the control polygon of q (n, nc) turns."""
     turned = 0.0

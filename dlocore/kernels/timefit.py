@@ -6,7 +6,7 @@ import numpy as np
 
 from dlocore.kernels.banded import factor, solve_rows
 from dlocore.kernels.basis import basis_rows, row_of
-from dlocore.kernels.compile import brief, kernel
+from dlocore.kernels.compile import brief, kernel, leaf
 
 
 @kernel
@@ -123,7 +123,7 @@ def sampled(knots_t: Any, knots_u: Any, control: Any, count: int) -> Any:
     return out
 
 
-@brief
+@leaf
 def farthest(a: Any, b: Any, dimensions: int) -> float:
     """Return the largest distance between the points of a and b (k, m, nc) [m], by the first so many coordinates."""
     most, total = 0.0, 0.0

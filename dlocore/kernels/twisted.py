@@ -112,21 +112,27 @@ def _middle(u: Any, weights: Any, n: int, end: int) -> tuple[float, float, float
 def _span_twists(q: Any, tables: Any, past: Any, inverse: float) -> Any:
     """Return the twist rate (points,) [rad/m] of q, over each knot span its mean or a straight line."""
     out = np.empty(len(tables.curvature_w))
-    firsts, weights, u = tables.curvature_first, tables.curvature_w, tables.curvature_u
+    for n in range(len(out)):
+        out[n] = _strain(q, tables, past, n, inverse)[0][2]
+    _straighten(tables.curvature_first, tables.curvature_w, tables.curvature_u, out)
+    return out
+
+
+@law
+def _straighten(firsts: Any, weights: Any, u: Any, tau: Any) -> None:
+    """Turn twist rates at the points (points,) into those over each knot span: their mean or a straight line."""
     n = 0
-    while n < len(out):
+    while n < len(tau):
         end = _span_end(firsts, n)
         middle, width, moment = _middle(u, weights, n, end)
         mean, slope = 0.0, 0.0
         for m in range(n, end):
-            tau = _strain(q, tables, past, m, inverse)[0][2]
-            mean += weights[m] / width * tau
-            slope += weights[m] * (u[m] - middle) / moment * tau
+            mean += weights[m] / width * tau[m]
+            slope += weights[m] * (u[m] - middle) / moment * tau[m]
         leans = _leans(firsts, n, end)
         for m in range(n, end):
-            out[m] = mean + (slope * (u[m] - middle) if leans else 0.0)
+            tau[m] = mean + (slope * (u[m] - middle) if leans else 0.0)
         n = end
-    return out
 
 
 def over_spans(tables: Any) -> Any:
@@ -142,7 +148,7 @@ def over_spans(tables: Any) -> Any:
     return shares + (leans * x)[:, None] * slopes
 
 
-@part
+@kernel
 def curvature(
     q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any, tangent: bool,
     f: Any, K: Any,
@@ -153,12 +159,24 @@ def curvature(
     over a span, or their straight line. The material part of the tangent is E' S E with the derivatives E by the
     control points. The geometric part is that at the carried frame: what the carrying adds vanishes with the step.
     """
+    local = np.empty((len(tables.curvature_w), LOCAL))
+    _add_curvature(
+        q, v, tables, active, p, memory, past, rates, scales, tangent, np.empty(16), np.empty(16), np.empty(16), local,
+        no_blocks(4 if tangent else 0), f, K,
+    )  # fmt: skip
+
+
+@part
+def _add_curvature(
+    q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any, tangent: bool,
+    mean: Any, slope: Any, own: Any, local: Any, blocks: Any, f: Any, K: Any,
+) -> None:  # fmt: skip
+    """Do the work of `curvature` in the room made there.
+
+    `mean` and `slope` (16,) are those of the derivative of the twist rate over a span, `own` (16,) is that of a point.
+    """
     firsts, weights, pairs = tables.curvature_first, tables.curvature_w, tables.curvature_pairs
     b0, b1, b2, u = tables.body_b0, tables.curvature_b1, tables.curvature_b2, tables.curvature_u
-    mean, slope = np.empty(16), np.empty(16)  # of the derivative of the twist rate over a span
-    own = np.empty(16)  # of that of a point
-    local = np.empty((len(weights), LOCAL))
-    blocks = no_blocks(4 if tangent else 0)
     n = 0
     while n < len(weights):
         k, until = firsts[n], _span_end(firsts, n)
@@ -350,11 +368,21 @@ def _derivatives(
 @kernel
 def remember(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h: float) -> None:
     """Carry the frames to q, note its strain, and let what yielded in a step h become memory."""
-    inverse = p[TWIST, 1]
-    twists = _span_twists(q, tables, past, inverse)
+    _remember(q, tables, active, p, memory, past, h, np.empty((len(past), SPIN)), np.empty(len(past)))
+
+
+@part
+def _remember(
+    q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h: float, state: Any, twists: Any
+) -> None:
+    """Do the work of `remember` in the room made there: `state` (points, SPIN) is k1, k2, t and kappa."""
     for n in range(len(past)):
-        (k1, k2, _), t, kappa = _strain(q, tables, past, n, inverse)
-        strain = (k1, k2, twists[n])
+        (state[n, 0], state[n, 1], twists[n]), t, kappa = _strain(q, tables, past, n, p[TWIST, 1])
+        for d in range(3):
+            state[n, NOW + d], state[n, KAPPA + d] = t[d], kappa[d]
+    _straighten(tables.curvature_first, tables.curvature_w, tables.curvature_u, twists)
+    for n in range(len(past)):
+        strain, t, kappa = (state[n, 0], state[n, 1], twists[n]), vector(state, n, NOW), vector(state, n, KAPPA)
         last = vector(past, n, LAST)
         free, _ = curvature_memory(
             active, p, (strain[0], strain[1], 0.0), (memory[n, 0], memory[n, 1], 0.0),

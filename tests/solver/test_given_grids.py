@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.hard.generator import draw
-from dlocore import predict
+from dlocore import Cable, Environment, Grasp, Move, Quality, Scene, Straight, Table, predict
 from dlocore.discretisation import make_grid
 from dlocore.events import time_knots
 from dlocore.given import MISSED, evenly_fitted, given_status
@@ -75,12 +75,18 @@ def test_watching_points_bear_folds_and_nothing_else():
 
 
 def test_time_knots_go_where_a_spline_of_given_size_misses_its_march():
-    scene = draw(2, 61).make()
-    problem = pose(scene, {"self_contact": "two strands come near each other"})
-    assert scene.quality.n_u is not None
-    assert scene.quality.n_t is not None
-    n_t = scene.quality.n_t
-    even = march_level(problem, Size(scene.quality.n_u, n_t, given_steps(n_t)), Monitor())
+    # a jerk, and a long rest: even knots in time leave three for the jerk
+    n_t = 13
+    scene = Scene(
+        cable=Cable.preset("paper"),
+        shape=Straight(),
+        grasps=(Grasp(u=0.0, path=Move(displacement=(0.0, 0.3, 0.0), duration=0.2)),),
+        environment=Environment(drag=1.0, table=Table()),
+        horizon=6.0,
+        quality=Quality(n_u=13, n_t=n_t, method="march"),
+    )
+    problem = pose(scene)
+    even = march_level(problem, Size(13, n_t, given_steps(n_t)), Monitor())
     moved = evenly_fitted(even)
     length = scene.cable.length
     assert even.missed > MISSED * length > moved.missed
