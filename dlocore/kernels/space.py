@@ -130,23 +130,23 @@ def curvature(
     """Add the forces and tangents of the curvature site; `past` holds kappa of two steps and t of the last (points, 9).
 
     With J = -h P / l^2 - kappa t' / l by r', and P / l by r'', the derivatives of kappa, the material part of the
-    tangent is J' S J; the geometric part is M . d2kappa. Of damping, what the spin of the sections depends on, all of
-    the cable, and the torque that keeps them from twisting are in the forces only.
+    tangent is J' S J, where S is a number, P kappa = kappa and P t = 0; the geometric part is M . d2kappa. Of damping,
+    what the spin of the sections depends on, all of the cable, and the torque that keeps them from twisting are in the
+    forces only.
     """
     damped = len(tables.curvature_w) if active[DAMPING] else 0
     _add_curvature(
-        q, v, tables, active, p, past, rates, scales, tangent, no_blocks(3 if tangent else 0), np.empty((2, 3, 3)),
-        np.empty((2, 3, 3)), np.empty((3, 3)), np.empty((damped, STATE)), np.empty((damped, 3)), np.empty((damped, 3)),
-        f, K,
+        q, v, tables, active, p, past, rates, scales, tangent, no_blocks(3 if tangent else 0),
+        np.empty((damped, STATE)), np.empty((damped, 3)), np.empty((damped, 3)), f, K,
     )  # fmt: skip
 
 
 @part
 def _add_curvature(
     q: Any, v: Any, tables: Any, active: Any, p: Any, past: Any, rates: Any, scales: Any, tangent: bool, blocks: Any,
-    J: Any, SJ: Any, S: Any, state: Any, rate: Any, by_torque: Any, f: Any, K: Any,
+    state: Any, rate: Any, by_torque: Any, f: Any, K: Any,
 ) -> None:  # fmt: skip
-    """Do the work of `curvature` in the room made there; J holds the derivatives of kappa by r' and by r''."""
+    """Do the work of `curvature` in the room made there."""
     elastic, viscous, geometric = scales
     if viscous != 0.0 and rates[0] != 0.0:
         viscous = rates[0]
@@ -182,41 +182,31 @@ def _add_curvature(
             f[k + i, 2] += bi * g[2] + ci * u[2]
         if not tangent:
             continue
-        for o in range(6):
-            d, e = (0, 1, 2, 0, 0, 1)[o], (0, 1, 2, 1, 2, 2)[o]
-            S[d, e] = w * (elastic * stiffness[o] + viscous * viscosity[o])
-            S[e, d] = S[d, e]
-        for d in range(3):
-            for e in range(3):
-                J[0, d, e] = (h * t[d] / length - kappa[d]) * t[e] / length
-                J[1, d, e] = -t[d] * t[e] / length
-            J[0, d, d] -= h / (length * length)
-            J[1, d, d] += 1.0 / length
-        for o in range(2):
-            for d in range(3):
-                for e in range(3):
-                    SJ[o, d, e] = S[d, 0] * J[o, 0, e] + S[d, 1] * J[o, 1, e] + S[d, 2] * J[o, 2, e]
+        # sections that have no orientation are alike across the tangent: J' J alone
+        stiff = w * (elastic * stiffness[0] + viscous * viscosity[0]) / (length * length)
         scale = w * geometric / (length * length)
+        along = h / length
         dot = M[0] * kappa[0] + M[1] * kappa[1] + M[2] * kappa[2]
+        square = kappa[0] * kappa[0] + kappa[1] * kappa[1] + kappa[2] * kappa[2]
+        of_one = stiff * along * along - scale * dot
+        of_tangent = stiff * (square - along * along) + 3.0 * scale * dot
         for d in range(3):
             for e in range(3):
-                Mt = M[d] * t[e] + t[d] * M[e]
-                by_first = 3.0 * dot * t[d] * t[e] + 2.0 * h / length * Mt - 0.5 * (M[d] * kappa[e] + kappa[d] * M[e])
+                Mt = scale * (M[d] * t[e] + t[d] * M[e])
+                across = -t[d] * t[e]
+                by_first = -of_tangent * across + stiff * along * (kappa[d] * t[e] + t[d] * kappa[e])
+                by_first += 2.0 * along * Mt - 0.5 * scale * (M[d] * kappa[e] + kappa[d] * M[e])
                 if d == e:
-                    by_first -= dot
+                    across += 1.0
+                    by_first += of_one
                 at = 3 * e + d
-                blocks[BB, at] = scale * by_first + _column_product(J, 0, d, SJ, 0, e)
-                blocks[BC, at] = _column_product(J, 0, d, SJ, 1, e) - scale * Mt
-                blocks[CB, at] = _column_product(J, 1, d, SJ, 0, e) - scale * Mt
-                blocks[CC, at] = _column_product(J, 1, d, SJ, 1, e)
+                blocks[BB, at] = by_first
+                blocks[BC, at] = -stiff * (along * across + t[d] * kappa[e]) - Mt
+                blocks[CB, at] = -stiff * (along * across + kappa[d] * t[e]) - Mt
+                blocks[CC, at] = stiff * across
         add_point(blocks, pairs[n])
         if n + 1 == len(weights) or firsts[n + 1] != k:
             add_span(3, K, k, blocks)
-
-
-@law
-def _column_product(X: Any, o: int, d: int, Y: Any, p: int, e: int) -> float:
-    return X[o, 0, d] * Y[p, 0, e] + X[o, 1, d] * Y[p, 1, e] + X[o, 2, d] * Y[p, 2, e]
 
 
 @kernel
