@@ -27,11 +27,11 @@ from dlocore.whole_march import MISSED_COUNTS, Outcome, is_folded, march_level, 
 AUTO_TARGET = 2e-3  # of the length: the error that quality "auto" aims at
 AUTO_ENOUGH = 1e-2  # of the length: the estimated error with which it is content where the finest grids reach no closer
 ROUGH = 0.05  # of the length: two grids that differ more are in no order yet: the next is marched with strong damping
-MOST_WORK = 1.6e7  # control points times steps of one march in the plane; each coordinate more costs twice the time
+MOST_WORK = 3.2e7  # control points times steps of one march in the plane; each coordinate more costs twice the time
 _FRAMES = 3  # a control point in time, at least, that are kept of a motion with twist: what its time spline needs
 CONTACT_COSTS = 2  # times as much work counts with contact, which takes more of the time of a step
-AUTO_SHARE = 1 / 16  # of it for who asked for no target, once the estimated error is AUTO_ENOUGH
-_MOST_POINTS = 400  # along the cable
+AUTO_SHARE = 1 / 32  # of it for who asked for no target, once the estimated error is AUTO_ENOUGH
+_MOST_POINTS = 800  # along the cable
 _FINER = {"space": 1.5, "time": 2.0}
 _FINE_IN_TIME = 0.3  # of the target: a time spline that misses its march by less keeps its knots as the steps halve
 _AT_BEST = 0.2  # of an error, is left by one refinement: what is still too much after all of them is not begun

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.errors import SceneError
-from dlocore.kernels.basis import GAUSS_4, spline_values
+from dlocore.kernels.basis import GAUSS_4, gauss_points, spline_values
 from dlocore.kernels.holding import place
 from dlocore.kernels.projection import on_knots
 from dlocore.scene import ControlPoints, Material, Points, Shape, Straight
@@ -22,7 +22,6 @@ SPEED_RANGE = (0.5, 1.5)  # of |r'|: a coarse spline of a hairpin stays within, 
 SAME_ANGLE = 1e-9  # [rad]
 _ONE_SPAN = uniform_knots(4, 1.0)
 _THIRDS = np.linspace(0.0, 1.0, 4)[:, None]
-GAUSS = ((np.polynomial.legendre.leggauss(4)[0] + 1) / 2, np.polynomial.legendre.leggauss(4)[1] / 2)  # on [0, 1]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -127,7 +126,7 @@ def _given(shape: ControlPoints, length: float) -> StartCurve:
 
 def _speed(curve: SplineCurve) -> tuple[Floats, Floats]:
     """Return |r'| at the Gauss points of each knot span (k,), and their quadrature weights (k,) [m]."""
-    u, width = _gauss_points(curve.knots)
+    u, width = gauss_points(_plain(curve.knots), *GAUSS_4)
     return np.sqrt((curve(u, 1) ** 2).sum(axis=1)), width
 
 
@@ -196,13 +195,6 @@ def fit_to_knots(curve: SplineCurve, knots: Floats) -> Floats:
     strained by 4 % in the middle of a span, on 13 by 0.9 %, on 25 by 0.07 %.
     """
     return np.asarray(on_knots(_plain(curve.knots), _plain(curve.control_points), _plain(knots), *GAUSS_4))
-
-
-def _gauss_points(knots: Floats) -> tuple[Floats, Floats]:
-    """Return four Gauss points in each knot span (4 k,) [m] and their weights (4 k,) [m]."""
-    start = knots[np.flatnonzero(np.diff(knots))]
-    width = np.diff(start, append=knots[-1])[:, None]
-    return (start[:, None] + width * GAUSS[0]).ravel(), (width * GAUSS[1]).ravel()
 
 
 def velocity_to_knots(curve: StartCurve, knots: Floats) -> Floats | None:

@@ -16,6 +16,7 @@ def _digest() -> str:
 
 
 _SOURCE = _digest()
+_njit: Any = numba.njit  # `_nrt`, the counting of references, is an option that it does not document
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -42,14 +43,14 @@ def leaf(function: Callable[..., Any]) -> Any:
 
 def law(function: Callable[..., Any]) -> Any:
     """Compile a pointwise law that is inlined into the kernels, and makes no array either."""
-    return numba.njit(error_model="numpy", forceinline=True, _nrt=False)(function)
+    return _njit(error_model="numpy", forceinline=True, _nrt=False)(function)
 
 
 part = law  # of a kernel, into it: handing over a table, which is a hundred numbers, takes longer than some parts
 
 
 def _compiled(function: Callable[..., Any], **options: bool) -> Any:
-    compiled: Any = numba.njit(cache=True, error_model="numpy", **options)(function)
+    compiled = _njit(cache=True, error_model="numpy", **options)(function)
     if hasattr(compiled, "_cache"):  # not where compilation is switched off for debugging
         compiled._cache._cache_file._source_stamp = _SOURCE
     return compiled

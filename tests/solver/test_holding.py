@@ -9,7 +9,16 @@ from dlocore import Cable, ControlPoints, Environment, Grasp, Move, Scene, Strai
 from dlocore.discretisation import make_grid
 from dlocore.grid import Grid
 from dlocore.holding import SMOOTH, Held, Starts, close_grasps, hold
-from dlocore.kernels.banded import place_held
+from dlocore.kernels.banded import (
+    expand_vector,
+    factor,
+    holding,
+    multiply_band,
+    place_held,
+    reduce_matrix,
+    reduce_vector,
+    solve,
+)
 from dlocore.kernels.entry import to_ends_of_steps
 from dlocore.paths import Path, Still
 from dlocore.problem import Problem, pose
@@ -121,6 +130,30 @@ def test_a_path_begins_at_the_point_and_along_the_unit_tangent_of_the_cable():
         point, slope = problem.start(g.u)[0], problem.start(g.u, 1)[0]
         assert np.abs(starts[g][0] - point).max() < ROUNDING
         assert np.abs(starts[g][1] - slope / np.linalg.norm(slope)).max() < ROUNDING
+
+
+@pytest.mark.parametrize("hold", ["point", "tangent", "clamp"])
+def test_what_an_update_does_to_forces_follows_from_the_balance_of_what_is_free(hold):
+    # the update of a Newton step with a random tangent, which is multiplied by all of its rows to compare
+    problem, grid, held = held_in(scene(Grasp(u=0.0, hold=hold), Grasp(u=0.5, hold=hold), Grasp(u=0.93)))
+    e, nc = held.elimination, problem.nc
+    size = grid.n_u * nc
+    random = np.random.default_rng(2)
+    K = random.normal(size=(size, 4 * nc))
+    K[:, 0] += 60.0
+    K[np.add.outer(np.arange(size), np.arange(4 * nc)) >= size] = 0.0
+    R = random.normal(size=size)
+    A, y, x = np.empty((size - len(e.held), e.width)), np.empty(size - len(e.held)), np.empty(size)
+    reduce_matrix(e, K, A)
+    reduce_vector(e, -R, y)
+    assert factor(A) == -1
+    solve(A, y)
+    expand_vector(e, y, x)
+    whole, found, forces = np.empty(size), np.empty(size), np.empty(len(e.held))
+    multiply_band(K, x, whole)
+    holding(e, K, x, R, forces, found)
+    assert np.abs(found - whole).max() < ROUNDING * np.abs(whole).max() * size
+    assert np.abs(forces - (R + whole)[e.held]).max() < ROUNDING * np.abs(whole).max() * size
 
 
 def test_forces_of_steps_are_brought_to_their_ends():

@@ -1,4 +1,4 @@
-"""The band of the plane, written out: factors and solutions of dense matrices."""
+"""The bands of a march, of widths that the compiler knows: factors and solutions of dense matrices."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def positive(n: int, width: int, seed: int) -> tuple[Floats, Floats]:
     return A, band
 
 
-@pytest.mark.parametrize("width", [8, 9, 12])
+@pytest.mark.parametrize("width", [8, 9, 12, 16])
 @pytest.mark.parametrize("n", [1, 5, 8, 9, 40])
 def test_a_system_is_solved(n: int, width: int) -> None:
     A, band = positive(n, width, n)
@@ -35,17 +35,19 @@ def test_a_system_is_solved(n: int, width: int) -> None:
     assert not x[n:].any()
 
 
+@pytest.mark.parametrize("width", [8, 12, 16])
 @pytest.mark.parametrize("n", [8, 40])
-def test_factors_are_those_of_any_band(n: int) -> None:
-    _, band = positive(n, 8, 3)
+def test_factors_are_those_of_any_band(n: int, width: int) -> None:
+    _, band = positive(n, width, 3)
     other = band[:n].copy()
     assert factor_step(band, n) == factor(other) == -1
     np.testing.assert_allclose(band[:n], other, atol=1e-13 * np.abs(other).max())  # a division for each column
 
 
+@pytest.mark.parametrize("width", [8, 12, 16])
 @pytest.mark.parametrize("bad", [0.0, -1.0, np.nan])
 @pytest.mark.parametrize("place", [0, 7, 19])
-def test_a_pivot_that_is_not_positive_is_told(place: int, bad: float) -> None:
-    _, band = positive(20, 8, 4)
+def test_a_pivot_that_is_not_positive_is_told(place: int, bad: float, width: int) -> None:
+    _, band = positive(20, width, 4)
     band[place, 0] = bad
     assert factor_step(band, 20) == place

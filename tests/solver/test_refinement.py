@@ -91,7 +91,7 @@ def test_a_target_is_reached_by_more_steps_where_only_time_errs():
 
 
 def test_auto_goes_as_far_as_the_target_that_it_is_content_with():
-    # a stiff arc on a table that springs straight: a sixteenth of a target's work leaves it at 1.6 % of the length
+    # a stiff arc on a table that springs straight: a thirty-second of a target's work leaves it at 1.6 % of the length
     scene = draw(2, 80).make()
     found = predict(scene)
     assert found.status == "converged"
