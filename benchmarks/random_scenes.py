@@ -24,7 +24,7 @@ import numpy as np
 from benchmarks.hard.generator import as_python, draw
 from benchmarks.hard.judge import WRONG, converges, is_undetermined, run
 from benchmarks.machine import machine_line
-from dlocore import warm_up
+from dlocore import SceneError, warm_up
 
 HANG = 6.0  # times the deadline of a prediction, after which a process is ended: one scene may have three
 
@@ -96,10 +96,16 @@ def _take(job: Job, ready: bool, seed: int) -> tuple[dict[str, Any], bool]:
 
 
 def _lost(index: int, seed: int, how: str) -> dict[str, Any]:
-    drawn = draw(seed, index)
+    """Return the record of a scene whose process hung or crashed, or which could not even be drawn."""
+    families, possible, message = ("numbers: none",), True, ""
+    try:
+        drawn = draw(seed, index)
+        families, possible = drawn.families, drawn.possible
+    except SceneError as error:
+        message = f"not drawn: {error}"
     return {
-        "index": index, "families": drawn.families, "possible": drawn.possible, "status": how,
-        "message": "", "seconds": 0.0, "faults": [how],
+        "index": index, "families": families, "possible": possible, "status": how,
+        "message": message, "seconds": 0.0, "faults": [how],
     }  # fmt: skip
 
 

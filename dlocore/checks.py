@@ -1,5 +1,6 @@
 """What no cable can follow, found before anything is solved: grasps too far apart, a start inside table or obstacle."""
 
+import math
 from typing import cast
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 from dlocore.effects.distance import distances
 from dlocore.effects.selfcontact import nearest_strands
 from dlocore.errors import SceneError
-from dlocore.paths import Move, Still, Waypoints
+from dlocore.paths import Move, Path, Still, Waypoints
 from dlocore.plane import TABLE_TOLERANCE
 from dlocore.scene import MAX_PRESCRIBED_STRAIN, Scene
 from dlocore.shape import StartCurve
@@ -37,15 +38,18 @@ def check_reach(scene: Scene, start: StartCurve) -> None:
     if len(scene.grasps) < 2:
         return
     t = np.linspace(0.0, cast(float, scene.horizon), 257)
-    paths = [g.path.at(t - g.start, start(g.u)[0]) for g in scene.grasps]
+    begin = [start(g.u)[0] for g in scene.grasps]
     for j, b in enumerate(scene.grasps):
         for i, a in enumerate(scene.grasps[:j]):
+            between = abs(b.u - a.u)
+            if _farthest(a.path, begin[i], b.path, begin[j]) <= between:
+                continue
             together = (t >= max(a.start, b.start)) & (t <= min(a.release_time or np.inf, b.release_time or np.inf))
             late = max(a.start, b.start) > 0 and not all(isinstance(g.path, Waypoints) for g in (a, b) if g.start > 0)
             if late or not together.any():
                 continue  # a later grasp begins where the cable is then, which only the solve can tell
-            between = abs(b.u - a.u)
-            apart = np.where(together, np.linalg.norm(paths[j] - paths[i], axis=1), 0.0)
+            paths = b.path.at(t - b.start, begin[j]) - a.path.at(t - a.start, begin[i])
+            apart = np.where(together, np.linalg.norm(paths, axis=1), 0.0)
             k = int(np.argmax(apart))
             if not apart[k] <= between * (1.0 + MAX_PRESCRIBED_STRAIN) + 1e-6:
                 raise SceneError(
@@ -54,6 +58,17 @@ def check_reach(scene: Scene, start: StartCurve) -> None:
                     f"at most {between:.4g} m",
                     "No cable can follow: the two grasps are farther apart than the cable between them",
                 )
+
+
+def _farthest(a: Path, from_a: Floats, b: Path, from_b: Floats) -> float:
+    """Return a distance [m] that two paths from given points never exceed: that of ends, where both are straight."""
+    if isinstance(a, Waypoints) or isinstance(b, Waypoints):
+        return np.inf
+    ends = [
+        [begin] if isinstance(path, Still) else [begin, begin + cast(Floats, path.displacement)]
+        for path, begin in ((a, from_a), (b, from_b))
+    ]
+    return max(math.dist(p, q) for p in ends[0] for q in ends[1])
 
 
 def check_above(scene: Scene, start: StartCurve) -> None:

@@ -12,7 +12,7 @@ from dlocore.errors import SceneError
 from dlocore.features import find_features, free_ends
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
-from dlocore.kernels.assembly import History
+from dlocore.kernels.assembly import MEMORY_IN_PLANE, MEMORY_IN_SPACE, PAST_IN_PLANE, PAST_IN_SPACE, History
 from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, Tables, build_tables, graded_knots
 from dlocore.kernels.entry import remember_start
 from dlocore.kernels.relax import relax
@@ -79,11 +79,11 @@ def _tables_of(problem: Problem, knots: Floats) -> Tables:
 def _no_history(problem: Problem, tables: Tables) -> History:
     points, nc = len(tables.curvature_w), problem.nc
     kept = points if problem.keeps_curvature else 0
-    columns = {2: 2, 3: 9, 4: PAST}[nc]
+    columns = {2: PAST_IN_PLANE, 3: PAST_IN_SPACE, 4: PAST}[nc]
     rubs = problem.friction is not None
     lies = rubs and problem.on_table
     return History(
-        memory=np.zeros((points, 2 if nc == 2 else 6)),
+        memory=np.zeros((points, MEMORY_IN_PLANE if nc == 2 else MEMORY_IN_SPACE)),
         past=np.zeros((kept, columns)),
         axial=np.zeros((len(tables.axial_w), 3)),
         stick=np.zeros((len(tables.contact_w) if rubs else 0, 6)),

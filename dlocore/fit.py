@@ -28,6 +28,7 @@ SLOWEST = 1e-3  # of the chord's speed: where the parameter of a fit moves on an
 MIN_STEPS = 512  # of the arclength of a fit, so that its inverse is smooth to SPEED_ERROR
 MIN_SPANS = 8  # of a fit, at which even few points can show three bends
 MIN_UNIT_SPANS, MAX_UNIT_SPANS = 64, 1024  # beyond which a curve is too sharp for a cable, and is fitted with fewer
+MOST_UNIT_SPANS = 4096  # where it is as sharp with the fewest: points that turn back at a corner
 KEPT = 64  # fits, each at most some 100 kB
 
 
@@ -82,21 +83,21 @@ def _fit(coordinates: bytes, length: float) -> PointFit:
     p, progress, weight = _averaged(distinct, share)
     noise = _noise(p) if len(p) > SPARSE else 0.0
     most_noise = max(NOISE * max(length, 1.0), 1.5 * noise)
-    spans = int(np.clip(len(p), MIN_SPANS, MAX_SPANS))
-    while True:
-        spline, x, s = _smoothed(_cumulated(p), p, weight, spans, noise, most_noise)
-        first, last = _ends(s, noise)
-        check_length("shape.points", "points along the whole cable", last - first, length)
-        doubt = 2 * END_NOISE * float(np.sqrt(((p - spline(x)) ** 2).sum(axis=1).mean()))
-        extra = float(np.clip(length - (last - first), -doubt, doubt))
-        start, end = first - extra / 2, last + extra / 2
-        curve = _unit_speed(spline, start, end)
-        if curve is not None:
-            at = np.clip(np.interp(share, progress, s) - start, 0.0, end - start)
-            return PointFit(curve=curve, length_given=last - first, at=at[which])
-        if spans == MIN_SPANS:
-            raise _doubled_back()
-        spans = max(spans // 2, MIN_SPANS)
+    for unit_spans in (MAX_UNIT_SPANS, MOST_UNIT_SPANS):
+        spans = 2 * int(np.clip(len(p), MIN_SPANS, MAX_SPANS))
+        while spans > MIN_SPANS:
+            spans = max(spans // 2, MIN_SPANS)
+            spline, x, s = _smoothed(_cumulated(p), p, weight, spans, noise, most_noise)
+            first, last = _ends(s, noise)
+            check_length("shape.points", "points along the whole cable", last - first, length)
+            doubt = 2 * END_NOISE * float(np.sqrt(((p - spline(x)) ** 2).sum(axis=1).mean()))
+            extra = float(np.clip(length - (last - first), -doubt, doubt))
+            start, end = first - extra / 2, last + extra / 2
+            curve = _unit_speed(spline, start, end, unit_spans)
+            if curve is not None:
+                at = np.clip(np.interp(share, progress, s) - start, 0.0, end - start)
+                return PointFit(curve=curve, length_given=last - first, at=at[which])
+    raise _doubled_back()
 
 
 def _smoothed(
@@ -201,10 +202,10 @@ def _arclength(spline: BSpline) -> tuple[Floats, Floats]:
     return grid, s - np.interp(0.0, grid, s)
 
 
-def _unit_speed(spline: BSpline, start: float, end: float) -> BSpline | None:
+def _unit_speed(spline: BSpline, start: float, end: float, most: int) -> BSpline | None:
     """Return the piece of a curve between two arclengths [m] as a spline in arclength.
 
-    Its knots are halved until | |r'| - 1 | <= SPEED_ERROR; None where the curve is too sharp for that.
+    Its knots are halved until | |r'| - 1 | <= SPEED_ERROR; None where the curve is too sharp for `most` spans of them.
     """
     grid, along = _arclength(spline)
     speed = np.sqrt((spline(grid, 1) ** 2).sum(axis=1))
@@ -212,7 +213,7 @@ def _unit_speed(spline: BSpline, start: float, end: float) -> BSpline | None:
         return None
     parameter = CubicHermiteSpline(along, grid, 1 / speed)
     spans = MIN_UNIT_SPANS
-    while spans <= MAX_UNIT_SPANS:
+    while spans <= most:
         s = np.linspace(start, end, spans + 1)
         x = parameter(s)
         first, last = (t / np.linalg.norm(t) for t in spline(x[[0, -1]], 1))

@@ -155,7 +155,7 @@ class Accuracy:
         dimensions: 2 where the motion is planar, else 3.
         dimensions_reason: why, in words.
         phases: time by phase [s]: "setup", "march", "fit", "spacetime", "estimate", "report"; "march" has the fit of a
-            smooth motion in the plane, which is one compiled call with it.
+            smooth motion without twist, which is one compiled call with it.
     """
 
     method: str

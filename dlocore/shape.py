@@ -97,7 +97,8 @@ def _straight(shape: Straight, length: float) -> StartCurve:
 def _given(shape: ControlPoints, length: float) -> StartCurve:
     from dlocore.fit import check_length  # slow to import, as those below, and a straight cable needs none
 
-    control, angles = np.split(cast(Floats, shape.control_points), [3], axis=1)
+    rows = cast(Floats, shape.control_points)
+    control, angles = rows[:, :3].copy(), rows[:, 3:].copy()
     knots = uniform_knots(len(control), length) if shape.knots is None else cast(Floats, shape.knots)
     speed, width = _speed(SplineCurve(knots=knots, control_points=control))
     given = float((speed * width).sum())

@@ -214,6 +214,17 @@ def test_a_stretched_or_compressed_cloud_is_scaled_about_its_middle(name: str, f
     assert np.linalg.norm(fit(U) - truth, axis=1).max() < 3e-4  # six fit errors at the ends may be continued
 
 
+@pytest.mark.parametrize("count", [20, 97, 200])
+def test_points_that_turn_back_at_a_corner_are_fitted_beside_it(count: int) -> None:
+    s, turn, corner = np.linspace(0.0, 1.0, count)[:, None], np.radians(150.0), 0.57
+    points = np.minimum(s, corner) * [1.0, 0.0, 0.0]
+    points += np.maximum(s - corner, 0.0) * [np.cos(turn), np.sin(turn), 0.0]
+    curve = fitted(points)
+    assert curve.fit_rms < 0.01
+    u = np.linspace(0.0, 1.0, 4001)
+    assert np.abs(np.linalg.norm(curve(u, 1), axis=1) - 1.0).max() < 1e-3  # of unit speed around the corner, too
+
+
 @pytest.mark.parametrize("factor", [0.89, 1.11, 1000.0, 1e-3])
 def test_points_of_another_cable_are_refused_by_name(factor: float) -> None:
     with pytest.raises(SceneError, match=r"another cable\.length") as error:

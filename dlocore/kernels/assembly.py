@@ -29,6 +29,8 @@ from dlocore.kernels.basis import row_of
 from dlocore.kernels.compile import kernel, leaf
 from dlocore.kernels.strain import space_curvature
 
+PAST_IN_PLANE, PAST_IN_SPACE = 2, 9  # columns of `History.past`, in space without twist
+MEMORY_IN_PLANE, MEMORY_IN_SPACE = 2, 6  # columns of `History.memory`
 NO_RATES = (0.0, 0.0, 0.0, 0.0)  # `rates` of `assemble` where the rate of strain comes from v and nothing yields
 
 

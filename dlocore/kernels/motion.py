@@ -1,11 +1,20 @@
-"""A whole smooth motion in the plane in one call: most of the time of a short march goes into what passes between."""
+"""A whole smooth motion without twist in one call: much of the time of a short march goes into what passes between."""
 
 from typing import Any
 
 import numpy as np
 
 from dlocore.effects.laws import keeps_curvature, keeps_history
-from dlocore.kernels.assembly import NO_RATES, History, slopes, times_scalar_band
+from dlocore.kernels.assembly import (
+    MEMORY_IN_PLANE,
+    MEMORY_IN_SPACE,
+    NO_RATES,
+    PAST_IN_PLANE,
+    PAST_IN_SPACE,
+    History,
+    slopes,
+    times_scalar_band,
+)
 from dlocore.kernels.basis import build_tables
 from dlocore.kernels.compile import kernel
 from dlocore.kernels.entry import begin_stretch, remember_start, to_ends_of_steps
@@ -24,36 +33,36 @@ def smooth_motion(
     directions: Any, knots_t: Any, active: Any, p: Any, density: float, dragged: float, weight: Any, rho: float,
     tolerance: float, least_jump: float, every: int, info: Any,
 ) -> Any:  # fmt: skip
-    """March a smooth motion in the plane from its start, and fit the time spline to it.
+    """March a smooth motion without twist from its start, and fit the time spline to it.
 
     It is `build_tables`, `remember_start`, `hold_rows`, `begin_stretch`, `march_steps`, `to_ends_of_steps` and `fitted`
     one after the other: see there for what is not said here.
 
     Args:
-        axes: (0, 1).
-        start, velocity: (n, 2) [m, m/s] of the control points at t = 0.
-        memory: (points, 2) stress-free curvature and its natural value, (0, 2) for a straight one [1/m].
+        axes: (0, 1) or (0, 1, 2).
+        start, velocity: (n, nc) [m, m/s] of the control points at t = 0.
+        memory: (points, 2) stress-free curvature and its natural value [1/m], in the plane; (0, 2) for a straight one.
         times: (steps + 1 + near,) [s] `near` times at the beginning, for velocity and acceleration of the paths, and
             those of the steps.
         rows, sampled: what is held at `times`.
-        origin, directions: (3,) [m] and (2, 3), of the coordinates of the solve.
-        weight: (2,) [N/m] per unit length.
+        origin, directions: (3,) [m] and (nc, 3), of the coordinates of the solve.
+        weight: (nc,) [N/m] per unit length.
         least_jump: of the velocity, in a step, that counts as a jump [m].
         every: of how many states one is searched for folds.
         info: (SEEN,) as in `march_steps`, and the largest axial strain of the motion, and the least and the largest
             |r'| at the curvature points.
 
     Returns:
-        The states (steps + 1, n, 2) [m], the velocity (n, 2) [m/s] as the grasps close, the forces (steps + 1, held)
-        [N] that hold them, what lies behind the motion at its end, the control points (n_t, n, 2) [m] of the time
+        The states (steps + 1, n, nc) [m], the velocity (n, nc) [m/s] as the grasps close, the forces (steps + 1, held)
+        [N] that hold them, what lies behind the motion at its end, the control points (n_t, n, nc) [m] of the time
         spline and what it misses each state by (steps + 1,) [m].
     """
     tables = build_tables(knots, free_start, free_end, rule2, w2, rule3, w3, rule4, w4, np.inf)
     n, nc = start.shape
     points, stretched = len(tables.curvature_w), len(tables.axial_w)
     history = History(
-        memory.copy() if len(memory) > 0 else np.zeros((points, 2)),
-        np.zeros((points if keeps_curvature(active) else 0, 2)),
+        memory.copy() if len(memory) > 0 else np.zeros((points, MEMORY_IN_PLANE if nc == 2 else MEMORY_IN_SPACE)),
+        np.zeros((points if keeps_curvature(active) else 0, PAST_IN_PLANE if nc == 2 else PAST_IN_SPACE)),
         np.zeros((stretched, 3)),
         np.zeros((0, 6)),
         np.zeros((0, 2)),

@@ -1,4 +1,4 @@
-"""The march of a smooth motion in the plane, in one compiled call: the plainest motions, and the most frequent."""
+"""The march of a smooth motion without twist, in one compiled call: the plainest motions, and the most frequent."""
 
 from functools import partial
 
@@ -28,7 +28,7 @@ _NO_LOG = np.zeros((0, 0, 0))
 def march_smooth(
     problem: Problem, grid: Grid, steps: int, knots_t: Floats, monitor: Monitor, rho: float
 ) -> tuple[March, Floats, Floats] | None:
-    """March a motion without events in the plane, and fit the time spline to it.
+    """March a motion without events and without twist, and fit the time spline to it.
 
     Args:
         knots_t: (n_t + 4,) [s] of the time spline.
@@ -61,9 +61,9 @@ def march_smooth(
     info[FAILED_STEP] = -1
     states, closed, forces, history, control, off = smooth_motion(
         problem.axes, grid.knots, *free_ends(problem.scene), *GAUSS_2, *GAUSS_3, *GAUSS_4, grid.start, grid.velocity,
-        _STRAIGHT if straight else grid.history.memory, times, len(NEAR), rows, sampled, problem.plane.origin,
-        problem.plane.axes, knots_t, *problem.laws, problem.mass_density(), problem.drag_coefficient(),
-        problem.weight(), rho, tolerance_of(problem, grid, problem.horizon / (steps + 1)),
+        _STRAIGHT if straight or problem.nc == 3 else grid.history.memory, times, len(NEAR), rows, sampled,
+        problem.plane.origin, problem.plane.axes, knots_t, *problem.laws, problem.mass_density(),
+        problem.drag_coefficient(), problem.weight(), rho, tolerance_of(problem, grid, problem.horizon / (steps + 1)),
         JUMPS * problem.scene.cable.length, every_of(steps + 1), info,
     )  # fmt: skip
     if info[FAILED_STEP] >= 0:
@@ -90,9 +90,9 @@ def march_smooth(
 
 
 def _is_plain(problem: Problem) -> bool:
-    """Tell whether a motion is in the plane and has inertia, and neither loads, contact nor anything that yields."""
+    """Tell whether a motion has inertia, and neither twist, loads, contact nor anything that yields."""
     return (
-        problem.nc == 2
+        problem.twist is None
         and problem.inertia is not None
         and not problem.touches
         and problem.bending_memory is None

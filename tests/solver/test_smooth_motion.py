@@ -47,6 +47,8 @@ SCENE = Scene(
     horizon=1.6,
 )
 ON_TABLE = SCENE.environment
+HANGING = Environment(drag=0.05)
+LIFT = Move(displacement=(-0.05, 0.1, 0.05), duration=1.6)
 STEPS = 60
 
 
@@ -79,6 +81,25 @@ def solved(
         pytest.param(replace(SCENE, cable=replace(CABLE, bending_damping=1e-4)), id="damped"),
         pytest.param(
             replace(SCENE, grasps=(Grasp(u=0.0),), environment=Environment(drag=0.05, drag_quadratic=0.1)), id="falls"
+        ),
+        pytest.param(replace(SCENE, environment=Environment(drag=0.05)), id="falls and is pulled sideways"),
+        pytest.param(
+            replace(
+                SCENE,
+                environment=Environment(drag=0.05, drag_quadratic=0.1),
+                cable=replace(CABLE, bending_damping=1e-4),
+                effects={"twist": "off"},
+            ),
+            id="damped in space",
+        ),
+        pytest.param(
+            replace(
+                SCENE,
+                shape=Points(points=ARC),
+                grasps=(Grasp(u=0.0, hold="tangent"), Grasp(u=1.0, path=LIFT)),
+                environment=HANGING,
+            ),
+            id="hangs between two grippers",
         ),
     ],
 )
@@ -118,7 +139,7 @@ def test_one_call_is_the_general_march(scene: Scene) -> None:
             replace(SCENE, cable=replace(CABLE, yield_strain=1e-3, memory_rate=1.0), effects={"plasticity": "on"}),
             id="yields",
         ),
-        pytest.param(replace(SCENE, environment=Environment(drag=0.05)), id="in space"),
+        pytest.param(replace(SCENE, environment=Environment(drag=0.05), effects={"twist": "on"}), id="twists"),
         pytest.param(
             replace(
                 SCENE,
