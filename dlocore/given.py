@@ -15,7 +15,7 @@ from dlocore.whole_march import is_folded, march_level, march_status
 MISSED = 0.02  # of the length: a time spline that misses its march by more is no answer
 # what is tried where a march finds no equilibrium, folds or tears the cable: times as many steps, and whether more
 # points watch over the length
-_OTHERWISE = ((4, False), (1, True), (4, True))
+_OTHERWISE = ((4, False), (1, True), (4, True), (16, False))
 
 
 def march_given(problem: Problem, n_u: int, n_t: int, monitor: Monitor) -> Level:

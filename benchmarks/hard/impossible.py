@@ -18,6 +18,7 @@ def pulled_apart(r: Rng, d: Draft) -> Callable[[], Scene]:
     far = r.uniform(0.02, 0.5) * length
     path = Move(displacement=(far, 0, 0), duration=d.time)
     d.grasps = [Grasp(u=u[0]), Grasp(u=u[1], path=path)]
+    d.horizon = None  # that of the pull
     return d.scene
 
 
