@@ -25,7 +25,7 @@ GRIDS = {
     "spacetime": Quality(n_u=17, n_t=33, delta=1e-4, method="spacetime"),
     "paper": Quality(n_u=7, n_t=9, delta=1e-4, method="paper"),
 }
-DEADLINE = 30.0  # [s]
+DEADLINE = 90.0  # [s]
 
 
 def by_method(case: Case, method: str) -> Scene:

@@ -13,6 +13,7 @@ Floats = NDArray[np.float64]
 _REFINEMENTS = 8  # of the time knots: each halves spans
 _MOST_OF_THE_TIME = 0.95
 _EVENINGS = 12  # of the time knots
+_MOST_NUMBERS = 10**7  # of all states: with more of them, none are added between
 _STATES = 2  # of the march in a span of the time spline, at least
 _QUIET = 1e-3  # of the largest miss: what a span misses at least, so that none grows without bounds
 
@@ -94,8 +95,13 @@ def _missed(knots_t: Floats, times: Floats, states: Floats, control: Floats) -> 
 
 
 def _halved(motion: March, knots_t: Floats, control: Floats, tolerance: float) -> March:
-    """Return the motion with states half-way through those steps where the spline leaves the chord of the states."""
+    """Return the motion with states half-way through those steps where the spline leaves the chord of the states.
+
+    A motion in so many steps that its states fill memory stays as it is: its steps are short enough.
+    """
     times, states = motion.times, motion.states
+    if states.size > _MOST_NUMBERS:
+        return motion
     middle = 0.5 * (times[1:] + times[:-1])
     chord = 0.5 * (states[1:] + states[:-1])
     away = _missed(knots_t, middle, chord, control)

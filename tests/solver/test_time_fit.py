@@ -1,0 +1,48 @@
+"""The time spline of a march: where knots and states are added, and where memory forbids it."""
+
+import numpy as np
+import pytest
+
+from dlocore import Cable, Environment, Grasp, Move, Scene, Straight, Table
+from dlocore.discretisation import make_grid
+from dlocore.events import time_knots
+from dlocore.problem import pose
+from dlocore.solvers import timefit
+from dlocore.solvers.march import March, march
+from dlocore.solvers.monitor import Monitor
+from dlocore.solvers.timefit import fit, refined
+
+TOLERANCE = 1e-6  # [m]: so little that the motion needs more knots and, with them, states between its steps
+
+
+def jerk() -> tuple[March, np.ndarray]:
+    """Return a march of a cable that is jerked sideways, in few steps, and time knots too few for it."""
+    problem = pose(
+        Scene(
+            cable=Cable.preset("paper"),
+            shape=Straight(),
+            grasps=(Grasp(u=0.25, path=Move(displacement=(0.0, 0.2, 0.0), duration=0.3)),),
+            environment=Environment(drag=0.5, table=Table()),
+            horizon=1.0,
+        )
+    )
+    knots_t = time_knots(problem, 13)
+    assert knots_t is not None
+    return march(problem, make_grid(problem, 9), 60, Monitor()), knots_t
+
+
+def test_knots_and_states_are_added_until_the_spline_follows_the_march() -> None:
+    motion, knots_t = jerk()
+    more, dense = refined(motion, knots_t, TOLERANCE)
+    assert len(more) > len(knots_t)
+    assert len(dense.times) > len(motion.times)
+    assert set(motion.times) <= set(dense.times)
+    assert fit(dense, more)[1].max() < 0.1 * fit(motion, knots_t)[1].max()
+
+
+def test_no_states_are_added_to_so_many_that_they_fill_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    motion, knots_t = jerk()
+    monkeypatch.setattr(timefit, "_MOST_NUMBERS", motion.states.size - 1)
+    more, same = refined(motion, knots_t, TOLERANCE)
+    assert same is motion
+    assert len(more) > len(knots_t)
