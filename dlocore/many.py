@@ -49,6 +49,8 @@ def predict_many(
         except SceneError as error:
             return error
 
+    if wanted == 1:
+        return [solve(scene) for scene in scenes]
     pool = ThreadPoolExecutor(wanted, "dlo-predict")
     try:
         return list(pool.map(solve, scenes))
