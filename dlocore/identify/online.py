@@ -114,24 +114,25 @@ class Identifier:
         """Return the derivatives (frames, m, 3, parameters) of the prediction by the parameters whose turn it is.
 
         They are two, or one where motions beside the played one can't be followed: to march one takes twice the time.
+
+        Raises:
+            ValueError: a motion beside the played one leaves it, as it is unstable: it has no derivative.
         """
-        count = len(x)
+        count, followed = len(x), replay.differentiable(played)
         out = np.zeros((*played.predicted.shape, count))
-        for _ in range(min(_AT_ONCE, count)):
+        for _ in range(min(_AT_ONCE if followed else 1, count)):
             j, p = self._next, self._chosen[self._next]
             self._next = (j + 1) % count
             candidate = p.put(self._candidate, p.value(x[j] + _ASIDE))
-            try:
-                moved, followed = replay.play_beside(played, candidate), True
-            except ValueError:
-                moved, followed = replay.play(candidate, played).predicted, False
+            moved = replay.play_beside(played, candidate) if followed else replay.play(candidate, played).predicted
             out[..., j] = (moved - played.predicted) / _ASIDE
-            if not followed:
-                break
         return out
 
     def update(self) -> Update | None:
-        """Improve the estimate by the latest frames; None while there are too few, or nothing can be replayed."""
+        """Improve the estimate by the latest frames; None while there are too few, or they tell nothing.
+
+        They don't where nothing can be replayed, or where it is so unstable that it has no derivative.
+        """
         if len(self._times) < self._frames:
             return None
         began = perf_counter()
@@ -148,11 +149,14 @@ class Identifier:
             played = replay.play(self._candidate)
         except SceneError:  # outliers where the window begins: no cable lies so
             return None
-        if played.stopped:
+        if played.stopped or played.motion.split > 0:  # beside a motion that took smaller steps others jump
             return None
         free = recording.free
         x = np.array([p.coordinate(p.get(self._candidate)) for p in self._chosen])
-        J = self._derivatives(replay, played, x)[:, free].reshape(-1, len(x))
+        try:
+            J = self._derivatives(replay, played, x)[:, free].reshape(-1, len(x))
+        except ValueError:
+            return None
         away = (played.predicted - replay.markers)[:, free]
         r = np.where(np.isfinite(away), away, 0.0).ravel()
         J[~np.isfinite(away).ravel()] = 0.0
