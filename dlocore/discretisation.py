@@ -19,6 +19,7 @@ from dlocore.kernels.relax import relax
 from dlocore.kernels.tension import COLUMNS
 from dlocore.kernels.twisted import DIRECTOR, PAST, start_frames
 from dlocore.paths import Waypoints
+from dlocore.plane import leftwards
 from dlocore.problem import Problem
 from dlocore.scene import Material, Points
 from dlocore.shape import SplineCurve, fit_to_knots, start_curve, velocity_to_knots
@@ -98,6 +99,8 @@ def _history_of(problem: Problem, grid: Grid) -> History:
     if problem.twist is not None:
         start_frames(grid.knots, grid.start, grid.tables, start_director(problem), history.past)
     history.memory[:] = _memory(problem, grid, history)
+    if problem.start.bow:
+        history.axial[:, 0] = _axial_strain(grid.tables, grid.start[:, : problem.plane.dimensions])
     if problem.start.material is not None:
         _write_stretch(grid, history, problem.start.material)
     if problem.keeps_history:
@@ -113,16 +116,9 @@ def start_director(problem: Problem) -> Floats:
     tangent = problem.start(0.0, 1)[0]
     tangent = tangent / np.linalg.norm(tangent)
     material = problem.start.material
-    director = plane_director(tangent) if material is None else cast(Floats, material.director)
+    director = leftwards(tangent) if material is None else cast(Floats, material.director)
     across = director - tangent * (tangent @ director)
     return np.asarray(across / np.linalg.norm(across))
-
-
-def plane_director(tangent: Floats) -> Floats:
-    """Return the horizontal unit vector (3,) to the left of a tangent (3,); x for a vertical one."""
-    left = np.array([-tangent[1], tangent[0], 0.0])
-    size = float(np.linalg.norm(left))
-    return left / size if size > 1e-9 * float(np.linalg.norm(tangent)) else np.array([1.0, 0.0, 0.0])
 
 
 def corners(curve: SplineCurve, length: float) -> list[float]:
@@ -151,9 +147,15 @@ def plane_curvature_of(tables: Tables, q: Floats) -> Floats:
     return ((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / (a * a).sum(axis=1))[:, None]
 
 
+def _axial_strain(tables: Tables, r: Floats) -> Floats:
+    """Return the axial strain (points,) of control points r (n_u, 2 or 3) at the axial points."""
+    index = tables.axial_first[:, None] + np.arange(4)
+    return np.asarray(np.linalg.norm(np.einsum("pi,pid->pd", tables.axial_b1, r[index]), axis=1) - 1.0)
+
+
 def _memory(problem: Problem, grid: Grid, history: History) -> Floats:
     """Return the stress-free strain at the curvature points, and its natural value, (points, 2 m)."""
-    rest, material = problem.scene.cable.rest_shape, problem.start.material
+    rest, material = problem.rest_shape, problem.start.material
     nc = problem.nc
     if nc == 3:
         return history.memory
@@ -172,7 +174,7 @@ def _memory(problem: Problem, grid: Grid, history: History) -> Floats:
     # the bends of the natural curve in a frame without twist that starts like that of the sections
     frames = np.zeros_like(history.past)
     own = natural if curve is not problem.start else grid.start
-    start_frames(grid.knots, own, grid.tables, plane_director(curve(0.0, 1)[0]), frames)
+    start_frames(grid.knots, own, grid.tables, leftwards(curve(0.0, 1)[0]), frames)
     first, second = frames[:, DIRECTOR : DIRECTOR + 3], np.cross(frames[:, :3], frames[:, DIRECTOR : DIRECTOR + 3])
     bends = frames[:, 3:6]
     strain = np.column_stack([(bends * first).sum(1), (bends * second).sum(1), np.zeros(len(bends))])

@@ -200,6 +200,13 @@ def _remembered_bends(start: StartCurve) -> Floats:
     return bends if sizes[1] > FLATNESS * sizes[0] else bends[:1]
 
 
+def leftwards(tangent: Floats) -> Floats:
+    """Return the horizontal unit vector (3,) to the left of a tangent (3,); x for a vertical one."""
+    left = np.array([-tangent[1], tangent[0], 0.0])
+    size = float(np.linalg.norm(left))
+    return left / size if size > 1e-9 * float(np.linalg.norm(tangent)) else np.array([1.0, 0.0, 0.0])
+
+
 def _unit_across(normal: Floats) -> Floats:
     """Return a unit vector in the plane of `normal`: the world axis nearest to it, x before y before z."""
     sizes = [round(abs(x), 9) for x in normal.tolist()]

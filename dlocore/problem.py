@@ -8,6 +8,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.buckling import with_side
 from dlocore.checks import check_above, check_apart, check_outside, check_reach, check_waypoints
 from dlocore.effects import laws
 from dlocore.effects.base import Effect
@@ -82,6 +83,12 @@ class Problem:
     def horizon(self) -> float:
         """Predicted time [s]."""
         return cast(float, self.scene.horizon)
+
+    @property
+    def rest_shape(self) -> str | Floats:
+        """The stress-free shape: "straight", "initial" or points (n, 2 or 3) [m]."""
+        rest = self.scene.cable.rest_shape
+        return "initial" if self.start.bow and isinstance(rest, str) else cast(str | Floats, rest)
 
     @cached_property
     def features(self) -> Features:
@@ -215,12 +222,13 @@ class Problem:
         return np.zeros(self.nc) if self.gravity is None else self.rates(self.gravity.weight())
 
 
-def pose(scene: Scene, called_for: Mapping[str, str] | None = None) -> Problem:
+def pose(scene: Scene, called_for: Mapping[str, str] | None = None, *, at_rest: bool = False) -> Problem:
     """Turn a scene into the equations of its motion.
 
     Args:
         scene: the scene.
         called_for: effects that a result of this scene has called for, and the reason for each.
+        at_rest: only an equilibrium is asked for, see `with_side`.
 
     Raises:
         SceneError: the scene asks what no cable can follow, or switches off what the rest of it needs.
@@ -240,9 +248,10 @@ def pose(scene: Scene, called_for: Mapping[str, str] | None = None) -> Problem:
     on_table = not leaves
     if on_table:
         start = lay_on_table(scene, start)
+    start = with_side(scene, start, at_rest)
     plane = find_plane(scene, start, on_table, bool(met))
     bent = _is_bent(scene, start)
-    choices = choose(scene, start, plane.dimensions, on_table, leaves, met, bent, called_for)
+    choices = choose(scene, start, plane.dimensions, on_table, leaves, met, bent or start.bow > 0.0, called_for)
     if choices["self_contact"].active:
         check_apart(scene, start)
     if plane.dimensions == 3 and not choices["twist"].active:
@@ -339,4 +348,4 @@ def _is_bent(scene: Scene, start: StartCurve) -> bool:
         return True
     if material is None and not isinstance(rest, str):
         return True
-    return material is None and rest == "initial" and len(start.control_points) > 4 and not is_straight(start)
+    return material is None and rest == "initial" and not start.bow and not is_straight(start)

@@ -10,6 +10,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.buckling import side_note
 from dlocore.effects import laws
 from dlocore.effects.damping import Damping
 from dlocore.effects.distance import distances
@@ -71,6 +72,8 @@ def objections(level: Level) -> list[str]:
     problem, found = level.problem, []
     if level.motion.largest_strain > _STRAINED:
         found.append(f"the motion strains the cable by up to {level.motion.largest_strain:.0%} along itself")
+    if problem.start.bow:
+        found.append(side_note(problem.start))
     off = {name for name, value in problem.scene.effects.items() if value == "off"}
     for name, test in (("plasticity", _yields), ("obstacles", _touches), ("self_contact", _meets_itself)):
         if name in off:

@@ -53,6 +53,7 @@ class StartCurve(SplineCurve):
         theta: angle of the sections, a spline with control points (n, 1) [rad], or None where it is the same
             everywhere.
         material: what the sections remember, or None where the scene's `rest_shape` tells.
+        bow: height of the bow without stress that a straight start was given to buckle by [m], see `buckling.py`.
     """
 
     velocity: SplineCurve | None = None
@@ -61,6 +62,7 @@ class StartCurve(SplineCurve):
     length_given: float = 0.0
     theta: SplineCurve | None = None
     material: Material | None = None
+    bow: float = 0.0
 
     @cached_property
     def heights(self) -> tuple[float, float]:

@@ -81,7 +81,7 @@ def equilibrium(
         Cancelled: `cancelled` returned True.
     """
     at = number("at", at, at_least=0.0, at_most=1e4, unit="s")
-    problem = pose(scene)
+    problem = pose(scene, at_rest=True)
     if not closed_grasps(problem, at, at) and (np.any(problem.weight() != 0) or scene.loads):
         raise SceneError(
             "primitives", "no grasp", "a grasp that holds the cable", "Nothing holds it against its forces"

@@ -75,8 +75,7 @@ def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
     if not motion.stopped and motion.largest_strain > TORN:
         strain = f"The motion strains the cable along itself by {motion.largest_strain:.0%}, which no cable follows."
         advice = "Bring the grasps no farther apart than the cable between them, or make the motion slower."
-        push = "A straight cable pushed along itself has no side to buckle to: start it slightly bent."
-        return "stalled", f"{strain} {advice} {push}"
+        return "stalled", f"{strain} {advice}"
     if is_folded(level):
         least, most = motion.slopes
         seen = f"|r'| is {least:.2g} to {most:.2g} within a span"

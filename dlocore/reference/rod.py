@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from dlocore.obstacles import Box, Capsule, Cylinder, Obstacle, Sphere
 from dlocore.paths import Waypoints
+from dlocore.plane import leftwards
 from dlocore.problem import Problem
 from dlocore.reference import body as places
 from dlocore.reference.surface import BOX, CYLINDER, FRICTION, PLANE, ROUNDING, ROW
@@ -285,13 +286,6 @@ def unit(x: Floats) -> Floats:
     return np.asarray(x / np.linalg.norm(x, axis=-1, keepdims=True))
 
 
-def leftwards(tangent: Floats) -> Floats:
-    """Return the horizontal unit vector (3,) to the left of a tangent (3,); x for a vertical one."""
-    left = np.array([-tangent[1], tangent[0], 0.0])
-    size = float(np.linalg.norm(left))
-    return left / size if size > 1e-9 * float(np.linalg.norm(tangent)) else np.array([1.0, 0.0, 0.0])
-
-
 def _along(tangents: Floats, between: Floats, first: Floats, angle: Floats) -> tuple[Floats, Floats]:
     """Carry a director along a cable: from the tangent at a node to that of the edge behind it, to the next node.
 
@@ -322,7 +316,8 @@ def _with_start(rod: Rod) -> Rod:
             point = start(g.u)
             at = g.path.at(np.zeros(1), point[0]) if isinstance(g.path, Waypoints) else point
             fixed[rod.node(g.u)] = _flat(rod, rod.inside(at))[0]
-    x = _unstretched(x, np.diff(u), fixed)
+    if not start.bow:  # whose length is without stress
+        x = _unstretched(x, np.diff(u), fixed)
     tangents = unit(_flat(rod, start(u, 1) @ rod.axes.T))
     between = unit(np.diff(x, axis=0))
     material = start.material
@@ -337,13 +332,15 @@ def _with_start(rod: Rod) -> Rod:
         director = carried(tangents[0], tangents[0], director, float(angle[0]))
     a, at_nodes = _along(tangents, between, director, angle)
     natural = np.zeros((len(u), 3))
-    if material is None and not isinstance(cable.rest_shape, str):
-        natural = _bends(rod, start_curve(Points(points=cable.rest_shape), cable.length))
-    elif material is None and cable.rest_shape == "initial":
+    if material is None and not isinstance(problem.rest_shape, str):
+        natural = _bends(rod, start_curve(Points(points=problem.rest_shape), cable.length))
+    elif material is None and problem.rest_shape == "initial":
         natural = _bends(rod, start, between)
     remembered = natural
     axial = np.zeros(len(u) - 1)
     soft = rod.law[places.SOFTENED]
+    if start.bow:
+        axial = (np.linalg.norm(np.diff(x, axis=0), axis=1) / np.diff(u) - 1.0) / soft
     if material is not None:
         place = cast(Floats, material.u)
         memory = _sections(rod, material.director, cast(Floats, material.memory), place, start(0.0, 1)[0])

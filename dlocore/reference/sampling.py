@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.plane import leftwards
 from dlocore.prediction import MaterialMotion
 from dlocore.reference import body as places
 from dlocore.reference.motion import Motion
-from dlocore.reference.rod import carried, leftwards, unit
+from dlocore.reference.rod import carried, unit
 
 Floats = NDArray[np.float64]
 

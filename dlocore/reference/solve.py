@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dlocore.buckling import side_note
 from dlocore.errors import SceneError
 from dlocore.prediction import Accuracy, EffectReport, GraspReaction, Iteration, Prediction, Status
 from dlocore.problem import Problem, pose
@@ -187,7 +188,7 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
         ),
         report_effects=lambda surface: _effects(refined, surface),
         report_material=lambda: material_of(motion, last.taken),
-        find_objections=list,
+        find_objections=lambda: [side_note(problem.start)] if problem.start.bow else [],
     )
 
 

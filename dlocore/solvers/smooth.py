@@ -55,7 +55,7 @@ def march_smooth(
     starts: Starts = {}
     close_grasps(problem, grid, grasps, starts, grid.start)
     _, rows, sampled = constraint_rows(grasps, times, starts)
-    rest = problem.scene.cable.rest_shape
+    rest = problem.rest_shape
     straight = isinstance(rest, str) and rest == "straight"
     info = np.zeros(SEEN)
     info[FAILED_STEP] = -1
@@ -98,6 +98,7 @@ def _is_plain(problem: Problem) -> bool:
         and problem.bending_memory is None
         and problem.stretch_memory is None
         and problem.start.material is None
+        and not problem.start.bow
         and not problem.scene.loads
     )
 

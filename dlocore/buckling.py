@@ -1,0 +1,234 @@
+"""A straight cable that is pushed or twisted along itself has no side to buckle to: it is given one.
+
+Straight, it is in equilibrium however hard it is pushed, but no real cable stays so. Where a disturbance would grow by
+much, it gets the imperfection that columns are designed with: a bow without stress of a thousandth of the length.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+from typing import NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.paths import Move, Path, Still
+from dlocore.plane import FLATNESS, TABLE_TOLERANCE, is_straight, leftwards, natural_points
+from dlocore.scene import Grasp, Scene
+from dlocore.shape import StartCurve
+
+Floats = NDArray[np.float64]
+
+BOW = 1e-3  # height, of the length of the part that buckles
+GROWTH = math.log(10.0)  # of a disturbance, from which on it matters that there is one
+# What of a force that is spread along a part, free at one end, counts as if it pushed there: of a column under its own
+# weight, mu g L^3/EI = 7.84 against P L^2/EI = pi^2/4 (Greenhill, 1881)
+_SPREAD = 0.315
+_SPANS = 24  # of the knots of a bowed start, in each part
+_AGES = 1e6  # times the horizon: all the time that a disturbance needs
+_TIMES = 65  # at which each stretch of the motion is looked at
+
+
+class _Part(NamedTuple):
+    """A part of the cable, from `begin` to `end` [m], with a grasp at either end or None where it is free."""
+
+    begin: float
+    end: float
+    grasps: tuple[Grasp | None, Grasp | None]
+
+
+def with_side(scene: Scene, start: StartCurve, at_rest: bool) -> StartCurve:
+    """Return the start, bowed to the left where it is straight and the motion pushes it along itself.
+
+    The left is that of its direction, horizontally; that of a vertical one is the x axis.
+
+    Args:
+        scene: the scene.
+        start: start curve.
+        at_rest: a disturbance has all the time that it needs to grow, as where only the equilibrium is asked for.
+    """
+    along = _line(scene, start)
+    if along is None:
+        return start
+    bowed = [part for part, growth in _growths(scene, start, along, at_rest).items() if growth > GROWTH]
+    if not bowed:
+        return start
+    knots = _knots(bowed, scene.cable.length)
+    u = (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0  # where control points on the curve are those of a straight one
+    aside = np.sum([_bow(part, u) for part in bowed], axis=0)
+    control = start.control_points[0] + np.outer(u, along) + np.outer(aside, leftwards(along))
+    return replace(start, knots=knots, control_points=control, bow=float(aside.max()))
+
+
+def _knots(parts: list[_Part], length: float) -> Floats:
+    """Return clamped knots, triple where a part begins or ends inside: what a grasp holds there stays on the line."""
+    marks = sorted({0.0, length, *(x for part in parts for x in (part.begin, part.end))})
+    knots = [np.zeros(4)]
+    for a, b in pairwise(marks):
+        knots += [np.linspace(a, b, _SPANS + 1)[1:-1], np.full(3, b)]
+    return np.append(np.concatenate(knots), length)
+
+
+def side_note(start: StartCurve) -> str:
+    """Return what is to be known of a start that was bowed, in words."""
+    return (
+        "the straight cable is pushed or twisted along itself and has no side to buckle to: it starts with a bow of "
+        f"{start.bow * 1e3:.2g} mm to its left, and its mirror image is as likely"
+    )
+
+
+def _bow(part: _Part, u: Floats) -> Floats:
+    """Return how far the bow of a part lies aside at u (k,) [m]: level where a grasp may hold its direction."""
+    length = part.end - part.begin
+    x = np.clip((u - part.begin) / length, 0.0, 1.0)
+    if None not in part.grasps or part.grasps == (None, None):
+        shape = 0.5 * (1.0 - np.cos(2.0 * np.pi * x))
+    else:
+        shape = 1.0 - np.cos(0.5 * np.pi * (x if part.grasps[1] is None else 1.0 - x))
+    return np.asarray(BOW * length * shape)
+
+
+def _line(scene: Scene, start: StartCurve) -> Floats | None:
+    """Return the direction (3,) of a start from which nothing in the scene leads away, None where something does."""
+    chord = start.control_points[-1] - start.control_points[0]
+    size = math.sqrt(chord @ chord)
+    if not size > 0.5 * scene.cable.length:
+        return None
+    along = chord / size
+    if any(_aside(g.path, g.u, start, along, scene.cable.length) for g in scene.grasps):
+        return None
+    forces = [_gravity(scene, start)[None], *(np.atleast_2d(cast(Floats, load.force)) for load in scene.loads)]
+    if start.velocity is not None:
+        forces.append(start.velocity.control_points)
+    if any(_off(vectors, along) > FLATNESS * float(np.abs(vectors).max()) for vectors in forces):
+        return None
+    natural, material = natural_points(scene), start.material
+    if natural is not None and _off(natural - natural[0], natural[-1] - natural[0]) > FLATNESS * scene.cable.length:
+        return None
+    if material is not None and bool(cast(Floats, material.memory)[:, :2].any()):
+        return None
+    return np.asarray(along) if is_straight(start) else None
+
+
+def _off(vectors: Floats, along: Floats) -> float:
+    """Return the largest part of vectors (k, 3) across a direction (3,)."""
+    unit = along / math.sqrt(along @ along)
+    return float(np.abs(vectors - np.outer(vectors @ unit, unit)).max())
+
+
+def _aside(path: Path, u: float, start: StartCurve, along: Floats, length: float) -> bool:
+    """Tell whether a path of a grasp at u [m] leads or turns the cable away from its line."""
+    if isinstance(path, Still):
+        return False
+    if isinstance(path, Move):
+        x, y, z = cast(Floats, path.displacement).tolist()
+        a, b, c = along.tolist()
+        if abs(y * c - z * b) + abs(z * a - x * c) + abs(x * b - y * a) > FLATNESS * length:
+            return True
+    else:
+        from_start = path.at(np.linspace(0.0, path.duration, _TIMES), start(u)[0]) - start(u)[0]
+        if _off(from_start, along) > FLATNESS * length:
+            return True
+    turns = path.rotation_at(np.linspace(0.0, path.duration, _TIMES))
+    return turns is not None and bool(np.abs(turns @ along - along).max() > FLATNESS)
+
+
+def _gravity(scene: Scene, start: StartCurve) -> Floats:
+    """Return the gravity (3,) [m/s^2] that a table under the cable leaves."""
+    table = scene.environment.table
+    g = cast(Floats, scene.environment.gravity)
+    if scene.effects.get("gravity", "auto") == "off":
+        return np.zeros(3)
+    lies = table is not None and scene.effects.get("table", "auto") != "off"
+    if lies and table is not None and max(abs(z - table.height) for z in start.heights) <= TABLE_TOLERANCE:
+        return np.array([g[0], g[1], 0.0])
+    return g
+
+
+def _growths(scene: Scene, start: StartCurve, along: Floats, at_rest: bool) -> dict[_Part, float]:
+    """Return for the parts of a straight cable the natural logarithm by which a disturbance of them grows, about.
+
+    A wave of wave number k grows at the rate s with mu s^2 + c s = M k^3 + P k^2 - EI k^4 under a push P and a torque
+    M: that of the fastest is summed over the time in which the part is unstable,
+    P + M^2/(4 EI) > pi^2 EI/l^2 (Greenhill, 1883).
+    """
+    cable, horizon = scene.cable, cast(float, scene.horizon)
+    patience = _AGES if at_rest else 1.0
+    mu, c, EI = cable.linear_density, scene.environment.drag, cast(float, cable.bending_stiffness)
+    times = {0.0, horizon}
+    for g in scene.grasps:
+        times |= {t for t in (g.start, g.release_time or 0.0) if t < horizon}
+    growths: dict[_Part, float] = {}
+    for a, b in pairwise(sorted(times)):
+        middle = 0.5 * (a + b)
+        held = [g for g in scene.grasps if g.start <= middle and (g.release_time is None or g.release_time > middle)]
+        t = np.linspace(a, b, _TIMES)
+        for part in _parts(sorted(held, key=lambda g: g.u), cable.length):
+            length = part.end - part.begin
+            clamped = None not in part.grasps
+            least = np.pi / (length if clamped else 2.0 * length)  # wave number
+            push, torque = _loaded(scene, start, along, part, t)
+            unstable = push + torque**2 / (4.0 * EI) > EI * least**2
+            k = np.maximum((3.0 * torque + np.sqrt(9.0 * torque**2 + 32.0 * EI * push)) / (8.0 * EI), least)
+            drive = np.where(unstable, torque * k**3 + push * k**2 - EI * k**4, 0.0)
+            rate = (np.sqrt(c**2 + 4.0 * mu * np.maximum(drive, 0.0)) - c) / (2.0 * mu)
+            growth = float(np.sum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t)))
+            growths[part] = growths.get(part, 0.0) + patience * growth
+    return growths
+
+
+def _parts(held: list[Grasp], length: float) -> Iterator[_Part]:
+    ends: list[tuple[float, Grasp | None]] = [(0.0, None), *((g.u, g) for g in held), (length, None)]
+    for (begin, first), (end, second) in pairwise(ends):
+        if end - begin > FLATNESS * length:
+            yield _Part(begin, end, (first, second))
+
+
+def _loaded(scene: Scene, start: StartCurve, along: Floats, part: _Part, t: Floats) -> tuple[Floats, Floats]:
+    """Return the largest push (k,) [N] along a part at times t (k,) [s], 0 where it is pulled, and the torque [N m].
+
+    A cable that keeps its length moves as what holds it does; between two grasps that come closer it is compressed.
+    """
+    cable = scene.cable
+    first, second = part.grasps
+    length = part.end - part.begin
+    loads = [(load.u, load.at(t) @ along) for load in scene.loads if part.begin <= load.u <= part.end]
+    weight = cable.linear_density * float(_gravity(scene, start) @ along)
+    holder = first or second
+    if holder is None:
+        needed = np.sum([force for _, force in loads], axis=0) / length if loads else np.zeros(len(t))
+    else:
+        v = np.gradient(_way(holder, start, along, t), t)
+        needed = cable.linear_density * np.gradient(v, t) + scene.environment.drag * v - weight
+    if first is not None and second is not None:
+        apart = _way(second, start, along, t) - _way(first, start, along, t)
+        met = np.array([max(first.start, second.start)])
+        closer = float((_way(second, start, along, met) - _way(first, start, along, met))[0]) - apart
+        elastic = cast(float, cable.axial_stiffness) * closer / length
+        push = elastic + 0.5 * np.abs(needed) * length + np.sum([np.abs(force) for _, force in loads], axis=0)
+        turned = np.abs(_spin(second, along, t) - _spin(first, along, t))
+        both = first.hold == second.hold == "clamp" and scene.effects.get("twist", "auto") != "off"
+        torque = cast(float, cable.torsional_stiffness) * turned / length if both else np.zeros(len(t))
+        return np.maximum(push, 0.0), torque
+    # what lies beyond a place is pushed from there: from the free end on, tension by tension
+    from_end = second is None
+    most = np.zeros(len(t))
+    for u in [u for u, _ in loads] + [part.begin if from_end else part.end]:
+        rest = (part.end - u) if from_end else (u - part.begin)
+        for there in (True, False):  # just before and just after a load
+            beyond = [f for v, f in loads if (v > u if from_end else v < u) or (there and v == u)]
+            push = _SPREAD * needed * rest - np.sum(beyond, axis=0)
+            most = np.maximum(most, push if from_end else -push)
+    return most, np.zeros(len(t))
+
+
+def _way(grasp: Grasp, start: StartCurve, along: Floats, t: Floats) -> Floats:
+    """Return how far a grasp has gone along a direction at times t (k,) [s]; (k,) [m]."""
+    return (grasp.path.at(t - grasp.start, start(grasp.u)[0]) - start(grasp.u)[0]) @ along
+
+
+def _spin(grasp: Grasp, along: Floats, t: Floats) -> Floats:
+    """Return the angle by which a grasp has turned about a direction since t[0] at times t (k,) [s]; (k,) [rad]."""
+    spins = grasp.path.spin(t - grasp.start, np.tile(along, (len(t), 1)))
+    return np.concatenate([[0.0], np.cumsum(spins)])

@@ -1,0 +1,238 @@
+"""A straight cable that is pushed or twisted along itself is given a side to buckle to, and nothing else is."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipk
+
+from dlocore import (
+    Cable,
+    ControlPoints,
+    Environment,
+    Grasp,
+    Load,
+    Move,
+    Points,
+    Prediction,
+    Quality,
+    Scene,
+    Sphere,
+    Straight,
+    Table,
+    Waypoints,
+    equilibrium,
+    predict,
+)
+from dlocore.buckling import BOW
+from dlocore.problem import pose
+
+WEIGHTLESS = Environment(gravity=(0.0, 0.0, 0.0), drag=0.3)
+LYING = Environment(drag=0.3, table=Table())
+HANGING = Environment(drag=0.3)
+
+
+def cord(**changes: Any) -> Cable:
+    values = {"length": 1.0, "diameter": 0.005, "linear_density": 0.05, "bending_stiffness": 1e-2}
+    return Cable(**(values | changes))
+
+
+def way(*displacement: float, time: float = 2.0, **changes: Any) -> Move:
+    return Move(displacement=displacement, duration=time, **changes)
+
+
+def pushed(by: float = 0.3, around: Environment = LYING, cable: Cable | None = None, **changes: Any) -> Scene:
+    """Return a straight cable whose ends come closer."""
+    hold = changes.pop("hold", "point")
+    grasps = (Grasp(u=0.0, hold=hold), Grasp(u=1.0, hold=hold, path=way(-by, 0.0, 0.0)))
+    return Scene(cable=cable or cord(), shape=Straight(), grasps=grasps, environment=around, **changes)
+
+
+def standing(stiffness: float, **changes: Any) -> Scene:
+    """Return a cable that stands upright on a foot that holds its direction."""
+    foot = (Grasp(u=0.0, hold="clamp"),)
+    shape = Straight(direction=(0.0, 0.0, 1.0))
+    cable = cord(bending_stiffness=stiffness)
+    return Scene(cable=cable, shape=shape, grasps=foot, environment=replace(HANGING, drag=0.5), **changes)
+
+
+def bow(scene: Scene) -> float:
+    return pose(scene).start.bow
+
+
+def at_end(p: Prediction, u: float) -> Any:
+    return p.surface.positions([u], p.surface.horizon)[0, 0]
+
+
+def elastica(apart: float) -> float:
+    """Return the height of the elastica of length one whose ends are `apart`: k/K(k) with 2 E(k)/K(k) - 1 = apart."""
+    m = float(brentq(lambda m: 2 * ellipe(m) / ellipk(m) - 1 - apart, 1e-6, 0.999))
+    return float(np.sqrt(m) / ellipk(m))
+
+
+@pytest.mark.parametrize("around", [LYING, WEIGHTLESS], ids=["table", "weightless"])
+@pytest.mark.parametrize("by", [0.01, 0.3, 0.6])
+def test_grippers_that_come_closer_end_at_the_elastica(by: float, around: Environment) -> None:
+    scene = pushed(by, replace(around, drag=2.0), horizon=6.0)
+    prediction = predict(scene)
+    assert prediction.status == "converged", prediction.message
+    # pushed so fast it buckles in short waves first, which may leave it on its other side
+    assert abs(at_end(prediction, 0.5)[1]) == pytest.approx(elastica(1.0 - by), abs=3e-3)
+    assert "no side to buckle to" in prediction.message
+    assert "mirror image" in prediction.message
+
+
+def test_the_side_is_the_left_of_the_cable_in_every_direction() -> None:
+    scene = pushed()
+    turned = replace(
+        scene,
+        shape=Straight(start=(1.0, 2.0, 0.0), direction=(0.0, -1.0, 0.0)),
+        grasps=(Grasp(u=0.0), Grasp(u=1.0, path=way(0.0, 0.3, 0.0))),
+    )
+    here, there = predict(scene), predict(turned)
+    y = at_end(here, 0.5)[1]
+    assert y > 0.2
+    assert at_end(there, 0.5)[0] == pytest.approx(1.0 + y, abs=1e-6)
+
+
+def test_the_scene_of_the_answer_is_the_one_that_was_given() -> None:
+    prediction = predict(pushed())
+    assert isinstance(prediction.scene.shape, Straight)
+    assert prediction.scene.cable.rest_shape == "straight"
+    start = prediction.surface.positions(np.linspace(0.0, 1.0, 65), 0.0)[0]
+    assert np.abs(start - np.outer(np.linspace(0.0, 1.0, 65), [1.0, 0.0, 0.0])).max() < 1.01 * BOW
+
+
+def test_what_is_grasped_stays_on_the_line_and_the_bow_is_at_rest() -> None:
+    grasps = (Grasp(u=0.0), Grasp(u=0.4), Grasp(u=1.0, path=way(-0.3, 0.0, 0.0), grasp_time=1.0))
+    scene = Scene(cable=cord(), shape=Straight(), grasps=grasps, environment=WEIGHTLESS, horizon=3.0)
+    prediction = predict(replace(scene, quality=Quality(target_error=1e-3)))
+    assert prediction.status == "converged", prediction.message
+    for t in (0.0, 0.5, 1.0):
+        held = prediction.surface.positions([0.0, 0.4], t)[0]
+        assert np.abs(held - [[0.0, 0.0, 0.0], [0.4, 0.0, 0.0]]).max() < 1e-9
+    before = prediction.surface.positions(np.linspace(0.0, 1.0, 33), [0.0, 0.9])
+    assert np.abs(before[1] - before[0]).max() < 2e-5
+    assert bow(scene) == pytest.approx(0.6 * BOW, rel=0.02)  # of the part that is pushed alone
+
+
+@pytest.mark.parametrize("hold", ["tangent", "clamp"])
+def test_held_directions_stay(hold: str) -> None:
+    prediction = predict(pushed(hold=hold))
+    assert prediction.status == "converged", prediction.message
+    near = prediction.surface.positions([1e-4, 1.0 - 1e-4], prediction.surface.horizon)[0]
+    assert np.abs(near[:, 1:]).max() < 1e-6  # of 1e-4
+    assert at_end(prediction, 0.5)[1] > 0.2
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        pushed(by=-1e-4),
+        pushed(by=1e-6),  # far less than what the cable can be shortened by before it buckles
+        Scene(cable=cord(), shape=Straight(), grasps=(Grasp(u=0.0, path=way(-0.5, 0.0, 0.0)),), environment=LYING),
+        Scene(cable=cord(), shape=Straight(), grasps=(Grasp(u=0.5, path=way(0.0, 0.5, 0.0)),), environment=LYING),
+        Scene(cable=cord(), shape=Straight(), grasps=(Grasp(u=0.0),), environment=HANGING, horizon=2.0),
+        Scene(cable=cord(), shape=Straight(), environment=WEIGHTLESS, horizon=2.0),
+        replace(
+            Scene(cable=cord(), shape=Straight(), environment=WEIGHTLESS, horizon=2.0),
+            shape=Straight(direction=(0.0, 0.0, -1.0)),
+            grasps=(Grasp(u=0.0, path=way(0.0, 0.0, 0.5)),),
+            environment=HANGING,
+        ),
+        pushed(cable=cord(rest_shape=[[0.0, 0.0], [0.3, 0.01], [0.6, 0.03], [1.0, 0.1]])),
+        pushed(around=HANGING),
+        replace(pushed(), loads=(Load(u=0.5, force=(0.0, 1e-6, 0.0)),)),
+        replace(pushed(), shape=Straight(velocity=(0.0, 1e-3, 0.0))),
+    ],
+    ids=[
+        "pulled", "hardly pushed", "drawn behind", "sideways", "weight across", "at rest", "hangs", "bent by nature",
+        "sags", "load across", "moves sideways",
+    ],
+)  # fmt: skip
+def test_what_has_a_side_or_needs_none_stays_as_it_is(scene: Scene) -> None:
+    assert bow(scene) == 0.0
+
+
+RIPPLED = Points(points=[[x, 1e-12 * (-1.0) ** k, 0.0] for k, x in enumerate(np.linspace(0.0, 1.0, 21))])
+THIRDS = ControlPoints(control_points=[[x, 0.0, 0.0] for x in (0.0, 1 / 3, 2 / 3, 1.0)])
+INWARDS = Waypoints(times=[0, 1, 2], positions=[[1.0, 0, 0], [0.9, 0, 0], [0.7, 0, 0]])
+FOOT, BALL = Grasp(u=0.0, hold="clamp"), Sphere(center=(0.5, 0.3, 0.0), radius=0.1)
+PUSHED = {
+    "straight": pushed(),
+    "noise of 1e-12": replace(pushed(), shape=RIPPLED),
+    "control points": replace(pushed(), shape=THIRDS),
+    "waypoints": replace(pushed(), grasps=(Grasp(u=0.0), Grasp(u=1.0, path=INWARDS))),
+    "load": replace(pushed(), grasps=(FOOT,), loads=(Load(u=1.0, force=(-0.2, 0.0, 0.0)),), horizon=2.0),
+    "free, pushed by a load": replace(pushed(), grasps=(), loads=(Load(u=0.0, force=(0.5, 0.0, 0.0)),), horizon=2.0),
+    "from behind": replace(
+        pushed(cable=cord(bending_stiffness=1e-4)), grasps=(Grasp(u=0.0, path=way(0.5, 0.0, 0.0, time=0.7)),)
+    ),
+    "obstacle": pushed(around=replace(LYING, obstacles=(BALL,))),
+    "table on": pushed(effects={"table": "on"}),
+    "no inertia": pushed(effects={"inertia": "off"}),
+}
+
+
+@pytest.mark.parametrize("scene", PUSHED.values(), ids=PUSHED)
+def test_every_kind_of_straight_start_and_push_gets_a_bow(scene: Scene) -> None:
+    assert bow(scene) == pytest.approx(BOW, rel=0.02)
+    prediction = predict(scene)
+    assert prediction.status == "converged", prediction.message
+    u = np.linspace(0.0, 1.0, 65)
+    aside = np.linalg.norm(prediction.surface.positions(u, prediction.surface.horizon)[0, :, 1:], axis=1).max()
+    assert aside > 1.5 * BOW
+
+
+def test_a_column_that_its_foot_bears_stands_and_a_taller_one_bends_over() -> None:
+    # Greenhill: mu g L^3/EI = 7.84 is the most that stands
+    stands, falls = 0.05 * 9.81 / 7.0, 0.05 * 9.81 / 12.0
+    assert at_end(predict(standing(4.0, horizon=2.0)), 1.0) == pytest.approx([0.0, 0.0, 1.0], abs=1e-6)
+    upright = equilibrium(standing(2.0 * stands, horizon=2.0)).positions([1.0])[0]
+    assert upright == pytest.approx([0.0, 0.0, 1.0], abs=1e-5)
+    scene = standing(falls, horizon=30.0)
+    bent = equilibrium(scene).positions([1.0])[0]
+    assert bent[0] > 0.3
+    prediction = predict(scene)
+    assert prediction.status == "converged", prediction.message
+    assert at_end(prediction, 1.0) == pytest.approx(bent, abs=2e-3)
+
+
+def test_equilibria_do_not_depend_on_the_horizon() -> None:
+    short = equilibrium(standing(0.03, horizon=0.01)).positions([1.0])[0]
+    assert short[0] > 0.3
+
+
+@pytest.mark.parametrize(("turns", "leaves"), [(0.5, False), (3.0, True)])
+def test_twist_beyond_what_a_straight_cable_bears_takes_it_off_its_line(turns: float, leaves: bool) -> None:
+    # Greenhill: a torque of 2 pi EI/L, one turn where GJ = EI
+    spin = way(-0.05, 0.0, 0.0, time=3.0, rotation=(2.0 * np.pi * turns, 0.0, 0.0))
+    held = replace(spin, displacement=(0.0, 0.0, 0.0)) if not leaves else spin
+    grasps = (Grasp(u=0.0, hold="clamp"), Grasp(u=1.0, hold="clamp", path=held))
+    cable = cord(torsional_stiffness=1e-2)
+    scene = Scene(cable=cable, shape=Straight(), grasps=grasps, environment=replace(WEIGHTLESS, drag=1.0))
+    assert (bow(scene) > 0.0) == leaves
+    prediction = predict(scene)
+    assert prediction.status == "converged", prediction.message
+    u = np.linspace(0.0, 1.0, 65)
+    aside = np.linalg.norm(prediction.surface.positions(u, 3.0)[0, :, 1:], axis=1)
+    assert (aside.max() > 0.05) == leaves
+
+
+def test_the_reference_buckles_to_the_same_side() -> None:
+    scene = pushed(hold="clamp", around=replace(LYING, drag=0.5))
+    ours = predict(replace(scene, quality=Quality(target_error=1e-3)))
+    theirs = predict(replace(scene, quality=Quality(method="reference", target_error=3e-3)))
+    assert theirs.status == "converged", theirs.message
+    assert "no side to buckle to" in theirs.message
+    away = ours.surface.sample()[2][..., :3] - theirs.surface.sample()[2][..., :3]
+    assert np.linalg.norm(away, axis=-1).max() < 4e-3
+
+
+@pytest.mark.parametrize("method", ["march", "spacetime"])
+def test_given_grids_start_with_the_bow_too(method: Any) -> None:
+    prediction = predict(pushed(quality=Quality(n_u=17, n_t=33, method=method)))
+    assert at_end(prediction, 0.5)[1] > 0.2
+    assert prediction.surface.positions([0.5], 0.0)[0, 0, 1] == pytest.approx(BOW, rel=0.05)
