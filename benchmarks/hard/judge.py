@@ -90,8 +90,9 @@ def compare(prediction: Prediction, scene: Scene, deadline: float) -> dict[str, 
     problem = _posed(prediction, scene)
     found = []
     for finer in (2.0, 3.0):
-        n_u = int(np.clip(round(finer * accuracy.n_u), 33, 129 if finer > 2 else 97))
-        n_t = int(np.clip(round(finer * accuracy.n_t), 65, 513 if finer > 2 else 385))
+        least = (finer + 2.0) / 3.0  # times what the answer has, however fine that is
+        n_u = max(int(np.clip(round(finer * accuracy.n_u), 33, 129 if finer > 2 else 97)), round(least * accuracy.n_u))
+        n_t = max(int(np.clip(round(finer * accuracy.n_t), 65, 513 if finer > 2 else 385)), round(least * accuracy.n_t))
         steps = max(given_steps(n_t), round(finer * accuracy.steps))
         try:
             level = march_level(problem, Size(n_u, n_t, steps), Monitor(None, deadline), free_knots=True)
@@ -113,8 +114,7 @@ def disturbed(prediction: Prediction, scene: Scene, deadline: float) -> float | 
 
     More than WRONG: the scene does not determine its motion. Three marches on one grid, as fine as the finest that the
     prediction tried, as coarse steps damp what would grow. Their start is as it is, or bent by some half waves; only
-    where each finds its equilibria and keeps the cable's length. A cable pushed exactly along itself has no side to go
-    to and does neither: there the two bent ones are compared with each other.
+    where each finds its equilibria and keeps the cable's length.
     """
     problem = _posed(prediction, scene)
     level = stretched(problem, 3)
@@ -131,9 +131,7 @@ def disturbed(prediction: Prediction, scene: Scene, deadline: float) -> float | 
         start[:, : waves.shape[1]] += DISTURBED * scene.cable.length * waves * (seed > 0)
         motion = march(problem, grid.changed(start=start), steps, monitor)
         if motion.stopped or motion.largest_strain > MOST_STRAIN:
-            if seed > 0:
-                return None
-            continue
+            return None
         at = np.searchsorted(motion.times, t).clip(0, len(motion.times) - 1)
         shapes.append(motion.states[at][:, :, : waves.shape[1]])
     away = max(float(np.linalg.norm(x - shapes[0], axis=-1).max()) for x in shapes[1:])
