@@ -13,6 +13,7 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.effects.distance import distances
 from dlocore.paths import Move, Path, Still
 from dlocore.plane import FLATNESS, TABLE_TOLERANCE, is_straight, leftwards, natural_points
 from dlocore.scene import Grasp, Scene
@@ -188,7 +189,8 @@ def _parts(held: list[Grasp], length: float) -> Iterator[_Part]:
 def _loaded(scene: Scene, start: StartCurve, along: Floats, part: _Part, t: Floats) -> tuple[Floats, Floats]:
     """Return the largest push (k,) [N] along a part at times t (k,) [s], 0 where it is pulled, and the torque [N m].
 
-    A cable that keeps its length moves as what holds it does; between two grasps that come closer it is compressed.
+    A cable that keeps its length moves as what holds it does; between two grasps that come closer, or a grasp and what
+    a free end meets, it is compressed.
     """
     cable = scene.cable
     first, second = part.grasps
@@ -197,9 +199,11 @@ def _loaded(scene: Scene, start: StartCurve, along: Floats, part: _Part, t: Floa
     weight = cable.linear_density * float(_gravity(scene, start) @ along)
     holder = first or second
     if holder is None:
-        needed = np.sum([force for _, force in loads], axis=0) / length if loads else np.zeros(len(t))
+        needed = np.zeros(len(t)) + sum(force for _, force in loads) / length
+        way = _free_way(start, along, (weight + needed) / cable.linear_density, t)
     else:
-        v = np.gradient(_way(holder, start, along, t), t)
+        way = _way(holder, start, along, t)
+        v = np.gradient(way, t)
         needed = cable.linear_density * np.gradient(v, t) + scene.environment.drag * v - weight
     if first is not None and second is not None:
         apart = _way(second, start, along, t) - _way(first, start, along, t)
@@ -213,7 +217,7 @@ def _loaded(scene: Scene, start: StartCurve, along: Floats, part: _Part, t: Floa
         return np.maximum(push, 0.0), torque
     # what lies beyond a place is pushed from there: from the free end on, tension by tension
     from_end = second is None
-    most = np.zeros(len(t))
+    most = cast(float, cable.axial_stiffness) * _depth(scene, start, along, part, way) / length
     for u in [u for u, _ in loads] + [part.begin if from_end else part.end]:
         rest = (part.end - u) if from_end else (u - part.begin)
         for there in (True, False):  # just before and just after a load
@@ -226,6 +230,29 @@ def _loaded(scene: Scene, start: StartCurve, along: Floats, part: _Part, t: Floa
 def _way(grasp: Grasp, start: StartCurve, along: Floats, t: Floats) -> Floats:
     """Return how far a grasp has gone along a direction at times t (k,) [s]; (k,) [m]."""
     return (grasp.path.at(t - grasp.start, start(grasp.u)[0]) - start(grasp.u)[0]) @ along
+
+
+def _free_way(start: StartCurve, along: Floats, acceleration: Floats, t: Floats) -> Floats:
+    """Return how far a cable that nothing holds has gone along its direction at times t (k,) [s]; (k,) [m]."""
+    velocity = 0.0 if start.velocity is None else float(start.velocity.control_points.mean(axis=0) @ along)
+    return velocity * t + 0.5 * acceleration * t**2
+
+
+def _depth(scene: Scene, start: StartCurve, along: Floats, part: _Part, way: Floats) -> Floats:
+    """Return how deep the free ends of a part would be in the table or an obstacle after a way (k,) [m]; (k,) [m]."""
+    environment, radius = scene.environment, 0.5 * scene.cable.diameter
+    on = {name for name in ("table", "obstacles") if scene.effects.get(name, "auto") != "off"}
+    deepest = np.zeros(len(way))
+    for u, grasp in zip((part.begin, part.end), part.grasps, strict=True):
+        if grasp is not None:
+            continue
+        end = start(u)[0] + np.outer(way, along)
+        if environment.table is not None and "table" in on:
+            deepest = np.maximum(deepest, environment.table.height - end[:, 2])
+        if environment.obstacles and "obstacles" in on:
+            rows = np.array([obstacle.row() for obstacle in environment.obstacles])
+            deepest = np.maximum(deepest, radius - distances(rows, end).min(axis=0))
+    return deepest
 
 
 def _spin(grasp: Grasp, along: Floats, t: Floats) -> Floats:

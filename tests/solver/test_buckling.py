@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 from dlocore import (
+    Box,
     Cable,
     ControlPoints,
     Environment,
@@ -146,10 +147,17 @@ def test_held_directions_stay(hold: str) -> None:
         pushed(around=HANGING),
         replace(pushed(), loads=(Load(u=0.5, force=(0.0, 1e-6, 0.0)),)),
         replace(pushed(), shape=Straight(velocity=(0.0, 1e-3, 0.0))),
+        Scene(
+            cable=cord(),
+            shape=Straight(start=(0.0, 0.0, 1.6), direction=(0.0, 0.0, -1.0)),
+            grasps=(Grasp(u=0.0, path=way(0.0, 0.0, -0.5)),),
+            environment=LYING,
+        ),
     ],
     ids=[
         "pulled", "hardly pushed", "drawn behind", "sideways", "weight across", "at rest", "hangs", "bent by nature",
         "sags", "load across", "moves sideways",
+        "lowered over the table",
     ],
 )  # fmt: skip
 def test_what_has_a_side_or_needs_none_stays_as_it_is(scene: Scene) -> None:
@@ -160,6 +168,8 @@ RIPPLED = Points(points=[[x, 1e-12 * (-1.0) ** k, 0.0] for k, x in enumerate(np.
 THIRDS = ControlPoints(control_points=[[x, 0.0, 0.0] for x in (0.0, 1 / 3, 2 / 3, 1.0)])
 INWARDS = Waypoints(times=[0, 1, 2], positions=[[1.0, 0, 0], [0.9, 0, 0], [0.7, 0, 0]])
 FOOT, BALL = Grasp(u=0.0, hold="clamp"), Sphere(center=(0.5, 0.3, 0.0), radius=0.1)
+WALL = Box(center=(1.2, 0.0, 0.0), size=(0.1, 1.0, 1.0))
+ABOVE = Straight(start=(0.0, 0.0, 1.05), direction=(0.0, 0.0, -1.0))
 PUSHED = {
     "straight": pushed(),
     "noise of 1e-12": replace(pushed(), shape=RIPPLED),
@@ -173,6 +183,15 @@ PUSHED = {
     "obstacle": pushed(around=replace(LYING, obstacles=(BALL,))),
     "table on": pushed(effects={"table": "on"}),
     "no inertia": pushed(effects={"inertia": "off"}),
+    "into a wall": replace(
+        pushed(around=replace(LYING, obstacles=(WALL,))), grasps=(replace(FOOT, path=way(0.4, 0.0, 0.0)),)
+    ),
+    "on to the table": Scene(
+        cable=cord(), shape=ABOVE, grasps=(Grasp(u=0.0, path=way(0.0, 0.0, -0.5)),), environment=LYING
+    ),
+    "let fall on its end": Scene(
+        cable=cord(bending_stiffness=0.1), shape=replace(ABOVE, start=(0.0, 0.0, 1.2)), environment=LYING, horizon=0.6
+    ),
 }
 
 
@@ -181,9 +200,9 @@ def test_every_kind_of_straight_start_and_push_gets_a_bow(scene: Scene) -> None:
     assert bow(scene) == pytest.approx(BOW, rel=0.02)
     prediction = predict(scene)
     assert prediction.status == "converged", prediction.message
-    u = np.linspace(0.0, 1.0, 65)
-    aside = np.linalg.norm(prediction.surface.positions(u, prediction.surface.horizon)[0, :, 1:], axis=1).max()
-    assert aside > 1.5 * BOW
+    along = np.asarray(scene.shape.direction if isinstance(scene.shape, Straight) else (1.0, 0.0, 0.0))
+    at = prediction.surface.positions(np.linspace(0.0, 1.0, 65), prediction.surface.horizon)[0]
+    assert np.linalg.norm(np.cross(at - at[0], along), axis=1).max() > 1.5 * BOW
 
 
 def test_a_column_that_its_foot_bears_stands_and_a_taller_one_bends_over() -> None:
