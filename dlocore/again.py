@@ -130,6 +130,7 @@ def _starts_alike(problem: Problem, before: Problem) -> bool:
         and (not scene.shape.settle or _same(scene.loads, other.loads))
         and _same(problem.obstacles, before.obstacles)
         and all(_same(getattr(scene, name), getattr(other, name)) for name in ("cable", "shape", "environment"))
+        and _same(problem.start, before.start)  # the same shape may be bowed, see `buckling.py`
     )
 
 

@@ -16,6 +16,8 @@ from dlocore.spline import SplineSurface, design_matrix
 
 Floats = NDArray[np.float64]
 
+FLAT = 1e-6  # of the length: so near to a plane a motion is planar, but for rounding
+
 _LAWS = {
     "stretch": laws.STRETCH,
     "bend": laws.BEND,
@@ -88,6 +90,12 @@ def effect_forces(
     return {name: float(np.sqrt(square / len(states))) for name, square in squares.items()}
 
 
+def _is_flat(problem: Problem, r: Floats) -> bool:
+    """Tell whether points r (..., 3) lie in the plane of a problem."""
+    away = r - problem.plane.world(problem.plane.points(r))
+    return bool(np.abs(away).max() <= FLAT * problem.scene.cable.length)
+
+
 def _motion(
     scene: Scene, surface: SplineSurface, times: ArrayLike, material: MaterialMotion | None
 ) -> tuple[Problem, Grid, Floats, Floats, Floats, list[History]]:
@@ -98,7 +106,10 @@ def _motion(
     cable = scene.cable
     yields = any(x is not None for x in (cable.yield_strain, cable.yield_twist, cable.yield_stretch))
     called = material is not None and yields and scene.effects.get("plasticity", "auto") != "off"
-    problem = pose(scene, {"plasticity": "it shows in the motion"} if called else None)
+    shown = {"plasticity": "it shows in the motion"} if called else {}
+    problem = pose(scene, shown)
+    if problem.plane.dimensions == 2 and not _is_flat(problem, surface.control_points[..., :3]):
+        problem = pose(scene, {**shown, "side": "the motion leaves its plane"})
     grid = grid_on(problem, surface.knots_u)
     at = np.clip(np.atleast_1d(np.asarray(times, dtype=float)), 0.0, surface.horizon)
     moved = [

@@ -1,4 +1,5 @@
-"""A straight cable that is pushed or twisted along itself has no side to buckle to: it is given one.
+"""A straight cable that is pushed or twisted along itself has no side to buckle to, nor a planar one to fall to: both
+are given one.
 
 Straight, it is in equilibrium however hard it is pushed, but no real cable stays so. Where a disturbance would grow by
 much, it gets the imperfection that columns are designed with: a bow without stress of a thousandth of the length.
@@ -17,11 +18,12 @@ from dlocore.effects.distance import distances
 from dlocore.paths import Move, Path, Still
 from dlocore.plane import FLATNESS, TABLE_TOLERANCE, is_straight, leftwards, natural_points
 from dlocore.scene import Grasp, Scene
-from dlocore.shape import StartCurve
+from dlocore.shape import StartCurve, fit_to_knots
 
 Floats = NDArray[np.float64]
 
 BOW = 1e-3  # height, of the length of the part that buckles
+UNSTABLE = "in its plane the motion is unstable, as a disturbance out of it grows"
 GROWTH = math.log(10.0)  # of a disturbance, from which on it matters that there is one
 # What of a force that is spread along a part, free at one end, counts as if it pushed there: of a column under its own
 # weight, mu g L^3/EI = 7.84 against P L^2/EI = pi^2/4 (Greenhill, 1881)
@@ -62,6 +64,25 @@ def with_side(scene: Scene, start: StartCurve, at_rest: bool) -> StartCurve:
     return replace(start, knots=knots, control_points=control, bow=float(aside.max()))
 
 
+def out_of_plane(scene: Scene, start: StartCurve, normal: Floats) -> StartCurve:
+    """Return a planar start, bowed along the unit normal (3,) of its plane."""
+    length = scene.cable.length
+    parts = list(_parts(sorted(scene.grasps, key=lambda g: g.u), length))
+    knots = _joined(start.knots, _knots(parts, length))
+    u = (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0
+    aside = np.sum([_bow(part, u) for part in parts], axis=0)
+    control = fit_to_knots(start, knots) + np.outer(aside, normal)
+    return replace(start, knots=knots, control_points=control, aside=float(aside.max()))
+
+
+def _joined(a: Floats, b: Floats) -> Floats:
+    """Return clamped knots that contain those of two others, each as often as the one that has it more often."""
+    places = np.unique(np.round(np.concatenate([a, b]) / a[-1], 9)) * a[-1]
+    near = 1e-9 * a[-1]
+    counts = [max(int((np.abs(knots - x) <= near).sum()) for knots in (a, b)) for x in places]
+    return np.repeat(places, counts)
+
+
 def _knots(parts: list[_Part], length: float) -> Floats:
     """Return clamped knots, triple where a part begins or ends inside: what a grasp holds there stays on the line."""
     marks = sorted({0.0, length, *(x for part in parts for x in (part.begin, part.end))})
@@ -73,6 +94,9 @@ def _knots(parts: list[_Part], length: float) -> Floats:
 
 def side_note(start: StartCurve) -> str:
     """Return what is to be known of a start that was bowed, in words."""
+    if start.aside:
+        bow = f"it starts with a bow of {start.aside * 1e3:.2g} mm out of it, and its mirror image is as likely"
+        return f"{UNSTABLE}: {bow}"
     return (
         "the straight cable is pushed or twisted along itself and has no side to buckle to: it starts with a bow of "
         f"{start.bow * 1e3:.2g} mm to its left, and its mirror image is as likely"

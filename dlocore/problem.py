@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.buckling import with_side
+from dlocore.buckling import out_of_plane, with_side
 from dlocore.checks import check_above, check_apart, check_outside, check_reach, check_waypoints
 from dlocore.effects import laws
 from dlocore.effects.base import Effect
@@ -50,7 +50,7 @@ class Problem:
         plane: coordinates of the centreline in the solve.
         on_table: the cable lies on the table, which carries its weight.
         choices: for each effect whether it is simulated, and why.
-        called_for: the effects that a result has called for, and why.
+        called_for: the effects that a result has called for, and why; "side": a bow out of the plane of the motion.
         inertia, drag, gravity, ...: the active effects, None where inactive.
     """
 
@@ -250,6 +250,9 @@ def pose(scene: Scene, called_for: Mapping[str, str] | None = None, *, at_rest: 
         start = lay_on_table(scene, start)
     start = with_side(scene, start, at_rest)
     plane = find_plane(scene, start, on_table, bool(met))
+    if "side" in called_for and plane.dimensions == 2 and not on_table:
+        start = out_of_plane(scene, start, np.cross(*plane.axes))
+        plane = Plane(np.eye(3), plane.origin, called_for["side"])
     bent = _is_bent(scene, start)
     choices = choose(scene, start, plane.dimensions, on_table, leaves, met, bent or start.bow > 0.0, called_for)
     if choices["self_contact"].active:

@@ -10,7 +10,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.buckling import side_note
+from dlocore.buckling import UNSTABLE, side_note
 from dlocore.effects import laws
 from dlocore.effects.damping import Damping
 from dlocore.effects.distance import distances
@@ -22,6 +22,7 @@ from dlocore.kernels.banded import solve as solve_factored
 from dlocore.kernels.twisted import TWIST_RATE
 from dlocore.problem import Problem
 from dlocore.report import WindowForces
+from dlocore.sideways import leaves_plane
 from dlocore.solvers.ladder import CREDIBLE_STRAIN, Level
 from dlocore.spline import design_matrix
 
@@ -33,10 +34,10 @@ _STRAINED = 0.05  # axial strain: few cables bear more
 _LOOKS = 5  # states of each stretch of a motion at which neglected forces are weighed
 
 
-def called_for(level: Level, strands: bool = True) -> dict[str, str]:
+def called_for(level: Level, fine: bool = True) -> dict[str, str]:
     """Return the effects that `auto` has left out and the motion calls for, with the reason for each.
 
-    Without `strands` it is left open whether they meet.
+    Where the grid is not `fine` it is left open what only such a grid tells.
     """
     problem, found = level.problem, {}
     switch = problem.scene.effects.get
@@ -44,8 +45,8 @@ def called_for(level: Level, strands: bool = True) -> dict[str, str]:
         found.update(_yields(level))
     if not problem.choices["obstacles"].active and switch("obstacles", "auto") == "auto":
         found.update(_touches(level))
-    if strands:
-        found.update(self_contact_called_for(level))
+    if fine:
+        found.update(called_for_by_fine(level))
     if problem.inertia is None and switch("inertia", "auto") == "auto":
         moved = neglected(level)
         if moved > MATTERS * problem.scene.cable.length:
@@ -53,8 +54,24 @@ def called_for(level: Level, strands: bool = True) -> dict[str, str]:
     return found
 
 
-def self_contact_called_for(level: Level) -> dict[str, str]:
-    """Return contact of the cable with itself, and why, where `auto` has left it out and the motion calls for it."""
+def called_for_by_fine(level: Level) -> dict[str, str]:
+    """Return what rough grids may call for only because they are rough, and why.
+
+    It is contact of the cable with itself, where `auto` has left it out, and on free grids a side to which a motion
+    leaves its plane.
+    """
+    return {**_side(level), **_strands(level)}
+
+
+def _side(level: Level) -> dict[str, str]:
+    problem, motion = level.problem, level.motion
+    credible = not motion.stopped and motion.largest_strain <= CREDIBLE_STRAIN
+    if credible and problem.scene.quality.n_u is None and leaves_plane(problem, motion):
+        return {"side": UNSTABLE}
+    return {}
+
+
+def _strands(level: Level) -> dict[str, str]:
     problem = level.problem
     credible = not level.motion.stopped and level.motion.largest_strain <= CREDIBLE_STRAIN
     left_out = not problem.choices["self_contact"].active
@@ -72,8 +89,10 @@ def objections(level: Level) -> list[str]:
     problem, found = level.problem, []
     if level.motion.largest_strain > _STRAINED:
         found.append(f"the motion strains the cable by up to {level.motion.largest_strain:.0%} along itself")
-    if problem.start.bow:
+    if problem.start.bow or problem.start.aside:
         found.append(side_note(problem.start))
+    elif problem.scene.quality.n_u is not None and leaves_plane(problem, level.motion):
+        found.append(f"{UNSTABLE}: without a given grid it is solved in space, with a bow out of the plane")
     off = {name for name, value in problem.scene.effects.items() if value == "off"}
     for name, test in (("plasticity", _yields), ("obstacles", _touches), ("self_contact", _meets_itself)):
         if name in off:

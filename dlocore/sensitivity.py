@@ -228,6 +228,9 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     called = {name: "the prediction found it" for name in found if name in ("plasticity", "self_contact", "obstacles")}
     values = [_number(scene, name) for name in wrt]
     problem = pose(scene, called)
+    if problem.plane.dimensions < accuracy.dimensions:
+        called["side"] = accuracy.dimensions_reason
+        problem = pose(scene, called)
     monitor = Monitor(None, None, None)
     steps = _asked_for(problem, accuracy.steps)
     rho = RHO if problem.contact is None and problem.friction is None else STRONGLY_DAMPED

@@ -54,6 +54,7 @@ class StartCurve(SplineCurve):
             everywhere.
         material: what the sections remember, or None where the scene's `rest_shape` tells.
         bow: height of the bow without stress that a straight start was given to buckle by [m], see `buckling.py`.
+        aside: that of the bow that a planar start was given out of its plane [m].
     """
 
     velocity: SplineCurve | None = None
@@ -63,6 +64,7 @@ class StartCurve(SplineCurve):
     theta: SplineCurve | None = None
     material: Material | None = None
     bow: float = 0.0
+    aside: float = 0.0
 
     @cached_property
     def heights(self) -> tuple[float, float]:

@@ -2,21 +2,25 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dlocore.buckling import UNSTABLE
 from dlocore.discretisation import make_grid, smallest_n_u
 from dlocore.errors import SceneError, number
 from dlocore.events import closed_grasps
 from dlocore.frames import free_of_frames
 from dlocore.grid import Grid
+from dlocore.kernels.assembly import History
 from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
 from dlocore.regrid import begin_on
-from dlocore.report import elastic_energy, reactions
+from dlocore.report import WindowForces, elastic_energy, reactions
 from dlocore.scene import Scene
 from dlocore.settling import Settled, settle
+from dlocore.sideways import is_unstable
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import design_matrix
 
@@ -90,21 +94,56 @@ def equilibrium(
     target = scene.quality.target_error or 1e-4 * scene.cable.length
     least = smallest_n_u(problem)
     sizes = [n_u] if n_u is not None else [max(n, least + 2 * i) for i, n in enumerate(LEVELS)]
+    rest = _refined(problem, sizes, at, target, monitor)
+    if rest.status == "converged" and is_unstable(problem, rest.grid, rest.q, closed_grasps(problem, at, at)):
+        problem = pose(scene, {"side": UNSTABLE}, at_rest=True)
+        rest = _refined(problem, sizes, at, target, monitor)
+    grid, q, history = rest.grid, rest.q, rest.history
+    world = problem.world(free_of_frames(problem, grid, q[None], history.past[None])[0])
+    held = reactions(problem, grid, rest.forces)
+    return Equilibrium(
+        status=rest.status,
+        message=rest.message,
+        control_points=world,
+        knots_u=grid.knots,
+        reactions=np.array([g.reaction[-1] for g in held]).reshape(-1, 3),
+        moments=np.array([g.moment[-1] for g in held]).reshape(-1, 3),
+        energy=elastic_energy(problem, grid, q, history),
+        error_estimate=None if n_u is not None or not np.isfinite(rest.change) else rest.change,
+    )
+
+
+class _Rest(NamedTuple):
+    """What `settle` found on the last of some grids, what to say of it, and how far it is from the one before [m]."""
+
+    grid: Grid
+    q: Floats
+    forces: tuple[WindowForces, ...]
+    history: History
+    status: Status
+    message: str
+    change: float
+
+
+def _refined(problem: Problem, sizes: list[int], at: float, target: float, monitor: Monitor) -> _Rest:
+    """Settle on finer and finer grids until two agree to the target [m]."""
     found: tuple[Grid, *Settled] | None = None
-    change, status, message = np.inf, "time_limit", "The time limit passed. Allow more time or a smaller n_u."
+    change, status = np.inf, cast(Status, "time_limit")
+    message = "The time limit passed. Allow more time or a smaller n_u."
     for n in sizes:
         grid = make_grid(problem, n)
         q, rest, forces, history = settle(problem, grid, at, monitor)
         if rest == "time" and found is not None:
             break
         if found is not None:
-            u = np.linspace(0.0, scene.cable.length, 65)
+            u = np.linspace(0.0, problem.scene.cable.length, 65)
             before = design_matrix(found[0].knots, u) @ found[1][:, :3]
             change = float(np.linalg.norm(design_matrix(grid.knots, u) @ q[:, :3] - before, axis=1).max())
         found = (grid, q, rest, forces, history)
         if rest == "time":
             break
-        status, message = "converged", "Forces balance." if n_u else f"Two grids agree to {change * 1e3:.2g} mm."
+        one = len(sizes) == 1
+        status, message = "converged", "Forces balance." if one else f"Two grids agree to {change * 1e3:.2g} mm."
         if change <= target:
             break
     assert found is not None, "every list of sizes has a first"
@@ -112,20 +151,9 @@ def equilibrium(
     if rest == "restless":
         status = "stalled"
         message = "The relaxation did not come to rest. The scene may have no equilibrium, or many side by side."
-    elif status == "converged" and n_u is None and not change <= target:
+    elif status == "converged" and len(sizes) > 1 and not change <= target:
         status, message = "max_iterations", f"The finest grid still moved the shape by {change * 1e3:.2g} mm."
-    world = problem.world(free_of_frames(problem, grid, q[None], history.past[None])[0])
-    held = reactions(problem, grid, forces)
-    return Equilibrium(
-        status=status,  # type: ignore[arg-type]
-        message=message,
-        control_points=world,
-        knots_u=grid.knots,
-        reactions=np.array([g.reaction[-1] for g in held]).reshape(-1, 3),
-        moments=np.array([g.moment[-1] for g in held]).reshape(-1, 3),
-        energy=elastic_energy(problem, grid, q, history),
-        error_estimate=None if n_u is not None or not np.isfinite(change) else change,
-    )
+    return _Rest(grid, q, forces, history, status, message, change)
 
 
 def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None = None) -> Grid:

@@ -9,7 +9,7 @@ from dlocore.events import smallest_n_t
 from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
 from dlocore.progress import record_level
-from dlocore.review import called_for, self_contact_called_for
+from dlocore.review import called_for, called_for_by_fine
 from dlocore.solvers.ladder import CREDIBLE_STRAIN, Level, Size, credible_after, hardness, run_level
 from dlocore.solvers.march import RHO
 from dlocore.solvers.monitor import Monitor
@@ -42,10 +42,10 @@ def march_level(
 ) -> Level:
     """March on one grid; where the motion calls for effects that were left out, again with them.
 
-    On a `rough` grid, which another follows, strands that meet may do so because of the grid: whether they do is left
-    open. A march of this grid that is `known` is done again only for that. Contact begins as stiff as the level
-    `before` had to make it, strains are believed that are not far above its own, and a start that is to settle does so
-    from its start. With `watch` the cable can't fold within a span, see `run_level`.
+    On a `rough` grid, which another follows, strands may meet, and a motion leave its plane, because of the grid:
+    whether they do is left open. A march of this grid that is `known` is done again only for that. Contact begins as
+    stiff as the level `before` had to make it, strains are believed that are not far above its own, and a start that is
+    to settle does so from its start. With `watch` the cable can't fold within a span, see `run_level`.
     """
     called = dict(problem.called_for)
     while True:
@@ -59,9 +59,9 @@ def march_level(
             watch=watch, like=like,
         )  # fmt: skip
         if known is not None:
-            new, known = self_contact_called_for(level), None
+            new, known = called_for_by_fine(level), None
         else:
-            new = {} if level.motion.stopped == "time" else called_for(level, strands=not rough)
+            new = {} if level.motion.stopped == "time" else called_for(level, fine=not rough)
         if not new:
             return level
         record_level(problem, replace(level, note=f"calls for {', '.join(new)}"), monitor)

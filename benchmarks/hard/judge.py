@@ -140,7 +140,8 @@ def disturbed(prediction: Prediction, scene: Scene, deadline: float) -> float | 
 
 def _posed(prediction: Prediction, scene: Scene) -> Problem:
     """Return the problem with the effects that a prediction found to be needed."""
-    return pose(scene, {e.name: e.reason for e in prediction.effects if e.active})
+    called = {} if prediction.level is None else prediction.level.posed.called_for
+    return pose(scene, {**called, **{e.name: e.reason for e in prediction.effects if e.active}})
 
 
 def converges(record: dict[str, Any]) -> bool:

@@ -188,7 +188,7 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
         ),
         report_effects=lambda surface: _effects(refined, surface),
         report_material=lambda: material_of(motion, last.taken),
-        find_objections=lambda: [side_note(problem.start)] if problem.start.bow else [],
+        find_objections=lambda: [side_note(problem.start)] if problem.start.bow or problem.start.aside else [],
     )
 
 

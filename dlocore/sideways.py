@@ -1,0 +1,115 @@
+"""Whether a planar motion stays in its plane: whether a disturbance out of it would grow."""
+
+from itertools import pairwise
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.buckling import GROWTH
+from dlocore.grid import Grid
+from dlocore.kernels.across import stiffness_across
+from dlocore.kernels.banded import factor
+from dlocore.problem import Problem
+from dlocore.scene import Grasp
+from dlocore.solvers.march import March
+
+Floats = NDArray[np.float64]
+
+_LOOKS = 7  # states of a motion
+_NEUTRAL = 1e-8  # of the largest stiffness: what rounding leaves of none
+_FIRM = 1e6  # times the largest stiffness, with which what is held stays in the plane
+
+
+def leaves_plane(problem: Problem, motion: March) -> bool:
+    """Tell whether a disturbance out of the plane of a motion would grow tenfold in its time."""
+    if not _may_leave(problem):
+        return False
+    looks = np.unique(np.linspace(0, len(motion.times) - 1, _LOOKS).round().astype(int))
+    bands, unit = _bands(problem, motion.grid, motion.states[looks])
+    density, drag = problem.scene.cable.linear_density, problem.drag_coefficient()
+    slowest = GROWTH / problem.horizon  # [1/s]: rate of growth that matters
+    slack = density * slowest**2 + drag * slowest
+    growth = 0.0
+    for k, band in zip(looks, bands, strict=True):
+        t = float(motion.times[k])
+        held = [g for g in problem.scene.grasps if g.start <= t and (g.release_time is None or t < g.release_time)]
+        stiff = band + _held_band(motion.grid, held, _FIRM * float(np.abs(band).max()))
+        if factor(stiff + slack * unit) >= 0:
+            least = _least(_dense(stiff) + _twisting(problem, motion.grid, motion.states[k], held), unit)
+            growth += (np.sqrt(drag**2 - 4.0 * density * min(least, 0.0)) - drag) / (2.0 * density)
+    return growth * problem.horizon / len(looks) > GROWTH
+
+
+def is_unstable(problem: Problem, grid: Grid, q: Floats, held: list[Grasp]) -> bool:
+    """Tell whether planar control points q (n, 2) at rest would leave their plane, as in `leaves_plane`."""
+    if not _may_leave(problem):
+        return False
+    bands, unit = _bands(problem, grid, q[None])
+    largest = float(np.abs(bands).max())
+    slack = _NEUTRAL * largest / float(unit.max())
+    stiff = bands[0] + _held_band(grid, held, _FIRM * largest)
+    if factor(stiff + slack * unit) < 0:
+        return False
+    return _least(_dense(stiff) + _twisting(problem, grid, q, held), unit) < -slack
+
+
+def _may_leave(problem: Problem) -> bool:
+    return not problem.on_table and problem.plane.dimensions == 2 and problem.rest_shape == "straight"
+
+
+def _bands(problem: Problem, grid: Grid, states: Floats) -> tuple[Floats, Floats]:
+    """Return the stiffness of states (k, n, 2) against leaving their plane, and the unit matrix, as lower bands."""
+    cable, tables = problem.scene.cable, grid.tables
+    moduli = cast(float, cable.bending_stiffness), cast(float, cable.axial_stiffness)
+    return stiffness_across(np.ascontiguousarray(states), tables, *moduli), tables.mass
+
+
+def _held_band(grid: Grid, held: list[Grasp], stiffness: float) -> Floats:
+    """Return springs that keep grasps, and held directions, in the plane: a lower band (n, 4)."""
+    band = np.zeros((grid.n_u, 4))
+    for grasp in held:
+        for order in range(1 if grasp.hold == "point" else 2):
+            first, b = grid.rows(grasp.u, order)
+            for j in range(4):
+                band[first + j, : 4 - j] += stiffness / (b @ b) * b[j] * b[j:]
+    return band
+
+
+def _twisting(problem: Problem, grid: Grid, q: Floats, held: list[Grasp]) -> Floats:
+    """Return the stiffness (n, n) that clamps add, which do not let the sections between them turn.
+
+    A displacement w out of the plane twists a cable of curvature kappa by kappa w' per length; spread evenly over the
+    length l between two clamps that takes the energy GJ/(2 l) (integral of kappa w')^2.
+    """
+    tables, added = grid.tables, np.zeros((len(q), len(q)))
+    clamps = sorted(g.u for g in held if g.hold == "clamp")
+    if len(clamps) < 2:
+        return added
+    at = tables.curvature_first[:, None] + np.arange(4)
+    a, c = (np.einsum("pi,pid->pd", b, q[at]) for b in (tables.curvature_b1, tables.curvature_b2))
+    kappa = (a[:, 0] * c[:, 1] - a[:, 1] * c[:, 0]) / (a * a).sum(axis=1)
+    turns = (tables.curvature_w * kappa)[:, None] * tables.curvature_b1
+    for begin, end in pairwise(clamps):
+        between = (tables.curvature_u > begin) & (tables.curvature_u < end)
+        g = np.zeros(len(q))
+        np.add.at(g, at[between], turns[between])
+        added += cast(float, problem.scene.cable.torsional_stiffness) / (end - begin) * np.outer(g, g)
+    return added
+
+
+def _least(stiff: Floats, unit: Floats) -> float:
+    """Return the least eigenvalue k [N/m^2] of K w = k U w, of a stiffness (n, n) and the lower band (n, 4) of U."""
+    root = np.linalg.cholesky(_dense(unit))
+    inner = np.linalg.solve(root, np.linalg.solve(root, stiff).T)
+    return float(np.linalg.eigvalsh(inner)[0])
+
+
+def _dense(band: Floats) -> Floats:
+    """Return the symmetric matrix (n, n) of a lower band (n, 4)."""
+    n = len(band)
+    full = np.zeros((n, n))
+    for o in range(4):
+        at = np.arange(n - o)
+        full[at + o, at] = full[at, at + o] = band[: n - o, o]
+    return full

@@ -1,0 +1,167 @@
+"""Planar motions that a disturbance out of their plane would grow in are solved in space, and others are not."""
+
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dlocore import Cable, Environment, Grasp, Move, Points, Prediction, Quality, Scene, equilibrium, predict
+from dlocore.kernels.across import stiffness_across
+from dlocore.kernels.assembly import NO_RATES, History, assemble
+from dlocore.kernels.tension import COLUMNS
+from dlocore.plane import Plane
+from dlocore.problem import Problem
+from dlocore.sideways import is_unstable
+from dlocore.solvers.ladder import Level
+
+Floats = NDArray[np.float64]
+
+HEAVY = Environment(drag=0.1)
+WEIGHTLESS = Environment(gravity=(0.0, 0.0, 0.0), drag=0.3)
+
+
+def arch(angle: float, upward: bool) -> Floats:
+    """Return points along an arc in the x-z plane whose ends are inclined by an angle [rad]."""
+    turn = np.linspace(angle, -angle, 401) * (1.0 if upward else -1.0)
+    middle = 0.5 * (turn[1:] + turn[:-1])
+    x, z = (np.concatenate([[0.0], np.cumsum(f(middle))]) / 400 for f in (np.cos, np.sin))
+    return np.column_stack([x, 0.0 * x, z])[::10]
+
+
+def between(angle: float, upward: bool, hold: Any, around: Environment, closer: float, **changes: Any) -> Scene:
+    """Return a cable between two grippers that come closer by a share of their distance."""
+    points = arch(angle, upward)
+    cable = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=changes.pop("stiffness", 1e-2))
+    path = Move(displacement=(-closer * points[-1, 0], 0.0, 0.0), duration=2.0)
+    grasps = (Grasp(u=0.0, hold=hold), Grasp(u=1.0, hold=hold, path=path))
+    shape = Points(points=points, settle=changes.pop("settle", False))
+    return Scene(cable=cable, shape=shape, grasps=grasps, environment=around, horizon=3.0, **changes)
+
+
+def out_of_plane(p: Prediction) -> float:
+    u, t = np.linspace(0.0, 1.0, 65), np.linspace(0.0, p.surface.horizon, 33)
+    return float(np.abs(p.surface.positions(u, t)[..., 1]).max())
+
+
+FALLS = between(1.0, True, "point", HEAVY, 0.0, stiffness=0.1)
+
+
+def test_an_arch_that_turns_freely_about_its_ends_falls_over() -> None:
+    prediction = predict(FALLS)
+    assert prediction.status == "converged", prediction.message
+    assert prediction.accuracy.dimensions == 3
+    assert "in its plane the motion is unstable" in prediction.accuracy.dimensions_reason
+    assert "in its plane the motion is unstable" in prediction.message
+    assert "mirror image" in prediction.message
+    assert out_of_plane(prediction) > 0.2
+
+
+def test_its_equilibrium_hangs() -> None:
+    assert equilibrium(FALLS).positions([0.5])[0, 2] < -0.2
+    assert equilibrium(replace(FALLS, shape=replace(FALLS.shape, settle=True)), n_u=17).positions([0.5])[0, 2] < -0.2
+
+
+def test_a_settled_start_is_the_stable_one() -> None:
+    prediction = predict(replace(FALLS, shape=replace(FALLS.shape, settle=True)))
+    assert prediction.status == "converged", prediction.message
+    assert prediction.surface.positions([0.5], 0.0)[0, 0, 2] < -0.2
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        between(1.0, False, "point", HEAVY, 0.3, stiffness=1e-3),
+        between(1.0, False, "clamp", HEAVY, 0.6, stiffness=0.1),
+        between(1.0, True, "clamp", HEAVY, 0.0, stiffness=0.1),
+        between(0.3, True, "clamp", WEIGHTLESS, 0.4),
+        between(0.3, True, "tangent", WEIGHTLESS, 0.2),
+        between(0.3, True, "point", WEIGHTLESS, 0.3),  # turns about its ends for nothing: neutral
+        replace(between(1.0, False, "point", HEAVY, 0.0), grasps=()),
+    ],
+    ids=["hangs", "hangs stiffly", "clamped arch", "clamped", "tangents held", "neutral", "thrown"],
+)
+def test_a_stable_motion_stays_planar(scene: Scene) -> None:
+    prediction = predict(scene)
+    assert prediction.status == "converged", prediction.message
+    assert prediction.accuracy.dimensions == 2
+    assert "unstable" not in prediction.message
+
+
+def test_an_elastica_whose_directions_are_held_leaves_its_plane_when_it_is_compressed_far() -> None:
+    prediction = predict(between(0.3, True, "tangent", WEIGHTLESS, 0.8))
+    assert prediction.status == "converged", prediction.message
+    assert prediction.accuracy.dimensions == 3
+    assert out_of_plane(prediction) > 0.05
+
+
+@pytest.mark.parametrize("hold", ["tangent", "clamp"])
+@pytest.mark.parametrize("closer", [0.3, 0.5, 0.7, 0.9])
+def test_what_it_says_of_a_state_is_what_a_disturbed_motion_does(hold: str, closer: float) -> None:
+    scene = between(0.3, True, hold, replace(WEIGHTLESS, drag=1.0), closer)
+    planar = predict(replace(scene, horizon=4.0, quality=Quality(n_u=25, n_t=61, method="march")))
+    level = cast(Level, planar.level)
+    says = is_unstable(level.problem, level.motion.grid, level.motion.states[-1], list(scene.grasps))
+    u = np.linspace(0.0, np.pi, 41)
+    bent = scene.shape.points + np.outer(1e-4 * (np.sin(u) ** 2 + np.sin(u) * np.sin(2.0 * u)), [0.0, 1.0, 0.0])  # type: ignore[union-attr]
+    quality = Quality(n_u=25, n_t=121, method="march")
+    spatial = predict(replace(scene, shape=Points(points=bent), horizon=16.0, quality=quality))
+    u, late = np.linspace(0.0, 1.0, 65), spatial.surface.positions(np.linspace(0.0, 1.0, 65), [4.0, 16.0])
+    before, after = np.abs(late[..., 1]).max(axis=1)
+    assert says == (after > max(3.0 * before, 1e-3) or before > 1e-2)
+
+
+def test_the_stiffness_is_the_tangent_of_the_forces_in_space() -> None:
+    prediction = predict(
+        replace(between(1.0, False, "point", HEAVY, 0.3), quality=Quality(n_u=13, n_t=25, method="march"))
+    )
+    level = cast(Level, prediction.level)
+    problem, grid, q = level.problem, level.motion.grid, level.motion.states[-1]
+    cable = problem.scene.cable
+    band = stiffness_across(
+        q[None], grid.tables, cast(float, cable.bending_stiffness), cast(float, cable.axial_stiffness)
+    )[0]
+    space = _in_space(problem)
+    n = len(q)
+    flat = np.zeros((n, 3))
+    flat[:, :2] = q
+    for j in range(n):
+        forces = []
+        for side in (1e-6, -1e-6):
+            x = flat.copy()
+            x[j, 2] = side
+            forces.append(_forces(space, x, grid.tables))
+        column = (forces[0] - forces[1])[:, 2] / 2e-6
+        expected = [band[min(i, j), abs(i - j)] if abs(i - j) < 4 else 0.0 for i in range(n)]
+        assert column == pytest.approx(np.array(expected), abs=1e-6 * np.abs(band).max())
+
+
+def _in_space(problem: Problem) -> Problem:
+    axes = np.vstack([problem.plane.axes, np.cross(*problem.plane.axes)])
+    return replace(problem, plane=Plane(axes, problem.plane.origin, ""))
+
+
+def _forces(problem: Problem, x: Floats, tables: Any) -> Floats:
+    points, stretched = len(tables.curvature_w), len(tables.axial_w)
+    past = np.zeros((stretched, 3)), np.zeros((0, 6)), np.zeros((0, 2)), np.zeros((0, COLUMNS))
+    history = History(np.zeros((points, 6)), np.zeros((0, 9)), *past)
+    f, K = np.empty((len(x), 3)), np.empty((3 * len(x), 12))
+    active, parameters = problem.law_table()
+    assemble((0, 1, 2), x, np.zeros_like(x), tables, active, parameters, history, NO_RATES, (0.0, 0.0, 0.0), f, K)
+    return f
+
+
+def test_a_given_grid_keeps_to_its_plane_and_says_so() -> None:
+    prediction = predict(replace(FALLS, quality=Quality(n_u=17, n_t=33, method="march")))
+    assert prediction.accuracy.dimensions == 2
+    assert "in its plane the motion is unstable" in prediction.message
+
+
+def test_the_reference_leaves_the_plane_too() -> None:
+    scene = replace(FALLS, horizon=1.0)
+    ours = predict(replace(scene, quality=Quality(target_error=2e-3)))
+    theirs = predict(replace(scene, quality=Quality(method="reference", target_error=5e-3)))
+    assert theirs.accuracy.dimensions == 3
+    away = ours.surface.sample()[2][..., :3] - theirs.surface.sample()[2][..., :3]
+    assert np.linalg.norm(away, axis=-1).max() < 1e-2
