@@ -9,14 +9,15 @@ from dlocore.frames import directors
 from dlocore.grid import Grid
 from dlocore.kernels.assembly import NO_RATES, History, assemble, multiply_scalar_band, stored_energy
 from dlocore.kernels.twisted import start_frames
+from dlocore.plane import Plane, flat_plane
 from dlocore.prediction import MaterialMotion
 from dlocore.problem import Problem, pose
 from dlocore.scene import Scene
+from dlocore.sideways import FLAT
 from dlocore.spline import SplineSurface, design_matrix
 
 Floats = NDArray[np.float64]
 
-FLAT = 1e-6  # of the length: so near to a plane a motion is planar, but for rounding
 
 _LAWS = {
     "stretch": laws.STRETCH,
@@ -90,10 +91,9 @@ def effect_forces(
     return {name: float(np.sqrt(square / len(states))) for name, square in squares.items()}
 
 
-def _is_flat(problem: Problem, r: Floats) -> bool:
-    """Tell whether points r (..., 3) lie in the plane of a problem."""
-    away = r - problem.plane.world(problem.plane.points(r))
-    return bool(np.abs(away).max() <= FLAT * problem.scene.cable.length)
+def _leaves(plane: Plane, r: Floats, length: float) -> bool:
+    """Tell whether some of the points r (..., 3) [m] lie off a plane, if it is one."""
+    return plane.dimensions == 2 and bool(np.abs(r - plane.world(plane.points(r))).max() > FLAT * length)
 
 
 def _motion(
@@ -108,7 +108,9 @@ def _motion(
     called = material is not None and yields and scene.effects.get("plasticity", "auto") != "off"
     shown = {"plasticity": "it shows in the motion"} if called else {}
     problem = pose(scene, shown)
-    if problem.plane.dimensions == 2 and not _is_flat(problem, surface.control_points[..., :3]):
+    if not problem.on_table and _leaves(
+        flat_plane(scene, problem.start), surface.control_points[..., :3], cable.length
+    ):
         problem = pose(scene, {**shown, "side": "the motion leaves its plane"})
     grid = grid_on(problem, surface.knots_u)
     at = np.clip(np.atleast_1d(np.asarray(times, dtype=float)), 0.0, surface.horizon)

@@ -92,15 +92,17 @@ def _knots(parts: list[_Part], length: float) -> Floats:
     return np.append(np.concatenate(knots), length)
 
 
-def side_note(start: StartCurve) -> str:
+def side_notes(start: StartCurve) -> list[str]:
     """Return what is to be known of a start that was bowed, in words."""
+    notes = []
+    if start.bow:
+        bow = f"it starts with a bow of {start.bow * 1e3:.2g} mm to its left, and its mirror image is as likely"
+        why = "the straight cable is pushed or twisted along itself and has no side to buckle to"
+        notes.append(f"{why}: {bow}")
     if start.aside:
         bow = f"it starts with a bow of {start.aside * 1e3:.2g} mm out of it, and its mirror image is as likely"
-        return f"{UNSTABLE}: {bow}"
-    return (
-        "the straight cable is pushed or twisted along itself and has no side to buckle to: it starts with a bow of "
-        f"{start.bow * 1e3:.2g} mm to its left, and its mirror image is as likely"
-    )
+        notes.append(f"{UNSTABLE}: {bow}")
+    return notes
 
 
 def _bow(part: _Part, u: Floats) -> Floats:

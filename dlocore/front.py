@@ -21,12 +21,12 @@ from dlocore.refinement import climb
 from dlocore.report import WindowForces, effect_reports, elastic_energy, reactions
 from dlocore.review import neglected, objections
 from dlocore.scene import Method, Quality, Scene
-from dlocore.solvers.ladder import Level, stretched
+from dlocore.solvers.ladder import Level
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.paper import solve_as_printed
 from dlocore.solvers.spacetime import solve
 from dlocore.spline import uniform_knots
-from dlocore.whole_march import MISSED_COUNTS, TORN, Outcome, march_level, march_status
+from dlocore.whole_march import MISSED_COUNTS, TORN, Outcome, march_status, sided
 
 Floats = NDArray[np.float64]
 FindForces = Callable[[], tuple[WindowForces, ...]]
@@ -78,7 +78,7 @@ def _solved(problem: Problem, monitor: Monitor, cost: Cost | None, again: Again 
     if method == "reference":
         from dlocore.reference.solve import reference  # its compiled code is for those who ask for it
 
-        return reference(_with_side(problem, monitor), monitor)
+        return reference(sided(problem, monitor), monitor)
     if method == "auto":
         method = automatic_method(problem)
     if method != "march":
@@ -87,14 +87,6 @@ def _solved(problem: Problem, monitor: Monitor, cost: Cost | None, again: Again 
         return _answer(monitor, method, _as_before(again, monitor), judged=again.judged)
     outcome = climb(problem, quality, monitor, cost) if quality.n_u is None else _given(problem, quality, monitor)
     return _answer(monitor, method, outcome)
-
-
-def _with_side(problem: Problem, monitor: Monitor) -> Problem:
-    """Return the problem of the reference, in space where a march says that its motion leaves its plane."""
-    if problem.on_table or problem.plane.dimensions == 3:
-        return problem
-    called = march_level(problem, stretched(problem, 1), monitor).posed.called_for
-    return pose(problem.scene, {"side": called["side"]}) if "side" in called else problem
 
 
 def automatic_method(problem: Problem) -> Method:

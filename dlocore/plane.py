@@ -133,7 +133,12 @@ def find_plane(scene: Scene, start: StartCurve, on_table: bool, met: bool) -> Pl
         return Plane(np.eye(3), origin, "the start is twisted")
     if on_table:
         return Plane(np.eye(3)[:2], origin, "the cable lies on the table and moves in its plane")
-    length = scene.cable.length
+    return flat_plane(scene, start)
+
+
+def flat_plane(scene: Scene, start: StartCurve) -> Plane:
+    """Return the plane of start, paths and forces, whatever the cable may touch; all of space where they have none."""
+    origin, length = np.array(start.control_points[0]), scene.cable.length
     spread = [(start.control_points - origin) / length]
     if start.velocity is not None:
         spread.append(start.velocity.control_points / max(1e-9, np.abs(start.velocity.control_points).max()))

@@ -29,7 +29,7 @@ from dlocore.events import Event, find_events
 from dlocore.features import Features, find_features
 from dlocore.kernels.projection import in_world
 from dlocore.obstacles import Box, Cylinder, Obstacle
-from dlocore.plane import Plane, find_plane, is_straight, lay_on_table, off_the_table
+from dlocore.plane import Plane, find_plane, flat_plane, is_straight, lay_on_table, off_the_table
 from dlocore.scene import Scene
 from dlocore.selection import Choice, choose, reached
 from dlocore.shape import StartCurve, start_curve
@@ -250,9 +250,11 @@ def pose(scene: Scene, called_for: Mapping[str, str] | None = None, *, at_rest: 
         start = lay_on_table(scene, start)
     start = with_side(scene, start, at_rest)
     plane = find_plane(scene, start, on_table, bool(met))
-    if "side" in called_for and plane.dimensions == 2 and not on_table:
-        start = out_of_plane(scene, start, np.cross(*plane.axes))
-        plane = Plane(np.eye(3), plane.origin, called_for["side"])
+    flat = flat_plane(scene, start) if "side" in called_for and not on_table else None
+    if flat is not None and flat.dimensions == 2:
+        start = out_of_plane(scene, start, np.cross(*flat.axes))
+        reason = called_for["side"] if plane.dimensions == 2 else plane.reason
+        plane = Plane(np.eye(3), plane.origin, reason)
     bent = _is_bent(scene, start)
     choices = choose(scene, start, plane.dimensions, on_table, leaves, met, bent or start.bow > 0.0, called_for)
     if choices["self_contact"].active:

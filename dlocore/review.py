@@ -10,7 +10,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.buckling import UNSTABLE, side_note
+from dlocore.buckling import UNSTABLE, side_notes
 from dlocore.effects import laws
 from dlocore.effects.damping import Damping
 from dlocore.effects.distance import distances
@@ -89,9 +89,8 @@ def objections(level: Level) -> list[str]:
     problem, found = level.problem, []
     if level.motion.largest_strain > _STRAINED:
         found.append(f"the motion strains the cable by up to {level.motion.largest_strain:.0%} along itself")
-    if problem.start.bow or problem.start.aside:
-        found.append(side_note(problem.start))
-    elif problem.scene.quality.n_u is not None and leaves_plane(problem, level.motion):
+    found += side_notes(problem.start)
+    if problem.scene.quality.n_u is not None and leaves_plane(problem, level.motion):
         found.append(f"{UNSTABLE}: without a given grid it is solved in space, with a bow out of the plane")
     off = {name for name, value in problem.scene.effects.items() if value == "off"}
     for name, test in (("plasticity", _yields), ("obstacles", _touches), ("self_contact", _meets_itself)):

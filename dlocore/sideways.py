@@ -1,21 +1,25 @@
 """Whether a planar motion stays in its plane: whether a disturbance out of it would grow."""
 
+import math
 from itertools import pairwise
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.buckling import GROWTH
+from dlocore.buckling import BOW, GROWTH
+from dlocore.discretisation import plane_curvature_of
 from dlocore.grid import Grid
 from dlocore.kernels.across import stiffness_across
 from dlocore.kernels.banded import factor
+from dlocore.plane import flat_plane
 from dlocore.problem import Problem
 from dlocore.scene import Grasp
 from dlocore.solvers.march import March
 
 Floats = NDArray[np.float64]
 
+FLAT = 1e-6  # of the length: so near to a plane a motion is planar, but for rounding
 _LOOKS = 7  # states of a motion
 _NEUTRAL = 1e-8  # of the largest stiffness: what rounding leaves of none
 _FIRM = 1e6  # times the largest stiffness, with which what is held stays in the plane
@@ -23,46 +27,74 @@ _FIRM = 1e6  # times the largest stiffness, with which what is held stays in the
 
 def leaves_plane(problem: Problem, motion: March) -> bool:
     """Tell whether a disturbance out of the plane of a motion would grow tenfold in its time."""
-    if not _may_leave(problem):
-        return False
     looks = np.unique(np.linspace(0, len(motion.times) - 1, _LOOKS).round().astype(int))
-    bands, unit = _bands(problem, motion.grid, motion.states[looks])
+    states = _in_plane(problem, motion.states[looks])
+    if states is None:
+        return False
+    bands, unit = _bands(problem, motion.grid, states)
     density, drag = problem.scene.cable.linear_density, problem.drag_coefficient()
     slowest = GROWTH / problem.horizon  # [1/s]: rate of growth that matters
     slack = density * slowest**2 + drag * slowest
     growth = 0.0
-    for k, band in zip(looks, bands, strict=True):
-        t = float(motion.times[k])
+    for t, q, band in zip(motion.times[looks].tolist(), states, bands, strict=True):
         held = [g for g in problem.scene.grasps if g.start <= t and (g.release_time is None or t < g.release_time)]
         stiff = band + _held_band(motion.grid, held, _FIRM * float(np.abs(band).max()))
         if factor(stiff + slack * unit) >= 0:
-            least = _least(_dense(stiff) + _twisting(problem, motion.grid, motion.states[k], held), unit)
+            least = _least(_dense(stiff) + _twisting(problem, motion.grid, q, held), unit)
             growth += (np.sqrt(drag**2 - 4.0 * density * min(least, 0.0)) - drag) / (2.0 * density)
-    return growth * problem.horizon / len(looks) > GROWTH
+    # a straight cable that buckles may do so to any side: until it has, all grow alike
+    both = math.log(1.0 / BOW) if problem.start.bow else 0.0
+    return growth * problem.horizon / len(looks) > GROWTH + both
 
 
 def is_unstable(problem: Problem, grid: Grid, q: Floats, held: list[Grasp]) -> bool:
-    """Tell whether planar control points q (n, 2) at rest would leave their plane, as in `leaves_plane`."""
-    if not _may_leave(problem):
+    """Tell whether control points q (n, nc) at rest would leave their plane, as in `leaves_plane`."""
+    states = _in_plane(problem, q[None])
+    if states is None:
         return False
-    bands, unit = _bands(problem, grid, q[None])
+    bands, unit = _bands(problem, grid, states)
     largest = float(np.abs(bands).max())
     slack = _NEUTRAL * largest / float(unit.max())
     stiff = bands[0] + _held_band(grid, held, _FIRM * largest)
     if factor(stiff + slack * unit) < 0:
         return False
-    return _least(_dense(stiff) + _twisting(problem, grid, q, held), unit) < -slack
+    return _least(_dense(stiff) + _twisting(problem, grid, states[0], held), unit) < -slack
 
 
-def _may_leave(problem: Problem) -> bool:
-    return not problem.on_table and problem.plane.dimensions == 2 and problem.rest_shape == "straight"
+def _in_plane(problem: Problem, states: Floats) -> Floats | None:
+    """Return the coordinates (k, n, 2) of states (k, n, nc) in their plane, None where none is or they can't leave it.
+
+    That is a cable on a table, and one with bends without stress, whose stiffness is another.
+    """
+    start, rest = problem.start, problem.scene.cable.rest_shape
+    bent = not isinstance(rest, str) or rest != "straight" or start.material is not None
+    if problem.on_table or bent or start.aside or start.theta is not None or problem.bending_memory is not None:
+        return None
+    if problem.plane.dimensions == 2:
+        return states
+    plane = flat_plane(problem.scene, start)
+    if plane.dimensions == 3:
+        return None
+    r = problem.plane.world(states[..., :3])
+    flat = plane.points(r)
+    away = float(np.abs(r - plane.world(flat)).max())
+    return flat if away <= FLAT * problem.scene.cable.length else None
 
 
 def _bands(problem: Problem, grid: Grid, states: Floats) -> tuple[Floats, Floats]:
     """Return the stiffness of states (k, n, 2) against leaving their plane, and the unit matrix, as lower bands."""
     cable, tables = problem.scene.cable, grid.tables
     moduli = cast(float, cable.bending_stiffness), cast(float, cable.axial_stiffness)
-    return stiffness_across(np.ascontiguousarray(states), tables, *moduli), tables.mass
+    if not problem.start.bow:
+        return stiffness_across(np.ascontiguousarray(states), tables, *moduli), tables.mass
+    # sections that turn with the bend of kappa take its natural bend along: EI |kappa - natural| then is the moment
+    natural = np.linalg.norm(grid.history.memory[:, grid.history.memory.shape[1] // 2 :], axis=1)
+    bands = []
+    for q in states:
+        kappa = np.abs(plane_curvature_of(tables, q)[:, 0])
+        share = 1.0 - np.minimum(natural / np.maximum(kappa, 1e-300), 1.0)
+        bands.append(stiffness_across(q[None].copy(), tables._replace(curvature_w=share * tables.curvature_w), *moduli))
+    return np.concatenate(bands), tables.mass
 
 
 def _held_band(grid: Grid, held: list[Grasp], stiffness: float) -> Floats:
@@ -87,9 +119,7 @@ def _twisting(problem: Problem, grid: Grid, q: Floats, held: list[Grasp]) -> Flo
     if len(clamps) < 2:
         return added
     at = tables.curvature_first[:, None] + np.arange(4)
-    a, c = (np.einsum("pi,pid->pd", b, q[at]) for b in (tables.curvature_b1, tables.curvature_b2))
-    kappa = (a[:, 0] * c[:, 1] - a[:, 1] * c[:, 0]) / (a * a).sum(axis=1)
-    turns = (tables.curvature_w * kappa)[:, None] * tables.curvature_b1
+    turns = tables.curvature_w[:, None] * plane_curvature_of(tables, q) * tables.curvature_b1
     for begin, end in pairwise(clamps):
         between = (tables.curvature_u > begin) & (tables.curvature_u < end)
         g = np.zeros(len(q))

@@ -6,11 +6,12 @@ from typing import NamedTuple
 
 from dlocore.discretisation import smallest_n_u
 from dlocore.events import smallest_n_t
+from dlocore.plane import flat_plane
 from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
 from dlocore.progress import record_level
 from dlocore.review import called_for, called_for_by_fine
-from dlocore.solvers.ladder import CREDIBLE_STRAIN, Level, Size, credible_after, hardness, run_level
+from dlocore.solvers.ladder import CREDIBLE_STRAIN, Level, Size, credible_after, hardness, run_level, stretched
 from dlocore.solvers.march import RHO
 from dlocore.solvers.monitor import Monitor
 
@@ -67,6 +68,14 @@ def march_level(
         record_level(problem, replace(level, note=f"calls for {', '.join(new)}"), monitor)
         called |= new
         problem = pose(problem.scene, called)
+
+
+def sided(problem: Problem, monitor: Monitor) -> Problem:
+    """Return the problem, with a side to go to where a march says that its motion leaves its plane."""
+    if problem.on_table or flat_plane(problem.scene, problem.start).dimensions == 3:
+        return problem
+    called = march_level(problem, stretched(problem, 1), monitor).posed.called_for
+    return pose(problem.scene, {"side": called["side"]}) if "side" in called else problem
 
 
 def march_status(problem: Problem, level: Level) -> tuple[Status, str]:

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dlocore.buckling import side_note
+from dlocore.buckling import side_notes
 from dlocore.errors import SceneError
 from dlocore.prediction import Accuracy, EffectReport, GraspReaction, Iteration, Prediction, Status
 from dlocore.problem import Problem, pose
@@ -19,6 +19,7 @@ from dlocore.reference.strands import refuse_meeting
 from dlocore.scene import Scene
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import SplineSurface
+from dlocore.whole_march import sided
 
 Floats = NDArray[np.float64]
 
@@ -58,7 +59,7 @@ def converged(scene: Scene, tolerance: float, *, times: ArrayLike | None = None)
     Raises:
         SceneError: the scene has an effect that the reference does not cover.
     """
-    problem = pose(scene)
+    problem = sided(pose(scene), Monitor())
     refuse(problem)
     refined = refine(problem, tolerance, Monitor(), lambda problem, level: None)
     refuse_meeting(refined)
@@ -188,7 +189,7 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
         ),
         report_effects=lambda surface: _effects(refined, surface),
         report_material=lambda: material_of(motion, last.taken),
-        find_objections=lambda: [side_note(problem.start)] if problem.start.bow or problem.start.aside else [],
+        find_objections=partial(side_notes, problem.start),
     )
 
 
