@@ -42,7 +42,7 @@ class _Part(NamedTuple):
 
 
 def with_side(scene: Scene, start: StartCurve, at_rest: bool) -> StartCurve:
-    """Return the start, bowed to the left where it is straight and the motion pushes it along itself.
+    """Return the start, bowed to the left, or by turns, where it is straight and the motion pushes it along itself.
 
     The left is that of its direction, horizontally; that of a vertical one is the x axis.
 
@@ -59,9 +59,10 @@ def with_side(scene: Scene, start: StartCurve, at_rest: bool) -> StartCurve:
         return start
     knots = _knots(bowed, scene.cable.length)
     u = (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0  # where control points on the curve are those of a straight one
-    aside = np.sum([_bow(part, u) for part in bowed], axis=0)
+    # by turns, as beyond a grasp that lets the cable turn it bends on the other way
+    aside = np.sum([(-1) ** k * _bow(part, u) for k, part in enumerate(bowed)], axis=0)
     control = start.control_points[0] + np.outer(u, along) + np.outer(aside, leftwards(along))
-    return replace(start, knots=knots, control_points=control, bow=float(aside.max()))
+    return replace(start, knots=knots, control_points=control, bow=float(np.abs(aside).max()))
 
 
 def out_of_plane(scene: Scene, start: StartCurve, normal: Floats) -> StartCurve:
@@ -237,7 +238,7 @@ def _loaded(scene: Scene, start: StartCurve, along: Floats, part: _Part, t: Floa
         closer = float((_way(second, start, along, met) - _way(first, start, along, met))[0]) - apart
         elastic = cast(float, cable.axial_stiffness) * closer / length
         push = elastic + 0.5 * np.abs(needed) * length + np.sum([np.abs(force) for _, force in loads], axis=0)
-        turned = np.abs(_spin(second, along, t) - _spin(first, along, t))
+        turned = np.abs(_spin(second, along, t) - _spin(first, along, t) + _twist(start, part))
         both = first.hold == second.hold == "clamp" and scene.effects.get("twist", "auto") != "off"
         torque = cast(float, cable.torsional_stiffness) * turned / length if both else np.zeros(len(t))
         return np.maximum(push, 0.0), torque
@@ -279,6 +280,11 @@ def _depth(scene: Scene, start: StartCurve, along: Floats, part: _Part, way: Flo
             rows = np.array([obstacle.row() for obstacle in environment.obstacles])
             deepest = np.maximum(deepest, radius - distances(rows, end).min(axis=0))
     return deepest
+
+
+def _twist(start: StartCurve, part: _Part) -> float:
+    """Return the angle by which the sections at the end of a part are turned against those at its begin [rad]."""
+    return 0.0 if start.theta is None else float(np.diff(start.theta([part.begin, part.end])[:, 0])[0])
 
 
 def _spin(grasp: Grasp, along: Floats, t: Floats) -> Floats:

@@ -240,6 +240,33 @@ def test_twist_beyond_what_a_straight_cable_bears_takes_it_off_its_line(turns: f
     assert (aside.max() > 0.05) == leaves
 
 
+def test_a_start_that_is_twisted_more_than_it_bears_leaves_its_line() -> None:
+    control = np.column_stack([np.linspace(0.0, 1.0, 4), np.zeros((4, 2)), np.linspace(0.0, 15.0, 4)])
+    grasps = (Grasp(u=0.0, hold="clamp"), Grasp(u=1.0, hold="clamp"))
+    scene = Scene(
+        cable=cord(torsional_stiffness=1e-2),
+        shape=ControlPoints(control_points=control),
+        grasps=grasps,
+        environment=replace(WEIGHTLESS, drag=1.0),
+        horizon=3.0,
+    )
+    prediction = predict(scene)
+    assert prediction.status == "converged", prediction.message
+    aside = np.linalg.norm(prediction.surface.positions(np.linspace(0.0, 1.0, 65), 3.0)[0, :, 1:], axis=1)
+    assert aside.max() > 3.0 * BOW  # between ends that do not come closer
+    assert bow(replace(scene, cable=cord(torsional_stiffness=1e-3))) == 0.0
+
+
+def test_parts_side_by_side_bow_to_both_sides_by_turns() -> None:
+    grasps = tuple(Grasp(u=u, path=way(0.2 * (0.5 - u), 0.0, 0.0)) for u in (0.0, 0.25, 0.5, 0.75, 1.0))
+    scene = Scene(cable=cord(), shape=Straight(), grasps=grasps, environment=replace(LYING, drag=1.0), horizon=4.0)
+    prediction = predict(scene)
+    assert prediction.status == "converged", prediction.message
+    y = prediction.surface.positions([0.125, 0.375, 0.625, 0.875], 4.0)[0, :, 1]
+    assert np.sign(y).tolist() in ([1.0, -1.0, 1.0, -1.0], [-1.0, 1.0, -1.0, 1.0])
+    assert np.abs(y).min() > 0.02
+
+
 def test_the_reference_buckles_to_the_same_side() -> None:
     scene = pushed(hold="clamp", around=replace(LYING, drag=0.5))
     ours = predict(replace(scene, quality=Quality(target_error=1e-3)))
