@@ -10,7 +10,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.buckling import UNSTABLE, side_notes
+from dlocore.buckling import BOW, UNSTABLE, side_notes
 from dlocore.effects import laws
 from dlocore.effects.damping import Damping
 from dlocore.effects.distance import distances
@@ -20,6 +20,7 @@ from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, larges
 from dlocore.kernels.banded import expand_vector, factor, reduce_matrix, reduce_vector
 from dlocore.kernels.banded import solve as solve_factored
 from dlocore.kernels.twisted import TWIST_RATE
+from dlocore.mirrored import goes_elsewhere
 from dlocore.problem import Problem
 from dlocore.report import WindowForces
 from dlocore.sideways import leaves_plane
@@ -92,6 +93,12 @@ def objections(level: Level) -> list[str]:
     found += side_notes(problem.start)
     if problem.scene.quality.n_u is not None and leaves_plane(problem, level.motion):
         found.append(f"{UNSTABLE}: without a given grid it is solved in space, with a bow out of the plane")
+    elsewhere = goes_elsewhere(problem, level.motion)
+    if elsewhere:
+        lopsided = f"a cable lopsided by {BOW * problem.scene.cable.length * 1e3:.2g} mm"
+        found.append(
+            f"the motion is its own mirror image, and unstable so: {lopsided} goes {elsewhere:.2g} m elsewhere"
+        )
     off = {name for name, value in problem.scene.effects.items() if value == "off"}
     for name, test in (("plasticity", _yields), ("obstacles", _touches), ("self_contact", _meets_itself)):
         if name in off:

@@ -72,6 +72,8 @@ def _in_plane(problem: Problem, states: Floats) -> Floats | None:
         return None
     if problem.plane.dimensions == 2:
         return states
+    if not problem.touches and problem.scene.effects.get("twist", "auto") != "on":
+        return None  # in space for another reason than what it touches: it lies in no plane
     plane = flat_plane(problem.scene, start)
     if plane.dimensions == 3:
         return None
