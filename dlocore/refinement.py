@@ -135,6 +135,9 @@ class _Climb:
             if self.estimate <= ACCEPT * self.target and self.budget == np.inf and unfolds is None:
                 agreed = self._agreed(level) if status == "converged" else message
                 return Outcome(level, status, agreed, _parts(self.changes, level))
+            unfolded = self._unfolded(level, size)
+            if unfolded is not None:
+                return unfolded
             finer = self._next(level, size, unfolds)
             if finer is not None and not self._in_time(size, finer, self.monitor.elapsed() - began):
                 return self._within_budget(level)
@@ -229,6 +232,27 @@ class _Climb:
 
     def _agreed(self, level: Level) -> str:
         return f"Two grids agree to {level.change * 1e3:.2g} mm, target {self.target * 1e3:.2g} mm."
+
+    def _unfolded(self, level: Level, size: Size) -> Outcome | None:
+        """Return the answer of a march that watches over the length at more points, if a fold is all that is amiss.
+
+        A tip far shorter than a span, beyond a grasp, may fold straight back on any grid: nothing else moves by that.
+        """
+        if not (is_folded(level) and self.estimate <= ACCEPT * self.target and self.budget == np.inf):
+            return None
+        other = march_level(
+            self.problem, size, self.monitor, self.rho, free_knots=True, rough=True, before=level, watch=True
+        )
+        away = distance(level, other, self.problem)
+        if other.posed is not self.problem or march_status(self.problem, other)[0] != "converged":
+            return None
+        if not self.estimate + away <= self.target:
+            return None
+        other = replace(other, change=level.change + away, note="watched at more points")
+        record_level(self.problem, other, self.monitor)
+        parts = _parts(self.changes, other) or {}
+        parts[list(parts)[-1]] += away
+        return Outcome(other, "converged", self._agreed(other), parts)
 
     def _within_budget(self, level: Level) -> Outcome:
         """Return the best that the budget allows."""

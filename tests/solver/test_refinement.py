@@ -240,6 +240,19 @@ def test_a_fold_is_unfolded_with_all_the_work_that_a_target_is_worth():
     assert not is_folded(prediction.level)
 
 
+def test_a_tip_that_folds_beyond_a_grasp_is_held_straight_by_watching_its_length():
+    # 0.3 mm of a metre beyond a grasp at which the velocity jumps: it folded straight back on up to 708 control points
+    scene = draw(11, 369).make()
+    found = predict(scene)
+    assert found.status == "converged", found.message
+    assert "watched at more points" in found.iterations[-1].note
+    least, most = found.level.motion.slopes
+    assert least > 0.4
+    assert most < 1.6
+    assert found.accuracy.n_u < 100
+    assert compare(found, scene, 60.0)["error"] * scene.cable.length < found.accuracy.error_estimate
+
+
 def test_a_sharp_bend_is_the_same_on_coarse_and_fine_grids():
     coarse, fine = predict(kinked(march(25, 33))), predict(kinked(march(97, 65)))
     # 1.4 mm; with knots spread evenly, where the bend is another one on each grid, 14 mm
