@@ -1,8 +1,8 @@
-"""A straight cable that is pushed or twisted along itself has no side to buckle to, nor a planar one to fall to: both
-are given one.
+"""Sides for those that have none: straight cables that are pushed along themselves, motions that may leave their plane.
 
-Straight, it is in equilibrium however hard it is pushed, but no real cable stays so. Where a disturbance would grow by
-much, it gets the imperfection that columns are designed with: a bow without stress of a thousandth of the length.
+Straight, a cable is in equilibrium however hard it is pushed, but no real cable stays so. Where a disturbance would
+grow by much, it gets the imperfection that columns are designed with, a bow without stress of a thousandth of its
+length.
 """
 
 import math

@@ -50,7 +50,10 @@ def called_for(level: Level, fine: bool = True) -> dict[str, str]:
         found.update(called_for_by_fine(level))
     if problem.inertia is None and switch("inertia", "auto") == "auto":
         moved = neglected(level)
-        if moved > MATTERS * problem.scene.cable.length:
+        if level.motion.stopped == "step":
+            reached = level.motion.times[level.motion.reached]
+            found["inertia"] = f"without it the cable has no equilibrium to go on to at {reached:.3g} s"
+        elif moved > MATTERS * problem.scene.cable.length:
             found["inertia"] = f"without it a first solve is {moved * 1e3:.2g} mm off"
     return found
 

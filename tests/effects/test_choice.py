@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.catalogue import catalogue
+from benchmarks.hard.generator import draw
 from dlocore import (
     Cable,
     Cylinder,
@@ -147,3 +148,13 @@ def test_what_is_off_and_does_not_matter_is_not_mentioned():
         effects={"drag": "off"},
     )
     assert "off" not in predict(still).message
+
+
+def test_a_slow_motion_that_has_no_equilibrium_to_go_on_to_is_solved_with_inertia():
+    # held at two points it stands on its head at first, and is to turn over: it was stalled at 0 s
+    scene = replace(draw(12, 41).make(), quality=Quality(n_u=9, n_t=109, method="march", estimate=False))
+    prediction = predict(scene)
+    assert prediction.status == "converged", prediction.message
+    active, reason = effect(prediction, "inertia")
+    assert active
+    assert "no equilibrium to go on to" in reason
