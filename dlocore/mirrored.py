@@ -21,8 +21,8 @@ _PLACES = 33  # along the cable
 def goes_elsewhere(problem: Problem, motion: March) -> float:
     """Return how far a lopsided cable goes elsewhere in a symmetric planar motion [m]; 0 where that does not grow.
 
-    It starts bent to one side in one half, and to the other in the other, by BOW of the length, without stress, and is
-    marched once more in the same steps.
+    Its stress-free shape is bent to one side in one half, and to the other in the other, by BOW of the length. It is
+    marched once more from the same start in the same steps.
     """
     length = problem.scene.cable.length
     if problem.plane.dimensions != 2 or motion.stopped or not _is_mirrored(motion, length):
@@ -34,7 +34,7 @@ def goes_elsewhere(problem: Problem, motion: March) -> float:
     bent = grid.start + BOW * length * np.sin(2.0 * np.pi * u / length)[:, None] * across
     history = grid.past()
     history.memory[:] += plane_curvature_of(grid.tables, bent) - plane_curvature_of(grid.tables, grid.start)
-    lopsided = grid.changed(start=bent, history=history)
+    lopsided = grid.changed(history=history)
     other = march(problem, lopsided, len(motion.times) - 1, Monitor(None, None, None), rho=motion.rho)
     if other.stopped or len(other.states) != len(motion.states):
         return 0.0
