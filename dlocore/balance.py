@@ -9,15 +9,13 @@ from dlocore.frames import directors
 from dlocore.grid import Grid
 from dlocore.kernels.assembly import NO_RATES, History, assemble, multiply_scalar_band, stored_energy
 from dlocore.kernels.twisted import start_frames
-from dlocore.plane import Plane, flat_plane
 from dlocore.prediction import MaterialMotion
-from dlocore.problem import Problem, pose
+from dlocore.problem import Problem
 from dlocore.scene import Scene
-from dlocore.sideways import FLAT
+from dlocore.sideways import pose_as_shown
 from dlocore.spline import SplineSurface, design_matrix
 
 Floats = NDArray[np.float64]
-
 
 _LAWS = {
     "stretch": laws.STRETCH,
@@ -91,11 +89,6 @@ def effect_forces(
     return {name: float(np.sqrt(square / len(states))) for name, square in squares.items()}
 
 
-def _leaves(plane: Plane, r: Floats, length: float) -> bool:
-    """Tell whether some of the points r (..., 3) [m] lie off a plane, if it is one."""
-    return plane.dimensions == 2 and bool(np.abs(r - plane.world(plane.points(r))).max() > FLAT * length)
-
-
 def _motion(
     scene: Scene, surface: SplineSurface, times: ArrayLike, material: MaterialMotion | None
 ) -> tuple[Problem, Grid, Floats, Floats, Floats, list[History]]:
@@ -107,11 +100,7 @@ def _motion(
     yields = any(x is not None for x in (cable.yield_strain, cable.yield_twist, cable.yield_stretch))
     called = material is not None and yields and scene.effects.get("plasticity", "auto") != "off"
     shown = {"plasticity": "it shows in the motion"} if called else {}
-    problem = pose(scene, shown)
-    if not problem.on_table and _leaves(
-        flat_plane(scene, problem.start), surface.control_points[..., :3], cable.length
-    ):
-        problem = pose(scene, {**shown, "side": "the motion leaves its plane"})
+    problem = pose_as_shown(scene, shown, surface.control_points[0, :, :3])
     grid = grid_on(problem, surface.knots_u)
     at = np.clip(np.atleast_1d(np.asarray(times, dtype=float)), 0.0, surface.horizon)
     moved = [

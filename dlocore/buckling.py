@@ -15,10 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.effects.distance import distances
+from dlocore.events import closed_grasps
 from dlocore.paths import Move, Path, Still
 from dlocore.plane import FLATNESS, TABLE_TOLERANCE, is_straight, leftwards, natural_points
 from dlocore.scene import Grasp, Scene
 from dlocore.shape import StartCurve, fit_to_knots
+from dlocore.spline import greville
 
 Floats = NDArray[np.float64]
 
@@ -58,7 +60,7 @@ def with_side(scene: Scene, start: StartCurve, at_rest: bool) -> StartCurve:
     if not bowed:
         return start
     knots = _knots(bowed, scene.cable.length)
-    u = (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0  # where control points on the curve are those of a straight one
+    u = greville(knots)
     # by turns, as beyond a grasp that lets the cable turn it bends on the other way
     aside = np.sum([(-1) ** k * _bow(part, u) for k, part in enumerate(bowed)], axis=0)
     control = start.control_points[0] + np.outer(u, along) + np.outer(aside, leftwards(along))
@@ -70,7 +72,7 @@ def out_of_plane(scene: Scene, start: StartCurve, normal: Floats) -> StartCurve:
     length = scene.cable.length
     parts = list(_parts(sorted(scene.grasps, key=lambda g: g.u), length))
     knots = _joined(start.knots, _knots(parts, length))
-    u = (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0
+    u = greville(knots)
     aside = np.sum([_bow(part, u) for part in parts], axis=0)
     control = fit_to_knots(start, knots) + np.outer(aside, normal)
     return replace(start, knots=knots, control_points=control, aside=float(aside.max()))
@@ -189,8 +191,7 @@ def _growths(scene: Scene, start: StartCurve, along: Floats, at_rest: bool) -> d
         times |= {t for t in (g.start, g.release_time or 0.0) if t < horizon}
     growths: dict[_Part, float] = {}
     for a, b in pairwise(sorted(times)):
-        middle = 0.5 * (a + b)
-        held = [g for g in scene.grasps if g.start <= middle and (g.release_time is None or g.release_time > middle)]
+        held = closed_grasps(scene, a, b)
         t = np.linspace(a, b, _TIMES)
         for part in _parts(sorted(held, key=lambda g: g.u), cable.length):
             length = part.end - part.begin

@@ -73,12 +73,10 @@ def smallest_n_t(problem: "Problem") -> int:
     return max(5, 4 + sum(e.multiplicity for e in problem.events))
 
 
-def closed_grasps(problem: "Problem", begin: float, end: float) -> list[Grasp]:
+def closed_grasps(scene: Scene, begin: float, end: float) -> list[Grasp]:
     """Return the grasps that hold all through the times `begin` to `end` [s]."""
     middle = 0.5 * (begin + end)
-    return [
-        g for g in problem.scene.grasps if g.start <= middle and (g.release_time is None or g.release_time > middle)
-    ]
+    return [g for g in scene.grasps if g.start <= middle and (g.release_time is None or g.release_time > middle)]
 
 
 def marks_of(problem: "Problem") -> list[float]:

@@ -8,7 +8,7 @@ from dlocore.discretisation import plane_curvature_of
 from dlocore.problem import Problem
 from dlocore.solvers.march import March, march
 from dlocore.solvers.monitor import Monitor
-from dlocore.spline import design_matrix
+from dlocore.spline import design_matrix, greville
 
 Floats = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ def goes_elsewhere(problem: Problem, motion: March) -> float:
     if problem.plane.dimensions != 2 or motion.stopped or not _is_mirrored(motion, length):
         return 0.0
     grid = motion.grid
-    u = (grid.knots[1:-3] + grid.knots[2:-2] + grid.knots[3:-1]) / 3.0
+    u = greville(grid.knots)
     tangent = design_matrix(grid.knots, u, 1) @ grid.start
     across = np.column_stack([-tangent[:, 1], tangent[:, 0]]) / np.linalg.norm(tangent, axis=1)[:, None]
     bent = grid.start + BOW * length * np.sin(2.0 * np.pi * u / length)[:, None] * across

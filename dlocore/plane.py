@@ -49,6 +49,10 @@ class Plane:
         """Return the points r (..., 3) [m] of plane coordinates x (..., nc)."""
         return self.origin + x @ self.axes
 
+    def distance(self, r: Floats) -> float:
+        """Return the largest component of the way from the points r (..., 3) to the plane [m]."""
+        return float(np.abs(r - self.world(self.points(r))).max())
+
     def world_vectors(self, x: Floats) -> Floats:
         """Return the vectors (..., 3) of components x (..., nc)."""
         return x @ self.axes

@@ -39,7 +39,7 @@ def begin_on(problem: Problem, grid: Grid, settled: Grid) -> tuple[Floats, Histo
         missing = np.interp(grid.tables.curvature_u, settled.tables.curvature_u, there)
         missing -= rates_of(problem, grid, q[None], history.past[None])[0]
         q[:, 3] = angles_of(problem, grid, missing[None], settled.start[:1, 3])[0]
-        held = [g.u for g in closed_grasps(problem, 0.0, 0.0) if g.hold == "clamp"]
+        held = [g.u for g in closed_grasps(problem.scene, 0.0, 0.0) if g.hold == "clamp"]
         off = np.array([grid.at(grid.start, u)[3] - grid.at(q, u)[3] for u in held])
         if held:  # the start of the frames, at u = 0, may have swung
             q[:, 3] += off[0]

@@ -29,6 +29,7 @@ from dlocore.prediction import Prediction
 from dlocore.problem import Problem, pose
 from dlocore.report import surface_of
 from dlocore.scene import Scene
+from dlocore.sideways import pose_as_shown
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, march
 from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.stretch import Entry, enter
@@ -174,7 +175,7 @@ def _enter(
     """Close the grasps of the stretch from step `first` to `last` of `times` (steps + 1,) [s]; return how it begins."""
     own = times[first : last + 1]
     load = applied_forces(problem, grid, own[:1])[0]
-    grasps = closed_grasps(problem, float(own[0]), float(own[-1]))
+    grasps = closed_grasps(problem.scene, float(own[0]), float(own[-1]))
     h = float(own[-1] - own[0]) / (last - first)
     before = float(times[first] - times[first - 1]) if first > 0 else 0.0
     return enter(problem, grid, grasps, starts, own, h, before, np.ascontiguousarray(q), v, history, load)
@@ -227,10 +228,7 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     found = {report.name: "" for report in prediction.effects if report.active}
     called = {name: "the prediction found it" for name in found if name in ("plasticity", "self_contact", "obstacles")}
     values = [_number(scene, name) for name in wrt]
-    problem = pose(scene, called)
-    if problem.plane.dimensions < accuracy.dimensions:
-        called["side"] = accuracy.dimensions_reason
-        problem = pose(scene, called)
+    problem = pose_as_shown(scene, called, prediction.surface.control_points[0, :, :3])
     monitor = Monitor(None, None, None)
     steps = _asked_for(problem, accuracy.steps)
     rho = RHO if problem.contact is None and problem.friction is None else STRONGLY_DAMPED
@@ -244,7 +242,7 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
         reason = "the start is an equilibrium that is found by iteration"
 
     def moved(name: str, value: float) -> tuple[Problem, Grid]:
-        other = pose(_with(scene, name, value), called)
+        other = pose(_with(scene, name, value), problem.called_for)
         return other, start_grid(other, accuracy.n_u, monitor)
 
     above, below, exact, widths = [], [], [], []

@@ -16,6 +16,7 @@ from dlocore.problem import Problem
 from dlocore.report import WindowForces
 from dlocore.scene import Grasp
 from dlocore.solvers.monitor import Monitor, TimeIsUp
+from dlocore.spline import greville
 
 Floats = NDArray[np.float64]
 Rest = Literal["settled", "restless", "time"]  # at rest; no rest found; the time was up
@@ -65,7 +66,7 @@ def settle(
     rest: Rest = "restless"
     forces: tuple[WindowForces, ...] = ()
     for t in times:
-        grasps = closed_grasps(problem, t, t)
+        grasps = closed_grasps(problem.scene, t, t)
         close_grasps(problem, grid, grasps, starts, q)
         held = hold(problem, grid, grasps, np.array([before_t, t]), starts, q if t > 0.0 else grid.start)
         if t > 0.0:
@@ -195,7 +196,7 @@ def _carry(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, t:
             for g in order
         ]
     )
-    middle = (grid.knots[1:-3] + grid.knots[2:-2] + grid.knots[3:-1]) / 3  # of the control points
+    middle = greville(grid.knots)  # of the control points
     for d in range(dimensions):
         q[:, d] += np.interp(middle, [g.u for g in order], shift[:, d])
 

@@ -1,25 +1,28 @@
 """Whether a planar motion stays in its plane: whether a disturbance out of it would grow."""
 
 import math
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.buckling import BOW, GROWTH
+from dlocore.bands import dense_of
+from dlocore.buckling import BOW, GROWTH, UNSTABLE
 from dlocore.discretisation import plane_curvature_of
+from dlocore.events import closed_grasps
 from dlocore.grid import Grid
 from dlocore.kernels.across import stiffness_across
 from dlocore.kernels.banded import factor
 from dlocore.plane import flat_plane
-from dlocore.problem import Problem
-from dlocore.scene import Grasp
+from dlocore.problem import Problem, pose
+from dlocore.scene import Grasp, Scene
 from dlocore.solvers.march import March
 
 Floats = NDArray[np.float64]
 
-FLAT = 1e-6  # of the length: so near to a plane a motion is planar, but for rounding
+_FLAT = 1e-6  # of the length: so near to a plane a motion is planar, but for rounding
 _LOOKS = 7  # states of a motion
 _NEUTRAL = 1e-8  # of the largest stiffness: what rounding leaves of none
 _FIRM = 1e6  # times the largest stiffness, with which what is held stays in the plane
@@ -37,10 +40,10 @@ def leaves_plane(problem: Problem, motion: March) -> bool:
     slack = density * slowest**2 + drag * slowest
     growth = 0.0
     for t, q, band in zip(motion.times[looks].tolist(), states, bands, strict=True):
-        held = [g for g in problem.scene.grasps if g.start <= t and (g.release_time is None or t < g.release_time)]
+        held = closed_grasps(problem.scene, t, t)
         stiff = band + _held_band(motion.grid, held, _FIRM * float(np.abs(band).max()))
         if factor(stiff + slack * unit) >= 0:
-            least = _least(_dense(stiff) + _twisting(problem, motion.grid, q, held), unit)
+            least = _least(dense_of(stiff) + _twisting(problem, motion.grid, q, held), unit)
             growth += (np.sqrt(drag**2 - 4.0 * density * min(least, 0.0)) - drag) / (2.0 * density)
     # a straight cable that buckles may do so to any side: until it has, all grow alike
     both = math.log(1.0 / BOW) if problem.start.bow else 0.0
@@ -58,7 +61,7 @@ def is_unstable(problem: Problem, grid: Grid, q: Floats, held: list[Grasp]) -> b
     stiff = bands[0] + _held_band(grid, held, _FIRM * largest)
     if factor(stiff + slack * unit) < 0:
         return False
-    return _least(_dense(stiff) + _twisting(problem, grid, states[0], held), unit) < -slack
+    return _least(dense_of(stiff) + _twisting(problem, grid, states[0], held), unit) < -slack
 
 
 def _in_plane(problem: Problem, states: Floats) -> Floats | None:
@@ -78,9 +81,16 @@ def _in_plane(problem: Problem, states: Floats) -> Floats | None:
     if plane.dimensions == 3:
         return None
     r = problem.plane.world(states[..., :3])
-    flat = plane.points(r)
-    away = float(np.abs(r - plane.world(flat)).max())
-    return flat if away <= FLAT * problem.scene.cable.length else None
+    return plane.points(r) if plane.distance(r) <= _FLAT * problem.scene.cable.length else None
+
+
+def pose_as_shown(scene: Scene, called_for: Mapping[str, str], start: Floats) -> Problem:
+    """Return the problem of a motion that began at control points (n, 3) [m], bowed out of its plane as they are."""
+    problem = pose(scene, called_for)
+    plane = flat_plane(scene, problem.start)
+    if problem.on_table or plane.dimensions == 3 or plane.distance(start) <= _FLAT * scene.cable.length:
+        return problem
+    return pose(scene, {**called_for, "side": UNSTABLE})
 
 
 def _bands(problem: Problem, grid: Grid, states: Floats) -> tuple[Floats, Floats]:
@@ -132,16 +142,6 @@ def _twisting(problem: Problem, grid: Grid, q: Floats, held: list[Grasp]) -> Flo
 
 def _least(stiff: Floats, unit: Floats) -> float:
     """Return the least eigenvalue k [N/m^2] of K w = k U w, of a stiffness (n, n) and the lower band (n, 4) of U."""
-    root = np.linalg.cholesky(_dense(unit))
+    root = np.linalg.cholesky(dense_of(unit))
     inner = np.linalg.solve(root, np.linalg.solve(root, stiff).T)
     return float(np.linalg.eigvalsh(inner)[0])
-
-
-def _dense(band: Floats) -> Floats:
-    """Return the symmetric matrix (n, n) of a lower band (n, 4)."""
-    n = len(band)
-    full = np.zeros((n, n))
-    for o in range(4):
-        at = np.arange(n - o)
-        full[at + o, at] = full[at, at + o] = band[: n - o, o]
-    return full

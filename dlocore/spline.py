@@ -17,6 +17,11 @@ def uniform_knots(n: int, end: float) -> Floats:
     return knots
 
 
+def greville(knots: Floats) -> Floats:
+    """Return the means of three successive knots (n,), where control points of a straight line at even speed lie."""
+    return (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0
+
+
 def design_matrix(knots: Floats, x: ArrayLike, derivative: int = 0) -> Floats:
     """Return the basis functions, or a derivative of them, at the points `x`; (len(x), n) [1/unit^derivative]."""
     from scipy.interpolate import BSpline  # slow to import, and not needed to make a scene

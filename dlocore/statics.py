@@ -86,7 +86,7 @@ def equilibrium(
     """
     at = number("at", at, at_least=0.0, at_most=1e4, unit="s")
     problem = pose(scene, at_rest=True)
-    if not closed_grasps(problem, at, at) and (np.any(problem.weight() != 0) or scene.loads):
+    if not closed_grasps(scene, at, at) and (np.any(problem.weight() != 0) or scene.loads):
         raise SceneError(
             "primitives", "no grasp", "a grasp that holds the cable", "Nothing holds it against its forces"
         )
@@ -95,7 +95,7 @@ def equilibrium(
     least = smallest_n_u(problem)
     sizes = [n_u] if n_u is not None else [max(n, least + 2 * i) for i, n in enumerate(LEVELS)]
     rest = _refined(problem, sizes, at, target, monitor)
-    if rest.status == "converged" and is_unstable(problem, rest.grid, rest.q, closed_grasps(problem, at, at)):
+    if rest.status == "converged" and is_unstable(problem, rest.grid, rest.q, closed_grasps(scene, at, at)):
         problem = pose(scene, {"side": UNSTABLE}, at_rest=True)
         rest = _refined(problem, sizes, at, target, monitor)
     grid, q, history = rest.grid, rest.q, rest.history

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from dlocore.frames import unit
 from dlocore.scene import ControlPoints, Material
-from dlocore.spline import design_matrix
+from dlocore.spline import design_matrix, greville
 from dlocore.transport import transported
 
 Floats = NDArray[np.float64]
@@ -75,7 +75,7 @@ def with_sections(
         d, end = carried(t, director)[-1], frames[1][0]
         theta = float(np.arctan2(np.cross(d, end) @ t[-1], d @ end)) + turn
         theta = (theta + np.pi) % (2.0 * np.pi) - np.pi
-    middle = (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0
+    middle = greville(knots)
     bends = np.zeros((2, 2)) if rest_curvature is None else rest_curvature
     at = np.linspace(0.0, length, 201)
     places = np.linspace(0.0, length, len(bends))

@@ -6,6 +6,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.bands import dense_of
 from dlocore.cable import Cable
 from dlocore.discretisation import make_grid
 from dlocore.effects import laws
@@ -13,7 +14,7 @@ from dlocore.grid import Grid
 from dlocore.kernels.assembly import NO_RATES, assemble, stored_energy
 from dlocore.problem import pose
 from dlocore.scene import Grasp, Scene, Straight
-from dlocore.spline import design_matrix
+from dlocore.spline import design_matrix, greville
 
 Floats = NDArray[np.float64]
 
@@ -96,7 +97,7 @@ class StartFit:
         springs = _SPRING * np.kron(rows.free.T @ (B.T @ B) @ rows.free, np.eye(3))
         Z = np.kron(rows.free, np.eye(3))
         if guess is None:
-            middle = (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0
+            middle = greville(knots)
             guess = np.column_stack([np.interp(middle, u, markers[:, d]) for d in range(3)])
         C = np.vstack([design_matrix(knots, [at], order) for at, order in self.held]) if self.held else np.zeros((0, n))
         q = guess + rows.offset @ (targets - C @ guess)
@@ -112,7 +113,7 @@ class StartFit:
             scales = (1.0, 0.0, 0.0)  # the positive part: from a guess along noisy markers the full one need not be
             assemble(_AXES, q, still, tables, active, p, history, NO_RATES, scales, f, K)
             force = (Z.T @ (f - load + _SPRING * B.T @ (B @ q - markers)).ravel()).astype(float)
-            step = -np.linalg.solve(Z.T @ _dense(K) @ Z + springs, force)
+            step = -np.linalg.solve(Z.T @ dense_of(K) @ Z + springs, force)
             slope, length = float(force @ step), 1.0
             change = (Z @ step).reshape(n, 3)
             after = energy(q + change)
@@ -165,15 +166,6 @@ def start_fit(length: float, n_u: int, held: tuple[tuple[float, int], ...]) -> S
     cable = Cable(length=length, diameter=0.01 * length, linear_density=1.0, bending_stiffness=1.0)
     straight = Scene(cable=cable, shape=Straight(), grasps=grasps, horizon=1.0, effects={"twist": "off"})
     return StartFit(make_grid(pose(straight), n_u), held)
-
-
-def _dense(K: Floats) -> Floats:
-    size, width = K.shape
-    out = np.zeros((size, size))
-    for o in range(min(width, size)):
-        at = np.arange(size - o)
-        out[at + o, at] = out[at, at + o] = K[: size - o, o]
-    return out
 
 
 def _matrix(first: NDArray[np.int64], values: Floats, n: int) -> Floats:

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dlocore.buckling import side_notes
 from dlocore.errors import SceneError
+from dlocore.events import closed_grasps
 from dlocore.prediction import Accuracy, EffectReport, GraspReaction, Iteration, Prediction, Status
 from dlocore.problem import Problem, pose
 from dlocore.reference.chain import chain, grip
@@ -149,7 +150,7 @@ def _elastic_energy(level: Level, k: int) -> float:
     """Return the elastic energy [J] at the step k of a motion."""
     rod, now = level.motion.rod, level.motion.states[k]
     t = float(level.motion.times[k])
-    held = [g for g in rod.problem.scene.grasps if g.start <= t and (g.release_time is None or t < g.release_time)]
+    held = closed_grasps(rod.problem.scene, t, t)
     grips = tuple(grip(rod, g, level.motion.states[int(np.searchsorted(level.motion.times, g.start))]) for g in held)
     link = chain(rod, grips, t, t + 1.0)
     return float(sum(energies(link.body, link.state(now))[1:]))

@@ -280,7 +280,7 @@ class _Walk:
         """Close the grasps of a stretch; what friction holds leans on it from the beginning."""
         problem, grid, times = self._problem, self._grid, self._times
         h = (end - begin) / (last - first)
-        grasps = closed_grasps(problem, begin, end)
+        grasps = closed_grasps(problem.scene, begin, end)
         load = self._applied[min(first, len(self._applied) - 1)]
         before = float(times[first] - times[first - 1]) if first > 0 else 0.0
         entry = enter(

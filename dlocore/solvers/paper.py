@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.bands import dense_of
 from dlocore.discretisation import applied_forces
 from dlocore.errors import SceneError
 from dlocore.events import closed_grasps
@@ -53,7 +54,7 @@ def solve_as_printed(
     if n_u * n_t > LARGEST_NET:
         allowed = f"at most {LARGEST_NET} control points with the printed scheme, which is dense"
         raise SceneError("quality.n_u", f"n_u n_t = {n_u * n_t}", allowed)
-    grasps = closed_grasps(problem, 0.0, problem.horizon)
+    grasps = closed_grasps(problem.scene, 0.0, problem.horizon)
     starts: Starts = {}
     close_grasps(problem, grid, grasps, starts, None)
     window = WindowSolver(
@@ -104,7 +105,7 @@ def _equations(
     size, free = n_u * nc, window.free
     K, dense = np.empty((size, 4 * nc)), np.empty((size, size))
     unit, density, dragged = window.grid.tables.mass, window.problem.mass_density(), window.problem.drag_coefficient()
-    M, N = (_dense_band(factor * unit, nc) for factor in (density, dragged))
+    M, N = (np.kron(dense_of(factor * unit), np.eye(nc)) for factor in (density, dragged))
     f, state = np.empty((n_u, nc)), np.empty((3, n_u, nc))
     J = np.zeros((len(first) * free, (n_t - 2) * free))
     R = np.empty(len(first) * free)
@@ -123,12 +124,3 @@ def _equations(
             column = (int(first[k]) + j - 2) * free
             J[rows, column : column + free] = sum(table[k, o, j] * reduced[o] for o in range(3))
     return J, R
-
-
-def _dense_band(band: Floats, nc: int) -> Floats:
-    n = len(band)
-    full = np.zeros((n, n))
-    for o in range(4):
-        full[np.arange(n - o) + o, np.arange(n - o)] = band[: n - o, o]
-        full[np.arange(n - o), np.arange(n - o) + o] = band[: n - o, o]
-    return np.asarray(np.kron(full, np.eye(nc)), dtype=np.float64)

@@ -51,7 +51,7 @@ def march_smooth(
     h = problem.horizon / steps
     times = np.concatenate([h * NEAR, h * np.arange(steps + 1)])
     times[-1] = problem.horizon
-    grasps = closed_grasps(problem, 0.0, problem.horizon)
+    grasps = closed_grasps(problem.scene, 0.0, problem.horizon)
     starts: Starts = {}
     close_grasps(problem, grid, grasps, starts, grid.start)
     _, rows, sampled = constraint_rows(grasps, times, starts)

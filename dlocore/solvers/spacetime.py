@@ -236,7 +236,7 @@ def solve(problem: Problem, motion: March, knots_t: Floats, delta: float, monito
     q, v = motion.states[0], motion.velocity
     converged, worst = True, 0.0
     for i, window in enumerate(windows):
-        grasps = closed_grasps(problem, window.begin, window.end)
+        grasps = closed_grasps(problem.scene, window.begin, window.end)
         close_grasps(problem, grid, grasps, starts, q)
         span = (window.end - window.begin) / (len(window.knots) - 7)
         stiffness = bounded_axial_stiffness(problem, tension, span)

@@ -188,7 +188,7 @@ class Tangle:
 
     def elimination(self) -> Elimination:
         """Return the elimination of what the scene's grasps hold."""
-        grasps, starts = closed_grasps(self.problem, 0.0, 0.1), Starts()
+        grasps, starts = closed_grasps(self.problem.scene, 0.0, 0.1), Starts()
         close_grasps(self.problem, self.grid, grasps, starts, None)
         return hold(self.problem, self.grid, grasps, np.zeros(1), starts, self.grid.start).elimination
 

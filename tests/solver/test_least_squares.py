@@ -41,7 +41,7 @@ def window(table: Table | None, twist: str, damping: float) -> tuple[WindowSolve
     knots = time_knots(problem, 9)
     assert knots is not None
     part = windows_of(problem, knots)[0]
-    grasps = closed_grasps(problem, part.begin, part.end)
+    grasps = closed_grasps(problem.scene, part.begin, part.end)
     starts: Starts = {}
     close_grasps(problem, grid, grasps, starts, grid.start)
     solver = WindowSolver(

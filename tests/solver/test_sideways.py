@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dlocore import Cable, Environment, Grasp, Move, Points, Prediction, Quality, Scene, equilibrium, predict
+from dlocore import Cable, Environment, Grasp, Move, Points, Prediction, Quality, Scene, Sphere, equilibrium, predict
 from dlocore.kernels.across import stiffness_across
 from dlocore.kernels.assembly import NO_RATES, History, assemble
 from dlocore.kernels.tension import COLUMNS
 from dlocore.plane import Plane
 from dlocore.problem import Problem
-from dlocore.sideways import is_unstable
+from dlocore.sideways import is_unstable, pose_as_shown
 from dlocore.solvers.ladder import Level
 
 Floats = NDArray[np.float64]
@@ -56,6 +56,21 @@ def test_an_arch_that_turns_freely_about_its_ends_falls_over() -> None:
     assert "in its plane the motion is unstable" in prediction.message
     assert "mirror image" in prediction.message
     assert out_of_plane(prediction) > 0.2
+
+
+@pytest.mark.parametrize("touches", [False, True])
+def test_a_motion_is_posed_anew_with_the_bow_that_its_start_shows(touches: bool) -> None:
+    far = Sphere(center=(0.5, 0.0, -0.9), radius=0.05)  # in the plane, and in space for it
+    scene = (
+        replace(FALLS, environment=replace(HEAVY, obstacles=(far,)), effects={"obstacles": "on"}) if touches else FALLS
+    )
+    prediction = predict(scene)
+    shown = pose_as_shown(scene, {}, prediction.surface.control_points[0, :, :3])
+    level = cast(Level, prediction.level)
+    assert level.posed.start.aside > 0.0
+    assert shown.start.aside == level.posed.start.aside
+    hangs = between(1.0, False, "point", HEAVY, 0.3, stiffness=1e-3)
+    assert pose_as_shown(hangs, {}, predict(hangs).surface.control_points[0, :, :3]).start.aside == 0.0
 
 
 def test_its_equilibrium_hangs() -> None:
