@@ -16,7 +16,7 @@ from dlocore.effects.bend import Bend
 from dlocore.effects.contact import Contact, TableContact
 from dlocore.effects.damping import Damping, TwistDamping
 from dlocore.effects.drag import LinearDrag, QuadraticDrag
-from dlocore.effects.friction import Friction
+from dlocore.effects.friction import Friction, slip_of
 from dlocore.effects.gravity import Gravity
 from dlocore.effects.inertia import Inertia
 from dlocore.effects.laws import keeps_curvature, keeps_history
@@ -317,7 +317,7 @@ def pose(scene: Scene, called_for: Mapping[str, str] | None = None, *, at_rest: 
         table=TableContact(table.height - plane.origin[2], table.friction)
         if table is not None and active("table", not on_table)
         else None,
-        friction=Friction(cable.diameter, lying) if rubs else None,
+        friction=Friction(slip_of(cable.diameter, cable.length, np.inf), lying) if rubs else None,
         self_contact=SelfContact(cable.diameter, 10.0 * _contact_stiffness(scene), cable.linear_density)
         if active("self_contact")
         else None,
@@ -333,6 +333,14 @@ def stiffer(problem: Problem, ratio: float) -> Problem:
         contact=None if contact is None else replace(contact, stiffness=ratio * contact.stiffness),
         self_contact=None if own is None else replace(own, stiffness=ratio * own.stiffness),
     )
+
+
+def firmer(problem: Problem, step: float) -> Problem:
+    """Return the problem with friction that gives way by as much as is in keeping with steps of `step` [s]."""
+    if problem.friction is None:
+        return problem
+    cable = problem.scene.cable
+    return replace(problem, friction=replace(problem.friction, slip=slip_of(cable.diameter, cable.length, step)))
 
 
 def _contact_stiffness(scene: Scene) -> float:

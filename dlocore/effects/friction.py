@@ -3,11 +3,13 @@
     f = -mu N s/max(|s|, s_0),
 
 with s the displacement along the surface from an anchor. Where |s| passes s_0 the anchor is dragged behind, so that a
-cable at rest stays at rest under any force below mu N, and moves by less than s_0 while it sticks. N is that of the
-last step, which keeps the tangent symmetric. Where there is no step (space-time least squares) the law is
+cable at rest stays at rest under any force below mu N, and moves by less than s_0 while it sticks. Coulomb's law is
+the limit of a small s_0, which goes with the square of the step: so its refinement is part of that of the steps. N is
+that of the last step, which keeps the tangent symmetric. Where there is no step (space-time least squares) the law is
 -mu N v/sqrt(v^2 + v_0^2).
 """
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -16,22 +18,30 @@ import numpy as np
 from dlocore.effects.base import Effect, Site, Symmetric, Vector
 from dlocore.kernels.compile import law
 
-STICK = 0.02  # of the diameter: s_0
+STICK = 0.02  # of the diameter: s_0 of steps of COARSE and longer ones
+COARSE = 0.05  # [s] for a cable of 1 m; with the root of the length, as the period of one that swings
+LEAST_STICK = 1e-7  # of the length: ten times what Newton's method leaves of a step
 SLIP_SPEED = 0.005  # [m/s]: v_0
 
 
 @dataclass(frozen=True)
 class Friction(Effect):
-    """Diameter D [m], and the friction per length mu N of a cable that lies in the plane of the motion [N/m], or 0."""
+    """The slip s_0 [m], and the friction per length mu N [N/m] of a cable lying in the plane of the motion, or 0."""
 
     name: ClassVar[str] = "friction"
     site: ClassVar[Site] = "contact"
-    diameter: float
+    slip: float
     lying: float
 
     def parameters(self) -> tuple[float, ...]:
         """Return (s_0, v_0, mu N of the lying cable)."""
-        return (STICK * self.diameter, SLIP_SPEED, self.lying)
+        return (self.slip, SLIP_SPEED, self.lying)
+
+
+def slip_of(diameter: float, length: float, step: float) -> float:
+    """Return the slip s_0 [m] of steps of `step` [s], for a cable of a diameter and a length [m]."""
+    most = STICK * diameter
+    return min(most, max(LEAST_STICK * length, most * (step / (COARSE * math.sqrt(length))) ** 2))
 
 
 @law

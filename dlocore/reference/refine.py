@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 ELEMENTS = 20  # of the coarsest rod
 LEVELS = 6  # of refinement: up to 640 elements
 LEAST = 3  # rods, of which two changes tell how fast they converge
-FIRMEST = 64.0  # times: friction holds within a quarter of the way with each refinement, up to here
+FIRMER = 4.0  # times: friction holds within a quarter of the way with each refinement
 STEP = 1e-2  # of the target: the error of a step of the coarsest rod; a quarter of it with each refinement
 ORDERLY = (2.5, 8.0)  # change over next change, about 4: motions that converge with the second order
 SLOWEST = 1.5  # change over next change, below which nothing is said of the limit
@@ -93,7 +93,7 @@ def refine(problem: Problem, target: float, watch: Watch, on_level: Callable[[Pr
     ended: Literal["agreed", "finest", "time", "step"] = "finest"
     while len(levels) < LEVELS:
         k = len(levels)
-        rod = build(problem, nodes_of(problem, ELEMENTS, k), stiffening, min(4.0**k, FIRMEST))
+        rod = build(problem, nodes_of(problem, ELEMENTS, k), stiffening, FIRMER**k)
         motion = simulate(rod, STEP * target * 0.25**k, watch)
         if motion.stopped == "time" and levels:
             return Refined(problem, tuple(levels), "time")

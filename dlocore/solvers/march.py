@@ -28,7 +28,7 @@ from dlocore.kernels.march import (
 )
 from dlocore.kernels.tension import COLUMNS
 from dlocore.kernels.twisted import PAST
-from dlocore.problem import Problem
+from dlocore.problem import Problem, firmer
 from dlocore.report import WindowForces
 from dlocore.scene import Grasp
 from dlocore.solvers.monitor import Monitor, TimeIsUp
@@ -151,6 +151,7 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
     """
     marks = marks_of(problem)
     counts = step_counts(marks, steps)
+    problem = firmer(problem, problem.horizon / steps)
     if problem.inertia is None or problem.contact is not None or problem.friction is not None:
         rho = STRONGLY_DAMPED  # forces that jump are balanced at the end of each step
     walk = _Walk(problem, grid, monitor, step_times(marks, counts), rho)

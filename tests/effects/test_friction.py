@@ -18,12 +18,14 @@ from dlocore import (
     Move,
     Points,
     Prediction,
+    Quality,
     Scene,
     Straight,
     Table,
     Waypoints,
     predict,
 )
+from dlocore.effects.friction import slip_of
 from tests.solver.scenes import Floats, G, apart, cable, march, momentum, refined
 
 MASS = 0.05  # [kg] of the paper's cable, 1 m long
@@ -330,3 +332,56 @@ def test_friction_takes_exactly_the_work_that_the_gripper_gives():
     work = np.trapezoid(found.reaction[:, 0], path[:, 0])
     # it begins and ends at rest; 0.1 mm of the 0.1 m are given way before it slides
     assert work == pytest.approx(0.3 * MASS * G * 0.1, rel=0.01)
+
+
+# --- Coulomb's law as the limit of the elastic slip ---
+
+
+def pushed_together(turn: float = 0.0) -> Scene:
+    """Return a straight cable on a rough table whose end is brought nearer to the other, and turned by `turn` [rad].
+
+    Which way it buckles, and where, friction decides while it holds: a cable that gives way by 0.1 mm before friction
+    holds ends up to 0.15 L elsewhere.
+    """
+    share = 0.5 if turn else 1.0
+    rotation = (0.0, 0.0, turn) if turn else None
+    path = Move(displacement=(0.2 * share, 0.1 * share, 0.0), duration=2.0, rotation=rotation)
+    grasps = (Grasp(u=0.0, hold="tangent" if turn else "point", path=path), Grasp(u=1.0))
+    around = Environment(drag=0.05, table=Table(friction=0.4))
+    return Scene(
+        cable=cable(),
+        shape=Straight(),
+        grasps=grasps,
+        environment=around,
+        effects={"self_contact": "off"},
+    )
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.78])
+def test_a_cable_pushed_together_on_a_rough_table_is_where_the_reference_takes_it(turn):
+    scene = pushed_together(turn)
+    found = converged(scene)
+    reference = converged(replace(scene, quality=Quality(method="reference", target_error=2e-3)))
+    told = found.accuracy.error_estimate + reference.accuracy.error_estimate
+    assert told < 4e-3
+    assert apart(found.surface, reference.surface).max() < 1.5 * told
+
+
+def test_an_estimate_on_a_given_grid_tells_of_the_slip_before_friction_holds():
+    scene = pushed_together(0.78)
+    truth = converged(replace(scene, quality=Quality(target_error=1e-3)))
+    for n_u, n_t in ((17, 33), (33, 65)):
+        found = predict(replace(scene, quality=Quality(n_u=n_u, n_t=n_t, method="march")))
+        off = apart(found.surface, truth.surface).max()
+        assert off > 5e-3  # so that there is something to tell
+        assert found.accuracy.error_estimate > 0.5 * off
+
+
+def test_the_slip_goes_with_the_square_of_the_step_between_its_bounds():
+    diameter, length = 0.005, 4.0
+    coarse = slip_of(diameter, length, 0.1)  # of the coarsest grid
+    assert coarse == pytest.approx(0.02 * diameter)
+    assert slip_of(diameter, length, 5.0) == coarse
+    assert slip_of(diameter, length, 0.05) == pytest.approx(coarse / 4.0)
+    assert slip_of(diameter, length, 1e-9) == pytest.approx(1e-7 * length)
+    assert slip_of(1e-9, length, 0.1) == pytest.approx(2e-11)  # never above what it begins with
