@@ -73,7 +73,8 @@ def out_of_plane(scene: Scene, start: StartCurve, normal: Floats) -> StartCurve:
     parts = list(_parts(sorted(scene.grasps, key=lambda g: g.u), length))
     knots = _joined(start.knots, _knots(parts, length))
     u = greville(knots)
-    aside = np.sum([_bow(part, u) for part in parts], axis=0)
+    # one that buckles has a side already: what is left to tell is whether it leaves the plane that this gave it
+    aside = np.sum([_bow(part, u) for part in parts], axis=0) * (BOW if start.bow else 1.0)
     control = fit_to_knots(start, knots) + np.outer(aside, normal)
     return replace(start, knots=knots, control_points=control, aside=float(aside.max()))
 
@@ -104,7 +105,7 @@ def side_notes(start: StartCurve) -> list[str]:
         notes.append(f"{why}: {bow}")
     if start.aside:
         bow = f"it starts with a bow of {start.aside * 1e3:.2g} mm out of it, and its mirror image is as likely"
-        notes.append(f"{UNSTABLE}: {bow}")
+        notes.append(f"{'the plane of its bow may not hold it' if start.bow else UNSTABLE}: {bow}")
     return notes
 
 

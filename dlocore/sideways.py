@@ -88,7 +88,7 @@ def pose_as_shown(scene: Scene, called_for: Mapping[str, str], start: Floats) ->
     """Return the problem of a motion that began at control points (n, 3) [m], bowed out of its plane as they are."""
     problem = pose(scene, called_for)
     plane = flat_plane(scene, problem.start)
-    if problem.on_table or plane.dimensions == 3 or plane.distance(start) <= _FLAT * scene.cable.length:
+    if problem.on_table or plane.dimensions == 3 or plane.distance(start) <= 0.1 * BOW**2 * scene.cable.length:
         return problem
     return pose(scene, {**called_for, "side": UNSTABLE})
 

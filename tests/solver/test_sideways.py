@@ -7,7 +7,20 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dlocore import Cable, Environment, Grasp, Move, Points, Prediction, Quality, Scene, Sphere, equilibrium, predict
+from dlocore import (
+    Cable,
+    Environment,
+    Grasp,
+    Move,
+    Points,
+    Prediction,
+    Quality,
+    Scene,
+    Sphere,
+    Straight,
+    equilibrium,
+    predict,
+)
 from dlocore.kernels.across import stiffness_across
 from dlocore.kernels.assembly import NO_RATES, History, assemble
 from dlocore.kernels.tension import COLUMNS
@@ -71,6 +84,29 @@ def test_a_motion_is_posed_anew_with_the_bow_that_its_start_shows(touches: bool)
     assert shown.start.aside == level.posed.start.aside
     hangs = between(1.0, False, "point", HEAVY, 0.3, stiffness=1e-3)
     assert pose_as_shown(hangs, {}, predict(hangs).surface.control_points[0, :, :3]).start.aside == 0.0
+
+
+@pytest.mark.parametrize(("closer", "leaves"), [(0.5, False), (0.9, True)])
+def test_a_column_leaves_the_plane_of_its_bow_only_where_that_is_unstable(closer: float, leaves: bool) -> None:
+    # straight, a disturbance to any side grows as much as its bow, and turns the plane it buckles in by as little
+    around = replace(WEIGHTLESS, drag=0.05)
+    grasps = [
+        Grasp(u=u, hold="tangent", path=Move(displacement=(d, 0.0, 0.0), duration=3.0))
+        for u, d in ((0.0, 0.0), (1.0, -closer))
+    ]
+    cable = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-2)
+    scene = Scene(
+        cable=cable, shape=Straight(), grasps=tuple(grasps), environment=around, effects={"self_contact": "off"}
+    )
+    prediction = predict(scene)
+    assert prediction.status == "converged", prediction.message
+    assert prediction.accuracy.dimensions == 3  # it might have left it
+    u, t = np.linspace(0.0, 1.0, 65), np.linspace(0.0, 3.0, 33)
+    y, z = (np.abs(prediction.surface.positions(u, t)[..., d]).max() for d in (1, 2))
+    assert y > 0.3
+    assert (z > 0.1) if leaves else (z < 1.1e-3 * y)
+    shown = pose_as_shown(scene, {}, prediction.surface.control_points[0, :, :3])
+    assert shown.start.aside == cast(Level, prediction.level).posed.start.aside > 0.0
 
 
 def test_its_equilibrium_hangs() -> None:
