@@ -45,7 +45,8 @@ class Straight:
     """A straight cable from `start` (3,) [m] along `direction` (3,), which need not have unit length.
 
     Args (of every start shape):
-        settle: relax to static equilibrium under the grasps' first poses before t = 0.
+        settle: relax to static equilibrium under the grasps' first poses before t = 0; on something rough to where
+            friction holds it.
         velocity: initial velocity [m/s]: None (rest), (3,) for all points, or (n, 3) at points evenly spaced along
             the cable (for `Points`: at the points themselves; for `ControlPoints`: control points of the velocity).
     """

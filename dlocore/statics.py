@@ -18,6 +18,7 @@ from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
 from dlocore.regrid import begin_on
 from dlocore.report import WindowForces, elastic_energy, reactions
+from dlocore.resting import slide_to_rest
 from dlocore.scene import Scene
 from dlocore.settling import Settled, settle
 from dlocore.sideways import is_unstable
@@ -74,7 +75,7 @@ def equilibrium(
     of the length, or to the scene's `target_error`.
 
     Args:
-        scene: its horizon, inertia, drag and damping play no part.
+        scene: its horizon, inertia, drag, damping and friction play no part.
         at: time of the grasps' poses and of the loads [s].
         n_u: number of control points; None: chosen.
         deadline: time allowed [s].
@@ -181,7 +182,13 @@ def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None =
 
 
 def _settled(problem: Problem, grid: Grid, monitor: Monitor, like: Grid | None) -> Grid | None:
-    """Return a grid with its start settled, first from that of a grid like it, or None where it finds no rest."""
+    """Return a grid with its start settled, first from that of a grid like it, or None where it finds no rest.
+
+    On something rough it slides there from the given start on every grid, as what friction holds depends on the way.
+    """
+    if problem.friction is not None:
+        q, rest, history = slide_to_rest(problem, grid, monitor)
+        return None if rest == "restless" else grid.changed(start=q, history=history)
     begin = None if like is None else begin_on(problem, grid, like)
     q, rest, _, history = settle(problem, grid, 0.0, monitor, begin)
     if begin is not None and rest == "restless":

@@ -22,6 +22,7 @@ from dlocore.reference.body import (
     EA,
     EI,
     GJ,
+    GYRATION,
     LYING,
     MEMORY_RATE,
     PASSAGE,
@@ -279,8 +280,13 @@ def _add_full(body: Any, k: int, H: Any, W: Any, full: Any, K: Any) -> None:
 
 @compiled
 def add_drag(body: Any, v: Any, implicit: float, R: Any, K: Any, mode: int) -> None:
-    """Add the drag of the nodes (eq. 8)."""
+    """Add the drag of the nodes, and of the spins of the edges (eq. 8)."""
     c, c2 = body.law[DRAG], body.law[DRAG_QUADRATIC]
+    for e in range(len(body.rest) if body.dims == 4 else 0):
+        spins = c * body.law[GYRATION] ** 2 * body.rest[e]
+        R[e, 3] += spins * v[e, 3]
+        if mode != 0:
+            add(body, K, e, 3, e, 3, spins / implicit)
     for n in range(len(body.cell)):
         speed = np.sqrt(v[n, 0] ** 2 + v[n, 1] ** 2 + v[n, 2] ** 2)
         for i in range(3):

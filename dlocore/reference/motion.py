@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dlocore.paths import Waypoints
 from dlocore.problem import Problem
+from dlocore.reference import body as places
 from dlocore.reference.body import State, Tableau
 from dlocore.reference.chain import Chain, Grip, chain, grip
 from dlocore.reference.rod import Memory, Rod, Snapshot
@@ -41,6 +42,7 @@ SAFETY, SHRINK, GROW = 0.85, 0.2, 4.0  # of the choice of the next step
 FAILURE = 0.25  # of a step that found no solution: the next
 NOTES = 2000  # of a motion at most, between its events
 SHORTEST = 1e-9  # of the horizon: a step
+DOWN = 1e-3  # [s]: the first step downhill; what friction holds in the end depends on longer ones
 SETTLED = 1e-11  # of the length: a step downhill that ends the search for an equilibrium
 DOWNHILL = 400  # steps to an equilibrium
 
@@ -219,14 +221,17 @@ def _window(link: Chain, state: State, tolerance: float, watch: Watch, record: _
 def settled(rod: Rod, watch: Watch) -> Snapshot:
     """Return the rod in equilibrium under the grasps' first poses: backward Euler downhill, in ever longer steps.
 
-    The velocity is forgotten after each step, so that the rod goes where its energy falls.
+    The velocity is forgotten after each step, so that the rod goes where its energy falls; nothing yields on the way.
     """
     length = rod.problem.scene.cable.length
+    law = rod.law.copy()
+    law[places.YIELD_BEND : places.YIELD_STRETCH + 1] = np.inf
+    rod = replace(rod, law=law)
     held = tuple(grip(rod, g, rod.start) for g in rod.problem.scene.grasps if g.start == 0.0)
     link = chain(rod, held, 0.0, rod.problem.horizon)
     state = link.state(rod.start)
     told = np.zeros(3)
-    h = 1e-2
+    h = DOWN
     for _ in range(DOWNHILL):
         watch.check()
         after = State(*(np.zeros_like(x) for x in state))

@@ -19,6 +19,7 @@ from dlocore import (
     Move,
     Points,
     Prediction,
+    Quality,
     Scene,
     Straight,
     Waypoints,
@@ -530,3 +531,23 @@ def test_a_long_rod_that_is_twisted_and_slackened_buckles_to_one_localised_helix
     tension = B * (4 * np.sin(phi / 2) / slack) ** 2
     assert found.reactions[1, 0] == pytest.approx(tension, rel=3e-3)
     assert found.moments[1, 0] == pytest.approx(2 * np.cos(phi / 2) * np.sqrt(B * tension), rel=1e-3)
+
+
+@pytest.mark.parametrize("method", ["march", "reference"])
+def test_drag_resists_the_spin_of_the_sections(method):
+    # spun steadily at one end, all of the cable spins alike: the gripper gives the torque c D^2/8 omega L
+    thick = cable(diameter=0.02, bending_stiffness=1.0, torsional_stiffness=1.0)
+    turn = Move(displacement=(0.0, 0.0, 0.0), duration=2.0, rotation=(3.0, 0.0, 0.0), profile="linear")
+    quality = Quality(method="reference", target_error=1e-3) if method == "reference" else march(9, 33)
+    scene = Scene(
+        cable=thick,
+        shape=Straight(),
+        grasps=(Grasp(u=0.0, hold="clamp", path=turn),),
+        environment=Environment(gravity=(0.0, 0.0, 0.0), drag=50.0),
+        effects={"twist": "on"},
+        quality=quality,
+    )
+    found = predict(scene).grasps[0]
+    late = found.times > 1.0
+    expected = 50.0 * 0.02**2 / 8.0 * 1.5
+    np.testing.assert_allclose(found.moment[late, 0], expected, rtol=1e-3)

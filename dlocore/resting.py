@@ -1,0 +1,82 @@
+"""Bring a cable that lies on something rough to rest: it slides downhill until friction holds it."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.discretisation import applied_forces
+from dlocore.effects import laws
+from dlocore.effects.friction import slip_of
+from dlocore.events import closed_grasps
+from dlocore.grid import Grid
+from dlocore.holding import Starts, close_grasps, hold
+from dlocore.kernels.assembly import History
+from dlocore.kernels.march import FAILED_STEP, march_steps
+from dlocore.kernels.tension import COLUMNS
+from dlocore.problem import Problem
+from dlocore.settling import RESTING, Rest
+from dlocore.solvers.monitor import Monitor, TimeIsUp
+
+Floats = NDArray[np.float64]
+
+_TOLERANCE = 1e-9  # of the length, on what Newton's method leaves of a step
+_FIRST, _LONG, _LAST = 1e-3, 1e2, 1e3  # steps [s]: the first, long enough to tell rest from creeping, the longest
+_STEPS = 200  # at most
+_RATES = (
+    laws.DAMPING, laws.TWIST_DAMPING, laws.STRETCH_DAMPING, laws.QUADRATIC_DRAG,
+    laws.BENDING_MEMORY, laws.TWIST_MEMORY, laws.STRETCH_MEMORY,
+)  # fmt: skip
+
+
+def slide_to_rest(problem: Problem, grid: Grid, monitor: Monitor) -> tuple[Floats, Rest, History]:
+    """Return control points (n_u, nc) [m] at rest with the grasps at their first poses, how, and what lies behind them.
+
+    Steps of backward Euler whose velocity is forgotten, each twice as long as the last: the cable goes where its energy
+    falls, and friction, whose anchors it drags along, holds it where it can. Nothing yields on the way.
+
+    Raises:
+        Cancelled: the caller asked to stop.
+    """
+    cable = problem.scene.cable
+    assert problem.friction is not None
+    firm = replace(problem, friction=replace(problem.friction, slip=slip_of(cable.diameter, cable.length, 0.0)))
+    active, parameters = firm.law_table()
+    active[list(_RATES)] = 0
+    axes, tables, length = problem.axes, grid.tables, cable.length
+    history = grid.past()._replace(tension=np.full((len(tables.axial_w), COLUMNS), np.nan))
+    starts: Starts = {}
+    grasps = closed_grasps(problem.scene, 0.0, 0.0)
+    close_grasps(problem, grid, grasps, starts, None)
+    held = hold(problem, grid, grasps, np.zeros(2), starts, grid.start)
+    offsets = np.ascontiguousarray(held.offsets)
+    applied, nothing, log = applied_forces(problem, grid, np.zeros(1)), np.zeros_like(offsets), np.zeros((0, 0, 0))
+    q, h = grid.start.copy(), _FIRST
+    rest: Rest = "restless"
+    for _ in range(_STEPS):
+        try:
+            monitor.check()
+        except TimeIsUp:
+            rest = "time"
+            break
+        states, info = np.array([q, q]), np.zeros(3)
+        v, a, G = (np.zeros_like(q) for _ in range(3))
+        info[FAILED_STEP] = -1
+        before = [x.copy() for x in history]
+        march_steps(
+            axes, 0, 1, 0, True, h, 0.0, _TOLERANCE * length, states, v, a, G, cable.linear_density, 0.0, tables,
+            active, parameters, history, applied, held.elimination, offsets, nothing, log, info,
+        )  # fmt: skip
+        if info[FAILED_STEP] >= 0:
+            for x, old in zip(history, before, strict=True):
+                x[:] = old
+            h *= 0.25
+            continue
+        moved = float(np.abs(states[1] - q).max())
+        q = states[1]
+        if moved <= RESTING * length and h >= _LONG:
+            rest = "settled"
+            break
+        h = min(2.0 * h, _LAST)
+    kept = grid.history
+    return q, rest, history._replace(memory=kept.memory, axial=kept.axial, tension=kept.tension)
