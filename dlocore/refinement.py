@@ -35,6 +35,8 @@ _MOST_POINTS = 800  # along the cable
 _FINER = {"space": 1.5, "time": 2.0}
 _FINE_IN_TIME = 0.3  # of the target: a time spline that misses its march by less keeps its knots as the steps halve
 _AT_BEST = 0.2  # of an error, is left by one refinement: what is still too much after all of them is not begun
+_STALE = 4.0  # times what a refinement in one direction moved the surface by: once those in the other moved it by more,
+# and by more than the target, what the first has left is measured again
 _FAILURES = 2  # refinements in time of a march that found no equilibrium
 
 
@@ -83,6 +85,7 @@ class _Climb:
         direction: in which the grid at hand is finer than the best one: "both", "space" or "time".
         best: the finest march so far that is to be believed.
         changes: how far refinements moved the surface.
+        since: by direction, how far others have moved it at most since the last in this one [m].
         estimate: error of the best one [m].
         rho: spectral radius of the next march.
         failures: marches in a row that found less than the best one, or no equilibrium as that.
@@ -98,6 +101,7 @@ class _Climb:
     direction: str = "both"
     best: Level | None = None
     changes: Changes = field(default_factory=dict)
+    since: dict[str, float] = field(default_factory=dict)
     estimate: float = np.inf
     rho: float = RHO
     failures: int = 0
@@ -132,13 +136,17 @@ class _Climb:
             if level.motion.stopped == "time" or self.failures > len(LEVELS):
                 return Outcome(level, status, message, None)
             unfolds = self._affordable(_finer(size, "space", False)) if is_folded(level) else None
+            finer: Size | None
             if self.estimate <= ACCEPT * self.target and self.budget == np.inf and unfolds is None:
-                agreed = self._agreed(level) if status == "converged" else message
-                return Outcome(level, status, agreed, _parts(self.changes, level))
-            unfolded = self._unfolded(level, size)
-            if unfolded is not None:
-                return unfolded
-            finer = self._next(level, size, unfolds)
+                finer = self._once_more(size)
+                if finer is None:
+                    agreed = self._agreed(level) if status == "converged" else message
+                    return Outcome(level, status, agreed, _parts(self.changes, level))
+            else:
+                unfolded = self._unfolded(level, size)
+                if unfolded is not None:
+                    return unfolded
+                finer = self._next(level, size, unfolds)
             if finer is not None and not self._in_time(size, finer, self.monitor.elapsed() - began):
                 return self._within_budget(level)
             size = finer
@@ -177,10 +185,25 @@ class _Climb:
             self.changes, self.estimate = {}, np.inf
             return
         self.changes[self.direction] = weighed(level, best, self.changes.get(self.direction))
+        self.since = {d: max(self.since.get(d, 0.0), level.change) for d in self.changes if d != self.direction}
         self.estimate = max(_error(self.changes), MISSED_COUNTS * level.missed)
         rough = self._is_rough(level)
         if self.number < len(LEVELS) or (rough and self.problem.self_contact is not None):
             self.rho = STRONGLY_DAMPED if rough else RHO  # later on two marches would differ by their damping
+
+    def _once_more(self, size: Size) -> Size | None:
+        """Return the next size in a direction whose last refinement tells little of the grid at hand, or None.
+
+        On coarse steps, which damp what they can't resolve, more control points may move the surface by far less.
+        """
+        for direction in _FINER:
+            moved = self.since.get(direction, 0.0)
+            if direction in self.changes and moved > max(_STALE * self.changes[direction].moved, self.target):
+                finer = self._affordable(_finer(size, direction, False))
+                if finer is not None:
+                    self.direction = direction
+                    return finer
+        return None
 
     def _next(self, level: Level, size: Size, unfolds: Size | None) -> Size | None:
         """Return the next size, None where no finer grid is worth its time; `unfolds` is for a motion that folds."""

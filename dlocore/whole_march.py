@@ -18,6 +18,7 @@ from dlocore.solvers.monitor import Monitor
 TOO_DEEP = 0.25  # of the diameter, in the table, an obstacle or itself
 TORN = 0.2  # axial strain: no cable of this kind follows
 FOLDED = 0.4  # of |r'| between the points that watch over the length: less is a fold that no energy sees
+_LOOKS = (1, 2, 3)  # grids on which a motion is looked at for whether it leaves its plane
 MISSED_COUNTS = 3.0  # what the time spline misses of its march, times this, is the least that the error may be
 
 
@@ -74,8 +75,11 @@ def sided(problem: Problem, monitor: Monitor) -> Problem:
     """Return the problem, with a side to go to where a march says that its motion leaves its plane."""
     if problem.on_table or flat_plane(problem.scene, problem.start).dimensions == 3:
         return problem
-    called = march_level(problem, stretched(problem, 1), monitor).posed.called_for
-    return pose(problem.scene, {"side": called["side"]}) if "side" in called else problem
+    for number in _LOOKS:
+        called = march_level(problem, stretched(problem, number), monitor).posed.called_for
+        if "side" in called:
+            return pose(problem.scene, {"side": called["side"]})
+    return problem
 
 
 def march_status(problem: Problem, level: Level) -> tuple[Status, str]:

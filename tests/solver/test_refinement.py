@@ -1,6 +1,7 @@
 """Refinement and what an answer says of itself: regressions found by random hard scenes."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -292,3 +293,17 @@ def test_contact_that_a_grid_had_to_make_stiffer_begins_so_on_the_next():
     again = run_level(problem, 13, 25, 96, Monitor(), hardness=needed)
     assert again.motion.deepest == pytest.approx(first.motion.deepest, rel=1e-6)  # the same march, to rounding
     assert hardness(again) == pytest.approx(needed)
+
+
+def test_what_control_points_moved_on_coarse_steps_is_measured_again_on_fine_ones():
+    # steps that damp what they can't resolve hid what more control points change: it was three times the estimate off
+    scene = draw(14, 180).make()
+    found = predict(scene)
+    assert found.status == "converged", found.message
+    spaces = [b.n_u > a.n_u and b.n_t == a.n_t for a, b in pairwise(found.iterations)]
+    assert spaces.count(True) > 1  # and steps were refined in between
+    assert False in spaces[spaces.index(True) : -1]
+    estimate = found.accuracy.error_estimate
+    truth = predict(replace(scene, quality=Quality(target_error=0.3 * estimate)))
+    assert truth.status == "converged", truth.message
+    assert apart(found.surface, truth.surface).max() < 2.5 * estimate
