@@ -11,6 +11,7 @@ _LEFT = 0.45  # of what twice as many steps moved the surface by, is left; 1/3 i
 _LEFT_DAMPED = 0.9  # the same of strongly damped steps, as forces with kinks ask for; 1 were they of first order
 _LEFT_ALONG = 0.75  # the same of half as many control points again
 _MOST_LEFT = 1.5  # times the last change: what is believed of changes that hardly shrink
+_MOST_FALL = 20.0  # times less than the refinement before, at most, is believed of one: more is chance
 _MORE = 1.1  # times as many steps: fewer are as many
 
 
@@ -32,11 +33,14 @@ class Change(NamedTuple):
         """The error [m] that it points to.
 
         Where changes shrink by less than expected from one refinement to the next, the sum of those to come is larger
-        than the share that is left in theory: c/(1 - c), c = moved/before.
+        than the share that is left in theory: c/(1 - c), c = moved/before. Where they shrink by far more, two grids
+        may agree by chance.
         """
-        contraction = self.moved / self.before if 0.0 < self.before < np.inf else 0.0
+        known = 0.0 < self.before < np.inf
+        contraction = self.moved / self.before if known else 0.0
         to_come = contraction / (1.0 - contraction) if contraction < 1.0 else np.inf
-        return self.moved * max(self.left, min(to_come, _MOST_LEFT))
+        moved = max(self.moved, self.before / _MOST_FALL) if known else self.moved
+        return moved * max(self.left, min(to_come, _MOST_LEFT))
 
 
 def weighed(level: Level, before: Level, last: Change | None) -> Change:
