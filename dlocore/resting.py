@@ -1,20 +1,17 @@
-"""Bring a cable that lies on something rough to rest: it slides downhill until friction holds it."""
-
-from dataclasses import replace
+"""Bring a cable to rest downhill of where it is: it slides in small steps, until friction, if any, holds it."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.discretisation import applied_forces
 from dlocore.effects import laws
-from dlocore.effects.friction import slip_of
 from dlocore.events import closed_grasps
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.assembly import History
 from dlocore.kernels.march import FAILED_STEP, march_steps
 from dlocore.kernels.tension import COLUMNS
-from dlocore.problem import Problem
+from dlocore.problem import Problem, firmer
 from dlocore.settling import RESTING, Rest
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 
@@ -22,7 +19,8 @@ Floats = NDArray[np.float64]
 
 _TOLERANCE = 1e-9  # of the length, on what Newton's method leaves of a step
 _FIRST, _LONG, _LAST = 1e-3, 1e2, 1e3  # steps [s]: the first, long enough to tell rest from creeping, the longest
-_STEPS = 200  # at most
+_STEPS = 400  # at most
+_FARTHEST = 0.05  # of the length, in a step: farther the cable might pass through what is in its way
 _RATES = (
     laws.DAMPING, laws.TWIST_DAMPING, laws.STRETCH_DAMPING, laws.QUADRATIC_DRAG,
     laws.BENDING_MEMORY, laws.TWIST_MEMORY, laws.STRETCH_MEMORY,
@@ -39,9 +37,7 @@ def slide_to_rest(problem: Problem, grid: Grid, monitor: Monitor) -> tuple[Float
         Cancelled: the caller asked to stop.
     """
     cable = problem.scene.cable
-    assert problem.friction is not None
-    firm = replace(problem, friction=replace(problem.friction, slip=slip_of(cable.diameter, cable.length, 0.0)))
-    active, parameters = firm.law_table()
+    active, parameters = firmer(problem, 0.0).law_table()
     active[list(_RATES)] = 0
     axes, tables, length = problem.axes, grid.tables, cable.length
     history = grid.past()._replace(tension=np.full((len(tables.axial_w), COLUMNS), np.nan))
@@ -67,12 +63,12 @@ def slide_to_rest(problem: Problem, grid: Grid, monitor: Monitor) -> tuple[Float
             axes, 0, 1, 0, True, h, 0.0, _TOLERANCE * length, states, v, a, G, cable.linear_density, 0.0, tables,
             active, parameters, history, applied, held.elimination, offsets, nothing, log, info,
         )  # fmt: skip
-        if info[FAILED_STEP] >= 0:
+        moved = float(np.abs(states[1] - q).max())
+        if info[FAILED_STEP] >= 0 or moved > _FARTHEST * length:
             for x, old in zip(history, before, strict=True):
                 x[:] = old
             h *= 0.25
             continue
-        moved = float(np.abs(states[1] - q).max())
         q = states[1]
         if moved <= RESTING * length and h >= _LONG:
             rest = "settled"

@@ -21,6 +21,7 @@ from dlocore.report import WindowForces, elastic_energy, reactions
 from dlocore.resting import slide_to_rest
 from dlocore.scene import Scene
 from dlocore.settling import Settled, settle
+from dlocore.shape import SplineCurve
 from dlocore.sideways import is_unstable
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import design_matrix
@@ -28,6 +29,8 @@ from dlocore.spline import design_matrix
 Floats = NDArray[np.float64]
 
 LEVELS = (9, 13, 17, 25, 33, 49, 65, 97)
+_WOUND = np.pi  # [rad]: a start that turns by more along its length may have other equilibria beside the one downhill
+_PLACES = 129  # at which it is looked at
 _FINER = (1.5, 2.0)  # times the control points, with which a start that finds no rest may
 
 
@@ -184,13 +187,25 @@ def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None =
 def _settled(problem: Problem, grid: Grid, monitor: Monitor, like: Grid | None) -> Grid | None:
     """Return a grid with its start settled, first from that of a grid like it, or None where it finds no rest.
 
-    On something rough it slides there from the given start on every grid, as what friction holds depends on the way.
+    What friction holds depends on the way, and of several equilibria that a wound start may have relaxations may jump
+    to another: such starts slide downhill from the given one, on every grid.
     """
-    if problem.friction is not None:
+    if problem.friction is not None or _turning(problem.start) > _WOUND:
         q, rest, history = slide_to_rest(problem, grid, monitor)
-        return None if rest == "restless" else grid.changed(start=q, history=history)
+        if rest != "restless":
+            return grid.changed(start=q, history=history)
+        if problem.friction is not None:
+            return None
     begin = None if like is None else begin_on(problem, grid, like)
     q, rest, _, history = settle(problem, grid, 0.0, monitor, begin)
     if begin is not None and rest == "restless":
         q, rest, _, history = settle(problem, grid, 0.0, monitor)
     return None if rest == "restless" else grid.changed(start=q, history=history)
+
+
+def _turning(curve: SplineCurve) -> float:
+    """Return the angle by which the tangent of a curve turns along it, to whichever side [rad]."""
+    tangents = curve(np.linspace(0.0, curve.knots[-1], _PLACES), 1)
+    tangents /= np.linalg.norm(tangents, axis=1)[:, None]
+    chords = np.linalg.norm(np.diff(tangents, axis=0), axis=1)
+    return float(np.sum(2.0 * np.arcsin(np.minimum(0.5 * chords, 1.0))))

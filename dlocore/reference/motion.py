@@ -44,6 +44,7 @@ NOTES = 2000  # of a motion at most, between its events
 SHORTEST = 1e-9  # of the horizon: a step
 DOWN = 1e-3  # [s]: the first step downhill; what friction holds in the end depends on longer ones
 SETTLED = 1e-11  # of the length: a step downhill that ends the search for an equilibrium
+FARTHEST = 0.05  # of the length, in a step downhill: farther the rod might pass through what is in its way
 DOWNHILL = 400  # steps to an equilibrium
 
 
@@ -242,10 +243,10 @@ def settled(rod: Rod, watch: Watch) -> Snapshot:
             link.body, BACKWARD_EULER, h, True, state, guide, 0.1 * SETTLED * length, after, np.zeros_like(state.q),
             np.zeros_like(state.t), told,
         )  # fmt: skip
-        if flag != DONE:
+        moved = float(np.abs(after.q[:, :3] - state.q[:, :3]).max())
+        if flag != DONE or moved > FARTHEST * length:
             h *= 0.25
             continue
-        moved = float(np.abs(after.q[:, :3] - state.q[:, :3]).max())
         after.q[:, 3] = 0.0
         after.v[:] = 0.0
         state = after

@@ -56,8 +56,8 @@ def test_every_kind_of_hardness_is_drawn_often():
     assert sum(count for family, count in families.items() if family.startswith("impossible")) > 300 * IMPOSSIBLE / 2
 
 
-# Scenes that had ended up to 0.8 of the length from the reference, and not said so: starts that settle on something rough
-# (58, 133, 319, 366), drag on the spin of the sections (64), and the reference's own starts, which yielded (290).
+# Scenes that had ended up to 0.8 of the length from the reference, and not said so: starts that settle on something
+# rough (58, 133, 319, 366), drag on the spin of the sections (64), and the reference's own starts, which yielded (290).
 @pytest.mark.parametrize("index", [58, 64, 133, 290, 319, 366])
 def test_scenes_that_were_elsewhere_are_where_the_reference_takes_them(index: int) -> None:
     found = compare_with_reference(20, index)
