@@ -140,18 +140,28 @@ def find_plane(scene: Scene, start: StartCurve, on_table: bool, met: bool) -> Pl
     return flat_plane(scene, start)
 
 
-def flat_plane(scene: Scene, start: StartCurve) -> Plane:
-    """Return the plane of start, paths and forces, whatever the cable may touch; all of space where they have none."""
+def rest_plane(scene: Scene, start: StartCurve) -> Plane:
+    """Return the plane of start, paths and forces, or of all but the paths where the start settles in it first."""
+    plane = flat_plane(scene, start)
+    return flat_plane(scene, start, still=True) if plane.dimensions == 3 and scene.shape.settle else plane
+
+
+def flat_plane(scene: Scene, start: StartCurve, *, still: bool = False) -> Plane:
+    """Return the plane of start, paths and forces, whatever the cable may touch; all of space where they have none.
+
+    Of grasps that stand `still` only where they begin counts.
+    """
     origin, length = np.array(start.control_points[0]), scene.cable.length
     spread = [(start.control_points - origin) / length]
     if start.velocity is not None:
         spread.append(start.velocity.control_points / max(1e-9, np.abs(start.velocity.control_points).max()))
     for grasp in scene.grasps:
-        if isinstance(grasp.path, Move):
+        if isinstance(grasp.path, Move) and not still:
             spread.append(cast(Floats, grasp.path.displacement)[None] / length)
         if isinstance(grasp.path, Waypoints):
             positions = cast(Floats, grasp.path.positions)
-            spread.append((positions - positions[0]) / length)
+            if not still:
+                spread.append((positions - positions[0]) / length)
             spread.append((positions[:1] - start(grasp.u)) / length)
     gravity = cast(Floats, scene.environment.gravity)
     if gravity.any() and scene.effects.get("gravity", "auto") != "off":
@@ -172,7 +182,7 @@ def flat_plane(scene: Scene, start: StartCurve) -> Plane:
     if not off_plane <= FLATNESS * max(1.0, np.abs(vectors).max()):
         return Plane(np.eye(3), origin, "start, motion and forces do not lie in one plane")
     flat_turns = True
-    for grasp in scene.grasps:
+    for grasp in () if still else scene.grasps:
         turns = _turns(grasp.path, 33)
         if turns is not None and np.abs(turns @ normal - normal).max() > 1e-9:
             flat_turns = False

@@ -29,7 +29,7 @@ from dlocore.events import Event, find_events
 from dlocore.features import Features, find_features
 from dlocore.kernels.projection import in_world
 from dlocore.obstacles import Box, Cylinder, Obstacle
-from dlocore.plane import Plane, find_plane, flat_plane, is_straight, lay_on_table, off_the_table
+from dlocore.plane import Plane, find_plane, is_straight, lay_on_table, off_the_table, rest_plane
 from dlocore.scene import Scene
 from dlocore.selection import Choice, choose, reached
 from dlocore.shape import StartCurve, start_curve
@@ -38,6 +38,8 @@ Floats = NDArray[np.float64]
 
 LEAST_MASS = 1e-9  # of the true one, where inertia is off: it keeps rigid motion determined
 MOST_NODES = 4000  # of contact
+_SAG = 0.03  # of the diameter: by how much a cable comes nearer to something round between two of them
+_EDGES = 16.0  # of them on a diameter, where obstacles have edges
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,9 +206,9 @@ class Problem:
     def contact_spacing(self) -> float:
         """Return how close the nodes of contact lie [m]; infinite where there is none.
 
-        Between nodes a diameter apart a straight cable comes nearer to a peg of 2 cm by less than 3 % of a diameter of
-        5 mm; over an edge the cable slides from node to node unless they are much closer; on a table there is nothing
-        to fall between.
+        Between nodes a cable that lies about something round comes nearer to it by _SAG of its diameter at most: on a
+        peg of 2 cm nodes may be a diameter of 5 mm apart, on a wire half of it. Over an edge the cable slides from node
+        to node unless they are much closer; on a table there is nothing to fall between.
         """
         cable = self.scene.cable
         if self.contact is None or not self.obstacles:
@@ -215,7 +217,11 @@ class Problem:
             return max(min(apart, rests), cable.length / MOST_NODES)
         flat = [o for o in self.obstacles if isinstance(o, Box | Cylinder)]
         sharp = (bool(flat) and not self.on_table) or any(isinstance(o, Box) for o in flat)
-        return max(cable.diameter / (16.0 if sharp else 1.0), cable.length / MOST_NODES)
+        if sharp:
+            return max(cable.diameter / _EDGES, cable.length / MOST_NODES)
+        radii = [0.5 * cable.diameter + o.radius for o in self.obstacles if not isinstance(o, Box)]
+        round_it = float(np.sqrt(8.0 * _SAG * cable.diameter * min(radii, default=np.inf)))
+        return max(min(cable.diameter, round_it), cable.length / MOST_NODES)
 
     def weight(self) -> Floats:
         """Return the weight per unit length in the solve's coordinates (nc,) [N/m]."""
@@ -250,7 +256,7 @@ def pose(scene: Scene, called_for: Mapping[str, str] | None = None, *, at_rest: 
         start = lay_on_table(scene, start)
     start = with_side(scene, start, at_rest)
     plane = find_plane(scene, start, on_table, bool(met))
-    flat = flat_plane(scene, start) if "side" in called_for and not on_table else None
+    flat = rest_plane(scene, start) if "side" in called_for and not on_table else None
     if flat is not None and flat.dimensions == 2:
         start = out_of_plane(scene, start, np.cross(*flat.axes))
         reason = called_for["side"] if plane.dimensions == 2 else plane.reason

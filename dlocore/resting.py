@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 _TOLERANCE = 1e-9  # of the length, on what Newton's method leaves of a step
 _FIRST, _LONG, _LAST = 1e-3, 1e2, 1e3  # steps [s]: the first, long enough to tell rest from creeping, the longest
-_STEPS = 400  # at most
+_STEPS = 2000  # at most
 _FARTHEST = 0.05  # of the length, in a step: farther the cable might pass through what is in its way
 _RATES = (
     laws.DAMPING, laws.TWIST_DAMPING, laws.STRETCH_DAMPING, laws.QUADRATIC_DRAG,

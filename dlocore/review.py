@@ -160,11 +160,14 @@ def _touches(level: Level) -> dict[str, str]:
     motion = level.motion
     u = np.linspace(0.0, problem.scene.cable.length, 65)
     points = np.einsum("ui,kid->kud", design_matrix(motion.grid.knots, u), motion.states)
-    world = problem.plane.world(points[..., : problem.plane.dimensions]).reshape(-1, 3)
+    world = problem.plane.world(points[..., : problem.plane.dimensions])
+    way = np.linalg.norm(np.diff(world, axis=0), axis=2)
+    between = 0.5 * np.maximum(np.vstack([way, way[-1:]]), np.vstack([way[:1], way]))  # of steps it may come nearer
     rows = np.array([o.row() for o in left_out])
-    gap = float(distances(rows, np.ascontiguousarray(world)).min()) - 0.5 * problem.scene.cable.diameter
-    if gap > CLOSE * problem.scene.cable.length:
+    gaps = distances(rows, world.reshape(-1, 3)).min(axis=1) - 0.5 * problem.scene.cable.diameter
+    if (gaps - between.ravel()).min() > CLOSE * problem.scene.cable.length:
         return {}
+    gap = float(gaps.min())
     what = f"comes within {gap * 1e3:.2g} mm of" if gap > 0 else "passes through"
     return {"obstacles": f"the motion {what} an obstacle"}
 

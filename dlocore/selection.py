@@ -141,7 +141,8 @@ def reached(scene: Scene, start: StartCurve, called_for: Mapping[str, str]) -> t
     """Return the obstacles that the cable may touch: those near its start, or carried off with its grasps.
 
     Every point of the cable follows its grasps about as far as they go; what a result shows to come near is called
-    for by it.
+    for by it. A start that settles has come from where it was given: it may have touched all that the cable reaches
+    from the grasps that hold it.
     """
     obstacles = scene.environment.obstacles
     switch = scene.effects.get("obstacles", "auto")
@@ -149,15 +150,22 @@ def reached(scene: Scene, start: StartCurve, called_for: Mapping[str, str]) -> t
         return ()
     if switch == "on" or "obstacles" in called_for:
         return tuple(range(len(obstacles)))
-    points = start(np.linspace(0.0, scene.cable.length, 41))
+    u = np.linspace(0.0, scene.cable.length, 41)
+    points = start(u)
     shifts = [np.zeros((1, 3))]
     for grasp in scene.grasps:
         t = np.linspace(0.0, grasp.path.duration, 17)
         shifts.append(grasp.path.at(t, start(grasp.u)[0]) - start(grasp.u)[0])
     moved = (points[:, None] + np.concatenate(shifts)[None]).reshape(-1, 3)
     rows = np.array([o.row() for o in obstacles])
-    gaps = distances(rows, np.ascontiguousarray(moved)).min(axis=0) - 0.5 * scene.cable.diameter
-    return tuple(int(i) for i in np.flatnonzero(gaps < NEAR * scene.cable.length))
+    radius = 0.5 * scene.cable.diameter
+    near = distances(rows, np.ascontiguousarray(moved)).min(axis=0) - radius < NEAR * scene.cable.length
+    holding = [g.u for g in scene.grasps if g.start == 0.0]
+    if scene.shape.settle and holding:
+        away = distances(rows, start(np.array(holding))) - radius  # of each obstacle from each grasp
+        along = np.abs(u[:, None] - np.array(holding))
+        near |= (along[:, :, None] >= away).all(axis=1).any(axis=0)
+    return tuple(int(i) for i in np.flatnonzero(near))
 
 
 def _twist(scene: Scene, start: StartCurve, dimensions: int, bent: bool, plastic: bool, damped: bool) -> Choice:

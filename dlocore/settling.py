@@ -10,6 +10,7 @@ from dlocore.events import closed_grasps
 from dlocore.grid import Grid
 from dlocore.holding import Held, Starts, close_grasps, hold
 from dlocore.kernels.assembly import NO_RATES, History, assemble, remember
+from dlocore.kernels.contact import went_through
 from dlocore.kernels.relax import descend, relax
 from dlocore.kernels.tension import COLUMNS
 from dlocore.problem import Problem
@@ -133,6 +134,11 @@ def _relaxed(
                 axes, q, before, searched, applied, tables, active, parameters, untouched, elimination, offset,
                 tolerance * length, _ITERATIONS,
             )  # fmt: skip
+            if went_through(problem.nc, before, q, tables, parameters):
+                q[:] = before
+                searched *= _STRONGER
+                rounds -= 1
+                continue
             found = update <= max(tolerance, RESTING) * length
             searched *= 0.2 if used <= 12 else 0.5 if found else 1.0
             scale, strength = 1.0, springs

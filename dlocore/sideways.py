@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from dlocore.bands import dense_of
 from dlocore.buckling import BOW, GROWTH, UNSTABLE
 from dlocore.discretisation import plane_curvature_of
+from dlocore.effects import laws
 from dlocore.events import closed_grasps
 from dlocore.grid import Grid
 from dlocore.kernels.across import stiffness_across
+from dlocore.kernels.assembly import NO_RATES, assemble
 from dlocore.kernels.banded import factor
-from dlocore.plane import flat_plane
+from dlocore.plane import rest_plane
 from dlocore.problem import Problem, pose
 from dlocore.scene import Grasp, Scene
 from dlocore.solvers.march import March
@@ -29,21 +31,28 @@ _FIRM = 1e6  # times the largest stiffness, with which what is held stays in the
 
 
 def leaves_plane(problem: Problem, motion: March) -> bool:
-    """Tell whether a disturbance out of the plane of a motion would grow tenfold in its time."""
+    """Tell whether a disturbance out of the plane of a motion would grow tenfold in its time.
+
+    So it would where the start has settled to an equilibrium that is none of a cable that may leave the plane.
+    """
+    grid = motion.grid
+    if problem.scene.shape.settle and is_unstable(problem, grid, grid.start, closed_grasps(problem.scene, 0.0, 0.0)):
+        return True
     looks = np.unique(np.linspace(0, len(motion.times) - 1, _LOOKS).round().astype(int))
     states = _in_plane(problem, motion.states[looks])
     if states is None:
         return False
-    bands, unit = _bands(problem, motion.grid, states)
+    bands, unit = _bands(problem, grid, states)
+    bands = bands + slipping_across(problem, grid, motion.states[looks])
     density, drag = problem.scene.cable.linear_density, problem.drag_coefficient()
     slowest = GROWTH / problem.horizon  # [1/s]: rate of growth that matters
     slack = density * slowest**2 + drag * slowest
     growth = 0.0
     for t, q, band in zip(motion.times[looks].tolist(), states, bands, strict=True):
         held = closed_grasps(problem.scene, t, t)
-        stiff = band + _held_band(motion.grid, held, _FIRM * float(np.abs(band).max()))
+        stiff = band + _held_band(grid, held, _FIRM * float(np.abs(band).max()))
         if factor(stiff + slack * unit) >= 0:
-            least = _least(dense_of(stiff) + _twisting(problem, motion.grid, q, held), unit)
+            least = _least(dense_of(stiff) + _twisting(problem, grid, q, held), unit)
             growth += (np.sqrt(drag**2 - 4.0 * density * min(least, 0.0)) - drag) / (2.0 * density)
     # a straight cable that buckles may do so to any side: until it has, all grow alike
     both = math.log(1.0 / BOW) if problem.start.bow else 0.0
@@ -56,6 +65,7 @@ def is_unstable(problem: Problem, grid: Grid, q: Floats, held: list[Grasp]) -> b
     if states is None:
         return False
     bands, unit = _bands(problem, grid, states)
+    bands = bands + slipping_across(problem, grid, q[None])
     largest = float(np.abs(bands).max())
     slack = _NEUTRAL * largest / float(unit.max())
     stiff = bands[0] + _held_band(grid, held, _FIRM * largest)
@@ -75,19 +85,20 @@ def _in_plane(problem: Problem, states: Floats) -> Floats | None:
         return None
     if problem.plane.dimensions == 2:
         return states
-    if not problem.touches and problem.scene.effects.get("twist", "auto") != "on":
+    scene = problem.scene
+    if not problem.touches and scene.effects.get("twist", "auto") != "on" and not scene.shape.settle:
         return None  # in space for another reason than what it touches: it lies in no plane
-    plane = flat_plane(problem.scene, start)
+    plane = rest_plane(scene, start)
     if plane.dimensions == 3:
         return None
     r = problem.plane.world(states[..., :3])
-    return plane.points(r) if plane.distance(r) <= _FLAT * problem.scene.cable.length else None
+    return plane.points(r) if plane.distance(r) <= _FLAT * scene.cable.length else None
 
 
 def pose_as_shown(scene: Scene, called_for: Mapping[str, str], start: Floats) -> Problem:
     """Return the problem of a motion that began at control points (n, 3) [m], bowed out of its plane as they are."""
     problem = pose(scene, called_for)
-    plane = flat_plane(scene, problem.start)
+    plane = rest_plane(scene, problem.start)
     if problem.on_table or plane.dimensions == 3 or plane.distance(start) <= 0.1 * BOW**2 * scene.cable.length:
         return problem
     return pose(scene, {**called_for, "side": UNSTABLE})
@@ -107,6 +118,32 @@ def _bands(problem: Problem, grid: Grid, states: Floats) -> tuple[Floats, Floats
         share = 1.0 - np.minimum(natural / np.maximum(kappa, 1e-300), 1.0)
         bands.append(stiffness_across(q[None].copy(), tables._replace(curvature_w=share * tables.curvature_w), *moduli))
     return np.concatenate(bands), tables.mass
+
+
+def slipping_across(problem: Problem, grid: Grid, states: Floats) -> Floats:
+    """Return what obstacles add to the stiffness of states (k, n, nc): lower bands (k, n, 4), negative on round ones.
+
+    A cable that is pressed by N on what is round across the plane, with H the curvature of the distance there, slips
+    off it to the side: -N H. Where it rubs it is held.
+    """
+    bands = np.zeros((*states.shape[:2], 4))
+    if problem.plane.dimensions == 2 or not problem.obstacles or problem.friction is not None:
+        return bands
+    normal = np.cross(*rest_plane(problem.scene, problem.start).axes)
+    active, parameters = problem.law_table()
+    active[[row for row in range(laws.COUNT) if row != laws.CONTACT]] = 0
+    parameters[[laws.STRETCH, laws.TWIST], 0] = 0.0
+    nc = problem.nc
+    f, K = np.empty(states.shape[1:]), np.empty((states.shape[1] * nc, 4 * nc))
+    for q, band in zip(states, bands, strict=True):
+        still = np.zeros_like(q)
+        assemble(problem.axes, q, still, grid.tables, active, parameters, grid.history, NO_RATES, (1.0, 0.0, 1.0), f, K)
+        for m in range(4):  # the block of control points k + m and k, a row of K for each column
+            for a in range(3):
+                for b in range(3):
+                    i, j = (a, b) if m > 0 or a >= b else (b, a)
+                    band[:, m] += normal[a] * normal[b] * K[j::nc, nc * m + i - j]
+    return bands
 
 
 def _held_band(grid: Grid, held: list[Grasp], stiffness: float) -> Floats:

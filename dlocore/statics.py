@@ -187,10 +187,10 @@ def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None =
 def _settled(problem: Problem, grid: Grid, monitor: Monitor, like: Grid | None) -> Grid | None:
     """Return a grid with its start settled, first from that of a grid like it, or None where it finds no rest.
 
-    What friction holds depends on the way, and of several equilibria that a wound start may have relaxations may jump
-    to another: such starts slide downhill from the given one, on every grid.
+    What friction holds depends on the way, and of several equilibria that a wound start may have, or one with obstacles
+    below it, relaxations may jump to another: such starts slide downhill from the given one, on every grid.
     """
-    if problem.friction is not None or _turning(problem.start) > _WOUND:
+    if problem.friction is not None or problem.obstacles or _turning(problem.start) > _WOUND:
         q, rest, history = slide_to_rest(problem, grid, monitor)
         if rest != "restless":
             return grid.changed(start=q, history=history)

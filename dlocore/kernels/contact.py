@@ -13,14 +13,18 @@ from dlocore.effects.base import Symmetric, Vector
 from dlocore.effects.contact import pressure
 from dlocore.effects.distance import signed_distance
 from dlocore.effects.friction import friction
+from dlocore.effects.kinds import BOX, CYLINDER
 from dlocore.effects.laws import CONTACT, COUNT, FRICTION, TABLE
 from dlocore.kernels.basis import row_of
-from dlocore.kernels.compile import law, leaf, part
+from dlocore.kernels.compile import kernel, law, leaf, part
 
 _UP = (0.0, 0.0, 1.0)
 _ANY = (0.0, 0.0, 0.0)
 _FLAT = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _SLACK = 0.9  # of the distance that is skipped: a strained cable is longer
+_THROUGH = 0.5  # of the way to the middle of an obstacle: a node that was deeper on its way went through it
+_LEAVES = 0.05  # of it: by so much it has to have come out again
+_SEARCH = 24  # looks for the deepest place of such a way: a thousandth of it
 
 
 @law
@@ -168,6 +172,73 @@ def strikes(nc: int, q0: Any, q1: Any, tables: Any, active: Any, p: Any) -> floa
                     most = max(most, before - gap)
         reach = tables.contact_u[n] + _SLACK * nearest
     return most
+
+
+@law
+def _thickness(p: Any, i: int) -> float:
+    """Return how deep the middle of obstacle i lies, for the axis of the cable [m]."""
+    if p[i, 0] == CYLINDER:
+        return min(p[i, 13], p[i, 15]) + p[CONTACT, 0]
+    if p[i, 0] == BOX:
+        return min(p[i, 13], p[i, 14], p[i, 15]) + p[CONTACT, 0]
+    return p[i, 13] + p[CONTACT, 0]
+
+
+@law
+def _between(x: Vector, y: Vector, s: float) -> Vector:
+    return x[0] + s * (y[0] - x[0]), x[1] + s * (y[1] - x[1]), x[2] + s * (y[2] - x[2])
+
+
+@leaf
+def passes(nc: int, q0: Any, q1: Any, tables: Any, p: Any) -> bool:
+    """Tell whether a node goes through an obstacle on its straight way from q0 to q1 (n, nc), as a step too long may.
+
+    The distance from a convex body is convex along a straight way, so that its least is found by halving.
+    """
+    if len(p) == COUNT:
+        return False
+    longest = 0.0
+    for i in range(len(q0)):
+        square = 0.0
+        for d in range(min(nc, 3)):
+            square += (q1[i, d] - q0[i, d]) ** 2
+        longest = max(longest, square)
+    longest = np.sqrt(longest)
+    reach = 0.0  # up to where nothing is near enough
+    for n in range(len(tables.contact_w)):
+        if tables.contact_u[n] < reach:
+            continue
+        k, b = tables.contact_first[n], row_of(tables.contact_b0, n)
+        x, y = _point(nc, q0, k, b), _point(nc, q1, k, b)
+        way = np.sqrt((y[0] - x[0]) ** 2 + (y[1] - x[1]) ** 2 + (y[2] - x[2]) ** 2)
+        nearest = np.inf
+        for i in range(COUNT, len(p)):
+            begin = _gap(p, i, x)[0]
+            nearest = min(nearest, begin)
+            deep = -_THROUGH * _thickness(p, i)
+            if begin - way >= deep:
+                continue
+            end = _gap(p, i, y)[0]
+            low, high, least = 0.0, 1.0, np.inf
+            for _ in range(_SEARCH):
+                left, right = (2.0 * low + high) / 3.0, (low + 2.0 * high) / 3.0
+                one = _gap(p, i, _between(x, y, left))[0]
+                other = _gap(p, i, _between(x, y, right))[0]
+                least = min(least, one, other)
+                if one < other:
+                    high = right
+                else:
+                    low = left
+            if least < deep and least < min(begin, end) + _LEAVES * deep:
+                return True
+        reach = tables.contact_u[n] + _SLACK * (nearest - longest)
+    return False
+
+
+@kernel
+def went_through(nc: int, q0: Any, q1: Any, tables: Any, p: Any) -> bool:
+    """Return what `passes` does, to those who do not compile."""
+    return bool(passes(nc, q0, q1, tables, p))
 
 
 @leaf

@@ -23,7 +23,7 @@ from dlocore.kernels.banded import (
     solve,
 )
 from dlocore.kernels.compile import brief, kernel, leaf
-from dlocore.kernels.contact import strikes
+from dlocore.kernels.contact import passes, strikes
 from dlocore.kernels.inertia import both_sides, effective, padded, residual
 from dlocore.kernels.mixing import mixed, room
 from dlocore.kernels.narrow import ROOM, factor_step, solve_step
@@ -345,7 +345,7 @@ def march_steps(
                 continue
             if converged:
                 break
-        if not converged:
+        if not converged or (touches and passes(nc, q0, q1, tables, p)):
             info[FAILED_STEP] = k
             return
         keep(history.tension)

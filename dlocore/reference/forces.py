@@ -38,7 +38,7 @@ from dlocore.reference.body import (
 )
 from dlocore.reference.compile import compiled
 from dlocore.reference.hinge import FOLDED, add_curvature_of_strains, carry, cross, dot, gradients, strains
-from dlocore.reference.surface import FRICTION, gap, press, rub
+from dlocore.reference.surface import FRICTION, gap, press, rub, thickness
 
 
 @compiled
@@ -361,3 +361,33 @@ def add_contact(
                 add(body, K, e + 1, i, e + 1, j, s * s * value)
                 add(body, K, e + 1, i, e, j, s * (1.0 - s) * value)
     return deepest
+
+
+@compiled
+def goes_through(body: Any, q: Any, after: Any) -> bool:
+    """Tell whether a point of the cable, going straight from q to `after` (n, 4), is nearer to the middle of a solid on
+    its way than to its surface, and leaves it again: no step that sees the solid goes so.
+    """
+    n, x, y, z = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for p in range(len(body.point_edge)):
+        e, s = body.point_edge[p], body.point_along[p]
+        way = 0.0
+        for i in range(3):
+            x[i] = (1.0 - s) * q[e, i] + s * q[e + 1, i]
+            y[i] = (1.0 - s) * after[e, i] + s * after[e + 1, i]
+            way += (y[i] - x[i]) ** 2
+        way = np.sqrt(way)
+        for m in range(0 if body.point_lies[p] else len(body.surfaces)):
+            thick = body.law[RADIUS] + thickness(body.surfaces[m])
+            begin = gap(body.surfaces[m], x, n) - body.law[RADIUS]
+            if not begin - way < -0.5 * thick:
+                continue
+            end = gap(body.surfaces[m], y, n) - body.law[RADIUS]
+            looks = int(min(8.0 * way / thick, 1e4)) + 2
+            for k in range(1, looks):
+                for i in range(3):
+                    z[i] = x[i] + (y[i] - x[i]) * k / looks
+                here = gap(body.surfaces[m], z, n) - body.law[RADIUS]
+                if here < -0.5 * thick and here < min(begin, end) - 0.05 * thick:
+                    return True
+    return False

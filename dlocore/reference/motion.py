@@ -13,6 +13,7 @@ from dlocore.problem import Problem
 from dlocore.reference import body as places
 from dlocore.reference.body import State, Tableau
 from dlocore.reference.chain import Chain, Grip, chain, grip
+from dlocore.reference.forces import goes_through
 from dlocore.reference.rod import Memory, Rod, Snapshot
 from dlocore.reference.step import DONE, take_step
 from dlocore.solvers.monitor import TimeIsUp
@@ -45,7 +46,7 @@ SHORTEST = 1e-9  # of the horizon: a step
 DOWN = 1e-3  # [s]: the first step downhill; what friction holds in the end depends on longer ones
 SETTLED = 1e-11  # of the length: a step downhill that ends the search for an equilibrium
 FARTHEST = 0.05  # of the length, in a step downhill: farther the rod might pass through what is in its way
-DOWNHILL = 400  # steps to an equilibrium
+DOWNHILL = 2000  # steps to an equilibrium
 
 
 Stopped = Literal["", "step", "time"]
@@ -202,9 +203,10 @@ def _window(link: Chain, state: State, tolerance: float, watch: Watch, record: _
         reaction, torque = np.zeros_like(state.q), np.zeros_like(state.t)
         guide = link.guide(t + h * SDIRK4.times)
         flag = take_step(link.body, SDIRK4, h, False, state, guide, NEWTON * tolerance, after, reaction, torque, told)
-        if flag != DONE or not told[0] <= tolerance:
+        failed = flag != DONE or goes_through(link.body, state.q, after.q)
+        if failed or not told[0] <= tolerance:
             record.rejected += 1
-            h *= FAILURE if flag != DONE else max(SHRINK, SAFETY * (tolerance / told[0]) ** (1.0 / SDIRK4.order))
+            h *= FAILURE if failed else max(SHRINK, SAFETY * (tolerance / told[0]) ** (1.0 / SDIRK4.order))
             if h < SHORTEST * link.rod.problem.horizon:
                 return None
             continue
@@ -244,7 +246,7 @@ def settled(rod: Rod, watch: Watch) -> Snapshot:
             np.zeros_like(state.t), told,
         )  # fmt: skip
         moved = float(np.abs(after.q[:, :3] - state.q[:, :3]).max())
-        if flag != DONE or moved > FARTHEST * length:
+        if flag != DONE or moved > FARTHEST * length or goes_through(link.body, state.q, after.q):
             h *= 0.25
             continue
         after.q[:, 3] = 0.0

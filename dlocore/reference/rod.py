@@ -24,7 +24,7 @@ SINKS = 0.005  # of the diameter, under weight and the bending of a tenth of the
 PASSAGE = 0.005  # of the diameter: the depth at which the stiffness of contact is whole
 STICK = 0.02  # of the diameter: by how much friction gives way before it holds
 STRAIGHTENING = 30  # steps of Newton's method towards edges of unit stretch
-MOST_POINTS = 8  # of contact in an edge
+POINTS = 8  # of contact in an edge where there are obstacles, so that they halve their distance as edges do; else 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,9 +197,7 @@ def _points(problem: Problem, u: Floats) -> tuple[Integers, Floats, Floats, NDAr
         lies += [True] * len(u)
     if problem.table is not None or problem.obstacles:
         for k, size in enumerate(h):
-            parts = 2
-            if problem.obstacles:
-                parts = int(np.clip(np.ceil(size / problem.scene.cable.diameter), 2, MOST_POINTS))
+            parts = POINTS if problem.obstacles else 2
             for p in range(parts):
                 edge.append(k)
                 along.append((p + 0.5) / parts)

@@ -64,6 +64,15 @@ def gap(row: Any, x: Any, n: Any) -> float:
 
 
 @compiled
+def thickness(row: Any) -> float:
+    """Return how deep the middle of the solid of `row` (ROW,) lies [m]; infinite for a plane."""
+    if row[0] == PLANE:
+        return np.inf
+    across = row[_HALF] if row[0] == CYLINDER else min(row[_HALF], row[_HALF + 1])
+    return min(across, row[_HALF + 2]) + row[ROUNDING]
+
+
+@compiled
 def press(stiffness: float, width: float, damping: float, depth: float, approach: float) -> tuple[float, float, float]:
     """Return the normal force per length N [N/m] and its derivatives by depth and by speed of approach (eq. 21)."""
     if depth <= 0.0:
