@@ -38,7 +38,7 @@ Floats = NDArray[np.float64]
 
 LEAST_MASS = 1e-9  # of the true one, where inertia is off: it keeps rigid motion determined
 MOST_NODES = 4000  # of contact
-_SAG = 0.03  # of the diameter: by how much a cable comes nearer to something round between two of them
+_SAG = 0.005  # of the diameter: by how much a cable comes nearer to something round between two of them
 _EDGES = 16.0  # of them on a diameter, where obstacles have edges
 
 
@@ -207,8 +207,8 @@ class Problem:
         """Return how close the nodes of contact lie [m]; infinite where there is none.
 
         Between nodes a cable that lies about something round comes nearer to it by _SAG of its diameter at most: on a
-        peg of 2 cm nodes may be a diameter of 5 mm apart, on a wire half of it. Over an edge the cable slides from node
-        to node unless they are much closer; on a table there is nothing to fall between.
+        peg of 2 cm nodes may be 2.1 mm apart, farther they would hold a cable that slides. Over an edge it slides from
+        node to node unless they are much closer; on a table there is nothing to fall between.
         """
         cable = self.scene.cable
         if self.contact is None or not self.obstacles:

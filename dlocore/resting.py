@@ -5,13 +5,15 @@ from numpy.typing import NDArray
 
 from dlocore.discretisation import applied_forces
 from dlocore.effects import laws
+from dlocore.effects.contact import DEEPEST
 from dlocore.events import closed_grasps
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.assembly import History
+from dlocore.kernels.march import DEEPEST as DEEPEST_PLACE
 from dlocore.kernels.march import FAILED_STEP, march_steps
 from dlocore.kernels.tension import COLUMNS
-from dlocore.problem import Problem, firmer
+from dlocore.problem import Problem, firmer, stiffer
 from dlocore.settling import RESTING, Rest
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 
@@ -21,6 +23,7 @@ _TOLERANCE = 1e-9  # of the length, on what Newton's method leaves of a step
 _FIRST, _LONG, _LAST = 1e-3, 1e2, 1e3  # steps [s]: the first, long enough to tell rest from creeping, the longest
 _STEPS = 2000  # at most
 _FARTHEST = 0.05  # of the length, in a step: farther the cable might pass through what is in its way
+_STIFFER, _STIFFENING = 6, 10.0  # times that contact is made stiffer, and by how much at most
 _RATES = (
     laws.DAMPING, laws.TWIST_DAMPING, laws.STRETCH_DAMPING, laws.QUADRATIC_DRAG,
     laws.BENDING_MEMORY, laws.TWIST_MEMORY, laws.STRETCH_MEMORY,
@@ -31,11 +34,24 @@ def slide_to_rest(problem: Problem, grid: Grid, monitor: Monitor) -> tuple[Float
     """Return control points (n_u, nc) [m] at rest with the grasps at their first poses, how, and what lies behind them.
 
     Steps of backward Euler whose velocity is forgotten, each twice as long as the last: the cable goes where its energy
-    falls, and friction, whose anchors it drags along, holds it where it can. Nothing yields on the way.
+    falls, and friction, whose anchors it drags along, holds it where it can. Nothing yields on the way. Where the cable
+    sinks too deep into something, and might sink through it, it slides again with stiffer contact.
 
     Raises:
         Cancelled: the caller asked to stop.
     """
+    allowed = DEEPEST * problem.scene.cable.diameter
+    q, rest, history, deepest = _slid(problem, grid, monitor)
+    for _ in range(_STIFFER if problem.contact is not None else 0):
+        if rest == "time" or deepest <= allowed:
+            break
+        problem = stiffer(problem, min(1.5 * deepest / allowed, _STIFFENING))
+        q, rest, history, deepest = _slid(problem, grid, monitor)
+    return q, rest, history
+
+
+def _slid(problem: Problem, grid: Grid, monitor: Monitor) -> tuple[Floats, Rest, History, float]:
+    """Return what `slide_to_rest` does, with the contact at hand, and the largest depth on the way [m]."""
     cable = problem.scene.cable
     active, parameters = firmer(problem, 0.0).law_table()
     active[list(_RATES)] = 0
@@ -47,7 +63,7 @@ def slide_to_rest(problem: Problem, grid: Grid, monitor: Monitor) -> tuple[Float
     held = hold(problem, grid, grasps, np.zeros(2), starts, grid.start)
     offsets = np.ascontiguousarray(held.offsets)
     applied, nothing, log = applied_forces(problem, grid, np.zeros(1)), np.zeros_like(offsets), np.zeros((0, 0, 0))
-    q, h = grid.start.copy(), _FIRST
+    q, h, deepest = grid.start.copy(), _FIRST, 0.0
     rest: Rest = "restless"
     for _ in range(_STEPS):
         try:
@@ -69,10 +85,10 @@ def slide_to_rest(problem: Problem, grid: Grid, monitor: Monitor) -> tuple[Float
                 x[:] = old
             h *= 0.25
             continue
-        q = states[1]
+        q, deepest = states[1], max(deepest, float(info[DEEPEST_PLACE]))
         if moved <= RESTING * length and h >= _LONG:
             rest = "settled"
             break
         h = min(2.0 * h, _LAST)
     kept = grid.history
-    return q, rest, history._replace(memory=kept.memory, axial=kept.axial, tension=kept.tension)
+    return q, rest, history._replace(memory=kept.memory, axial=kept.axial, tension=kept.tension), deepest

@@ -173,7 +173,7 @@ def simulate(rod: Rod, tolerance: float, watch: Watch) -> Motion:
     now = rod.start
     if problem.scene.shape.settle:
         with suppress(TimeIsUp):
-            now = settled(rod, watch)
+            now, record.deepest = settled(rod, watch)
     for begin, end in pairwise(events_of(problem)):
         middle = 0.5 * (begin + end)
         hold = [i for i, g in enumerate(grasps) if g.start <= middle and (g.release_time or np.inf) > middle]
@@ -221,8 +221,10 @@ def _window(link: Chain, state: State, tolerance: float, watch: Watch, record: _
     return state
 
 
-def settled(rod: Rod, watch: Watch) -> Snapshot:
-    """Return the rod in equilibrium under the grasps' first poses: backward Euler downhill, in ever longer steps.
+def settled(rod: Rod, watch: Watch) -> tuple[Snapshot, float]:
+    """Return the rod in equilibrium under the grasps' first poses, and the largest depth on its way there [m].
+
+    Backward Euler downhill, in ever longer steps.
 
     The velocity is forgotten after each step, so that the rod goes where its energy falls; nothing yields on the way.
     """
@@ -234,7 +236,7 @@ def settled(rod: Rod, watch: Watch) -> Snapshot:
     link = chain(rod, held, 0.0, rod.problem.horizon)
     state = link.state(rod.start)
     told = np.zeros(3)
-    h = DOWN
+    h, deepest = DOWN, 0.0
     for _ in range(DOWNHILL):
         watch.check()
         after = State(*(np.zeros_like(x) for x in state))
@@ -251,15 +253,16 @@ def settled(rod: Rod, watch: Watch) -> Snapshot:
             continue
         after.q[:, 3] = 0.0
         after.v[:] = 0.0
-        state = after
+        state, deepest = after, max(deepest, told[2])
         if moved <= SETTLED * length and h >= 100.0:
             break
         h = min(2.0 * h, 1e3)
     rest = link.snapshot(state)
-    return replace(
+    resting = replace(
         rest,
         v=rod.start.v,
         kept=Memory(rest.kept.turn, rod.start.kept.memory),
         axial=rod.start.axial,
         anchor=np.zeros_like(rest.anchor),
     )
+    return resting, deepest

@@ -209,6 +209,34 @@ def test_a_start_meets_what_it_reaches_only_as_it_settles() -> None:
     assert found.apart < 2e-3
 
 
+def laid_over(radius: float, held: float) -> Floats:
+    """Return points of a cable that hangs over a bar through 0, by `held` [m] on one side and the rest on the other."""
+    bend = radius + RADIUS + 0.001
+    s = np.concatenate([np.linspace(-held, 0.0, 30), np.linspace(0.0, np.pi * bend, 20)[1:-1]])
+    s = np.concatenate([s, np.linspace(np.pi * bend, 1.0 - held, 30)])
+    angle = np.clip(s / bend, 0.0, np.pi)
+    z = bend * np.sin(angle) + np.minimum(s, 0.0) - np.maximum(s - np.pi * bend, 0.0)
+    return np.column_stack([-bend * np.cos(angle), 0.0 * s, z])
+
+
+@pytest.mark.parametrize("n_u", [13, 28, 61])
+def test_a_start_does_not_sink_through_a_wire_while_contact_is_soft(n_u: int) -> None:
+    # all of its weight on a wire: with the contact that bears the weight of a cable on a table it had sunk through
+    wire_below = replace(bar(0.0, 0.0, 0.003257), friction=0.3)
+    scene = Scene(
+        cable=wire(4.129e-4),
+        shape=Points(points=laid_over(0.003257, 0.5424), settle=True),
+        grasps=(Grasp(u=0.0, hold="point"),),
+        environment=Environment(drag=0.1, obstacles=(wire_below,)),
+        horizon=1.0,
+        effects={"self_contact": "off"},
+    )
+    problem = pose(scene)
+    grid = start_grid(problem, n_u, Monitor())
+    end = problem.plane.world((design_matrix(grid.knots, [1.0]) @ grid.start)[:, :3])[0]
+    assert end[2] == pytest.approx(-0.396, abs=0.01)  # 1.54 m below the bar where it has sunk through it
+
+
 def test_what_no_held_point_reaches_is_left_out() -> None:
     far = bar(0.0, -0.4, 0.005)  # 0.75 m below the grips, of which half of the cable reaches 0.37 m
     near = bar(0.0, 0.0, 0.005)

@@ -38,7 +38,7 @@ def rod(scene: Scene, elements: int, halvings: int = 0, stiffening: float = 1.0)
 def equilibrium(scene: Scene, elements: int) -> Floats:
     """Return the settled nodes (n, 3) [m], extrapolated to a fine rod from `elements` and twice as many."""
     coarse, fine = (rod(scene, elements, k) for k in (0, 1))
-    x, y = (r.world(settled(r, Patient()).x) for r in (coarse, fine))
+    x, y = (r.world(settled(r, Patient())[0].x) for r in (coarse, fine))
     return np.asarray((4.0 * y[::2] - x) / 3.0)
 
 
