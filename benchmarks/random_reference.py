@@ -24,6 +24,7 @@ from dlocore import Prediction, Quality, Scene, SceneError, predict, warm_up
 
 TARGET = 3e-3  # of the length: that of the reference
 DEADLINES = 10.0, 15.0  # [s] of the predictor and the reference
+PATIENT = 300.0, 300.0  # [s]: the same where what is found must not depend on the machine
 WRONG = 1e-2  # of the length
 
 
@@ -51,7 +52,7 @@ def solved(scene: Scene, deadline: float) -> Prediction | None:
     return found if found.status == "converged" and found.accuracy.error_estimate is not None else None
 
 
-def compare(seed: int, index: int) -> Compared | None:
+def compare(seed: int, index: int, deadlines: tuple[float, float] = DEADLINES) -> Compared | None:
     """Compare the scene of a seed and an index, None where it can't be followed or one of the two does not solve it."""
     drawn = draw(seed, index)
     if not drawn.possible:
@@ -62,11 +63,11 @@ def compare(seed: int, index: int) -> Compared | None:
         return None
     length = scene.cable.length
     scene = replace(scene, quality=Quality(), effects={**scene.effects, "self_contact": "off"})
-    found = solved(scene, DEADLINES[0])
+    found = solved(scene, deadlines[0])
     if found is None:
         return None
     quality = Quality(method="reference", target_error=max(TARGET * length, 1e-6))
-    reference = solved(replace(scene, quality=quality), DEADLINES[1])
+    reference = solved(replace(scene, quality=quality), deadlines[1])
     if reference is None:
         return None
     u, t = np.linspace(0.0, length, 65), np.linspace(0.0, found.surface.horizon, 33)

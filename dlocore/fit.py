@@ -25,10 +25,10 @@ END_NOISE = 3.0  # an end point lies within three deviations of the noise, so th
 MARGIN = 0.05  # of the length: how far feet of noisy points may lie beyond the ends
 SPEED_ERROR = 3e-4  # at quarter points; between them it is at most twice that, below the 1e-3 strain of a taut cable
 SLOWEST = 1e-3  # of the chord's speed: where the parameter of a fit moves on and the curve doesn't, it is a cusp
-MIN_STEPS = 512  # of the arclength of a fit, so that its inverse is smooth to SPEED_ERROR
+STEPS, MIN_STEPS = 16, 512  # of the arclength of a fit, a knot span and in all: its inverse is smooth to SPEED_ERROR
+MISSED = 0.01  # of the length, by which a fit with fewer spans may miss the points in the mean
 MIN_SPANS = 8  # of a fit, at which even few points can show three bends
-MIN_UNIT_SPANS, MAX_UNIT_SPANS = 64, 1024  # beyond which a curve is too sharp for a cable, and is fitted with fewer
-MOST_UNIT_SPANS = 4096  # where it is as sharp with the fewest: points that turn back at a corner
+MIN_UNIT_SPANS, MAX_UNIT_SPANS = 64, 4096  # beyond which a curve is too sharp for a cable, and is fitted with fewer
 KEPT = 64  # fits, each at most some 100 kB
 
 
@@ -83,20 +83,21 @@ def _fit(coordinates: bytes, length: float) -> PointFit:
     p, progress, weight = _averaged(distinct, share)
     noise = _noise(p) if len(p) > SPARSE else 0.0
     most_noise = max(NOISE * max(length, 1.0), 1.5 * noise)
-    for unit_spans in (MAX_UNIT_SPANS, MOST_UNIT_SPANS):
-        spans = 2 * int(np.clip(len(p), MIN_SPANS, MAX_SPANS))
-        while spans > MIN_SPANS:
-            spans = max(spans // 2, MIN_SPANS)
-            spline, x, s = _smoothed(_cumulated(p), p, weight, spans, noise, most_noise)
-            first, last = _ends(s, noise)
-            check_length("shape.points", "points along the whole cable", last - first, length)
-            doubt = 2 * END_NOISE * float(np.sqrt(((p - spline(x)) ** 2).sum(axis=1).mean()))
-            extra = float(np.clip(length - (last - first), -doubt, doubt))
-            start, end = first - extra / 2, last + extra / 2
-            curve = _unit_speed(spline, start, end, unit_spans)
-            if curve is not None:
-                at = np.clip(np.interp(share, progress, s) - start, 0.0, end - start)
-                return PointFit(curve=curve, length_given=last - first, at=at[which])
+    spans, most_missed = 2 * int(np.clip(len(p), MIN_SPANS, MAX_SPANS)), np.inf
+    while spans > MIN_SPANS:
+        spans = max(spans // 2, MIN_SPANS)
+        spline, x, s = _smoothed(_cumulated(p), p, weight, spans, noise, most_noise)
+        first, last = _ends(s, noise)
+        check_length("shape.points", "points along the whole cable", last - first, length)
+        missed = float(np.sqrt(((p - spline(x)) ** 2).sum(axis=1).mean()))
+        most_missed = min(most_missed, missed + MISSED * length)
+        doubt = 2 * END_NOISE * missed
+        extra = float(np.clip(length - (last - first), -doubt, doubt))
+        start, end = first - extra / 2, last + extra / 2
+        curve = _unit_speed(spline, start, end) if missed <= most_missed else None
+        if curve is not None:
+            at = np.clip(np.interp(share, progress, s) - start, 0.0, end - start)
+            return PointFit(curve=curve, length_given=last - first, at=at[which])
     raise _doubled_back()
 
 
@@ -194,7 +195,7 @@ def _ends(s: Floats, noise: float) -> tuple[float, float]:
 
 def _arclength(spline: BSpline) -> tuple[Floats, Floats]:
     """Return a grid of parameters with margins and the arclength there [m], 0 at parameter 0; Simpson's rule."""
-    span, steps = spline.t[-DEGREE - 1], max(4 * (len(spline.c) - DEGREE), MIN_STEPS)
+    span, steps = spline.t[-DEGREE - 1], max(STEPS * (len(spline.c) - DEGREE), MIN_STEPS)
     fine = np.linspace(-MARGIN * span, (1 + MARGIN) * span, 2 * steps + 1)
     speed = np.sqrt((spline(fine, 1) ** 2).sum(axis=1))
     part = (speed[:-1:2] + 4 * speed[1::2] + speed[2::2]) * (fine[2] - fine[0]) / 6
@@ -202,10 +203,10 @@ def _arclength(spline: BSpline) -> tuple[Floats, Floats]:
     return grid, s - np.interp(0.0, grid, s)
 
 
-def _unit_speed(spline: BSpline, start: float, end: float, most: int) -> BSpline | None:
+def _unit_speed(spline: BSpline, start: float, end: float) -> BSpline | None:
     """Return the piece of a curve between two arclengths [m] as a spline in arclength.
 
-    Its knots are halved until | |r'| - 1 | <= SPEED_ERROR; None where the curve is too sharp for `most` spans of them.
+    Its spans are halved until | |r'| - 1 | <= SPEED_ERROR; None where the curve is too sharp for MAX_UNIT_SPANS.
     """
     grid, along = _arclength(spline)
     speed = np.sqrt((spline(grid, 1) ** 2).sum(axis=1))
@@ -213,7 +214,7 @@ def _unit_speed(spline: BSpline, start: float, end: float, most: int) -> BSpline
         return None
     parameter = CubicHermiteSpline(along, grid, 1 / speed)
     spans = MIN_UNIT_SPANS
-    while spans <= most:
+    while spans <= MAX_UNIT_SPANS:
         s = np.linspace(start, end, spans + 1)
         x = parameter(s)
         first, last = (t / np.linalg.norm(t) for t in spline(x[[0, -1]], 1))

@@ -13,7 +13,7 @@ from dlocore.checks import check_above, check_apart, check_outside, check_reach,
 from dlocore.effects import laws
 from dlocore.effects.base import Effect
 from dlocore.effects.bend import Bend
-from dlocore.effects.contact import Contact, TableContact
+from dlocore.effects.contact import DEEPEST, Contact, TableContact
 from dlocore.effects.damping import Damping, TwistDamping
 from dlocore.effects.drag import LinearDrag, QuadraticDrag
 from dlocore.effects.friction import Friction, slip_of
@@ -39,6 +39,7 @@ Floats = NDArray[np.float64]
 LEAST_MASS = 1e-9  # of the true one, where inertia is off: it keeps rigid motion determined
 MOST_NODES = 4000  # of contact
 _SAG = 0.005  # of the diameter: by how much a cable comes nearer to something round between two of them
+_STIFFENING = 10.0  # times that contact is made stiffer at once, at most
 _EDGES = 16.0  # of them on a diameter, where obstacles have edges
 
 
@@ -339,6 +340,16 @@ def stiffer(problem: Problem, ratio: float) -> Problem:
         contact=None if contact is None else replace(contact, stiffness=ratio * contact.stiffness),
         self_contact=None if own is None else replace(own, stiffness=ratio * own.stiffness),
     )
+
+
+def stiffer_for(problem: Problem, deepest: float) -> Problem:
+    """Return the problem with contact about so much stiffer that what was `deepest` [m] will be as deep as is allowed.
+
+    At once it is made _STIFFENING times as stiff at most.
+    """
+    # where strands strike each other, the depth goes only with the root of the stiffness
+    ratio = 1.5 * deepest / (DEEPEST * problem.scene.cable.diameter)
+    return stiffer(problem, min(ratio ** (1 if problem.self_contact is None else 2), _STIFFENING))
 
 
 def firmer(problem: Problem, step: float) -> Problem:

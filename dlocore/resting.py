@@ -13,7 +13,7 @@ from dlocore.kernels.assembly import History
 from dlocore.kernels.march import DEEPEST as DEEPEST_PLACE
 from dlocore.kernels.march import FAILED_STEP, march_steps
 from dlocore.kernels.tension import COLUMNS
-from dlocore.problem import Problem, firmer, stiffer
+from dlocore.problem import Problem, firmer, stiffer_for
 from dlocore.settling import RESTING, Rest
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 
@@ -23,7 +23,7 @@ _TOLERANCE = 1e-9  # of the length, on what Newton's method leaves of a step
 _FIRST, _LONG, _LAST = 1e-3, 1e2, 1e3  # steps [s]: the first, long enough to tell rest from creeping, the longest
 _STEPS = 2000  # at most
 _FARTHEST = 0.05  # of the length, in a step: farther the cable might pass through what is in its way
-_STIFFER, _STIFFENING = 6, 10.0  # times that contact is made stiffer, and by how much at most
+_STIFFER = 6  # times that contact is made stiffer
 _RATES = (
     laws.DAMPING, laws.TWIST_DAMPING, laws.STRETCH_DAMPING, laws.QUADRATIC_DRAG,
     laws.BENDING_MEMORY, laws.TWIST_MEMORY, laws.STRETCH_MEMORY,
@@ -45,7 +45,7 @@ def slide_to_rest(problem: Problem, grid: Grid, monitor: Monitor) -> tuple[Float
     for _ in range(_STIFFER if problem.contact is not None else 0):
         if rest == "time" or deepest <= allowed:
             break
-        problem = stiffer(problem, min(1.5 * deepest / allowed, _STIFFENING))
+        problem = stiffer_for(problem, deepest)
         q, rest, history, deepest = _slid(problem, grid, monitor)
     return q, rest, history
 

@@ -10,7 +10,7 @@ from dlocore.events import closed_grasps
 from dlocore.grid import Grid
 from dlocore.holding import Held, Starts, close_grasps, hold
 from dlocore.kernels.assembly import NO_RATES, History, assemble, remember
-from dlocore.kernels.contact import went_through
+from dlocore.kernels.contact import passes
 from dlocore.kernels.relax import descend, relax
 from dlocore.kernels.tension import COLUMNS
 from dlocore.problem import Problem
@@ -134,7 +134,7 @@ def _relaxed(
                 axes, q, before, searched, applied, tables, active, parameters, untouched, elimination, offset,
                 tolerance * length, _ITERATIONS,
             )  # fmt: skip
-            if went_through(problem.nc, before, q, tables, parameters):
+            if passes(problem.nc, before, q, tables, parameters):
                 q[:] = before
                 searched *= _STRONGER
                 rounds -= 1

@@ -42,8 +42,7 @@ def leaves_plane(problem: Problem, motion: March) -> bool:
     states = _in_plane(problem, motion.states[looks])
     if states is None:
         return False
-    bands, unit = _bands(problem, grid, states)
-    bands = bands + slipping_across(problem, grid, motion.states[looks])
+    bands, unit = _bands(problem, grid, motion.states[looks], states)
     density, drag = problem.scene.cable.linear_density, problem.drag_coefficient()
     slowest = GROWTH / problem.horizon  # [1/s]: rate of growth that matters
     slack = density * slowest**2 + drag * slowest
@@ -64,8 +63,7 @@ def is_unstable(problem: Problem, grid: Grid, q: Floats, held: list[Grasp]) -> b
     states = _in_plane(problem, q[None])
     if states is None:
         return False
-    bands, unit = _bands(problem, grid, states)
-    bands = bands + slipping_across(problem, grid, q[None])
+    bands, unit = _bands(problem, grid, q[None], states)
     largest = float(np.abs(bands).max())
     slack = _NEUTRAL * largest / float(unit.max())
     stiff = bands[0] + _held_band(grid, held, _FIRM * largest)
@@ -104,20 +102,28 @@ def pose_as_shown(scene: Scene, called_for: Mapping[str, str], start: Floats) ->
     return pose(scene, {**called_for, "side": UNSTABLE})
 
 
-def _bands(problem: Problem, grid: Grid, states: Floats) -> tuple[Floats, Floats]:
-    """Return the stiffness of states (k, n, 2) against leaving their plane, and the unit matrix, as lower bands."""
+def _bands(problem: Problem, grid: Grid, states: Floats, flat: Floats) -> tuple[Floats, Floats]:
+    """Return the stiffness of states (k, n, nc) against leaving their plane, and the unit matrix, as lower bands.
+
+    `flat` (k, n, 2) are their coordinates in the plane.
+    """
+    return _elastic(problem, grid, flat) + slipping_across(problem, grid, states), grid.tables.mass
+
+
+def _elastic(problem: Problem, grid: Grid, flat: Floats) -> Floats:
+    """Return the stiffness of bends and tension (k, n, 4) of states (k, n, 2) against leaving their plane."""
     cable, tables = problem.scene.cable, grid.tables
     moduli = cast(float, cable.bending_stiffness), cast(float, cable.axial_stiffness)
     if not problem.start.bow:
-        return stiffness_across(np.ascontiguousarray(states), tables, *moduli), tables.mass
+        return np.asarray(stiffness_across(np.ascontiguousarray(flat), tables, *moduli))
     # sections that turn with the bend of kappa take its natural bend along: EI |kappa - natural| then is the moment
     natural = np.linalg.norm(grid.history.memory[:, grid.history.memory.shape[1] // 2 :], axis=1)
     bands = []
-    for q in states:
+    for q in flat:
         kappa = np.abs(plane_curvature_of(tables, q)[:, 0])
         share = 1.0 - np.minimum(natural / np.maximum(kappa, 1e-300), 1.0)
         bands.append(stiffness_across(q[None].copy(), tables._replace(curvature_w=share * tables.curvature_w), *moduli))
-    return np.concatenate(bands), tables.mass
+    return np.concatenate(bands)
 
 
 def slipping_across(problem: Problem, grid: Grid, states: Floats) -> Floats:

@@ -347,6 +347,28 @@ def test_a_sharp_corner_is_rounded(count: int, degrees: float, noise: float) -> 
     assert np.sqrt(((fit(U) - truth(U)) ** 2).sum(axis=1).mean()) < 9e-3
 
 
+@pytest.mark.parametrize("count", [161, 321, 1001])
+@pytest.mark.parametrize("radius", [0.0067, 0.01, 0.015])
+def test_dense_exact_points_around_a_sharp_hairpin_keep_its_tip(radius: float, count: int) -> None:
+    # it had been fitted on ever fewer spans, as the inverse of its arclength was too rough: up to 40 mm off, or refused
+    truth = unit_length(lambda t: hairpin(t, radius=radius))
+    fit = fitted(truth(np.linspace(0.0, 1.0, count)))
+    assert np.linalg.norm(fit(U) - truth(U), axis=1).max() < 3e-4  # 6^2/60/6.7 mm, as of the bend above, for each jump
+    assert fit.fit_max < 3e-4
+
+
+@pytest.mark.parametrize("count", range(33, 61, 4))
+def test_points_too_far_apart_to_show_a_sharp_bend_are_refused_or_nearly_met(count: int) -> None:
+    # up to 31 mm apart, of a half circle of 31 mm: what fewer spans made of 41 of them missed one by 55 mm
+    truth = unit_length(lambda t: hairpin(t - 0.04, radius=0.01))
+    try:
+        fit = fitted(truth(np.linspace(0.0, 1.0, count)))
+    except SceneError as error:
+        assert error.field == "shape.points"
+    else:
+        assert fit.fit_rms < 0.01
+
+
 def test_a_narrow_hairpin_keeps_its_bend() -> None:
     error, distance = errors(unit_length(lambda t: hairpin(t, radius=0.02)), 60, 3e-3)
     # with one stiffness for the bend and the legs the errors are 12 and 4 mm

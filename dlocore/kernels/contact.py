@@ -16,7 +16,7 @@ from dlocore.effects.friction import friction
 from dlocore.effects.kinds import BOX, CYLINDER
 from dlocore.effects.laws import CONTACT, COUNT, FRICTION, TABLE
 from dlocore.kernels.basis import row_of
-from dlocore.kernels.compile import kernel, law, leaf, part
+from dlocore.kernels.compile import law, leaf, part
 
 _UP = (0.0, 0.0, 1.0)
 _ANY = (0.0, 0.0, 0.0)
@@ -24,7 +24,7 @@ _FLAT = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _SLACK = 0.9  # of the distance that is skipped: a strained cable is longer
 _THROUGH = 0.5  # of the way to the middle of an obstacle: a node that was deeper on its way went through it
 _LEAVES = 0.05  # of it: by so much it has to have come out again
-_SEARCH = 24  # looks for the deepest place of such a way: a thousandth of it
+_SEARCH = 24  # times that the deepest place of such a way is looked for, each in two thirds of the last part
 
 
 @law
@@ -193,7 +193,7 @@ def _between(x: Vector, y: Vector, s: float) -> Vector:
 def passes(nc: int, q0: Any, q1: Any, tables: Any, p: Any) -> bool:
     """Tell whether a node goes through an obstacle on its straight way from q0 to q1 (n, nc), as a step too long may.
 
-    The distance from a convex body is convex along a straight way, so that its least is found by halving.
+    The distance from a convex body is convex along a straight way, so that its least is found by thirds.
     """
     if len(p) == COUNT:
         return False
@@ -233,12 +233,6 @@ def passes(nc: int, q0: Any, q1: Any, tables: Any, p: Any) -> bool:
                 return True
         reach = tables.contact_u[n] + _SLACK * (nearest - longest)
     return False
-
-
-@kernel
-def went_through(nc: int, q0: Any, q1: Any, tables: Any, p: Any) -> bool:
-    """Return what `passes` does, to those who do not compile."""
-    return bool(passes(nc, q0, q1, tables, p))
 
 
 @leaf

@@ -12,7 +12,7 @@ from dlocore.effects.contact import DEEPEST
 from dlocore.events import smallest_n_t, time_knots
 from dlocore.grid import Grid
 from dlocore.kernels.timefit import farthest, sampled
-from dlocore.problem import Problem, stiffer
+from dlocore.problem import Problem, stiffer, stiffer_for
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, march
 from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.smooth import march_smooth
@@ -37,7 +37,6 @@ TEARS = 1.5  # times the strain of another march: what strains a cable so much m
 _STIFFER = 5  # times that contact is made stiffer on one grid
 _MISSED = 0.01  # of the diameter: what the time spline may miss of a motion with contact
 _SAMPLES = 33  # along the cable and over time at which surfaces are compared
-_STIFFENING = 10.0  # at most each time
 _YIELDING = 0.8  # of the depth, at most, is left by a stiffer contact where it is one of stiffness
 ACCEPT = 0.75  # of the target: an answer with a smaller estimated error is believed
 
@@ -154,9 +153,7 @@ def run_level(
             break
         if motion.stopped and problem.self_contact is None:
             break  # a soft contact may be why strands got through each other, and the march ended
-        # where strands strike each other, the depth goes only with the root of the stiffness
-        ratio = (1.5 * motion.deepest / allowed) ** (1 if problem.self_contact is None else 2)
-        harder = stiffer(problem, min(ratio, _STIFFENING))
+        harder = stiffer_for(problem, motion.deepest)
         again = march(harder, grid, steps, monitor, rho=rho)
         if (again.reached, -again.deepest) < (motion.reached, -_YIELDING * motion.deepest):
             break  # what is this deep was not pushed in

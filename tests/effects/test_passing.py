@@ -27,7 +27,7 @@ from dlocore import (
 )
 from dlocore.discretisation import make_grid
 from dlocore.kernels.assembly import contact_energy
-from dlocore.kernels.contact import went_through
+from dlocore.kernels.contact import passes
 from dlocore.obstacles import Obstacle
 from dlocore.plane import rest_plane
 from dlocore.problem import Problem, pose
@@ -35,6 +35,7 @@ from dlocore.sideways import is_unstable, slipping_across
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import design_matrix
 from dlocore.statics import start_grid
+from tests.effects.test_contact import saddle
 from tests.solver.scenes import Floats
 
 RADIUS = 0.0025  # [m] of the cables here
@@ -67,7 +68,7 @@ def ways(problem: Problem, before: Floats, after: Floats) -> bool:
     grid = make_grid(problem, 9)
     along = np.linspace(0.0, 1.0, 9)[:, None]
     states = [(1.0 - along) * ends[0] + along * ends[1] - problem.plane.origin for ends in (before, after)]
-    return bool(went_through(3, *states, grid.tables, problem.laws[1]))
+    return bool(passes(3, *states, grid.tables, problem.laws[1]))
 
 
 SOLIDS: dict[str, Obstacle] = {
@@ -144,12 +145,11 @@ def test_coarse_steps_swing_through_no_bar_nor_past_it_unseen(z: float) -> None:
     grid, motion = level.motion.grid, level.motion
     marched = np.einsum("ui,kid->kud", design_matrix(grid.knots, np.linspace(0.0, 1.0, 401)), motion.states)
     world = level.problem.plane.world(marched[..., :3])[: motion.reached + 1]
-    passes = [largest_turn_in_a_step(world, 0.0, z)]
+    with_bar = largest_turn_in_a_step(world, 0.0, z)
     through = predict(replace(scene, effects={"obstacles": "off"})).surface.positions(
         np.linspace(0.0, 1.0, 401), np.linspace(0.0, 1.0, 401)
     )
-    passes.append(largest_turn_in_a_step(through, 0.0, z))
-    assert passes[0] < 3.0 < passes[1]
+    assert with_bar < 3.0 < largest_turn_in_a_step(through, 0.0, z)
 
 
 # --- as a start settles ---
@@ -213,23 +213,15 @@ def test_a_start_meets_what_it_reaches_only_as_it_settles() -> None:
         assert middle[2] == pytest.approx(-0.435, abs=0.01)
 
 
-def laid_over(radius: float, held: float) -> Floats:
-    """Return points of a cable that hangs over a bar through 0, by `held` [m] on one side and the rest on the other."""
-    bend = radius + RADIUS + 0.001
-    s = np.concatenate([np.linspace(-held, 0.0, 30), np.linspace(0.0, np.pi * bend, 20)[1:-1]])
-    s = np.concatenate([s, np.linspace(np.pi * bend, 1.0 - held, 30)])
-    angle = np.clip(s / bend, 0.0, np.pi)
-    z = bend * np.sin(angle) + np.minimum(s, 0.0) - np.maximum(s - np.pi * bend, 0.0)
-    return np.column_stack([-bend * np.cos(angle), 0.0 * s, z])
-
-
 @pytest.mark.parametrize("n_u", [13, 28, 61])
 def test_a_start_does_not_sink_through_a_wire_while_contact_is_soft(n_u: int) -> None:
     # all of its weight on a wire: with the contact that bears the weight of a cable on a table it had sunk through
     wire_below = replace(bar(0.0, 0.0, 0.003257), friction=0.3)
+    bend, held = 0.003257 + RADIUS + 0.001, 0.5424
+    laid_over = saddle(bend, held, 1.0 - held - np.pi * bend)
     scene = Scene(
         cable=wire(4.129e-4),
-        shape=Points(points=laid_over(0.003257, 0.5424), settle=True),
+        shape=Points(points=laid_over, settle=True),
         grasps=(Grasp(u=0.0, hold="point"),),
         environment=Environment(drag=0.1, obstacles=(wire_below,)),
         horizon=1.0,
