@@ -298,9 +298,8 @@ class _Climb:
         best = self.best
         assert best is not None
         status, message = march_status(self.problem, best)
-        moved = (
-            f"the last refinement moved the surface by {best.change * 1e3:.3g} mm, target {self.target * 1e3:.3g} mm"
-        )
+        known = f"the estimated error is {self.estimate * 1e3:.3g} mm" if np.isfinite(self.estimate) else "it is alone"
+        left = f"{known}, target {self.target * 1e3:.3g} mm"
         advice = "Allow a larger target_error, more time or a shorter motion."
         if status == "converged" and self.estimate <= self.enough:
             message = self._agreed(best)
@@ -308,9 +307,9 @@ class _Climb:
                 above = f"the estimated error of {self.estimate * 1e3:.2g} mm is above the target."
                 message += f" No finer grid was tried; {above}"
         elif status == "converged" and self.monitor.remaining() <= 0:
-            status, message = "time_limit", f"The time limit passed; {moved}. {advice}"
+            status, message = "time_limit", f"The time limit passed; {left}. {advice}"
         elif status == "converged":
-            status, message = "max_iterations", f"No finer grid; {moved}. {advice}"
+            status, message = "max_iterations", f"No finer grid was tried; {left}. {advice}"
         return Outcome(best, status, message, _parts(self.changes, best))
 
 

@@ -255,8 +255,8 @@ def test_a_tip_that_folds_beyond_a_grasp_is_held_straight_by_watching_its_length
 
 
 def test_a_sharp_bend_is_the_same_on_coarse_and_fine_grids():
-    coarse, fine = predict(kinked(march(25, 33))), predict(kinked(march(97, 65)))
-    # 1.4 mm; with knots spread evenly, where the bend is another one on each grid, 14 mm
+    coarse, fine = predict(kinked(march(49, 33))), predict(kinked(march(97, 65)))
+    # 1.4 mm; with knots spread evenly, where the bend is another one on each grid, 55 mm
     assert apart(coarse.surface, fine.surface).max() < 3e-3
     assert predict(kinked(march(5, 9))).surface.positions(0.5, 0.0).shape == (1, 1, 3)  # too few for knots at it
 
