@@ -21,6 +21,7 @@ import numpy as np
 from benchmarks.hard.generator import draw
 from benchmarks.machine import machine_line
 from dlocore import Prediction, Quality, Scene, SceneError, predict, warm_up
+from dlocore.events import moments
 
 TARGET = 3e-3  # of the length: that of the reference
 DEADLINES = 10.0, 15.0  # [s] of the predictor and the reference
@@ -70,7 +71,7 @@ def compare(seed: int, index: int, deadlines: tuple[float, float] = DEADLINES) -
     reference = solved(replace(scene, quality=quality), deadlines[1])
     if reference is None:
         return None
-    u, t = np.linspace(0.0, length, 65), np.linspace(0.0, found.surface.horizon, 33)
+    u, t = np.linspace(0.0, length, 65), np.linspace(0.0, found.surface.horizon, moments(scene, 33))
     apart = np.linalg.norm(found.surface.positions(u, t) - reference.surface.positions(u, t), axis=-1).max()
     told, sure = (float(p.accuracy.error_estimate or 0.0) / length for p in (found, reference))
     return Compared(index, drawn.families, told, sure, float(apart) / length)

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
+_LONGEST = 64.0  # times that a cable swings, for as many of which grids and comparisons grow
+
+
 @dataclass(frozen=True, eq=False)
 class Event:
     """A time at which the motion is not smooth, and how much of it jumps.
@@ -28,6 +31,17 @@ class Event:
 
     time: float
     multiplicity: int
+
+
+def swings(scene: Scene) -> float:
+    """Return how many times as long a motion is as a cable of that length needs to swing, about; 1 to _LONGEST."""
+    natural = 2.0 * np.sqrt(scene.cable.length)  # [s], for a length in metres
+    return float(np.clip(cast(float, scene.horizon) / natural, 1.0, _LONGEST))
+
+
+def moments(scene: Scene, in_a_swing: int) -> int:
+    """Return at how many evenly spaced times motions are compared: so many, and as many again for each swing more."""
+    return round((in_a_swing - 1) * swings(scene)) + 1
 
 
 def find_events(scene: Scene) -> tuple[Event, ...]:

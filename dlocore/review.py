@@ -5,7 +5,7 @@ switched off in the scene stays off, and the answer says what that does.
 """
 
 from collections.abc import Callable
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ CLOSE = 0.01  # of the length: a cable that comes this near to an obstacle left 
 MATTERS = 0.001  # of the length: what a neglected effect may move the cable before it is worth a word
 _STRAINED = 0.05  # axial strain: few cables bear more
 _LOOKS = 5  # states of each stretch of a motion at which neglected forces are weighed
+_LONGER = 4  # times as long, each time that a motion is searched for turns
 
 
 def called_for(level: Level, fine: bool = True) -> dict[str, str]:
@@ -117,7 +118,7 @@ def objections(level: Level) -> list[str]:
     allowed = MATTERS * problem.scene.cable.length
     for name, force in _forces(problem).items() if off else ():
         if name in off:
-            moved = _response(level, force)
+            moved = _response(level, name, force)
             if moved > allowed:
                 found.append(f"{name} is off, though it would move the cable by about {moved * 1e3:.2g} mm")
     return found
@@ -128,7 +129,7 @@ def neglected(level: Level) -> float:
     problem = level.problem
     if problem.inertia is not None or problem.scene.effects.get("inertia", "auto") != "auto":
         return 0.0
-    return _response(level, _forces(problem)["inertia"])
+    return _response(level, "inertia", _forces(problem)["inertia"])
 
 
 def _yields(level: Level) -> dict[str, str]:
@@ -230,44 +231,81 @@ def _forces(problem: Problem) -> dict[str, Force]:
     return {"inertia": inertia, "drag": drag, "gravity": gravity, "damping": damping, "friction": friction}
 
 
-def _response(level: Level, force: Force) -> float:
+def _response(level: Level, name: str, force: Force) -> float:
     """Return the largest displacement [m] of a control point that a force which was left out would cause, about.
 
-    It is (K+ + 2/T^2 M + 1/T C)^-1 f at a few states of the motion: its static displacement where the cable is held
-    stiffly, and that of a free body after the time T of the motion where it isn't.
+    It is (K + 2/T^2 M + 1/T C)^-1 f at a few states of the motion: its static displacement where the cable is held
+    stiffly, and that of a free body after the time T of the motion where it isn't. Inertia is looked for where the
+    motion turns fastest, over longer and longer times tau: (K + M/tau^2)^-1 M a then is the static displacement in
+    modes that are faster than tau, and by how far the motion turned in slower ones.
     """
     most = 0.0
     for window in level.motion.forces:
-        most = max(most, _response_in(level, window, force))
+        looks = _evenly(window) + (_turns(window) if name == "inertia" else [])
+        most = max([most, *(_given_way(level, window, look, force) for look in looks)])
     return most
 
 
-def _response_in(level: Level, window: WindowForces, force: Force) -> float:
+class _Look(NamedTuple):
+    """Control points (n_u, nc) [m], their velocities and accelerations, and the time that these were taken over [s]."""
+
+    q: Floats
+    v: Floats
+    a: Floats
+    tau: float
+
+
+def _evenly(window: WindowForces) -> list[_Look]:
+    """Return looks at states evenly spaced over a stretch of motion, as if they were without end."""
+    last = len(window.times) - 2
+    if last < 1:
+        return []
+    at = np.unique(np.linspace(1, last, _LOOKS).round().astype(int))
+    return [look._replace(tau=np.inf) for look in _looks(window, at, 1)]
+
+
+def _turns(window: WindowForces) -> list[_Look]:
+    """Return looks at the states of a stretch of motion where it turns fastest, over longer and longer times."""
+    last, stride, found = len(window.times) - 1, 1, []
+    while 2 * stride <= last:
+        at = np.arange(stride, last - stride + 1, max(1, stride // 2))
+        states = window.states
+        turned = states[at + stride] - 2.0 * states[at] + states[at - stride]
+        sharpest = int((turned * turned).sum(axis=2).max(axis=1).argmax())
+        found += _looks(window, at[sharpest : sharpest + 1], stride)
+        stride *= _LONGER
+    return found
+
+
+def _looks(window: WindowForces, at: NDArray[np.intp], stride: int) -> list[_Look]:
+    """Return looks at some states of a stretch, with rates over so many of its (equal) steps to both sides."""
+    states, tau = window.states, stride * float(window.times[-1] - window.times[0]) / (len(window.times) - 1)
+    found = []
+    for k in at:
+        before, q, after = states[k - stride], states[k], states[k + stride]
+        found.append(_Look(q, (after - before) / (2.0 * tau), (after - 2.0 * q + before) / tau**2, tau))
+    return found
+
+
+def _given_way(level: Level, window: WindowForces, look: _Look, force: Force) -> float:
+    """Return how far a force moves the cable at most, from where it is looked at [m]; 0 where it gives way anyway."""
     problem, grid = level.problem, level.motion.grid
+    q, v, a, tau = look
     nc, e = problem.nc, window.held.elimination
-    size, horizon = grid.n_u * nc, problem.horizon
-    free = size - len(e.held)
     active, parameters = problem.law_table()
-    mass = problem.scene.cable.linear_density
-    K, A = np.empty((size, 4 * nc)), np.empty((free, e.width))
-    f, x, change = np.empty((grid.n_u, nc)), np.empty(free), np.empty(size)
-    h = np.diff(window.times)
-    most = 0.0
-    for k in np.unique(np.linspace(1, len(window.times) - 2, _LOOKS).round().astype(int)):
-        if not 0 < k < len(h):
-            continue
-        q = window.states[k]
-        v = (window.states[k + 1] - window.states[k - 1]) / (h[k] + h[k - 1])
-        a = 2.0 * ((window.states[k + 1] - q) / h[k] - (q - window.states[k - 1]) / h[k - 1]) / (h[k] + h[k - 1])
-        history = grid.history
-        assemble(problem.axes, q, v, grid.tables, active, parameters, history, NO_RATES, (1.0, 0.0, 0.0), f, K)
-        add_scalar_band(nc, grid.tables.mass, 2.0 * mass / horizon**2 + problem.drag_coefficient() / horizon, K)
+    slow = problem.scene.cable.linear_density * (2.0 / problem.horizon**2 + tau**-2)
+    K, A = np.empty((q.size, 4 * nc)), np.empty((q.size - len(e.held), e.width))
+    f, x, change = np.empty_like(q), np.empty(len(A)), np.empty(q.size)
+    for geometric in (1.0, 0.0):  # of a cable that is about to give way only the positive part is of use
+        scales = (1.0, 0.0, geometric)
+        assemble(problem.axes, q, v, grid.tables, active, parameters, grid.history, NO_RATES, scales, f, K)
+        add_scalar_band(nc, grid.tables.mass, slow + problem.drag_coefficient() / problem.horizon, K)
         reduce_matrix(e, K, A)
-        reduce_vector(e, np.ascontiguousarray(force(q, v, a, level)).ravel(), x)
-        if factor(A) >= 0:
-            continue
-        solve_factored(A, x)
-        expand_vector(e, x, change)
-        moved = change.reshape(-1, nc)[:, : problem.plane.dimensions]
-        most = max(most, float(np.linalg.norm(moved, axis=1).max()))
-    return most
+        if factor(A) < 0:
+            break
+    else:
+        return 0.0
+    reduce_vector(e, np.ascontiguousarray(force(q, v, a, level)).ravel(), x)
+    solve_factored(A, x)
+    expand_vector(e, x, change)
+    return float(np.linalg.norm(change.reshape(-1, nc)[:, : problem.plane.dimensions], axis=1).max())

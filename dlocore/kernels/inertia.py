@@ -66,6 +66,32 @@ def residual(
 
 
 @part
+def follow(
+    nc: int, rows: Any, inertia: float, share: float, change: Any, moved: Any, f: Any, stacked: Any
+) -> None:  # fmt: skip
+    """Add to the forces f (n, nc) [N], to first order, what a change (n, nc) [m] of the control points makes of them.
+
+    Args:
+        nc: coordinates of a control point.
+        rows: of the unit matrix, see `both_sides`.
+        inertia: what the step makes of its density [N/m^2], see `effective`.
+        share: of the forces in the tangent of the step.
+        moved: that tangent times the change (n nc,) [N].
+        stacked: of `padded`; overwritten.
+    """
+    n = len(rows)
+    for i in range(n):
+        for d in range(nc):
+            stacked[i + _REACH, d] = inertia * change[i, d]
+    for i in range(n):
+        for d in range(nc):
+            heavy = 0.0
+            for o in range(2 * _REACH + 1):
+                heavy += rows[i, o] * stacked[i + o, d]
+            f[i, d] += (moved[i * nc + d] - heavy) / share
+
+
+@part
 def effective(nc: int, K: Any, unit: Any, inertia: float, share: float, drag: float) -> None:
     """Turn the tangent K (n nc, 4 nc) of the forces into that of a step: share K + (inertia + drag) U.
 

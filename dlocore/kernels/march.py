@@ -24,7 +24,7 @@ from dlocore.kernels.banded import (
 )
 from dlocore.kernels.compile import brief, kernel, leaf
 from dlocore.kernels.contact import passes, strikes
-from dlocore.kernels.inertia import both_sides, effective, padded, residual
+from dlocore.kernels.inertia import both_sides, effective, follow, padded, residual
 from dlocore.kernels.mixing import mixed, room
 from dlocore.kernels.narrow import ROOM, factor_step, solve_step
 from dlocore.kernels.predictor import differences_of, predict_by, shift
@@ -141,7 +141,6 @@ def march_steps(
     f = np.empty((n, nc))
     R = np.empty((n, nc))
     flat = R.reshape(size)
-    weighted = np.empty((n, nc))
     unit = tables.mass
     rows, stacked = both_sides(unit), padded(n, nc)
     x = np.empty(free)
@@ -373,13 +372,7 @@ def march_steps(
                     reactions[k, i] = flat[e.held[i]] + moved[e.held[i]]
             else:
                 holding(e, K, change, flat, reactions[k], moved)
-            for i in range(n):
-                for d in range(nc):
-                    weighted[i, d] = 0.0
-            multiply_scalar_band(unit, step_change, inertia, weighted)
-            for i in range(n):
-                for d in range(nc):
-                    f[i, d] += (moved[i * nc + d] - weighted[i, d]) / (1.0 - al_f)
+            follow(nc, rows, inertia, 1.0 - al_f, step_change, moved, f, stacked)
         for i in range(n):
             for d in range(nc):
                 Q[k, i, d] = q1[i, d]

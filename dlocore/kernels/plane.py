@@ -60,26 +60,27 @@ def axial(
         k, w = firsts[n], weights[n]
         b = row_of(b1, n)
         x, y = _combine(q, k, b)
-        square = x * x + y * y
-        length = np.sqrt(square)
+        length = np.sqrt(x * x + y * y)
+        inverse = 1.0 / length
         strain, rate = length - 1.0, 0.0
         if active[STRETCH_DAMPING] and rates[0] != 0.0:
             rate = rates[0] * strain + rates[1] * past[n, 1] + rates[2] * past[n, 2]
         elif active[STRETCH_DAMPING]:
             vx, vy = _combine(v, k, b)
-            rate = (x * vx + y * vy) / length
+            rate = (x * vx + y * vy) * inverse
         tension, modulus, viscosity = axial_stress(active, p, strain, rate, past[n, 0], past[n, 1], rates[3])
         if len(kept) > 0:
             kept[n, AT_HAND], kept[n, MODULUS] = tension, modulus + rates[0] * viscosity
-        gx, gy = w * tension * x / length, w * tension * y / length
+        g = w * tension * inverse
+        gx, gy = g * x, g * y
         for i in range(4):
             f[k + i, 0] += b[i] * gx
             f[k + i, 1] += b[i] * gy
         if tangent:
             # the part of the stress is positive only in tension
             pull = assumed(kept, n, tension) if geometric != 0.0 else tension
-            stress = w * (geometric * pull if geometric != 0.0 else elastic * max(pull, 0.0)) / length
-            along = (w * (elastic * modulus + viscous * viscosity) - stress) / square
+            stress = w * (geometric * pull if geometric != 0.0 else elastic * max(pull, 0.0)) * inverse
+            along = (w * (elastic * modulus + viscous * viscosity) - stress) * inverse * inverse
             xx, xy, yy = along * x * x + stress, along * x * y, along * y * y + stress
             for j in range(4):
                 for i in range(j, 4):

@@ -69,18 +69,18 @@ def axial(
         k, w = firsts[n], weights[n]
         b = row_of(b1, n)
         x, y, z = combine(q, k, b)
-        square = x * x + y * y + z * z
-        length = np.sqrt(square)
+        length = np.sqrt(x * x + y * y + z * z)
+        inverse = 1.0 / length
         strain, rate = length - 1.0, 0.0
         if active[STRETCH_DAMPING] and rates[0] != 0.0:
             rate = rates[0] * strain + rates[1] * past[n, 1] + rates[2] * past[n, 2]
         elif active[STRETCH_DAMPING]:
             vx, vy, vz = combine(v, k, b)
-            rate = (x * vx + y * vy + z * vz) / length
+            rate = (x * vx + y * vy + z * vz) * inverse
         tension, modulus, viscosity = axial_stress(active, p, strain, rate, past[n, 0], past[n, 1], rates[3])
         if len(kept) > 0:
             kept[n, AT_HAND], kept[n, MODULUS] = tension, modulus + rates[0] * viscosity
-        g = w * tension / length
+        g = w * tension * inverse
         for i in range(4):
             f[k + i, 0] += b[i] * g * x
             f[k + i, 1] += b[i] * g * y
@@ -88,8 +88,8 @@ def axial(
         if tangent:
             # the part of the stress is positive only in tension
             pull = assumed(kept, n, tension) if geometric != 0.0 else tension
-            stress = w * (geometric * pull if geometric != 0.0 else elastic * max(pull, 0.0)) / length
-            s = (w * (elastic * modulus + viscous * viscosity) - stress) / square
+            stress = w * (geometric * pull if geometric != 0.0 else elastic * max(pull, 0.0)) * inverse
+            s = (w * (elastic * modulus + viscous * viscosity) - stress) * inverse * inverse
             H = (s * x * x + stress, s * y * y + stress, s * z * z + stress, s * x * y, s * x * z, s * y * z)
             for j in range(4):
                 for i in range(j, 4):

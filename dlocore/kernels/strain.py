@@ -51,9 +51,10 @@ def plane_hessian(
 def space_curvature(a: Vector, c: Vector) -> tuple[float, float, Vector, Vector]:
     """Return l, h = t . r'', the unit tangent t and the curvature vector kappa [1/m] of r' = a, r'' = c."""
     length = np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
-    t = (a[0] / length, a[1] / length, a[2] / length)
+    inverse = 1.0 / length
+    t = (a[0] * inverse, a[1] * inverse, a[2] * inverse)
     h = t[0] * c[0] + t[1] * c[1] + t[2] * c[2]
-    return length, h, t, ((c[0] - h * t[0]) / length, (c[1] - h * t[1]) / length, (c[2] - h * t[2]) / length)
+    return length, h, t, ((c[0] - h * t[0]) * inverse, (c[1] - h * t[1]) * inverse, (c[2] - h * t[2]) * inverse)
 
 
 @law
@@ -61,11 +62,12 @@ def space_curvature_rate(length: float, h: float, t: Vector, kappa: Vector, da: 
     """Return the rate of kappa seen by sections that do not spin, P kappa_t, of the rates da of r' and dc of r''."""
     da_t = t[0] * da[0] + t[1] * da[1] + t[2] * da[2]
     dc_t = t[0] * dc[0] + t[1] * dc[1] + t[2] * dc[2]
-    s = h / length
+    inverse = 1.0 / length
+    s = h * inverse
     return (
-        (dc[0] - dc_t * t[0] - s * (da[0] - da_t * t[0]) - kappa[0] * da_t) / length,
-        (dc[1] - dc_t * t[1] - s * (da[1] - da_t * t[1]) - kappa[1] * da_t) / length,
-        (dc[2] - dc_t * t[2] - s * (da[2] - da_t * t[2]) - kappa[2] * da_t) / length,
+        (dc[0] - dc_t * t[0] - s * (da[0] - da_t * t[0]) - kappa[0] * da_t) * inverse,
+        (dc[1] - dc_t * t[1] - s * (da[1] - da_t * t[1]) - kappa[1] * da_t) * inverse,
+        (dc[2] - dc_t * t[2] - s * (da[2] - da_t * t[2]) - kappa[2] * da_t) * inverse,
     )
 
 
@@ -120,7 +122,8 @@ def twist_increment(t0: Vector, k0: Vector, t: Vector, kappa: Vector) -> tuple[f
 @law
 def space_moment(length: float, h: float, t: Vector, kappa: Vector, M: Vector) -> tuple[Vector, Vector]:
     """Return the generalised forces by r' and by r'' of the moment vector M across the tangent."""
-    dot = (M[0] * kappa[0] + M[1] * kappa[1] + M[2] * kappa[2]) / length
-    s = -h / (length * length)
+    inverse = 1.0 / length
+    dot = (M[0] * kappa[0] + M[1] * kappa[1] + M[2] * kappa[2]) * inverse
+    s = -h * inverse * inverse
     by_first = (s * M[0] - dot * t[0], s * M[1] - dot * t[1], s * M[2] - dot * t[2])
-    return by_first, (M[0] / length, M[1] / length, M[2] / length)
+    return by_first, (M[0] * inverse, M[1] * inverse, M[2] * inverse)

@@ -102,21 +102,20 @@ def _missed(first: Any, table: Any, Q: Any, C: Any, dimensions: int) -> Any:
 
 
 @brief
-def sampled(knots_t: Any, knots_u: Any, control: Any, count: int) -> Any:
-    """Return the surface of control points (n_t, n, nc) at `count` even times and places (count, count, nc) [m]."""
+def sampled(knots_t: Any, knots_u: Any, control: Any, times: int, places: int) -> Any:
+    """Return the surface of control points (n_t, n, nc) at even times and places (times, places, nc) [m]."""
     _, n, nc = control.shape
-    share = np.arange(count) / (count - 1)
-    first_t, over = basis_rows(knots_t, share * knots_t[-1], 0)
-    first_u, along = basis_rows(knots_u, share * knots_u[-1], 0)
-    out = np.empty((count, count, nc))
+    first_t, over = basis_rows(knots_t, np.arange(times) / (times - 1) * knots_t[-1], 0)
+    first_u, along = basis_rows(knots_u, np.arange(places) / (places - 1) * knots_u[-1], 0)
+    out = np.empty((times, places, nc))
     q = np.empty((n, nc))
-    for k in range(count):
+    for k in range(times):
         f, (b0, b1, b2, b3) = first_t[k], row_of(over[k], 0)
         for i in range(n):
             for d in range(nc):
                 own = b0 * control[f, i, d] + b1 * control[f + 1, i, d]
                 q[i, d] = own + b2 * control[f + 2, i, d] + b3 * control[f + 3, i, d]
-        for s in range(count):
+        for s in range(places):
             g, (b0, b1, b2, b3) = first_u[s], row_of(along[s], 0)
             for d in range(nc):
                 out[k, s, d] = b0 * q[g, d] + b1 * q[g + 1, d] + b2 * q[g + 2, d] + b3 * q[g + 3, d]

@@ -357,12 +357,14 @@ def _derivatives(
     length: float, h: float, director: Vector, by_spin: float, spin: Vector, by_t: float, t: Vector
 ) -> tuple[Vector, Vector]:
     """Return the derivatives by r' and by r'' of a curvature along a director, which turns with the frames."""
+    inverse = 1.0 / length
+    along = h * inverse
     first = (
-        (by_spin * spin[0] + by_t * t[0] - h / length * director[0]) / length,
-        (by_spin * spin[1] + by_t * t[1] - h / length * director[1]) / length,
-        (by_spin * spin[2] + by_t * t[2] - h / length * director[2]) / length,
+        (by_spin * spin[0] + by_t * t[0] - along * director[0]) * inverse,
+        (by_spin * spin[1] + by_t * t[1] - along * director[1]) * inverse,
+        (by_spin * spin[2] + by_t * t[2] - along * director[2]) * inverse,
     )
-    return first, (director[0] / length, director[1] / length, director[2] / length)
+    return first, (director[0] * inverse, director[1] * inverse, director[2] * inverse)
 
 
 @kernel

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.events import moments
 from dlocore.problem import Problem, pose
 from dlocore.reference.motion import Motion, Watch, events_of, simulate
 from dlocore.reference.rod import build, nodes_of, solid
@@ -27,7 +28,7 @@ FOURTH = 15.0  # what is left of a change by an extrapolation of the fourth orde
 DEEP = 0.02  # of the diameter: a motion that goes deeper into a surface is done again with stiffer contact
 STIFFER = (2.0, 30.0)  # at least and at most by these ratios
 STIFFEST = 1e5  # times the stiffness that bears the weight
-TIMES = 129  # at which motions are compared, besides events
+TIMES = 129  # while a cable swings once, at which motions are compared, besides events
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +124,9 @@ def _compared(problem: Problem, levels: list[Level], motion: Motion) -> Level:
     taken = samples(motion)
     if not levels:
         return Level(motion, taken, np.inf, np.inf, False)
-    t = np.unique(np.concatenate([np.linspace(0.0, problem.horizon, TIMES), events_of(problem)]))
+    t = np.unique(
+        np.concatenate([np.linspace(0.0, problem.horizon, moments(problem.scene, TIMES)), events_of(problem)])
+    )
     fine, coarse = taken.positions(t)[:, ::2], levels[-1].taken.positions(t)
     change = _farthest(fine, coarse)
     if len(levels) < LEAST - 1:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dlocore.discretisation import smallest_n_u
 from dlocore.effects.contact import DEEPEST
-from dlocore.events import smallest_n_t, time_knots
+from dlocore.events import moments, smallest_n_t, swings, time_knots
 from dlocore.grid import Grid
 from dlocore.kernels.timefit import farthest, sampled
 from dlocore.problem import Problem, stiffer, stiffer_for
@@ -36,7 +36,7 @@ CREDIBLE_STRAIN = 0.02  # axial: a march that stretches the cable more is tried 
 TEARS = 1.5  # times the strain of another march: what strains a cable so much more does it for want of steps
 _STIFFER = 5  # times that contact is made stiffer on one grid
 _MISSED = 0.01  # of the diameter: what the time spline may miss of a motion with contact
-_SAMPLES = 33  # along the cable and over time at which surfaces are compared
+_SAMPLES = 33  # along the cable, and in time while it swings once, at which surfaces are compared
 _YIELDING = 0.8  # of the depth, at most, is left by a stiffer contact where it is one of stiffness
 ACCEPT = 0.75  # of the target: an answer with a smaller estimated error is believed
 
@@ -79,15 +79,15 @@ class Level:
 
     @cached_property
     def samples(self) -> Floats:
-        """The surface at 33 evenly spaced times and 33 places along the cable (33, 33, nc) [m]."""
-        return np.asarray(sampled(self.knots_t, self.motion.grid.knots, self.control, _SAMPLES))
+        """The surface at evenly spaced times and 33 places along the cable (moments, 33, nc) [m]."""
+        times = moments(self.problem.scene, _SAMPLES)
+        return np.asarray(sampled(self.knots_t, self.motion.grid.knots, self.control, times, _SAMPLES))
 
 
 def stretched(problem: Problem, level: int) -> Size:
     """Return the size of a level for the horizon and the features of a problem."""
     n_u, n_t, steps = LEVELS[level]
-    natural = 2.0 * np.sqrt(problem.scene.cable.length)  # [s]: about the period of a cable that swings
-    factor = float(np.clip(problem.horizon / natural, 1.0, 64.0))
+    factor = swings(problem.scene)
     n_u = max(n_u, smallest_n_u(problem) + 2 * level) + problem.kinks
     n_t = max(round(n_t * factor), smallest_n_t(problem) + 4 * (level + 1))
     return Size(n_u, n_t, max(round(steps * factor), 3 * n_t))

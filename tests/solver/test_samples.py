@@ -3,16 +3,40 @@
 import numpy as np
 import pytest
 
+from dlocore import Cable, Environment, Grasp, Move, Scene, Straight
+from dlocore.events import moments
 from dlocore.kernels.timefit import sampled
+from dlocore.problem import pose
+from dlocore.progress import surface_at
+from dlocore.solvers.ladder import distance, stretched
+from dlocore.solvers.monitor import Monitor
 from dlocore.spline import SplineSurface, uniform_knots
+from dlocore.whole_march import march_level
 
 
 @pytest.mark.parametrize("nc", [2, 3, 4])
 def test_samples_are_those_of_the_surface(nc: int) -> None:
     control = np.random.default_rng(nc).normal(size=(11, 9, nc))
     knots_u, knots_t = uniform_knots(9, 0.8), np.sort(np.concatenate([uniform_knots(10, 1.5), [0.6]]))
-    found = sampled(knots_t, knots_u, control, 33)
+    found = sampled(knots_t, knots_u, control, 49, 33)
     full = np.concatenate([control, np.zeros((11, 9, 4 - nc))], axis=2)
     surface = SplineSurface(full, knots_u, knots_t)
-    expected = surface(np.linspace(0.0, 0.8, 33), np.linspace(0.0, 1.5, 33))
+    expected = surface(np.linspace(0.0, 0.8, 33), np.linspace(0.0, 1.5, 49))
     np.testing.assert_allclose(found, expected[..., :nc], atol=1e-14)  # rounding
+
+
+def test_what_a_second_of_a_long_motion_brings_is_seen() -> None:
+    # a level rod is let go at its middle, and rings for a second of forty: at 33 times of them little of that had shown
+    scene = Scene(
+        cable=Cable(length=1.0, diameter=0.006, linear_density=0.026, bending_stiffness=0.38),
+        shape=Straight(),
+        grasps=(Grasp(u=0.5, hold="tangent", path=Move(displacement=(0.05, -0.1, 0.1), duration=40.0)),),
+        environment=Environment(drag=0.1),
+        effects={"inertia": "on"},
+    )
+    assert moments(scene, 33) == 20 * 32 + 1
+    problem = pose(scene)
+    a, b = (march_level(problem, stretched(problem, number), Monitor(), free_knots=True) for number in (0, 1))
+    u, t = np.linspace(0.0, 1.0, 33), np.linspace(0.0, 2.0, 401)
+    first, second = (surface_at(level.problem, level, level.control).positions(u, t) for level in (a, b))
+    assert distance(a, b, problem) > 0.5 * np.linalg.norm(first - second, axis=-1).max()
