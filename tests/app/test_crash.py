@@ -48,7 +48,7 @@ store = RunStore(Settings(data_dir=Path(sys.argv[1]), max_runs=60))
 def write():
     while True:
         id = store.save(scene, prediction)
-        print(id, flush=True)
+        print(id + chr(10), end='', flush=True)  # in one piece, whatever other threads print
         store.recording(id)
 
 print("ready", flush=True)
