@@ -11,6 +11,7 @@ from benchmarks.hard.generator import Drawn
 from benchmarks.hard.laws import measure
 from dlocore import Prediction, Quality, Scene, SceneError, predict
 from dlocore.discretisation import smallest_n_u
+from dlocore.events import moments
 from dlocore.given import evenly_fitted, given_status
 from dlocore.problem import Problem, pose
 from dlocore.progress import surface_at
@@ -86,7 +87,7 @@ def _answer(prediction: Prediction, scene: Scene) -> dict[str, Any]:
 def compare(prediction: Prediction, scene: Scene, deadline: float) -> dict[str, Any]:
     """Return the distance from a refined march, and how far two refined marches are apart, of the length."""
     accuracy, surface, length = prediction.accuracy, prediction.surface, scene.cable.length
-    u, t = np.linspace(0.0, length, 101), np.linspace(0.0, surface.horizon, 65)
+    u, t = np.linspace(0.0, length, 101), np.linspace(0.0, surface.horizon, moments(scene, 65))
     problem = _posed(prediction, scene)
     found = []
     for finer in (2.0, 3.0):

@@ -60,15 +60,17 @@ def canvas(page: Page) -> np.ndarray:
 def test_dragging_the_gizmo_changes_the_prediction_to_that_of_the_python_api(service, witness):
     page = open_scene(witness, service)
     offset = HANDLE * SIZE
-    page.mouse.move(*on_screen(page, 0.25 + offset, 0.5 + offset))
-    page.wait_for_timeout(500)  # the gizmo takes hold of what it saw hovered in an earlier frame
-    page.mouse.down()
-    page.mouse.move(*on_screen(page, 0.40 + offset, 0.30 + offset), steps=8)
-    page.mouse.up()
-    give_up = monotonic() + PATIENCE
-    away = np.inf
+    give_up, again = monotonic() + PATIENCE, 0.0
+    away, dy = np.inf, 0.5
     while away > 0.02:  # a pixel is about 2 mm; until the drag has arrived, the run on show is that of before
         assert monotonic() < give_up, f"the drag ends {away} m from where it was let go"
+        if dy == 0.5 and monotonic() > again:  # a slow renderer may not have seen what was hovered: once more
+            page.mouse.move(*on_screen(page, 0.25 + offset, 0.5 + offset))
+            page.wait_for_timeout(500 if again == 0.0 else 3000)  # the gizmo takes hold of what it saw hovered before
+            page.mouse.down()
+            page.mouse.move(*on_screen(page, 0.40 + offset, 0.30 + offset), steps=8)
+            page.mouse.up()
+            again = monotonic() + 0.25 * PATIENCE
         page.wait_for_timeout(500)
         page.wait_for_selector('[data-status="converged"]:not(:has-text("Preview"))')
         base = f"{service.address}/v1/predictions/{kept_run(page)}"
