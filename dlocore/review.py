@@ -48,8 +48,6 @@ def called_for(level: Level, fine: bool = True) -> dict[str, str]:
         found.update(_yields(level))
     if not problem.choices["obstacles"].active and switch("obstacles", "auto") == "auto":
         found.update(_touches(level))
-    if fine:
-        found.update(called_for_by_fine(level))
     if problem.inertia is None and switch("inertia", "auto") == "auto":
         moved = neglected(level)
         if level.motion.stopped == "step":
@@ -57,6 +55,8 @@ def called_for(level: Level, fine: bool = True) -> dict[str, str]:
             found["inertia"] = f"without it the cable has no equilibrium to go on to at {reached:.3g} s"
         elif moved > MATTERS * problem.scene.cable.length:
             found["inertia"] = f"without it a first solve is {moved * 1e3:.2g} mm off"
+    if fine and not found:  # they are of the motion that has all the others
+        found.update(called_for_by_fine(level))
     return found
 
 
