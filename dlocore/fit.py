@@ -61,8 +61,8 @@ def fit_points(points: Floats, length: float) -> PointFit:
         length: of the cable [m].
 
     Raises:
-        SceneError: the curve differs in length from the cable by more than MAX_LENGTH_MISMATCH, or fewer than three
-            points are distinct.
+        SceneError: the curve differs in length from the cable by more than MAX_LENGTH_MISMATCH, fewer than three
+            points are distinct, or the curve is so sharp that only one which misses the points could be followed.
     """
     return _fit(np.asarray(points, dtype=np.float64).tobytes(), length)
 
@@ -86,7 +86,7 @@ def _fit(coordinates: bytes, length: float) -> PointFit:
     spans, most_missed = 2 * int(np.clip(len(p), MIN_SPANS, MAX_SPANS)), np.inf
     while spans > MIN_SPANS:
         spans = max(spans // 2, MIN_SPANS)
-        spline, x, s = _smoothed(_cumulated(p), p, weight, spans, noise, most_noise)
+        spline, x, s, measured = _smoothed(_cumulated(p), p, weight, spans, noise, most_noise)
         first, last = _ends(s, noise)
         check_length("shape.points", "points along the whole cable", last - first, length)
         missed = float(np.sqrt(((p - spline(x)) ** 2).sum(axis=1).mean()))
@@ -94,7 +94,7 @@ def _fit(coordinates: bytes, length: float) -> PointFit:
         doubt = 2 * END_NOISE * missed
         extra = float(np.clip(length - (last - first), -doubt, doubt))
         start, end = first - extra / 2, last + extra / 2
-        curve = _unit_speed(spline, start, end) if missed <= most_missed else None
+        curve = _unit_speed(spline, measured, start, end) if missed <= most_missed else None
         if curve is not None:
             at = np.clip(np.interp(share, progress, s) - start, 0.0, end - start)
             return PointFit(curve=curve, length_given=last - first, at=at[which])
@@ -103,8 +103,10 @@ def _fit(coordinates: bytes, length: float) -> PointFit:
 
 def _smoothed(
     s: Floats, p: Floats, weight: Floats, spans: int, noise: float, most_noise: float
-) -> tuple[BSpline, Floats, Floats]:
-    """Return a spline through the points, and their parameters on it and arclengths (n,) [m] from a guess of these."""
+) -> tuple[BSpline, Floats, Floats, tuple[Floats, Floats]]:
+    """Return a spline through the points, their parameters on it and arclengths (n,) [m] from a guess of these, and
+    what `_arclength` says of it.
+    """
     stiffness = np.ones(spans)
     for _ in range(REFITS):
         first, last = _ends(s, noise)
@@ -115,8 +117,9 @@ def _smoothed(
         stiffness = stiffness_of(spline)
         if len(p) > SPARSE:
             x = np.clip(_foot(spline, x, p), -MARGIN * span, (1 + MARGIN) * span)
-        s = np.interp(x, *_arclength(spline))
-    return spline, x, s
+        measured = _arclength(spline)
+        s = np.interp(x, *measured)
+    return spline, x, s, measured
 
 
 def _doubled_back() -> SceneError:
@@ -203,12 +206,12 @@ def _arclength(spline: BSpline) -> tuple[Floats, Floats]:
     return grid, s - np.interp(0.0, grid, s)
 
 
-def _unit_speed(spline: BSpline, start: float, end: float) -> BSpline | None:
-    """Return the piece of a curve between two arclengths [m] as a spline in arclength.
+def _unit_speed(spline: BSpline, measured: tuple[Floats, Floats], start: float, end: float) -> BSpline | None:
+    """Return the piece of a curve, `measured` by `_arclength`, between two arclengths [m] as a spline in arclength.
 
     Its spans are halved until | |r'| - 1 | <= SPEED_ERROR; None where the curve is too sharp for MAX_UNIT_SPANS.
     """
-    grid, along = _arclength(spline)
+    grid, along = measured
     speed = np.sqrt((spline(grid, 1) ** 2).sum(axis=1))
     if not speed.min() > SLOWEST:
         return None

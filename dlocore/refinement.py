@@ -298,7 +298,8 @@ class _Climb:
         best = self.best
         assert best is not None
         status, message = march_status(self.problem, best)
-        known = f"the estimated error is {self.estimate * 1e3:.3g} mm" if np.isfinite(self.estimate) else "it is alone"
+        finite = np.isfinite(self.estimate)
+        known = f"the estimated error is {self.estimate * 1e3:.3g} mm" if finite else "its error is not known"
         left = f"{known}, target {self.target * 1e3:.3g} mm"
         advice = "Allow a larger target_error, more time or a shorter motion."
         if status == "converged" and self.estimate <= self.enough:

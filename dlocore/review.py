@@ -54,7 +54,8 @@ def called_for(level: Level, fine: bool = True) -> dict[str, str]:
             reached = level.motion.times[level.motion.reached]
             found["inertia"] = f"without it the cable has no equilibrium to go on to at {reached:.3g} s"
         elif moved > MATTERS * problem.scene.cable.length:
-            found["inertia"] = f"without it a first solve is {moved * 1e3:.2g} mm off"
+            most = min(moved, problem.scene.cable.length)  # where the cable is about to give way it tells no distance
+            found["inertia"] = f"without it a first solve is {most * 1e3:.2g} mm off"
     if fine and not found:  # they are of the motion that has all the others
         found.update(called_for_by_fine(level))
     return found
@@ -117,9 +118,9 @@ def objections(level: Level) -> list[str]:
     if "twist" in off and problem.plane.dimensions == 3 and clamps > 1:
         found.append("twist is off, though two grasps hold the orientation of the sections")
     allowed = MATTERS * problem.scene.cable.length
-    for name, force in _forces(problem).items() if off else ():
+    for name in _forces(problem) if off else ():
         if name in off:
-            moved = _response(level, name, force)
+            moved = _response(level, name)
             if moved > allowed:
                 found.append(f"{name} is off, though it would move the cable by about {moved * 1e3:.2g} mm")
     return found
@@ -130,7 +131,7 @@ def neglected(level: Level) -> float:
     problem = level.problem
     if problem.inertia is not None or problem.scene.effects.get("inertia", "auto") != "auto":
         return 0.0
-    return _response(level, "inertia", _forces(problem)["inertia"])
+    return _response(level, "inertia")
 
 
 def _yields(level: Level) -> dict[str, str]:
@@ -232,15 +233,15 @@ def _forces(problem: Problem) -> dict[str, Force]:
     return {"inertia": inertia, "drag": drag, "gravity": gravity, "damping": damping, "friction": friction}
 
 
-def _response(level: Level, name: str, force: Force) -> float:
-    """Return the largest displacement [m] of a control point that a force which was left out would cause, about.
+def _response(level: Level, name: str) -> float:
+    """Return the largest displacement [m] of a control point that an effect which was left out would cause, about.
 
-    It is (K + 2/T^2 M + 1/T C)^-1 f at a few states of the motion: its static displacement where the cable is held
-    stiffly, and that of a free body after the time T of the motion where it isn't. Inertia is looked for where the
-    motion turns fastest, over longer and longer times tau: (K + M/tau^2)^-1 M a then is the static displacement in
-    modes that are faster than tau, and by how far the motion turned in slower ones.
+    It is (K + 2/T^2 M + 1/T C)^-1 f for its forces f at a few states of the motion: their static displacement where the
+    cable is held stiffly, and that of a free body after the time T of the motion where it isn't. Inertia is looked for
+    where the motion turns fastest, over longer and longer times tau: (K + M/tau^2)^-1 M a then is the static
+    displacement in modes that are faster than tau, and by how far the motion turned in slower ones.
     """
-    most = 0.0
+    force, most = _forces(level.problem)[name], 0.0
     for window in level.motion.forces:
         looks = _evenly(window) + (_turns(window) if name == "inertia" else [])
         most = max([most, *(_given_way(level, window, look, force) for look in looks)])
@@ -256,13 +257,18 @@ class _Look(NamedTuple):
     tau: float
 
 
+def _look(window: WindowForces, k: int, stride: int) -> _Look:
+    """Return a look at the state k of a stretch, with rates over so many of its (equal) steps to both sides."""
+    before, q, after = window.states[k - stride], window.states[k], window.states[k + stride]
+    tau = stride * float(window.times[-1] - window.times[0]) / (len(window.times) - 1)
+    return _Look(q, (after - before) / (2.0 * tau), (after - 2.0 * q + before) / tau**2, tau)
+
+
 def _evenly(window: WindowForces) -> list[_Look]:
     """Return looks at states evenly spaced over a stretch of motion, as if they were without end."""
     last = len(window.times) - 2
-    if last < 1:
-        return []
-    at = np.unique(np.linspace(1, last, _LOOKS).round().astype(int))
-    return [look._replace(tau=np.inf) for look in _looks(window, at, 1)]
+    at = np.unique(np.linspace(1, last, _LOOKS).round().astype(int)).tolist() if last >= 1 else []
+    return [_look(window, k, 1)._replace(tau=np.inf) for k in at]
 
 
 def _turns(window: WindowForces) -> list[_Look]:
@@ -272,19 +278,9 @@ def _turns(window: WindowForces) -> list[_Look]:
         step, end = max(1, stride // 2), len(states)
         turned = states[: end - 2 * stride : step] + states[2 * stride :: step]
         turned -= 2.0 * states[stride : end - stride : step]
-        sharpest = stride + step * int(np.einsum("kid,kid->ki", turned, turned).max(axis=1).argmax())
-        found += _looks(window, np.array([sharpest]), stride)
+        sharpest = int(np.einsum("kid,kid->ki", turned, turned).max(axis=1).argmax())
+        found.append(_look(window, stride + step * sharpest, stride))
         stride *= _LONGER
-    return found
-
-
-def _looks(window: WindowForces, at: NDArray[np.intp], stride: int) -> list[_Look]:
-    """Return looks at some states of a stretch, with rates over so many of its (equal) steps to both sides."""
-    states, tau = window.states, stride * float(window.times[-1] - window.times[0]) / (len(window.times) - 1)
-    found = []
-    for k in at:
-        before, q, after = states[k - stride], states[k], states[k + stride]
-        found.append(_Look(q, (after - before) / (2.0 * tau), (after - 2.0 * q + before) / tau**2, tau))
     return found
 
 

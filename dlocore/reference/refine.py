@@ -124,9 +124,7 @@ def _compared(problem: Problem, levels: list[Level], motion: Motion) -> Level:
     taken = samples(motion)
     if not levels:
         return Level(motion, taken, np.inf, np.inf, False)
-    t = np.unique(
-        np.concatenate([np.linspace(0.0, problem.horizon, moments(problem.scene, TIMES)), events_of(problem)])
-    )
+    t = np.union1d(np.linspace(0.0, problem.horizon, moments(problem.scene, TIMES)), events_of(problem))
     fine, coarse = taken.positions(t)[:, ::2], levels[-1].taken.positions(t)
     change = _farthest(fine, coarse)
     if len(levels) < LEAST - 1:
