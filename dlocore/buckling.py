@@ -46,7 +46,9 @@ class _Part(NamedTuple):
 def with_side(scene: Scene, start: StartCurve, at_rest: bool) -> StartCurve:
     """Return the start, bowed to the left, or by turns, where it is straight and the motion pushes it along itself.
 
-    The left is that of its direction, horizontally; that of a vertical one is the x axis.
+    The left is that of its direction, horizontally; that of a vertical one is the x axis. A start that settles is
+    straight then if it is nearly so: what it deviates from a line, by a bow at most, it does without stress, too, and
+    the bow is on that side.
 
     Args:
         scene: the scene.
@@ -63,8 +65,11 @@ def with_side(scene: Scene, start: StartCurve, at_rest: bool) -> StartCurve:
     u = greville(knots)
     # by turns, as beyond a grasp that lets the cable turn it bends on the other way
     aside = np.sum([(-1) ** k * _bow(part, u) for k, part in enumerate(bowed)], axis=0)
-    control = start.control_points[0] + np.outer(u, along) + np.outer(aside, leftwards(along))
-    return replace(start, knots=knots, control_points=control, bow=float(np.abs(aside).max()))
+    left = leftwards(along)
+    if float(np.mean((start.control_points - start.control_points[0]) @ left)) < -FLATNESS * scene.cable.length:
+        aside *= -1.0
+    control = fit_to_knots(start, knots) + np.outer(aside, left)
+    return replace(start, knots=knots, control_points=control, bow=float(aside[np.abs(aside).argmax()]))
 
 
 def out_of_plane(scene: Scene, start: StartCurve, normal: Floats) -> StartCurve:
@@ -100,7 +105,8 @@ def side_notes(start: StartCurve) -> list[str]:
     """Return what is to be known of a start that was bowed, in words."""
     notes = []
     if start.bow:
-        bow = f"it starts with a bow of {start.bow * 1e3:.2g} mm to its left, and its mirror image is as likely"
+        side = "left" if start.bow > 0.0 else "right"
+        bow = f"it starts with a bow of {abs(start.bow) * 1e3:.2g} mm to its {side}, and its mirror image is as likely"
         why = "the straight cable is pushed or twisted along itself and has no side to buckle to"
         notes.append(f"{why}: {bow}")
     if start.aside:
@@ -127,19 +133,22 @@ def _line(scene: Scene, start: StartCurve) -> Floats | None:
     if not size > 0.5 * scene.cable.length:
         return None
     along = chord / size
-    if any(_aside(g.path, g.u, start, along, scene.cable.length) for g in scene.grasps):
+    # settled, a cable is straight that deviates from a line by less than a bow: its direction is no surer than that
+    flat = BOW if scene.shape.settle and not is_straight(start) else FLATNESS
+    if any(_aside(g.path, g.u, start, along, scene.cable.length, flat) for g in scene.grasps):
         return None
     forces = [_gravity(scene, start)[None], *(np.atleast_2d(cast(Floats, load.force)) for load in scene.loads)]
     if start.velocity is not None:
         forces.append(start.velocity.control_points)
-    if any(_off(vectors, along) > FLATNESS * float(np.abs(vectors).max()) for vectors in forces):
+    if any(_off(vectors, along) > flat * float(np.abs(vectors).max()) for vectors in forces):
         return None
     natural, material = natural_points(scene), start.material
     if natural is not None and _off(natural - natural[0], natural[-1] - natural[0]) > FLATNESS * scene.cable.length:
         return None
     if material is not None and bool(cast(Floats, material.memory)[:, :2].any()):
         return None
-    return np.asarray(along) if is_straight(start) else None
+    straight = _off(start.control_points - start.control_points[0], along) <= flat * size
+    return np.asarray(along) if straight else None
 
 
 def _off(vectors: Floats, along: Floats) -> float:
@@ -148,21 +157,21 @@ def _off(vectors: Floats, along: Floats) -> float:
     return float(np.abs(vectors - np.outer(vectors @ unit, unit)).max())
 
 
-def _aside(path: Path, u: float, start: StartCurve, along: Floats, length: float) -> bool:
-    """Tell whether a path of a grasp at u [m] leads or turns the cable away from its line."""
+def _aside(path: Path, u: float, start: StartCurve, along: Floats, length: float, flat: float) -> bool:
+    """Tell whether a path of a grasp at u [m] leads or turns the cable away from its line by more than a part `flat`."""
     if isinstance(path, Still):
         return False
     if isinstance(path, Move):
         x, y, z = cast(Floats, path.displacement).tolist()
         a, b, c = along.tolist()
-        if abs(y * c - z * b) + abs(z * a - x * c) + abs(x * b - y * a) > FLATNESS * length:
+        if abs(y * c - z * b) + abs(z * a - x * c) + abs(x * b - y * a) > flat * length:
             return True
     else:
         from_start = path.at(np.linspace(0.0, path.duration, _TIMES), start(u)[0]) - start(u)[0]
-        if _off(from_start, along) > FLATNESS * length:
+        if _off(from_start, along) > flat * length:
             return True
     turns = path.rotation_at(np.linspace(0.0, path.duration, _TIMES))
-    return turns is not None and bool(np.abs(turns @ along - along).max() > FLATNESS)
+    return turns is not None and bool(np.abs(turns @ along - along).max() > flat)
 
 
 def _gravity(scene: Scene, start: StartCurve) -> Floats:

@@ -263,7 +263,7 @@ def pose(scene: Scene, called_for: Mapping[str, str] | None = None, *, at_rest: 
         reason = called_for["side"] if plane.dimensions == 2 else plane.reason
         plane = Plane(np.eye(3), plane.origin, reason)
     bent = _is_bent(scene, start)
-    choices = choose(scene, start, plane.dimensions, on_table, leaves, met, bent or start.bow > 0.0, called_for)
+    choices = choose(scene, start, plane.dimensions, on_table, leaves, met, bent or start.bow != 0.0, called_for)
     if choices["self_contact"].active:
         check_apart(scene, start)
     if plane.dimensions == 3 and not choices["twist"].active:

@@ -98,6 +98,24 @@ def test_the_side_is_the_left_of_the_cable_in_every_direction() -> None:
     assert at_end(there, 0.5)[0] == pytest.approx(1.0 + y, abs=1e-6)
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_start_that_settles_straight_buckles_to_the_side_that_it_was_given_on(side: float) -> None:
+    x = np.linspace(0.0, 1.0, 49)[:, None]
+    scene = pushed(by=0.2)
+    scenes = [
+        replace(scene, shape=Points(points=x * [1.0, 0.0, 0.0] + side * aside * x * (1.0 - x) * [0.0, 1.0, 0.0], settle=True))
+        for aside in (1e-7, 4e-6, 2e-4)
+    ]  # fmt: skip
+    answers = [predict(s) for s in scenes]
+    for answer in answers:
+        assert answer.status == "converged", answer.message
+        assert f"bow of 1 mm to its {'left' if side > 0.0 else 'right'}" in answer.message
+    ends = [at_end(answer, 0.5) for answer in answers]
+    assert ends[0][1] * side > 0.1
+    assert np.abs(ends[1] - ends[0]).max() < 2e-3
+    assert np.abs(ends[2] - ends[0]).max() < 2e-3
+
+
 def test_the_scene_of_the_answer_is_the_one_that_was_given() -> None:
     prediction = predict(pushed())
     assert isinstance(prediction.scene.shape, Straight)
