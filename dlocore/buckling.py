@@ -158,7 +158,7 @@ def _off(vectors: Floats, along: Floats) -> float:
 
 
 def _aside(path: Path, u: float, start: StartCurve, along: Floats, length: float, flat: float) -> bool:
-    """Tell whether a path of a grasp at u [m] leads or turns the cable away from its line by more than a part `flat`."""
+    """Tell whether a path of a grasp at u [m] leads or turns the cable off its line by more than a part `flat`."""
     if isinstance(path, Still):
         return False
     if isinstance(path, Move):

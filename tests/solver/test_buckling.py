@@ -102,10 +102,8 @@ def test_the_side_is_the_left_of_the_cable_in_every_direction() -> None:
 def test_a_start_that_settles_straight_buckles_to_the_side_that_it_was_given_on(side: float) -> None:
     x = np.linspace(0.0, 1.0, 49)[:, None]
     scene = pushed(by=0.2)
-    scenes = [
-        replace(scene, shape=Points(points=x * [1.0, 0.0, 0.0] + side * aside * x * (1.0 - x) * [0.0, 1.0, 0.0], settle=True))
-        for aside in (1e-7, 4e-6, 2e-4)
-    ]  # fmt: skip
+    curves = [x * [1.0, 0.0, 0.0] + side * aside * x * (1.0 - x) * [0.0, 1.0, 0.0] for aside in (1e-7, 4e-6, 2e-4)]
+    scenes = [replace(scene, shape=Points(points=points, settle=True)) for points in curves]
     answers = [predict(s) for s in scenes]
     for answer in answers:
         assert answer.status == "converged", answer.message
