@@ -17,6 +17,12 @@ _FOLDED = 0.4  # of |r'| - 1 between the points that watch over the length: of a
 _ASTRAY = 0.3  # [rad]: a held section that turns out farther from where it was has been turned on the way
 
 
+def starts_folded(grid: Grid) -> bool:
+    """Tell whether the start of a grid is folded within a span."""
+    least, most = slopes(grid.start[None], 1, grid.tables.curvature_first, grid.tables.curvature_b1)
+    return not (least >= 1.0 - _FOLDED and most <= 1.0 + _FOLDED)
+
+
 def begin_on(problem: Problem, grid: Grid, settled: Grid) -> tuple[Floats, History] | None:
     """Return the start of a `settled` grid of a problem on another grid: control points (n_u, nc) [m] and a history.
 
@@ -25,8 +31,7 @@ def begin_on(problem: Problem, grid: Grid, settled: Grid) -> tuple[Floats, Histo
     span, or the sections that clamps hold would not be turned as they are.
     """
     dimensions = problem.plane.dimensions
-    least, most = slopes(settled.start[None], 1, settled.tables.curvature_first, settled.tables.curvature_b1)
-    if settled.start.shape[1] != problem.nc or not (least >= 1.0 - _FOLDED and most <= 1.0 + _FOLDED):
+    if settled.start.shape[1] != problem.nc or starts_folded(settled):
         return None
     q = grid.start.copy()
     line = SplineCurve(knots=settled.knots, control_points=settled.start[:, :dimensions])

@@ -22,6 +22,7 @@ Floats = NDArray[np.float64]
 _TOLERANCE = 1e-9  # of the length, on what Newton's method leaves of a step
 _FIRST, _LONG, _LAST = 1e-3, 1e2, 1e3  # steps [s]: the first, long enough to tell rest from creeping, the longest
 _STEPS = 2000  # at most
+_PATIENCE = 64  # steps at most until a length that has failed is tried again: twice as many each time it fails
 _FARTHEST = 0.05  # of the length, in a step: farther the cable might pass through what is in its way
 _STIFFER = 6  # times that contact is made stiffer
 _RATES = (
@@ -33,9 +34,10 @@ _RATES = (
 def slide_to_rest(problem: Problem, grid: Grid, monitor: Monitor) -> tuple[Floats, Rest, History]:
     """Return control points (n_u, nc) [m] at rest with the grasps at their first poses, how, and what lies behind them.
 
-    Steps of backward Euler whose velocity is forgotten, each twice as long as the last: the cable goes where its energy
-    falls, and friction, whose anchors it drags along, holds it where it can. Nothing yields on the way. Where the cable
-    sinks too deep into something, and might sink through it, it slides again with stiffer contact.
+    Steps of backward Euler whose velocity is forgotten, each twice as long as the last, but where so long a one has just
+    failed: the cable goes where its energy falls, and friction, whose anchors it drags along, holds it where it can.
+    Nothing yields on the way. Where the cable sinks too deep into something, and might sink through it, it slides again
+    with stiffer contact.
 
     Raises:
         Cancelled: the caller asked to stop.
@@ -64,6 +66,7 @@ def _slid(problem: Problem, grid: Grid, monitor: Monitor) -> tuple[Floats, Rest,
     offsets = np.ascontiguousarray(held.offsets)
     applied, nothing, log = applied_forces(problem, grid, np.zeros(1)), np.zeros_like(offsets), np.zeros((0, 0, 0))
     q, h, deepest = grid.start.copy(), _FIRST, 0.0
+    longest, wait, patience = _LAST, 0, 1
     rest: Rest = "restless"
     for _ in range(_STEPS):
         try:
@@ -83,12 +86,15 @@ def _slid(problem: Problem, grid: Grid, monitor: Monitor) -> tuple[Floats, Rest,
         if info[FAILED_STEP] >= 0 or moved > _FARTHEST * length:
             for x, old in zip(history, before, strict=True):
                 x[:] = old
-            h *= 0.25
+            longest, wait, patience, h = 0.5 * h, patience, min(2 * patience, _PATIENCE), 0.25 * h
             continue
         q, deepest = states[1], max(deepest, float(info[DEEPEST_PLACE]))
         if moved <= RESTING * length and h >= _LONG:
             rest = "settled"
             break
-        h = min(2.0 * h, _LAST)
+        if h > longest:  # what had failed does no longer
+            longest, patience = _LAST, 1
+        wait = max(wait - 1, 0)
+        h = min(2.0 * h, longest if wait > 0 else _LAST)
     kept = grid.history
     return q, rest, history._replace(memory=kept.memory, axial=kept.axial, tension=kept.tension), deepest

@@ -16,7 +16,7 @@ from dlocore.grid import Grid
 from dlocore.kernels.assembly import History
 from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
-from dlocore.regrid import begin_on
+from dlocore.regrid import begin_on, starts_folded
 from dlocore.report import WindowForces, elastic_energy, reactions
 from dlocore.resting import slide_to_rest
 from dlocore.scene import Scene
@@ -164,8 +164,8 @@ def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None =
     """Return the grid of a motion's start: settled to equilibrium where the scene asks for it.
 
     Where a grid `like` it, of the same problem, has settled, the start is settled from there: of several equilibria it
-    is the same one, and near. Where none has, and this one finds no rest from the given start, it is settled from that
-    of a finer grid.
+    is the same one, and near. Where none has, and this one finds no rest from the given start, or folds within a span, it
+    is settled from that of a finer grid.
 
     Raises:
         SceneError: the start was to settle and found no equilibrium.
@@ -174,10 +174,11 @@ def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None =
     if not problem.scene.shape.settle:
         return grid
     found = _settled(problem, grid, monitor, like)
-    for finer in _FINER if like is None else ():
-        if found is None:
+    for finer in _FINER if like is None or starts_folded(like) else ():
+        if found is None or starts_folded(found):
             other = _settled(problem, make_grid(problem, round(finer * n_u)), monitor, None)
-            found = None if other is None else _settled(problem, grid, monitor, other)
+            again = None if other is None else _settled(problem, grid, monitor, other)
+            found = again or found
     if found is None:
         allowed = "false, or a start that grasps hold in an equilibrium"
         raise SceneError("shape.settle", True, allowed, "The start did not come to rest")
@@ -188,19 +189,21 @@ def _settled(problem: Problem, grid: Grid, monitor: Monitor, like: Grid | None) 
     """Return a grid with its start settled, first from that of a grid like it, or None where it finds no rest.
 
     What friction holds depends on the way, and of several equilibria that a wound start may have, or one with obstacles
-    below it, relaxations may jump to another: such starts slide downhill from the given one, on every grid.
+    below it, relaxations may jump to another: such starts slide downhill from the given one, on every grid. One that folds
+    within a span as it slides, which no energy sees, relaxes all the same.
     """
+    slid: Grid | None = None
     if problem.friction is not None or problem.obstacles or _turning(problem.start) > _WOUND:
         q, rest, history = slide_to_rest(problem, grid, monitor)
         if rest != "restless":
-            return grid.changed(start=q, history=history)
-        if problem.friction is not None:
-            return None
+            slid = grid.changed(start=q, history=history)
+        if problem.friction is not None or (slid is not None and not starts_folded(slid)):
+            return slid
     begin = None if like is None else begin_on(problem, grid, like)
     q, rest, _, history = settle(problem, grid, 0.0, monitor, begin)
     if begin is not None and rest == "restless":
         q, rest, _, history = settle(problem, grid, 0.0, monitor)
-    return None if rest == "restless" else grid.changed(start=q, history=history)
+    return slid if rest == "restless" else grid.changed(start=q, history=history)
 
 
 def _turning(curve: SplineCurve) -> float:

@@ -16,7 +16,8 @@ from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.relax import descend, relax
 from dlocore.kernels.tension import COLUMNS
 from dlocore.problem import Problem, pose
-from dlocore.regrid import begin_on
+from dlocore.regrid import begin_on, starts_folded
+from dlocore.settling import settle
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import design_matrix
 from dlocore.statics import start_grid
@@ -120,13 +121,18 @@ def test_a_start_settles_in_the_equilibrium_of_the_grid_it_is_handed_on_from():
     assert apart(problem, handed, own) > 0.2
 
 
-def test_a_start_that_coarse_grids_fold_is_not_handed_on():
-    # a stiff loop hung from a point straightens and hangs; on 13 control points it stays folded within a span
+def test_a_start_that_coarse_grids_fold_is_not_handed_on_and_settles_from_more_control_points():
+    # a stiff loop hung from a point straightens and hangs; on 13 control points alone it stays folded within a span
     problem = pose(draw(4, 182).make())
-    folded = start_grid(problem, 13, Monitor())
+    grid = make_grid(problem, 13)
+    q, rest, _, history = settle(problem, grid, 0.0, Monitor())
+    folded = grid.changed(start=q, history=history)
     own = start_grid(problem, 28, Monitor())
+    assert rest == "settled"
+    assert starts_folded(folded)
     assert apart(problem, folded, own) > 0.2
     assert apart(problem, start_grid(problem, 28, Monitor(), folded), own) < 1e-3
+    assert apart(problem, start_grid(problem, 13, Monitor()), own) < 1e-3
 
 
 def test_a_stiff_loop_that_has_two_equilibria_has_one_start_on_all_grids():
