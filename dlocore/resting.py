@@ -34,10 +34,10 @@ _RATES = (
 def slide_to_rest(problem: Problem, grid: Grid, monitor: Monitor) -> tuple[Floats, Rest, History]:
     """Return control points (n_u, nc) [m] at rest with the grasps at their first poses, how, and what lies behind them.
 
-    Steps of backward Euler whose velocity is forgotten, each twice as long as the last, but where so long a one has just
-    failed: the cable goes where its energy falls, and friction, whose anchors it drags along, holds it where it can.
-    Nothing yields on the way. Where the cable sinks too deep into something, and might sink through it, it slides again
-    with stiffer contact.
+    Steps of backward Euler whose velocity is forgotten, each twice as long as the last, but where so long a one has
+    just failed: the cable goes where its energy falls, and friction, whose anchors it drags along, holds it where it
+    can. Nothing yields on the way. Where the cable sinks too deep into something, and might sink through it, it slides
+    again with stiffer contact.
 
     Raises:
         Cancelled: the caller asked to stop.

@@ -164,8 +164,8 @@ def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None =
     """Return the grid of a motion's start: settled to equilibrium where the scene asks for it.
 
     Where a grid `like` it, of the same problem, has settled, the start is settled from there: of several equilibria it
-    is the same one, and near. Where none has, and this one finds no rest from the given start, or folds within a span, it
-    is settled from that of a finer grid.
+    is the same one, and near. Where none has, and this one finds no rest from the given start, or folds within a span,
+    it is settled from that of a finer grid.
 
     Raises:
         SceneError: the start was to settle and found no equilibrium.
@@ -189,8 +189,8 @@ def _settled(problem: Problem, grid: Grid, monitor: Monitor, like: Grid | None) 
     """Return a grid with its start settled, first from that of a grid like it, or None where it finds no rest.
 
     What friction holds depends on the way, and of several equilibria that a wound start may have, or one with obstacles
-    below it, relaxations may jump to another: such starts slide downhill from the given one, on every grid. One that folds
-    within a span as it slides, which no energy sees, relaxes all the same.
+    below it, relaxations may jump to another: such starts slide downhill from the given one, on every grid. One that
+    folds within a span as it slides, which no energy sees, relaxes all the same.
     """
     slid: Grid | None = None
     if problem.friction is not None or problem.obstacles or _turning(problem.start) > _WOUND:
