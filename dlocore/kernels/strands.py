@@ -76,6 +76,22 @@ def _middles(x: Any) -> Any:
     return middle, half
 
 
+@law
+def _apart(x: Any, a: int, b: int) -> float:
+    """Return the distance of two of the points x (k, 3)."""
+    u, v, w = x[a, 0] - x[b, 0], x[a, 1] - x[b, 1], x[a, 2] - x[b, 2]
+    return np.sqrt(u * u + v * v + w * w)
+
+
+@leaf
+def _hop(x: Any, moved: Any) -> float:
+    """Return the largest way, with the one they move against each other, between neighbours among x (k, 3)."""
+    most = 0.0
+    for n in range(1, len(x)):
+        most = max(most, _apart(x, n, n - 1) + _apart(moved, n, n - 1))
+    return most
+
+
 @kernel
 def _blocks(middle: Any, half: Any) -> Any:
     """Return centres (k, 3) and radii (k,) [m] of balls around blocks of segments with these middles and half lengths.
@@ -98,11 +114,50 @@ def _blocks(middle: Any, half: Any) -> Any:
     return center, radius
 
 
-@law
-def _apart(x: Any, a: int, b: int) -> float:
-    """Return the distance of two of the points x (k, 3)."""
-    u, v, w = x[a, 0] - x[b, 0], x[a, 1] - x[b, 1], x[a, 2] - x[b, 2]
-    return np.sqrt(u * u + v * v + w * w)
+@kernel
+def _ways(half: Any) -> Any:
+    """Return how far it is from the first segment to each block, and to the last's end, of these half lengths [m]."""
+    last = len(half)
+    ways = np.zeros((last + _BLOCK - 1) // _BLOCK + 1)
+    for i in range(last):
+        ways[i // _BLOCK + 1] += 2.0 * half[i]
+    for n in range(1, len(ways)):
+        ways[n] += ways[n - 1]
+    return ways
+
+
+@kernel
+def _stretches(u: Any, half: Any) -> Any:
+    """Return the least length (k,), by that of the cable, of the segments of each block; at most one.
+
+    Args:
+        u: material coordinates of the nodes [m].
+        half: half lengths of the segments between them [m].
+    """
+    last = len(half)
+    least = np.ones((last + _BLOCK - 1) // _BLOCK)
+    for i in range(last):
+        least[i // _BLOCK] = min(least[i // _BLOCK], 2.0 * half[i] / (u[i + 1] - u[i]))
+    return least
+
+
+@kernel
+def _is_open(x: Any, ways: Any, least: Any, a: int, b: int, separation: float, near: float) -> bool:
+    """Tell whether the nodes x (k, 2 or 3) from block a to block b are so straight that no part of them meets another.
+
+    A part of length s of a stretch of length S and chord c has a chord of s - (S - c) at least.
+
+    Args:
+        ways, least: see `_ways` and `_stretches`.
+        separation: least distance along the cable of parts that may meet [m].
+        near: distance at which they do [m].
+    """
+    c = between_nodes(x, min((b + 1) * _BLOCK, len(x) - 1), a * _BLOCK)
+    room = separation - near - (ways[b + 1] - ways[a] - np.sqrt(dot(c, c)))
+    n = a
+    while n <= b and (1.0 - least[n]) * separation < room:
+        n += 1
+    return n > b
 
 
 @kernel
@@ -120,8 +175,8 @@ def _noted(found: Any, count: int, i: int, j: int) -> Any:
 def near_pairs(x: Any, u: Any, radius: float, separation: float, found: Any) -> Any:
     """Return (found, count): pairs of segments of the nodes x (k, 2 or 3) that may be nearer than `radius` [m].
 
-    The distance of two segments grows at most as fast as one goes along the cable, so that from a far one the next are
-    skipped.
+    The distance of two segments, or of two blocks of them, grows at most as fast as one goes along the cable, so that
+    from a far one the next are skipped. So are blocks between which the cable is nearly straight.
 
     Args:
         u: material coordinates of the nodes (k,) [m].
@@ -134,14 +189,24 @@ def near_pairs(x: Any, u: Any, radius: float, separation: float, found: Any) -> 
     middle, half = _middles(x)
     longest = np.max(half)
     center, around = _blocks(middle, half)
+    hop, widest = _hop(center, np.zeros_like(center)), np.max(around)
+    ways, least = _ways(half), _stretches(u, half)
     near = np.empty(len(around), np.int64)
     j0 = 0
     for block in range(len(around)):
         nears = 0
-        for other in range(block, len(around)):
-            if not _apart(center, block, other) > radius + around[block] + around[other]:
+        other = block
+        while other < len(around):
+            clear = _apart(center, block, other) - radius - around[block] - widest
+            if clear > 0.0:
+                other += max(1, int(clear / hop))
+                continue
+            if not _is_open(x, ways, least, block, other, separation, radius):
                 near[nears] = other
                 nears += 1
+            other += 1
+        if nears == 0:
+            continue
         for i in range(block * _BLOCK, min((block + 1) * _BLOCK, last)):
             while j0 < last and u[j0] - u[i + 1] < separation:
                 j0 += 1
@@ -177,26 +242,36 @@ def meeting_pairs(x0: Any, x1: Any, u: Any, near: float, separation: float, foun
     middle, half = _middles(x0)
     moved, turned = _middles(x1 - x0)
     last = len(half)
-    reach, slope = 0.0, 0.0
+    least = _stretches(u, half)
+    reach, slope = 0.0, _hop(middle, moved)
     for j in range(last):
         half[j] += turned[j]
         reach = max(reach, half[j])
-        if j > 0:
-            slope = max(slope, _apart(middle, j, j - 1) + _apart(moved, j, j - 1))
         if not half[j] < np.inf:
             return found, -1
     center, around = _blocks(middle, half)
     way, stray = _blocks(moved, np.zeros(last))
+    around += stray
+    hop, widest = _hop(center, way), np.max(around)
+    # the longer a stretch, by what its segments move against each other, the less of its chord is left on the way
+    ways = _ways(half)
     near_by = np.empty(len(around), np.int64)
     count = 0
     j0 = 0
     for block in range(len(around)):
         nears = 0
-        for other in range(block, len(around)):
-            room = near + around[block] + around[other] + stray[block] + stray[other]
-            if not _apart(center, block, other) - _apart(way, block, other) > room:
+        other = block
+        while other < len(around):
+            clear = _apart(center, block, other) - _apart(way, block, other) - near - around[block] - widest
+            if clear > 0.0:
+                other += max(1, int(clear / hop))
+                continue
+            if not _is_open(x0, ways, least, block, other, separation, near):
                 near_by[nears] = other
                 nears += 1
+            other += 1
+        if nears == 0:
+            continue
         for i in range(block * _BLOCK, min((block + 1) * _BLOCK, last)):
             while j0 < last and u[j0] - u[i + 1] < separation:
                 j0 += 1
