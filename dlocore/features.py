@@ -16,6 +16,8 @@ _INTERIOR = (0.6, 0.02)
 _END = (0.3, 0.04)
 _CORNER = (1.0, 0.01)  # a start that turns sharply: the corner would be another one on every grid
 SAME = 1e-9  # of the length: features this close are one
+_TIP = 2e-3  # of the length: the longest end beyond a point that is held or loaded that needs no span of its own, ...
+_ALONE = 0.1  # ... where nothing else holds or loads the cable so near to that end
 
 
 class Features(NamedTuple):
@@ -46,8 +48,10 @@ def find_features(scene: Scene, bends: Sequence[float] = (), apart: float = 0.0,
     length = scene.cable.length
     found: dict[float, tuple[int, float, float]] = {}
     directed = 3 if kinks else 2
-    places = [(g.u, 1 if g.hold == "point" else directed) for g in scene.grasps]
-    places += [(load.u, 1) for load in scene.loads]
+    points = [g.u for g in scene.grasps if g.hold == "point"] + [load.u for load in scene.loads]
+    places = [(g.u, directed) for g in scene.grasps if g.hold != "point"]
+    others = [u for u, _ in places] + points
+    places += [(_without_tip(scene, u, others), 1) for u in points]
     for place, multiplicity in places:
         u = next((v for v in found if abs(v - place) <= SAME * length), place)
         at_end = min(u, length - u) <= SAME * length
@@ -67,6 +71,24 @@ def find_features(scene: Scene, bends: Sequence[float] = (), apart: float = 0.0,
         np.array([row[2] for row in rows], float),
         max(5, 4 + sum(inside) + (len(inside) + 1 if kinks else 0)),
     )
+
+
+def _without_tip(scene: Scene, u: float, places: list[float]) -> float:
+    """Return where a knot for a held or loaded point at `u` [m] belongs: at an end that only a tip lies beyond.
+
+    A tip, no longer than half a diameter, has no moment and does not bend: nothing is lost where it has no span of its
+    own. That would be so short that it folds, or strains, before it bends.
+
+    Args:
+        places: all that is held or loaded, `u` among them [m].
+    """
+    length = scene.cable.length
+    tip = min(0.5 * scene.cable.diameter, _TIP * length)
+    for end in (0.0, length):
+        near = [v for v in places if abs(v - end) <= _ALONE * length]
+        if near == [u] and abs(u - end) <= tip:
+            return end
+    return u
 
 
 def free_ends(scene: Scene) -> tuple[bool, bool]:

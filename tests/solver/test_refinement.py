@@ -11,6 +11,7 @@ from benchmarks.hard.generator import draw
 from benchmarks.hard.judge import compare
 from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, Sphere, Straight, equilibrium, predict
 from dlocore.discretisation import corners, make_grid
+from dlocore.features import find_features
 from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.banded import reduce_matrix
 from dlocore.problem import pose
@@ -20,7 +21,7 @@ from dlocore.solvers.ladder import hardness, run_level
 from dlocore.solvers.march import march as take_steps
 from dlocore.solvers.monitor import Monitor
 from dlocore.whole_march import is_folded
-from tests.solver.scenes import apart, march, paper_scene, refined
+from tests.solver.scenes import apart, cable, march, paper_scene, refined
 
 
 def swinging(quality: Quality) -> Scene:
@@ -241,9 +242,14 @@ def test_a_fold_is_unfolded_with_all_the_work_that_a_target_is_worth():
     assert not is_folded(prediction.level)
 
 
+def thinner(scene: Scene) -> Scene:
+    """Return a scene whose cable is thinner than any tip of it is long."""
+    return replace(scene, cable=replace(scene.cable, diameter=5e-4 * scene.cable.length))
+
+
 def test_a_tip_that_folds_beyond_a_grasp_is_held_straight_by_watching_its_length():
     # 0.3 mm of a metre beyond a grasp at which the velocity jumps: it folded straight back on up to 708 control points
-    scene = draw(11, 369).make()
+    scene = thinner(draw(11, 369).make())
     found = predict(scene)
     assert found.status == "converged", found.message
     assert "watched at more points" in found.iterations[-1].note
@@ -252,6 +258,36 @@ def test_a_tip_that_folds_beyond_a_grasp_is_held_straight_by_watching_its_length
     assert most < 1.6
     assert found.accuracy.n_u < 708
     assert compare(found, scene, 60.0)["error"] * scene.cable.length < found.accuracy.error_estimate
+
+
+# noisy waypoints, twice, a rough table, and the jump in velocity of the last test
+@pytest.mark.parametrize(("seed", "index"), [(17, 3138), (17, 5561), (17, 4069), (11, 369)])
+def test_a_tip_shorter_than_half_a_diameter_has_no_span_that_could_fold(seed: int, index: int):
+    scene = draw(seed, index).make()
+    (grasp,) = scene.grasps
+    assert 0.0 < grasp.u < 0.5 * scene.cable.diameter
+    found = predict(scene)
+    assert found.status == "converged", found.message
+    assert found.accuracy.n_u <= 28
+    assert grasp.u not in found.surface.knots_u
+    problem, motion = found.level.problem, found.level.motion
+    held = problem.world(motion.grid.at(motion.states, grasp.u))[:, :3]
+    np.testing.assert_allclose(held, grasp.path.at(motion.times, held[0]), atol=1e-9 * scene.cable.length)
+    assert compare(found, scene, 60.0)["error"] * scene.cable.length < found.accuracy.error_estimate
+
+
+def test_a_tip_that_bears_a_moment_has_its_span():
+    line = np.linspace(0.0, 1.0, 5)[:, None] * [1.0, 0.0, 0.0]
+    wire = cable(diameter=0.01)
+    for grasps, inside in (
+        ((Grasp(u=1e-3),), 0),
+        ((Grasp(u=1e-3, hold="tangent"),), 1),  # which bends what lies beyond
+        ((Grasp(u=0.0), Grasp(u=1e-3)), 1),  # that hold a direction together
+        ((Grasp(u=1e-3), Grasp(u=0.05)), 2),
+        ((Grasp(u=1e-3), Grasp(u=0.999)), 0),
+    ):
+        features = find_features(Scene(cable=wire, shape=Points(points=line), grasps=grasps, horizon=1.0))
+        assert ((features.u > 0.0) & (features.u < 1.0)).sum() == inside
 
 
 def test_a_sharp_bend_is_the_same_on_coarse_and_fine_grids():
