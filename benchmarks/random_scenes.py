@@ -26,7 +26,8 @@ from benchmarks.hard.judge import WRONG, converges, is_undetermined, run
 from benchmarks.machine import machine_line
 from dlocore import SceneError, warm_up
 
-HANG = 6.0  # times the deadline of a prediction, after which a process is ended: one scene may have three
+HANG = 6.0  # times the deadline of a prediction, after which a process is ended: one scene may have three, ...
+JUDGED = 60.0  # ... and this long is left for what the judge does besides [s]
 
 
 class Job(NamedTuple):
@@ -67,7 +68,7 @@ def run_all(seed: int, indices: list[int], jobs: int, share: float, deadline: fl
         while running:
             ready = wait([job.pipe for job in running], timeout=1.0)
             for job in list(running):
-                late = time.monotonic() - job.since > HANG * deadline
+                late = time.monotonic() - job.since > HANG * deadline + JUDGED
                 if job.pipe not in ready and not late:
                     continue
                 record, alive = _take(job, job.pipe in ready, seed)
