@@ -1,14 +1,16 @@
 """Many predictions at once, on all processors."""
 
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
-from threading import Event
+from threading import Event, Lock, Thread
+from typing import cast
 
 from dlocore.errors import SceneError, number
 from dlocore.front import predict
 from dlocore.machine import usable_cores
 from dlocore.prediction import Prediction
 from dlocore.scene import Scene
+
+_MOST_AT_ONCE = 16  # scenes that a thread takes: to wake another for each takes longer than to solve a short one
 
 
 def predict_many(
@@ -38,7 +40,10 @@ def predict_many(
         Cancelled: `cancelled` returned True.
     """
     wanted = usable_cores() if threads is None else int(number("threads", threads, at_least=1, at_most=1024))
-    stop = Event()
+    given = list(scenes)
+    answers: list[Prediction | SceneError | None] = [None] * len(given)
+    failures: list[BaseException] = []
+    stop, lock, taken = Event(), Lock(), 0
 
     def stopped() -> bool:
         return stop.is_set() or (cancelled is not None and cancelled())
@@ -49,11 +54,34 @@ def predict_many(
         except SceneError as error:
             return error
 
-    if wanted == 1:
-        return [solve(scene) for scene in scenes]
-    pool = ThreadPoolExecutor(wanted, "dlo-predict")
+    def take() -> range:
+        nonlocal taken
+        with lock:  # fewer at once towards the end, so that all threads end together
+            begin = taken
+            taken += min(_MOST_AT_ONCE, -(-(len(given) - taken) // (2 * wanted)))
+            return range(begin, taken)
+
+    def work() -> None:
+        try:
+            while not stop.is_set() and (indices := take()):
+                for index in indices:
+                    answers[index] = solve(given[index])
+        except BaseException as failure:  # the caller's to see, whichever thread it is in
+            failures.append(failure)
+            stop.set()
+
+    helpers = [Thread(target=work, name=f"dlo-predict-{n}") for n in range(1, min(wanted, len(given)))]
     try:
-        return list(pool.map(solve, scenes))
+        for helper in helpers:
+            helper.start()
+        work()
+        for helper in helpers:
+            helper.join()
     finally:
-        stop.set()  # what still runs where a solve failed, or this thread is interrupted
-        pool.shutdown(cancel_futures=True)
+        stop.set()  # what still runs where this thread is interrupted
+        for helper in helpers:
+            if helper.is_alive():
+                helper.join()
+    if failures:
+        raise failures[0]
+    return cast(list[Prediction | SceneError], answers)

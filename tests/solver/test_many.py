@@ -57,6 +57,13 @@ def test_each_is_bit_for_bit_what_predict_gives(threads: int):
         assert (one.status, one.message) == (alone.status, alone.message)
 
 
+@pytest.mark.parametrize("threads", [1, 3, 64])
+def test_each_answer_is_in_the_place_of_its_scene(threads: int):
+    scenes = [scene(u) for u in np.linspace(0.0, 1.0, 50)]
+    together = predict_many(iter(scenes), threads=threads)
+    assert [one.scene for one in together if isinstance(one, Prediction)] == scenes
+
+
 def test_an_impossible_scene_has_its_error_in_its_place_and_spoils_no_other():
     taut = Scene(
         cable=Cable.preset("paper"), shape=Straight(),
