@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dlocore.effects.distance import distances
 from dlocore.events import closed_grasps
 from dlocore.paths import Move, Path, Still
-from dlocore.plane import FLATNESS, TABLE_TOLERANCE, is_straight, leftwards, natural_points
+from dlocore.plane import FLATNESS, is_straight, leftwards, natural_points, table_tolerance
 from dlocore.scene import Grasp, Scene
 from dlocore.shape import StartCurve, fit_to_knots
 from dlocore.spline import greville
@@ -181,7 +181,7 @@ def _gravity(scene: Scene, start: StartCurve) -> Floats:
     if scene.effects.get("gravity", "auto") == "off":
         return np.zeros(3)
     lies = table is not None and scene.effects.get("table", "auto") != "off"
-    if lies and table is not None and max(abs(z - table.height) for z in start.heights) <= TABLE_TOLERANCE:
+    if lies and table is not None and max(abs(z - table.height) for z in start.heights) <= table_tolerance(scene):
         return np.array([g[0], g[1], 0.0])
     return g
 

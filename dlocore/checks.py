@@ -10,7 +10,7 @@ from dlocore.effects.distance import distances
 from dlocore.effects.selfcontact import nearest_strands
 from dlocore.errors import SceneError
 from dlocore.paths import Move, Path, Still, Waypoints
-from dlocore.plane import TABLE_TOLERANCE
+from dlocore.plane import table_tolerance
 from dlocore.scene import MAX_PRESCRIBED_STRAIN, Scene
 from dlocore.shape import StartCurve
 
@@ -76,9 +76,9 @@ def check_above(scene: Scene, start: StartCurve) -> None:
     table = scene.environment.table
     assert table is not None
     lowest = start.heights[0]
-    if not lowest >= table.height - TABLE_TOLERANCE:
+    if not lowest >= table.height - table_tolerance(scene):
         lowest = float(start(np.linspace(0.0, scene.cable.length, 101))[:, 2].min())
-    if not lowest >= table.height - TABLE_TOLERANCE:
+    if not lowest >= table.height - table_tolerance(scene):
         reason = f"The start is {table.height - lowest:.3g} m below a cable that lies on the table"
         raise SceneError("environment.table.height", table.height, f"at most {lowest:.6g} [m] with this start", reason)
     for i, grasp in enumerate(scene.grasps):
@@ -88,7 +88,7 @@ def check_above(scene: Scene, start: StartCurve) -> None:
             continue
         path = grasp.path.at(np.linspace(0.0, grasp.path.duration, 65), start(grasp.u)[0])
         below = table.height - float(path[:, 2].min())
-        if not below <= TABLE_TOLERANCE:
+        if not below <= table_tolerance(scene):
             reason = f"It takes the cable {below:.3g} m into the table"
             raise SceneError(
                 f"primitives[{i}].path", f"{below:.3g} m below", f"a path above {table.height:g} m", reason
@@ -122,11 +122,11 @@ def check_outside(scene: Scene, start: StartCurve, met: tuple[int, ...]) -> None
 
     inside, i = depth(start(np.linspace(0.0, scene.cable.length, 101)))
     allowed = "the cable outside all obstacles, or effects.obstacles off"
-    if inside > TABLE_TOLERANCE:
+    if inside > table_tolerance(scene):
         reason = f"The cable starts up to {inside:.3g} m inside it"
         raise SceneError(f"environment.obstacles[{i}]", f"{inside:.3g} m inside", allowed, reason)
     for k, grasp in enumerate(scene.grasps):
         inside, i = depth(grasp.path.at(np.linspace(0.0, grasp.path.duration, 65), start(grasp.u)[0]))
-        if grasp.start == 0.0 and inside > TABLE_TOLERANCE:
+        if grasp.start == 0.0 and inside > table_tolerance(scene):
             reason = f"It takes the cable {inside:.3g} m into obstacles[{i}]"
             raise SceneError(f"primitives[{k}].path", f"{inside:.3g} m inside", allowed, reason)

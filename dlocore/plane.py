@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 FLATNESS = 1e-9  # of the length: a start and a motion this close to a plane are planar
 _BEGINNING = np.zeros(1)  # [s]
-TABLE_TOLERANCE = 0.005  # [m]: points seen this close to the table lie on it
+_SEEN = 0.005, 0.02  # [m] and of the length: points seen this close to the table lie on it
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +73,12 @@ def is_straight(start: StartCurve) -> bool:
     return float(np.linalg.svd(chord, compute_uv=False)[1]) <= FLATNESS * float(np.abs(chord).max())
 
 
+def table_tolerance(scene: Scene) -> float:
+    """Return how far off the table, or in something, what was seen of a cable that touches it may lie [m]."""
+    absolute, relative = _SEEN
+    return min(absolute, relative * scene.cable.length)
+
+
 def off_the_table(scene: Scene, start: StartCurve, met: tuple[int, ...]) -> str:
     """Return why the cable leaves the table or does more than slide on it, or "" where it lies there all the time."""
     table, environment = scene.environment.table, scene.environment
@@ -82,7 +88,7 @@ def off_the_table(scene: Scene, start: StartCurve, met: tuple[int, ...]) -> str:
     if scene.effects.get("twist", "auto") == "on":
         return "twist is switched on in the scene"
     off = max(abs(z - table.height) for z in start.heights)
-    if not off <= TABLE_TOLERANCE:
+    if not off <= table_tolerance(scene):
         return f"the cable starts up to {off:.3g} m above it"
     if cast(Floats, environment.gravity)[2] > 0:
         return "gravity lifts the cable off it"
@@ -104,7 +110,7 @@ def off_the_table(scene: Scene, start: StartCurve, met: tuple[int, ...]) -> str:
         if not environment.obstacles[i].upright_at(table.height, 0.5 * scene.cable.diameter):
             return f"obstacles[{i}] has no upright walls where the cable lies"
     natural = natural_points(scene)
-    if natural is not None and not np.ptp(natural[:, 2]) <= TABLE_TOLERANCE:
+    if natural is not None and not np.ptp(natural[:, 2]) <= table_tolerance(scene):
         return "the stress-free shape is not flat"
     if start.theta is not None:
         return "the cable is twisted"

@@ -27,6 +27,7 @@ from dlocore import (
     equilibrium,
     predict,
 )
+from dlocore.problem import Problem, pose
 from tests.solver.scenes import arc, cable
 
 NAN, INF = float("nan"), float("inf")
@@ -164,3 +165,19 @@ def test_bad_scene_is_refused_by_the_name_of_its_field(field, make):
 def test_two_grasps_pulled_exactly_taut_are_no_bad_scene():
     prediction = predict(scene(grasps=(Grasp(u=0.2, path=UP), Grasp(u=0.8, path=UP))))
     assert np.isfinite(prediction.surface.control_points).all()
+
+
+@pytest.mark.parametrize("length", [0.05, 1.0])
+def test_a_start_is_on_the_table_within_what_is_seen_of_such_a_cable(length: float):
+    off = min(0.005, 0.02 * length)
+    wire = Cable(length=length, diameter=0.005 * length, linear_density=0.05, bending_stiffness=1e-3)
+
+    def posed(z: float) -> Problem:
+        start = Straight(start=(0.0, 0.0, z))
+        return pose(Scene(cable=wire, shape=start, environment=Environment(table=Table()), horizon=1.0))
+
+    assert posed(0.9 * off).on_table
+    assert posed(-0.9 * off).on_table
+    assert not posed(1.1 * off).on_table
+    with pytest.raises(SceneError, match="below a cable that lies on the table"):
+        posed(-1.1 * off)
