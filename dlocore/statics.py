@@ -175,7 +175,7 @@ def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None =
         return grid
     found = _settled(problem, grid, monitor, like)
     for finer in _FINER if like is None or starts_folded(like) else ():
-        if found is None or starts_folded(found):
+        if _is_wanting(problem, found):
             other = _settled(problem, make_grid(problem, round(finer * n_u)), monitor, None)
             again = None if other is None else _settled(problem, grid, monitor, other)
             found = again or found
@@ -190,20 +190,28 @@ def _settled(problem: Problem, grid: Grid, monitor: Monitor, like: Grid | None) 
 
     What friction holds depends on the way, and of several equilibria that a wound start may have, or one with obstacles
     below it, relaxations may jump to another: such starts slide downhill from the given one, on every grid. One that
-    folds within a span as it slides, which no energy sees, relaxes all the same.
+    folds within a span as it slides, which no energy sees, relaxes all the same where nothing is in its way.
     """
     slid: Grid | None = None
     if problem.friction is not None or problem.obstacles or _turning(problem.start) > _WOUND:
         q, rest, history = slide_to_rest(problem, grid, monitor)
         if rest != "restless":
             slid = grid.changed(start=q, history=history)
-        if problem.friction is not None or (slid is not None and not starts_folded(slid)):
+        if problem.friction is not None or not _is_wanting(problem, slid):
             return slid
     begin = None if like is None else begin_on(problem, grid, like)
     q, rest, _, history = settle(problem, grid, 0.0, monitor, begin)
     if begin is not None and rest == "restless":
         q, rest, _, history = settle(problem, grid, 0.0, monitor)
     return slid if rest == "restless" else grid.changed(start=q, history=history)
+
+
+def _is_wanting(problem: Problem, start: Grid | None) -> bool:
+    """Tell whether a start found no rest, or a fold within a span that a relaxation may unfold.
+
+    Over an obstacle it may not: it would take the cable through it.
+    """
+    return start is None or (problem.friction is None and not problem.obstacles and starts_folded(start))
 
 
 def _turning(curve: SplineCurve) -> float:
