@@ -50,8 +50,8 @@ def find_features(scene: Scene, bends: Sequence[float] = (), apart: float = 0.0,
     directed = 3 if kinks else 2
     points = [g.u for g in scene.grasps if g.hold == "point"] + [load.u for load in scene.loads]
     places = [(g.u, directed) for g in scene.grasps if g.hold != "point"]
-    others = [u for u, _ in places] + points
-    places += [(_without_tip(scene, u, others), 1) for u in points]
+    everywhere = [u for u, _ in places] + points
+    places += [(_without_tip(scene, u, everywhere), 1) for u in points]
     for place, multiplicity in places:
         u = next((v for v in found if abs(v - place) <= SAME * length), place)
         at_end = min(u, length - u) <= SAME * length
@@ -85,8 +85,7 @@ def _without_tip(scene: Scene, u: float, places: list[float]) -> float:
     length = scene.cable.length
     tip = min(0.5 * scene.cable.diameter, _TIP * length)
     for end in (0.0, length):
-        near = [v for v in places if abs(v - end) <= _ALONE * length]
-        if near == [u] and abs(u - end) <= tip:
+        if abs(u - end) <= tip and [v for v in places if abs(v - end) <= _ALONE * length] == [u]:
             return end
     return u
 
