@@ -12,6 +12,8 @@ _LEFT_DAMPED = 0.9  # the same of strongly damped steps, as forces with kinks as
 _LEFT_ALONG = 0.75  # the same of half as many control points again
 _MOST_LEFT = 1.5  # times the last change: what is believed of changes that hardly shrink
 _MOST_FALL = 20.0  # times less than the refinement before, at most, is believed of one: more is chance
+# ... where strong damping begins with it, whose errors are about those of half as many steps without: 6 in theory
+_MOST_FALL_DAMPED = 8.0
 _MORE = 1.1  # times as many steps: fewer are as many
 
 
@@ -22,11 +24,13 @@ class Change(NamedTuple):
         moved: by this one, as if it had twice the steps at least [m].
         before: by the one before it in the same direction [m], infinite where there is none.
         left: share of it that is left in theory, or more.
+        fall: times less than the one before it that this one is believed to be, at most.
     """
 
     moved: float
     before: float
     left: float
+    fall: float = _MOST_FALL
 
     @property
     def error(self) -> float:
@@ -39,7 +43,7 @@ class Change(NamedTuple):
         known = 0.0 < self.before < np.inf
         contraction = self.moved / self.before if known else 0.0
         to_come = contraction / (1.0 - contraction) if contraction < 1.0 else np.inf
-        moved = max(self.moved, self.before / _MOST_FALL) if known else self.moved
+        moved = max(self.moved, self.before / self.fall) if known else self.moved
         return moved * max(self.left, min(to_come, _MOST_LEFT))
 
 
@@ -57,4 +61,6 @@ def weighed(level: Level, before: Level, last: Change | None) -> Change:
         return Change(level.change, moved_before, _LEFT_ALONG)
     # the errors of the steps are of second order: what twice as many take away is three times what they leave
     counts = max(1.0, 3.0 / (more**2 - 1.0))
-    return Change(counts * level.change, moved_before, _LEFT_DAMPED if level.motion.rho == STRONGLY_DAMPED else _LEFT)
+    damped, was_damped = (x.motion.rho == STRONGLY_DAMPED for x in (level, before))
+    fall = _MOST_FALL_DAMPED if damped and not was_damped else _MOST_FALL
+    return Change(counts * level.change, moved_before, _LEFT_DAMPED if damped else _LEFT, fall)
