@@ -74,7 +74,8 @@ def grid_on(problem: Problem, knots: Floats) -> Grid:
 
 def _tables_of(problem: Problem, knots: Floats) -> Tables:
     rules = (*GAUSS_2, *GAUSS_3, *GAUSS_4)
-    return cast(Tables, build_tables(knots, *free_ends(problem.scene), *rules, problem.contact_spacing()))
+    spacings = problem.contact_spacing(), problem.strand_spacing()
+    return cast(Tables, build_tables(knots, *free_ends(problem.scene), *rules, *spacings))
 
 
 def _no_history(problem: Problem, tables: Tables) -> History:

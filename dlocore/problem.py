@@ -39,6 +39,7 @@ Floats = NDArray[np.float64]
 LEAST_MASS = 1e-9  # of the true one, where inertia is off: it keeps rigid motion determined
 MOST_NODES = 4000  # of contact
 _SAG = 0.005  # of the diameter: by how much a cable comes nearer to something round between two of them
+_SEGMENTS = 800  # of the cable that its contact with itself looks at, where they are shorter than it is thick
 _STIFFENING = 10.0  # times that contact is made stiffer at once, at most
 _EDGES = 16.0  # of them on a diameter, where obstacles have edges
 
@@ -213,9 +214,7 @@ class Problem:
         """
         cable = self.scene.cable
         if self.contact is None or not self.obstacles:
-            apart = cable.diameter if self.self_contact is not None else np.inf
-            rests = np.inf if self.contact is None else cable.length / 64
-            return max(min(apart, rests), cable.length / MOST_NODES)
+            return np.inf if self.contact is None else cable.length / 64
         flat = [o for o in self.obstacles if isinstance(o, Box | Cylinder)]
         sharp = (bool(flat) and not self.on_table) or any(isinstance(o, Box) for o in flat)
         if sharp:
@@ -223,6 +222,17 @@ class Problem:
         radii = [0.5 * cable.diameter + o.radius for o in self.obstacles if not isinstance(o, Box)]
         round_it = float(np.sqrt(8.0 * _SAG * cable.diameter * min(radii, default=np.inf)))
         return max(min(cable.diameter, round_it), cable.length / MOST_NODES)
+
+    def strand_spacing(self) -> float:
+        """Return how close the nodes lie between which the cable's strands are straight to each other [m]; or infinite.
+
+        It is the same on every grid, as strands that strike each other a little elsewhere may soon be far apart. It is
+        half a diameter; of a thin cable, for which a share of its diameter is little, a whole one.
+        """
+        if self.self_contact is None:
+            return np.inf
+        length, diameter = self.scene.cable.length, self.scene.cable.diameter
+        return max(min(diameter, max(0.5 * diameter, length / _SEGMENTS)), length / MOST_NODES)
 
     def weight(self) -> Floats:
         """Return the weight per unit length in the solve's coordinates (nc,) [N/m]."""

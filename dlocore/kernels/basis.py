@@ -184,8 +184,9 @@ class Tables(NamedTuple):
     their basis functions [1/m], `*_b2` second [1/m^2], `*_b0` values; `*_w` (p,): weights [m]; `curvature_pairs`: see
     `pairs.py`. Axial points: one a span and two in an end span whose end direction is free (selective reduced
     integration, docs/model.md). Curvature and body points: three a span. Contact nodes: every span in parts of one
-    length, with their ends; none where contact is off. `mass` (n, 4): integrals of b_i b_{i+d} du [m]; `weight` (n,):
-    integrals of b_i du [m].
+    length, with their ends; none where contact is off. Strand nodes: ends of the segments, as long on every grid, that
+    the cable's contact with itself looks at; none where that is off. `mass` (n, 4): integrals of b_i b_{i+d} du [m];
+    `weight` (n,): integrals of b_i du [m].
     """
 
     axial_u: Any
@@ -205,6 +206,9 @@ class Tables(NamedTuple):
     contact_first: Any
     contact_b0: Any
     contact_w: Any
+    strand_u: Any
+    strand_first: Any
+    strand_b0: Any
     mass: Any
     weight: Any
 
@@ -310,11 +314,12 @@ def build_tables(
     rule4: Any,
     w4: Any,
     spacing: float,
+    segment: float,
 ) -> Any:
     """Return `Tables` of the clamped cubic `knots`.
 
-    `free_*`: the direction at that end of the cable is free; `spacing`: largest distance of contact nodes [m], infinite
-    for none.
+    `free_*`: the direction at that end of the cable is free; `spacing`, `segment`: largest distance of contact nodes,
+    and of strand nodes [m], infinite for none.
     """
     u, axial_w = _axial_points(knots, free_start, free_end, rule2, w2)
     axial_first, table = basis_rows(knots, u, 1)
@@ -327,6 +332,9 @@ def build_tables(
     contact_u, contact_w = _nodes(knots, spacing)
     contact_first, table = basis_rows(knots, contact_u, 0)
     contact_b0 = np.ascontiguousarray(table[:, 0])
+    strand_u = np.linspace(0.0, knots[-1], 1 + int(np.ceil(knots[-1] / segment - 1e-9)) if segment < np.inf else 0)
+    strand_first, table = basis_rows(knots, strand_u, 0)
+    strand_b0 = np.ascontiguousarray(table[:, 0])
     n = len(knots) - 4
     mass = np.zeros((n, 4))
     weight = np.zeros(n)
@@ -340,5 +348,6 @@ def build_tables(
                 mass[f + i, j - i] += weights4[p] * table4[p, 0, i] * table4[p, 0, j]
     return Tables(
         u, axial_first, axial_b1, axial_w, curvature_u, curvature_first, b1, b2, curvature_w, pair_products(b0, b1, b2),
-        curvature_first, b0, curvature_w, contact_u, contact_first, contact_b0, contact_w, mass, weight,
+        curvature_first, b0, curvature_w, contact_u, contact_first, contact_b0, contact_w, strand_u, strand_first,
+        strand_b0, mass, weight,
     )  # fmt: skip

@@ -52,7 +52,7 @@ def begin_stretch(
     K = np.empty((1, 1))
     assemble(axes, q, before, tables, active, p, history, rates, (0.0, 0.0, 0.0), G, K)
     if active[SELF_CONTACT]:
-        x = np.empty((len(tables.contact_w), min(nc, 3)))
+        x = np.empty((len(tables.strand_u), min(nc, 3)))
         press(q, v, tables, p, x, np.empty((64, 2), np.int64), G)
     if keeps_history(active):
         remember(axes, q, tables, active, p, history, 0.0, False)

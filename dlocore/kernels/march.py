@@ -32,7 +32,7 @@ from dlocore.kernels.selfcontact import closing, factor_wide, place_nodes, press
 from dlocore.kernels.strands import clear_way
 from dlocore.kernels.tension import assume_last, keep, point_on
 
-FAILED_STEP, LEFT, DEEPEST = range(3)  # places in `info`
+FAILED_STEP, LEFT, DEEPEST, DIVIDED_FROM, STRUCK = range(5)  # places in `info`
 _REFRESH = 0.2  # contraction of the updates above which the old factors no longer serve
 _UNMEASURED = 8  # steps in a row that end with their first update, as the contraction that was last measured allows
 _DOUBT = 3.0  # times that contraction it may be
@@ -111,8 +111,9 @@ def march_steps(
         offsets: (steps + 1, held) their prescribed part [m].
         reactions: (steps + 1, held) forces that hold them [N]; written.
         log: (rows, points, columns) of the steps of `row_of_step` the frames and the memory, see `note`; or (0, 0, 0).
-        info: (3,) the step that found no equilibrium, or -1, the largest error that Newton's iterations left [m], and
-            the largest depth in an obstacle or the table [m].
+        info: (5,) the step that found no equilibrium or is to be divided, or -1, the largest error that Newton's
+            iterations left [m], the largest depth in an obstacle or the table [m], read: the first step that is to be
+            divided if strands strike each other in it, and 1 where that is why a step is to be divided.
     """
     nc = len(axes)
     keeps = keeps_history(active)
@@ -128,8 +129,8 @@ def march_steps(
     touches = bool(active[CONTACT])
     tight = bool(active[SELF_CONTACT])
     # steps to come by backward Euler; the first one, where the acceleration at the start knows of no contact yet, or
-    # is that of the instant of a jump
-    dull = 1 if (touches or jumps) and start == begin else 0
+    # is that of the instant of a jump or a strike
+    dull = 1 if (touches or tight or jumps) and start == begin else 0
     # the tangent of this damping is not complete; across kinks earlier iterations teach nothing
     mixes = nc == 3 and bool(active[DAMPING]) and not exact and not tight
     smooth = not mixes and not exact
@@ -152,11 +153,12 @@ def march_steps(
     v1 = np.empty((n, nc))
     a1 = np.empty((n, nc))
     # contact of the cable with itself: nodes before, at and after an update, pairs, and the widened tangent
-    shape = (len(tables.contact_w) if tight else 0, min(nc, 3))
+    shape = (len(tables.strand_u) if tight else 0, min(nc, 3))
     x0, x1, x2 = np.empty(shape), np.empty(shape), np.empty(shape)
     found = np.empty((64 if tight else 0, 2), np.int64)
     row_end = np.empty(free if tight else 0, np.int64)
     S = np.empty((free if tight else 0, free if tight else 0))
+    filled, columns = np.empty_like(row_end), np.empty(S.shape, np.int32)
     pairs, wide, depth, share = 0, False, 0.0, 1.0
     first_contraction, first_update, unmeasured = 1.0, 1.0, _UNMEASURED  # of the first update of a step, as measured
     # the acceleration at the start knows of no damping yet, which would make too much of it
@@ -209,7 +211,7 @@ def march_steps(
                 place_nodes(q0, tables, x0)
                 if robust:
                     place_nodes(q1, tables, x1)
-                    found, share = clear_way(x0, x1, tables.contact_u, p[SELF_CONTACT, 0], p[SELF_CONTACT, 4], found)
+                    found, share = clear_way(x0, x1, tables.strand_u, p[SELF_CONTACT, 0], p[SELF_CONTACT, 4], found)
                     if share < 1.0:
                         converged = False
                         continue  # what is held passes through a strand
@@ -234,7 +236,7 @@ def march_steps(
                     if wide:
                         part = (1.0 - al_f, (1.0 - al_f) * tv, 1.0 - al_f)
                         widen(nc, v1, tables, p, x1, found, pairs, part, e, A[:free], row_end, S)
-                    if (factor_wide(S, row_end) if wide else factor_step(A, free)) >= 0:
+                    if (factor_wide(S, row_end, filled, columns) if wide else factor_step(A, free)) >= 0:
                         if not robust:
                             break
                         assemble(axes, q1, v1, tables, active, p, history, rates, (1.0, tv, 0.0), f, K)
@@ -245,13 +247,13 @@ def march_steps(
                         if wide:
                             part = (1.0 - al_f, (1.0 - al_f) * tv, 0.0)
                             widen(nc, v1, tables, p, x1, found, pairs, part, e, A[:free], row_end, S)
-                        if (factor_wide(S, row_end) if wide else factor_step(A, free)) >= 0:
+                        if (factor_wide(S, row_end, filled, columns) if wide else factor_step(A, free)) >= 0:
                             break
                     fresh = True
                 for i in range(free):
                     trial_x[i] = -x[i]
                 if wide:
-                    solve_wide(S, row_end, trial_x[:free])
+                    solve_wide(S, filled, columns, trial_x[:free])
                 else:
                     solve_step(A, free, trial_x)
                 if mixes:
@@ -269,7 +271,7 @@ def march_steps(
                 length = 1.0
                 if tight and robust:
                     place_nodes(q1 + step_change, tables, x2)
-                    found, length = clear_way(x1, x2, tables.contact_u, p[SELF_CONTACT, 0], p[SELF_CONTACT, 4], found)
+                    found, length = clear_way(x1, x2, tables.strand_u, p[SELF_CONTACT, 0], p[SELF_CONTACT, 4], found)
                 work = 0.0
                 if robust and update > tolerance:
                     for i in range(free):
@@ -330,13 +332,17 @@ def march_steps(
             if converged and tight:
                 place_nodes(q1, tables, x1)
                 if not robust:
-                    found, share = clear_way(x0, x1, tables.contact_u, p[SELF_CONTACT, 0], p[SELF_CONTACT, 4], found)
+                    found, share = clear_way(x0, x1, tables.strand_u, p[SELF_CONTACT, 0], p[SELF_CONTACT, 4], found)
                     converged = share == 1.0
             struck = 0.0
             if converged and not late and touches:
                 struck = strikes(nc, q0, q1, tables, active, p)
             if converged and not late and pairs > 0:
-                struck = max(struck, closing(x0, x1, tables.contact_u, p[SELF_CONTACT, 0], found, pairs))
+                closed = closing(x0, x1, tables.strand_u, p[SELF_CONTACT, 0], found, pairs)
+                if closed > _STRIKE * h and k >= info[DIVIDED_FROM]:
+                    info[FAILED_STEP], info[STRUCK] = k, 1.0
+                    return
+                struck = max(struck, closed)
             if struck > _STRIKE * h:
                 converged = False
                 dull = _DULL

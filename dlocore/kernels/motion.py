@@ -23,7 +23,7 @@ from dlocore.kernels.march import march_steps
 from dlocore.kernels.tension import COLUMNS
 from dlocore.kernels.timefit import fitted
 
-STRAIN, LEAST_SLOPE, MOST_SLOPE, SEEN = 3, 4, 5, 6  # places in `info` after those of `march_steps`, and their number
+STRAIN, LEAST_SLOPE, MOST_SLOPE, SEEN = 5, 6, 7, 8  # places in `info` after those of `march_steps`, and their number
 
 
 @kernel
@@ -57,7 +57,7 @@ def smooth_motion(
         [N] that hold them, what lies behind the motion at its end, the control points (n_t, n, nc) [m] of the time
         spline and what it misses each state by (steps + 1,) [m].
     """
-    tables = build_tables(knots, free_start, free_end, rule2, w2, rule3, w3, rule4, w4, np.inf)
+    tables = build_tables(knots, free_start, free_end, rule2, w2, rule3, w3, rule4, w4, np.inf, np.inf)
     n, nc = start.shape
     points, stretched = len(tables.curvature_w), len(tables.axial_w)
     history = History(

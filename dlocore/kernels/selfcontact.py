@@ -25,18 +25,19 @@ from dlocore.kernels.strands import between, between_nodes, closest, dot, near_p
 
 _DRAWN = 0.05  # eps
 _WINDOW = 8  # control points of a segment, at most
+_GATHERED = 3  # times as long takes an entry that is looked up as one that is next
 _ROOM = 4096  # reduced entries of a pair, at most: held control points may follow many free ones
 
 
 @leaf
 def place_nodes(q: Any, tables: Any, x: Any) -> None:
-    """Write the positions x (nodes, 2 or 3) [m] of the contact nodes of the control points q (n, nc)."""
+    """Write the positions x (nodes, 2 or 3) [m] of the strand nodes of the control points q (n, nc)."""
     for n in range(len(x)):
-        k = tables.contact_first[n]
+        k = tables.strand_first[n]
         for d in range(x.shape[1]):
             value = 0.0
             for i in range(4):
-                value += tables.contact_b0[n, i] * q[k + i, d]
+                value += tables.strand_b0[n, i] * q[k + i, d]
             x[n, d] = value
 
 
@@ -51,6 +52,19 @@ def _pair(x: Any, u: Any, D: float, i: int, j: int) -> tuple[Vector, float, floa
     return y, rho, s, t, a, b, pull_a, pull_b
 
 
+@law
+def _spread_one(first: Any, b0: Any, i: int, s: float, sign: float, begin: int, point: Any, c: Any) -> int:
+    """Write the control points of segment i from place `begin` on and how they weigh in its point s; return the end."""
+    shift = min(first[i + 1] - first[i], 4)  # control points between those of its ends have no part in it
+    for o in range(4 + shift):
+        point[begin + o] = first[i] + o if o < shift else first[i + 1] + o - shift
+        c[begin + o] = 0.0
+    for o in range(4):
+        c[begin + o] += sign * (1.0 - s) * b0[i, o]
+        c[begin + o + shift] += sign * s * b0[i + 1, o]
+    return begin + 4 + shift
+
+
 @kernel
 def _spread(first: Any, b0: Any, i: int, j: int, s: float, t: float, point: Any, c: Any) -> Any:
     """Write the control points of segments i and j and how they weigh in point s of i minus point t of j.
@@ -58,21 +72,8 @@ def _spread(first: Any, b0: Any, i: int, j: int, s: float, t: float, point: Any,
     Returns:
         how many control points belong to i, and how many to both.
     """
-    shift = first[i + 1] - first[i]
-    ni = 4 + shift
-    for o in range(ni):
-        point[o], c[o] = first[i] + o, 0.0
-    for o in range(4):
-        c[o] += (1.0 - s) * b0[i, o]
-        c[o + shift] += s * b0[i + 1, o]
-    shift = first[j + 1] - first[j]
-    m = ni + 4 + shift
-    for o in range(ni, m):
-        point[o], c[o] = first[j] + o - ni, 0.0
-    for o in range(4):
-        c[ni + o] -= (1.0 - t) * b0[j, o]
-        c[ni + o + shift] -= t * b0[j + 1, o]
-    return ni, m
+    ni = _spread_one(first, b0, i, s, 1.0, 0, point, c)
+    return ni, _spread_one(first, b0, j, t, -1.0, ni, point, c)
 
 
 @law
@@ -105,7 +106,7 @@ def press(q: Any, v: Any, tables: Any, p: Any, x: Any, found: Any, f: Any) -> An
         found: room for the pairs, see `near_pairs`.
     """
     place_nodes(q, tables, x)
-    u, first, b0 = tables.contact_u, tables.contact_first, tables.contact_b0
+    u, first, b0 = tables.strand_u, tables.strand_first, tables.strand_b0
     D, stiffness, passage, damping = p[SELF_CONTACT, 0], p[SELF_CONTACT, 1], p[SELF_CONTACT, 2], p[SELF_CONTACT, 3]
     found, count = near_pairs(x, u, D, p[SELF_CONTACT, 4], found)
     point = np.empty(2 * _WINDOW, np.int64)
@@ -192,7 +193,7 @@ def widen(
     """
     free, width = A.shape
     nd = x.shape[1]
-    u, first, b0 = tables.contact_u, tables.contact_first, tables.contact_b0
+    u, first, b0 = tables.strand_u, tables.strand_first, tables.strand_b0
     push = (p[SELF_CONTACT, 0], p[SELF_CONTACT, 1], p[SELF_CONTACT, 2], p[SELF_CONTACT, 3])
     point = np.empty(2 * _WINDOW, np.int64)
     H = np.empty((2 * _WINDOW * nd, 2 * _WINDOW * nd))
@@ -230,31 +231,49 @@ def widen(
 
 
 @leaf
-def factor_wide(S: Any, end: Any) -> int:
-    """Factor S = U' D U in place, within its rows' ends; return -1, or the row where a pivot is not positive."""
+def factor_wide(S: Any, end: Any, filled: Any, columns: Any) -> int:
+    """Factor S = U' D U in place, within its rows' ends; return -1, or the row where a pivot is not positive.
+
+    Args:
+        filled, columns: (free,) and (free, free), written: how many columns of each row beyond the diagonal are not
+            zero, and which.
+    """
     for j in range(len(end)):
         pivot = S[j, j]
         if not pivot > 0.0:
             return j
+        count = 0
         for i in range(j + 1, end[j]):
             if S[j, i] != 0.0:
-                ratio = S[j, i] / pivot
+                columns[j, count] = i
+                count += 1
+        filled[j] = count
+        for a in range(count):
+            i = columns[j, a]
+            ratio = S[j, i] / pivot
+            if _GATHERED * (count - a) > end[j] - i:
                 for k in range(i, end[j]):
+                    S[i, k] -= ratio * S[j, k]
+            else:
+                for b in range(a, count):
+                    k = columns[j, b]
                     S[i, k] -= ratio * S[j, k]
     return -1
 
 
 @leaf
-def solve_wide(S: Any, end: Any, x: Any) -> None:
+def solve_wide(S: Any, filled: Any, columns: Any, x: Any) -> None:
     """Solve U' D U x = b in place with the factors of `factor_wide`."""
-    n = len(end)
+    n = len(filled)
     for j in range(n):
         ratio = x[j] / S[j, j]
-        for i in range(j + 1, end[j]):
+        for a in range(filled[j]):
+            i = columns[j, a]
             x[i] -= ratio * S[j, i]
     for j in range(n - 1, -1, -1):
         total = x[j]
-        for i in range(j + 1, end[j]):
+        for a in range(filled[j]):
+            i = columns[j, a]
             total -= S[j, i] * x[i]
         x[j] = total / S[j, j]
 

@@ -141,7 +141,7 @@ def _stretches(u: Any, half: Any) -> Any:
     return least
 
 
-@kernel
+@leaf
 def _is_open(x: Any, ways: Any, least: Any, a: int, b: int, separation: float, near: float) -> bool:
     """Tell whether the nodes x (k, 2 or 3) from block a to block b are so straight that no part of them meets another.
 
@@ -158,6 +158,32 @@ def _is_open(x: Any, ways: Any, least: Any, a: int, b: int, separation: float, n
     while n <= b and (1.0 - least[n]) * separation < room:
         n += 1
     return n > b
+
+
+@leaf
+def _blocks_near(
+    x: Any, block: int, center: Any, way: Any, hop: float, around: Any, widest: float, ways: Any, least: Any,
+    separation: float, near: float, found: Any,
+) -> int:  # fmt: skip
+    """Write the blocks from `block` on whose segments its own may meet to `found` (blocks,), and return their number.
+
+    Args:
+        x: the nodes (k, 2 or 3) [m].
+        center, around, widest: of the balls around the blocks, see `_blocks`, and the largest of their radii [m].
+        way, hop: by which the centres move (blocks, 3) [m], and their `_hop`.
+        ways, least, separation, near: see `_is_open`.
+    """
+    count, other = 0, block
+    while other < len(around):
+        clear = _apart(center, block, other) - _apart(way, block, other) - near - around[block] - widest
+        if clear > 0.0:
+            other += max(1, int(clear / hop))
+            continue
+        if not _is_open(x, ways, least, block, other, separation, near):
+            found[count] = other
+            count += 1
+        other += 1
+    return count
 
 
 @kernel
@@ -189,22 +215,15 @@ def near_pairs(x: Any, u: Any, radius: float, separation: float, found: Any) -> 
     middle, half = _middles(x)
     longest = np.max(half)
     center, around = _blocks(middle, half)
-    hop, widest = _hop(center, np.zeros_like(center)), np.max(around)
+    still = np.zeros_like(center)
+    hop, widest = _hop(center, still), np.max(around)
     ways, least = _ways(half), _stretches(u, half)
     near = np.empty(len(around), np.int64)
     j0 = 0
     for block in range(len(around)):
-        nears = 0
-        other = block
-        while other < len(around):
-            clear = _apart(center, block, other) - radius - around[block] - widest
-            if clear > 0.0:
-                other += max(1, int(clear / hop))
-                continue
-            if not _is_open(x, ways, least, block, other, separation, radius):
-                near[nears] = other
-                nears += 1
-            other += 1
+        nears = _blocks_near(
+            x, block, center, still, hop, around, widest, ways, least, separation, radius, near
+        )  # fmt: skip
         if nears == 0:
             continue
         for i in range(block * _BLOCK, min((block + 1) * _BLOCK, last)):
@@ -259,17 +278,9 @@ def meeting_pairs(x0: Any, x1: Any, u: Any, near: float, separation: float, foun
     count = 0
     j0 = 0
     for block in range(len(around)):
-        nears = 0
-        other = block
-        while other < len(around):
-            clear = _apart(center, block, other) - _apart(way, block, other) - near - around[block] - widest
-            if clear > 0.0:
-                other += max(1, int(clear / hop))
-                continue
-            if not _is_open(x0, ways, least, block, other, separation, near):
-                near_by[nears] = other
-                nears += 1
-            other += 1
+        nears = _blocks_near(
+            x0, block, center, way, hop, around, widest, ways, least, separation, near, near_by
+        )  # fmt: skip
         if nears == 0:
             continue
         for i in range(block * _BLOCK, min((block + 1) * _BLOCK, last)):

@@ -20,8 +20,10 @@ from dlocore.kernels.banded import Elimination
 from dlocore.kernels.entry import to_ends_of_steps
 from dlocore.kernels.march import (
     DEEPEST,
+    DIVIDED_FROM,
     FAILED_STEP,
     LEFT,
+    STRUCK,
     constrained_mass_solve,
     march_steps,
     row_of_step,
@@ -53,6 +55,8 @@ _WORK = (
 )
 MOST_FRAMES = 1_300_000  # control points times steps of which a motion with twist keeps the frames: 0.6 GB of them
 _SPLITS = (4, 16, 64)  # parts of a step that found no equilibrium
+_STRUCK = (16,)  # the same where strands strike each other, which leaves an error that goes with the step
+_MOST_STRUCK = 1 / 8  # of the steps: where they strike in more, the others are taken whole
 _LOOKS = 12  # states of a motion, at least, that are searched for folds
 
 
@@ -210,7 +214,7 @@ class _Walk:
         self._states = np.empty((len(times), grid.n_u, problem.nc))
         self._states[0] = grid.start
         self._v = self._velocity = grid.velocity.copy()
-        self._info = np.zeros(3)
+        self._info = np.zeros(5)
         self._info[FAILED_STEP] = -1
         self._starts: Starts = {}
         self._forces: list[WindowForces] = []
@@ -241,7 +245,11 @@ class _Walk:
             elif self._in_smaller_steps(stretch, failed):
                 at = smooth = failed
             else:
-                at, self.stopped = failed - 1, "step"
+                at = failed - 1
+                self.stopped = "" if self._info[STRUCK] else "step"  # whole, it found one
+            if self._info[STRUCK]:
+                left = self._split < _MOST_STRUCK * len(self._times)
+                self._info[DIVIDED_FROM], self._info[STRUCK] = failed + 1 if left else np.inf, 0.0
         self._reached, self._v = at, stretch.v
         to_ends_of_steps(stretch.reactions, first, at, self._rho / (1.0 + self._rho))
         part = slice(first, last + 1)
@@ -318,12 +326,13 @@ class _Walk:
         return failed
 
     def _in_smaller_steps(self, stretch: _Stretch, failed: int) -> bool:
-        """Take a step that found no equilibrium in smaller ones, which damp what they can't resolve, if they do."""
+        """Take a step that was left in smaller ones, which damp what they can't resolve, if they find equilibrium."""
         states, times, at = self._states, self._times, failed - 1
         jumps = stretch.entry.jumps and at == stretch.first
         under_way = (stretch.v, stretch.a, stretch.G, *self._history)
         kept = [x.copy() for x in under_way]
-        for parts in _SPLITS:
+        divided_from, self._info[DIVIDED_FROM] = self._info[DIVIDED_FROM], np.inf
+        for parts in _STRUCK if self._info[STRUCK] else _SPLITS:
             inner = np.linspace(times[at], times[failed], parts + 1)
             offsets = hold(self._problem, self._grid, stretch.grasps, inner, self._starts, states[at]).offsets
             inner_states = np.empty((parts + 1, *states.shape[1:]))
@@ -335,15 +344,18 @@ class _Walk:
                 reactions, self._log[:0],
             )  # fmt: skip
             if found < 0:
-                states[failed], stretch.reactions[failed] = inner_states[-1], reactions[-1]
+                states[failed] = inner_states[-1]
+                # strands that strike each other pull at the grasps for an instant: what lasts is the impulse
+                stretch.reactions[failed] = reactions[1:].mean(axis=0) if self._info[STRUCK] else reactions[-1]
                 if len(self._log):
                     row = row_of_step(failed, len(states), len(self._log))
                     note(self._problem.axes, self._history, self._log[row])
                 self._split += 1
-                return True
+                break
             for x, before in zip(under_way, kept, strict=True):
                 x[:] = before
-        return False
+        self._info[DIVIDED_FROM] = divided_from
+        return found < 0
 
 
 def chunk_of(problem: Problem, grid: Grid) -> int:

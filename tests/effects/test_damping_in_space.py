@@ -26,7 +26,7 @@ class Damped:
 
     def __init__(self, n_u: int) -> None:
         self.knots = uniform_knots(n_u, LENGTH)
-        self.tables = build_tables(self.knots, True, True, *GAUSS_2, *GAUSS_3, *GAUSS_4, np.inf)
+        self.tables = build_tables(self.knots, True, True, *GAUSS_2, *GAUSS_3, *GAUSS_4, np.inf, np.inf)
         self.active, self.parameters = np.zeros(laws.COUNT, np.int64), np.zeros((laws.COUNT, laws.PARAMETERS))
         self.active[laws.DAMPING], self.parameters[laws.DAMPING, 0] = 1, Damping(ETA).parameters()[0]
 

@@ -78,7 +78,7 @@ def body(name: str, nc: int, n_u: int = N_U, rest: float = 0.0) -> Body:
     feature = np.array([0.3])
     one = np.ones(1, np.int64)
     knots = graded_knots(n_u, LENGTH, feature, one, np.array([0.6]), np.array([0.02]))
-    tables = build_tables(knots, True, True, *GAUSS_2, *GAUSS_3, *GAUSS_4, np.inf)
+    tables = build_tables(knots, True, True, *GAUSS_2, *GAUSS_3, *GAUSS_4, np.inf, np.inf)
     active, parameters = np.zeros(laws.COUNT, np.int64), np.zeros((laws.COUNT, laws.PARAMETERS))
     chosen = list(LAWS) if name == "all" else [name.removesuffix(" with memory")]
     for row, effect in (LAWS[c] for c in chosen):

@@ -26,7 +26,7 @@ class Body:
     def __init__(self, remembered: bool = True) -> None:
         one = np.ones(1, np.int64)
         self.knots = graded_knots(N_U, LENGTH, np.array([0.3]), one, np.array([0.6]), np.array([0.02]))
-        self.tables: Tables = build_tables(self.knots, True, True, *GAUSS_2, *GAUSS_3, *GAUSS_4, np.inf)
+        self.tables: Tables = build_tables(self.knots, True, True, *GAUSS_2, *GAUSS_3, *GAUSS_4, np.inf, np.inf)
         self.active = np.zeros(laws.COUNT, np.int64)
         self.p = np.zeros((laws.COUNT, laws.PARAMETERS))
         effects = ((laws.STRETCH, Stretch(60.0)), (laws.BEND, Bend(1e-3)), (laws.TWIST, Twist(2e-3, 0.005)))
