@@ -97,7 +97,7 @@ def march_steps(
         axes: (0, 1), (0, 1, 2) or (0, 1, 2, 3).
         start, stop: step numbers.
         begin: first step of the smooth stretch of motion that `start` lies in.
-        jumps: whether that stretch begins with a jump, of which a and G tell nothing that lasts for a step.
+        jumps: whether that stretch begins with a jump or a strike: a and G tell nothing of it that lasts for a step.
         h: time step [s].
         rho: spectral radius at infinite frequency, 0 (strong damping of the unresolved) to 1 (none).
         tolerance: on the estimated error of the Newton iteration [m], largest component.
@@ -130,7 +130,7 @@ def march_steps(
     tight = bool(active[SELF_CONTACT])
     # steps to come by backward Euler; the first one, where the acceleration at the start knows of no contact yet, or
     # is that of the instant of a jump or a strike
-    dull = 1 if (touches or tight or jumps) and start == begin else 0
+    dull = 1 if (touches or jumps) and start == begin else 0
     # the tangent of this damping is not complete; across kinks earlier iterations teach nothing
     mixes = nc == 3 and bool(active[DAMPING]) and not exact and not tight
     smooth = not mixes and not exact

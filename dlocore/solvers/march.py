@@ -229,6 +229,7 @@ class _Walk:
         """Walk through the stretch from `begin` to `end` [s], steps `first` to `last`, or until it has to stop."""
         stretch = self._enter(begin, end, first, last)
         at, smooth = first, first  # the step reached, and the first of the smooth steps that it is one of
+        jumps = stretch.entry.jumps  # whether these begin with a jump or a strike
         while at < last and not self.stopped:
             try:
                 self._monitor.check()
@@ -237,13 +238,14 @@ class _Walk:
                 break
             until = min(at + chunk_of(self._problem, self._grid), last)
             failed = self._steps(
-                stretch, at, until, smooth, stretch.entry.jumps, stretch.h, self._rho, self._states, self._applied,
-                stretch.offsets, stretch.reactions, self._log,
+                stretch, at, until, smooth, jumps, stretch.h, self._rho, self._states, self._applied, stretch.offsets,
+                stretch.reactions, self._log,
             )  # fmt: skip
             if failed < 0:
                 at = until
-            elif self._in_smaller_steps(stretch, failed):
+            elif self._in_smaller_steps(stretch, failed, jumps and failed == smooth + 1):
                 at = smooth = failed
+                jumps = bool(self._info[STRUCK])
             else:
                 at = failed - 1
                 self.stopped = "" if self._info[STRUCK] else "step"  # whole, it found one
@@ -325,10 +327,9 @@ class _Walk:
         self._info[FAILED_STEP] = -1
         return failed
 
-    def _in_smaller_steps(self, stretch: _Stretch, failed: int) -> bool:
+    def _in_smaller_steps(self, stretch: _Stretch, failed: int, jumps: bool) -> bool:
         """Take a step that was left in smaller ones, which damp what they can't resolve, if they find equilibrium."""
         states, times, at = self._states, self._times, failed - 1
-        jumps = stretch.entry.jumps and at == stretch.first
         under_way = (stretch.v, stretch.a, stretch.G, *self._history)
         kept = [x.copy() for x in under_way]
         divided_from, self._info[DIVIDED_FROM] = self._info[DIVIDED_FROM], np.inf

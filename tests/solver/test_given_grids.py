@@ -19,7 +19,7 @@ from dlocore.whole_march import FOLDED, is_folded, march_level
 from tests.solver.scenes import apart, march, paper_scene
 
 
-@pytest.mark.parametrize(("seed", "index"), [(1, 63), (2, 186)])
+@pytest.mark.parametrize(("seed", "index"), [(2, 186), (5, 207)])
 def test_a_cable_that_folds_on_a_given_grid_is_marched_on_points_between_which_it_cant(seed: int, index: int):
     scene = draw(seed, index).make()
     quality = scene.quality
@@ -39,7 +39,7 @@ def test_a_cable_that_folds_on_a_given_grid_is_marched_on_points_between_which_i
 
 
 def test_the_estimate_tells_how_far_a_coarse_grid_that_was_watched_is_off():
-    scene = draw(1, 63).make()
+    scene = draw(2, 186).make()
     found = predict(scene)
     fine = predict(replace(scene, quality=march(96, 120)))
     assert fine.status == "converged"
