@@ -113,7 +113,7 @@ def march_steps(
         log: (rows, points, columns) of the steps of `row_of_step` the frames and the memory, see `note`; or (0, 0, 0).
         info: (5,) the step that found no equilibrium or is to be divided, or -1, the largest error that Newton's
             iterations left [m], the largest depth in an obstacle or the table [m], read: the first step that is to be
-            divided if strands strike each other in it, and 1 where that is why a step is to be divided.
+            divided if the cable strikes something in it, and 1 where that is why a step is to be divided.
     """
     nc = len(axes)
     keeps = keeps_history(active)
@@ -338,12 +338,11 @@ def march_steps(
             if converged and not late and touches:
                 struck = strikes(nc, q0, q1, tables, active, p)
             if converged and not late and pairs > 0:
-                closed = closing(x0, x1, tables.strand_u, p[SELF_CONTACT, 0], found, pairs)
-                if closed > _STRIKE * h and k >= info[DIVIDED_FROM]:
+                struck = max(struck, closing(x0, x1, tables.strand_u, p[SELF_CONTACT, 0], found, pairs))
+            if struck > _STRIKE * h:
+                if k >= info[DIVIDED_FROM]:
                     info[FAILED_STEP], info[STRUCK] = k, 1.0
                     return
-                struck = max(struck, closed)
-            if struck > _STRIKE * h:
                 converged = False
                 dull = _DULL
                 first = 2

@@ -55,8 +55,8 @@ _WORK = (
 )
 MOST_FRAMES = 1_300_000  # control points times steps of which a motion with twist keeps the frames: 0.6 GB of them
 _SPLITS = (4, 16, 64)  # parts of a step that found no equilibrium
-_STRUCK = (16,)  # the same where strands strike each other, which leaves an error that goes with the step
-_MOST_STRUCK = 1 / 8  # of the steps: where they strike in more, the others are taken whole
+_STRUCK = (16,)  # the same where the cable strikes something, which leaves an error that goes with the step
+_MOST_STRUCK = 1 / 8  # of the steps: where it strikes in more, the others are taken whole
 _LOOKS = 12  # states of a motion, at least, that are searched for folds
 
 
@@ -346,7 +346,7 @@ class _Walk:
             )  # fmt: skip
             if found < 0:
                 states[failed] = inner_states[-1]
-                # strands that strike each other pull at the grasps for an instant: what lasts is the impulse
+                # a strike pulls at the grasps for an instant: what lasts is the impulse
                 stretch.reactions[failed] = reactions[1:].mean(axis=0) if self._info[STRUCK] else reactions[-1]
                 if len(self._log):
                     row = row_of_step(failed, len(states), len(self._log))
