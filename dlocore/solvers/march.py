@@ -50,9 +50,9 @@ _STIFF = 3e6  # EA L^2/EI up to which tension is no noise: that of cables whose 
 _NOISELESS = 1e-4  # of the tolerance, at least
 _RESTS = 0.05  # of the diameter above the table: nearer to it the cable rests on it
 CHUNK = 256  # steps between looks at the clock, at most
-_WORK = (
-    2.5e5  # of these steps, at most: times control points and their coordinates squared; some hundredths of a second
-)
+# of these steps, at most: times control points and their coordinates squared; some hundredths of a second
+_WORK = 2.5e5
+_NODE = 5.0  # times as much counts a node of contact: where many touch, a step may take many iterations
 MOST_FRAMES = 1_300_000  # control points times steps of which a motion with twist keeps the frames: 0.6 GB of them
 _SPLITS = (4, 16, 64)  # parts of a step that found no equilibrium
 _STRUCK = (16,)  # the same where the cable strikes something, which leaves an error that goes with the step
@@ -230,28 +230,28 @@ class _Walk:
         stretch = self._enter(begin, end, first, last)
         at, smooth = first, first  # the step reached, and the first of the smooth steps that it is one of
         jumps = stretch.entry.jumps  # whether these begin with a jump or a strike
-        while at < last and not self.stopped:
-            try:
+        try:
+            while at < last and not self.stopped:
                 self._monitor.check()
-            except TimeIsUp:
-                self.stopped = "time"
-                break
-            until = min(at + chunk_of(self._problem, self._grid), last)
-            failed = self._steps(
-                stretch, at, until, smooth, jumps, stretch.h, self._rho, self._states, self._applied, stretch.offsets,
-                stretch.reactions, self._log,
-            )  # fmt: skip
-            if failed < 0:
-                at = until
-            elif self._in_smaller_steps(stretch, failed, jumps and failed == smooth + 1):
-                at = smooth = failed
-                jumps = bool(self._info[STRUCK])
-            else:
+                until = min(at + chunk_of(self._problem, self._grid), last)
+                failed = self._steps(
+                    stretch, at, until, smooth, jumps, stretch.h, self._rho, self._states, self._applied,
+                    stretch.offsets, stretch.reactions, self._log,
+                )  # fmt: skip
+                if failed < 0:
+                    at = until
+                    continue
                 at = failed - 1
-                self.stopped = "" if self._info[STRUCK] else "step"  # whole, it found one
-            if self._info[STRUCK]:
-                left = self._split < _MOST_STRUCK * len(self._times)
-                self._info[DIVIDED_FROM], self._info[STRUCK] = failed + 1 if left else np.inf, 0.0
+                if self._in_smaller_steps(stretch, failed, jumps and at == smooth):
+                    at = smooth = failed
+                    jumps = bool(self._info[STRUCK])
+                elif not self._info[STRUCK]:  # as one it found equilibrium
+                    self.stopped = "step"
+                if self._info[STRUCK]:
+                    left = self._split < _MOST_STRUCK * len(self._times)
+                    self._info[DIVIDED_FROM], self._info[STRUCK] = failed + 1 if left else np.inf, 0.0
+        except TimeIsUp:
+            self.stopped = "time"
         self._reached, self._v = at, stretch.v
         to_ends_of_steps(stretch.reactions, first, at, self._rho / (1.0 + self._rho))
         part = slice(first, last + 1)
@@ -340,10 +340,14 @@ class _Walk:
             inner_states[0] = states[at]
             reactions = np.zeros((parts + 1, stretch.reactions.shape[1]))
             applied = applied_forces(self._problem, self._grid, inner)
-            found = self._steps(
-                stretch, 0, parts, 0, jumps, stretch.h / parts, STRONGLY_DAMPED, inner_states, applied, offsets,
-                reactions, self._log[:0],
-            )  # fmt: skip
+            k, found = 0, -1
+            while k < parts and found < 0:
+                self._monitor.check()
+                begun, k = k, min(k + chunk_of(self._problem, self._grid), parts)
+                found = self._steps(
+                    stretch, begun, k, 0, jumps, stretch.h / parts, STRONGLY_DAMPED, inner_states, applied, offsets,
+                    reactions, self._log[:0],
+                )  # fmt: skip
             if found < 0:
                 states[failed] = inner_states[-1]
                 # a strike pulls at the grasps for an instant: what lasts is the impulse
@@ -361,7 +365,8 @@ class _Walk:
 
 def chunk_of(problem: Problem, grid: Grid) -> int:
     """Return how many steps on a grid are taken between looks at the clock."""
-    return min(CHUNK, max(1, int(_WORK / (grid.n_u * problem.nc**2))))
+    nodes = problem.scene.cable.length * (1.0 / problem.contact_spacing() + 1.0 / problem.strand_spacing())
+    return min(CHUNK, max(1, int(_WORK / (grid.n_u * problem.nc**2 + _NODE * nodes))))
 
 
 def every_of(states: int) -> int:
