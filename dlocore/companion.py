@@ -12,7 +12,7 @@ FINER = 1.5  # times n_u, n_t and the steps
 COARSER, FEWER = 0.75, 0.5  # times n_u and n_t, and the steps
 _SAFETY = 1.5  # times the distance to a finer march: what a slowly converging motion may be off beyond it
 _LEFT = 0.75  # times the distance to a coarser march: benchmarks.estimate
-_LEFT_DAMPED = 1.0  # the same of strongly damped steps, as forces with kinks ask for
+_LEFT_KINKED = 1.0  # the same of strongly damped steps, and where forces have kinks
 _ROOM = 0.8  # of n_u and n_t: a march on more is not coarser
 _TOO_LATE = " The time limit passed before its error was estimated."
 
@@ -40,7 +40,8 @@ def by_coarser(problem: Problem, level: Level, monitor: Monitor) -> tuple[float 
         if other is None:
             return None, said
         if march_status(problem, other)[0] == "converged":
-            left = _LEFT_DAMPED if level.motion.rho == STRONGLY_DAMPED else _LEFT
+            kinked = level.motion.rho == STRONGLY_DAMPED or level.motion.deepest > 0.0
+            left = _LEFT_KINKED if kinked else _LEFT
             return left * distance(level, other, problem), ""
     return by_finer(problem, level, monitor)
 
