@@ -76,13 +76,13 @@ def row(bending: float, grasp: float, drag: float, hold: Hold, repeats: int) -> 
 
 
 def table(rows: list[Row]) -> str:
-    """Return a Markdown table with a row for each way to hold."""
+    """Return a Markdown table with a row for each way to hold, and one for all."""
     lines = [
         "| held | cases | met | ms, median | 90 % | worst | grids, median | estimate/true, least | median | largest |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
-    for hold in HOLDS:
-        group = [r for r in rows if r.hold == hold]
+    for hold in (*HOLDS, "all"):
+        group = [r for r in rows if hold in ("all", r.hold)]
         times = 1e3 * np.quantile([r.time for r in group], [0.5, 0.9, 1.0])
         ratios = np.quantile([r.estimate / r.error for r in group], [0.0, 0.5, 1.0])
         lines.append(

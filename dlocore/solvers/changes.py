@@ -56,7 +56,7 @@ def weighed(level: Level, before: Level, last: Change | None) -> Change:
         last: the change of the refinement before in the same direction.
     """
     moved_before = np.inf if last is None else last.moved
-    more = len(level.motion.times) / len(before.motion.times)
+    more = (len(level.motion.times) - 1) / (len(before.motion.times) - 1)
     if more <= _MORE:
         return Change(level.change, moved_before, _LEFT_ALONG)
     # the errors of the steps are of second order: what twice as many take away is three times what they leave
