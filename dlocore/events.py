@@ -1,5 +1,6 @@
 """When a motion is not smooth, and what follows from that: its stretches, their steps, and the knots in time."""
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, cast
@@ -35,8 +36,8 @@ class Event:
 
 def swings(scene: Scene) -> float:
     """Return how many times as long a motion is as a cable of that length needs to swing, about; 1 to _LONGEST."""
-    natural = 2.0 * np.sqrt(scene.cable.length)  # [s], for a length in metres
-    return float(np.clip(cast(float, scene.horizon) / natural, 1.0, _LONGEST))
+    natural = 2.0 * math.sqrt(scene.cable.length)  # [s], for a length in metres
+    return min(max(cast(float, scene.horizon) / natural, 1.0), _LONGEST)
 
 
 def moments(scene: Scene, in_a_swing: int) -> int:
