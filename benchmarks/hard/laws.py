@@ -12,6 +12,7 @@ Floats = NDArray[np.float64]
 
 _LOOKS = 33  # times at which a law is looked at
 _NOTHING = 1e-3  # of a cable's own forces: what is smaller than that is no motion
+_BEFORE = 1e-9  # of a stretch between two events: how far before its end is still in it
 _SETTLE = 4  # steps after an event, in which the forces of what jumped die away
 
 
@@ -123,8 +124,14 @@ def energy_gain(prediction: Prediction) -> float | None:
 
 
 def windows_of(times: Floats) -> list[Floats]:
-    """Return the stretches of smooth motion between events, at which the times of the reactions stand twice."""
-    return np.split(times, np.flatnonzero(np.diff(times) <= 0.0) + 1)
+    """Return the stretches of smooth motion between events, at which the times of the reactions stand twice.
+
+    Each but the last ends a little before its event: at the event itself a surface has the velocity after it.
+    """
+    windows = [part.copy() for part in np.split(times, np.flatnonzero(np.diff(times) <= 0.0) + 1)]
+    for part in windows[:-1]:
+        part[-1] -= _BEFORE * (part[-1] - part[0])
+    return windows
 
 
 def _own(scene: Scene) -> tuple[float, float]:

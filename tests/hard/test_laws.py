@@ -58,3 +58,20 @@ def test_energy_from_nothing_is_noticed(sound: Prediction):
     found = measure(with_reaction(sound, 0.0))  # the cable rises and gains speed, and nobody did it
     assert found.energy is not None
     assert found.energy > GAIN
+
+
+def test_the_velocity_after_a_release_is_none_of_the_motion_before_it():
+    # at the instant of the release the surface has both, and the bent cable springs away at once
+    grasps = (
+        Grasp(u=0.2, hold="tangent"),
+        Grasp(u=0.8, hold="tangent", path=Move(displacement=(-0.1, 0.3, 0.0), duration=1.0), release_time=0.5),
+    )
+    around = Environment(gravity=(0.0, 0.0, 0.0))
+    quality = Quality(n_u=17, n_t=49, method="march", estimate=False)
+    stiff = cable(bending_stiffness=4.0)
+    released = predict(Scene(cable=stiff, shape=Straight(), grasps=grasps, environment=around, quality=quality))
+    found = measure(released)
+    assert found.energy is not None
+    assert found.energy < GAIN
+    assert found.momentum is not None
+    assert found.momentum < LOST
