@@ -21,6 +21,7 @@ from dlocore.transport import transported
 Floats = NDArray[np.float64]
 
 MATERIAL_TIMES = 33  # at most, at which the memory of a motion is kept
+_INSIDE = 1e-3  # of a span of the time knots: how far from its ends a time is inside
 _SMOOTH = 0.03  # times the bends of an angle over a span count as its slopes do: little where these decide
 
 
@@ -72,6 +73,9 @@ def angles_of(problem: Problem, grid: Grid, rates: Floats, first: Floats) -> Flo
 def free_control(problem: Problem, grid: Grid, knots_t: Floats, control: Floats, times: Floats, log: Floats) -> Floats:
     """Return control points (n_t, n_u, 4) of a motion with theta against a frame without twist along the cable.
 
+    Spans of the knots without any of the times inside, as there are where the cable strikes something, would leave it
+    free: between the times, what the angles against the two frames differ by is linear.
+
     Args:
         control: (n_t, n_u, nc), with theta against frames carried in time.
         times: (k,) [s].
@@ -80,10 +84,27 @@ def free_control(problem: Problem, grid: Grid, knots_t: Floats, control: Floats,
     assert problem.twist is not None
     over = design_matrix(knots_t, times)
     states = free_of_frames(problem, grid, np.tensordot(over, control, axes=1), log)
+    theta = states[:, :, 3]
+    starved = _starved(knots_t, times)
+    if len(starved):
+        differ = theta - over @ control[:, :, 3]
+        k = np.searchsorted(times, starved) - 1
+        share = ((starved - times[k]) / (times[k + 1] - times[k]))[:, None]
+        own = design_matrix(knots_t, starved) @ control[:, :, 3]
+        theta = np.insert(theta, k + 1, own + (1.0 - share) * differ[k] + share * differ[k + 1], axis=0)
+        times = np.insert(times, k + 1, starved)
     rate = 3.0 * (control[1, :, 3] - control[0, :, 3]) / (knots_t[4] - knots_t[1])
     out = control.copy()
-    out[:, :, 3] = fit_time(knots_t, times, np.ascontiguousarray(states[:, :, 3]), np.ascontiguousarray(rate))
+    out[:, :, 3] = fit_time(knots_t, times, np.ascontiguousarray(theta), np.ascontiguousarray(rate))
     return out
+
+
+def _starved(knots_t: Floats, times: Floats) -> Floats:
+    """Return the middles [s] of those spans of the time knots that have none of the times (k,) [s] well inside."""
+    breaks = np.unique(knots_t)
+    margin = _INSIDE * np.diff(breaks)
+    first = np.searchsorted(times, breaks[:-1] + margin, side="right")
+    return (0.5 * (breaks[1:] + breaks[:-1]))[first == np.searchsorted(times, breaks[1:] - margin)]
 
 
 def carried(director: Floats, tangents: Floats) -> Floats:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from dlocore import Cable, Environment, Grasp, Move, Scene, Straight, Table
+from benchmarks.catalogue import catalogue
+from dlocore import Cable, Environment, Grasp, Move, Scene, Straight, Table, predict
 from dlocore.discretisation import make_grid
 from dlocore.events import time_knots
 from dlocore.problem import pose
@@ -46,3 +47,15 @@ def test_no_states_are_added_to_so_many_that_they_fill_memory(monkeypatch: pytes
     more, same = refined(motion, knots_t, TOLERANCE)
     assert same is motion
     assert len(more) > len(knots_t)
+
+
+@pytest.mark.parametrize("name", ["lowered over a bar", "laid into a bin"])
+def test_the_angle_of_the_sections_does_not_tremble_where_knots_are_added(name: str) -> None:
+    # its frames are known at the steps alone, between which the strikes have knots
+    prediction = predict(catalogue()[name])
+    motion, surface = prediction.level.motion, prediction.surface  # type: ignore[union-attr]
+    u, steps = np.linspace(0.0, surface.length, 9), motion.times[motion.logged]
+    assert np.histogram(steps, np.unique(surface.knots_t))[0].min() == 0
+    rates = np.diff(surface(u, steps)[..., 3], axis=0) / np.diff(steps)[:, None]
+    fastest = np.abs(surface(u, np.linspace(0.0, surface.horizon, 4001), dt=1)[..., 3]).max()
+    assert fastest < 2.0 * np.abs(rates).max()
