@@ -31,9 +31,10 @@ def energies(
 ) -> dict[str, Floats]:
     """Return the energies of the motion at `times` (k,) [s]; each (k,) [J].
 
-    Keys: "kinetic", mu/2 |r_t|^2, "stretch", "bend" and "twist", docs/model.md eq. 7, and "gravity", -mu g . r
-    relative to the first of the times. Each is integrated over the cable as the solver does it. What is off in the
-    scene is zero. `material` is what the sections remember (`Prediction.material`), for a cable that yields.
+    Keys: "kinetic", mu/2 (|r_t|^2 + D^2/8 theta_t^2), "stretch", "bend" and "twist", docs/model.md eq. 7, and
+    "gravity", -mu g . r relative to the first of the times. Each is integrated over the cable as the solver does it.
+    What is off in the scene is zero. `material` is what the sections remember (`Prediction.material`), for a cable that
+    yields.
     """
     problem, grid, states, rates, _, histories = _motion(scene, surface, times, material)
     active, parameters = problem.law_table()

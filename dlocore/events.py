@@ -73,14 +73,38 @@ def _smoothness(grasp: Grasp, end: float) -> int:
     return 3
 
 
-def time_knots(problem: "Problem", n_t: int) -> Floats | None:
-    """Return the time knots (n_t + 4,) [s] with a knot at every event, or None where n_t is too small for them."""
-    events = problem.events
-    times = np.array([e.time for e in events])
-    multiplicity = np.array([e.multiplicity for e in events], dtype=np.int64)
-    even, wide = np.zeros(len(events)), np.ones(len(events))
-    knots = graded_knots(n_t, problem.horizon, times, multiplicity, even, wide)
+def time_knots(problem: "Problem", n_t: int, follow: bool = False) -> Floats | None:
+    """Return the time knots (n_t + 4,) [s] with a knot at every event, or None where n_t is too small for them.
+
+    Where they are to `follow` paths, waypoints have knots too if these are at most half of what is left, and nowhere
+    closer than even ones: a path through waypoints is then a spline on these knots.
+    """
+    found = {event.time: event.multiplicity for event in problem.events}
+    if follow:
+        found |= dict.fromkeys(_waypoints(problem, found, n_t), 1)
+    times = sorted(found)
+    multiplicity = np.array([found[time] for time in times], dtype=np.int64)
+    even, wide = np.zeros(len(times)), np.ones(len(times))
+    knots = graded_knots(n_t, problem.horizon, np.array(times), multiplicity, even, wide)
     return knots if len(knots) else None
+
+
+def _waypoints(problem: "Problem", events: dict[float, int], n_t: int) -> list[float]:
+    """Return the times [s] of the waypoints inside the horizon, or none where they are too many or too close."""
+    horizon, led = problem.horizon, []
+    for g in problem.scene.grasps:
+        if isinstance(g.path, Waypoints):
+            times = g.start + cast(Floats, g.path.times)[1:-1]
+            led.append(times[times < min(g.release_time or horizon, horizon)])
+    if not led:
+        return []
+    found = np.setdiff1d(np.concatenate(led), list(events))
+    if 2 * len(found) > n_t - 4 - sum(events.values()):
+        return []
+    marks = np.array(sorted([0.0, *events, *found, horizon]))
+    close = np.diff(marks) < horizon / n_t
+    crowded = close & (np.isin(marks[1:], found) | np.isin(marks[:-1], found))
+    return [] if crowded.any() else found.tolist()
 
 
 def smallest_n_t(problem: "Problem") -> int:

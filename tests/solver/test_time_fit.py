@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.catalogue import catalogue
-from dlocore import Cable, Environment, Grasp, Move, Scene, Straight, Table, predict
+from dlocore import Cable, Environment, Grasp, Move, Scene, Straight, Table, Waypoints, predict
 from dlocore.discretisation import make_grid
 from dlocore.events import time_knots
 from dlocore.problem import pose
@@ -59,3 +59,40 @@ def test_the_angle_of_the_sections_does_not_tremble_where_knots_are_added(name: 
     rates = np.diff(surface(u, steps)[..., 3], axis=0) / np.diff(steps)[:, None]
     fastest = np.abs(surface(u, np.linspace(0.0, surface.horizon, 4001), dt=1)[..., 3]).max()
     assert fastest < 2.0 * np.abs(rates).max()
+
+
+def led(times: list[float]) -> Scene:
+    """Return a scene of a cable on a table that is led through points at the given times."""
+    turns = np.arange(len(times))
+    positions = np.column_stack([0.25 + 0.05 * turns, 0.1 * np.sin(2.0 * turns), np.zeros(len(times))])
+    return Scene(
+        cable=Cable.preset("paper"),
+        shape=Straight(),
+        grasps=(Grasp(u=0.25, path=Waypoints(times=times, positions=positions)),),
+        environment=Environment(drag=0.1, table=Table()),
+    )
+
+
+def test_a_path_of_few_waypoints_is_followed_exactly_at_all_times() -> None:
+    scene = led([0.0, 0.35, 0.8, 1.1, 1.6])
+    prediction = predict(scene)
+    t = np.linspace(0.0, 1.6, 501)
+    path = scene.grasps[0].path.at(t, np.zeros(3))
+    assert prediction.status == "converged"
+    assert np.abs(prediction.surface.positions(0.25, t)[:, 0] - path).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        pytest.param(np.linspace(0.0, 1.6, 40).tolist(), id="too many"),
+        pytest.param([0.0, 0.4, 0.4001, 1.0, 1.6], id="too close"),
+        pytest.param([0.0, 0.4, 1.5999, 1.6], id="too close to the end"),
+        pytest.param([0.0, 1.6], id="none inside"),
+    ],
+)
+def test_time_knots_stay_even_where_waypoints_would_crowd_them(times: list[float]) -> None:
+    problem = pose(led(times))
+    followed, even = time_knots(problem, 19, follow=True), time_knots(problem, 19)
+    assert followed is not None
+    np.testing.assert_array_equal(followed, even)
