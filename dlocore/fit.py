@@ -83,14 +83,17 @@ def _fit(coordinates: bytes, length: float) -> PointFit:
     p, progress, weight = _averaged(distinct, share)
     noise = _noise(p) if len(p) > SPARSE else 0.0
     most_noise = max(NOISE * max(length, 1.0), 1.5 * noise)
+    chords = _cumulated(p)
     spans, most_missed = 2 * int(np.clip(len(p), MIN_SPANS, MAX_SPANS)), np.inf
     while spans > MIN_SPANS:
         spans = max(spans // 2, MIN_SPANS)
-        spline, x, s, measured = _smoothed(_cumulated(p), p, weight, spans, noise, most_noise)
+        spline, x, s, measured = _smoothed(chords, p, weight, spans, noise, most_noise)
         first, last = _ends(s, noise)
-        check_length("shape.points", "points along the whole cable", last - first, length)
         missed = float(np.sqrt(((p - spline(x)) ** 2).sum(axis=1).mean()))
         most_missed = min(most_missed, missed + MISSED * length)
+        if not _is_about(last - first, length) and _is_about(chords[-1], length):
+            continue  # the spline loops at a corner between points that tell of none
+        check_length("shape.points", "points along the whole cable", last - first, length)
         doubt = 2 * END_NOISE * missed
         extra = float(np.clip(length - (last - first), -doubt, doubt))
         start, end = first - extra / 2, last + extra / 2
@@ -98,6 +101,7 @@ def _fit(coordinates: bytes, length: float) -> PointFit:
         if curve is not None:
             at = np.clip(np.interp(share, progress, s) - start, 0.0, end - start)
             return PointFit(curve=curve, length_given=last - first, at=at[which])
+    check_length("shape.points", "points along the whole cable", last - first, length)
     raise _doubled_back()
 
 
@@ -129,9 +133,13 @@ def _doubled_back() -> SceneError:
 
 def check_length(name: str, allowed: str, given: float, length: float) -> None:
     """Raise SceneError on the field `name` unless a curve of length `given` [m] fits a cable of `length` [m]."""
-    if not abs(given - length) <= MAX_LENGTH_MISMATCH * length:
+    if not _is_about(given, length):
         reason = f"The cable is {length:.4g} m long; the two may differ by {MAX_LENGTH_MISMATCH:.0%}"
         raise SceneError(name, f"a curve {given:.4g} m long", f"{allowed}, or another cable.length", reason)
+
+
+def _is_about(given: float, length: float) -> bool:
+    return abs(given - length) <= MAX_LENGTH_MISMATCH * length
 
 
 def _distinct(p: Floats, distance: float) -> tuple[Floats, NDArray[np.intp]]:
