@@ -73,14 +73,15 @@ def _smoothness(grasp: Grasp, end: float) -> int:
     return 3
 
 
-def time_knots(problem: "Problem", n_t: int, follow: bool = False) -> Floats | None:
+def time_knots(problem: "Problem", n_t: int) -> Floats | None:
     """Return the time knots (n_t + 4,) [s] with a knot at every event, or None where n_t is too small for them.
 
-    Where they are to `follow` paths, waypoints have knots too if these are at most half of what is left, and nowhere
-    closer than even ones: a path through waypoints is then a spline on these knots.
+    Where the answer is a march waypoints have knots too if these are at most half of what is left, and nowhere closer
+    than even ones: a path through waypoints is then a spline on these knots. The least squares prefer even ones.
     """
     found = {event.time: event.multiplicity for event in problem.events}
-    if follow:
+    quality = problem.scene.quality
+    if quality.n_u is None or quality.method == "march":
         found |= dict.fromkeys(_waypoints(problem, found, n_t), 1)
     times = sorted(found)
     multiplicity = np.array([found[time] for time in times], dtype=np.int64)

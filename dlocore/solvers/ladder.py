@@ -123,7 +123,7 @@ def run_level(
     Args:
         rho: spectral radius of the march.
         booked: whether to book the time by phase.
-        free_knots: whether to choose time knots: at waypoints, and where the cable strikes something.
+        free_knots: whether to add time knots where the cable strikes something.
         hardness: times that contact is stiffer to begin with, as it had to be made on a grid before.
         credible: axial strain up to which a march is believed.
         watch: watch over the stretch at more points, between which the cable can't fold.
@@ -138,7 +138,7 @@ def run_level(
         grid = start_grid(problem, n_u, monitor, like)
         grid = watched(grid) if watch else grid
     if knots_t is None:
-        knots_t = time_knots(problem, n_t, follow=free_knots)
+        knots_t = time_knots(problem, n_t)
     assert knots_t is not None, "the caller asks for enough control points"
     if booked:
         monitor.phase("setup")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.catalogue import catalogue
-from dlocore import Cable, Environment, Grasp, Move, Scene, Straight, Table, Waypoints, predict
+from dlocore import Cable, Environment, Grasp, Move, Quality, Scene, Straight, Table, Waypoints, predict
 from dlocore.discretisation import make_grid
 from dlocore.events import time_knots
 from dlocore.problem import pose
@@ -61,7 +61,7 @@ def test_the_angle_of_the_sections_does_not_tremble_where_knots_are_added(name: 
     assert fastest < 2.0 * np.abs(rates).max()
 
 
-def led(times: list[float]) -> Scene:
+def led(times: list[float], quality: Quality) -> Scene:
     """Return a scene of a cable on a table that is led through points at the given times."""
     turns = np.arange(len(times))
     positions = np.column_stack([0.25 + 0.05 * turns, 0.1 * np.sin(2.0 * turns), np.zeros(len(times))])
@@ -70,11 +70,13 @@ def led(times: list[float]) -> Scene:
         shape=Straight(),
         grasps=(Grasp(u=0.25, path=Waypoints(times=times, positions=positions)),),
         environment=Environment(drag=0.1, table=Table()),
+        quality=quality,
     )
 
 
-def test_a_path_of_few_waypoints_is_followed_exactly_at_all_times() -> None:
-    scene = led([0.0, 0.35, 0.8, 1.1, 1.6])
+@pytest.mark.parametrize("quality", [Quality(), Quality(n_u=9, n_t=19, method="march")], ids=["chosen", "given"])
+def test_a_march_follows_a_path_of_few_waypoints_exactly_at_all_times(quality: Quality) -> None:
+    scene = led([0.0, 0.35, 0.8, 1.1, 1.6], quality)
     prediction = predict(scene)
     t = np.linspace(0.0, 1.6, 501)
     path = scene.grasps[0].path.at(t, np.zeros(3))
@@ -92,7 +94,7 @@ def test_a_path_of_few_waypoints_is_followed_exactly_at_all_times() -> None:
     ],
 )
 def test_time_knots_stay_even_where_waypoints_would_crowd_them(times: list[float]) -> None:
-    problem = pose(led(times))
-    followed, even = time_knots(problem, 19, follow=True), time_knots(problem, 19)
+    least_squares = Quality(n_u=9, n_t=19, method="spacetime")
+    followed, even = (time_knots(pose(led(times, quality)), 19) for quality in (Quality(), least_squares))
     assert followed is not None
     np.testing.assert_array_equal(followed, even)
