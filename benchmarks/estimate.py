@@ -29,7 +29,7 @@ from benchmarks.catalogue import catalogue
 from benchmarks.machine import machine, machine_line
 from benchmarks.robot_scenes import random_scene
 from dlocore import Quality, Scene, SceneError, predict, warm_up
-from dlocore.study.judge import Truth, finest_march, largest_error, positions_of
+from dlocore.study.judge import Truth, as_truth, finest_march, largest_error
 
 TARGETS = (1e-2, 3e-3, 1e-3)  # of the length
 GRIDS = ((9, 13), (13, 19), (21, 31))
@@ -95,15 +95,8 @@ def truth_of(name: str, scene: Scene, folder: Path | None) -> Truth:
 
 def bowed_truth(scene: Scene) -> Truth:
     """Return the motion of a scene that starts with a bow out of its plane, as free grids have it."""
-    answer = predict(replace(scene, quality=Quality(target_error=0.1 * min(TARGETS) * scene.cable.length)))
-    accuracy = answer.accuracy
-    return Truth(
-        positions=positions_of(answer),
-        moved=np.inf if accuracy.error_estimate is None else accuracy.error_estimate,
-        n_u=accuracy.n_u,
-        n_t=accuracy.n_t,
-        status=answer.status,
-    )
+    quality = Quality(target_error=0.1 * min(TARGETS) * scene.cable.length)
+    return as_truth(predict(replace(scene, quality=quality)))
 
 
 def rows(name: str, scene: Scene, given: Truth) -> Iterable[Row]:

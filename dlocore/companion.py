@@ -4,7 +4,6 @@ from dlocore.discretisation import smallest_n_u
 from dlocore.events import smallest_n_t
 from dlocore.problem import Problem
 from dlocore.solvers.ladder import Level, Size, distance, run_level
-from dlocore.solvers.march import STRONGLY_DAMPED
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.whole_march import march_status
 
@@ -12,7 +11,7 @@ FINER = 1.5  # times n_u, n_t and the steps
 COARSER, FEWER = 0.75, 0.5  # times n_u and n_t, and the steps
 _SAFETY = 1.5  # times the distance to a finer march: what a slowly converging motion may be off beyond it
 _LEFT = 0.75  # times the distance to a coarser march: benchmarks.estimate
-_LEFT_KINKED = 1.0  # the same of strongly damped steps, and where forces have kinks
+_LEFT_KINKED = 1.0  # the same of a `kinked` march
 _ROOM = 0.8  # of n_u and n_t: a march on more is not coarser
 _TOO_LATE = " The time limit passed before its error was estimated."
 
@@ -40,8 +39,7 @@ def by_coarser(problem: Problem, level: Level, monitor: Monitor) -> tuple[float 
         if other is None:
             return None, said
         if march_status(problem, other)[0] == "converged":
-            kinked = level.motion.rho == STRONGLY_DAMPED or level.motion.deepest > 0.0
-            left = _LEFT_KINKED if kinked else _LEFT
+            left = _LEFT_KINKED if level.motion.kinked else _LEFT
             return left * distance(level, other, problem), ""
     return by_finer(problem, level, monitor)
 

@@ -82,7 +82,7 @@ def time_knots(problem: "Problem", n_t: int) -> Floats | None:
     found = {event.time: event.multiplicity for event in problem.events}
     quality = problem.scene.quality
     if quality.n_u is None or quality.method == "march":
-        found |= dict.fromkeys(_waypoints(problem, found, n_t), 1)
+        found |= dict.fromkeys(_waypoints(problem, n_t), 1)
     times = sorted(found)
     multiplicity = np.array([found[time] for time in times], dtype=np.int64)
     even, wide = np.zeros(len(times)), np.ones(len(times))
@@ -90,7 +90,7 @@ def time_knots(problem: "Problem", n_t: int) -> Floats | None:
     return knots if len(knots) else None
 
 
-def _waypoints(problem: "Problem", events: dict[float, int], n_t: int) -> list[float]:
+def _waypoints(problem: "Problem", n_t: int) -> list[float]:
     """Return the times [s] of the waypoints inside the horizon, or none where they are too many or too close."""
     horizon, led = problem.horizon, []
     for g in problem.scene.grasps:
@@ -99,10 +99,10 @@ def _waypoints(problem: "Problem", events: dict[float, int], n_t: int) -> list[f
             led.append(times[times < min(g.release_time or horizon, horizon)])
     if not led:
         return []
-    found = np.setdiff1d(np.concatenate(led), list(events))
-    if 2 * len(found) > n_t - 4 - sum(events.values()):
+    found = np.setdiff1d(np.concatenate(led), marks_of(problem))
+    if 2 * len(found) > n_t - 4 - sum(e.multiplicity for e in problem.events):
         return []
-    marks = np.array(sorted([0.0, *events, *found, horizon]))
+    marks = np.sort(np.concatenate([marks_of(problem), found]))
     close = np.diff(marks) < horizon / n_t
     crowded = close & (np.isin(marks[1:], found) | np.isin(marks[:-1], found))
     return [] if crowded.any() else found.tolist()

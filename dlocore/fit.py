@@ -89,19 +89,20 @@ def _fit(coordinates: bytes, length: float) -> PointFit:
         spans = max(spans // 2, MIN_SPANS)
         spline, x, s, measured = _smoothed(chords, p, weight, spans, noise, most_noise)
         first, last = _ends(s, noise)
+        given = last - first
         missed = float(np.sqrt(((p - spline(x)) ** 2).sum(axis=1).mean()))
         most_missed = min(most_missed, missed + MISSED * length)
-        if not _is_about(last - first, length) and _is_about(chords[-1], length):
+        if not _is_about(given, length) and _is_about(chords[-1], length):
             continue  # the spline loops at a corner between points that tell of none
-        check_length("shape.points", "points along the whole cable", last - first, length)
+        check_length("shape.points", "points along the whole cable", given, length)
         doubt = 2 * END_NOISE * missed
-        extra = float(np.clip(length - (last - first), -doubt, doubt))
+        extra = float(np.clip(length - given, -doubt, doubt))
         start, end = first - extra / 2, last + extra / 2
         curve = _unit_speed(spline, measured, start, end) if missed <= most_missed else None
         if curve is not None:
             at = np.clip(np.interp(share, progress, s) - start, 0.0, end - start)
-            return PointFit(curve=curve, length_given=last - first, at=at[which])
-    check_length("shape.points", "points along the whole cable", last - first, length)
+            return PointFit(curve=curve, length_given=given, at=at[which])
+    check_length("shape.points", "points along the whole cable", given, length)
     raise _doubled_back()
 
 

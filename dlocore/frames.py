@@ -83,11 +83,11 @@ def free_control(problem: Problem, grid: Grid, knots_t: Floats, control: Floats,
     """
     assert problem.twist is not None
     over = design_matrix(knots_t, times)
-    states = free_of_frames(problem, grid, np.tensordot(over, control, axes=1), log)
-    theta = states[:, :, 3]
+    states = np.tensordot(over, control, axes=1)
+    theta = free_of_frames(problem, grid, states, log)[:, :, 3]
     starved = _starved(knots_t, times)
     if len(starved):
-        differ = theta - over @ control[:, :, 3]
+        differ = theta - states[:, :, 3]
         k = np.searchsorted(times, starved) - 1
         share = ((starved - times[k]) / (times[k + 1] - times[k]))[:, None]
         own = design_matrix(knots_t, starved) @ control[:, :, 3]

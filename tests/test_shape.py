@@ -400,11 +400,11 @@ def test_a_fit_that_is_kept_is_that_of_its_points_and_length() -> None:
 
 def test_uneven_points_beside_a_sharp_corner_are_fitted_without_a_loop_there() -> None:
     # one spline span for each point followed them all, on a curve 1.7 times as long as the cable
-    parts = (
-        "0 1 2 5 6 7 9 10 11 13 16 17 19 20 22 25 26 27 28 29 33 35 38 39 41 43 46 47 49 50 52 53 55 58 60 64 65 66 "
+    before = (
+        "0 1 2 5 6 7 9 10 11 13 16 17 19 20 22 25 26 27 28 29 33 35 38 39 41 43 46 47 49 50 52 53 55 58 60 64 65 66"
     )
-    parts += "68 76 80 81 82 85 87 88 89 92 93 96"
-    u = np.array(parts.split(), float) / 96
+    after = "68 76 80 81 82 85 87 88 89 92 93 96"
+    u = np.array([*before.split(), *after.split()], float) / 96
     corner, turn = 66 / 96, np.radians(119.0)
     points = np.column_stack([np.minimum(u, corner), np.zeros(len(u))])
     points += np.maximum(u - corner, 0.0)[:, None] * [np.cos(turn), np.sin(turn)]

@@ -8,7 +8,7 @@ from dlocore.solvers.ladder import Level
 from dlocore.solvers.march import STRONGLY_DAMPED
 
 _LEFT = 0.45  # of what twice as many steps moved the surface by, is left; 1/3 in theory: benchmarks.estimate
-_LEFT_KINKED = 0.9  # the same of strongly damped steps, and where forces have kinks; 1 were they of first order
+_LEFT_KINKED = 0.9  # the same of a `kinked` march; 1 were its steps of first order
 _LEFT_ALONG = 0.75  # the same of half as many control points again
 _MOST_LEFT = 1.5  # times the last change: what is believed of changes that hardly shrink
 _MOST_FALL = 20.0  # times less than the refinement before, at most, is believed of one: more is chance
@@ -63,5 +63,4 @@ def weighed(level: Level, before: Level, last: Change | None) -> Change:
     counts = max(1.0, 3.0 / (more**2 - 1.0))
     damped, was_damped = (x.motion.rho == STRONGLY_DAMPED for x in (level, before))
     fall = _MOST_FALL_DAMPED if damped and not was_damped else _MOST_FALL
-    kinked = damped or level.motion.deepest > 0.0  # something was touched, if only a strand by another
-    return Change(counts * level.change, moved_before, _LEFT_KINKED if kinked else _LEFT, fall)
+    return Change(counts * level.change, moved_before, _LEFT_KINKED if level.motion.kinked else _LEFT, fall)

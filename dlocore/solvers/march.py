@@ -79,7 +79,7 @@ class March:
         largest_strain: largest |axial strain| of the motion.
         slopes: least and largest |r'| at the curvature points of some of its states.
         update: largest error left by the Newton iterations of a step, as estimated [m].
-        deepest: largest depth of the cable in an obstacle or the table [m].
+        deepest: largest depth of the cable in an obstacle, the table or itself [m].
         find_forces: finds `forces`, as they are first read.
     """
 
@@ -103,6 +103,11 @@ class March:
     def forces(self) -> tuple[WindowForces, ...]:
         """What holds the cable between each two events."""
         return self.find_forces()
+
+    @property
+    def kinked(self) -> bool:
+        """Whether errors of its steps may be of first order: they are strongly damped, or something was touched."""
+        return self.rho == STRONGLY_DAMPED or self.deepest > 0.0
 
     @property
     def logged(self) -> NDArray[np.int64]:

@@ -91,13 +91,17 @@ def step_by_step(scene: Scene, *, tolerance: float = TOLERANCE, cancelled: Calla
         Cancelled: `cancelled` returned True.
     """
     quality = Quality(method="reference", target_error=max(tolerance * scene.cable.length, 1e-6))
-    prediction = predict(replace(scene, quality=quality), cancelled=cancelled)
-    estimate = prediction.accuracy.error_estimate
+    return as_truth(predict(replace(scene, quality=quality), cancelled=cancelled))
+
+
+def as_truth(prediction: Prediction) -> Truth:
+    """Return a prediction as the truth, which is as sure as its own estimated error."""
+    accuracy = prediction.accuracy
     return Truth(
         positions=positions_of(prediction),
-        moved=np.inf if estimate is None else estimate,
-        n_u=prediction.accuracy.n_u,
-        n_t=prediction.accuracy.n_t,
+        moved=np.inf if accuracy.error_estimate is None else accuracy.error_estimate,
+        n_u=accuracy.n_u,
+        n_t=accuracy.n_t,
         status=prediction.status,
     )
 

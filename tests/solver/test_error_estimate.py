@@ -42,10 +42,21 @@ def test_what_a_refinement_in_time_tells_is_much_the_same_however_fine_it_is(ste
     assert by_less.error == pytest.approx(by_half.error, rel=0.25)  # the order is two but for higher terms
 
 
+def test_what_twice_the_steps_move_counts_as_it_is():
+    fine, coarse = marched(13, 128), marched(13, 64)
+    assert told(fine, coarse).moved == distance(fine, coarse, fine.problem)
+
+
 def test_strongly_damped_steps_leave_a_larger_share_of_a_change():
     plain = told(marched(13, 128), marched(13, 64))
     damped = told(*(marched(13, steps, rho=STRONGLY_DAMPED) for steps in (128, 64)))
     assert damped.left > 1.5 * plain.left
+
+
+def test_steps_in_which_something_is_touched_leave_a_larger_share_of_a_change():
+    free, coarse = marched(13, 128), marched(13, 64)
+    touching = replace(free, motion=replace(free.motion, deepest=1e-6))
+    assert told(touching, coarse).left > 1.5 * told(free, coarse).left
 
 
 def test_changes_that_hardly_shrink_leave_the_sum_of_those_to_come():
