@@ -75,10 +75,10 @@ def timed(solve: Callable[[], Prediction], repeats: int = REPEATS) -> tuple[floa
 def row(setting: str, scene: Scene, other: Scene, truth: Truth) -> Row:
     """Measure one setting of one scene and the other that is like it."""
     quality = ASKED[setting](scene.cable.length)
-    known = predict(replace(scene, quality=quality), deadline=DEADLINE)
+    known = predict(replace(scene, quality=quality), deadline=DEADLINE, keep_grid=True)
     new = replace(other, quality=quality)
-    from_beginning, fresh = timed(partial(predict, new, deadline=DEADLINE))
-    from_known, again = timed(partial(predict, new, like=known, deadline=DEADLINE))
+    from_beginning, fresh = timed(partial(predict, new, deadline=DEADLINE, keep_grid=True))
+    from_known, again = timed(partial(predict, new, like=known, deadline=DEADLINE, keep_grid=True))
     return Row(
         setting=setting,
         times=(from_beginning, from_known),

@@ -123,7 +123,7 @@ def print_errors() -> None:
         for n_u, n_t in GRIDS:
             quality = Quality(n_u=n_u, n_t=n_t, method="march", estimate=False)
             with FIRST_MARCH, GENERAL, patch.multiple(module, **changes):
-                motions = {case: predict(paper_scene(*case, quality)) for case in CASES}
+                motions = {case: predict(paper_scene(*case, quality), keep_grid=True) for case in CASES}
             worst = [1e3 * errors(m.surface.sample()[2][..., :3], truths[c])["final"] for c, m in motions.items()]
             cells.append(f"{np.median(worst):9.2f}{max(worst):9.2f}")
         print(f"{name:34}" + "".join(cells))
@@ -142,7 +142,7 @@ def print_energies() -> None:
     print("energy but that of stretch at 1, 2, 5 and 10 s over that at 0.5 s: a stiff cable let go at 0.4 s, undamped")
     for rho in RADII:
         with FIRST_MARCH, GENERAL, patch.multiple(given, **damped(rho)):
-            surface = predict(scene).surface
+            surface = predict(scene, keep_grid=True).surface
         parts = energies(scene, surface, TIMES)
         energy = parts["kinetic"] + parts["bend"]  # the fit in time does not resolve the waves of the stretch
         print(f"{f'steps: rho = {rho:g}':34}" + "".join(f"{e:10.3g}" for e in energy[1:] / energy[0]))
@@ -162,7 +162,7 @@ def print_kinks() -> None:
 
     def motion(n_u: int) -> Any:
         quality = Quality(n_u=n_u, n_t=60, method="march", estimate=False)
-        return predict(replace(scene, quality=quality)).surface.positions(u, t)
+        return predict(replace(scene, quality=quality), keep_grid=True).surface.positions(u, t)
 
     truth = motion(FINEST)
     print("largest error [mm] of a bent wire that a clamp carries and turns by its middle")

@@ -104,7 +104,7 @@ def rows(name: str, scene: Scene, given: Truth) -> Iterable[Row]:
     bowed: Truth | None = None
     for setting, quality in settings(scene.cable.length).items():
         try:
-            answer = predict(replace(scene, quality=quality), deadline=DEADLINE)
+            answer = predict(replace(scene, quality=quality), deadline=DEADLINE, keep_grid=True)
         except SceneError:  # this grid has no room for the scene's features
             continue
         accuracy, truth = answer.accuracy, given

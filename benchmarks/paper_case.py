@@ -83,7 +83,8 @@ def reference(scene: Scene) -> tuple[Floats, float]:
     before: Floats | None = None
     moved = np.inf
     for n_u, n_t in REFINEMENTS:
-        prediction = predict(replace(scene, quality=Quality(n_u=n_u, n_t=n_t, method="march", estimate=False)))
+        quality = Quality(n_u=n_u, n_t=n_t, method="march", estimate=False)
+        prediction = predict(replace(scene, quality=quality), keep_grid=True)
         if prediction.status != "converged":
             raise RuntimeError(f"the reference did not converge: {prediction.message}")
         now = prediction.surface.sample()[2][..., :3]

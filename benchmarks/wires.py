@@ -235,7 +235,7 @@ def critical_of_motion(wire: Wire, duration: float, drag: float = 0.05, n_u: int
         environment=Environment(drag=drag),
         quality=Quality(n_u=n_u, n_t=min(513, int(4 * duration) + 5), method="march", estimate=False),
     )
-    found = predict(scene)
+    found = predict(scene, keep_grid=True)
     t = np.linspace(0.0, duration, 2001)
     turned = heading(found.surface([0.5 * wire.length], t, du=1)[:, 0, :3])
     past = np.flatnonzero(turned > np.radians(120.0))

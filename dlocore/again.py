@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.given import given_status
 from dlocore.paths import Waypoints
 from dlocore.plane import Plane
 from dlocore.prediction import Prediction
 from dlocore.problem import Problem
 from dlocore.review import called_for
-from dlocore.scene import Grasp
+from dlocore.scene import Grasp, Scene
 from dlocore.solvers.ladder import Level, distance, hardness, run_level
 from dlocore.solvers.monitor import Monitor
 from dlocore.whole_march import MISSED_COUNTS, march_status
@@ -48,6 +49,14 @@ class Again:
         return f" On the grid of a motion {self.level.change * 1e3:.2g} mm away, whose error was estimated."
 
 
+def as_solved(scene: Scene, like: Prediction) -> Scene:
+    """Return a scene with the quality that one like it was solved with, where the same was asked for: finer grids."""
+    if like.level is None or scene.quality != like.scene.quality:
+        return scene
+    quality = like.level.posed.scene.quality
+    return scene if quality == scene.quality else replace(scene, quality=quality)
+
+
 def march_again(problem: Problem, like: Prediction, monitor: Monitor) -> Again | str:
     """March a problem on the grid of a prediction like it.
 
@@ -77,7 +86,8 @@ def march_again(problem: Problem, like: Prediction, monitor: Monitor) -> Again |
     if level.motion.stopped == "time":
         return Again(level, judged, None)
     length = problem.scene.cable.length
-    status, message = march_status(level.problem, level)
+    by_march = like.accuracy.method == "march" and not free_knots
+    status, message = given_status(level) if by_march else march_status(level.problem, level)
     if status != "converged":
         return message
     if errors and not change <= NEAR * length:

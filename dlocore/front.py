@@ -7,11 +7,12 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.again import Again, march_again
+from dlocore.again import Again, as_solved, march_again
 from dlocore.companion import by_coarser, by_finer
 from dlocore.cost import Cost
 from dlocore.errors import SceneError
 from dlocore.events import smallest_n_t
+from dlocore.fallback import no_grid_for, quality_instead, with_finer
 from dlocore.frames import material_of
 from dlocore.given import evenly_fitted, given_status, march_given
 from dlocore.prediction import Accuracy, GraspReaction, MaterialMotion, OnIteration, Prediction, Status
@@ -40,6 +41,7 @@ def predict(
     deadline: float | None = None,
     cancelled: Callable[[], bool] | None = None,
     cost: Cost | None = None,
+    keep_grid: bool = False,
 ) -> Prediction:
     """Predict the motion of a scene's cable as one bivariate spline.
 
@@ -53,6 +55,8 @@ def predict(
         cancelled: asked between iterations; where it returns True the solve stops.
         cost: what solves cost on this machine (`dlocore.calibration.stored_cost`), by which a time budget begins with a
             grid that fits; without it with the coarsest.
+        keep_grid: answer on a given grid (n_u and n_t) also where it can't show the motion, as who measures grids
+            wants. Else finer ones are solved there, and are the answer where they show it, which `message` tells.
 
     Returns:
         The prediction. Not converging is a status, not an exception.
@@ -63,13 +67,32 @@ def predict(
     """
     monitor = Monitor(on_iteration, deadline, cancelled)
     if like is None:
-        return _solved(pose(scene), monitor, cost)
-    problem = pose(scene, None if like.level is None else like.level.posed.called_for)
+        return _shown(scene, monitor, cost, keep_grid)
+    asked = scene if keep_grid else as_solved(scene, like)
+    problem = pose(asked, None if like.level is None else like.level.posed.called_for)
     again = march_again(problem, like, monitor)
     if isinstance(again, Again):
-        return _solved(problem, monitor, cost, again)
-    fresh = _solved(pose(scene), monitor, cost)
+        found = replace(_solved(problem, monitor, cost, again), scene=scene)
+        if quality_instead(found) is None or keep_grid:
+            return found if asked is scene else replace(found, said=f"{found.said} {no_grid_for(scene)}")
+        again = found.said
+    fresh = _shown(scene, monitor, cost, keep_grid)
     return replace(fresh, said=f"{fresh.said} Solved from the beginning: {again}")
+
+
+def _shown(scene: Scene, monitor: Monitor, cost: Cost | None, keep_grid: bool) -> Prediction:
+    """Solve a scene; where a grid that is given can't show its motion, on finer ones."""
+    found = _solved(pose(scene), monitor, cost)
+    instead = None if keep_grid else quality_instead(found)
+    if instead is None:
+        return found
+    spent = monitor.elapsed()
+    finer: Prediction | SceneError
+    try:
+        finer = _solved(pose(replace(scene, quality=instead)), monitor, cost)
+    except SceneError as error:  # a start that comes to rest on the given grid need not on others
+        finer = error
+    return with_finer(found, finer, spent, monitor)
 
 
 def _solved(problem: Problem, monitor: Monitor, cost: Cost | None, again: Again | None = None) -> Prediction:
@@ -121,7 +144,7 @@ def _least_squares(
     problem = level.problem
     if level.motion.stopped or level.motion.largest_strain > TORN:
         return _answer(monitor, "march", Outcome(level, *march_status(problem, level), None))
-    knots_t = level.knots_t
+    knots_t, before = level.knots_t, len(monitor.iterations)
     last = [level.control]
 
     def on_step(control: Floats, update: float, residual: float, damping: float = 0.0, length: float = 1.0) -> None:
@@ -144,7 +167,7 @@ def _least_squares(
         message = "The time limit passed; this is the last iterate. Allow more time or a coarser grid."
         return _answer(monitor, method, Outcome(level, "time_limit", message, None))
     monitor.phase(method)
-    count, left = len(monitor.iterations), update
+    count, left = len(monitor.iterations) - before, update
     status: Status = "converged" if converged else "max_iterations"
     message = f"The update fell below delta = {quality.delta:g} m in {count} iterations."
     if not converged:

@@ -35,6 +35,7 @@ EFFECTS = (
     "self_contact",
 )
 MAX_GRASPS = 32
+MAX_N_U, MAX_N_T = 129, 513  # of a given grid: memory and time
 MAX_OBSTACLES = 100
 MAX_POINTS = 100_000
 MAX_PRESCRIBED_STRAIN = 0.005  # of the chord between two grasps: beyond it no cable of this kind can follow
@@ -287,7 +288,8 @@ class Quality:
 
     Args:
         n_u: control points along the cable, 5 to 129.
-        n_t: control points in time, 5 to 513.
+        n_t: control points in time, 5 to 513. Where such a grid can't show the motion finer ones are solved, and where
+            these do, they are the answer, which says so; `predict(..., keep_grid=True)` does without.
         delta: the paper's threshold on the norm of the control-point update, eq. (25) [m], 1e-10 to 1e-2.
         method: "march", "spacetime", "paper", "reference" (docs/reference.md), or "auto": `spacetime` where the grid is
             given, else `march`.
@@ -303,7 +305,7 @@ class Quality:
     estimate: bool = True
 
     def __post_init__(self) -> None:
-        for name, most in (("n_u", 129), ("n_t", 513)):
+        for name, most in (("n_u", MAX_N_U), ("n_t", MAX_N_T)):
             value = getattr(self, name)
             if value is None:
                 continue

@@ -50,7 +50,7 @@ def _time(scene: Scene, cancelled: Callable[[], bool]) -> float | None:
             raise Cancelled("superseded")
         began = time.thread_time()
         try:
-            prediction = dlocore.predict(scene, deadline=LONGEST, cancelled=cancelled)
+            prediction = dlocore.predict(scene, deadline=LONGEST, cancelled=cancelled, keep_grid=True)
         except Cancelled:
             raise
         except DloError:

@@ -140,7 +140,7 @@ def make(name: str, family: str, scene: Scene) -> Case:
     t = np.linspace(0.0, float(scene.horizon or 0.0), SAMPLES_T)
     motions = []
     for n_u, n_t in FINE:
-        found = predict(replace(scene, quality=fine(n_u, n_t)))
+        found = predict(replace(scene, quality=fine(n_u, n_t)), keep_grid=True)
         if found.status != "converged":
             raise RuntimeError(f"the fine march of {name} did not converge: {found.message}")
         motions.append(found.surface.positions(u, t))

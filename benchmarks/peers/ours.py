@@ -60,7 +60,7 @@ def _calls(case: Case, quality: Quality) -> Callable[[], Callable[[], Floats]]:
     forget_fits()  # of the points where the cable starts: fitting them is part of a call
 
     def run() -> Callable[[], Floats]:
-        prediction: Prediction = predict(scene)
+        prediction: Prediction = predict(scene, keep_grid=True)
         if prediction.status not in ("converged", "max_iterations"):
             raise RuntimeError(prediction.message)
         return lambda: prediction.surface.positions(case.places, case.times)

@@ -78,7 +78,9 @@ class _Course:
         self.next(f"{name}: {method}, {grid[0]} x {grid[1]}")
         quality = Quality(n_u=grid[0], n_t=grid[1], method=method, estimate=on.get("estimate", False))
         asked = replace(scene, quality=quality)
-        prediction, times = timed(lambda: predict(asked, cancelled=self.cancelled), self.repeats, _PATIENCE)
+        prediction, times = timed(
+            lambda: predict(asked, cancelled=self.cancelled, keep_grid=True), self.repeats, _PATIENCE
+        )
         return _Run(
             dimensions=prediction.accuracy.dimensions,
             method=method,

@@ -66,7 +66,7 @@ def finest_march(
     moved = np.inf
     for n_u, n_t in GRIDS:
         quality = Quality(n_u=n_u, n_t=n_t, method="march", estimate=False)
-        prediction = predict(replace(scene, quality=quality), cancelled=cancelled)
+        prediction = predict(replace(scene, quality=quality), cancelled=cancelled, keep_grid=True)
         positions = positions_of(prediction)
         if before is not None:
             moved = float(np.linalg.norm(positions - before, axis=-1).max())

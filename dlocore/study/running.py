@@ -90,7 +90,9 @@ class _Measuring:
 
     def _solved(self, scene: Scene) -> tuple[Prediction, Times]:
         return timed(
-            lambda: predict(scene, deadline=self._deadline, cancelled=self._cancelled), self._plan.repeats, _PATIENCE
+            lambda: predict(scene, deadline=self._deadline, cancelled=self._cancelled, keep_grid=True),
+            self._plan.repeats,
+            _PATIENCE,
         )
 
     def _truth(self, scene: Scene) -> Truth:

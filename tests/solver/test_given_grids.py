@@ -7,7 +7,20 @@ import numpy as np
 import pytest
 
 from benchmarks.hard.generator import draw
-from dlocore import Cable, Environment, Grasp, Move, Quality, Scene, Straight, Table, predict
+from dlocore import (
+    Cable,
+    Cancelled,
+    Environment,
+    Grasp,
+    Iteration,
+    Move,
+    Prediction,
+    Quality,
+    Scene,
+    Straight,
+    Table,
+    predict,
+)
 from dlocore.discretisation import make_grid
 from dlocore.events import time_knots
 from dlocore.given import MISSED, evenly_fitted, given_status
@@ -117,8 +130,117 @@ def test_a_march_without_equilibrium_on_a_given_grid_is_tried_in_more_steps():
 def test_a_time_spline_has_states_in_every_span():
     # topples within a second of 55: knots that crowd there got between the steps, and the spline left for kilometres
     scene = draw(7, 1448).make()
-    found = predict(replace(scene, quality=march(19, 33)))
+    found = predict(replace(scene, quality=march(19, 33)), keep_grid=True)
     assert found.status == "max_iterations"
     assert "time spline" in found.message
     x = found.surface.positions(np.linspace(0.0, 1.0, 33), np.linspace(0.0, found.surface.horizon, 4001))
     assert np.abs(x).max() < 3.0
+
+
+def control_points(prediction: Prediction) -> tuple[int, int]:
+    return prediction.accuracy.n_u, prediction.accuracy.n_t
+
+
+def asked_for(scene: Scene) -> str:
+    return f"The {scene.quality.n_u} x {scene.quality.n_t} control points that were asked for"
+
+
+@pytest.mark.parametrize(
+    ("seed", "index", "why"), [(8, 277, "The time spline of 10 control points misses"), (19, 641, "folded")]
+)
+@pytest.mark.parametrize("estimate", [True, False])
+def test_finer_grids_are_the_answer_where_a_given_one_cant_show_the_motion(
+    seed: int, index: int, why: str, estimate: bool
+):
+    scene = draw(seed, index).make()
+    scene = replace(scene, quality=replace(scene.quality, estimate=estimate))
+    given = predict(scene, keep_grid=True)
+    assert given.status in ("max_iterations", "stalled")
+    assert control_points(given) == (scene.quality.n_u, scene.quality.n_t)
+    assert why in given.said
+    seen: list[Iteration] = []
+    found = predict(scene, on_iteration=seen.append)
+    assert found.status == "converged"
+    assert found.scene is scene
+    assert f"{asked_for(scene)} could not show the motion, which took" in found.message
+    assert why in found.message
+    assert f"This is the answer on {control_points(found)[0]} x {control_points(found)[1]}" in found.message
+    estimated = found.accuracy.error_estimate
+    assert estimated is not None  # it is how finer grids end, whether it was asked for or not
+    assert estimated <= 0.01 * scene.cable.length
+    assert tuple(seen) == found.iterations
+    assert [step.number for step in seen] == list(range(len(seen)))
+    assert [(i.n_u, i.n_t) for i in seen[: len(given.iterations)]] == [(i.n_u, i.n_t) for i in given.iterations]
+    assert len(seen) > len(given.iterations)
+    assert (seen[-1].n_u, seen[-1].n_t) == control_points(found)
+    free = predict(replace(scene, quality=Quality(target_error=0.01 * scene.cable.length)))
+    np.testing.assert_array_equal(found.surface.control_points, free.surface.control_points)
+
+
+def test_a_given_grid_is_the_answer_where_finer_ones_do_no_better():
+    # hangs from one end, so soft that its weight strains it by a half: no grid helps
+    soft = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-3, axial_stiffness=2.0)
+    down = Straight(direction=(0.0, 0.0, -1.0))
+    scene = Scene(cable=soft, shape=down, grasps=(Grasp(u=0.0),), horizon=2.0, quality=march(9, 13))
+    given, found = predict(scene, keep_grid=True), predict(scene)
+    assert found.status == given.status == "stalled"
+    assert found.said.startswith(given.said)
+    assert "Finer grids were tried for" in found.said
+    assert "which no cable follows" in found.said
+    np.testing.assert_array_equal(found.surface.control_points, given.surface.control_points)
+    assert control_points(found) == (9, 13)
+    assert len(found.iterations) > len(given.iterations)
+    assert sum(found.accuracy.phases.values()) <= found.accuracy.wall_time
+
+
+def test_finer_grids_keep_a_deadline_and_can_be_cancelled():
+    scene = draw(8, 231).make()  # finer grids take half a minute
+    deadline = 1.0
+    found = predict(scene, deadline=deadline)
+    assert found.status == "max_iterations"
+    assert control_points(found) == (scene.quality.n_u, scene.quality.n_t)
+    assert "Finer grids were tried for" in found.said
+    assert "time limit" in found.said
+    assert found.accuracy.wall_time < deadline + 0.5
+    assert found.accuracy.error_estimate is not None
+    seen: list[Iteration] = []
+    with pytest.raises(Cancelled):
+        predict(scene, on_iteration=seen.append, cancelled=lambda: len(seen) > 3)
+    assert len(seen) == 4
+
+
+def test_a_least_squares_that_does_not_converge_gets_more_control_points_in_time():
+    scene = draw(7, 359).make()
+    given, found = predict(scene, keep_grid=True), predict(scene)
+    assert (given.status, given.accuracy.method) == ("max_iterations", "spacetime")
+    assert (found.status, found.accuracy.method) == ("converged", "spacetime")
+    n_u, n_t = scene.quality.n_u, scene.quality.n_t
+    assert n_t is not None
+    assert control_points(found) == (n_u, 2 * n_t)
+    assert f"{asked_for(scene)} did not converge" in found.message
+    assert len(found.iterations) > len(given.iterations)
+    update = found.iterations[-1].update
+    assert update < scene.quality.delta
+    assert f"in {len(found.iterations) - len(given.iterations)} iterations" in found.message
+
+
+def test_a_least_squares_that_more_control_points_in_time_do_not_mend_is_told_so():
+    scene = draw(6, 22).make()
+    found = predict(scene)
+    assert (found.status, found.accuracy.method) == ("max_iterations", "spacetime")
+    assert control_points(found) == (scene.quality.n_u, scene.quality.n_t)
+    assert "The surface is that of the march it started from. Finer grids were tried for" in found.message
+
+
+def test_a_motion_like_one_on_finer_grids_goes_on_on_them():
+    scene = draw(8, 277).make()
+    before = predict(scene)
+    again = predict(scene, like=before)
+    assert again.status == "converged"
+    assert again.scene is scene
+    assert len(again.iterations) == 1
+    assert control_points(again) == control_points(before)
+    assert f"{asked_for(scene)} were left before" in again.message
+    kept = predict(scene, like=before, keep_grid=True)
+    assert kept.status == "max_iterations"
+    assert control_points(kept) == (scene.quality.n_u, scene.quality.n_t)
