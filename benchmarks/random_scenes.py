@@ -1,8 +1,11 @@
 """Run random hard scenes and count what goes wrong: exceptions, NaN, hangs, broken laws, answers that lie.
 
-    python -m benchmarks.random_scenes --seed 1 --count 50000 --jobs 2 --resume random-scenes.jsonl
+    python -m benchmarks.random_scenes --seed 1 --count 50000 --jobs 2 --deadline 1 --again 400 --resume scenes.jsonl
 
-Every scene is drawn from (seed, index) alone; `--index 17` runs that one and prints it as Python.
+Every scene is drawn from (seed, index) alone; `--index 17` runs that one and prints it as Python. With `--again` all
+scenes are run with the short `--deadline` and judged by the laws. Of those that do not converge in it so many, drawn by
+the seed, are run once more with `--again-deadline`, and asked whether they determine their motion. Without it all are
+asked that do not converge.
 """
 
 import argparse
@@ -22,12 +25,51 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmarks.hard.generator import as_python, draw
-from benchmarks.hard.judge import WRONG, converges, is_undetermined, run
+from benchmarks.hard.judge import WRONG, Whose, converges, is_undetermined, left_its_grid, run
+from benchmarks.hard.shares import GROWTHS, drawn_again, is_left, share, strata
 from benchmarks.machine import machine_line
 from dlocore import SceneError, warm_up
 
 HANG = 6.0  # times the deadline of a prediction, after which a process is ended: one scene may have three, ...
 JUDGED = 60.0  # ... and this long is left for what the judge does besides [s]
+
+
+COUNTED = {
+    "exceptions": ("exception",),
+    "not finite": ("not finite",),
+    "hangs and crashes": ("hang", "crash"),
+    "refused though possible": ("refused a possible scene",),
+    "impossible but converged": ("converged on an impossible scene",),
+    "lies": ("lie", "undetermined and not told"),
+}
+
+
+class Stage(NamedTuple):
+    """How scenes are run.
+
+    Attributes:
+        seed: they are drawn from.
+        deadline: time that a prediction is allowed [s].
+        patience: time that each further solve of the judge is allowed [s].
+        checked: share that is compared with refined marches.
+        measured: whose sensitivity is measured, see `judge.run`.
+    """
+
+    seed: int
+    deadline: float
+    patience: float
+    checked: float
+    measured: Whose
+
+    def run(self, index: int) -> dict[str, Any]:
+        """Run a scene and return its record."""
+        drawn, checked = draw(self.seed, index), is_checked(self.seed, index, self.checked)
+        return run(drawn, self.deadline, checked, patience=self.patience, measured=self.measured)
+
+    @property
+    def longest(self) -> float:
+        """Time after which a scene hangs [s]."""
+        return HANG * max(self.deadline, self.patience) + JUDGED
 
 
 class Job(NamedTuple):
@@ -39,25 +81,25 @@ class Job(NamedTuple):
     since: float
 
 
-def work(pipe: Connection, seed: int, share: float, deadline: float) -> None:
+def work(pipe: Connection, stage: Stage) -> None:
     """Run the scenes whose indices come through a pipe, and send their records back, until None comes."""
     while (index := pipe.recv()) is not None:
-        pipe.send(run(draw(seed, index), deadline, is_checked(seed, index, share)))
+        pipe.send(stage.run(index))
 
 
-def is_checked(seed: int, index: int, share: float) -> bool:
+def is_checked(seed: int, index: int, part: float) -> bool:
     """Tell whether a scene is among those compared with a refined march; drawn by the seed."""
-    return bool(np.random.default_rng([seed, index, 1]).random() < share)
+    return bool(np.random.default_rng([seed, index, 1]).random() < part)
 
 
-def run_all(seed: int, indices: list[int], jobs: int, share: float, deadline: float) -> Iterator[dict[str, Any]]:
+def run_all(stage: Stage, indices: list[int], jobs: int) -> Iterator[dict[str, Any]]:
     """Run scenes in `jobs` processes; end and replace those that hang or die."""
     context = multiprocessing.get_context("spawn")
     waiting = iter(indices)
 
     def start(index: int) -> Job:
         ours, theirs = context.Pipe()
-        process = context.Process(target=work, args=(theirs, seed, share, deadline), daemon=True)
+        process = context.Process(target=work, args=(theirs, stage), daemon=True)
         process.start()
         theirs.close()
         ours.send(index)
@@ -68,10 +110,10 @@ def run_all(seed: int, indices: list[int], jobs: int, share: float, deadline: fl
         while running:
             ready = wait([job.pipe for job in running], timeout=1.0)
             for job in list(running):
-                late = time.monotonic() - job.since > HANG * deadline + JUDGED
+                late = time.monotonic() - job.since > stage.longest
                 if job.pipe not in ready and not late:
                     continue
-                record, alive = _take(job, job.pipe in ready, seed)
+                record, alive = _take(job, job.pipe in ready, stage.seed)
                 index = next(waiting, None)
                 running.remove(job)
                 if alive:
@@ -110,8 +152,36 @@ def _lost(index: int, seed: int, how: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def counts(records: list[dict[str, Any]]) -> list[str]:
+    """Return how often happened what never may; undetermined scenes that do not tell are lies, too."""
+    judged = [r for r in records if r.get("method") != "paper"]
+    lines = []
+    for name, faults in COUNTED.items():
+        found = [r["index"] for r in judged if set(faults) & set(r["faults"])]
+        lines.append(f"{name}: {len(found)}{': ' if found else ''}{' '.join(map(str, found[:8]))}")
+    return lines
+
+
+def in_the_end(seed: int, first: list[dict[str, Any]], again: list[dict[str, Any]]) -> list[str]:
+    """Return the share that converges given the time of the second stage, by what counts as determined."""
+    lines = []
+    for growth in GROWTHS:
+        found = strata(seed, first, again, growth)
+        middle, low, high = share(found)
+        ran = found.again_converged + found.again_failed + found.again_excluded
+        lines += [
+            f"converged in the end, but for scenes shown to amplify a change of the start more than {growth:.0e} times "
+            f"({WRONG / growth * 1e6:.0f} um on a metre moves the motion by 1 % of the length): "
+            f"{middle:.2%}, 95 % interval {low:.2%} to {high:.2%}",
+            f"    {found.converged} converged in the first stage, {found.lost} failed for good; of {found.left} others "
+            f"{ran} were run again: {found.again_converged} converged, {found.again_failed} did not, "
+            f"{found.again_excluded} are left out",
+        ]
+    return lines
+
+
 def summary(records: list[dict[str, Any]]) -> str:
-    """Return the tables of a run."""
+    """Return the tables of a run of one stage."""
     lines = []
     possible = [r for r in records if r["possible"]]
     printed = [r for r in possible if r.get("method") == "paper"]
@@ -124,11 +194,15 @@ def summary(records: list[dict[str, Any]]) -> str:
     lines.append(f"{len(records)} scenes, {len(possible)} of them possible, {len(printed)} of these by method paper")
     lines.append(f"undetermined: {len(undetermined)}, {told} of them told")
     for name, part in (("of the others", determined), ("grid free", free), ("grid given", given)):
-        converged = sum(r["status"] == "converged" for r in part)
-        lines.append(f"converged, {name}: {converged} of {len(part)}, {converged / max(1, len(part)):.2%}")
-    either = sum(converges(r) for r in determined)
-    share = f"{either} of {len(determined)}, {either / max(1, len(determined)):.2%}"
-    lines.append(f"converged, as asked or to 1 % of the length on a free grid: {share}")
+        lines.append(f"converged, {name}: {_part(sum(r['status'] == 'converged' for r in part), len(part))}")
+    finer = sum(r["status"] == "converged" and left_its_grid(r) for r in given)
+    lines.append(f"of them on finer grids than the one given, as that could not show the motion: {finer}")
+    lines.append(f"converged, as asked or by a march: {_part(sum(converges(r) for r in determined), len(determined))}")
+    steady = [r for r in judged if not is_undetermined(r, GROWTHS[1])]
+    least = _part(sum(r["status"] == "converged" for r in steady), len(steady))
+    lines.append(f"converged, but for those shown to amplify a start's change over {GROWTHS[1]:.0e} times: {least}")
+    ended = Counter(r["status"] for r in determined if r["status"] != "converged")
+    lines.append(f"the others ended: {', '.join(f'{count} {status}' for status, count in ended.most_common())}")
     seconds = np.array([r["seconds"] for r in records])
     lines.append(
         f"CPU time: median {np.median(seconds) * 1e3:.0f} ms, mean {seconds.mean() * 1e3:.0f} ms, "
@@ -161,6 +235,10 @@ def summary(records: list[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def _part(count: int, total: int) -> str:
+    return f"{count} of {total}, {count / max(1, total):.2%}"
+
+
 def _set(record: dict[str, Any]) -> str:
     return " ".join(e for e in record["effects"] if e not in ("inertia", "stretch", "bend"))
 
@@ -179,34 +257,60 @@ def main() -> None:
     parser.add_argument("--resume", type=Path, help="file of records to write, and to go on from")
     parser.add_argument("--check", type=int, default=300, help="scenes compared with a refined march")
     parser.add_argument("--deadline", type=float, default=30.0, help="seconds that a prediction is allowed")
+    parser.add_argument("--again", type=int, default=0, help="of the scenes that do not converge, run again so many")
+    parser.add_argument("--again-deadline", type=float, default=60.0, help="seconds that a prediction is allowed then")
     parser.add_argument("--index", type=int, help="run this scene alone and print it as Python")
     parser.add_argument("--summary", action="store_true", help="only print the summary of the file")
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that no process is left behind
     os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    share = options.check / options.count
+    staged = options.again > 0
+    patience = options.again_deadline if staged else options.deadline
+    part = options.check / options.count
     if options.index is not None:
         drawn = draw(options.seed, options.index)
-        record = run(drawn, options.deadline, True)
+        record = run(drawn, options.deadline, True, patience=patience)
         if record["status"] != "refused":
             print(as_python(drawn.make()))
         print(json.dumps(record, indent=1))
         return
-    records: list[dict[str, Any]] = []
-    if options.resume is not None and options.resume.exists():
-        records = [json.loads(line) for line in options.resume.read_text().splitlines()]
-    done = {r["index"] for r in records}
-    left = [] if options.summary else [i for i in range(options.count) if i not in done]
-    if left:
-        warm_up()  # so that no process compiles while its time runs
-    for record in run_all(options.seed, left, options.jobs, share, options.deadline):
-        records.append(record)
-        if options.resume is not None:
-            with options.resume.open("a") as file:
-                file.write(json.dumps(record) + "\n")
-    print(f"seed {options.seed}")
-    print(summary(records))
+    records = _read(options.resume)
+
+    def add(stage: Stage, indices: list[int], again: bool) -> None:
+        done = {r["index"] for r in records if r.get("again", False) == again}
+        left = [] if options.summary else [i for i in indices if i not in done]
+        if left:
+            warm_up()  # so that no process compiles while its time runs
+        for record in run_all(stage, left, options.jobs):
+            records.append({**record, "again": again})
+            if options.resume is not None:
+                with options.resume.open("a") as file:
+                    file.write(json.dumps(records[-1]) + "\n")
+
+    measured: Whose = "checked" if staged else "failed"
+    add(Stage(options.seed, options.deadline, patience, part, measured), list(range(options.count)), False)
+    first = [r for r in records if not r.get("again", False)]
+    if staged:
+        left = [r["index"] for r in first if is_left(r)]
+        stage = Stage(options.seed, options.again_deadline, patience, 0.0, "all")
+        add(stage, drawn_again(options.seed, left, options.again), True)
+    again = [r for r in records if r.get("again", False)]
+    print("\n".join([f"seed {options.seed}", *counts(records), "", summary(first)]))
+    if again:
+        print("\n".join(["", f"run again with {options.again_deadline:g} s:", *in_the_end(options.seed, first, again)]))
+        print(summary(again))
     print(machine_line())
+
+
+def _read(file: Path | None) -> list[dict[str, Any]]:
+    """Return the records in a file; the last line may have been cut off."""
+    if file is None or not file.exists():
+        return []
+    lines = file.read_text().splitlines(keepends=True)
+    whole = [line for line in lines if line.endswith("\n")]
+    if len(whole) < len(lines):
+        file.write_text("".join(whole))
+    return [json.loads(line) for line in whole]
 
 
 if __name__ == "__main__":

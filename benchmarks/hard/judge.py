@@ -3,7 +3,7 @@
 import time
 import traceback
 from dataclasses import asdict, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -30,15 +30,23 @@ GAINED = 0.02  # of the energy that was about
 LOST = 0.05  # of the impulses that were about
 DISTURBED = 1e-6  # of the length: a start that is this much different is the same to any hand
 
+Whose = Literal["checked", "failed", "all"]
 
-def run(drawn: Drawn, deadline: float, checked: bool) -> dict[str, Any]:
+
+def run(
+    drawn: Drawn, deadline: float, checked: bool, *, patience: float | None = None, measured: Whose = "failed"
+) -> dict[str, Any]:
     """Run one scene and return its record.
 
     Args:
         drawn: the scene.
         deadline: time that a prediction is allowed [s].
         checked: compare it with a refined march too.
+        patience: time that each further solve of the judge is allowed [s]; the same where it is None.
+        measured: whose start is disturbed, to tell whether it determines the motion: of scenes that do not converge,
+            of "all", or, as always, only of those whose refined marches differ ("checked").
     """
+    patience = deadline if patience is None else patience
     record: dict[str, Any] = {"index": drawn.index, "families": drawn.families, "possible": drawn.possible}
     began, cpu = time.perf_counter(), time.process_time()
     try:
@@ -48,12 +56,13 @@ def run(drawn: Drawn, deadline: float, checked: bool) -> dict[str, Any]:
         record["seconds"] = time.process_time() - cpu
         record["laws"] = asdict(measure(prediction))
         if checked:
-            record |= compare(prediction, scene, deadline)
-        if prediction.status != "converged" or record.get("apart", 0.0) > WRONG:
-            record["disturbed"] = disturbed(prediction, scene, deadline)
-        if prediction.status != "converged" and scene.quality.n_u is not None:
+            record |= compare(prediction, scene, patience)
+        failed = measured != "checked" and prediction.status != "converged"
+        if failed or measured == "all" or record.get("apart", 0.0) > WRONG:
+            record["disturbed"] = disturbed(prediction, scene, patience)
+        if failed and scene.quality.method == "spacetime":
             free = replace(scene, quality=Quality(target_error=WRONG * scene.cable.length))
-            record["free"] = predict(free, deadline=deadline).status
+            record["free"] = predict(free, deadline=patience).status
     except SceneError as error:
         record |= {"status": "refused", "message": str(error), "field": error.field}
     except Exception as error:  # whatever it is, it is what this looks for
@@ -75,6 +84,7 @@ def _answer(prediction: Prediction, scene: Scene) -> dict[str, Any]:
         "solved_by": accuracy.method,
         "effects": [e.name for e in prediction.effects if e.active],
         "dimensions": accuracy.dimensions,
+        "asked": None if scene.quality.n_u is None else [scene.quality.n_u, scene.quality.n_t],
         "n_u": accuracy.n_u,
         "n_t": accuracy.n_t,
         "iterations": len(prediction.iterations),
@@ -146,13 +156,19 @@ def _posed(prediction: Prediction, scene: Scene) -> Problem:
 
 
 def converges(record: dict[str, Any]) -> bool:
-    """Tell whether a scene converges on the grid that was asked for, or, where that can't show it, on a free one."""
+    """Tell whether a scene converges as asked, or, by a march, where the least squares that it asks for does not."""
     return "converged" in (record["status"], record.get("free"))
 
 
-def is_undetermined(record: dict[str, Any]) -> bool:
-    """Tell whether a scene was proven not to determine its motion."""
-    return (record.get("disturbed") or 0.0) > WRONG
+def left_its_grid(record: dict[str, Any]) -> bool:
+    """Tell whether a scene was solved on finer grids than the one that it asks for."""
+    asked = record.get("asked")
+    return asked is not None and asked != [record["n_u"], record["n_t"]]
+
+
+def is_undetermined(record: dict[str, Any], growth: float = WRONG / DISTURBED) -> bool:
+    """Tell whether a scene was proven not to determine its motion: it amplifies a change of the start by more."""
+    return (record.get("disturbed") or 0.0) > growth * DISTURBED
 
 
 def faults(record: dict[str, Any]) -> list[str]:

@@ -1,0 +1,94 @@
+"""What share of random scenes converges: from all of them in little time, and a sample of the rest in more."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from benchmarks.hard.judge import DISTURBED, WRONG, is_undetermined
+
+GROWTHS = (WRONG / DISTURBED, 0.1 * WRONG / DISTURBED)  # of a change of the start: beyond it a motion is not determined
+_DRAWS = 200_000
+_PRIOR = 0.5  # Jeffreys'
+
+
+class Strata(NamedTuple):
+    """Counts of a run in two stages.
+
+    Attributes:
+        converged: scenes that converge in the first stage.
+        lost: that are refused, raise or hang in it: no more time helps.
+        left: the others.
+        again_converged: of those left that were drawn for the second stage: that converge in it, ...
+        again_failed: ... that do not, ...
+        again_excluded: ... and that do not determine their motion.
+    """
+
+    converged: int
+    lost: int
+    left: int
+    again_converged: int
+    again_failed: int
+    again_excluded: int
+
+
+def drawn_again(seed: int, left: Sequence[int], count: int) -> list[int]:
+    """Return the indices drawn from those left for the second stage, at most `count`, in the order of their running.
+
+    Each has its place from the seed and itself alone, so that what is first in the order is a fair sample, too.
+    """
+    return sorted(left, key=lambda index: (np.random.default_rng([seed, index, 2]).random(), index))[:count]
+
+
+def is_left(record: dict[str, Any]) -> bool:
+    """Tell whether a record of the first stage is of a scene that did not converge, though it may in more time."""
+    told = record["status"] in ("max_iterations", "stalled", "time_limit")
+    return told and record["possible"] and record.get("method") != "paper"
+
+
+def strata(seed: int, first: list[dict[str, Any]], again: list[dict[str, Any]], growth: float) -> Strata:
+    """Count the records of both stages; scenes that are shown to amplify a change by more than `growth` are left out.
+
+    Of the second stage those count that were run before the first that was drawn and is missing: which ones are missing
+    where a run was interrupted is no chance.
+    """
+    judged = [r for r in first if r["possible"] and r.get("method") != "paper"]
+    left = {r["index"] for r in judged if is_left(r)}
+    known = [r for r in judged if r["index"] not in left and not is_undetermined(r, growth)]
+    run = {r["index"]: r for r in again}
+    drawn: list[dict[str, Any]] = []
+    for index in drawn_again(seed, sorted(left), len(left)):
+        if index not in run:
+            break
+        drawn.append(run[index])
+    determined = [r for r in drawn if not is_undetermined(r, growth)]
+    good = sum(r["status"] == "converged" for r in determined)
+    converged = sum(r["status"] == "converged" for r in known)
+    return Strata(
+        converged=converged,
+        lost=len(known) - converged,
+        left=len(left),
+        again_converged=good,
+        again_failed=len(determined) - good,
+        again_excluded=len(drawn) - len(determined),
+    )
+
+
+def share(counts: Strata) -> tuple[float, float, float]:
+    """Return the share of the scenes that determine their motion which converges in the end, and its 95 % interval.
+
+    The interval is that of scenes drawn in the same way. It has the chance of which scenes were drawn in it and that of
+    which of them were run again: quantiles of the share for shares of the strata drawn from their posteriors with
+    Jeffreys' prior.
+    """
+    a, lost, left, *again = counts
+    if left > 0 and sum(again) == 0:
+        return np.nan, np.nan, np.nan
+    rng = np.random.default_rng(0)
+    first = rng.dirichlet([a + _PRIOR, lost + _PRIOR, left + _PRIOR], _DRAWS)
+    second = rng.dirichlet(np.add(again, _PRIOR), _DRAWS)
+    good, bad = first[:, 0] + first[:, 2] * second[:, 0], first[:, 1] + first[:, 2] * second[:, 1]
+    low, high = np.quantile(good / (good + bad), [0.025, 0.975])
+    p = np.array(again) / max(1, sum(again))
+    best = a + left * p[0]
+    return best / max(1.0, best + lost + left * p[1]), float(low), float(high)
