@@ -294,6 +294,15 @@ def _material(problem: Problem, level: Level) -> MaterialMotion | None:
     return material_of(problem, motion.grid, motion.times[kept], motion.states[kept], memory, axial)
 
 
+def _read_all(answer: Prediction) -> None:
+    """Read all that is found only as it is read, and ask for its energies, so that what that takes is compiled, too."""
+    from dlocore.balance import energies
+
+    _ = answer.message, answer.grasps, answer.effects, answer.material, answer.start_energy
+    _ = [(iteration.surface, iteration.energy) for iteration in answer.iterations]
+    energies(answer.scene, answer.surface, [0.0])
+
+
 def warm_up() -> None:
     """Compile, or load from the cache, every kernel, so that the first prediction is as fast as the next."""
     from dlocore.cable import Cable
@@ -323,8 +332,7 @@ def warm_up() -> None:
                 quality=quality,
             )
             for effects in (scene.effects, {"twist": twist, "obstacles": "off"}):
-                answer = predict(replace(scene, effects=effects))
-                _ = answer.message, answer.start_energy, [i.energy for i in answer.iterations]  # found as they are read
+                _read_all(predict(replace(scene, effects=effects)))
         equilibrium(scene, n_u=9)
     smooth = Environment(drag=0.1, table=Table())
     predict(Scene(cable=Cable.preset("paper"), shape=Points(points=arc), grasps=(grasp,), environment=smooth))

@@ -8,7 +8,7 @@ import sys
 from dataclasses import replace
 from numba.core.dispatcher import Dispatcher
 from benchmarks.catalogue import catalogue
-from dlocore import Quality, SceneError, predict, warm_up
+from dlocore import Quality, SceneError, energies, predict, warm_up
 
 def compiled():
     modules = [m for name, m in list(sys.modules.items()) if name.startswith("dlocore")]
@@ -22,7 +22,10 @@ for name, scene in catalogue().items():
     for method in ("march", "spacetime"):
         try:
             answer = predict(replace(scene, quality=Quality(n_u=13, n_t=19, method=method)), deadline=2.0)
-            answer.message, answer.start_energy, [i.energy for i in answer.iterations]
+            answer.message, answer.grasps, answer.effects, answer.material, answer.start_energy
+            [(i.surface, i.energy) for i in answer.iterations]
+            energies(answer.scene, answer.surface, [0.0, answer.surface.horizon])
+            predict(answer.scene, like=answer)
         except SceneError as error:
             assert error.field.startswith("quality"), (name, error)  # so small a grid is refused for a few
     new = compiled() - before
