@@ -6,11 +6,6 @@ from benchmarks.hard.cases import CASES, Case, posed
 from benchmarks.hard.laws import measure
 from dlocore import Prediction, SceneError, predict
 
-# What the solver does not do yet, and why; docs/stability.md lists them too. Strict: one that is mended has to leave.
-OPEN = {
-    "heavy cable": "the free end whips; the finest grid is not fine enough",
-}
-LONGEST = 5.0  # [s] that a case of these is allowed: what is mended in more is still open
 STRAIN = 0.02  # the cases are built so that weight and inertia strain them by less than 0.5 per cent
 HELD = 1e-9  # of the length: the ends of a hold are interpolated, so that only rounding is left
 GAIN = 0.02  # of the energy that was about: the velocities of the time spline, and trapezoids of the power
@@ -19,12 +14,7 @@ LOST = 0.05  # of the impulses that were about: the same
 
 def of_group(group: str) -> list[object]:
     """Return the cases of a group as parameters of a test."""
-    marks = {name: [pytest.mark.xfail(reason=reason, strict=True)] for name, reason in OPEN.items()}
-    return [
-        pytest.param(case, id=case.name, marks=marks.get(case.name, []))
-        for case in CASES.values()
-        if case.group == group
-    ]
+    return [pytest.param(case, id=case.name) for case in CASES.values() if case.group == group]
 
 
 def hold_to(case: Case) -> None:
@@ -33,7 +23,7 @@ def hold_to(case: Case) -> None:
         with pytest.raises(SceneError):
             predict(posed(case))
         return
-    prediction = predict(posed(case), deadline=LONGEST if case.name in OPEN else None)
+    prediction = predict(posed(case))
     length = prediction.surface.length
     estimate = prediction.accuracy.error_estimate
     told = prediction.status != "converged" or (estimate is not None and estimate > 0.01 * length)
