@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 FIRST_SPANS = 12  # in time
 MOST_SPANS = 400
 LEAST_TIMES, MOST_TIMES = 257, 2000  # at which a motion is fitted
-FIRM = 1e4  # weight of the first and the last instant, which the spline keeps
+FIRM = 1e4  # weight of what the spline keeps: what grasps hold, and the first and the last instant
 MARGINS = 2  # samples that each span needs
 
 
@@ -30,7 +30,9 @@ def fit(problem: Problem, u: Floats, times: Floats, q: Floats, tolerance: float)
     """Fit samples q (k, n, 4) [m, m, m, rad] at times (k,) [s] and u (n,) [m] within about `tolerance` [m]."""
     knots_u = _along(problem, u, q, tolerance)
     over = design_matrix(knots_u, u)
-    in_u = _least(over, q.transpose(1, 0, 2).reshape(len(u), -1))
+    firm = np.ones((len(u), 1))
+    firm[_held(problem, u)] = FIRM
+    in_u = _least(firm * over, firm * q.transpose(1, 0, 2).reshape(len(u), -1))
     rows = in_u.reshape(-1, len(q), 4).transpose(1, 0, 2)
     knots_t, control = _in_time(problem, times, rows, tolerance)
     surface = SplineSurface(np.ascontiguousarray(control), knots_u, knots_t)
@@ -43,12 +45,16 @@ def _least(over: Floats, right: Floats) -> Floats:
     return np.asarray(np.linalg.lstsq(over, right, rcond=None)[0], dtype=np.float64)
 
 
+def _held(problem: Problem, u: Floats) -> list[int]:
+    """Return the nodes of u (n,) [m] that grasps hold."""
+    return [int(np.argmin(np.abs(u - g.u))) for g in problem.scene.grasps]
+
+
 def _along(problem: Problem, u: Floats, q: Floats, tolerance: float) -> Floats:
     """Return knots in u: every 2^k-th node and those of grasps and loads, twice where a direction is held."""
     length = u[-1]
     marks: dict[int, int] = {}
-    for g in problem.scene.grasps:
-        node = int(np.argmin(np.abs(u - g.u)))
+    for g, node in zip(problem.scene.grasps, _held(problem, u), strict=True):
         marks[node] = max(marks.get(node, 1), 1 if g.hold == "point" else 2)
     for load in problem.scene.loads:
         marks.setdefault(int(np.argmin(np.abs(u - load.u))), 1)
