@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dlocore.kernels.compile import brief, kernel, law, leaf
+from dlocore.kernels.lanes import side_by_side
 from dlocore.kernels.pairs import pair_products
 
 GAUSS_2 = np.polynomial.legendre.leggauss(2)
@@ -182,11 +183,11 @@ class Tables(NamedTuple):
 
     `*_first` (p,): index of the first of the four control points at each point; `*_b1` (p, 4): first derivatives of
     their basis functions [1/m], `*_b2` second [1/m^2], `*_b0` values; `*_w` (p,): weights [m]; `curvature_pairs`: see
-    `pairs.py`. Axial points: one a span and two in an end span whose end direction is free (selective reduced
-    integration, docs/model.md). Curvature and body points: three a span. Contact nodes: every span in parts of one
-    length, with their ends; none where contact is off. Strand nodes: ends of the segments, as long on every grid, that
-    the cable's contact with itself looks at; none where that is off. `mass` (n, 4): integrals of b_i b_{i+d} du [m];
-    `weight` (n,): integrals of b_i du [m].
+    `pairs.py`; `curvature_lanes`: see `lanes.py`. Axial points: one a span and two in an end span whose end direction
+    is free (selective reduced integration, docs/model.md). Curvature and body points: three a span. Contact nodes:
+    every span in parts of one length, with their ends; none where contact is off. Strand nodes: ends of the segments,
+    as long on every grid, that the cable's contact with itself looks at; none where that is off. `mass` (n, 4):
+    integrals of b_i b_{i+d} du [m]; `weight` (n,): integrals of b_i du [m].
     """
 
     axial_u: Any
@@ -199,6 +200,7 @@ class Tables(NamedTuple):
     curvature_b2: Any
     curvature_w: Any
     curvature_pairs: Any
+    curvature_lanes: Any
     body_first: Any
     body_b0: Any
     body_w: Any
@@ -347,7 +349,7 @@ def build_tables(
             for j in range(i, 4):
                 mass[f + i, j - i] += weights4[p] * table4[p, 0, i] * table4[p, 0, j]
     return Tables(
-        u, axial_first, axial_b1, axial_w, curvature_u, curvature_first, b1, b2, curvature_w, pair_products(b0, b1, b2),
-        curvature_first, b0, curvature_w, contact_u, contact_first, contact_b0, contact_w, strand_u, strand_first,
-        strand_b0, mass, weight,
+        u, axial_first, axial_b1, axial_w, curvature_u, curvature_first, b1, b2, curvature_w, pair_products(b1, b2),
+        side_by_side(curvature_first, curvature_u, curvature_w, b0, b1, b2), curvature_first, b0, curvature_w,
+        contact_u, contact_first, contact_b0, contact_w, strand_u, strand_first, strand_b0, mass, weight,
     )  # fmt: skip

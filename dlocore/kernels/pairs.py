@@ -1,9 +1,10 @@
 """Tangents of the curvature points of a knot span, added up before they go into the band.
 
 What a point adds to the block of the tangent between control points i and j is a sum of blocks of the point, each times
-a product of a basis function of i and one of j. `Tables.curvature_pairs` (points, PAIRS, 9) holds these products. The
-blocks of a point and the sums of its span lie in one array, a row each, so that whole rows are added: a compiler that
-sees them in two would have to find out each time that they are not the same.
+a product of a derivative of a basis function of i and one of j. `Tables.curvature_pairs` (points, PAIRS, 4) has these
+products. The blocks of a point and the sums of its span lie in one array, a row each, so that whole rows are added: a
+compiler that sees them in two would have to find out each time that they are not the same. With twist there are too
+many blocks for that, and spans are taken side by side, see `lanes.py`.
 """
 
 from typing import Any
@@ -12,25 +13,23 @@ import numpy as np
 
 from dlocore.kernels.compile import kernel, part
 
-# of control point i, then of j: A its basis function, B the first and C the second derivative
-BB, BC, CB, CC, AA, AB, BA, AC, CA = range(9)
+# of control point i, then of j: B the first and C the second derivative of its basis function
+BB, BC, CB, CC = range(4)
 PAIRS = 10  # i >= j of four control points, column by column
 SUMS = 4  # the first row of sums; those before are the blocks of a point, by BB, BC, CB and CC
 
 
 @kernel
-def pair_products(b0: Any, b1: Any, b2: Any) -> Any:
-    """Return the products (points, PAIRS, 9) of the basis functions b0 (points, 4) and their derivatives b1 and b2."""
-    out = np.empty((len(b0), PAIRS, 9))
-    for n in range(len(b0)):
-        a, b, c = b0[n], b1[n], b2[n]
+def pair_products(b1: Any, b2: Any) -> Any:
+    """Return the products (points, PAIRS, 4) of the first and second derivatives b1 and b2 (points, 4)."""
+    out = np.empty((len(b1), PAIRS, 4))
+    for n in range(len(b1)):
+        b, c = b1[n], b2[n]
         pair = 0
         for j in range(4):
             for i in range(j, 4):
                 row = out[n, pair]
                 row[BB], row[BC], row[CB], row[CC] = b[i] * b[j], b[i] * c[j], c[i] * b[j], c[i] * c[j]
-                row[AA], row[AB], row[BA] = a[i] * a[j], a[i] * b[j], b[i] * a[j]
-                row[AC], row[CA] = a[i] * c[j], c[i] * a[j]
                 pair += 1
     return out
 

@@ -10,6 +10,8 @@ The twist rate of a point is the mean over its knot span, and in the two end spa
 line through those of the span: as many conditions as theta has freedoms. Where the curvature jumps, the twist rate of
 the carried frames jumps too as the cable swings about its own tangent. Theta can follow at a triple knot, where it may
 have a kink, but at no other: point by point the cable would be held back from swinging (membrane locking, of twist).
+
+A group of spans after the other is measured and assembled in one array W, see `lanes.py`.
 """
 
 from typing import Any
@@ -18,6 +20,7 @@ import numpy as np
 
 from dlocore.effects.base import Vector
 from dlocore.effects.laws import (
+    BENDING_MEMORY,
     DAMPING,
     TWIST,
     TWIST_DAMPING,
@@ -29,24 +32,52 @@ from dlocore.effects.laws import (
     twist_stress,
 )
 from dlocore.kernels.basis import basis, find_span, row_of
-from dlocore.kernels.compile import kernel, law, part
-from dlocore.kernels.pairs import AA, AB, AC, BA, BB, BC, CA, CB, CC, PAIRS, SUMS, add_point, add_span, no_blocks
+from dlocore.kernels.compile import kernel, law, leaf, part
+from dlocore.kernels.lanes import (
+    FIRSTS,
+    LANES,
+    LEVER,
+    POINTS,
+    SECONDS,
+    SHARE,
+    SLOPE,
+    SPANS,
+    TRIPLE,
+    VALUES,
+    WEIGHT,
+    added,
+    at,
+    combined,
+    over,
+    put,
+    put_vector,
+    vector_at,
+)
 from dlocore.kernels.space import combine
-from dlocore.kernels.strain import space_curvature, transport, twist_increment, vector
+from dlocore.kernels.strain import space_curvature, transport, twist_increment
 
 TANGENT, BEND, DIRECTOR, FRAME, LAST, BEFORE = 0, 3, 6, 9, 10, 13  # columns of `past`
 TWIST_RATE = LAST + 2
 PAST = 16
-LENGTH, ALONG, NOW, KAPPA, SPIN = 0, 1, 2, 5, 8  # columns of a point's geometry: |r'|, t . r'', t, kappa, spin
-LOCAL = 11
-Row = tuple[float, float, float, float]  # of basis functions
-_TRIPLE = 3  # control points on from one span to the next across a triple knot
 _STEPS = 8  # of the transport along the cable between two curvature points
-
-
-@law
-def _angle(q: Any, k: int, b: Row) -> float:
-    return b[0] * q[k, 3] + b[1] * q[k + 1, 3] + b[2] * q[k + 2, 3] + b[3] * q[k + 3, 3]
+# Rows of W, of numbers of points. What they are measured against: t0, k0, director, which is carried to t, theta;
+# r', r''; the strain: |r'|, t . r'', t, kappa, spin, derivative of the twist rate by r', cos and sin of theta, the
+# directors of the section, k1, k2, twist rate, their rates.
+T0, K0, D0, ANGLE, R1, R2 = 0, 3, 6, 9, 10, 13
+LENGTH, ALONG, NOW, KAPPA, SPIN, BY_FIRST = 16, 17, 18, 21, 24, 27
+COS, SIN, M1, M2, K1, K2, TAU, RATE = 30, 31, 32, 35, 38, 39, 40, 41
+# Stress, times weights: moments, torque, and the torque that the smoothing of the twist rate hands on to a point;
+# forces by r', r'' and theta; stiffness of k1 and k2 and of the twist rate.
+B1, B2, TORQUE, HANDED, G1, G2, G0, S11, S22, S12, STIFF = 44, 45, 46, 47, 48, 51, 54, 55, 56, 57, 58
+# The tangent of a point, by r' (B), r'' (C) and theta (A): BB and CC are symmetric, (xx, xy, xz, yy, yz, zz).
+BB, BC, CC, AB, AC, AA = 59, 65, 74, 80, 83, 86
+_ROWS = 87
+# Places in W of the first numbers of spans: control points and forces by coordinate, and the twist rate in its span, as
+# mean and slope that are independent: their stiffnesses and their derivatives by the control points.
+Q, F = _ROWS * LANES, _ROWS * LANES + 16 * SPANS
+OF_MEAN, OF_SLOPE, LEAN = F + 16 * SPANS, F + 17 * SPANS, F + 18 * SPANS
+MEAN, RISE = F + 19 * SPANS, F + 35 * SPANS
+_SIZE = F + 51 * SPANS
 
 
 @law
@@ -55,84 +86,122 @@ def _dot(a: Vector, b: Vector) -> float:
 
 
 @law
-def _directors(t0: Vector, t: Vector, director: Vector, theta: float) -> tuple[Vector, Vector]:
-    """Return the two directors of a section turned by theta against the carried frame."""
-    d = transport(t0, t, director)
-    e = (t[1] * d[2] - t[2] * d[1], t[2] * d[0] - t[0] * d[2], t[0] * d[1] - t[1] * d[0])
-    c, s = np.cos(theta), np.sin(theta)
-    return (
-        (c * d[0] + s * e[0], c * d[1] + s * e[1], c * d[2] + s * e[2]),
-        (c * e[0] - s * d[0], c * e[1] - s * d[1], c * e[2] - s * d[2]),
-    )
+def _count(points: int, group: int) -> int:
+    """Return how many spans a group has."""
+    return min(SPANS, points // POINTS - SPANS * group)
 
 
-@law
-def _strain(q: Any, tables: Any, past: Any, n: int, inverse: float) -> tuple[Vector, Vector, Vector]:
-    """Return (k1, k2, tau) of a curvature point, its tangent and its curvature vector."""
-    k = tables.curvature_first[n]
-    b1 = row_of(tables.curvature_b1, n)
-    _, _, t, kappa = space_curvature(combine(q, k, b1), combine(q, k, row_of(tables.curvature_b2, n)))
-    t0 = vector(past, n, TANGENT)
-    theta = inverse * _angle(q, k, row_of(tables.body_b0, n))
-    m1, m2 = _directors(t0, t, vector(past, n, DIRECTOR), theta)
-    tau = inverse * _angle(q, k, b1) + past[n, FRAME] + twist_increment(t0, vector(past, n, BEND), t, kappa)[0]
-    return (_dot(kappa, m1), _dot(kappa, m2), tau), t, kappa
+@part
+def _measure(q: Any, tables: Any, past: Any, inverse: float, group: int, W: Any) -> None:
+    """Write the geometry of a group of spans and its twist rate, and what it is measured against."""
+    _gather(q, tables.curvature_first, past, group, W)
+    _locate(tables.curvature_lanes[group], inverse, W)
+    _bend(W)
+    _smooth(tables.curvature_lanes[group], TAU, W)
 
 
-@law
-def _span_end(firsts: Any, n: int) -> int:
-    """Return the end of the points of a knot span, of which n is the first."""
-    end = n + 1
-    while end < len(firsts) and firsts[end] == firsts[n]:
-        end += 1
-    return end
+@leaf
+def _gather(q: Any, first: Any, past: Any, group: int, W: Any) -> None:
+    """Copy the control points q (n, 4) of a group of spans, and the frames of the last step, to their places."""
+    count = _count(len(past), group)
+    for s in range(SPANS):
+        n = POINTS * (SPANS * group + min(s, count - 1))
+        for i in range(4):
+            for d in range(4):
+                W[Q + (4 * i + d) * SPANS + s] = q[first[n] + i, d]
+        for m in range(POINTS):
+            lane = SPANS * m + s
+            for i in range(FRAME):
+                W[(T0 + i) * LANES + lane] = past[n + m, i]
+            put(W, TAU, lane, past[n + m, FRAME])
 
 
-@law
-def _leans(firsts: Any, n: int, end: int) -> bool:
-    """Tell whether the twist rate is a straight line over the span of the points n to `end`, not its mean."""
-    outer = n == 0 or end == len(firsts)
-    return outer or firsts[n] - firsts[n - 1] == _TRIPLE or firsts[end] - firsts[n] == _TRIPLE
+@leaf
+def _locate(T: Any, inverse: float, W: Any) -> None:
+    """Write r', r'' and theta of the points, and add its derivative to the twist rate."""
+    _locate_points(0, T, inverse, W)
+    _locate_points(1, T, inverse, W)
+    _locate_points(2, T, inverse, W)
 
 
-@law
-def _middle(u: Any, weights: Any, n: int, end: int) -> tuple[float, float, float]:
-    """Return the middle [m] of the span of the points n to `end`, its width [m] and its second moment [m^3]."""
-    middle, width, moment = 0.0, 0.0, 0.0
-    for m in range(n, end):
-        middle += weights[m] * u[m]
-        width += weights[m]
-    middle /= width
-    for m in range(n, end):
-        moment += weights[m] * (u[m] - middle) ** 2
-    return middle, width, moment
+@part
+def _locate_points(m: int, T: Any, inverse: float, W: Any) -> None:
+    for s in range(SPANS):
+        n, x, y, z, theta = SPANS * m + s, Q + s, Q + SPANS + s, Q + 2 * SPANS + s, Q + 3 * SPANS + s
+        a = (combined(W, x, T, FIRSTS, n), combined(W, y, T, FIRSTS, n), combined(W, z, T, FIRSTS, n))
+        c = (combined(W, x, T, SECONDS, n), combined(W, y, T, SECONDS, n), combined(W, z, T, SECONDS, n))
+        put_vector(W, R1, n, a)
+        put_vector(W, R2, n, c)
+        put(W, ANGLE, n, inverse * combined(W, theta, T, VALUES, n))
+        put(W, TAU, n, at(W, TAU, n) + inverse * combined(W, theta, T, FIRSTS, n))
 
 
-@kernel
-def _span_twists(q: Any, tables: Any, past: Any, inverse: float) -> Any:
-    """Return the twist rate (points,) [rad/m] of q, over each knot span its mean or a straight line."""
-    out = np.empty(len(tables.curvature_w))
-    for n in range(len(out)):
-        out[n] = _strain(q, tables, past, n, inverse)[0][2]
-    _straighten(tables.curvature_first, tables.curvature_w, tables.curvature_u, out)
-    return out
+@leaf
+def _bend(W: Any) -> None:
+    """Write the geometry of the points, and add what the carrying of the frames makes of their twist rate.
+
+    The derivatives of the twist rate are BY_FIRST by r' and spin/l by r''.
+    """
+    for n in range(LANES):
+        length, h, t, kappa = space_curvature(vector_at(W, R1, n), vector_at(W, R2, n))
+        increment, spin, by_t = twist_increment(vector_at(W, T0, n), vector_at(W, K0, n), t, kappa)
+        inverse = 1.0 / length
+        turned, along = _dot(by_t, t) + _dot(spin, kappa), h * inverse
+        by_first = (
+            (by_t[0] - turned * t[0] - along * spin[0]) * inverse,
+            (by_t[1] - turned * t[1] - along * spin[1]) * inverse,
+            (by_t[2] - turned * t[2] - along * spin[2]) * inverse,
+        )
+        put(W, LENGTH, n, length)
+        put(W, ALONG, n, h)
+        put_vector(W, NOW, n, t)
+        put_vector(W, KAPPA, n, kappa)
+        put_vector(W, SPIN, n, spin)
+        put_vector(W, BY_FIRST, n, by_first)
+        put(W, TAU, n, at(W, TAU, n) + increment)
 
 
-@law
-def _straighten(firsts: Any, weights: Any, u: Any, tau: Any) -> None:
-    """Turn twist rates at the points (points,) into those over each knot span: their mean or a straight line."""
-    n = 0
-    while n < len(tau):
-        end = _span_end(firsts, n)
-        middle, width, moment = _middle(u, weights, n, end)
-        mean, slope = 0.0, 0.0
-        for m in range(n, end):
-            mean += weights[m] / width * tau[m]
-            slope += weights[m] * (u[m] - middle) / moment * tau[m]
-        leans = _leans(firsts, n, end)
-        for m in range(n, end):
-            tau[m] = mean + (slope * (u[m] - middle) if leans else 0.0)
-        n = end
+@leaf
+def _smooth(T: Any, row: int, W: Any) -> None:
+    """Turn values at the points into those over their span: the mean, or the straight line."""
+    for s in range(SPANS):
+        mean, slope = over(T, SHARE, W, row, s), over(T, SLOPE, W, row, s)
+        for m in range(POINTS):
+            put(W, row, SPANS * m + s, mean + at(T, LEVER, SPANS * m + s) * slope)
+
+
+@part
+def _measure_bends(active: Any, memory: Any, group: int, W: Any) -> None:
+    """Write the directors of the sections, and the curvatures along them.
+
+    Sections that bend alike in all directions, and do not resist its rate, have any directors.
+    """
+    turns = bool(active[DAMPING] or active[BENDING_MEMORY])
+    for s in range(_count(len(memory), group)):
+        for m in range(POINTS):
+            n, lane = POINTS * (SPANS * group + s) + m, SPANS * m + s
+            c, r = 1.0, 0.0
+            if turns or memory[n, 0] != 0.0 or memory[n, 1] != 0.0:
+                c, r = np.cos(at(W, ANGLE, lane)), np.sin(at(W, ANGLE, lane))
+            put(W, COS, lane, c)
+            put(W, SIN, lane, r)
+    _direct(W)
+
+
+@leaf
+def _direct(W: Any) -> None:
+    """Carry the directors to the tangents at hand, turn those of the sections and write k1 and k2."""
+    for n in range(LANES):
+        t, kappa, c, s = vector_at(W, NOW, n), vector_at(W, KAPPA, n), at(W, COS, n), at(W, SIN, n)
+        d = transport(vector_at(W, T0, n), t, vector_at(W, D0, n))
+        e = (t[1] * d[2] - t[2] * d[1], t[2] * d[0] - t[0] * d[2], t[0] * d[1] - t[1] * d[0])
+        m1 = (c * d[0] + s * e[0], c * d[1] + s * e[1], c * d[2] + s * e[2])
+        m2 = (c * e[0] - s * d[0], c * e[1] - s * d[1], c * e[2] - s * d[2])
+        put_vector(W, D0, n, d)
+        put_vector(W, M1, n, m1)
+        put_vector(W, M2, n, m2)
+        put(W, K1, n, _dot(kappa, m1))
+        put(W, K2, n, _dot(kappa, m2))
 
 
 def over_spans(tables: Any) -> Any:
@@ -143,7 +212,7 @@ def over_spans(tables: Any) -> Any:
     x = u - shares @ u
     slopes = same * (weights * x) / (same @ (weights * x**2))[:, None]
     spans = np.unique(firsts)
-    outer = np.concatenate([[True], np.diff(spans) == _TRIPLE, [True]])
+    outer = np.concatenate([[True], np.diff(spans) == TRIPLE, [True]])
     leans = np.isin(firsts, spans[outer[:-1] | outer[1:]])
     return shares + (leans * x)[:, None] * slopes
 
@@ -159,197 +228,355 @@ def curvature(
     over a span, or their straight line. The material part of the tangent is E' S E with the derivatives E by the
     control points. The geometric part is that at the carried frame: what the carrying adds vanishes with the step.
     """
-    local = np.empty((len(tables.curvature_w), LOCAL))
     _add_curvature(
-        q, v, tables, active, p, memory, past, rates, scales, tangent, np.empty(16), np.empty(16), np.empty(16), local,
-        no_blocks(4 if tangent else 0), f, K,
-    )  # fmt: skip
+        q, v, tables, active, p, memory, past, rates, scales, tangent, np.empty(_SIZE), np.empty(16 * SPANS), f, K
+    )
 
 
 @part
 def _add_curvature(
     q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any, tangent: bool,
-    mean: Any, slope: Any, own: Any, local: Any, blocks: Any, f: Any, K: Any,
+    W: Any, block: Any, f: Any, K: Any,
 ) -> None:  # fmt: skip
-    """Do the work of `curvature` in the room made there.
-
-    `mean` and `slope` (16,) are those of the derivative of the twist rate over a span, `own` (16,) is that of a point.
-    """
-    firsts, weights, pairs = tables.curvature_first, tables.curvature_w, tables.curvature_pairs
-    b0, b1, b2, u = tables.body_b0, tables.curvature_b1, tables.curvature_b2, tables.curvature_u
-    n = 0
-    while n < len(weights):
-        k, until = firsts[n], _span_end(firsts, n)
-        middle, width, moment = _middle(u, weights, n, until)
-        leans = _leans(firsts, n, until)
-        tau, rise = _span_twist(
-            q, k, weights, u, b1, b2, past, n, until, p[TWIST, 1], middle, 1.0 / width, 1.0 / moment if leans else 0.0,
-            mean, slope, local,
-        )  # fmt: skip
-        torque, stiffness = 0.0, 0.0
-        for m in range(n, until):
-            x = u[m] - middle if leans else 0.0
-            for j in range(16):
-                own[j] = mean[j] + x * slope[j]
-            T, S = _point(
-                q, v, k, weights[m], row_of(b0, m), row_of(b1, m), row_of(b2, m), pairs, active, p, memory, past, rates,
-                scales, tangent, m, tau + x * rise, own, local, f, blocks,
-            )  # fmt: skip
-            torque += T
-            stiffness += S
-            if leans or m == until - 1:
-                _add_twist(k, torque, stiffness, own, tangent, f, K)
-                torque, stiffness = 0.0, 0.0
-        if tangent:
-            add_span(4, K, k, blocks)
-        n = until
-
-
-@law
-def _add_twist(k: int, torque: float, stiffness: float, derivative: Any, tangent: bool, f: Any, K: Any) -> None:
-    """Add the force and tangent of a twist rate, or the sum of some alike, with this `derivative` (16,)."""
-    for j in range(4):
-        for d in range(4):
-            f[k + j, d] += torque * derivative[4 * j + d]
-    if tangent:
-        for j in range(16):
-            row, stiff = K[4 * k + j], stiffness * derivative[j]
-            for i in range(j, 16):
-                row[i - j] += stiff * derivative[i]
-
-
-@law
-def _span_twist(
-    q: Any, k: int, weights: Any, u: Any, b1: Any, b2: Any, past: Any, n: int, until: int, inverse: float,
-    middle: float, shared: float, inclined: float, mean: Any, slope: Any, local: Any,
-) -> tuple[float, float]:  # fmt: skip
-    """Return the mean twist rate [rad/m] of the points n to `until` of a span, and its slope [rad/m^2].
-
-    Their derivatives (16,) by x, y, z, fourth of the four control points are written to `mean` and `slope`, and the
-    geometry of the points to `local` (points, LOCAL). `shared` is one over the width of the span, `inclined` one over
-    its second moment, or zero where it has no slope.
-    """
-    for j in range(16):
-        mean[j] = slope[j] = 0.0
-    tau, rise = 0.0, 0.0
-    for m in range(n, until):
-        b, c = row_of(b1, m), row_of(b2, m)
-        w, z = shared * weights[m], inclined * weights[m] * (u[m] - middle)
-        length, h, t, kappa = space_curvature(combine(q, k, b), combine(q, k, c))
-        increment, spin, by_t = twist_increment(vector(past, m, TANGENT), vector(past, m, BEND), t, kappa)
-        local[m, LENGTH], local[m, ALONG] = length, h
-        for d in range(3):
-            local[m, NOW + d], local[m, KAPPA + d], local[m, SPIN + d] = t[d], kappa[d], spin[d]
-        there = inverse * _angle(q, k, b) + past[m, FRAME] + increment
-        tau += w * there
-        rise += z * there
-        turned = _dot(by_t, t) + _dot(spin, kappa)
-        for j in range(4):
-            across, along = (c[j] - h * b[j] / length) / length, b[j] / length
-            for d in range(3):
-                derivative = across * spin[d] + along * (by_t[d] - turned * t[d])
-                mean[4 * j + d] += w * derivative
-                slope[4 * j + d] += z * derivative
-            mean[4 * j + 3] += w * inverse * b[j]
-            slope[4 * j + 3] += z * inverse * b[j]
-    return tau, rise
-
-
-@law
-def _point(
-    q: Any, v: Any, k: int, w: float, a: Row, b: Row, c: Row, pairs: Any, active: Any, p: Any, memory: Any, past: Any,
-    rates: Any, scales: Any, tangent: bool, n: int, tau: float, by_points: Any, local: Any, f: Any, blocks: Any,
-) -> tuple[float, float]:  # fmt: skip
-    """Add the forces of the bends of a point, and its share in the blocks of its span, but for that of the twist rate.
-
-    Returns:
-        the torque and the torsional stiffness of its part of the cable.
-    """
-    elastic, viscous, geometric = scales
-    if viscous != 0.0 and rates[0] != 0.0:
-        viscous = rates[0]
-    inverse = p[TWIST, 1]
-    length, h, t = local[n, LENGTH], local[n, ALONG], vector(local, n, NOW)
-    kappa, spin = vector(local, n, KAPPA), vector(local, n, SPIN)
-    m1, m2 = _directors(vector(past, n, TANGENT), t, vector(past, n, DIRECTOR), inverse * _angle(q, k, a))
-    k1, k2 = _dot(kappa, m1), _dot(kappa, m2)
-    O1, P1 = _derivatives(length, h, m1, k2, spin, -k1, t)
-    O2, P2 = _derivatives(length, h, m2, -k1, spin, -k2, t)
-    A1, A2 = inverse * k2, -inverse * k1
-    rate = (0.0, 0.0, 0.0)
+    """Do the work of `curvature` in the room made there."""
+    first, inverse = tables.curvature_first, p[TWIST, 1]
     damped = active[DAMPING] or active[TWIST_DAMPING]
-    if damped and rates[0] != 0.0:
-        rate = (
-            rates[0] * k1 + rates[1] * past[n, LAST] + rates[2] * past[n, BEFORE],
-            rates[0] * k2 + rates[1] * past[n, LAST + 1] + rates[2] * past[n, BEFORE + 1],
-            rates[0] * tau + rates[1] * past[n, LAST + 2] + rates[2] * past[n, BEFORE + 2],
+    for group in range(len(tables.curvature_lanes)):
+        T = tables.curvature_lanes[group]
+        _measure(q, tables, past, inverse, group, W)
+        _measure_bends(active, memory, group, W)
+        if damped and rates[0] != 0.0:
+            _rate_by_steps(past, rates, group, W)
+        elif damped:
+            _rate_by_velocity(v, tables, inverse, group, W)
+        _stress(active, p, memory, past, rates, scales, damped, group, T, W)
+        _force(T, inverse, W)
+        _scatter_force(first, _count(len(past), group), group, W, f)
+        if tangent:
+            _tangent(inverse, scales[2], W)
+            _twist_tangent(T, inverse, W)
+            _add_blocks(first, _count(len(past), group), group, T, W, block, K)
+
+
+@leaf
+def _rate_by_steps(past: Any, rates: Any, group: int, W: Any) -> None:
+    """Write the rates of k1, k2 and twist as the combination `rates` of their values now and at the last steps."""
+    for s in range(_count(len(past), group)):
+        for m in range(POINTS):
+            n, lane = POINTS * (SPANS * group + s) + m, SPANS * m + s
+            now = (at(W, K1, lane), at(W, K2, lane), at(W, TAU, lane))
+            for d in range(3):
+                W[(RATE + d) * LANES + lane] = (
+                    rates[0] * now[d] + rates[1] * past[n, LAST + d] + rates[2] * past[n, BEFORE + d]
+                )
+
+
+@leaf
+def _rate_by_velocity(v: Any, tables: Any, inverse: float, group: int, W: Any) -> None:
+    """Write the rates of k1, k2 and twist that the velocity v (n, 4) makes."""
+    first = tables.curvature_first
+    for s in range(_count(len(first), group)):
+        for m in range(POINTS):
+            n, lane = POINTS * (SPANS * group + s) + m, SPANS * m + s
+            k, b = first[n], row_of(tables.curvature_b1, n)
+            a, c = combine(v, k, b), combine(v, k, row_of(tables.curvature_b2, n))
+            length, h, k1, k2 = at(W, LENGTH, lane), at(W, ALONG, lane), at(W, K1, lane), at(W, K2, lane)
+            t, spin = vector_at(W, NOW, lane), vector_at(W, SPIN, lane)
+            O1, P1 = _derivatives(length, h, vector_at(W, M1, lane), k2, spin, -k1, t)
+            O2, P2 = _derivatives(length, h, vector_at(W, M2, lane), -k1, spin, -k2, t)
+            turn, twisting = inverse * _angle(v, k, row_of(tables.body_b0, n)), inverse * _angle(v, k, b)
+            twisting += _dot(vector_at(W, BY_FIRST, lane), a) + _dot(spin, c) / length
+            rate = (_dot(O1, a) + _dot(P1, c) + k2 * turn, _dot(O2, a) + _dot(P2, c) - k1 * turn, twisting)
+            put_vector(W, RATE, lane, rate)
+    _smooth(tables.curvature_lanes[group], RATE + 2, W)
+
+
+@law
+def _angle(q: Any, k: int, b: tuple[float, float, float, float]) -> float:
+    return b[0] * q[k, 3] + b[1] * q[k + 1, 3] + b[2] * q[k + 2, 3] + b[3] * q[k + 3, 3]
+
+
+@leaf
+def _stress(
+    active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any, damped: bool, group: int, T: Any, W: Any
+) -> None:
+    """Write moments, torques and their derivatives by the strain, all times the weights of the points."""
+    elastic, viscous = scales[0], rates[0] if scales[1] != 0.0 and rates[0] != 0.0 else scales[1]
+    for s in range(_count(len(past), group)):
+        for m in range(POINTS):
+            n, lane = POINTS * (SPANS * group + s) + m, SPANS * m + s
+            w, rate = at(T, WEIGHT, lane), vector_at(W, RATE, lane) if damped else (0.0, 0.0, 0.0)
+            moment, stiffness, viscosity = curvature_stress(
+                active, p, (at(W, K1, lane), at(W, K2, lane), 0.0), (rate[0], rate[1], 0.0),
+                (memory[n, 0], memory[n, 1], 0.0), (memory[n, 3], memory[n, 4], 0.0),
+                (past[n, LAST], past[n, LAST + 1], 0.0), rates[3],
+            )  # fmt: skip
+            torque, stiff, viscid = twist_stress(
+                active, p, at(W, TAU, lane), rate[2], memory[n, 2], memory[n, 5], past[n, LAST + 2], rates[3]
+            )
+            put(W, B1, lane, w * moment[0])
+            put(W, B2, lane, w * moment[1])
+            put(W, TORQUE, lane, w * torque)
+            put(W, S11, lane, w * (elastic * stiffness[0] + viscous * viscosity[0]))
+            put(W, S22, lane, w * (elastic * stiffness[1] + viscous * viscosity[1]))
+            put(W, S12, lane, w * (elastic * stiffness[3] + viscous * viscosity[3]))
+            put(W, STIFF, lane, w * (elastic * stiff + viscous * viscid))
+
+
+@leaf
+def _force(T: Any, inverse: float, W: Any) -> None:
+    """Write the forces of the points by r', r'' and theta, and those of the spans by their control points."""
+    for s in range(SPANS):
+        force, couple = added(W, TORQUE, s), over(T, LEVER, W, TORQUE, s)
+        for m in range(POINTS):
+            lane = SPANS * m + s
+            put(W, HANDED, lane, at(T, SHARE, lane) * force + at(T, SLOPE, lane) * couple)
+    for n in range(LANES):
+        a, b, torque, k1, k2 = at(W, B1, n), at(W, B2, n), at(W, HANDED, n), at(W, K1, n), at(W, K2, n)
+        m1, m2, by_first = vector_at(W, M1, n), vector_at(W, M2, n), vector_at(W, BY_FIRST, n)
+        t, spin, over_l = vector_at(W, NOW, n), vector_at(W, SPIN, n), 1.0 / at(W, LENGTH, n)
+        along, turn, dot = at(W, ALONG, n) * over_l, a * k2 - b * k1, a * k1 + b * k2
+        M = (a * m1[0] + b * m2[0], a * m1[1] + b * m2[1], a * m1[2] + b * m2[2])
+        g1 = (
+            (turn * spin[0] - dot * t[0] - along * M[0]) * over_l + torque * by_first[0],
+            (turn * spin[1] - dot * t[1] - along * M[1]) * over_l + torque * by_first[1],
+            (turn * spin[2] - dot * t[2] - along * M[2]) * over_l + torque * by_first[2],
         )
-    elif damped:
-        first, second, turn = combine(v, k, b), combine(v, k, c), _angle(v, k, a)
-        twisting = 0.0
-        for j in range(4):
+        put_vector(W, G1, n, g1)
+        put(W, G2, n, (M[0] + torque * spin[0]) * over_l)
+        put(W, G2 + 1, n, (M[1] + torque * spin[1]) * over_l)
+        put(W, G2 + 2, n, (M[2] + torque * spin[2]) * over_l)
+        put(W, G0, n, inverse * turn)
+    _force_on(0, T, inverse, W)
+    _force_on(1, T, inverse, W)
+    _force_on(2, T, inverse, W)
+    _force_on(3, T, inverse, W)
+
+
+@part
+def _force_on(i: int, T: Any, inverse: float, W: Any) -> None:
+    """Write the forces of the spans on their i-th control points."""
+    for s in range(SPANS):
+        place = F + 4 * i * SPANS + s
+        W[place] = over(T, FIRSTS + i, W, G1, s) + over(T, SECONDS + i, W, G2, s)
+        W[place + SPANS] = over(T, FIRSTS + i, W, G1 + 1, s) + over(T, SECONDS + i, W, G2 + 1, s)
+        W[place + 2 * SPANS] = over(T, FIRSTS + i, W, G1 + 2, s) + over(T, SECONDS + i, W, G2 + 2, s)
+        W[place + 3 * SPANS] = over(T, VALUES + i, W, G0, s) + inverse * over(T, FIRSTS + i, W, HANDED, s)
+
+
+@leaf
+def _scatter_force(first: Any, count: int, group: int, W: Any, f: Any) -> None:
+    """Add the forces of a group of spans to f (n, 4)."""
+    for s in range(count):
+        k = first[POINTS * (SPANS * group + s)]
+        for i in range(4):
             for d in range(4):
-                twisting += by_points[4 * j + d] * v[k + j, d]
-        rate = (
-            _dot(O1, first) + _dot(P1, second) + A1 * turn, _dot(O2, first) + _dot(P2, second) + A2 * turn, twisting,
+                f[k + i, d] += W[F + (4 * i + d) * SPANS + s]
+
+
+@leaf
+def _tangent(inverse: float, geometric: float, W: Any) -> None:
+    """Write the tangents of the points by r', r'' and theta, but for the stiffness of the twist rate."""
+    for n in range(LANES):
+        length, h, k1, k2 = at(W, LENGTH, n), at(W, ALONG, n), at(W, K1, n), at(W, K2, n)
+        t, kappa, spin = vector_at(W, NOW, n), vector_at(W, KAPPA, n), vector_at(W, SPIN, n)
+        m1, m2 = vector_at(W, M1, n), vector_at(W, M2, n)
+        S11_, S22_, S12_ = at(W, S11, n), at(W, S22, n), at(W, S12, n)
+        a, b, T = geometric * at(W, B1, n), geometric * at(W, B2, n), geometric * at(W, TORQUE, n)
+        O1, P1 = _derivatives(length, h, m1, k2, spin, -k1, t)
+        O2, P2 = _derivatives(length, h, m2, -k1, spin, -k2, t)
+        A1, A2 = inverse * k2, -inverse * k1
+        SO1, SO2 = _combined(S11_, O1, S12_, O2), _combined(S12_, O1, S22_, O2)
+        SP1, SP2 = _combined(S11_, P1, S12_, P2), _combined(S12_, P1, S22_, P2)
+        M, N = _combined(a, m1, b, m2), _combined(a, m2, -b, m1)  # N = t x M
+        over_l = 1.0 / length
+        scale, turn, along, dot = over_l * over_l, inverse * over_l, h * over_l, a * k1 + b * k2
+        binormal = (
+            t[1] * kappa[2] - t[2] * kappa[1], t[2] * kappa[0] - t[0] * kappa[2], t[0] * kappa[1] - t[1] * kappa[0],
         )  # fmt: skip
-    moment, stiffness, viscosity = curvature_stress(
-        active, p, (k1, k2, 0.0), (rate[0], rate[1], 0.0), (memory[n, 0], memory[n, 1], 0.0),
-        (memory[n, 3], memory[n, 4], 0.0), (past[n, LAST], past[n, LAST + 1], 0.0), rates[3],
-    )  # fmt: skip
-    T, twist_stiffness, twist_viscosity = twist_stress(
-        active, p, tau, rate[2], memory[n, 2], memory[n, 5], past[n, LAST + 2], rates[3]
-    )
-    M1, M2 = moment[0], moment[1]
+        u = _combined(1.0, _combined(1.5 * dot, t, 2.0 * along, M), -1.5 * T, binormal)
+        u, M = (scale * u[0], scale * u[1], scale * u[2]), (scale * M[0], scale * M[1], scale * M[2])
+        half, minus = (-0.5 * M[0], -0.5 * M[1], -0.5 * M[2]), 0.5 * scale * T
+        put(W, BB, n, _entry(0, 0, t, u, half, kappa, O1, SO1, O2, SO2) - scale * dot)
+        put(W, BB + 1, n, _entry(1, 0, t, u, half, kappa, O1, SO1, O2, SO2))
+        put(W, BB + 2, n, _entry(2, 0, t, u, half, kappa, O1, SO1, O2, SO2))
+        put(W, BB + 3, n, _entry(1, 1, t, u, half, kappa, O1, SO1, O2, SO2) - scale * dot)
+        put(W, BB + 4, n, _entry(2, 1, t, u, half, kappa, O1, SO1, O2, SO2))
+        put(W, BB + 5, n, _entry(2, 2, t, u, half, kappa, O1, SO1, O2, SO2) - scale * dot)
+        put(W, BC, n, _mixed(0, 0, t, M, O1, SP1, O2, SP2))
+        put(W, BC + 1, n, _mixed(0, 1, t, M, O1, SP1, O2, SP2) - minus * t[2])
+        put(W, BC + 2, n, _mixed(0, 2, t, M, O1, SP1, O2, SP2) + minus * t[1])
+        put(W, BC + 3, n, _mixed(1, 0, t, M, O1, SP1, O2, SP2) + minus * t[2])
+        put(W, BC + 4, n, _mixed(1, 1, t, M, O1, SP1, O2, SP2))
+        put(W, BC + 5, n, _mixed(1, 2, t, M, O1, SP1, O2, SP2) - minus * t[0])
+        put(W, BC + 6, n, _mixed(2, 0, t, M, O1, SP1, O2, SP2) - minus * t[1])
+        put(W, BC + 7, n, _mixed(2, 1, t, M, O1, SP1, O2, SP2) + minus * t[0])
+        put(W, BC + 8, n, _mixed(2, 2, t, M, O1, SP1, O2, SP2))
+        put(W, CC, n, P1[0] * SP1[0] + P2[0] * SP2[0])
+        put(W, CC + 1, n, P1[1] * SP1[0] + P2[1] * SP2[0])
+        put(W, CC + 2, n, P1[2] * SP1[0] + P2[2] * SP2[0])
+        put(W, CC + 3, n, P1[1] * SP1[1] + P2[1] * SP2[1])
+        put(W, CC + 4, n, P1[2] * SP1[1] + P2[2] * SP2[1])
+        put(W, CC + 5, n, P1[2] * SP1[2] + P2[2] * SP2[2])
+        by_first = _combined(-turn * along, N, -turn * _dot(N, kappa), t)
+        put_vector(W, AB, n, _combined(1.0, _combined(A1, SO1, A2, SO2), 1.0, by_first))
+        put_vector(W, AC, n, _combined(1.0, _combined(A1, SP1, A2, SP2), turn, N))
+        put(W, AA, n, S11_ * A1 * A1 + 2.0 * S12_ * A1 * A2 + S22_ * A2 * A2 - inverse * inverse * dot)
+
+
+@law
+def _combined(x: float, a: Vector, y: float, b: Vector) -> Vector:
+    return x * a[0] + y * b[0], x * a[1] + y * b[1], x * a[2] + y * b[2]
+
+
+@law
+def _entry(
+    d: int, e: int, t: Vector, u: Vector, half: Vector, kappa: Vector, O1: Vector, SO1: Vector, O2: Vector, SO2: Vector
+) -> float:
+    """Return t u' + u t' + half kappa' + kappa half' + O1 SO1' + O2 SO2' at d, e."""
+    geometric = t[d] * u[e] + u[d] * t[e] + half[d] * kappa[e] + kappa[d] * half[e]
+    return geometric + O1[d] * SO1[e] + O2[d] * SO2[e]
+
+
+@law
+def _mixed(d: int, e: int, t: Vector, M: Vector, O1: Vector, SP1: Vector, O2: Vector, SP2: Vector) -> float:
+    """Return O1 SP1' + O2 SP2' - t M' - M t' at d, e."""
+    return O1[d] * SP1[e] + O2[d] * SP2[e] - M[d] * t[e] - t[d] * M[e]
+
+
+@leaf
+def _twist_tangent(T: Any, inverse: float, W: Any) -> None:
+    """Write the stiffness of the twist rate of each span, and its derivatives by the control points.
+
+    With stiffnesses S of the points and their places x the energy of its mean m and slope a is sum S (m + x a)^2/2, the
+    sum of those of m + LEAN a and of a alone, with LEAN = sum S x/sum S.
+    """
+    for s in range(SPANS):
+        stiff, lever = added(W, STIFF, s), over(T, LEVER, W, STIFF, s)
+        x0, x1, x2 = at(T, LEVER, s), at(T, LEVER, SPANS + s), at(T, LEVER, 2 * SPANS + s)
+        square = x0 * x0 * at(W, STIFF, s) + x1 * x1 * at(W, STIFF, SPANS + s) + x2 * x2 * at(W, STIFF, 2 * SPANS + s)
+        lean = lever / stiff if stiff != 0.0 else 0.0
+        W[OF_MEAN + s], W[LEAN + s], W[OF_SLOPE + s] = stiff, lean, square - lean * lever
+    _twist_by(0, T, inverse, W)
+    _twist_by(1, T, inverse, W)
+    _twist_by(2, T, inverse, W)
+    _twist_by(3, T, inverse, W)
+
+
+@part
+def _twist_by(i: int, T: Any, inverse: float, W: Any) -> None:
+    """Write the derivatives of the twist rates of the spans by their i-th control points."""
+    for s in range(SPANS):
+        _put_twist(i, 0, s, _twist_of(i, 0, 0, T, W, s), _twist_of(i, 0, 1, T, W, s), _twist_of(i, 0, 2, T, W, s), T, W)
+        _put_twist(i, 1, s, _twist_of(i, 1, 0, T, W, s), _twist_of(i, 1, 1, T, W, s), _twist_of(i, 1, 2, T, W, s), T, W)
+        _put_twist(i, 2, s, _twist_of(i, 2, 0, T, W, s), _twist_of(i, 2, 1, T, W, s), _twist_of(i, 2, 2, T, W, s), T, W)
+        b0, b1, b2 = at(T, FIRSTS + i, s), at(T, FIRSTS + i, SPANS + s), at(T, FIRSTS + i, 2 * SPANS + s)
+        _put_twist(i, 3, s, inverse * b0, inverse * b1, inverse * b2, T, W)
+
+
+@law
+def _twist_of(i: int, d: int, m: int, T: Any, W: Any, s: int) -> float:
+    """Return the derivative of the twist rate of point m by coordinate d of the i-th control point."""
+    n = SPANS * m + s
+    return at(T, FIRSTS + i, n) * at(W, BY_FIRST + d, n) + at(T, SECONDS + i, n) * at(W, SPIN + d, n) / at(W, LENGTH, n)
+
+
+@law
+def _put_twist(i: int, d: int, s: int, x0: float, x1: float, x2: float, T: Any, W: Any) -> None:
+    """Write the derivatives of mean and slope of a span, of those of its points."""
+    mean = at(T, SHARE, s) * x0 + at(T, SHARE, SPANS + s) * x1 + at(T, SHARE, 2 * SPANS + s) * x2
+    rise = at(T, SLOPE, s) * x0 + at(T, SLOPE, SPANS + s) * x1 + at(T, SLOPE, 2 * SPANS + s) * x2
+    W[MEAN + (4 * i + d) * SPANS + s] = mean + W[LEAN + s] * rise
+    W[RISE + (4 * i + d) * SPANS + s] = rise
+
+
+@leaf
+def _add_blocks(first: Any, count: int, group: int, T: Any, W: Any, block: Any, K: Any) -> None:
+    """Add the tangents of a group of spans to the band K (4 n, 16)."""
     for j in range(4):
-        bj, cj = w * b[j], w * c[j]
-        for d in range(3):
-            f[k + j, d] += bj * (M1 * O1[d] + M2 * O2[d]) + cj * (M1 * P1[d] + M2 * P2[d])
-        f[k + j, 3] += w * a[j] * (M1 * A1 + M2 * A2)
-    if not tangent:
-        return w * T, 0.0
-    S11 = w * (elastic * stiffness[0] + viscous * viscosity[0])
-    S22 = w * (elastic * stiffness[1] + viscous * viscosity[1])
-    S12 = w * (elastic * stiffness[3] + viscous * viscosity[3])
-    M = (M1 * m1[0] + M2 * m2[0], M1 * m1[1] + M2 * m2[1], M1 * m1[2] + M2 * m2[2])
-    N = (M1 * m2[0] - M2 * m1[0], M1 * m2[1] - M2 * m1[1], M1 * m2[2] - M2 * m1[2])  # t x M
-    dot, along = M1 * k1 + M2 * k2, _dot(N, kappa)
-    scale = w * geometric / (length * length)
-    turn = w * geometric * inverse / length
-    kb = (t[1] * kappa[2] - t[2] * kappa[1], t[2] * kappa[0] - t[0] * kappa[2], t[0] * kappa[1] - t[1] * kappa[0])
-    half = 0.5 * scale * T
-    cross = ((0.0, -half * t[2], half * t[1]), (half * t[2], 0.0, -half * t[0]), (-half * t[1], half * t[0], 0.0))
-    products = pairs[n]
-    for e in range(3):
-        # S times the derivatives by coordinate e of r' and of r''
-        SO1, SO2 = S11 * O1[e] + S12 * O2[e], S12 * O1[e] + S22 * O2[e]
-        SP1, SP2 = S11 * P1[e] + S12 * P2[e], S12 * P1[e] + S22 * P2[e]
-        for d in range(3):
-            Mt = M[d] * t[e] + t[d] * M[e]
-            by_first = 3.0 * dot * t[d] * t[e] + 2.0 * h / length * Mt - 0.5 * (M[d] * kappa[e] + kappa[d] * M[e])
-            by_first -= 1.5 * T * (kb[d] * t[e] + t[d] * kb[e])
-            if d == e:
-                by_first -= dot
-            at = 4 * e + d
-            blocks[BB, at] = scale * by_first + O1[d] * SO1 + O2[d] * SO2
-            blocks[BC, at] = cross[d][e] - scale * Mt + O1[d] * SP1 + O2[d] * SP2
-            blocks[CB, at] = -cross[d][e] - scale * Mt + P1[d] * SO1 + P2[d] * SO2
-            blocks[CC, at] = P1[d] * SP1 + P2[d] * SP2
-    add_point(blocks, products)
-    for e in range(3):
-        # S times the derivatives by coordinate e, against the angle
-        by_first = A1 * (S11 * O1[e] + S12 * O2[e]) + A2 * (S12 * O1[e] + S22 * O2[e])
-        by_second = A1 * (S11 * P1[e] + S12 * P2[e]) + A2 * (S12 * P1[e] + S22 * P2[e])
-        by_first -= turn * (h / length * N[e] + along * t[e])
-        by_second += turn * N[e]
-        for pair in range(PAIRS):
-            of = products[pair]
-            blocks[SUMS + pair, 4 * e + 3] += by_first * of[AB] + by_second * of[AC]
-            blocks[SUMS + pair, 12 + e] += by_first * of[BA] + by_second * of[CA]
-    angular = S11 * A1 * A1 + 2.0 * S12 * A1 * A2 + S22 * A2 * A2 - w * geometric * inverse * inverse * dot
-    for pair in range(PAIRS):
-        blocks[SUMS + pair, 15] += angular * products[pair, AA]
-    return w * T, w * (elastic * twist_stiffness + viscous * twist_viscosity)
+        for i in range(j, 4):
+            _block(T[i * LANES :], T[j * LANES :], W[4 * i * SPANS :], W[4 * j * SPANS :], W, block)
+            _scatter_block(i, j, first, count, group, block, K)
+
+
+@leaf
+def _block(Ti: Any, Tj: Any, Wi: Any, Wj: Any, W: Any, block: Any) -> None:
+    """Write the blocks (16 SPANS,) of the tangents of the spans between their control points i and j.
+
+    Row 4 e + d is the entry of coordinate d of i and e of j. The tables and the derivatives of the twist rate begin at
+    the rows of i and of j.
+    """
+    for s in range(SPANS):
+        _column(0, Ti, Tj, Wi, Wj, W, block, s)
+        _column(1, Ti, Tj, Wi, Wj, W, block, s)
+        _column(2, Ti, Tj, Wi, Wj, W, block, s)
+        angular = _of_angles(0, Ti, Tj, W, s) + _of_angles(1, Ti, Tj, W, s) + _of_angles(2, Ti, Tj, W, s)
+        block[15 * SPANS + s] = angular + _of_twist(3, 3, Wi, Wj, W, s)
+
+
+@law
+def _column(e: int, Ti: Any, Tj: Any, Wi: Any, Wj: Any, W: Any, block: Any, s: int) -> None:
+    """Write what a block has of coordinate e of the centreline."""
+    block[4 * e * SPANS + s] = _of_place(0, e, Ti, Tj, W, s) + _of_twist(0, e, Wi, Wj, W, s)
+    block[(4 * e + 1) * SPANS + s] = _of_place(1, e, Ti, Tj, W, s) + _of_twist(1, e, Wi, Wj, W, s)
+    block[(4 * e + 2) * SPANS + s] = _of_place(2, e, Ti, Tj, W, s) + _of_twist(2, e, Wi, Wj, W, s)
+    below = _of_angle(e, 0, Ti, Tj, W, s) + _of_angle(e, 1, Ti, Tj, W, s) + _of_angle(e, 2, Ti, Tj, W, s)
+    above = _of_angle(e, 0, Tj, Ti, W, s) + _of_angle(e, 1, Tj, Ti, W, s) + _of_angle(e, 2, Tj, Ti, W, s)
+    block[(4 * e + 3) * SPANS + s] = below + _of_twist(3, e, Wi, Wj, W, s)
+    block[(12 + e) * SPANS + s] = above + _of_twist(e, 3, Wi, Wj, W, s)
+
+
+@law
+def _of_place(d: int, e: int, Ti: Any, Tj: Any, W: Any, s: int) -> float:
+    """Return the entry of coordinates d and e of the centreline."""
+    own = _of_point(d, e, 0, Ti, Tj, W, s) + _of_point(d, e, 1, Ti, Tj, W, s)
+    return own + _of_point(d, e, 2, Ti, Tj, W, s)
+
+
+@law
+def _of_point(d: int, e: int, m: int, Ti: Any, Tj: Any, W: Any, s: int) -> float:
+    n, least = SPANS * m + s, min(d, e)
+    symmetric = least * (5 - least) // 2 + max(d, e)
+    b, c = at(Tj, FIRSTS, n), at(Tj, SECONDS, n)
+    first = at(W, BB + symmetric, n) * b + at(W, BC + 3 * d + e, n) * c
+    second = at(W, BC + 3 * e + d, n) * b + at(W, CC + symmetric, n) * c
+    return at(Ti, FIRSTS, n) * first + at(Ti, SECONDS, n) * second
+
+
+@law
+def _of_angle(e: int, m: int, Ti: Any, Tj: Any, W: Any, s: int) -> float:
+    """Return the share of point m in the entry of the angle of i and coordinate e of j."""
+    n = SPANS * m + s
+    return at(Ti, VALUES, n) * (at(W, AB + e, n) * at(Tj, FIRSTS, n) + at(W, AC + e, n) * at(Tj, SECONDS, n))
+
+
+@law
+def _of_angles(m: int, Ti: Any, Tj: Any, W: Any, s: int) -> float:
+    n = SPANS * m + s
+    return at(W, AA, n) * at(Ti, VALUES, n) * at(Tj, VALUES, n)
+
+
+@law
+def _of_twist(d: int, e: int, Wi: Any, Wj: Any, W: Any, s: int) -> float:
+    """Return what the stiffness of the twist rate adds to an entry."""
+    a, b = d * SPANS + s, e * SPANS + s
+    return W[OF_MEAN + s] * Wi[MEAN + a] * Wj[MEAN + b] + W[OF_SLOPE + s] * Wi[RISE + a] * Wj[RISE + b]
+
+
+@part
+def _scatter_block(i: int, j: int, first: Any, count: int, group: int, block: Any, K: Any) -> None:
+    """Add the blocks of a group of spans between their control points i >= j to the band K."""
+    band = K.reshape(K.size)
+    for s in range(count):
+        entries = band[64 * (first[POINTS * (SPANS * group + s)] + j) + 4 * (i - j) :]
+        if i == j:
+            for e in range(4):
+                for d in range(e, 4):
+                    entries[15 * e + d] += block[(4 * e + d) * SPANS + s]
+        else:
+            for e in range(4):
+                for d in range(4):
+                    entries[15 * e + d] += block[(4 * e + d) * SPANS + s]
 
 
 @law
@@ -370,59 +597,71 @@ def _derivatives(
 @kernel
 def remember(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h: float) -> None:
     """Carry the frames to q, note its strain, and let what yielded in a step h become memory."""
-    _remember(q, tables, active, p, memory, past, h, np.empty((len(past), SPIN)), np.empty(len(past)))
+    _remember(q, tables, active, p, memory, past, h, np.empty(_SIZE))
 
 
 @part
-def _remember(
-    q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h: float, state: Any, twists: Any
-) -> None:
-    """Do the work of `remember` in the room made there: `state` (points, SPIN) is k1, k2, t and kappa."""
-    for n in range(len(past)):
-        (state[n, 0], state[n, 1], twists[n]), t, kappa = _strain(q, tables, past, n, p[TWIST, 1])
-        for d in range(3):
-            state[n, NOW + d], state[n, KAPPA + d] = t[d], kappa[d]
-    _straighten(tables.curvature_first, tables.curvature_w, tables.curvature_u, twists)
-    for n in range(len(past)):
-        strain, t, kappa = (state[n, 0], state[n, 1], twists[n]), vector(state, n, NOW), vector(state, n, KAPPA)
-        last = vector(past, n, LAST)
-        free, _ = curvature_memory(
-            active, p, (strain[0], strain[1], 0.0), (memory[n, 0], memory[n, 1], 0.0),
-            (memory[n, 3], memory[n, 4], 0.0), (last[0], last[1], 0.0), h,
-        )  # fmt: skip
-        memory[n, 0], memory[n, 1] = free[0], free[1]
-        memory[n, 2], _ = twist_memory(active, p, strain[2], memory[n, 2], memory[n, 5], last[2], h)
-        t0 = vector(past, n, TANGENT)
-        past[n, FRAME] += twist_increment(t0, vector(past, n, BEND), t, kappa)[0]
-        director = transport(t0, t, vector(past, n, DIRECTOR))
-        for d in range(3):
-            past[n, BEFORE + d] = past[n, LAST + d]
-            past[n, LAST + d] = strain[d]
-            past[n, TANGENT + d] = t[d]
-            past[n, BEND + d] = kappa[d]
-            past[n, DIRECTOR + d] = director[d]
+def _remember(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h: float, W: Any) -> None:
+    """Do the work of `remember` in the room made there."""
+    for group in range(len(tables.curvature_lanes)):
+        _measure(q, tables, past, p[TWIST, 1], group, W)
+        _measure_bends(active, memory, group, W)
+        _note(active, p, memory, past, h, group, W)
+
+
+@leaf
+def _note(active: Any, p: Any, memory: Any, past: Any, h: float, group: int, W: Any) -> None:
+    """Do what `remember` does for a group of spans that is measured."""
+    for s in range(_count(len(past), group)):
+        for m in range(POINTS):
+            n, lane = POINTS * (SPANS * group + s) + m, SPANS * m + s
+            k1, k2, tau = at(W, K1, lane), at(W, K2, lane), at(W, TAU, lane)
+            free, _ = curvature_memory(
+                active, p, (k1, k2, 0.0), (memory[n, 0], memory[n, 1], 0.0), (memory[n, 3], memory[n, 4], 0.0),
+                (past[n, LAST], past[n, LAST + 1], 0.0), h,
+            )  # fmt: skip
+            memory[n, 0], memory[n, 1] = free[0], free[1]
+            memory[n, 2], _ = twist_memory(active, p, tau, memory[n, 2], memory[n, 5], past[n, LAST + 2], h)
+            t, kappa = vector_at(W, NOW, lane), vector_at(W, KAPPA, lane)
+            t0, k0 = vector_at(W, T0, lane), vector_at(W, K0, lane)
+            past[n, FRAME] += twist_increment(t0, k0, t, kappa)[0]
+            for d in range(3):
+                past[n, BEFORE + d] = past[n, LAST + d]
+                past[n, TANGENT + d] = t[d]
+                past[n, BEND + d] = kappa[d]
+                past[n, DIRECTOR + d] = W[(D0 + d) * LANES + lane]
+            past[n, LAST], past[n, LAST + 1], past[n, LAST + 2] = k1, k2, tau
 
 
 @kernel
 def energy(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any) -> float:
     """Return the stored energy of curvature and twist [J]."""
     total = 0.0
-    twists = _span_twists(q, tables, past, p[TWIST, 1])
-    for n in range(len(tables.curvature_w)):
-        strain, _, _ = _strain(q, tables, past, n, p[TWIST, 1])
-        free = (memory[n, 0], memory[n, 1], 0.0)
-        total += tables.curvature_w[n] * (
-            curvature_energy(active, p, (strain[0], strain[1], 0.0), free)
-            + twist_energy(active, p, twists[n], memory[n, 2])
-        )
+    W = np.empty(_SIZE)
+    for group in range(len(tables.curvature_lanes)):
+        _measure(q, tables, past, p[TWIST, 1], group, W)
+        _measure_bends(active, memory, group, W)
+        for s in range(_count(len(past), group)):
+            for m in range(POINTS):
+                n, lane = POINTS * (SPANS * group + s) + m, SPANS * m + s
+                free = (memory[n, 0], memory[n, 1], 0.0)
+                total += tables.curvature_w[n] * (
+                    curvature_energy(active, p, (at(W, K1, lane), at(W, K2, lane), 0.0), free)
+                    + twist_energy(active, p, at(W, TAU, lane), memory[n, 2])
+                )
     return total
 
 
 @kernel
 def twist_rates(states: Any, tables: Any, p: Any, frames: Any, out: Any) -> None:
     """Write the twist rate (k, points) [rad/m] of the states (k, n, 4) measured against `frames` (k, points, >= 16)."""
-    for s in range(len(states)):
-        out[s] = _span_twists(states[s], tables, frames[s], p[TWIST, 1])
+    W = np.empty(_SIZE)
+    for k in range(len(states)):
+        for group in range(len(tables.curvature_lanes)):
+            _measure(states[k], tables, frames[k], p[TWIST, 1], group, W)
+            for s in range(_count(out.shape[1], group)):
+                for m in range(POINTS):
+                    out[k, POINTS * (SPANS * group + s) + m] = at(W, TAU, SPANS * m + s)
 
 
 @kernel
