@@ -70,6 +70,12 @@ def test_the_surface_is_the_motion_of_the_rods():
     assert force.reaction.shape == (len(force.times), 3)
 
 
+def test_the_surface_keeps_what_a_gripper_holds_at_both_ends():
+    surface = predict(target(5e-3)).surface
+    held = surface.positions([GRASP.u], [0.0, surface.horizon])[:, 0]
+    np.testing.assert_allclose(held, [[0.25, 0.0, 0.0], [0.25, 0.3, 0.0]], rtol=0.0, atol=1e-9)
+
+
 def test_its_end_is_the_start_of_another_motion():
     first = predict(SCENE)
     on = replace(SCENE, shape=first.shape_at(), grasps=(), horizon=0.1)
