@@ -122,14 +122,14 @@ def test_auto_answers_with_the_march_where_the_least_squares_fails():
 
 def test_a_march_in_place_of_the_least_squares_is_held_to_its_time_spline():
     # 17 control points miss it by 8 % of the length
-    found = predict(jerked(17))
+    found = predict(jerked(17), keep_grid=True)
     assert found.accuracy.method == "march"
     assert found.status == "max_iterations"
     assert "Raise n_t" in found.message
 
 
 def test_a_time_spline_that_misses_its_march_is_not_called_converged():
-    found = predict(paper_scene(0.25, quality=march(33, 5)))
+    found = predict(paper_scene(0.25, quality=march(33, 5)), keep_grid=True)
     assert found.status == "max_iterations"
     assert "Raise n_t" in found.message
 
