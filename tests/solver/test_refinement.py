@@ -355,6 +355,16 @@ def test_two_grids_that_agree_by_chance_are_not_believed():
     assert apart(found.surface, truth.surface).max() < 2.0 * found.accuracy.error_estimate
 
 
+def test_two_coarse_grids_with_friction_that_agree_are_not_believed_alone():
+    # a bow snaps over within 0.05 s, which 40 and 80 steps both damp away: 2.7 mm apart, and both 15 mm off
+    scene = draw(31, 11).make()
+    found = predict(scene)
+    truth = predict(replace(scene, quality=Quality(target_error=5e-4 * scene.cable.length)))
+    assert found.status == truth.status == "converged"
+    assert apart(found.surface, truth.surface).max() < 6e-3  # of 1 m; within the snap, where it moves fastest
+    assert found.iterations[1].update < 0.75 * scene.quality.target_error < found.iterations[3].update
+
+
 def test_a_strongly_damped_grid_that_agrees_with_one_that_was_not_is_not_believed():
     # it errs as much as the one before, on half as many steps, did: both were 1.9 % off, 0.8 % apart
     scene = draw(18, 3213).make()
