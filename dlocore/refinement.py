@@ -184,7 +184,7 @@ class _Climb:
         if best.motion.stopped:  # its surface stands still from there on: how far that is from another tells nothing
             self.changes, self.estimate = {}, np.inf
             return
-        self.changes[self.direction] = weighed(level, best, self.changes.get(self.direction))
+        self.changes[self.direction] = weighed(level, best, self.changes.get(self.direction), not self.changes)
         self.since = {d: max(self.since.get(d, 0.0), level.change) for d in self.changes if d != self.direction}
         self.estimate = max(_error(self.changes), MISSED_COUNTS * level.missed)
         rough = self._is_rough(level)

@@ -47,13 +47,15 @@ class Change(NamedTuple):
         return moved * max(self.left, min(to_come, _MOST_LEFT))
 
 
-def weighed(level: Level, before: Level, last: Change | None) -> Change:
+def weighed(level: Level, before: Level, last: Change | None, first: bool = False) -> Change:
     """Return the change from one level to the next, which has more steps, more control points or both.
 
     Args:
         level: the finer one.
         before: the coarser one.
         last: the change of the refinement before in the same direction.
+        first: nothing is known yet of whether changes shrink. Where steps may err by first order they may not on coarse
+            grids, and two of these agree by chance.
     """
     moved_before = np.inf if last is None else last.moved
     more = (len(level.motion.times) - 1) / (len(before.motion.times) - 1)
@@ -63,4 +65,5 @@ def weighed(level: Level, before: Level, last: Change | None) -> Change:
     counts = max(1.0, 3.0 / (more**2 - 1.0))
     damped, was_damped = (x.motion.rho == STRONGLY_DAMPED for x in (level, before))
     fall = _MOST_FALL_DAMPED if damped and not was_damped else _MOST_FALL
-    return Change(counts * level.change, moved_before, _LEFT_KINKED if level.motion.kinked else _LEFT, fall)
+    left = _MOST_LEFT if first else _LEFT_KINKED
+    return Change(counts * level.change, moved_before, left if level.motion.kinked else _LEFT, fall)

@@ -110,7 +110,7 @@ def test_a_prediction_without_a_march_or_without_an_answer_is_no_start(paper):
         environment=WEIGHTLESS,
         grasps=(Grasp(u=0.0), Grasp(u=1.0, path=Move(displacement=(-0.3, 0.0, 0.0), duration=1.0))),
     )
-    torn = predict(pushed)
+    torn = predict(pushed, keep_grid=True)
     assert torn.status != "converged"
     assert "did not converge" in predict(pushed, like=torn).message
 

@@ -17,9 +17,9 @@ def _paper(release: float | None = None, **quality: Any) -> Scene:
     )
 
 
-@case("numbers", "the error is told", end="told")
+@case("numbers", "all laws, on finer grids")
 def smallest_grid() -> Scene:
-    """5 by 5 control points."""
+    """5 by 5 control points: their time spline misses the march by 2.6 % of the length."""
     return _paper(n_u=5, n_t=5, method="march")
 
 
