@@ -20,6 +20,7 @@ def predict_many(
     threads: int | None = None,
     deadline: float | None = None,
     cancelled: Callable[[], bool] | None = None,
+    keep_grid: bool = False,
 ) -> list[Prediction | SceneError]:
     """Predict the motions of many scenes, each as `predict` would, bit for bit.
 
@@ -31,6 +32,7 @@ def predict_many(
         threads: solves at once; by default as many as there are processors for this process.
         deadline: time allowed for each scene [s], as in `predict`.
         cancelled: asked between iterations of every solve; where it returns True all stop.
+        keep_grid: answer on given grids also where they can't show the motion, as in `predict`.
 
     Returns:
         For each scene, in order, its prediction, or the error that says why it can't be solved as it was given.
@@ -50,7 +52,7 @@ def predict_many(
 
     def solve(scene: Scene) -> Prediction | SceneError:
         try:
-            return predict(scene, like=like, deadline=deadline, cancelled=stopped)
+            return predict(scene, like=like, deadline=deadline, cancelled=stopped, keep_grid=keep_grid)
         except SceneError as error:
             return error
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from benchmarks.hard.generator import draw
 from dlocore import (
     Cable,
     Cancelled,
@@ -112,3 +113,12 @@ def test_a_deadline_is_that_of_each_scene():
     for one in late:
         assert isinstance(one, Prediction)
         assert one.status == "time_limit"
+
+
+def test_grids_are_kept_where_that_is_asked_for():
+    given = draw(8, 277).make()  # a time spline of 10 control points can't show its motion
+    left, kept = (predict_many([given], keep_grid=keep)[0] for keep in (False, True))
+    assert isinstance(left, Prediction)
+    assert isinstance(kept, Prediction)
+    assert kept.accuracy.n_t == given.quality.n_t < left.accuracy.n_t
+    assert kept.status != left.status == "converged"
