@@ -289,7 +289,7 @@ class Quality:
     Args:
         n_u: control points along the cable, 5 to 129.
         n_t: control points in time, 5 to 513. Where such a grid can't show the motion finer ones are solved, and where
-            these do, they are the answer, which says so; `predict(..., keep_grid=True)` does without.
+            these do, they are the answer, which says so; `keep_grid=True` of `predict` does without.
         delta: the paper's threshold on the norm of the control-point update, eq. (25) [m], 1e-10 to 1e-2.
         method: "march", "spacetime", "paper", "reference" (docs/reference.md), or "auto": `spacetime` where the grid is
             given, else `march`.
