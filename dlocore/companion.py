@@ -70,8 +70,8 @@ def _marched(problem: Problem, size: Size, level: Level, monitor: Monitor) -> tu
         return None, ""
     try:
         monitor.check()
-        other = run_level(problem, *size, monitor, booked=False, like=level.motion.grid)
+        other = run_level(problem, *size, monitor, booked=False, like=level.motion.grid, whole=True)
     except TimeIsUp:
         return None, _TOO_LATE
     monitor.phase("estimate")
-    return (None, _TOO_LATE) if other.motion.stopped == "time" else (other, "")
+    return other, ""

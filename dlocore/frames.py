@@ -15,7 +15,7 @@ from dlocore.kernels.timefit import fit_time
 from dlocore.kernels.twisted import over_spans, twist_rates
 from dlocore.prediction import MaterialMotion
 from dlocore.problem import Problem
-from dlocore.spline import SplineSurface, design_matrix
+from dlocore.spline import DEGREE, SplineSurface, design_matrix
 from dlocore.transport import transported
 
 Floats = NDArray[np.float64]
@@ -82,8 +82,9 @@ def free_control(problem: Problem, grid: Grid, knots_t: Floats, control: Floats,
         log: those frames at the times (k, points, >= 16).
     """
     assert problem.twist is not None
-    over = design_matrix(knots_t, times)
-    states = np.tensordot(over, control, axes=1)
+    from scipy.interpolate import BSpline  # slow to import, and not needed without twist
+
+    states = BSpline(knots_t, control, DEGREE)(times)
     theta = free_of_frames(problem, grid, states, log)[:, :, 3]
     starved = _starved(knots_t, times)
     if len(starved):

@@ -8,7 +8,7 @@ from dlocore.prediction import Status
 from dlocore.problem import Problem
 from dlocore.progress import record_level
 from dlocore.solvers.ladder import Level, Size, given_steps
-from dlocore.solvers.monitor import Monitor
+from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.timefit import evened, fit, largest
 from dlocore.whole_march import is_folded, march_level, march_status
 
@@ -25,14 +25,15 @@ def march_given(problem: Problem, n_u: int, n_t: int, monitor: Monitor) -> Level
     """
     size = Size(n_u, n_t, given_steps(n_t))
     first = level = march_level(problem, size, monitor)
-    if march_status(level.problem, level)[0] == "converged":
+    if march_status(level.problem, level)[0] in ("converged", "time_limit"):
         return level
     shown = first
     for more, watch in _OTHERWISE:
-        if level.motion.stopped == "time":
-            break
         record_level(level.problem, level, monitor)
-        level = march_level(problem, size._replace(steps=more * size.steps), monitor, watch=watch)
+        try:
+            level = march_level(problem, size._replace(steps=more * size.steps), monitor, watch=watch, whole=True)
+        except TimeIsUp:
+            break
         note = f"{level.size.steps} steps" + (", watched at more points" if watch else "")
         level = replace(level, note=note, mended=_said(first, size.steps, watch))
         status = given_status(evenly_fitted(level))[0]

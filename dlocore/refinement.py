@@ -157,7 +157,10 @@ class _Climb:
         before = self.best
         if before is not None:
             self.monitor.check()
-        level = march_level(self.problem, size, self.monitor, self.rho, free_knots=True, rough=True, before=before)
+        level = march_level(
+            self.problem, size, self.monitor, self.rho, free_knots=True, rough=True, before=before,
+            whole=before is not None,
+        )  # fmt: skip
         if before is not None and level.posed is self.problem:
             level = replace(level, change=distance(before, level, self.problem))
             if not self._is_rough(level):  # so strands do not meet because of the grid
@@ -175,7 +178,7 @@ class _Climb:
         if not _is_worse(level, best):
             return None
         self.failures += 1
-        if self.failures > _FAILURES or level.motion.stopped == "time" or self.budget < np.inf:
+        if self.failures > _FAILURES or self.budget < np.inf:
             return None
         return self._affordable(_finer(size, "space" if is_folded(best) else "time", True))
 
@@ -263,9 +266,13 @@ class _Climb:
         """
         if not (is_folded(level) and self.estimate <= ACCEPT * self.target and self.budget == np.inf):
             return None
-        other = march_level(
-            self.problem, size, self.monitor, self.rho, free_knots=True, rough=True, before=level, watch=True
-        )
+        try:
+            other = march_level(
+                self.problem, size, self.monitor, self.rho, free_knots=True, rough=True, before=level, watch=True,
+                whole=True,
+            )  # fmt: skip
+        except TimeIsUp:
+            return None
         away = distance(level, other, self.problem)
         if other.posed is not self.problem or march_status(self.problem, other)[0] != "converged":
             return None

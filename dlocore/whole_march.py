@@ -41,6 +41,7 @@ def march_level(
     known: Level | None = None,
     before: Level | None = None,
     watch: bool = False,
+    whole: bool = False,
 ) -> Level:
     """March on one grid; where the motion calls for effects that were left out, again with them.
 
@@ -48,6 +49,10 @@ def march_level(
     whether they do is left open. A march of this grid that is `known` is done again only for that. Contact begins as
     stiff as the level `before` had to make it, strains are believed that are not far above its own, and a start that is
     to settle does so from its start. With `watch` the cable can't fold within a span, see `run_level`.
+
+    Raises:
+        Cancelled: the caller asked to stop.
+        TimeIsUp: the deadline passed, where the march had to be `whole`.
     """
     called = dict(problem.called_for)
     while True:
@@ -58,7 +63,7 @@ def march_level(
             stiffness, credible, like = hardness(before), credible_after(before), before.motion.grid
         level = known or run_level(
             problem, *size, monitor, rho=rho, free_knots=free_knots, hardness=stiffness, credible=credible,
-            watch=watch, like=like,
+            watch=watch, like=like, whole=whole,
         )  # fmt: skip
         if known is not None:
             new, known = called_for_by_fine(level), None

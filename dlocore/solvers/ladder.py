@@ -114,6 +114,7 @@ def run_level(
     grid: Grid | None = None,
     like: Grid | None = None,
     knots_t: Floats | None = None,
+    whole: bool = False,
 ) -> Level:
     """March on one grid and fit the time spline.
 
@@ -130,6 +131,11 @@ def run_level(
         grid: with the start on it, where it is known.
         like: another of the same problem, from whose start that of this one is settled.
         knots_t: time knots to begin with, where they are known.
+        whole: whether a march that the deadline ends is of no use.
+
+    Raises:
+        Cancelled: the caller asked to stop.
+        TimeIsUp: the deadline passed, where it had to be `whole`.
     """
     posed = problem
     if hardness > 1.0:
@@ -143,10 +149,10 @@ def run_level(
     if booked:
         monitor.phase("setup")
     plain = None if grid.watched else march_smooth(problem, grid, steps, knots_t, monitor, rho)
-    motion = march(problem, grid, steps, monitor, rho=rho) if plain is None else plain[0]
+    motion = march(problem, grid, steps, monitor, rho=rho, whole=whole) if plain is None else plain[0]
     if hardness > 1.0 and motion.stopped == "step":  # too stiff for this grid
         problem = posed
-        motion = march(problem, grid, steps, monitor, rho=rho)
+        motion = march(problem, grid, steps, monitor, rho=rho, whole=whole)
     allowed = DEEPEST * problem.scene.cable.diameter
     for _ in range(_STIFFER):
         if motion.stopped == "time" or motion.deepest <= allowed:
@@ -154,13 +160,14 @@ def run_level(
         if motion.stopped and problem.self_contact is None:
             break  # a soft contact may be why strands got through each other, and the march ended
         harder = stiffer_for(problem, motion.deepest)
-        again = march(harder, grid, steps, monitor, rho=rho)
+        again = march(harder, grid, steps, monitor, rho=rho, whole=whole)
         if (again.reached, -again.deepest) < (motion.reached, -_YIELDING * motion.deepest):
             break  # what is this deep was not pushed in
         problem, motion = harder, again
     doubtful = motion.stopped == "step" or motion.largest_strain > credible
     if doubtful and (rho > STRONGLY_DAMPED or motion.stopped == "step"):
-        again = march(problem, grid, steps, monitor, rho=RHO if rho == STRONGLY_DAMPED else STRONGLY_DAMPED)
+        other_rho = RHO if rho == STRONGLY_DAMPED else STRONGLY_DAMPED
+        again = march(problem, grid, steps, monitor, rho=other_rho, whole=whole)
         less = TEARS * again.largest_strain < motion.largest_strain
         if again.reached > motion.reached or (again.reached == motion.reached and less):
             motion = again

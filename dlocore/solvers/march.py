@@ -152,11 +152,22 @@ class March:
         return start._replace(memory=memory, past=np.ascontiguousarray(past), axial=axial)
 
 
-def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: float = RHO) -> March:
+def march(
+    problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: float = RHO, whole: bool = False
+) -> March:
     """March the motion of a problem on `grid` in about `steps` equal steps, more where events lie close.
+
+    Args:
+        problem: what is solved.
+        grid: its space discretisation, with the start on it.
+        steps: time steps.
+        monitor: that of the solve.
+        rho: spectral radius.
+        whole: whether a march that the deadline ends is of no use: there is an answer that it was to better.
 
     Raises:
         Cancelled: the caller asked to stop.
+        TimeIsUp: the deadline passed, where it had to be `whole`.
     """
     marks = marks_of(problem)
     counts = step_counts(marks, steps)
@@ -167,6 +178,8 @@ def march(problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: fl
     first = 0
     for begin, end, count in zip(marks[:-1], marks[1:], counts, strict=True):
         walk.go(begin, end, first, first + count)
+        if whole and walk.stopped == "time":
+            raise TimeIsUp
         if walk.stopped:
             break
         first += count
