@@ -17,7 +17,8 @@ from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, Tables, build_table
 from dlocore.kernels.entry import remember_start
 from dlocore.kernels.relax import relax
 from dlocore.kernels.tension import COLUMNS
-from dlocore.kernels.twisted import DIRECTOR, PAST, start_frames
+from dlocore.kernels.twisted import start_frames
+from dlocore.kernels.twisted_rows import DIRECTOR, PAST
 from dlocore.paths import Waypoints
 from dlocore.plane import leftwards
 from dlocore.problem import Problem

@@ -28,6 +28,7 @@ from dlocore.kernels.banded import clear
 from dlocore.kernels.basis import row_of
 from dlocore.kernels.compile import kernel, leaf
 from dlocore.kernels.strain import space_curvature
+from dlocore.kernels.twisted_rows import PAST
 
 PAST_IN_PLANE, PAST_IN_SPACE = 2, 9  # columns of `History.past`, in space without twist
 MEMORY_IN_PLANE, MEMORY_IN_SPACE = 2, 6  # columns of `History.memory`
@@ -150,7 +151,7 @@ def note(axes: Any, history: Any, out: Any) -> None:
 
     Rows beyond the curvature points hold the stress-free axial strain in their first column.
     """
-    frames = twisted.PAST if len(axes) == 4 else 0
+    frames = PAST if len(axes) == 4 else 0
     points = len(history.memory)
     for n in range(points, len(out)):
         out[n, 0] = history.axial[n - points, 0]

@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.effects.base import Vector
 from dlocore.effects.laws import (
     BENDING_MEMORY,
     DAMPING,
@@ -55,40 +54,54 @@ from dlocore.kernels.lanes import (
 )
 from dlocore.kernels.space import combine
 from dlocore.kernels.strain import space_curvature, transport, twist_increment
+from dlocore.kernels.strands import dot
+from dlocore.kernels.twisted_rows import (
+    ALONG,
+    ANGLE,
+    B1,
+    B2,
+    BEFORE,
+    BEND,
+    BY_FIRST,
+    COS,
+    D0,
+    DIRECTOR,
+    FRAME,
+    G0,
+    G1,
+    G2,
+    HANDED,
+    K0,
+    K1,
+    K2,
+    KAPPA,
+    LAST,
+    LENGTH,
+    M1,
+    M2,
+    NOW,
+    R1,
+    R2,
+    RATE,
+    S11,
+    S12,
+    S22,
+    SIN,
+    SIZE,
+    SPIN,
+    STIFF,
+    T0,
+    TANGENT,
+    TAU,
+    TORQUE,
+    F,
+    Q,
+    count_of,
+    derivatives,
+)
+from dlocore.kernels.twisted_tangent import add_blocks, tangent_of, twist_tangent
 
-TANGENT, BEND, DIRECTOR, FRAME, LAST, BEFORE = 0, 3, 6, 9, 10, 13  # columns of `past`
-TWIST_RATE = LAST + 2
-PAST = 16
 _STEPS = 8  # of the transport along the cable between two curvature points
-# Rows of W, of numbers of points. What they are measured against: t0, k0, director, which is carried to t, theta;
-# r', r''; the strain: |r'|, t . r'', t, kappa, spin, derivative of the twist rate by r', cos and sin of theta, the
-# directors of the section, k1, k2, twist rate, their rates.
-T0, K0, D0, ANGLE, R1, R2 = 0, 3, 6, 9, 10, 13
-LENGTH, ALONG, NOW, KAPPA, SPIN, BY_FIRST = 16, 17, 18, 21, 24, 27
-COS, SIN, M1, M2, K1, K2, TAU, RATE = 30, 31, 32, 35, 38, 39, 40, 41
-# Stress, times weights: moments, torque, and the torque that the smoothing of the twist rate hands on to a point;
-# forces by r', r'' and theta; stiffness of k1 and k2 and of the twist rate.
-B1, B2, TORQUE, HANDED, G1, G2, G0, S11, S22, S12, STIFF = 44, 45, 46, 47, 48, 51, 54, 55, 56, 57, 58
-# The tangent of a point, by r' (B), r'' (C) and theta (A): BB and CC are symmetric, (xx, xy, xz, yy, yz, zz).
-BB, BC, CC, AB, AC, AA = 59, 65, 74, 80, 83, 86
-_ROWS = 87
-# Places in W of the first numbers of spans: control points and forces by coordinate, and the twist rate in its span, as
-# mean and slope that are independent: their stiffnesses and their derivatives by the control points.
-Q, F = _ROWS * LANES, _ROWS * LANES + 16 * SPANS
-OF_MEAN, OF_SLOPE, LEAN = F + 16 * SPANS, F + 17 * SPANS, F + 18 * SPANS
-MEAN, RISE = F + 19 * SPANS, F + 35 * SPANS
-_SIZE = F + 51 * SPANS
-
-
-@law
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@law
-def _count(points: int, group: int) -> int:
-    """Return how many spans a group has."""
-    return min(SPANS, points // POINTS - SPANS * group)
 
 
 @part
@@ -103,7 +116,7 @@ def _measure(q: Any, tables: Any, past: Any, inverse: float, group: int, W: Any)
 @leaf
 def _gather(q: Any, first: Any, past: Any, group: int, W: Any) -> None:
     """Copy the control points q (n, 4) of a group of spans, and the frames of the last step, to their places."""
-    count = _count(len(past), group)
+    count = count_of(len(past), group)
     for s in range(SPANS):
         n = POINTS * (SPANS * group + min(s, count - 1))
         for i in range(4):
@@ -146,7 +159,7 @@ def _bend(W: Any) -> None:
         length, h, t, kappa = space_curvature(vector_at(W, R1, n), vector_at(W, R2, n))
         increment, spin, by_t = twist_increment(vector_at(W, T0, n), vector_at(W, K0, n), t, kappa)
         inverse = 1.0 / length
-        turned, along = _dot(by_t, t) + _dot(spin, kappa), h * inverse
+        turned, along = dot(by_t, t) + dot(spin, kappa), h * inverse
         by_first = (
             (by_t[0] - turned * t[0] - along * spin[0]) * inverse,
             (by_t[1] - turned * t[1] - along * spin[1]) * inverse,
@@ -177,7 +190,7 @@ def _measure_bends(active: Any, memory: Any, group: int, W: Any) -> None:
     Sections that bend alike in all directions, and do not resist its rate, have any directors.
     """
     turns = bool(active[DAMPING] or active[BENDING_MEMORY])
-    for s in range(_count(len(memory), group)):
+    for s in range(count_of(len(memory), group)):
         for m in range(POINTS):
             n, lane = POINTS * (SPANS * group + s) + m, SPANS * m + s
             c, r = 1.0, 0.0
@@ -200,8 +213,8 @@ def _direct(W: Any) -> None:
         put_vector(W, D0, n, d)
         put_vector(W, M1, n, m1)
         put_vector(W, M2, n, m2)
-        put(W, K1, n, _dot(kappa, m1))
-        put(W, K2, n, _dot(kappa, m2))
+        put(W, K1, n, dot(kappa, m1))
+        put(W, K2, n, dot(kappa, m2))
 
 
 def over_spans(tables: Any) -> Any:
@@ -229,7 +242,7 @@ def curvature(
     control points. The geometric part is that at the carried frame: what the carrying adds vanishes with the step.
     """
     _add_curvature(
-        q, v, tables, active, p, memory, past, rates, scales, tangent, np.empty(_SIZE), np.empty(16 * SPANS), f, K
+        q, v, tables, active, p, memory, past, rates, scales, tangent, np.empty(SIZE), np.empty(16 * SPANS), f, K
     )
 
 
@@ -251,17 +264,17 @@ def _add_curvature(
             _rate_by_velocity(v, tables, inverse, group, W)
         _stress(active, p, memory, past, rates, scales, damped, group, T, W)
         _force(T, inverse, W)
-        _scatter_force(first, _count(len(past), group), group, W, f)
+        _scatter_force(first, count_of(len(past), group), group, W, f)
         if tangent:
-            _tangent(inverse, scales[2], W)
-            _twist_tangent(T, inverse, W)
-            _add_blocks(first, _count(len(past), group), group, T, W, block, K)
+            tangent_of(inverse, scales[2], W)
+            twist_tangent(T, inverse, W)
+            add_blocks(first, count_of(len(past), group), group, T, W, block, K)
 
 
 @leaf
 def _rate_by_steps(past: Any, rates: Any, group: int, W: Any) -> None:
     """Write the rates of k1, k2 and twist as the combination `rates` of their values now and at the last steps."""
-    for s in range(_count(len(past), group)):
+    for s in range(count_of(len(past), group)):
         for m in range(POINTS):
             n, lane = POINTS * (SPANS * group + s) + m, SPANS * m + s
             now = (at(W, K1, lane), at(W, K2, lane), at(W, TAU, lane))
@@ -275,18 +288,18 @@ def _rate_by_steps(past: Any, rates: Any, group: int, W: Any) -> None:
 def _rate_by_velocity(v: Any, tables: Any, inverse: float, group: int, W: Any) -> None:
     """Write the rates of k1, k2 and twist that the velocity v (n, 4) makes."""
     first = tables.curvature_first
-    for s in range(_count(len(first), group)):
+    for s in range(count_of(len(first), group)):
         for m in range(POINTS):
             n, lane = POINTS * (SPANS * group + s) + m, SPANS * m + s
             k, b = first[n], row_of(tables.curvature_b1, n)
             a, c = combine(v, k, b), combine(v, k, row_of(tables.curvature_b2, n))
             length, h, k1, k2 = at(W, LENGTH, lane), at(W, ALONG, lane), at(W, K1, lane), at(W, K2, lane)
             t, spin = vector_at(W, NOW, lane), vector_at(W, SPIN, lane)
-            O1, P1 = _derivatives(length, h, vector_at(W, M1, lane), k2, spin, -k1, t)
-            O2, P2 = _derivatives(length, h, vector_at(W, M2, lane), -k1, spin, -k2, t)
+            O1, P1 = derivatives(length, h, vector_at(W, M1, lane), k2, spin, -k1, t)
+            O2, P2 = derivatives(length, h, vector_at(W, M2, lane), -k1, spin, -k2, t)
             turn, twisting = inverse * _angle(v, k, row_of(tables.body_b0, n)), inverse * _angle(v, k, b)
-            twisting += _dot(vector_at(W, BY_FIRST, lane), a) + _dot(spin, c) / length
-            rate = (_dot(O1, a) + _dot(P1, c) + k2 * turn, _dot(O2, a) + _dot(P2, c) - k1 * turn, twisting)
+            twisting += dot(vector_at(W, BY_FIRST, lane), a) + dot(spin, c) / length
+            rate = (dot(O1, a) + dot(P1, c) + k2 * turn, dot(O2, a) + dot(P2, c) - k1 * turn, twisting)
             put_vector(W, RATE, lane, rate)
     _smooth(tables.curvature_lanes[group], RATE + 2, W)
 
@@ -302,7 +315,7 @@ def _stress(
 ) -> None:
     """Write moments, torques and their derivatives by the strain, all times the weights of the points."""
     elastic, viscous = scales[0], rates[0] if scales[1] != 0.0 and rates[0] != 0.0 else scales[1]
-    for s in range(_count(len(past), group)):
+    for s in range(count_of(len(past), group)):
         for m in range(POINTS):
             n, lane = POINTS * (SPANS * group + s) + m, SPANS * m + s
             w, rate = at(T, WEIGHT, lane), vector_at(W, RATE, lane) if damped else (0.0, 0.0, 0.0)
@@ -335,12 +348,12 @@ def _force(T: Any, inverse: float, W: Any) -> None:
         a, b, torque, k1, k2 = at(W, B1, n), at(W, B2, n), at(W, HANDED, n), at(W, K1, n), at(W, K2, n)
         m1, m2, by_first = vector_at(W, M1, n), vector_at(W, M2, n), vector_at(W, BY_FIRST, n)
         t, spin, over_l = vector_at(W, NOW, n), vector_at(W, SPIN, n), 1.0 / at(W, LENGTH, n)
-        along, turn, dot = at(W, ALONG, n) * over_l, a * k2 - b * k1, a * k1 + b * k2
+        along, turn, work = at(W, ALONG, n) * over_l, a * k2 - b * k1, a * k1 + b * k2
         M = (a * m1[0] + b * m2[0], a * m1[1] + b * m2[1], a * m1[2] + b * m2[2])
         g1 = (
-            (turn * spin[0] - dot * t[0] - along * M[0]) * over_l + torque * by_first[0],
-            (turn * spin[1] - dot * t[1] - along * M[1]) * over_l + torque * by_first[1],
-            (turn * spin[2] - dot * t[2] - along * M[2]) * over_l + torque * by_first[2],
+            (turn * spin[0] - work * t[0] - along * M[0]) * over_l + torque * by_first[0],
+            (turn * spin[1] - work * t[1] - along * M[1]) * over_l + torque * by_first[1],
+            (turn * spin[2] - work * t[2] - along * M[2]) * over_l + torque * by_first[2],
         )
         put_vector(W, G1, n, g1)
         put(W, G2, n, (M[0] + torque * spin[0]) * over_l)
@@ -374,230 +387,10 @@ def _scatter_force(first: Any, count: int, group: int, W: Any, f: Any) -> None:
                 f[k + i, d] += W[F + (4 * i + d) * SPANS + s]
 
 
-@leaf
-def _tangent(inverse: float, geometric: float, W: Any) -> None:
-    """Write the tangents of the points by r', r'' and theta, but for the stiffness of the twist rate."""
-    for n in range(LANES):
-        length, h, k1, k2 = at(W, LENGTH, n), at(W, ALONG, n), at(W, K1, n), at(W, K2, n)
-        t, kappa, spin = vector_at(W, NOW, n), vector_at(W, KAPPA, n), vector_at(W, SPIN, n)
-        m1, m2 = vector_at(W, M1, n), vector_at(W, M2, n)
-        S11_, S22_, S12_ = at(W, S11, n), at(W, S22, n), at(W, S12, n)
-        a, b, T = geometric * at(W, B1, n), geometric * at(W, B2, n), geometric * at(W, TORQUE, n)
-        O1, P1 = _derivatives(length, h, m1, k2, spin, -k1, t)
-        O2, P2 = _derivatives(length, h, m2, -k1, spin, -k2, t)
-        A1, A2 = inverse * k2, -inverse * k1
-        SO1, SO2 = _combined(S11_, O1, S12_, O2), _combined(S12_, O1, S22_, O2)
-        SP1, SP2 = _combined(S11_, P1, S12_, P2), _combined(S12_, P1, S22_, P2)
-        M, N = _combined(a, m1, b, m2), _combined(a, m2, -b, m1)  # N = t x M
-        over_l = 1.0 / length
-        scale, turn, along, dot = over_l * over_l, inverse * over_l, h * over_l, a * k1 + b * k2
-        binormal = (
-            t[1] * kappa[2] - t[2] * kappa[1], t[2] * kappa[0] - t[0] * kappa[2], t[0] * kappa[1] - t[1] * kappa[0],
-        )  # fmt: skip
-        u = _combined(1.0, _combined(1.5 * dot, t, 2.0 * along, M), -1.5 * T, binormal)
-        u, M = (scale * u[0], scale * u[1], scale * u[2]), (scale * M[0], scale * M[1], scale * M[2])
-        half, minus = (-0.5 * M[0], -0.5 * M[1], -0.5 * M[2]), 0.5 * scale * T
-        put(W, BB, n, _entry(0, 0, t, u, half, kappa, O1, SO1, O2, SO2) - scale * dot)
-        put(W, BB + 1, n, _entry(1, 0, t, u, half, kappa, O1, SO1, O2, SO2))
-        put(W, BB + 2, n, _entry(2, 0, t, u, half, kappa, O1, SO1, O2, SO2))
-        put(W, BB + 3, n, _entry(1, 1, t, u, half, kappa, O1, SO1, O2, SO2) - scale * dot)
-        put(W, BB + 4, n, _entry(2, 1, t, u, half, kappa, O1, SO1, O2, SO2))
-        put(W, BB + 5, n, _entry(2, 2, t, u, half, kappa, O1, SO1, O2, SO2) - scale * dot)
-        put(W, BC, n, _mixed(0, 0, t, M, O1, SP1, O2, SP2))
-        put(W, BC + 1, n, _mixed(0, 1, t, M, O1, SP1, O2, SP2) - minus * t[2])
-        put(W, BC + 2, n, _mixed(0, 2, t, M, O1, SP1, O2, SP2) + minus * t[1])
-        put(W, BC + 3, n, _mixed(1, 0, t, M, O1, SP1, O2, SP2) + minus * t[2])
-        put(W, BC + 4, n, _mixed(1, 1, t, M, O1, SP1, O2, SP2))
-        put(W, BC + 5, n, _mixed(1, 2, t, M, O1, SP1, O2, SP2) - minus * t[0])
-        put(W, BC + 6, n, _mixed(2, 0, t, M, O1, SP1, O2, SP2) - minus * t[1])
-        put(W, BC + 7, n, _mixed(2, 1, t, M, O1, SP1, O2, SP2) + minus * t[0])
-        put(W, BC + 8, n, _mixed(2, 2, t, M, O1, SP1, O2, SP2))
-        put(W, CC, n, P1[0] * SP1[0] + P2[0] * SP2[0])
-        put(W, CC + 1, n, P1[1] * SP1[0] + P2[1] * SP2[0])
-        put(W, CC + 2, n, P1[2] * SP1[0] + P2[2] * SP2[0])
-        put(W, CC + 3, n, P1[1] * SP1[1] + P2[1] * SP2[1])
-        put(W, CC + 4, n, P1[2] * SP1[1] + P2[2] * SP2[1])
-        put(W, CC + 5, n, P1[2] * SP1[2] + P2[2] * SP2[2])
-        by_first = _combined(-turn * along, N, -turn * _dot(N, kappa), t)
-        put_vector(W, AB, n, _combined(1.0, _combined(A1, SO1, A2, SO2), 1.0, by_first))
-        put_vector(W, AC, n, _combined(1.0, _combined(A1, SP1, A2, SP2), turn, N))
-        put(W, AA, n, S11_ * A1 * A1 + 2.0 * S12_ * A1 * A2 + S22_ * A2 * A2 - inverse * inverse * dot)
-
-
-@law
-def _combined(x: float, a: Vector, y: float, b: Vector) -> Vector:
-    return x * a[0] + y * b[0], x * a[1] + y * b[1], x * a[2] + y * b[2]
-
-
-@law
-def _entry(
-    d: int, e: int, t: Vector, u: Vector, half: Vector, kappa: Vector, O1: Vector, SO1: Vector, O2: Vector, SO2: Vector
-) -> float:
-    """Return t u' + u t' + half kappa' + kappa half' + O1 SO1' + O2 SO2' at d, e."""
-    geometric = t[d] * u[e] + u[d] * t[e] + half[d] * kappa[e] + kappa[d] * half[e]
-    return geometric + O1[d] * SO1[e] + O2[d] * SO2[e]
-
-
-@law
-def _mixed(d: int, e: int, t: Vector, M: Vector, O1: Vector, SP1: Vector, O2: Vector, SP2: Vector) -> float:
-    """Return O1 SP1' + O2 SP2' - t M' - M t' at d, e."""
-    return O1[d] * SP1[e] + O2[d] * SP2[e] - M[d] * t[e] - t[d] * M[e]
-
-
-@leaf
-def _twist_tangent(T: Any, inverse: float, W: Any) -> None:
-    """Write the stiffness of the twist rate of each span, and its derivatives by the control points.
-
-    With stiffnesses S of the points and their places x the energy of its mean m and slope a is sum S (m + x a)^2/2, the
-    sum of those of m + LEAN a and of a alone, with LEAN = sum S x/sum S.
-    """
-    for s in range(SPANS):
-        stiff, lever = added(W, STIFF, s), over(T, LEVER, W, STIFF, s)
-        x0, x1, x2 = at(T, LEVER, s), at(T, LEVER, SPANS + s), at(T, LEVER, 2 * SPANS + s)
-        square = x0 * x0 * at(W, STIFF, s) + x1 * x1 * at(W, STIFF, SPANS + s) + x2 * x2 * at(W, STIFF, 2 * SPANS + s)
-        lean = lever / stiff if stiff != 0.0 else 0.0
-        W[OF_MEAN + s], W[LEAN + s], W[OF_SLOPE + s] = stiff, lean, square - lean * lever
-    _twist_by(0, T, inverse, W)
-    _twist_by(1, T, inverse, W)
-    _twist_by(2, T, inverse, W)
-    _twist_by(3, T, inverse, W)
-
-
-@part
-def _twist_by(i: int, T: Any, inverse: float, W: Any) -> None:
-    """Write the derivatives of the twist rates of the spans by their i-th control points."""
-    for s in range(SPANS):
-        _put_twist(i, 0, s, _twist_of(i, 0, 0, T, W, s), _twist_of(i, 0, 1, T, W, s), _twist_of(i, 0, 2, T, W, s), T, W)
-        _put_twist(i, 1, s, _twist_of(i, 1, 0, T, W, s), _twist_of(i, 1, 1, T, W, s), _twist_of(i, 1, 2, T, W, s), T, W)
-        _put_twist(i, 2, s, _twist_of(i, 2, 0, T, W, s), _twist_of(i, 2, 1, T, W, s), _twist_of(i, 2, 2, T, W, s), T, W)
-        b0, b1, b2 = at(T, FIRSTS + i, s), at(T, FIRSTS + i, SPANS + s), at(T, FIRSTS + i, 2 * SPANS + s)
-        _put_twist(i, 3, s, inverse * b0, inverse * b1, inverse * b2, T, W)
-
-
-@law
-def _twist_of(i: int, d: int, m: int, T: Any, W: Any, s: int) -> float:
-    """Return the derivative of the twist rate of point m by coordinate d of the i-th control point."""
-    n = SPANS * m + s
-    return at(T, FIRSTS + i, n) * at(W, BY_FIRST + d, n) + at(T, SECONDS + i, n) * at(W, SPIN + d, n) / at(W, LENGTH, n)
-
-
-@law
-def _put_twist(i: int, d: int, s: int, x0: float, x1: float, x2: float, T: Any, W: Any) -> None:
-    """Write the derivatives of mean and slope of a span, of those of its points."""
-    mean = at(T, SHARE, s) * x0 + at(T, SHARE, SPANS + s) * x1 + at(T, SHARE, 2 * SPANS + s) * x2
-    rise = at(T, SLOPE, s) * x0 + at(T, SLOPE, SPANS + s) * x1 + at(T, SLOPE, 2 * SPANS + s) * x2
-    W[MEAN + (4 * i + d) * SPANS + s] = mean + W[LEAN + s] * rise
-    W[RISE + (4 * i + d) * SPANS + s] = rise
-
-
-@leaf
-def _add_blocks(first: Any, count: int, group: int, T: Any, W: Any, block: Any, K: Any) -> None:
-    """Add the tangents of a group of spans to the band K (4 n, 16)."""
-    for j in range(4):
-        for i in range(j, 4):
-            _block(T[i * LANES :], T[j * LANES :], W[4 * i * SPANS :], W[4 * j * SPANS :], W, block)
-            _scatter_block(i, j, first, count, group, block, K)
-
-
-@leaf
-def _block(Ti: Any, Tj: Any, Wi: Any, Wj: Any, W: Any, block: Any) -> None:
-    """Write the blocks (16 SPANS,) of the tangents of the spans between their control points i and j.
-
-    Row 4 e + d is the entry of coordinate d of i and e of j. The tables and the derivatives of the twist rate begin at
-    the rows of i and of j.
-    """
-    for s in range(SPANS):
-        _column(0, Ti, Tj, Wi, Wj, W, block, s)
-        _column(1, Ti, Tj, Wi, Wj, W, block, s)
-        _column(2, Ti, Tj, Wi, Wj, W, block, s)
-        angular = _of_angles(0, Ti, Tj, W, s) + _of_angles(1, Ti, Tj, W, s) + _of_angles(2, Ti, Tj, W, s)
-        block[15 * SPANS + s] = angular + _of_twist(3, 3, Wi, Wj, W, s)
-
-
-@law
-def _column(e: int, Ti: Any, Tj: Any, Wi: Any, Wj: Any, W: Any, block: Any, s: int) -> None:
-    """Write what a block has of coordinate e of the centreline."""
-    block[4 * e * SPANS + s] = _of_place(0, e, Ti, Tj, W, s) + _of_twist(0, e, Wi, Wj, W, s)
-    block[(4 * e + 1) * SPANS + s] = _of_place(1, e, Ti, Tj, W, s) + _of_twist(1, e, Wi, Wj, W, s)
-    block[(4 * e + 2) * SPANS + s] = _of_place(2, e, Ti, Tj, W, s) + _of_twist(2, e, Wi, Wj, W, s)
-    below = _of_angle(e, 0, Ti, Tj, W, s) + _of_angle(e, 1, Ti, Tj, W, s) + _of_angle(e, 2, Ti, Tj, W, s)
-    above = _of_angle(e, 0, Tj, Ti, W, s) + _of_angle(e, 1, Tj, Ti, W, s) + _of_angle(e, 2, Tj, Ti, W, s)
-    block[(4 * e + 3) * SPANS + s] = below + _of_twist(3, e, Wi, Wj, W, s)
-    block[(12 + e) * SPANS + s] = above + _of_twist(e, 3, Wi, Wj, W, s)
-
-
-@law
-def _of_place(d: int, e: int, Ti: Any, Tj: Any, W: Any, s: int) -> float:
-    """Return the entry of coordinates d and e of the centreline."""
-    own = _of_point(d, e, 0, Ti, Tj, W, s) + _of_point(d, e, 1, Ti, Tj, W, s)
-    return own + _of_point(d, e, 2, Ti, Tj, W, s)
-
-
-@law
-def _of_point(d: int, e: int, m: int, Ti: Any, Tj: Any, W: Any, s: int) -> float:
-    n, least = SPANS * m + s, min(d, e)
-    symmetric = least * (5 - least) // 2 + max(d, e)
-    b, c = at(Tj, FIRSTS, n), at(Tj, SECONDS, n)
-    first = at(W, BB + symmetric, n) * b + at(W, BC + 3 * d + e, n) * c
-    second = at(W, BC + 3 * e + d, n) * b + at(W, CC + symmetric, n) * c
-    return at(Ti, FIRSTS, n) * first + at(Ti, SECONDS, n) * second
-
-
-@law
-def _of_angle(e: int, m: int, Ti: Any, Tj: Any, W: Any, s: int) -> float:
-    """Return the share of point m in the entry of the angle of i and coordinate e of j."""
-    n = SPANS * m + s
-    return at(Ti, VALUES, n) * (at(W, AB + e, n) * at(Tj, FIRSTS, n) + at(W, AC + e, n) * at(Tj, SECONDS, n))
-
-
-@law
-def _of_angles(m: int, Ti: Any, Tj: Any, W: Any, s: int) -> float:
-    n = SPANS * m + s
-    return at(W, AA, n) * at(Ti, VALUES, n) * at(Tj, VALUES, n)
-
-
-@law
-def _of_twist(d: int, e: int, Wi: Any, Wj: Any, W: Any, s: int) -> float:
-    """Return what the stiffness of the twist rate adds to an entry."""
-    a, b = d * SPANS + s, e * SPANS + s
-    return W[OF_MEAN + s] * Wi[MEAN + a] * Wj[MEAN + b] + W[OF_SLOPE + s] * Wi[RISE + a] * Wj[RISE + b]
-
-
-@part
-def _scatter_block(i: int, j: int, first: Any, count: int, group: int, block: Any, K: Any) -> None:
-    """Add the blocks of a group of spans between their control points i >= j to the band K."""
-    band = K.reshape(K.size)
-    for s in range(count):
-        entries = band[64 * (first[POINTS * (SPANS * group + s)] + j) + 4 * (i - j) :]
-        if i == j:
-            for e in range(4):
-                for d in range(e, 4):
-                    entries[15 * e + d] += block[(4 * e + d) * SPANS + s]
-        else:
-            for e in range(4):
-                for d in range(4):
-                    entries[15 * e + d] += block[(4 * e + d) * SPANS + s]
-
-
-@law
-def _derivatives(
-    length: float, h: float, director: Vector, by_spin: float, spin: Vector, by_t: float, t: Vector
-) -> tuple[Vector, Vector]:
-    """Return the derivatives by r' and by r'' of a curvature along a director, which turns with the frames."""
-    inverse = 1.0 / length
-    along = h * inverse
-    first = (
-        (by_spin * spin[0] + by_t * t[0] - along * director[0]) * inverse,
-        (by_spin * spin[1] + by_t * t[1] - along * director[1]) * inverse,
-        (by_spin * spin[2] + by_t * t[2] - along * director[2]) * inverse,
-    )
-    return first, (director[0] * inverse, director[1] * inverse, director[2] * inverse)
-
-
 @kernel
 def remember(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h: float) -> None:
     """Carry the frames to q, note its strain, and let what yielded in a step h become memory."""
-    _remember(q, tables, active, p, memory, past, h, np.empty(_SIZE))
+    _remember(q, tables, active, p, memory, past, h, np.empty(SIZE))
 
 
 @part
@@ -612,7 +405,7 @@ def _remember(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, 
 @leaf
 def _note(active: Any, p: Any, memory: Any, past: Any, h: float, group: int, W: Any) -> None:
     """Do what `remember` does for a group of spans that is measured."""
-    for s in range(_count(len(past), group)):
+    for s in range(count_of(len(past), group)):
         for m in range(POINTS):
             n, lane = POINTS * (SPANS * group + s) + m, SPANS * m + s
             k1, k2, tau = at(W, K1, lane), at(W, K2, lane), at(W, TAU, lane)
@@ -637,11 +430,11 @@ def _note(active: Any, p: Any, memory: Any, past: Any, h: float, group: int, W: 
 def energy(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any) -> float:
     """Return the stored energy of curvature and twist [J]."""
     total = 0.0
-    W = np.empty(_SIZE)
+    W = np.empty(SIZE)
     for group in range(len(tables.curvature_lanes)):
         _measure(q, tables, past, p[TWIST, 1], group, W)
         _measure_bends(active, memory, group, W)
-        for s in range(_count(len(past), group)):
+        for s in range(count_of(len(past), group)):
             for m in range(POINTS):
                 n, lane = POINTS * (SPANS * group + s) + m, SPANS * m + s
                 free = (memory[n, 0], memory[n, 1], 0.0)
@@ -655,11 +448,11 @@ def energy(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any) -> 
 @kernel
 def twist_rates(states: Any, tables: Any, p: Any, frames: Any, out: Any) -> None:
     """Write the twist rate (k, points) [rad/m] of the states (k, n, 4) measured against `frames` (k, points, >= 16)."""
-    W = np.empty(_SIZE)
+    W = np.empty(SIZE)
     for k in range(len(states)):
         for group in range(len(tables.curvature_lanes)):
             _measure(states[k], tables, frames[k], p[TWIST, 1], group, W)
-            for s in range(_count(out.shape[1], group)):
+            for s in range(count_of(out.shape[1], group)):
                 for m in range(POINTS):
                     out[k, POINTS * (SPANS * group + s) + m] = at(W, TAU, SPANS * m + s)
 

@@ -12,7 +12,8 @@ from dlocore.effects.stretch import Stretch
 from dlocore.effects.twist import Twist
 from dlocore.kernels.assembly import NO_RATES, History, assemble, remember, stored_energy
 from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, Tables, build_tables, graded_knots
-from dlocore.kernels.twisted import LAST, PAST, start_frames
+from dlocore.kernels.twisted import start_frames
+from dlocore.kernels.twisted_rows import LAST, PAST
 
 Floats = NDArray[np.float64]
 N_U, LENGTH = 9, 1.0
