@@ -30,7 +30,7 @@ from dlocore.problem import Problem, pose
 from dlocore.report import surface_of
 from dlocore.scene import Scene
 from dlocore.sideways import pose_as_shown
-from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, march
+from dlocore.solvers.march import March, march
 from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.stretch import Entry, enter
 from dlocore.spline import SplineSurface
@@ -231,9 +231,8 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     problem = pose_as_shown(scene, called, prediction.surface.control_points[0, :, :3])
     monitor = Monitor(None, None, None)
     steps = _asked_for(problem, accuracy.steps)
-    rho = RHO if problem.contact is None and problem.friction is None else STRONGLY_DAMPED
     grid = start_grid(problem, accuracy.n_u, monitor)
-    motion = march(problem, grid, steps, monitor, rho=rho)
+    motion = march(problem, grid, steps, monitor)
     reason = objection(problem, motion)
     known = None
     if not reason and not scene.shape.settle:
@@ -263,7 +262,7 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
             sides = []
             for sign in (1.0, -1.0):
                 other, other_grid = moved(name, value + sign * width)
-                one = march(other, other_grid, steps, monitor, rho=rho)
+                one = march(other, other_grid, steps, monitor)
                 sides.append(_surface(other, other_grid, one.states, one.times, one.velocity, accuracy.n_t))
         above.append(sides[0])
         below.append(sides[1])

@@ -54,6 +54,12 @@ def has_kinks(active: Any) -> bool:
 
 
 @law
+def has_jumps(active: Any) -> bool:
+    """Tell whether a law has a force that jumps as a step begins with it: what touches, and what sticks."""
+    return bool(active[CONTACT] or active[FRICTION])
+
+
+@law
 def has_viscosity(active: Any) -> bool:
     """Tell whether a law depends on velocities, or rates of strain, other than by the drag matrix."""
     return bool(

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.effects.laws import CONTACT, DAMPING, SELF_CONTACT, has_kinks, keeps_history
+from dlocore.effects.laws import CONTACT, DAMPING, SELF_CONTACT, has_jumps, has_kinks, keeps_history
 from dlocore.kernels.assembly import (
     add_scalar_band,
     assemble,
@@ -27,6 +27,7 @@ from dlocore.kernels.contact import passes, strikes
 from dlocore.kernels.inertia import both_sides, effective, follow, padded, residual
 from dlocore.kernels.mixing import mixed, room
 from dlocore.kernels.narrow import ROOM, factor_step, solve_step
+from dlocore.kernels.newmark import coefficients
 from dlocore.kernels.predictor import differences_of, predict_by, shift
 from dlocore.kernels.selfcontact import closing, factor_wide, place_nodes, press, solve_wide, widen
 from dlocore.kernels.strands import clear_way
@@ -85,7 +86,7 @@ def march_steps(
     a: Any, G: Any, density: float, dragged: float, tables: Any, active: Any, p: Any, history: Any, applied: Any,
     e: Any, offsets: Any, reactions: Any, log: Any, info: Any,
 ) -> None:  # fmt: skip
-    """Advance from step `start` to `stop` by the generalised-alpha method (Chung and Hulbert, 1993).
+    """Advance from step `start` to `stop` by the generalised-alpha method, see `newmark.py`.
 
     M [(1 - alpha_m) a1 + alpha_m a0] + (1 - alpha_f) G1 + alpha_f G0 = 0 with G = f(q, v) + C v - F, and Newmark's
     relations between q, v and a. The first Newton step of a time step has the full tangent, later ones its factors, and
@@ -120,10 +121,7 @@ def march_steps(
     exact = has_kinks(active)
     n = Q.shape[1]
     size = n * nc
-    alpha_m = (2.0 * rho - 1.0) / (rho + 1.0)
-    alpha_f = rho / (rho + 1.0)
-    gamma = 0.5 - alpha_m + alpha_f
-    beta = 0.25 * (1.0 - alpha_m + alpha_f) ** 2
+    alpha_m, alpha_f, gamma, beta = coefficients(rho, has_jumps(active))
     to_a = 1.0 / (beta * h * h)
     to_v = gamma / (beta * h)
     touches = bool(active[CONTACT])

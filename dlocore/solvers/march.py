@@ -29,7 +29,7 @@ from dlocore.kernels.march import (
     row_of_step,
 )
 from dlocore.kernels.tension import COLUMNS
-from dlocore.kernels.twisted import PAST
+from dlocore.kernels.twisted_rows import PAST
 from dlocore.problem import Problem, firmer
 from dlocore.report import WindowForces
 from dlocore.scene import Grasp
@@ -172,8 +172,8 @@ def march(
     marks = marks_of(problem)
     counts = step_counts(marks, steps)
     problem = firmer(problem, problem.horizon / steps)
-    if problem.inertia is None or problem.contact is not None or problem.friction is not None:
-        rho = STRONGLY_DAMPED  # forces that jump are balanced at the end of each step
+    if problem.inertia is None or (problem.friction is not None and problem.friction.lying > 0.0):
+        rho = STRONGLY_DAMPED  # without waves, or where a rough table stops them, there is nothing to keep
     walk = _Walk(problem, grid, monitor, step_times(marks, counts), rho)
     first = 0
     for begin, end, count in zip(marks[:-1], marks[1:], counts, strict=True):
@@ -271,7 +271,8 @@ class _Walk:
         except TimeIsUp:
             self.stopped = "time"
         self._reached, self._v = at, stretch.v
-        to_ends_of_steps(stretch.reactions, first, at, self._rho / (1.0 + self._rho))
+        jumps = self._problem.contact is not None or self._problem.friction is not None
+        to_ends_of_steps(stretch.reactions, first, at, 0.0 if jumps else self._rho / (1.0 + self._rho))
         part = slice(first, last + 1)
         self._forces.append(
             WindowForces(stretch.entry.held, self._times[part], stretch.reactions[part], self._states[part])

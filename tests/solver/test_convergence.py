@@ -5,11 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.catalogue import catalogue
 from dlocore import Quality, Scene, predict
 from dlocore.problem import Problem, pose
 from dlocore.solvers.ladder import run_level
+from dlocore.solvers.march import RHO, STRONGLY_DAMPED, march
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import design_matrix
+from dlocore.statics import start_grid
 from tests.solver.scenes import Floats, apart, paper_scene, refined, rms
 
 
@@ -47,6 +50,23 @@ def test_order_of_convergence_in_time_is_two(u):
     found = orders([marched(problem, 13, n) for n in (80, 160, 320)], exact)
     assert found.min() > 1.8
     assert found.max() < 2.2
+
+
+def test_contact_in_reach_leaves_the_order_in_time_and_most_of_the_accuracy():
+    # forces that jump are balanced at the end of a step; the table is never touched
+    problem = pose(catalogue()["cable carried high above a table"])
+    assert problem.contact is not None
+
+    def shapes(steps: int, rho: float = RHO) -> Floats:
+        motion = march(problem, start_grid(problem, 13, Monitor()), steps, Monitor(), rho=rho)
+        assert motion.deepest == 0.0
+        assert not motion.kinked or rho == STRONGLY_DAMPED
+        return motion.states[:: steps // 40]
+
+    exact, damped = shapes(5120), [shapes(n, STRONGLY_DAMPED) for n in (160, 320)]
+    errors = [np.abs(shapes(n) - exact).max() for n in (160, 320)]
+    assert 3.4 < errors[0] / errors[1] < 4.6
+    assert all(error < 0.5 * np.abs(x - exact).max() for error, x in zip(errors, damped, strict=True))
 
 
 def test_time_spline_converges_with_its_control_points():
