@@ -48,11 +48,9 @@ def find_features(scene: Scene, bends: Sequence[float] = (), apart: float = 0.0,
     length = scene.cable.length
     found: dict[float, tuple[int, float, float]] = {}
     directed = 3 if kinks else 2
-    points = [g.u for g in scene.grasps if g.hold == "point"] + [load.u for load in scene.loads]
-    places = [(g.u, directed) for g in scene.grasps if g.hold != "point"]
-    everywhere = [u for u, _ in places] + points
-    places += [(_without_tip(scene, u, everywhere), 1) for u in points]
-    for place, multiplicity in places:
+    places = [(g.u, 1 if g.hold == "point" else directed) for g in scene.grasps] + [(load.u, 1) for load in scene.loads]
+    for at, multiplicity in places:
+        place = _without_tip(scene, at)
         u = next((v for v in found if abs(v - place) <= SAME * length), place)
         at_end = min(u, length - u) <= SAME * length
         power, width = _END if at_end or multiplicity > 1 else _INTERIOR
@@ -73,20 +71,20 @@ def find_features(scene: Scene, bends: Sequence[float] = (), apart: float = 0.0,
     )
 
 
-def _without_tip(scene: Scene, u: float, places: list[float]) -> float:
-    """Return where a knot for a held or loaded point at `u` [m] belongs: at an end that only a tip lies beyond.
+def _without_tip(scene: Scene, u: float) -> float:
+    """Return where a knot for what is held or loaded at `u` [m] belongs: at an end that only a tip lies beyond.
 
     A tip, no longer than half a diameter, has no moment and does not bend: nothing is lost where it has no span of its
-    own. That would be so short that it folds, or strains, before it bends.
-
-    Args:
-        places: all that is held or loaded, `u` among them [m].
+    own. That would be so short that it folds, or strains, before it bends, and that what the time spline misses of the
+    motion is many times as long.
     """
     length = scene.cable.length
     tip = min(0.5 * scene.cable.diameter, _TIP * length)
     for end in (0.0, length):
-        if abs(u - end) <= tip and [v for v in places if abs(v - end) <= _ALONE * length] == [u]:
-            return end
+        if abs(u - end) <= tip:
+            places = [g.u for g in scene.grasps] + [load.u for load in scene.loads]
+            near = [v for v in places if abs(v - end) <= _ALONE * length]
+            return end if near == [u] else u
     return u
 
 
@@ -96,7 +94,7 @@ def free_ends(scene: Scene) -> tuple[bool, bool]:
 
     def free(end: float) -> bool:
         for g in scene.grasps:
-            if abs(g.u - end) <= SAME * length and g.hold != "point":
+            if abs(_without_tip(scene, g.u) - end) <= SAME * length and g.hold != "point":
                 return g.start > 0 or g.release_time is not None
         return True
 

@@ -16,10 +16,11 @@ from dlocore.effects.damping import Damping
 from dlocore.effects.distance import distances
 from dlocore.effects.selfcontact import CLOSE as CLOSE_STRANDS
 from dlocore.effects.selfcontact import nearest_strands
+from dlocore.events import moments
 from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, largest_curvature, times_scalar_band
 from dlocore.kernels.banded import expand_vector, factor, reduce_matrix, reduce_vector
 from dlocore.kernels.banded import solve as solve_factored
-from dlocore.kernels.twisted import TWIST_RATE
+from dlocore.kernels.twisted_rows import TWIST_RATE
 from dlocore.mirrored import goes_elsewhere
 from dlocore.problem import Problem
 from dlocore.report import WindowForces
@@ -32,6 +33,8 @@ Floats = NDArray[np.float64]
 CLOSE = 0.01  # of the length: a cable that comes this near to an obstacle left out calls for it
 MATTERS = 0.001  # of the length: what a neglected effect may move the cable before it is worth a word
 _STRAINED = 0.05  # axial strain: few cables bear more
+_FAR_MORE = 2.0  # times the strain of the march: what its spline adds is worth a word
+_PLACES, _MOMENTS = 4, 33  # in a span, and in time while it swings once, at which a surface is searched for strain
 _LOOKS = 5  # states of each stretch of a motion at which neglected forces are weighed
 _LONGER = 4  # times as long, each time that a motion is searched for turns
 _SKIPPED = 3  # of so many control points one is searched: their neighbours turn with them
@@ -96,6 +99,7 @@ def objections(level: Level) -> list[str]:
     problem, found = level.problem, []
     if level.motion.largest_strain > _STRAINED:
         found.append(f"the motion strains the cable by up to {level.motion.largest_strain:.0%} along itself")
+    found += _stretched(level)
     found += side_notes(problem.start)
     if problem.scene.quality.n_u is not None and leaves_plane(problem, level.motion):
         found.append(f"{UNSTABLE}: without a given grid it is solved in space, with a bow out of the plane")
@@ -124,6 +128,28 @@ def objections(level: Level) -> list[str]:
             if moved > allowed:
                 found.append(f"{name} is off, though it would move the cable by about {moved * 1e3:.2g} mm")
     return found
+
+
+def _stretched(level: Level) -> list[str]:
+    """Return in words where the surface strains the cable by more than few bear, and more than its march seems to.
+
+    What the time spline misses of the march may be little to the cable, and much to a short span of it; and a coarse
+    grid may strain a span between the points at which the march looks.
+    """
+    knots, horizon = level.motion.grid.knots, level.problem.horizon
+    breaks = np.unique(knots)
+    u = (breaks[:-1, None] + np.diff(breaks)[:, None] * np.linspace(0.0, 1.0, _PLACES, endpoint=False)).ravel()
+    t = np.linspace(0.0, horizon, moments(level.problem.scene, _MOMENTS))
+    states = np.tensordot(design_matrix(level.knots_t, t), level.control, axes=1)
+    slopes = np.matmul(design_matrix(knots, u, 1), states[:, :, : level.problem.plane.dimensions])
+    strain = np.abs(np.linalg.norm(slopes, axis=2) - 1.0)
+    k, s = np.unravel_index(np.argmax(strain), strain.shape)
+    if not strain[k, s] > max(_STRAINED, _FAR_MORE * level.motion.largest_strain):
+        return []
+    return [
+        f"the surface stretches the cable by up to {strain[k, s]:.0%} within a span, at {u[s]:.4g} m and {t[k]:.3g} s: "
+        "positions are as near as the error says, lengths and directions there are not; take more control points"
+    ]
 
 
 def neglected(level: Level) -> float:

@@ -175,7 +175,7 @@ U, T = np.linspace(0.0, LENGTH, 21), np.linspace(0.0, 0.8, 21)
 def motion(scene: Scene) -> Floats:
     prediction = predict(scene)
     # a fine net of a strongly damped cable is where the spin weighs most in the equations of a step
-    assert prediction.message == "Every time step found its equilibrium."
+    assert prediction.said == "Every time step found its equilibrium."
     return np.asarray(prediction.surface(U, T)[..., :3])
 
 
