@@ -17,6 +17,8 @@ _END = (0.3, 0.04)
 _CORNER = (1.0, 0.01)  # a start that turns sharply: the corner would be another one on every grid
 SAME = 1e-9  # of the length: features this close are one
 _TIP = 2e-3  # of the length: the longest end beyond a point that is held or loaded that needs no span of its own, ...
+_OF_TARGET = 0.1  # of the error that is aimed at: that end beyond a held direction
+_AIMED = 2e-3  # of the length: the error that is aimed at where none was asked for
 _ALONE = 0.1  # ... where nothing else holds or loads the cable so near to that end
 
 
@@ -50,7 +52,7 @@ def find_features(scene: Scene, bends: Sequence[float] = (), apart: float = 0.0,
     directed = 3 if kinks else 2
     places = [(g.u, 1 if g.hold == "point" else directed) for g in scene.grasps] + [(load.u, 1) for load in scene.loads]
     for at, multiplicity in places:
-        place = _without_tip(scene, at)
+        place = _without_tip(scene, at, multiplicity > 1)
         u = next((v for v in found if abs(v - place) <= SAME * length), place)
         at_end = min(u, length - u) <= SAME * length
         power, width = _END if at_end or multiplicity > 1 else _INTERIOR
@@ -71,15 +73,18 @@ def find_features(scene: Scene, bends: Sequence[float] = (), apart: float = 0.0,
     )
 
 
-def _without_tip(scene: Scene, u: float) -> float:
+def _without_tip(scene: Scene, u: float, directed: bool) -> float:
     """Return where a knot for what is held or loaded at `u` [m] belongs: at an end that only a tip lies beyond.
 
     A tip, no longer than half a diameter, has no moment and does not bend: nothing is lost where it has no span of its
     own. That would be so short that it folds, or strains, before it bends, and that what the time spline misses of the
-    motion is many times as long.
+    motion is many times as long. Where a direction is held the tip has to bend with the cable, whose end that makes
+    stiffer: the motion is off by about half of what the tip is long, a twentieth of the error that is aimed at.
     """
     length = scene.cable.length
     tip = min(0.5 * scene.cable.diameter, _TIP * length)
+    if directed:
+        tip = min(tip, _OF_TARGET * (scene.quality.target_error or _AIMED * length))
     for end in (0.0, length):
         if abs(u - end) <= tip:
             places = [g.u for g in scene.grasps] + [load.u for load in scene.loads]
@@ -94,7 +99,7 @@ def free_ends(scene: Scene) -> tuple[bool, bool]:
 
     def free(end: float) -> bool:
         for g in scene.grasps:
-            if abs(_without_tip(scene, g.u) - end) <= SAME * length and g.hold != "point":
+            if g.hold != "point" and abs(_without_tip(scene, g.u, True) - end) <= SAME * length:
                 return g.start > 0 or g.release_time is not None
         return True
 

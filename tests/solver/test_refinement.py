@@ -9,6 +9,7 @@ import pytest
 from benchmarks.hard.curves import arc, corner, hairpin, helix
 from benchmarks.hard.generator import draw
 from benchmarks.hard.judge import compare
+from benchmarks.robot_scenes import random_scene
 from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, Sphere, Straight, equilibrium, predict
 from dlocore.discretisation import corners, make_grid
 from dlocore.features import find_features
@@ -284,7 +285,7 @@ def test_a_tip_beyond_a_held_direction_is_not_stretched_either(index: int):
     (grasp,) = scene.grasps
     length = scene.cable.length
     assert grasp.hold != "point"
-    assert 0.0 < grasp.u < min(0.5 * scene.cable.diameter, 2e-3 * length)
+    assert 0.0 < grasp.u < min(0.5 * scene.cable.diameter, 2e-4 * length)
     found = predict(scene)
     assert found.status == "converged", found.message
     assert "stretches" not in found.message
@@ -304,13 +305,26 @@ def test_a_surface_that_its_time_spline_stretches_is_told_of():
     assert "the surface stretches the cable by up to" in found.message
 
 
+def test_what_a_tip_beyond_a_held_direction_costs_is_little_of_the_target():
+    # 1.2e-3 of the length: without a span of its own it took the cable 1.4 mm elsewhere, at an estimate of 0.3 mm
+    scene = random_scene(147)
+    length = scene.cable.length
+    (grasp,) = scene.grasps
+    exact = predict(replace(scene, quality=Quality(target_error=2e-4 * length)))
+    for target, has_span in ((1e-3, True), (2e-2, False)):
+        found = predict(replace(scene, quality=Quality(target_error=target * length)))
+        assert found.status == "converged"
+        assert (grasp.u in found.surface.knots_u) == has_span
+        assert apart(found.surface, exact.surface).max() < 2.0 * found.accuracy.error_estimate
+
+
 def test_a_tip_that_is_part_of_more_has_its_span():
     line = np.linspace(0.0, 1.0, 5)[:, None] * [1.0, 0.0, 0.0]
     wire = cable(diameter=0.01)
     for grasps, inside in (
         ((Grasp(u=1e-3),), 0),
-        ((Grasp(u=1e-3, hold="tangent"),), 0),
-        ((Grasp(u=5e-3, hold="tangent"),), 1),  # longer than a tip
+        ((Grasp(u=1.5e-4, hold="tangent"),), 0),
+        ((Grasp(u=1e-3, hold="tangent"),), 1),  # which bends what lies beyond, and is as stiff as that
         ((Grasp(u=0.0), Grasp(u=1e-3)), 1),  # that hold a direction together
         ((Grasp(u=1e-3), Grasp(u=0.05)), 2),
         ((Grasp(u=1e-3), Grasp(u=0.999)), 0),
