@@ -73,5 +73,6 @@ def _marched(problem: Problem, size: Size, level: Level, monitor: Monitor) -> tu
         other = run_level(problem, *size, monitor, booked=False, like=level.motion.grid, whole=True)
     except TimeIsUp:
         return None, _TOO_LATE
-    monitor.phase("estimate")
+    finally:
+        monitor.phase("estimate")
     return other, ""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.scene import Scene
+from dlocore.scene import AUTO_TARGET, Scene
 
 Floats = NDArray[np.float64]
 
@@ -17,9 +17,8 @@ _END = (0.3, 0.04)
 _CORNER = (1.0, 0.01)  # a start that turns sharply: the corner would be another one on every grid
 SAME = 1e-9  # of the length: features this close are one
 _TIP = 2e-3  # of the length: the longest end beyond a point that is held or loaded that needs no span of its own, ...
-_OF_TARGET = 0.1  # of the error that is aimed at: that end beyond a held direction
-_AIMED = 2e-3  # of the length: the error that is aimed at where none was asked for
 _ALONE = 0.1  # ... where nothing else holds or loads the cable so near to that end
+_OF_TARGET = 0.1  # of the error that is aimed at: the longest such end beyond a held direction
 
 
 class Features(NamedTuple):
@@ -84,7 +83,7 @@ def _without_tip(scene: Scene, u: float, directed: bool) -> float:
     length = scene.cable.length
     tip = min(0.5 * scene.cable.diameter, _TIP * length)
     if directed:
-        tip = min(tip, _OF_TARGET * (scene.quality.target_error or _AIMED * length))
+        tip = min(tip, _OF_TARGET * (scene.quality.target_error or AUTO_TARGET * length))
     for end in (0.0, length):
         if abs(u - end) <= tip:
             places = [g.u for g in scene.grasps] + [load.u for load in scene.loads]

@@ -33,6 +33,7 @@ def march_given(problem: Problem, n_u: int, n_t: int, monitor: Monitor) -> Level
         try:
             level = march_level(problem, size._replace(steps=more * size.steps), monitor, watch=watch, whole=True)
         except TimeIsUp:
+            monitor.phase("march")
             break
         note = f"{level.size.steps} steps" + (", watched at more points" if watch else "")
         level = replace(level, note=note, mended=_said(first, size.steps, watch))

@@ -9,7 +9,7 @@ from dlocore.cost import Cost
 from dlocore.errors import SceneError
 from dlocore.problem import Problem
 from dlocore.progress import record_level
-from dlocore.scene import Quality
+from dlocore.scene import AUTO_TARGET, Quality
 from dlocore.solvers.changes import Change, weighed
 from dlocore.solvers.ladder import (
     ACCEPT,
@@ -24,7 +24,6 @@ from dlocore.solvers.march import MOST_FRAMES, RHO, STRONGLY_DAMPED
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.whole_march import MISSED_COUNTS, Outcome, is_folded, march_level, march_status
 
-AUTO_TARGET = 2e-3  # of the length: the error that quality "auto" aims at
 AUTO_ENOUGH = 1e-2  # of the length: the estimated error with which it is content where the finest grids reach no closer
 ROUGH = 0.05  # of the length: two grids that differ more are in no order yet: the next is marched with strong damping
 MOST_WORK = 3.2e7  # control points times steps of one march in the plane; each coordinate more costs twice the time
@@ -114,6 +113,7 @@ class _Climb:
             try:
                 level = self._march(size)
             except TimeIsUp:
+                self.monitor.phase("march")
                 break
             except SceneError:  # a start that finds no rest on few control points may do so on more
                 self.number += 1

@@ -26,7 +26,7 @@ from dlocore.problem import Problem
 from dlocore.report import WindowForces
 from dlocore.sideways import leaves_plane
 from dlocore.solvers.ladder import CREDIBLE_STRAIN, Level
-from dlocore.spline import design_matrix
+from dlocore.spline import SplineSurface, design_matrix
 
 Floats = NDArray[np.float64]
 
@@ -140,8 +140,7 @@ def _stretched(level: Level) -> list[str]:
     breaks = np.unique(knots)
     u = (breaks[:-1, None] + np.diff(breaks)[:, None] * np.linspace(0.0, 1.0, _PLACES, endpoint=False)).ravel()
     t = np.linspace(0.0, horizon, moments(level.problem.scene, _MOMENTS))
-    states = np.tensordot(design_matrix(level.knots_t, t), level.control, axes=1)
-    slopes = np.matmul(design_matrix(knots, u, 1), states[:, :, : level.problem.plane.dimensions])
+    slopes = SplineSurface(level.control, knots, level.knots_t)(u, t, du=1)[..., : level.problem.plane.dimensions]
     strain = np.abs(np.linalg.norm(slopes, axis=2) - 1.0)
     k, s = np.unravel_index(np.argmax(strain), strain.shape)
     if not strain[k, s] > max(_STRAINED, _FAR_MORE * level.motion.largest_strain):

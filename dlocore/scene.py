@@ -37,6 +37,7 @@ EFFECTS = (
 MAX_GRASPS = 32
 MAX_N_U, MAX_N_T = 129, 513  # of a given grid: memory and time
 MAX_OBSTACLES = 100
+AUTO_TARGET = 2e-3  # of the length: the error that quality "auto" aims at
 MAX_POINTS = 100_000
 MAX_PRESCRIBED_STRAIN = 0.005  # of the chord between two grasps: beyond it no cable of this kind can follow
 

@@ -225,6 +225,8 @@ class _Walk:
 
     def __init__(self, problem: Problem, grid: Grid, monitor: Monitor, times: Floats, rho: float) -> None:
         self._problem, self._grid, self._monitor, self._times, self._rho = problem, grid, monitor, times, rho
+        at_ends = problem.contact is not None or problem.friction is not None  # forces that jump, see `newmark.py`
+        self._lag = 0.0 if at_ends else rho / (1.0 + rho)  # of the times at which steps balance forces, in steps
         self._laws = problem.laws
         self._mass = grid.tables.mass * problem.mass_density()
         self._applied = applied_forces(problem, grid, times)
@@ -271,8 +273,7 @@ class _Walk:
         except TimeIsUp:
             self.stopped = "time"
         self._reached, self._v = at, stretch.v
-        jumps = self._problem.contact is not None or self._problem.friction is not None
-        to_ends_of_steps(stretch.reactions, first, at, 0.0 if jumps else self._rho / (1.0 + self._rho))
+        to_ends_of_steps(stretch.reactions, first, at, self._lag)
         part = slice(first, last + 1)
         self._forces.append(
             WindowForces(stretch.entry.held, self._times[part], stretch.reactions[part], self._states[part])

@@ -176,6 +176,8 @@ def motion(scene: Scene) -> Floats:
     prediction = predict(scene)
     # a fine net of a strongly damped cable is where the spin weighs most in the equations of a step
     assert prediction.said == "Every time step found its equilibrium."
+    notes = prediction.message.split("Note: ")[1:]  # a span is strained between the points at which the march looks
+    assert all(note.startswith("the surface stretches the cable") for note in notes)
     return np.asarray(prediction.surface(U, T)[..., :3])
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from benchmarks.catalogue import catalogue
 from dlocore import Quality, Scene, predict
+from dlocore.kernels.newmark import coefficients
 from dlocore.problem import Problem, pose
 from dlocore.solvers.ladder import run_level
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED, march
@@ -50,6 +51,23 @@ def test_order_of_convergence_in_time_is_two(u):
     found = orders([marched(problem, 13, n) for n in (80, 160, 320)], exact)
     assert found.min() > 1.8
     assert found.max() < 2.2
+
+
+@pytest.mark.parametrize(
+    ("rho", "jumps", "slower", "decay"),
+    [(0.5, False, 0.12, None), (0.5, True, 0.17, 1.8e-3), (0.0, True, 0.39, 1.03e-2)],
+)
+def test_steps_keep_period_and_swing_as_the_model_says(rho: float, jumps: bool, slower: float, decay: float | None):
+    # a'' = -w^2 q in steps with w h = 0.3: the part of the frequency that is lost, over (w h)^2, and the damping ratio
+    alpha_m, alpha_f, gamma, beta = coefficients.py_func(rho, jumps)
+    wh = 0.3
+    after = [[wh**2 * (1.0 - alpha_f), 0.0, 1.0 - alpha_m], [1.0, 0.0, -beta], [0.0, 1.0, -gamma]]
+    before = [[-(wh**2) * alpha_f, 0.0, -alpha_m], [1.0, 1.0, 0.5 - beta], [0.0, 1.0, 1.0 - gamma]]
+    values = np.linalg.eigvals(np.linalg.solve(after, before))
+    swing = values[np.argmax(np.abs(values.imag))]
+    assert (1.0 - abs(np.angle(swing)) / wh) / wh**2 == pytest.approx(slower, abs=5e-3)
+    if decay is not None:
+        assert -np.log(abs(swing)) / abs(np.angle(swing)) == pytest.approx(decay, rel=0.01)
 
 
 def test_contact_in_reach_leaves_the_order_in_time_and_most_of_the_accuracy():
