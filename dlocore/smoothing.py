@@ -103,7 +103,20 @@ def _least(strengths: Floats, score: Floats) -> float:
 def _solve(band: Floats, right: Floats) -> Floats:
     """Return the solution of a banded system; zeros unless it is positive definite."""
     factor, failed = dpbtrf(band, lower=1)
-    return np.zeros_like(right) if failed else dpbtrs(factor, right, lower=1)[0]
+    if failed:
+        return np.zeros_like(right)
+    x = dpbtrs(factor, right, lower=1)[0]
+    return np.asarray(x + dpbtrs(factor, _residual(band, right, x), lower=1)[0])
+
+
+def _residual(band: Floats, right: Floats, x: Floats) -> Floats:
+    """Return right - A x of a symmetric band A, with more digits where the machine has them: third differences do."""
+    long, wide = x.astype(np.longdouble), band.astype(np.longdouble)
+    left = right - wide[0][:, None] * long
+    for k in range(1, len(band)):
+        left[k:] -= wide[k, :-k, None] * long[:-k]
+        left[:-k] -= wide[k, :-k, None] * long[k:]
+    return left.astype(np.float64)
 
 
 def stiffness_of(spline: BSpline) -> Floats:
