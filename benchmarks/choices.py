@@ -3,7 +3,8 @@
 The final worst error of a march on the paper's case, against the converged motion, as the solver is and with one choice
 undone: the quadrature of the energies of stretch and bending, the knots, the numerical damping of the time steps. Then
 the energy of a free, undamped motion, which should stay, over the numerical damping. Last a bent wire that a clamp
-carries and turns by its middle: its largest error anywhere, with and without kinks of its sections' angle there.
+carries and turns by its middle: its largest error anywhere, with and without kinks of its sections' angle there; and
+straight wires with one bend, which swings slowly: how far they are from rigid bodies.
 """
 
 import os
@@ -20,7 +21,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from benchmarks.hard.curves import arc
+from benchmarks.hard.curves import arc, bend
 from benchmarks.machine import machine_line
 from benchmarks.paper_case import errors, paper_scene, reference
 from dlocore import (
@@ -29,6 +30,7 @@ from dlocore import (
     Grasp,
     Move,
     Points,
+    Prediction,
     Quality,
     Scene,
     Straight,
@@ -48,6 +50,8 @@ RADII = (0.0, 0.5, 0.7, 0.9, 1.0)  # spectral radii at infinite frequency
 BENDING = 0.1  # [N m^2] of the stiff cable
 TURNED = (13, 19, 28, 41, 62)  # control points of the bent wire
 FINEST = 129
+BENDS = ((30, 0.005), (50, 0.005), (90, 0.01), (90, 0.06), (170, 0.02), (170, 0.06))  # angle [degrees], width [m]
+SLOWLY = 20.0  # [s]
 TIMES = np.array([0.5, 1.0, 2.0, 5.0, 10.0])  # [s]
 FIRST_MARCH = patch.object(given, "_OTHERWISE", ())  # is the answer, also where it folds the cable
 GENERAL = patch.object(ladder, "march_smooth", lambda *_: None)  # the compiled march makes its own tables
@@ -157,7 +161,7 @@ def print_kinks() -> None:
         environment=Environment(drag=0.1),
         effects={"self_contact": "off"},
     )
-    without = patch.object(discretisation, "find_features", lambda *_: find_features(*_[:3]))
+    without = patch.object(discretisation, "find_features", lambda *_: find_features(*_[:4]))
     u, t = np.linspace(0.0, 1.0, 65), np.linspace(0.0, 0.9, 33)
 
     def motion(n_u: int) -> Any:
@@ -173,10 +177,45 @@ def print_kinks() -> None:
         print(f"{name:34}" + "".join(f"{x:10.2f}" for x in worst))
 
 
+def swinging(angle: float, width: float, quality: Quality) -> Scene:
+    """Return a wire without weight that is bent at 0.45 m, clamped at its beginning and turned there about itself."""
+    turn = Move(displacement=(0.0, 0.0, 0.0), rotation=(np.pi / 2, 0.0, 0.0), duration=SLOWLY)
+    damped = {"bending_damping": 0.02, "torsional_damping": 0.02}
+    return Scene(
+        cable=Cable(
+            length=1.0, diameter=0.005, linear_density=0.2, bending_stiffness=0.2, rest_shape="initial", **damped
+        ),
+        shape=Points(points=bend(1.0, np.radians(angle), width, 0.45)),
+        grasps=(Grasp(u=0.0, hold="clamp", path=turn),),
+        environment=Environment(gravity=(0.0, 0.0, 0.0)),
+        horizon=SLOWLY,
+        quality=quality,
+    )
+
+
+def from_rigid(found: Prediction) -> float:
+    """Return the largest distance at the end [m] of a `swinging` wire from its start turned as a rigid body."""
+    u = np.linspace(0.0, 1.0, 65)
+    start, end = found.surface.positions(u, [0.0, SLOWLY])
+    x, y, z = (start - start[0]).T
+    return float(np.linalg.norm(end - start[0] - np.column_stack([x, -z, y]), axis=1).max())
+
+
+def print_swings() -> None:
+    print("distance [mm] from a rigid body of a wire with one bend that swings slowly by 90 degrees")
+    print(f"{'':34}" + "".join(f"{n_u:10}" for n_u in TURNED))
+    for angle, width in BENDS:
+        grids = [Quality(n_u=n_u, n_t=25, method="march", estimate=False) for n_u in TURNED]
+        off = [1e3 * from_rigid(predict(swinging(angle, width, quality), keep_grid=True)) for quality in grids]
+        name = f"{angle} degrees along {1e3 * width:g} mm"
+        print(f"{name:34}" + "".join(f"{x:10.3f}" for x in off))
+
+
 def main() -> None:
     print_errors()
     print_energies()
     print_kinks()
+    print_swings()
     print(machine_line())
 
 

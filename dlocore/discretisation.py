@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dlocore.effects import laws
 from dlocore.errors import SceneError
-from dlocore.features import find_features, free_ends
+from dlocore.features import LASTING, OPENING, find_features, free_ends
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.assembly import MEMORY_IN_PLANE, MEMORY_IN_SPACE, PAST_IN_PLANE, PAST_IN_SPACE, History
@@ -33,6 +33,7 @@ SHARP = 1.0
 BEND = 0.02
 _ELSEWHERE = 4.0  # times the median curvature
 _MOST_CORNERS = 4
+_APART = 0.25 * BEND  # of the length: what is nearer to a sharp bend shares its knot
 
 
 def smallest_n_u(problem: Problem) -> int:
@@ -48,10 +49,12 @@ def make_grid(problem: Problem, n_u: int) -> Grid:
     """
     scene, length = problem.scene, problem.scene.cable.length
     bends = corners(problem.start, length)
+    opens = problem.twist is None or (isinstance(problem.rest_shape, str) and problem.rest_shape == "straight")
+    sharply = OPENING if opens else LASTING, _APART * length
     # what is left out where there is no room for it: kinks of the angle, then sharp bends
     for kinks in (True, False) if problem.twist is not None else (False,):
         for sharp in (bends, []) if bends else ([],):
-            features = find_features(scene, sharp, BEND * length, kinks) if sharp or kinks else problem.features
+            features = find_features(scene, sharp, *sharply, kinks) if sharp or kinks else problem.features
             if n_u >= features.least:
                 return grid_on(problem, graded_knots(n_u, length, *features[:4]))
     reason = f"{len(problem.features.u)} grasps and loads need a knot each"

@@ -14,7 +14,8 @@ Floats = NDArray[np.float64]
 # beside it; at an end or at a held direction a weaker grading serves better (docs/model.md).
 _INTERIOR = (0.6, 0.02)
 _END = (0.3, 0.04)
-_CORNER = (1.0, 0.01)  # a start that turns sharply: the corner would be another one on every grid
+OPENING = (1.0, 0.01)  # a start that turns sharply: the corner would be another one on every grid
+LASTING = (1.3, 0.005)  # ... and may be free of stress, so that it stays and swings: it needs several spans for that
 SAME = 1e-9  # of the length: features this close are one
 _TIP = 2e-3  # of the length: the longest end beyond a point that is held or loaded that needs no span of its own, ...
 _ALONE = 0.1  # ... where nothing else holds or loads the cable so near to that end
@@ -38,12 +39,19 @@ class Features(NamedTuple):
     least: int
 
 
-def find_features(scene: Scene, bends: Sequence[float] = (), apart: float = 0.0, kinks: bool = False) -> Features:
-    """Return the features of a scene, with those sharp `bends` [m] of its start that lie farther `apart` from others.
+def find_features(
+    scene: Scene,
+    bends: Sequence[float] = (),
+    grading: tuple[float, float] = OPENING,
+    apart: float = 0.0,
+    kinks: bool = False,
+) -> Features:
+    """Return the features of a scene, with the sharp `bends` of its start.
 
     Args:
         bends: (k,) [m].
-        apart: [m].
+        grading: towards them, exponent and width.
+        apart: one knot serves a bend and what is no farther from it [m].
         kinks: the angle of the sections may have kinks where directions are held, for which these knots are triple.
     """
     length = scene.cable.length
@@ -58,8 +66,10 @@ def find_features(scene: Scene, bends: Sequence[float] = (), apart: float = 0.0,
         before = found.get(u, (0, 0.0, 1.0))
         found[u] = (max(before[0], multiplicity), max(before[1], power), min(before[2], width))
     for u in bends:
-        if all(abs(u - v) > apart for v in found):
-            found[u] = (1, *_CORNER)
+        near = [v for v in found if abs(v - u) <= apart]
+        place = min(near, key=lambda v: abs(v - u)) if near else u
+        multiplicity, power, width = found.get(place, (1, *grading))
+        found[place] = (multiplicity, max(power, grading[0]), min(width, grading[1]))
     order = sorted(found)
     rows = [found[u] for u in order]
     inside = [row[0] for u, row in zip(order, rows, strict=True) if 0.0 < u < length]

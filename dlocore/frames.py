@@ -30,7 +30,7 @@ def free_of_frames(problem: Problem, grid: Grid, states: Floats, frames: Floats)
 
     Args:
         states: control points in the solve's coordinates (k, n_u, nc).
-        frames: the frames that their theta refers to (k, points, >= 16), see `kernels/twisted.py`.
+        frames: the frames that their theta refers to (k, points, PAST), see `kernels/twisted.py`.
     """
     if problem.twist is None:
         return states
@@ -79,7 +79,7 @@ def free_control(problem: Problem, grid: Grid, knots_t: Floats, control: Floats,
     Args:
         control: (n_t, n_u, nc), with theta against frames carried in time.
         times: (k,) [s].
-        log: those frames at the times (k, points, >= 16).
+        log: those frames at the times (k, points, PAST).
     """
     assert problem.twist is not None
     from scipy.interpolate import BSpline  # slow to import, and not needed without twist

@@ -6,6 +6,7 @@ from benchmarks.hard.draft import Draft, Floats, Rng, Room, chance, pick, spread
 from dlocore import Points, Straight
 
 SAMPLES = 96  # points on a curve
+FINE = 4 * SAMPLES  # ... with a sharp bend
 
 
 def along(tangents: Floats, length: float) -> Floats:
@@ -29,6 +30,12 @@ def _middles() -> Floats:
 def arc(length: float, angle: float, room: Room) -> Floats:
     """Return an arc that turns by `angle` [rad], level at its middle."""
     return turning(angle * (_middles() - 0.5), room, length)
+
+
+def bend(length: float, angle: float, width: float, at: float) -> Floats:
+    """Return a straight curve that turns by `angle` [rad] to the left, along `width` [m] about `at` [m]."""
+    middles = (np.arange(FINE) + 0.5) * length / FINE
+    return turning(angle * np.clip((middles - at) / width + 0.5, 0.0, 1.0), "flat", length)
 
 
 def wave(length: float, angle: float, turns: float, room: Room) -> Floats:

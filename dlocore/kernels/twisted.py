@@ -1,8 +1,9 @@
 """Assembly in space with twist: the fourth coordinate is theta times the polar radius of gyration of the section.
 
-At every curvature point a frame without spin is kept: `past` (points, 16) holds the tangent t0 of the last step, its
-derivative k0 along the cable, a director across it, the twist rate of these frames along the cable, and the strain
-(two curvatures in the frame of the sections, twist rate) of the two last steps. A state is measured against the frame
+At every curvature point a frame without spin is kept: `past` (points, 17) holds the tangent t0 of the last step, its
+derivative k0 along the cable, a director across it, the twist rate of these frames along the cable, the strain
+(two curvatures in the frame of the sections, twist rate) of the two last steps, and what theta misses of the angle of
+the section, see `twisted_angles.py`. A state is measured against the frame
 that the smallest rotation carries from t0 to its tangent: nothing is singular where the cable is straight, and theta
 counts turns without end (docs/model.md eq. 19).
 
@@ -55,6 +56,7 @@ from dlocore.kernels.lanes import (
 from dlocore.kernels.space import combine
 from dlocore.kernels.strain import space_curvature, transport, twist_increment
 from dlocore.kernels.strands import dot
+from dlocore.kernels.twisted_angles import KNOT, correct_angles
 from dlocore.kernels.twisted_rows import (
     ALONG,
     ANGLE,
@@ -80,6 +82,7 @@ from dlocore.kernels.twisted_rows import (
     M1,
     M2,
     NOW,
+    OFFSET,
     R1,
     R2,
     RATE,
@@ -127,11 +130,12 @@ def _gather(q: Any, first: Any, past: Any, group: int, W: Any) -> None:
             for i in range(FRAME):
                 W[(T0 + i) * LANES + lane] = past[n + m, i]
             put(W, TAU, lane, past[n + m, FRAME])
+            put(W, ANGLE, lane, past[n + m, OFFSET])
 
 
 @leaf
 def _locate(T: Any, inverse: float, W: Any) -> None:
-    """Write r', r'' and theta of the points, and add its derivative to the twist rate."""
+    """Write r' and r'' of the points, and add theta to their angle and its derivative to the twist rate."""
     _locate_points(0, T, inverse, W)
     _locate_points(1, T, inverse, W)
     _locate_points(2, T, inverse, W)
@@ -145,7 +149,7 @@ def _locate_points(m: int, T: Any, inverse: float, W: Any) -> None:
         c = (combined(W, x, T, SECONDS, n), combined(W, y, T, SECONDS, n), combined(W, z, T, SECONDS, n))
         put_vector(W, R1, n, a)
         put_vector(W, R2, n, c)
-        put(W, ANGLE, n, inverse * combined(W, theta, T, VALUES, n))
+        put(W, ANGLE, n, at(W, ANGLE, n) + inverse * combined(W, theta, T, VALUES, n))
         put(W, TAU, n, at(W, TAU, n) + inverse * combined(W, theta, T, FIRSTS, n))
 
 
@@ -390,16 +394,24 @@ def _scatter_force(first: Any, count: int, group: int, W: Any, f: Any) -> None:
 @kernel
 def remember(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h: float) -> None:
     """Carry the frames to q, note its strain, and let what yielded in a step h become memory."""
-    _remember(q, tables, active, p, memory, past, h, np.empty(SIZE))
+    room = np.empty((len(past) // POINTS + 1, KNOT))
+    _remember(q, tables, active, p, memory, past, h, np.empty(SIZE), room)
 
 
 @part
-def _remember(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h: float, W: Any) -> None:
+def _remember(
+    q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h: float, W: Any, room: Any
+) -> None:  # fmt: skip
     """Do the work of `remember` in the room made there."""
+    turns = bool(active[DAMPING] or active[BENDING_MEMORY])
+    for n in range(len(memory)):
+        turns = turns or memory[n, 0] != 0.0 or memory[n, 1] != 0.0
     for group in range(len(tables.curvature_lanes)):
         _measure(q, tables, past, p[TWIST, 1], group, W)
         _measure_bends(active, memory, group, W)
         _note(active, p, memory, past, h, group, W)
+    if turns:
+        correct_angles(q, tables, p[TWIST, 1], past, room)
 
 
 @leaf
@@ -447,7 +459,7 @@ def energy(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any) -> 
 
 @kernel
 def twist_rates(states: Any, tables: Any, p: Any, frames: Any, out: Any) -> None:
-    """Write the twist rate (k, points) [rad/m] of the states (k, n, 4) measured against `frames` (k, points, >= 16)."""
+    """Write the twist rate (k, points) [rad/m] of the states (k, n, 4) measured against `frames` (k, points, PAST)."""
     W = np.empty(SIZE)
     for k in range(len(states)):
         for group in range(len(tables.curvature_lanes)):
@@ -459,7 +471,7 @@ def twist_rates(states: Any, tables: Any, p: Any, frames: Any, out: Any) -> None
 
 @kernel
 def start_frames(knots: Any, q: Any, tables: Any, director: Any, past: Any) -> None:
-    """Write frames without twist along the cable q (n, >= 3) to `past` (points, 16), from `director` (3,) at u = 0."""
+    """Write frames without twist along the cable q (n, >= 3) to `past`, from `director` (3,) at u = 0."""
     row = np.empty((3, 4))
     before = 0.0
     u = 0.0

@@ -4,9 +4,9 @@ from dlocore.effects.base import Vector
 from dlocore.kernels.compile import law
 from dlocore.kernels.lanes import LANES, POINTS, SPANS
 
-TANGENT, BEND, DIRECTOR, FRAME, LAST, BEFORE = 0, 3, 6, 9, 10, 13  # columns of `past`
+TANGENT, BEND, DIRECTOR, FRAME, LAST, BEFORE, OFFSET = 0, 3, 6, 9, 10, 13, 16  # columns of `past`
 TWIST_RATE = LAST + 2
-PAST = 16
+PAST = 17
 # Rows of W, of numbers of points. What they are measured against: t0, k0, director, which is carried to t, theta;
 # r', r''; the strain: |r'|, t . r'', t, kappa, spin, derivative of the twist rate by r', cos and sin of theta, the
 # directors of the section, k1, k2, twist rate, their rates.

@@ -135,7 +135,7 @@ def test_positive_part_has_no_negative_eigenvalue():
 
 
 def test_carrying_the_frames_on_changes_no_strain():
-    body = Body()
+    body = Body(remembered=False)
     q = bent(body)
     body.carry_frames(q)
     q = moved(q, 0.02)
@@ -145,6 +145,26 @@ def test_carrying_the_frames_on_changes_no_strain():
     body.remember(q)
     assert body.energy(q) == pytest.approx(before, rel=1e-12)  # rounding
     np.testing.assert_allclose(body.history.past[:, LAST : LAST + 3], strain, atol=1e-12 * np.abs(strain).max())
+
+
+def test_sections_of_a_bent_stress_free_shape_turn_by_what_theta_misses_and_no_other_strain_changes():
+    # the energy changes here, as the bend of the sections turns against that of their stress-free shape
+    plain, body = Body(remembered=False), Body()
+    q = bent(body)
+    for one in (plain, body):
+        one.carry_frames(q)
+    q = moved(q, 0.02)
+    for one in (plain, body):
+        one.remember(q)
+    known, found = (one.history.past[:, LAST : LAST + 3].copy() for one in (plain, body))
+    turned = np.abs((found - known)[:, :2]).max()
+    assert turned > 1e-3 * np.abs(known[:, :2]).max()  # there is something to turn
+    np.testing.assert_allclose(found[:, 2], known[:, 2], rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(np.hypot(*found.T[:2]), np.hypot(*known.T[:2]), rtol=1e-12)
+    energy = body.energy(q)
+    body.remember(q)  # what was kept is measured, and there is no more to keep
+    assert body.energy(q) == pytest.approx(energy, rel=1e-12)
+    np.testing.assert_allclose(body.history.past[:, LAST : LAST + 3], found, atol=1e-12 * np.abs(found).max())
 
 
 def angle_between(a: Floats, b: Floats, axis: Floats) -> float:
