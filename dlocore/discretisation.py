@@ -48,13 +48,12 @@ def make_grid(problem: Problem, n_u: int) -> Grid:
         SceneError: n_u is too small for the knots that the grasps and loads need.
     """
     scene, length = problem.scene, problem.scene.cable.length
-    bends = corners(problem.start, length)
-    opens = problem.twist is None or (isinstance(problem.rest_shape, str) and problem.rest_shape == "straight")
-    sharply = OPENING if opens else LASTING, _APART * length
+    bends, apart = corners(problem.start, length), _APART * length
+    grading = OPENING if problem.twist is None or problem.rests_straight else LASTING
     # what is left out where there is no room for it: kinks of the angle, then sharp bends
     for kinks in (True, False) if problem.twist is not None else (False,):
         for sharp in (bends, []) if bends else ([],):
-            features = find_features(scene, sharp, *sharply, kinks) if sharp or kinks else problem.features
+            features = find_features(scene, sharp, grading, apart, kinks) if sharp or kinks else problem.features
             if n_u >= features.least:
                 return grid_on(problem, graded_knots(n_u, length, *features[:4]))
     reason = f"{len(problem.features.u)} grasps and loads need a knot each"
@@ -166,7 +165,7 @@ def _memory(problem: Problem, grid: Grid, history: History) -> Floats:
         return history.memory
     if material is not None:
         return _remembered(problem, grid, material, problem.start(0.0, 1)[0])
-    if isinstance(rest, str) and rest == "straight":
+    if problem.rests_straight:
         return history.memory
     if isinstance(rest, str):
         curve: SplineCurve = problem.start

@@ -94,6 +94,12 @@ class Problem:
         rest = self.scene.cable.rest_shape
         return "initial" if self.start.bow and isinstance(rest, str) else cast(str | Floats, rest)
 
+    @property
+    def rests_straight(self) -> bool:
+        """Whether the stress-free shape is straight."""
+        rest = self.rest_shape
+        return isinstance(rest, str) and rest == "straight"
+
     @cached_property
     def features(self) -> Features:
         """Where along the cable knots are needed, but for sharp bends of the start."""

@@ -55,16 +55,15 @@ def march_smooth(
     starts: Starts = {}
     close_grasps(problem, grid, grasps, starts, grid.start)
     _, rows, sampled = constraint_rows(grasps, times, starts)
-    rest = problem.rest_shape
-    straight = isinstance(rest, str) and rest == "straight"
+    memory = _STRAIGHT if problem.rests_straight or problem.nc == 3 else grid.history.memory
     info = np.zeros(SEEN)
     info[FAILED_STEP] = -1
     states, closed, forces, history, control, off = smooth_motion(
         problem.axes, grid.knots, *free_ends(problem.scene), *GAUSS_2, *GAUSS_3, *GAUSS_4, grid.start, grid.velocity,
-        _STRAIGHT if straight or problem.nc == 3 else grid.history.memory, times, len(NEAR), rows, sampled,
-        problem.plane.origin, problem.plane.axes, knots_t, *problem.laws, problem.mass_density(),
-        problem.drag_coefficient(), problem.weight(), rho, tolerance_of(problem, grid, problem.horizon / (steps + 1)),
-        JUMPS * problem.scene.cable.length, every_of(steps + 1), info,
+        memory, times, len(NEAR), rows, sampled, problem.plane.origin, problem.plane.axes, knots_t, *problem.laws,
+        problem.mass_density(), problem.drag_coefficient(), problem.weight(), rho,
+        tolerance_of(problem, grid, problem.horizon / (steps + 1)), JUMPS * problem.scene.cable.length,
+        every_of(steps + 1), info,
     )  # fmt: skip
     if info[FAILED_STEP] >= 0:
         return None
