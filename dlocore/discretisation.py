@@ -28,10 +28,13 @@ from dlocore.shape import SplineCurve, fit_to_knots, start_curve, velocity_to_kn
 Floats = NDArray[np.float64]
 
 # A start that turns by SHARP [rad] within BEND of the length to either side of a point, which is many times as much as
-# it turns elsewhere, has knots graded towards that point: the corner would be another one on every grid.
-SHARP = 1.0
+# it turns elsewhere, has knots graded towards the bend: the corner would be another one on every grid.
+SHARP = 0.8
 BEND = 0.02
 _ELSEWHERE = 4.0  # times the median curvature
+_WIDE = 2.2  # times BEND: where a bend, rather than what is looked over, is as wide as that
+_PLACES = 501  # along the start at which bends are looked for
+_REACH = round(BEND * (_PLACES - 1))  # of them, to either side
 _MOST_CORNERS = 4
 _APART = 0.25 * BEND  # of the length: what is nearer to a sharp bend shares its knot
 
@@ -126,21 +129,32 @@ def start_director(problem: Problem) -> Floats:
 
 
 def corners(curve: SplineCurve, length: float) -> list[float]:
-    """Return the material coordinates [m] of the sharp bends of a start curve, sharpest first."""
+    """Return the material coordinates [m] of the sharp bends of a start curve, sharpest first.
+
+    How sharp a place is tells the angle between the tangents BEND of the length to either side, to which noise that
+    turns to and fro adds nothing. A bend is where that is above half of its largest value about there: as wide as the
+    bend, or as what is looked over. It has its middle, and a wider one two places, a third of it to either side.
+    """
     if (len(curve.control_points) - 3) * BEND < 2.0:
         return []  # its spans are too long for it
-    u = np.linspace(0.0, length, 501)
+    u = np.linspace(0.0, length, _PLACES)
     first, second = curve(u, 1), curve(u, 2)
-    bends = np.linalg.norm(np.cross(first, second), axis=1) / np.linalg.norm(first, axis=1) ** 3
-    turned = np.concatenate([[0.0], np.cumsum(0.5 * (bends[1:] + bends[:-1]))]) * (u[1] - u[0])
+    speed = np.linalg.norm(first, axis=1)
+    tangents = first / speed[:, None]
+    before, after = (tangents[np.clip(np.arange(_PLACES) + k, 0, _PLACES - 1)] for k in (-_REACH, _REACH))
+    turned = 2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(after - before, axis=1), 1.0))
+    bends = np.linalg.norm(np.cross(first, second), axis=1) / speed**3
+    least = max(SHARP, _ELSEWHERE * float(np.median(bends)) * 2.0 * BEND * length)
     found: list[float] = []
-    for k in np.argsort(-bends):
-        around = np.interp([u[k] - BEND * length, u[k] + BEND * length], u, turned)
-        if len(found) == _MOST_CORNERS or bends[k] < _ELSEWHERE * np.median(bends) or around[1] - around[0] < SHARP:
-            break
-        if all(abs(u[k] - v) > 2.0 * BEND * length for v in found):
-            found.append(float(u[k]))
-    return found
+    while len(found) < _MOST_CORNERS and turned.max() >= least:
+        k = int(np.argmax(turned))
+        lower = np.flatnonzero(turned < 0.5 * turned[k])
+        begin = int(lower[lower < k].max(initial=-1)) + 1
+        end = int(lower[lower > k].min(initial=_PLACES))
+        middle, wide = float(np.average(u[begin:end], weights=turned[begin:end])), float(u[end - 1] - u[begin])
+        found += [middle] if wide <= _WIDE * BEND * length else [middle - wide / 3.0, middle + wide / 3.0]
+        turned[max(0, begin - _REACH) : end + _REACH] = 0.0
+    return found[:_MOST_CORNERS]
 
 
 def plane_curvature_of(tables: Tables, q: Floats) -> Floats:

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from benchmarks.hard.curves import arc, corner, hairpin, helix
+from benchmarks.hard.curves import FINE, arc, bend, corner, hairpin, helix
 from benchmarks.hard.generator import draw
 from benchmarks.hard.judge import compare
 from benchmarks.robot_scenes import random_scene
@@ -345,11 +345,14 @@ def test_a_sharp_bend_is_the_same_on_coarse_and_fine_grids():
     [
         (corner(1.0, 2.0, 0.4, "flat"), [0.4]),
         (corner(1.0, 0.5, 0.4, "flat"), []),
+        (bend(1.0, 1.6, 0.03, 0.4), [0.4]),
+        (bend(1.0, 1.6, 0.06, 0.4), [0.38, 0.42]),  # a third of its width to either side
+        (bend(1.0, 1.6, 0.03, 0.4) + 2e-4 * np.random.default_rng(1).standard_normal((FINE + 1, 3)), [0.4]),
         (hairpin(1.0, 0.2, "flat"), []),
         (arc(1.0, 6.0, "flat"), []),
         (helix(1.0, 10.0, 0.3), []),
     ],
-    ids=["corner", "blunt corner", "hairpin", "arc", "helix"],
+    ids=["corner", "blunt corner", "bend", "wide bend", "noisy bend", "hairpin", "arc", "helix"],
 )
 def test_only_a_bend_sharper_than_the_rest_of_the_cable_is_a_corner(points, found):
     u = corners(start_curve(Points(points=points), 1.0), 1.0)
