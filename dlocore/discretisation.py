@@ -243,7 +243,7 @@ def consistent_start(problem: Problem, grid: Grid) -> Floats:
 
     What the knots leave inside the table or an obstacle is pushed out. The angle of the sections plays no part.
     """
-    line = problem if problem.twist is None else replace(problem, twist=None)
+    line = problem.line
     history = _no_history(line, grid.tables)
     start = np.ascontiguousarray(grid.start[:, : line.nc])
     grasps = [g for g in problem.scene.grasps if g.start == 0.0]

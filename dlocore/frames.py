@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from dlocore.discretisation import start_director
 from dlocore.grid import Grid
+from dlocore.kernels.angles import angles_with
 from dlocore.kernels.timefit import fit_time
-from dlocore.kernels.twisted import over_spans, twist_rates
+from dlocore.kernels.twisted import twist_rates
 from dlocore.prediction import MaterialMotion
 from dlocore.problem import Problem
 from dlocore.spline import DEGREE, SplineSurface, design_matrix
@@ -55,19 +56,8 @@ def angles_of(problem: Problem, grid: Grid, rates: Floats, first: Floats) -> Flo
     is too coarse for a triple one, so that of all angles with these slopes it is the smoothest.
     """
     assert problem.twist is not None, "who asks for angles has some"
-    tables = grid.tables
-    weights, firsts = np.asarray(tables.curvature_w), np.asarray(tables.curvature_first)
-    root = np.sqrt(weights)[:, None]
-    slopes, bends = np.zeros((2, len(root), grid.n_u))
-    for order, rows in ((slopes, tables.curvature_b1), (bends, tables.curvature_b2)):
-        np.put_along_axis(order, firsts[:, None] + np.arange(4), rows, axis=1)
-    slopes = over_spans(tables) @ slopes  # as the twist rates are
-    widths = (firsts[:, None] == firsts) @ weights  # of the knot spans
-    rows = np.concatenate([root * slopes, _SMOOTH * widths[:, None] * root * bends])
-    right = np.concatenate([problem.twist.radius * rates * root[:, 0], np.zeros((len(rates), len(root)))], axis=1)
-    right -= first[:, None] * rows[:, 0]
-    q, r = np.linalg.qr(rows[:, 1:])
-    return np.concatenate([first[:, None], np.linalg.solve(r, q.T @ right.T).T], axis=1)
+    slopes = problem.twist.radius * rates
+    return np.asarray(angles_with(grid.tables, slopes, np.ascontiguousarray(first), _SMOOTH))
 
 
 def free_control(problem: Problem, grid: Grid, knots_t: Floats, control: Floats, times: Floats, log: Floats) -> Floats:

@@ -316,7 +316,8 @@ def warm_up() -> None:
     cable = Cable.preset("paper", bending_damping=1e-4, yield_strain=0.1, memory_rate=1.0)
     u = np.linspace(0.0, 1.0, 12)[:, None]
     arc = u * [1.0, 0.0, 0.0] + 0.05 * np.sin(3.0 * u) * [0.0, 1.0, 0.0]
-    grasp = Grasp(u=0.3, hold="clamp", path=Move(displacement=(0.0, 0.01, 0.0), duration=1.0))
+    turn = Move(displacement=(0.0, 0.01, 0.0), rotation=(0.0, 0.0, 0.1), duration=1.0)
+    grasp = Grasp(u=0.3, hold="clamp", path=turn)
     beside = (Sphere(center=(0.5, 0.3, 0.0), radius=0.2),)
     kinds: tuple[tuple[Table | None, Switch], ...] = ((Table(friction=0.1), "auto"), (None, "off"), (None, "on"))
     for table, twist in kinds:  # two, three and four coordinates

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from dlocore.grid import Grid
 from dlocore.kernels.banded import Elimination
-from dlocore.kernels.holding import ROW, hold_rows, place
+from dlocore.kernels.holding import ROW, hold_rows, place, spun
 from dlocore.paths import Still
+from dlocore.plane import unit_across
 from dlocore.problem import Problem
 from dlocore.scene import Grasp
-from dlocore.transport import transported
 
 Floats = NDArray[np.float64]
 
@@ -127,13 +127,6 @@ def spin_of(grasp: Grasp, t: Floats, direction: Floats) -> Floats:
     turns = grasp.path.rotation_at(t - grasp.start)
     if turns is None:
         return np.zeros(len(t))
+    across = turns[0].T @ unit_across(turns[0] @ direction)  # a director, fixed in the gripper
     tangents = turns @ direction
-    before, after = tangents[:-1], tangents[1:]
-    across = np.linalg.svd(tangents[:1])[2][1:2]  # a director at t[0], fixed in the gripper from then on
-    directors = (turns @ (turns[0].T @ across[0])[:, None])[..., 0]
-    x, y = directors[:-1], directors[1:]
-    carried = transported(before, after, x)
-    angle = np.arctan2((np.cross(carried, y) * after).sum(axis=1), (carried * y).sum(axis=1))
-    expected = grasp.path.spin(t - grasp.start, tangents)
-    angle += 2.0 * np.pi * np.round((expected - angle) / (2.0 * np.pi))
-    return np.concatenate([[0.0], np.cumsum(angle)])
+    return np.asarray(spun(tangents, turns @ across, grasp.path.spin(t - grasp.start, tangents)))

@@ -4,6 +4,7 @@ A path's clock starts when its grasp does (`Grasp.grasp_time`, t = 0 by default)
 its last a path stands still.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Literal, cast
 
@@ -91,10 +92,12 @@ class Move:
         """Rotations since the grasp began at times `t`; (k, 3, 3), or None where it never turns."""
         if self.rotation is None:
             return None
-        from scipy.spatial.transform import Rotation  # slow to import, and seldom needed
-
-        s = self._share(t)
-        return Rotation.from_rotvec(s[:, None] * cast(Floats, self.rotation)).as_matrix()
+        rotation = cast(Floats, self.rotation)
+        full = math.sqrt(rotation @ rotation)
+        x, y, z = (rotation / (full or 1.0)).tolist()
+        across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        angle = (full * self._share(t))[:, None, None]
+        return np.eye(3) + np.sin(angle) * across + 2.0 * np.sin(0.5 * angle) ** 2 * (across @ across)  # Rodrigues
 
     def spin(self, t: Floats, tangents: Floats) -> Floats:
         """Turn about the `tangents` (k, 3) between each two of the times `t` (k,) [s]; (k - 1,) [rad].

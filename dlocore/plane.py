@@ -183,7 +183,7 @@ def flat_plane(scene: Scene, start: StartCurve, *, still: bool = False) -> Plane
     vectors = np.concatenate(spread)
     _, sizes, principal = np.linalg.svd(np.concatenate([vectors, np.zeros((2, 3))]), full_matrices=False)
     collinear = not sizes[1] > FLATNESS * sizes[0]
-    normal = _unit_across(principal[0]) if collinear else principal[2]
+    normal = unit_across(principal[0]) if collinear else principal[2]
     off_plane = float(np.abs(vectors @ normal).max())
     if not off_plane <= FLATNESS * max(1.0, np.abs(vectors).max()):
         return Plane(np.eye(3), origin, "start, motion and forces do not lie in one plane")
@@ -195,7 +195,7 @@ def flat_plane(scene: Scene, start: StartCurve, *, still: bool = False) -> Plane
     if not flat_turns:
         return Plane(np.eye(3), origin, "a grasp turns the cable out of the plane of its motion")
     normal = normal * (1.0 if normal[np.argmax(np.abs(normal))] > 0 else -1.0)
-    first = _unit_across(normal)
+    first = unit_across(normal)
     return Plane(np.array([first, _cross(normal, first)]), origin, "start, motion and forces lie in one plane")
 
 
@@ -232,7 +232,7 @@ def leftwards(tangent: Floats) -> Floats:
     return left / size if size > 1e-9 * float(np.linalg.norm(tangent)) else np.array([1.0, 0.0, 0.0])
 
 
-def _unit_across(normal: Floats) -> Floats:
+def unit_across(normal: Floats) -> Floats:
     """Return a unit vector in the plane of `normal`: the world axis nearest to it, x before y before z."""
     sizes = [round(abs(x), 9) for x in normal.tolist()]
     k = sizes.index(min(sizes))

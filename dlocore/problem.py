@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import cast
+from typing import Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,6 +122,16 @@ class Problem:
             return 0
         u, multiplicity = self.features.u, self.features.multiplicity
         return int(((multiplicity > 1) & (u > 0.0) & (u < self.scene.cable.length)).sum())
+
+    @cached_property
+    def rest_plane(self) -> Plane:
+        """The plane of start, paths and forces, or of all but the paths where the start settles in it first."""
+        return rest_plane(self.scene, self.start)
+
+    @cached_property
+    def line(self) -> Self:
+        """The same without the angle of the sections: that of the centreline alone."""
+        return self if self.twist is None else replace(self, twist=None)
 
     @cached_property
     def nc(self) -> int:

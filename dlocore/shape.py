@@ -20,6 +20,7 @@ Floats = NDArray[np.float64]
 
 SPEED_RANGE = (0.5, 1.5)  # of |r'|: a coarse spline of a hairpin stays within, evenly spaced control points don't
 SAME_ANGLE = 1e-9  # [rad]
+_PLACES = 129  # at which a curve is looked at for how it turns
 _ONE_SPAN = uniform_knots(4, 1.0)
 _THIRDS = np.linspace(0.0, 1.0, 4)[:, None]
 
@@ -71,6 +72,14 @@ class StartCurve(SplineCurve):
         """Heights of the lowest and the highest control point, between which the curve lies [m]."""
         z = self.control_points[:, 2].tolist()
         return min(z), max(z)
+
+    @cached_property
+    def turning(self) -> float:
+        """Angle by which the tangent turns along the curve, to whichever side [rad]."""
+        tangents = self(np.linspace(0.0, self.knots[-1], _PLACES), 1)
+        tangents /= np.linalg.norm(tangents, axis=1)[:, None]
+        chords = np.linalg.norm(np.diff(tangents, axis=0), axis=1)
+        return float(np.sum(2.0 * np.arcsin(np.minimum(0.5 * chords, 1.0))))
 
 
 def _plain(x: Floats) -> Floats:

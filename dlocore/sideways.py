@@ -17,7 +17,6 @@ from dlocore.grid import Grid
 from dlocore.kernels.across import stiffness_across
 from dlocore.kernels.assembly import NO_RATES, assemble
 from dlocore.kernels.banded import factor
-from dlocore.plane import rest_plane
 from dlocore.problem import Problem, pose
 from dlocore.scene import Grasp, Scene
 from dlocore.solvers.march import March
@@ -86,7 +85,7 @@ def _in_plane(problem: Problem, states: Floats) -> Floats | None:
     scene = problem.scene
     if not problem.touches and scene.effects.get("twist", "auto") != "on" and not scene.shape.settle:
         return None  # in space for another reason than what it touches: it lies in no plane
-    plane = rest_plane(scene, start)
+    plane = problem.rest_plane
     if plane.dimensions == 3:
         return None
     r = problem.plane.world(states[..., :3])
@@ -96,7 +95,7 @@ def _in_plane(problem: Problem, states: Floats) -> Floats | None:
 def pose_as_shown(scene: Scene, called_for: Mapping[str, str], start: Floats) -> Problem:
     """Return the problem of a motion that began at control points (n, 3) [m], bowed out of its plane as they are."""
     problem = pose(scene, called_for)
-    plane = rest_plane(scene, problem.start)
+    plane = problem.rest_plane
     if problem.on_table or plane.dimensions == 3 or plane.distance(start) <= 0.1 * BOW**2 * scene.cable.length:
         return problem
     return pose(scene, {**called_for, "side": UNSTABLE})
@@ -135,7 +134,7 @@ def slipping_across(problem: Problem, grid: Grid, states: Floats) -> Floats:
     bands = np.zeros((*states.shape[:2], 4))
     if problem.plane.dimensions == 2 or not problem.obstacles or problem.friction is not None:
         return bands
-    normal = np.cross(*rest_plane(problem.scene, problem.start).axes)
+    normal = np.cross(*problem.rest_plane.axes)
     active, parameters = problem.law_table()
     active[[row for row in range(laws.COUNT) if row != laws.CONTACT]] = 0
     parameters[[laws.STRETCH, laws.TWIST], 0] = 0.0

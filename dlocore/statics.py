@@ -21,7 +21,6 @@ from dlocore.report import WindowForces, elastic_energy, reactions
 from dlocore.resting import slide_to_rest
 from dlocore.scene import Scene
 from dlocore.settling import Settled, settle
-from dlocore.shape import SplineCurve
 from dlocore.sideways import is_unstable
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import design_matrix
@@ -30,7 +29,6 @@ Floats = NDArray[np.float64]
 
 LEVELS = (9, 13, 17, 25, 33, 49, 65, 97)
 _WOUND = np.pi  # [rad]: a start that turns by more along its length may have other equilibria beside the one downhill
-_PLACES = 129  # at which it is looked at
 _FINER = (1.5, 2.0)  # times the control points, with which a start that finds no rest may
 
 
@@ -193,7 +191,7 @@ def _settled(problem: Problem, grid: Grid, monitor: Monitor, like: Grid | None) 
     folds within a span as it slides, which no energy sees, relaxes all the same where nothing is in its way.
     """
     slid: Grid | None = None
-    if problem.friction is not None or problem.obstacles or _turning(problem.start) > _WOUND:
+    if problem.friction is not None or problem.obstacles or problem.start.turning > _WOUND:
         q, rest, history = slide_to_rest(problem, grid, monitor)
         if rest != "restless":
             slid = grid.changed(start=q, history=history)
@@ -212,11 +210,3 @@ def _is_wanting(problem: Problem, start: Grid | None) -> bool:
     Over an obstacle it may not: it would take the cable through it.
     """
     return start is None or (problem.friction is None and not problem.obstacles and starts_folded(start))
-
-
-def _turning(curve: SplineCurve) -> float:
-    """Return the angle by which the tangent of a curve turns along it, to whichever side [rad]."""
-    tangents = curve(np.linspace(0.0, curve.knots[-1], _PLACES), 1)
-    tangents /= np.linalg.norm(tangents, axis=1)[:, None]
-    chords = np.linalg.norm(np.diff(tangents, axis=0), axis=1)
-    return float(np.sum(2.0 * np.arcsin(np.minimum(0.5 * chords, 1.0))))

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 from dlocore.discretisation import smallest_n_u
 from dlocore.events import smallest_n_t
-from dlocore.plane import rest_plane
 from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
 from dlocore.progress import record_level
@@ -78,7 +77,7 @@ def march_level(
 
 def sided(problem: Problem, monitor: Monitor) -> Problem:
     """Return the problem, with a side to go to where a march says that its motion leaves its plane."""
-    if problem.on_table or rest_plane(problem.scene, problem.start).dimensions == 3:
+    if problem.on_table or problem.rest_plane.dimensions == 3:
         return problem
     for number in _LOOKS:
         called = march_level(problem, stretched(problem, number), monitor).posed.called_for

@@ -4,9 +4,11 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.effects.base import Vector
 from dlocore.kernels.banded import elimination
 from dlocore.kernels.basis import basis, find_span
-from dlocore.kernels.compile import brief, kernel
+from dlocore.kernels.compile import brief, kernel, law
+from dlocore.kernels.strain import transport
 
 ROW = 17  # numbers that describe a row
 _JUMP = 2  # in place of a derivative: what the slope jumps by
@@ -89,6 +91,35 @@ def hold_rows(
                 offsets[k, count * nd + r] += turned_inverse[r, s] * angles[k, s]
     e = elimination(len(knots) - 4, nc, nd, pivots, follow, turned_pivots, turned_follow)
     return e, offsets, inverse, turned_inverse
+
+
+@brief
+def spun(tangents: Any, directors: Any, expected: Any) -> Any:
+    """Return by how much a gripper has turned about the cable since the first of some times (k,) [rad].
+
+    It is measured against a frame that the smallest rotations carry from each tangent to the next, and counts full
+    turns.
+
+    Args:
+        tangents: (k, 3) unit tangents of the cable, fixed in the gripper, over time.
+        directors: (k, 3) a unit vector across them, fixed in the gripper.
+        expected: (k - 1,) turn between each two of the times, to less than half a turn [rad].
+    """
+    out = np.zeros(len(tangents))
+    for k in range(1, len(tangents)):
+        t = _row(tangents, k)
+        x, y = transport(_row(tangents, k - 1), t, _row(directors, k - 1)), _row(directors, k)
+        turned = (x[1] * y[2] - x[2] * y[1]) * t[0] + (x[2] * y[0] - x[0] * y[2]) * t[1]
+        turned += (x[0] * y[1] - x[1] * y[0]) * t[2]
+        angle = np.arctan2(turned, x[0] * y[0] + x[1] * y[1] + x[2] * y[2])
+        out[k] = out[k - 1] + angle + 2.0 * np.pi * np.round((expected[k - 1] - angle) / (2.0 * np.pi))
+    return out
+
+
+@law
+def _row(x: Any, k: int) -> Vector:
+    """Return a row of x (k, 3)."""
+    return x[k, 0], x[k, 1], x[k, 2]
 
 
 @kernel

@@ -10,7 +10,11 @@ from dlocore.kernels.compile import kernel, law, leaf
 _SLACK = 0.9  # of a distance that is skipped along the cable: a strained cable is longer
 _TOO_NEAR = 0.5  # of the diameter: no step brings strands from farther away nearer than this
 _LOOK = 1e-3  # diameters: the least way between two looks at a gap
-_WIDE = 8.0  # times the distance of interest, up to which it is told how far apart strands are
+_WIDE = 8.0  # times the distance of interest, or ...
+_WIDER = 0.3  # ... of the length between strands, up to which it is told how far apart they are
+_KEPT = (
+    0.8  # of the length up to which strands can't be near, from which on they are looked at: states to come turn more
+)
 _BLOCK = 16  # segments that are looked at as one before each of them is
 
 
@@ -383,54 +387,67 @@ def nearest(x: Any, u: Any, separation: float, cap: float) -> float:
     return best
 
 
-@leaf
-def turning(q: Any, nd: int) -> float:
-    """Return the total angle [rad] by which the control polygon of q (n, nc) turns."""
-    turned = 0.0
-    for i in range(1, q.shape[0] - 1):
-        product, before, after = 0.0, 0.0, 0.0
-        for d in range(nd):
-            a, b = q[i, d] - q[i - 1, d], q[i + 1, d] - q[i, d]
-            product += a * b
-            before += a * a
-            after += b * b
-        if before > 0.0 and after > 0.0:
-            turned += np.arccos(min(max(product / np.sqrt(before * after), -1.0), 1.0))
-    return turned
-
-
 @kernel
-def turning_states(states: Any, nd: int, angle: float) -> Any:
-    """Return the numbers of the states (k, n, nc) whose control polygon turns by more than `angle` [rad]."""
-    found = np.empty(len(states), np.int64)
-    count = 0
+def lengths_apart(states: Any, knots: Any, nd: int, angle: float) -> Any:
+    """Return the length [m] up to which no part of a cable turns by more than `angle` [rad], of each of the states.
+
+    A part turns by no more than the control polygon of the spans that it lies in. Infinite where all of it does not.
+
+    Args:
+        states: control points (k, n, nc) [m].
+        knots: (n + 4,) [m].
+        nd: dimensions of the centreline.
+    """
+    n = states.shape[1]
+    out = np.full(len(states), np.inf)
+    turned = np.zeros(n)  # by the polygon, up to a control point
     for k in range(len(states)):
-        if turning(states[k], nd) > angle:
-            found[count] = k
-            count += 1
-    return found[:count]
+        for i in range(1, n - 1):
+            product, before, after = 0.0, 0.0, 0.0
+            for d in range(nd):
+                a, b = states[k, i, d] - states[k, i - 1, d], states[k, i + 1, d] - states[k, i, d]
+                product += a * b
+                before += a * a
+                after += b * b
+            turned[i] = turned[i - 1]
+            if before > 0.0 and after > 0.0:
+                turned[i] += np.arccos(min(max(product / np.sqrt(before * after), -1.0), 1.0))
+        last = 0  # span up to which the cable turns by less, from `first` on
+        for first in range(n - 3):
+            last = max(last, first)
+            while last < n - 3 and turned[last + 2] - turned[first] <= angle:
+                last += 1
+            if last == n - 3:
+                break
+            out[k] = min(out[k], max(0.0, knots[last + 3] - knots[first + 4]))
+    return out
 
 
 @kernel
-def nearest_of(states: Any, which: Any, first: Any, b: Any, u: Any, nd: int, separation: float, cap: float) -> float:
+def nearest_of(
+    states: Any, which: Any, apart: Any, first: Any, b: Any, u: Any, nd: int, separation: float, cap: float
+) -> float:
     """Return the smallest `nearest` of the states `which` of (k, n, nc), at nodes with rows `first` (m,), b (m, 4).
 
     No point moves farther than the control point that moves most. So states that lie so close to one whose strands are
     far apart that they can't have come nearer than what was found are not looked at.
+
+    Args:
+        apart: (k,) [m] of each of all states: nodes nearer than this along the cable are not looked at.
     """
     best = cap
-    wide = _WIDE * cap
     x = np.empty((len(u), nd))
-    seen, apart = -1, 0.0  # the state last looked at, and how far apart its strands are, at most `wide`
+    # the state last looked at, how far apart along the cable, and then in space, its strands are at least
+    seen, along, gap = -1, 0.0, 0.0
     for k in which:
-        if seen >= 0:
+        if seen >= 0 and along <= max(separation, apart[k]):
             moved = 0.0
             for n in range(states.shape[1]):
                 square = 0.0
                 for d in range(nd):
                     square += (states[k, n, d] - states[seen, n, d]) ** 2
                 moved = max(moved, square)
-            if apart - 2.0 * np.sqrt(moved) >= best:
+            if gap - 2.0 * np.sqrt(moved) >= best:
                 continue
         for n in range(len(u)):
             for d in range(nd):
@@ -438,6 +455,7 @@ def nearest_of(states: Any, which: Any, first: Any, b: Any, u: Any, nd: int, sep
                 for i in range(4):
                     value += b[n, i] * states[k, first[n] + i, d]
                 x[n, d] = value
-        seen, apart = k, nearest(x, u, separation, wide)
-        best = min(best, apart)
+        along = max(separation, _KEPT * apart[k])
+        seen, gap = k, nearest(x, u, along, max(_WIDE * cap, _WIDER * along))
+        best = min(best, gap)
     return best

@@ -42,7 +42,6 @@ from dlocore.kernels.lanes import (
     SHARE,
     SLOPE,
     SPANS,
-    TRIPLE,
     VALUES,
     WEIGHT,
     added,
@@ -219,19 +218,6 @@ def _direct(W: Any) -> None:
         put_vector(W, M2, n, m2)
         put(W, K1, n, dot(kappa, m1))
         put(W, K2, n, dot(kappa, m2))
-
-
-def over_spans(tables: Any) -> Any:
-    """Return the matrix (points, points) that takes values at the curvature points to those that the twist rate has."""
-    firsts, weights, u = tables.curvature_first, tables.curvature_w, tables.curvature_u
-    same = firsts[:, None] == firsts
-    shares = same * weights / (same @ weights)[:, None]
-    x = u - shares @ u
-    slopes = same * (weights * x) / (same @ (weights * x**2))[:, None]
-    spans = np.unique(firsts)
-    outer = np.concatenate([[True], np.diff(spans) == TRIPLE, [True]])
-    leans = np.isin(firsts, spans[outer[:-1] | outer[1:]])
-    return shares + (leans * x)[:, None] * slopes
 
 
 @kernel

@@ -23,6 +23,7 @@ from dlocore.kernels.strands import clear_way, meeting_pairs, near_pairs
 from dlocore.problem import Problem, pose
 from dlocore.solvers.ladder import distance, run_level
 from dlocore.solvers.monitor import Monitor
+from dlocore.spline import design_matrix, uniform_knots
 
 Floats = NDArray[np.float64]
 DIAMETER = 0.005  # [m]
@@ -432,6 +433,36 @@ def test_the_smallest_distance_of_strands_is_found() -> None:
         else:
             # the cable is uneven here, so that nodes 0.05 of its coordinate apart miss some of it
             assert found == pytest.approx(true, abs=0.02)
+
+
+def test_strands_are_found_where_a_long_cable_winds_and_moves() -> None:
+    # most states, and most strands of the others, are not looked at: they can't be near, as the cable turns too little
+    random = np.random.default_rng(5)
+    u, n = np.linspace(0.0, 1.0, 801), 40
+    within, separation = 1.2 * DIAMETER, APART * DIAMETER
+    near = 0
+    for _ in range(12):
+        turns = random.normal(0.0, 1.0, (4, 2)) * random.uniform(0.5, 3.0)
+        states = []
+        for share in np.linspace(0.2, 1.6, 15):
+            angle = share * sum(a * np.sin((k + 1) * np.pi * u) + b * u ** (k + 1) for k, (a, b) in enumerate(turns))
+            climb = 0.1 * np.sin(3.0 * angle)
+            tangents = np.column_stack([np.cos(angle) * np.cos(climb), np.sin(angle) * np.cos(climb), np.sin(climb)])
+            line = np.concatenate([np.zeros((1, 3)), np.cumsum(0.5 * (tangents[1:] + tangents[:-1]), axis=0) / 800])
+            states.append(fit_line(u, line, n))
+        knots, states_ = uniform_knots(n, 1.0), np.stack(states)
+        x = np.stack([design_matrix(knots, u) @ q for q in states_])
+        apart = np.linalg.norm(x[:, :, None] - x[:, None], axis=3)[:, np.abs(u[:, None] - u[None]) >= separation].min()
+        found = nearest_strands(knots, states_, 3, DIAMETER, within)
+        near += bool(np.isfinite(found))
+        assert np.isfinite(found) if apart < 0.9 * within else (found == np.inf or apart < 1.1 * within)
+        assert found == np.inf or found == pytest.approx(apart, abs=0.3 * DIAMETER)
+    assert 2 < near < 10
+
+
+def fit_line(u: Floats, line: Floats, n: int) -> Floats:
+    """Return the control points (n, 3) of the least-squares spline through points (k, 3) at u (k,)."""
+    return np.linalg.lstsq(design_matrix(uniform_knots(n, 1.0), u), line)[0]
 
 
 # --- the choice

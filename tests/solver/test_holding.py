@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from dlocore import Cable, ControlPoints, Environment, Grasp, Move, Scene, Straight, Waypoints
 from dlocore.discretisation import make_grid
@@ -88,6 +89,16 @@ def test_a_held_direction_turns_with_the_gripper(u):
         rotation = path.rotation_at(np.array([t]))
         assert rotation is not None
         assert np.abs(world_at(problem, grid, q, u, 1) - rotation[0] @ [1.0, 0.0, 0.0]).max() < 100 * ROUNDING
+
+
+def test_a_move_turns_about_its_rotation_vector():
+    random = np.random.default_rng(3)
+    for turn in (np.zeros(3), np.array([0.0, 0.0, 1e-9]), *random.normal(0.0, 5.0, (20, 3))):
+        found = Move(displacement=WAY, duration=2.0, rotation=turn, profile="linear").rotation_at(
+            np.array([-1.0, 0.5, 3.0])
+        )
+        known = Rotation.from_rotvec(np.array([0.0, 0.25, 1.0])[:, None] * turn).as_matrix()
+        np.testing.assert_allclose(found, known, atol=20 * ROUNDING)
 
 
 def test_in_the_plane_rows_hold_in_its_coordinates():

@@ -122,9 +122,9 @@ def test_a_start_settles_in_the_equilibrium_of_the_grid_it_is_handed_on_from():
 
 
 def test_a_start_that_coarse_grids_fold_is_not_handed_on_and_settles_from_more_control_points():
-    # a stiff loop hung from a point straightens and hangs; on 13 control points alone it stays folded within a span
+    # a stiff loop hung from a point straightens and hangs; on 10 control points alone it stays folded within a span
     problem = pose(draw(4, 182).make())
-    grid = make_grid(problem, 13)
+    grid = make_grid(problem, 10)
     q, rest, _, history = settle(problem, grid, 0.0, Monitor())
     folded = grid.changed(start=q, history=history)
     own = start_grid(problem, 28, Monitor())
@@ -132,7 +132,7 @@ def test_a_start_that_coarse_grids_fold_is_not_handed_on_and_settles_from_more_c
     assert starts_folded(folded)
     assert apart(problem, folded, own) > 0.2
     assert apart(problem, start_grid(problem, 28, Monitor(), folded), own) < 1e-3
-    assert apart(problem, start_grid(problem, 13, Monitor()), own) < 1e-3
+    assert apart(problem, start_grid(problem, 10, Monitor()), own) < 1e-3
 
 
 def test_a_stiff_loop_that_has_two_equilibria_has_one_start_on_all_grids():
