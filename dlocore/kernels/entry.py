@@ -8,10 +8,20 @@ from typing import Any
 import numpy as np
 
 from dlocore.effects.laws import SELF_CONTACT, keeps_history
-from dlocore.kernels.assembly import assemble, multiply_scalar_band, remember, times_scalar_band
+from dlocore.kernels.assembly import (
+    NO_RATES,
+    add_scalar_band,
+    assemble,
+    multiply_scalar_band,
+    remember,
+    times_scalar_band,
+)
+from dlocore.kernels.banded import expand_vector, factor, multiply_band, reduce_matrix, reduce_vector, solve
 from dlocore.kernels.compile import brief
 from dlocore.kernels.march import constrained_mass_solve
 from dlocore.kernels.selfcontact import press
+
+_LASTS = 0.25  # (h w)^2 of a wave of which a step keeps half the acceleration that it begins with, inverse
 
 
 @brief
@@ -64,6 +74,41 @@ def begin_stretch(
         return closed, np.zeros_like(v), G, jump
     held_acceleration = (near[2] - 2.0 * near[1] + near[0]) / (h * h)
     return closed, constrained_mass_solve(nc, density * unit, e, held_acceleration, -G), G, jump
+
+
+@brief
+def lasting(
+    axes: Any, q: Any, a: Any, G: Any, unit: Any, density: float, h: float, tables: Any, active: Any, p: Any,
+    history: Any, e: Any,
+) -> Any:  # fmt: skip
+    """Return what lasts for a step of the acceleration a (n, nc) that a stretch begins with, and a G that balances it.
+
+    What a cable is let go from, or springs away with, acts at one point, or at an end: the shorter the spans, the more
+    of its acceleration is of waves faster than any step. A step turns that into speeds which the cable never has, and
+    drag and damping of these hold it back. So (M + c h^2 K) a' = M a, which leaves alone what is slower than the step,
+    with the positive semidefinite part of K; G' = G + M (a - a').
+
+    Args:
+        q, a, G: (n, nc) what `begin_stretch` was given and returned.
+        unit: (n, 4) mass matrix of unit density; `density` [kg/m] is that of the cable.
+        h: time step [s].
+    """
+    nc, free = len(axes), q.size - len(e.held)
+    f, K = np.empty_like(q), np.empty((q.size, 4 * nc))
+    assemble(axes, q, np.zeros_like(q), tables, active, p, history, NO_RATES, (1.0, 0.0, 0.0), f, K)
+    K *= _LASTS * h * h
+    force, x, change = np.empty(q.size), np.empty(free), np.empty(q.size)
+    multiply_band(K, a.ravel(), force)
+    add_scalar_band(nc, unit, density, K)
+    A = np.empty((free, e.width))
+    reduce_matrix(e, K, A)
+    if factor(A) >= 0:
+        return a, G
+    reduce_vector(e, force, x)
+    solve(A, x)
+    expand_vector(e, x, change)
+    fast = change.reshape(q.shape)
+    return a - fast, G + density * times_scalar_band(unit, fast)
 
 
 @brief

@@ -17,7 +17,7 @@ from dlocore.kernels.assembly import (
 )
 from dlocore.kernels.basis import build_tables
 from dlocore.kernels.compile import kernel
-from dlocore.kernels.entry import begin_stretch, remember_start, to_ends_of_steps
+from dlocore.kernels.entry import begin_stretch, lasting, remember_start, to_ends_of_steps
 from dlocore.kernels.holding import hold_rows
 from dlocore.kernels.march import march_steps
 from dlocore.kernels.tension import COLUMNS
@@ -35,8 +35,8 @@ def smooth_motion(
 ) -> Any:  # fmt: skip
     """March a smooth motion without twist from its start, and fit the time spline to it.
 
-    It is `build_tables`, `remember_start`, `hold_rows`, `begin_stretch`, `march_steps`, `to_ends_of_steps` and `fitted`
-    one after the other: see there for what is not said here.
+    It is `build_tables`, `remember_start`, `hold_rows`, `begin_stretch`, `lasting`, `march_steps`, `to_ends_of_steps`
+    and `fitted` one after the other: see there for what is not said here.
 
     Args:
         axes: (0, 1) or (0, 1, 2).
@@ -89,6 +89,7 @@ def smooth_motion(
     for k in range(len(e.held)):
         i, d = e.held[k] // nc, e.held[k] % nc
         reactions[0, k] = density * inertia[i, d] + G[i, d]
+    a, G = lasting(axes, start, a, G, tables.mass, density, h, tables, active, p, history, e)
     states = np.empty((steps + 1, n, nc))
     states[0] = start
     march_steps(

@@ -17,7 +17,7 @@ from dlocore.grid import Grid
 from dlocore.holding import Starts, hold
 from dlocore.kernels.assembly import History, note, slopes, times_scalar_band
 from dlocore.kernels.banded import Elimination
-from dlocore.kernels.entry import to_ends_of_steps
+from dlocore.kernels.entry import lasting, to_ends_of_steps
 from dlocore.kernels.march import (
     DEEPEST,
     DIVIDED_FROM,
@@ -331,7 +331,13 @@ class _Walk:
         offsets[first : last + 1] = entry.offsets
         reactions = np.zeros((len(times), len(e.held)))
         reactions[first] = (times_scalar_band(self._mass, a) + entry.G).reshape(-1)[e.held]
-        return _Stretch(h, first, last, grasps, entry, entry.v, a, entry.G, offsets, reactions)
+        G = entry.G
+        if problem.inertia is not None:
+            tables, density = grid.tables, problem.mass_density()
+            a, G = lasting(
+                problem.axes, self._states[first], a, G, tables.mass, density, h, tables, *self._laws, self._history, e
+            )
+        return _Stretch(h, first, last, grasps, entry, entry.v, a, G, offsets, reactions)
 
     def _steps(
         self, stretch: _Stretch, start: int, stop: int, begin: int, jumps: bool, h: float, rho: float, states: Floats,
