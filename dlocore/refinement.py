@@ -28,6 +28,9 @@ AUTO_ENOUGH = 1e-2  # of the length: the estimated error with which it is conten
 ROUGH = 0.05  # of the length: two grids that differ more are in no order yet: the next is marched with strong damping
 MOST_WORK = 3.2e7  # control points times steps of one march in the plane; each coordinate more costs twice the time
 _FRAMES = 3  # a control point in time, at least, that are kept of a motion with twist: what its time spline needs
+PATIENT = 4.0  # times as much, of a march that will end before a deadline or within a time budget, ...
+MOST_STATES = 1e8  # ... and whose states are no more numbers than these: 0.8 GB
+_SLOWER = 1.3  # times as long as its work tells, a march may take
 CONTACT_COSTS = 2  # times as much work counts with contact, which takes more of the time of a step
 AUTO_SHARE = 1 / 32  # of it for who asked for no target, once the estimated error is AUTO_ENOUGH
 _MOST_POINTS = 800  # along the cable
@@ -51,7 +54,8 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
     error is the sum of both. A cable that folds between its control points gets more of them, whatever grids agree on.
     The error is at least what the time spline misses of its march: a cable that trembles faster than
     two grids can show looks alike on both. A march that finds no equilibrium is tried with more steps before it is
-    given up. Within a time budget the first grid is the one that what solves cost on this machine allows.
+    given up. Within a time budget the first grid is the one that what solves cost on this machine allows. Who gives a
+    time, as a budget or a deadline, is given more grids within it than who doesn't, who would wait for minutes.
 
     A target that was asked for has to be met. Quality "auto" aims at AUTO_TARGET with a share of that work, and where
     it reaches no closer with it, an estimate of AUTO_ENOUGH is success, for which it does all of the work that a target
@@ -88,6 +92,7 @@ class _Climb:
         estimate: error of the best one [m].
         rho: spectral radius of the next march.
         failures: marches in a row that found less than the best one, or no equilibrium as that.
+        pace: time that the last march took for each of its points and steps [s].
     """
 
     problem: Problem
@@ -104,6 +109,7 @@ class _Climb:
     estimate: float = np.inf
     rho: float = RHO
     failures: int = 0
+    pace: float = np.inf
 
     def outcome(self) -> Outcome:
         """March until an answer is found, and return it."""
@@ -121,6 +127,8 @@ class _Climb:
                     raise
                 size = stretched(self.problem, self.number)
                 continue
+            spent = self.monitor.elapsed() - began
+            self.pace = spent / self._work(size)
             if self.best is not None:
                 more = self._after_failure(level, self.best, size)
                 if more is not None:
@@ -147,7 +155,7 @@ class _Climb:
                 if unfolded is not None:
                     return unfolded
                 finer = self._next(level, size, unfolds)
-            if finer is not None and not self._in_time(size, finer, self.monitor.elapsed() - began):
+            if finer is not None and not self._in_time(size, finer, spent):
                 return self._within_budget(level)
             size = finer
         return self._ended()
@@ -236,13 +244,23 @@ class _Climb:
 
     def _affordable(self, size: Size) -> Size | None:
         """Return a size, or None where a march of it takes too long."""
-        touches = self.problem.contact is not None or self.problem.self_contact is not None
-        work = size.n_u * size.steps * 2 ** (self.problem.nc - 2) * (CONTACT_COSTS if touches else 1)
+        work = self._work(size)
         success = self.best is None or not is_folded(self.best)
         content = self.enough > self.target and self.estimate <= self.enough and success
-        most = MOST_WORK * (AUTO_SHARE if content else 1.0)
+        most = MOST_WORK * (AUTO_SHARE if content else PATIENT if self._ends_in_time(size) else 1.0)
         fits = self.problem.twist is None or _FRAMES * size.n_t * size.n_u <= MOST_FRAMES
         return size if fits and size.n_u <= _MOST_POINTS and work <= most else None
+
+    def _work(self, size: Size) -> float:
+        """Return the control points times steps of a march in the plane that takes as long as one of a size."""
+        touches = self.problem.contact is not None or self.problem.self_contact is not None
+        return size.n_u * size.steps * 2.0 ** (self.problem.nc - 2) * (CONTACT_COSTS if touches else 1.0)
+
+    def _ends_in_time(self, size: Size) -> bool:
+        """Tell whether there is a deadline or a budget, and a march of a size will end before it."""
+        left = min(self.monitor.remaining(), self.budget - self.monitor.elapsed())
+        few = size.n_u * size.steps * self.problem.nc <= MOST_STATES
+        return left < np.inf and few and _SLOWER * self.pace * self._work(size) < left
 
     def _left(self, size: Size | None) -> int:
         """Return how many refinements in the direction are left, from a size on."""
