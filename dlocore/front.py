@@ -51,7 +51,8 @@ def predict(
             estimate are taken on, which saves the search for them. Where the two differ too much for that this one is
             solved from the beginning, and `message` says why.
         on_iteration: called after every iteration, or refinement level, with its record.
-        deadline: time allowed [s]; after it the best iterate is returned with status "time_limit".
+        deadline: time allowed [s]; after it the best iterate is returned with status "time_limit". For a target that
+            is hard to meet more is done within it, or within `quality.time_budget`, than without either.
         cancelled: asked between iterations; where it returns True the solve stops.
         cost: what solves cost on this machine (`dlocore.calibration.stored_cost`), by which a time budget begins with a
             grid that fits; without it with the coarsest.

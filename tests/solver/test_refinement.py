@@ -10,7 +10,20 @@ from benchmarks.hard.curves import FINE, arc, bend, corner, hairpin, helix
 from benchmarks.hard.generator import draw
 from benchmarks.hard.judge import compare
 from benchmarks.robot_scenes import random_scene
-from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, Sphere, Straight, equilibrium, predict
+from dlocore import (
+    Cable,
+    Environment,
+    Grasp,
+    Move,
+    Points,
+    Quality,
+    Scene,
+    Sphere,
+    Straight,
+    equilibrium,
+    predict,
+    refinement,
+)
 from dlocore.discretisation import corners, make_grid
 from dlocore.features import find_features
 from dlocore.holding import Starts, close_grasps, hold
@@ -91,6 +104,18 @@ def test_a_target_is_reached_by_more_steps_where_only_time_errs():
     found = predict(swinging(Quality(target_error=2e-3)))
     assert found.status == "converged"
     assert found.accuracy.steps > 10 * found.accuracy.n_u
+
+
+def test_who_gives_a_deadline_gets_more_work_for_a_target_that_ends_before_it(monkeypatch: pytest.MonkeyPatch):
+    scene = swinging(Quality(target_error=2e-4))
+    free = predict(scene).accuracy
+    monkeypatch.setattr(refinement, "MOST_WORK", 0.5 * free.n_u * free.steps)
+    assert predict(scene).status == "max_iterations"
+    found = predict(scene, deadline=60.0)
+    assert found.status == "converged"
+    assert (found.accuracy.n_u, found.accuracy.steps) == (free.n_u, free.steps)
+    monkeypatch.setattr(refinement, "_SLOWER", 1e9)  # the next march would not end before it: it is not begun
+    assert predict(scene, deadline=60.0).status == "max_iterations"
 
 
 def test_auto_goes_as_far_as_the_target_that_it_is_content_with():
