@@ -164,8 +164,15 @@ def _least_squares(
             )
     except TimeIsUp:
         monitor.phase(method)
-        level = replace(level, control=last[0])
         message = "The time limit passed; this is the last iterate. Allow more time or a coarser grid."
+        if method == "spacetime":  # iterates that don't come near may be anything
+            level = evenly_fitted(level)
+            message = (
+                f"The time limit passed after {len(monitor.iterations) - before} iterations of the least squares. "
+                "Allow more time or a coarser grid. The surface is that of the march it started from."
+            )
+        else:
+            level = replace(level, control=last[0])
         return _answer(monitor, method, Outcome(level, "time_limit", message, None))
     monitor.phase(method)
     count, left = len(monitor.iterations) - before, update
@@ -173,7 +180,7 @@ def _least_squares(
     message = f"The update fell below delta = {quality.delta:g} m in {count} iterations."
     if not converged:
         message = (
-            f"The update is still {update:.2g} m after {count} iterations, above delta = {quality.delta:g} m. "
+            f"The update fell to {update:.2g} m in {count} iterations, not below delta = {quality.delta:g} m. "
             "Raise n_u and n_t, allow a larger delta, or take method march."
         )
     if problem.self_contact is not None:

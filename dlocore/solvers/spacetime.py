@@ -32,11 +32,13 @@ from dlocore.solvers.monitor import Monitor
 
 Floats = NDArray[np.float64]
 
-MAX_ITERATIONS = 60
+MAX_ITERATIONS = 200
 _CHUNK = 1.5e7  # about the multiplications between two looks at the clock
 _HISTORY = 4  # iterates that Anderson acceleration combines
 _FRESH = 2  # iterations that have their own normal matrix, at least; after them a matrix serves twice, at least
 _SHRINKS = 0.7  # of the update before: where an update is larger, the next iteration has its own, too
+_PATIENCE = 20  # iterations after which the least update has to be below ...
+_FALLS = 0.9  # ... this share of what it was; else it won't fall below delta, which most do in 15 and few in 40
 _DAMPING = 1e-6  # of the diagonal of normal equations that lost their positive factors to rounding
 _LARGEST_STEP = 0.25  # of the length, in one control point: beyond it a step is shortened
 LARGEST_STRAIN = 0.003  # that the bounded axial stiffness allows under the largest tension of the march
@@ -199,10 +201,11 @@ class Solved:
     """A space-time solution.
 
     Attributes:
-        control: (n_t, n_u, nc) [m].
+        control: (n_t, n_u, nc) [m]; that of the march from the first window on that did not converge.
         converged: the update fell below delta in every window.
-        update: the last update norm [m], the largest over the windows.
-        find_forces: finds what holds the cable in each window, at its collocation points.
+        update: the last update norm [m], the largest over the windows that were solved; the least of one that did not
+            converge.
+        find_forces: finds what holds the cable in each window that was solved, at its collocation points.
     """
 
     control: Floats
@@ -218,7 +221,8 @@ def solve(problem: Problem, motion: March, knots_t: Floats, delta: float, monito
     """Solve the space-time least squares, started from a march on the same grid.
 
     Gauss-Newton steps with the positive semidefinite part of the tangent, combined over the last iterates by Anderson
-    acceleration (Walker and Ni, 2011), until the norm of the update of all control points is below `delta`.
+    acceleration (Walker and Ni, 2011), until the norm of the update of all control points is below `delta`. The first
+    window in which that does not come to be is the last one that is tried.
 
     Args:
         on_step: called with (control, update, residual, damping, step length) after every iteration.
@@ -231,10 +235,10 @@ def solve(problem: Problem, motion: March, knots_t: Floats, delta: float, monito
     windows = windows_of(problem, knots_t)
     guess = [_window_fit(motion, w) for w in windows]
     parts: list[Floats] = []
-    forces = []
+    forces: list[Callable[[], WindowForces]] = []
     starts: Starts = {}
     q, v = motion.states[0], motion.velocity
-    converged, worst = True, 0.0
+    worst = 0.0
     for i, window in enumerate(windows):
         grasps = closed_grasps(problem.scene, window.begin, window.end)
         close_grasps(problem, grid, grasps, starts, q)
@@ -255,13 +259,14 @@ def solve(problem: Problem, motion: March, knots_t: Floats, delta: float, monito
             on_step(join([*parts, iterate, *guess[at + 1 :]], windows), update, residual, damping, length)
 
         control, update = _iterate(solver, control, delta, monitor, show)
+        worst = max(worst, update)
+        if not update < delta:
+            return Solved(join([*parts, *guess[i:]], windows), False, worst, lambda: tuple(find() for find in forces))
         parts.append(control)
         forces.append(solver.forces(control))
-        converged &= update < delta
-        worst = max(worst, update)
         q = control[-1]
         v = 3 * (control[-1] - control[-2]) / (window.knots[-2] - window.knots[-5])
-    return Solved(join(parts, windows), converged, worst, lambda: tuple(find() for find in forces))
+    return Solved(join(parts, windows), True, worst, lambda: tuple(find() for find in forces))
 
 
 def _window_fit(motion: March, window: Window) -> Floats:
@@ -277,7 +282,9 @@ def _window_fit(motion: March, window: Window) -> Floats:
 def _iterate(
     solver: WindowSolver, control: Floats, delta: float, monitor: Monitor, on_step: OnStep
 ) -> tuple[Floats, float]:
-    """Iterate one window; return its control points and the norm of the last update [m].
+    """Iterate one window; return its control points and the norm of the last update [m], the least if none is small.
+
+    It ends where the least update has fallen by less than a tenth in the last _PATIENCE iterations.
 
     As long as updates shrink, the normal matrix of an iterate before serves, and an iteration takes a fraction of the
     time; it is the right side that has to be its own. A fresh matrix serves for the next iteration, too: what the last
@@ -285,7 +292,7 @@ def _iterate(
     """
     limit = _LARGEST_STEP * solver.problem.scene.cable.length
     last = room(_HISTORY, control.size)
-    best = (np.inf, control)
+    best: list[float] = []  # update so far, by iteration
     factors: Floats | None = None
     damping, before = 0.0, np.inf
     for known in range(MAX_ITERATIONS):
@@ -303,12 +310,13 @@ def _iterate(
         on_step(following, update, float(np.sqrt(value)), damping, length)
         if update < delta:
             return following, update
-        if update < best[0]:
-            best = (update, control + last.steps[0].reshape(control.shape))
+        best.append(min([update, *best[-1:]]))
+        if known >= _PATIENCE and best[-1] > _FALLS * best[-1 - _PATIENCE]:
+            break
         if known + 1 < _FRESH or not (fresh or update < _SHRINKS * before):
             factors = None
         control, before = following, update
-    return best[1], best[0]
+    return control, best[-1] if best else np.inf
 
 
 def _linearised(solver: WindowSolver, control: Floats) -> tuple[float, Floats | None, Floats, float]:

@@ -226,7 +226,7 @@ def test_a_least_squares_that_does_not_converge_gets_more_control_points_in_time
 
 
 def test_a_least_squares_that_more_control_points_in_time_do_not_mend_is_told_so():
-    scene = draw(6, 22).make()
+    scene = draw(33, 417).make()
     found = predict(scene)
     assert (found.status, found.accuracy.method) == ("max_iterations", "spacetime")
     assert control_points(found) == (scene.quality.n_u, scene.quality.n_t)

@@ -1,5 +1,6 @@
 """Refinement and what an answer says of itself: regressions found by random hard scenes."""
 
+import time
 from dataclasses import replace
 from itertools import pairwise
 
@@ -14,6 +15,7 @@ from dlocore import (
     Cable,
     Environment,
     Grasp,
+    Iteration,
     Move,
     Points,
     Quality,
@@ -144,6 +146,32 @@ def test_auto_answers_with_the_march_where_the_least_squares_fails():
     assert auto.accuracy.method == "march"
     assert "least squares did not converge" in auto.message
     np.testing.assert_array_equal(auto.surface.control_points, asked.surface.control_points)
+
+
+def test_a_least_squares_ends_where_its_updates_no_longer_fall():
+    # it begins with a jump of the velocity, and again when the gripper stops: two stretches, the first is the last
+    scene = draw(33, 296).make()
+    found = predict(scene, keep_grid=True)
+    least = np.minimum.accumulate([iteration.update for iteration in found.iterations])
+    falls = least[20:] < 0.9 * least[:-20]
+    assert found.status == "max_iterations"
+    assert not falls[-1]
+    assert falls[:-1].all()
+    assert f"fell to {least[-1]:.2g} m in {len(least)} iterations, not below delta" in found.message
+
+
+def test_a_least_squares_that_runs_out_of_time_leaves_the_march_that_it_started_from():
+    def slow(step: Iteration) -> None:
+        time.sleep(2.0 if step.number == 2 else 0.0)
+
+    scene = jerked(41)
+    asked = replace(scene, quality=replace(scene.quality, method="spacetime"))
+    found = predict(asked, deadline=2.0, on_iteration=slow)
+    assert found.status == "time_limit"
+    assert len(found.iterations) == 3
+    assert "after 3 iterations" in found.message
+    marched = predict(replace(scene, quality=replace(scene.quality, method="march")))
+    np.testing.assert_array_equal(found.surface.control_points, marched.surface.control_points)
 
 
 def test_a_march_in_place_of_the_least_squares_is_held_to_its_time_spline():
