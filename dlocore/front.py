@@ -114,13 +114,15 @@ def _solved(problem: Problem, monitor: Monitor, cost: Cost | None, again: Again 
 
 
 def automatic_method(problem: Problem) -> Method:
-    """Return the method of quality "auto": the least squares on a given grid where the motion is smooth, else a march.
+    """Return the method of quality "auto": a march, or the least squares on a given grid with a threshold for it.
 
-    What touches, slips or yields does so at instants that a march steps over and collocation points miss.
+    On the same grid a march is nearer to the motion and takes less time (`python -m benchmarks.methods`). What touches,
+    slips or yields does so at instants that a march steps over and collocation points miss.
     """
     jumps = ("plasticity", "self_contact")
     smooth = problem.contact is None and problem.friction is None and not any(problem.choices[j].active for j in jumps)
-    return "spacetime" if problem.scene.quality.n_u is not None and smooth else "march"
+    quality = problem.scene.quality
+    return "spacetime" if quality.n_u is not None and quality.delta is not None and smooth else "march"
 
 
 def _as_before(again: Again, monitor: Monitor) -> Outcome:
@@ -155,12 +157,12 @@ def _least_squares(
     find_forces: FindForces | None = None
     try:
         if method == "spacetime":
-            solved = solve(problem, level.motion, knots_t, quality.delta, monitor, on_step)
+            solved = solve(problem, level.motion, knots_t, quality.threshold, monitor, on_step)
             control, converged, update = solved.control, solved.converged, solved.update
             find_forces = solved.find_forces
         else:
             control, converged, update = solve_as_printed(
-                problem, level.motion, knots_t, quality.delta, monitor, on_step
+                problem, level.motion, knots_t, quality.threshold, monitor, on_step
             )
     except TimeIsUp:
         monitor.phase(method)
@@ -177,10 +179,10 @@ def _least_squares(
     monitor.phase(method)
     count, left = len(monitor.iterations) - before, update
     status: Status = "converged" if converged else "max_iterations"
-    message = f"The update fell below delta = {quality.delta:g} m in {count} iterations."
+    message = f"The update fell below delta = {quality.threshold:g} m in {count} iterations."
     if not converged:
         message = (
-            f"The update fell to {update:.2g} m in {count} iterations, not below delta = {quality.delta:g} m. "
+            f"The update fell to {update:.2g} m in {count} iterations, not below delta = {quality.threshold:g} m. "
             "Raise n_u and n_t, allow a larger delta, or take method march."
         )
     if problem.self_contact is not None:
@@ -266,7 +268,7 @@ def _answer(
             wall_time=monitor.elapsed(),
             n_u=grid.n_u,
             n_t=len(level.control),
-            delta=problem.scene.quality.delta,
+            delta=problem.scene.quality.threshold,
             steps=len(level.motion.times) - 1,
             dimensions=problem.plane.dimensions,
             dimensions_reason=problem.plane.reason,

@@ -36,6 +36,7 @@ EFFECTS = (
 )
 MAX_GRASPS = 32
 MAX_N_U, MAX_N_T = 129, 513  # of a given grid: memory and time
+DELTA = 1e-5  # [m]: threshold of a least squares
 MAX_OBSTACLES = 100
 AUTO_TARGET = 2e-3  # of the length: the error that quality "auto" aims at
 MAX_POINTS = 100_000
@@ -291,15 +292,17 @@ class Quality:
         n_u: control points along the cable, 5 to 129.
         n_t: control points in time, 5 to 513. Where such a grid can't show the motion finer ones are solved, and where
             these do, they are the answer, which says so; `keep_grid=True` of `predict` does without.
-        delta: the paper's threshold on the norm of the control-point update, eq. (25) [m], 1e-10 to 1e-2.
-        method: "march", "spacetime", "paper", "reference" (docs/reference.md), or "auto": `spacetime` where the grid is
-            given, else `march`.
+        delta: threshold of a least squares on the norm of its control-point update, paper eq. (25) [m], 1e-10 to 1e-2;
+            without it 1e-5.
+        method: "march", "spacetime", "paper", "reference" (docs/reference.md), or "auto": `march`, which is nearer to
+            the motion on the same grid and takes less time; but `spacetime` where a grid is given with a `delta`, which
+            a march has no use for, and the motion is smooth.
         estimate: with a given grid, estimate the error by a second march on another grid; False saves its time.
     """
 
     n_u: int | None = None
     n_t: int | None = None
-    delta: float = 1e-5
+    delta: float | None = None
     target_error: float | None = None
     time_budget: float | None = None
     method: Method = "auto"
@@ -313,7 +316,8 @@ class Quality:
             if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 5 <= value <= most:
                 raise SceneError(name, value, f"an integer, 5 to {most}")
             object.__setattr__(self, name, int(value))
-        object.__setattr__(self, "delta", number("delta", self.delta, at_least=1e-10, at_most=1e-2, unit="m"))
+        if self.delta is not None:
+            object.__setattr__(self, "delta", number("delta", self.delta, at_least=1e-10, at_most=1e-2, unit="m"))
         choice("method", self.method, ("auto", "march", "spacetime", "paper", "reference"))
         if (self.n_u is None) != (self.n_t is None):
             missing = "n_u" if self.n_u is None else "n_t"
@@ -336,6 +340,11 @@ class Quality:
         if self.method == "reference" and (self.n_u is not None or self.time_budget is not None):
             name = "n_u" if self.n_u is not None else "time_budget"
             raise SceneError(name, getattr(self, name), 'target_error or nothing with method "reference"')
+
+    @property
+    def threshold(self) -> float:
+        """The threshold of a least squares on its update [m]: `delta`, or where none is given that of the paper."""
+        return DELTA if self.delta is None else self.delta
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

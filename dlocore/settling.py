@@ -21,7 +21,7 @@ from dlocore.spline import greville
 
 Floats = NDArray[np.float64]
 Rest = Literal["settled", "restless", "time"]  # at rest; no rest found; the time was up
-Settled = tuple[Floats, Rest, tuple[WindowForces, ...], History]
+Settled = tuple[Floats, Rest, Held, History]
 
 TOLERANCE = 1e-10  # of the length, on the last Newton update
 RESTING = 1e-8  # of the length, as near to the equilibrium as a march solves its steps
@@ -44,8 +44,8 @@ _ROUGH = 1e-5  # of the length: the tolerance of the first of those, which other
 def settle(
     problem: Problem, grid: Grid, at: float, monitor: Monitor, begin: tuple[Floats, History] | None = None
 ) -> Settled:
-    """Return control points (n_u, nc) [m] with the grasps at their poses of time `at`, how they rest, what holds them,
-    and what lies behind them.
+    """Return control points (n_u, nc) [m] with the grasps at their poses of time `at`, how they rest, what is held of
+    them, and what lies behind them.
 
     Relaxations held back by a spring towards where they started: the first strongly, later ones less, so that a cable
     without a stable tangent (buckling, free rotation) walks downhill instead of jumping. Each is Newton's method alone,
@@ -64,8 +64,6 @@ def settle(
     starts: Starts = {}
     before_t = 0.0
     times = np.linspace(0.0, at, PATH_STEPS + 1)[1:] if at > 0 else np.zeros(1)
-    rest: Rest = "restless"
-    forces: tuple[WindowForces, ...] = ()
     for t in times:
         grasps = closed_grasps(problem.scene, t, t)
         close_grasps(problem, grid, grasps, starts, q)
@@ -76,17 +74,17 @@ def settle(
         applied = applied_forces(problem, grid, np.array([t]))[0]
         rounds = ROUNDS if t == times[-1] else PATH_ROUNDS
         rest = _relaxed(problem, grid, q, history, held, applied, rounds, 1.0 if begin is None else _NEARBY, monitor)
-        forces = (
-            WindowForces(
-                held,
-                np.array([t]),
-                _unbalanced(problem, grid, history, q, applied).reshape(1, -1)[:, held.elimination.held],
-                q[None],
-            ),
-        )
         if rest == "time":
             break
-    return q, rest, forces, history._replace(tension=grid.history.tension)
+    return q, rest, held, history._replace(tension=grid.history.tension)
+
+
+def holding(problem: Problem, grid: Grid, at: float, settled: Settled) -> WindowForces:
+    """Return what holds a cable that has settled at the time `at` [s]."""
+    q, _, held, history = settled
+    applied = applied_forces(problem, grid, np.array([at]))[0]
+    forces = _unbalanced(problem, grid, history, q, applied).reshape(1, -1)[:, held.elimination.held]
+    return WindowForces(held, np.array([at]), forces, q[None])
 
 
 def _relaxed(

@@ -13,14 +13,13 @@ from dlocore.errors import SceneError, number
 from dlocore.events import closed_grasps
 from dlocore.frames import free_of_frames
 from dlocore.grid import Grid
-from dlocore.kernels.assembly import History
 from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
 from dlocore.regrid import begin_on, starts_folded
-from dlocore.report import WindowForces, elastic_energy, reactions
+from dlocore.report import elastic_energy, reactions
 from dlocore.resting import slide_to_rest
 from dlocore.scene import Scene
-from dlocore.settling import Settled, settle
+from dlocore.settling import Settled, holding, settle
 from dlocore.sideways import is_unstable
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import design_matrix
@@ -97,12 +96,12 @@ def equilibrium(
     least = smallest_n_u(problem)
     sizes = [n_u] if n_u is not None else [max(n, least + 2 * i) for i, n in enumerate(LEVELS)]
     rest = _refined(problem, sizes, at, target, monitor)
-    if rest.status == "converged" and is_unstable(problem, rest.grid, rest.q, closed_grasps(scene, at, at)):
+    if rest.status == "converged" and is_unstable(problem, rest.grid, rest.settled[0], closed_grasps(scene, at, at)):
         problem = pose(scene, {"side": UNSTABLE}, at_rest=True)
         rest = _refined(problem, sizes, at, target, monitor)
-    grid, q, history = rest.grid, rest.q, rest.history
+    grid, (q, _, _, history) = rest.grid, rest.settled
     world = problem.world(free_of_frames(problem, grid, q[None], history.past[None])[0])
-    held = reactions(problem, grid, rest.forces)
+    held = reactions(problem, grid, (holding(problem, grid, at, rest.settled),))
     return Equilibrium(
         status=rest.status,
         message=rest.message,
@@ -119,9 +118,7 @@ class _Rest(NamedTuple):
     """What `settle` found on the last of some grids, what to say of it, and how far it is from the one before [m]."""
 
     grid: Grid
-    q: Floats
-    forces: tuple[WindowForces, ...]
-    history: History
+    settled: Settled
     status: Status
     message: str
     change: float
@@ -129,19 +126,20 @@ class _Rest(NamedTuple):
 
 def _refined(problem: Problem, sizes: list[int], at: float, target: float, monitor: Monitor) -> _Rest:
     """Settle on finer and finer grids until two agree to the target [m]."""
-    found: tuple[Grid, *Settled] | None = None
+    found: tuple[Grid, Settled] | None = None
     change, status = np.inf, cast(Status, "time_limit")
     message = "The time limit passed. Allow more time or a smaller n_u."
     for n in sizes:
         grid = make_grid(problem, n)
-        q, rest, forces, history = settle(problem, grid, at, monitor)
+        settled = settle(problem, grid, at, monitor)
+        q, rest = settled[:2]
         if rest == "time" and found is not None:
             break
         if found is not None:
             u = np.linspace(0.0, problem.scene.cable.length, 65)
-            before = design_matrix(found[0].knots, u) @ found[1][:, :3]
+            before = design_matrix(found[0].knots, u) @ found[1][0][:, :3]
             change = float(np.linalg.norm(design_matrix(grid.knots, u) @ q[:, :3] - before, axis=1).max())
-        found = (grid, q, rest, forces, history)
+        found = grid, settled
         if rest == "time":
             break
         one = len(sizes) == 1
@@ -149,13 +147,13 @@ def _refined(problem: Problem, sizes: list[int], at: float, target: float, monit
         if change <= target:
             break
     assert found is not None, "every list of sizes has a first"
-    grid, q, rest, forces, history = found
-    if rest == "restless":
+    grid, settled = found
+    if settled[1] == "restless":
         status = "stalled"
         message = "The relaxation did not come to rest. The scene may have no equilibrium, or many side by side."
     elif status == "converged" and len(sizes) > 1 and not change <= target:
         status, message = "max_iterations", f"The finest grid still moved the shape by {change * 1e3:.2g} mm."
-    return _Rest(grid, q, forces, history, status, message, change)
+    return _Rest(grid, settled, status, message, change)
 
 
 def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None = None) -> Grid:

@@ -116,8 +116,12 @@ class QualityModel(Model):
 
     n_u: Count | None = Field(default=None, ge=5, le=129, description="Control points along the cable.", examples=[9])
     n_t: Count | None = Field(default=None, ge=5, le=513, description="Control points in time.", examples=[13])
-    delta: Number = Field(
-        default=1e-5, ge=1e-10, le=1e-2, description="Threshold on the control-point update [m].", examples=[1e-5]
+    delta: Number | None = Field(
+        default=None,
+        ge=1e-10,
+        le=1e-2,
+        description="Threshold of a least squares on its control-point update [m]; absent: 1e-5.",
+        examples=[1e-5],
     )
     target_error: Number | None = Field(
         default=None, ge=1e-6, le=10.0, description="Error at the worst point of the surface [m].", examples=[0.002]
@@ -126,7 +130,10 @@ class QualityModel(Model):
         default=None, ge=1e-4, le=3600.0, description="Time the solve may take [s].", examples=[0.02]
     )
     method: Literal["auto", "march", "spacetime", "paper", "reference"] = Field(
-        default="auto", description="How to solve; the answer names the method used.", examples=["auto"]
+        default="auto",
+        description="How to solve; the answer names the method used. `auto` is `march`, but `spacetime` where a grid "
+        "is given with a `delta` and nothing touches, slips or yields.",
+        examples=["auto"],
     )
 
 

@@ -176,7 +176,7 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
             wall_time=monitor.elapsed(),
             n_u=control.shape[1],
             n_t=len(control),
-            delta=problem.scene.quality.delta,
+            delta=problem.scene.quality.threshold,
             steps=motion.steps,
             dimensions=problem.plane.dimensions,
             dimensions_reason=problem.plane.reason,

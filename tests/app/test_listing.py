@@ -23,7 +23,7 @@ def stored(tmp_path_factory: pytest.TempPathFactory) -> Any:
     settings = Settings(data_dir=tmp_path_factory.mktemp("data"))
     with TestClient(create_app(settings)) as client:
         start(client)
-        spacetime = {"n_u": 9, "n_t": 13}
+        spacetime = {"n_u": 9, "n_t": 13, "delta": 1e-5}
         scenes = [
             paper_scene(name="Along the wall"),
             paper_scene(name="along the floor", quality=spacetime),

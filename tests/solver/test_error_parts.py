@@ -48,6 +48,6 @@ def test_what_auto_leaves_out_has_its_part():
 
 
 def test_an_unknown_error_has_no_parts():
-    accuracy = predict(replace(SCENE, quality=Quality(n_u=9, n_t=13, estimate=False))).accuracy
+    accuracy = predict(replace(SCENE, quality=Quality(n_u=9, n_t=13, method="spacetime", estimate=False))).accuracy
     assert accuracy.error_estimate is None
     assert accuracy.error_parts == {}

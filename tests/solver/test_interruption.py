@@ -11,7 +11,7 @@ from tests.solver.scenes import cable, march, paper_scene
 METHODS = {
     "march": march(9, 13),
     "auto": Quality(),
-    "spacetime": Quality(n_u=9, n_t=13),
+    "spacetime": Quality(n_u=9, n_t=13, method="spacetime"),
     "paper": Quality(n_u=9, n_t=13, method="paper"),
 }
 every_method = pytest.mark.parametrize("method", METHODS)

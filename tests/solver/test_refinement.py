@@ -23,6 +23,7 @@ from dlocore import (
     Sphere,
     Straight,
     equilibrium,
+    plan,
     predict,
     refinement,
 )
@@ -135,6 +136,24 @@ def jerked(n_t: int) -> Scene:
     path = Move(displacement=(0.3, 0.0, 0.0), duration=0.15, profile="linear")
     scene = swinging(Quality(n_u=17, n_t=n_t, delta=1e-9))
     return replace(scene, grasps=(Grasp(u=0.0, path=path),))
+
+
+def test_auto_is_a_march_unless_a_given_grid_has_a_threshold():
+    for quality, method in (
+        (Quality(n_u=9, n_t=13), "march"),
+        (Quality(n_u=9, n_t=13, delta=1e-5), "spacetime"),
+        (Quality(delta=1e-5), "march"),
+    ):
+        scene = paper_scene(0.25, quality=quality)
+        assert predict(scene).accuracy.method == plan(scene).method == method
+
+
+def test_the_threshold_is_that_of_the_paper_where_none_is_given():
+    least = paper_scene(0.25, quality=Quality(n_u=9, n_t=13, method="spacetime"))
+    found = predict(least)
+    given = predict(replace(least, quality=replace(least.quality, delta=1e-5)))
+    assert found.accuracy.delta == 1e-5
+    np.testing.assert_array_equal(found.surface.control_points, given.surface.control_points)
 
 
 def test_auto_answers_with_the_march_where_the_least_squares_fails():

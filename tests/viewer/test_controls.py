@@ -68,6 +68,7 @@ GRIPPER = ("primitives", 0)
         ({"Points along n_u": 11}, ("quality", "n_u"), 11),
         ({"Points in time n_t": 17}, ("quality", "n_t"), 17),
         ({"Threshold δ": "10⁻⁶ m"}, ("quality", "delta"), 1e-6),
+        ({"Threshold δ": "none"}, ("quality",), {"n_u": 9, "n_t": 13}),
         ({"Method": "march"}, ("quality", "method"), "march"),
         ({"Name": "my run"}, ("name",), "my run"),
         ({"Let it settle first": True}, ("shape", "settle"), True),

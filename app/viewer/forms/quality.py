@@ -10,6 +10,7 @@ from app.viewer.forms.base import Form, OnEdit, show_if, show_value
 Mode = Literal["automatic", "target error", "time budget", "grid"]
 QUALITY = ("quality",)
 METHODS = ("auto", "march", "spacetime", "paper")
+NONE = "none"  # that of the method, and no reason to take one that has a threshold
 DELTAS = {"10⁻⁴ m": 1e-4, "10⁻⁵ m": 1e-5, "10⁻⁶ m": 1e-6, "10⁻⁷ m": 1e-7, "10⁻⁸ m": 1e-8}
 
 
@@ -23,7 +24,7 @@ class QualityForm(Form):
         self._budget = gui.add_number("Time budget [ms]", 20.0, min=0.1, max=60_000.0, step=1.0)
         self._n_u = gui.add_slider("Points along n_u", min=5, max=65, step=1, initial_value=9)
         self._n_t = gui.add_slider("Points in time n_t", min=5, max=129, step=1, initial_value=13)
-        self._delta = gui.add_dropdown("Threshold δ", tuple(DELTAS), initial_value="10⁻⁵ m")
+        self._delta = gui.add_dropdown("Threshold δ", (NONE, *DELTAS))
         self._method = gui.add_dropdown("Method", METHODS)
         self._bind(self._mode, self._asked)
         for control in (self._error, self._budget, self._n_u, self._n_t, self._delta, self._method):
@@ -37,8 +38,10 @@ class QualityForm(Form):
         elif mode == "time budget":
             wanted = {"time_budget": float(f"{1e-3 * self._budget.value:.9g}")}
         elif mode == "grid":
-            delta = DELTAS.get(self._delta.value) or float(self._delta.value.removesuffix(" m"))
-            wanted = {"n_u": int(self._n_u.value), "n_t": int(self._n_t.value), "delta": delta}
+            wanted = {"n_u": int(self._n_u.value), "n_t": int(self._n_t.value)}
+            words = self._delta.value
+            if words != NONE:
+                wanted["delta"] = DELTAS.get(words) or float(words.removesuffix(" m"))
             if self._method.value != "auto":
                 wanted["method"] = self._method.value
         return draft.put(QUALITY, wanted)
@@ -69,10 +72,9 @@ class QualityForm(Form):
             if control.max < given[name]:
                 control.max = given[name]
             show_value(control, given[name])
-        delta = given.get("delta", 1e-5)
-        words = next((text for text, value in DELTAS.items() if value == delta), None)
-        if words is None:
-            words = f"{delta:g} m"
-            self._delta.options = (*DELTAS, words)
+        delta = given.get("delta")
+        words = NONE if delta is None else next((text for text, x in DELTAS.items() if x == delta), f"{delta:g} m")
+        if words not in self._delta.options:
+            self._delta.options = (NONE, *DELTAS, words)
         show_value(self._delta, words)
         show_value(self._method, given.get("method", "auto"))
