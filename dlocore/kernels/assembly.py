@@ -62,7 +62,7 @@ def history_at(histories: Any, k: int) -> Any:
     """Return the `History` of time k from one with arrays (1 or more times, ...)."""
     at = min(k, len(histories.memory) - 1)
     h = histories
-    return History(h.memory[at], h.past[at], h.axial[at], h.stick, h.slide, h.tension)
+    return History(h.memory[at], h.past[at], h.axial[min(k, len(h.axial) - 1)], h.stick, h.slide, h.tension)
 
 
 @leaf

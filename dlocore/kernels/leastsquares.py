@@ -67,6 +67,49 @@ def collocation(knots: Any) -> Any:
 
 
 @leaf
+def _strain(tables: Any, n: int, q: Any) -> float:
+    """Return the axial strain of control points q (n, nc) at the n-th axial point."""
+    square = 0.0
+    for d in range(min(q.shape[1], 3)):
+        slope = 0.0
+        for i in range(4):
+            slope += tables.axial_b1[n, i] * q[tables.axial_first[n] + i, d]
+        square += slope * slope
+    return np.sqrt(square) - 1.0
+
+
+@kernel
+def resting_strains(
+    times: Any, states: Any, at: Any, tables: Any, behind: Any, stiffness: float, viscosity: float, soft: float
+) -> Any:
+    """Return `behind` with the stress-free strain with which a softer cable bears the tension of a march.
+
+    That is N_m + EA_b (e - e_m) of the strain e, where the march has the strain e_m and, with the damping of stretch,
+    the tension N_m (docs/model.md eq. 15b).
+
+    Args:
+        times, states: of the march, (s,) [s] and (s, n, nc).
+        at: (k,) [s].
+        tables: `basis.Tables`.
+        behind: `History.axial` of the march at these times (1 or k, points, 3).
+        stiffness, viscosity: EA [N] and what damps stretch [N s] in the march.
+        soft: EA_b [N].
+    """
+    out = np.empty((len(at), behind.shape[1], 3))
+    for k in range(len(at)):
+        s = min(max(np.searchsorted(times, at[k], side="right") - 1, 0), len(times) - 2)
+        h = times[s + 1] - times[s]
+        share = (at[k] - times[s]) / h
+        axial = behind[min(k, len(behind) - 1)]
+        for n in range(behind.shape[1]):
+            before, after = _strain(tables, n, states[s]), _strain(tables, n, states[s + 1])
+            strain = (1.0 - share) * before + share * after
+            tension = stiffness * (strain - axial[n, 0]) + viscosity * (after - before) / h
+            out[k, n, 0], out[k, n, 1], out[k, n, 2] = strain - tension / soft, axial[n, 1], axial[n, 2]
+    return out
+
+
+@leaf
 def band_to_dense(A: Any, out: Any) -> None:
     """Write the symmetric banded A (n, width) as a full matrix (n, n)."""
     n, width = A.shape

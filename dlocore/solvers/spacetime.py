@@ -18,10 +18,17 @@ from dlocore.events import closed_grasps
 from dlocore.grid import Grid
 from dlocore.holding import Held, Starts, close_grasps, hold
 from dlocore.kernels.anderson import advance, room
-from dlocore.kernels.assembly import times_scalar_band
+from dlocore.kernels.assembly import History, times_scalar_band
 from dlocore.kernels.banded import expand_rows, place_rows
 from dlocore.kernels.blocks import REACH, factor_rows
-from dlocore.kernels.leastsquares import POINTS, Equations, collocation, holding_forces, normal_equations
+from dlocore.kernels.leastsquares import (
+    POINTS,
+    Equations,
+    collocation,
+    holding_forces,
+    normal_equations,
+    resting_strains,
+)
 from dlocore.kernels.march import constrained_mass_solve
 from dlocore.kernels.timefit import fit_time
 from dlocore.problem import Problem
@@ -41,7 +48,7 @@ _PATIENCE = 20  # iterations after which the least update has to be below ...
 _FALLS = 0.9  # ... this share of what it was; else it won't fall below delta, which most do in 15 and few in 40
 _DAMPING = 1e-6  # of the diagonal of normal equations that lost their positive factors to rounding
 _LARGEST_STEP = 0.25  # of the length, in one control point: beyond it a step is shortened
-LARGEST_STRAIN = 0.003  # that the bounded axial stiffness allows under the largest tension of the march
+LARGEST_STRAIN = 0.003  # of a cable of the bounded axial stiffness under the largest tension of the march
 RESOLVED = 15.0  # times mu L^2/h^2: the axial stiffness that a time spline of span h resolves
 
 
@@ -81,13 +88,29 @@ def join(parts: list[Floats], windows: list[Window]) -> Floats:
 def bounded_axial_stiffness(problem: Problem, largest_tension: float, span: float) -> float:
     """Return the axial stiffness [N] of the least squares: what the time spline resolves, never above the true one.
 
-    Collocated in time, near-inextensibility over-constrains the time spline (docs/model.md eq. 15).
+    Collocated in time, near-inextensibility over-constrains the time spline (docs/model.md eq. 15a).
     """
     cable = problem.scene.cable
     true = problem.stretch.axial_stiffness
     resolved = RESOLVED * cable.linear_density * (cable.length / span) ** 2
     buckles = 400.0 * (problem.bend.bending_stiffness if problem.bend else 0.0) / cable.length**2
     return min(true, max(largest_tension / LARGEST_STRAIN, resolved, buckles))
+
+
+def behind_softer(problem: Problem, motion: March, times: Floats, axial_stiffness: float) -> History:
+    """Return what lies behind a march at the times (k,) [s] for a cable of another axial stiffness [N].
+
+    Strained as the march is, it bears the same tension (docs/model.md eq. 15b).
+    """
+    history, true = motion.behind(times), problem.stretch.axial_stiffness
+    if axial_stiffness == true:
+        return history
+    active, parameters = problem.laws
+    viscosity = float(parameters[laws.STRETCH_DAMPING, 0]) if active[laws.STRETCH_DAMPING] else 0.0
+    axial = resting_strains(
+        motion.times, motion.states, times, motion.grid.tables, history.axial, true, viscosity, axial_stiffness
+    )
+    return history._replace(axial=axial)
 
 
 class WindowSolver:
@@ -126,7 +149,7 @@ class WindowSolver:
             tables=grid.tables,
             active=active,
             p=parameters,
-            histories=motion.behind(self.times),
+            histories=behind_softer(problem, motion, self.times, axial_stiffness),
             applied=applied_forces(problem, grid, self.times),
             e=e,
         )
@@ -188,11 +211,13 @@ class WindowSolver:
     def forces(self, control: Floats) -> Callable[[], WindowForces]:
         """Return what finds what holds the cable at `control`."""
         lean = self.equations._replace(histories=None)  # the motion knows them, and is kept
-        return partial(_window_forces, self.held, self.times, lean, self.motion, control)
+        return partial(_window_forces, self.problem, self.motion, self.held, self.times, lean, control)
 
 
-def _window_forces(held: Held, times: Floats, lean: Equations, motion: March, control: Floats) -> WindowForces:
-    equations = lean._replace(histories=motion.behind(times))
+def _window_forces(
+    problem: Problem, motion: March, held: Held, times: Floats, lean: Equations, control: Floats
+) -> WindowForces:
+    equations = lean._replace(histories=behind_softer(problem, motion, times, float(lean.p[laws.STRETCH, 0])))
     return WindowForces(held, times, *holding_forces(equations, control))
 
 

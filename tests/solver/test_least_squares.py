@@ -1,10 +1,12 @@
-"""The compiled normal equations of the space-time least squares are those of docs/model.md eq. 16 and 17."""
+"""The space-time least squares: its compiled normal equations (docs/model.md eq. 16, 17), and its tension (eq. 15b)."""
+
+from typing import Literal
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dlocore import Cable, Environment, Grasp, Move, Points, Scene, Table
+from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, Table, predict
 from dlocore.events import closed_grasps, time_knots
 from dlocore.holding import Starts, close_grasps
 from dlocore.kernels.anderson import advance, room
@@ -15,9 +17,10 @@ from dlocore.kernels.leastsquares import band_to_dense, holding_forces, states_a
 from dlocore.problem import pose
 from dlocore.solvers.march import march
 from dlocore.solvers.monitor import Monitor
-from dlocore.solvers.spacetime import WindowSolver, windows_of
+from dlocore.solvers.spacetime import WindowSolver, behind_softer, windows_of
 from dlocore.solvers.timefit import fit
 from dlocore.statics import start_grid
+from tests.solver.scenes import arc
 
 Floats = NDArray[np.float64]
 
@@ -25,10 +28,10 @@ Floats = NDArray[np.float64]
 def window(table: Table | None, twist: str, damping: float) -> tuple[WindowSolver, Floats]:
     """Return the least squares of a clamped cable on a small grid, and control points near its solution."""
     u = np.linspace(0.0, 1.0, 12)[:, None]
-    arc = u * [1.0, 0.0, 0.0] + 0.05 * np.sin(3.0 * u) * [0.0, 1.0, 0.0]
+    wave = u * [1.0, 0.0, 0.0] + 0.05 * np.sin(3.0 * u) * [0.0, 1.0, 0.0]
     scene = Scene(
         cable=Cable.preset("paper", bending_damping=damping),
-        shape=Points(points=arc),
+        shape=Points(points=wave),
         grasps=(Grasp(u=0.3, hold="clamp", path=Move(displacement=(0.0, 0.1, 0.0), duration=1.0)),),
         environment=Environment(drag=0.05, table=table),
         effects={"twist": twist},
@@ -172,3 +175,49 @@ def test_steps_are_combined_as_least_squares_of_their_differences() -> None:
         np.testing.assert_allclose(following.ravel(), expected, atol=1e-12)
     last_step = advance(e, blocks, 1e-3 * right, control, last, 5, 0.5, 1.0)
     np.testing.assert_allclose(last_step[2], control + 1e-3 * step, atol=1e-15)
+
+
+def pulled_taut(method: Literal["march", "spacetime"]) -> Scene:
+    """Return an arc of 1 m whose ends are pulled apart until 0.1 mm are left of what it is longer than straight."""
+    points = arc(1.0, 0.85)
+    end = points[-1]
+    way = end / np.linalg.norm(end) * 0.9999 - end
+    return Scene(
+        cable=Cable.preset("paper"),
+        shape=Points(points=points, settle=True),
+        grasps=(Grasp(u=0.0), Grasp(u=1.0, path=Move(displacement=way, duration=1.0))),
+        environment=Environment(drag=0.05, table=Table()),
+        horizon=1.2,
+        quality=Quality(n_u=17, n_t=25, method=method),
+    )
+
+
+def test_a_softer_cable_that_is_pulled_taut_does_not_sag() -> None:
+    # the bounded stiffness alone left it 7 mm from the march
+    marched, least = predict(pulled_taut("march")), predict(pulled_taut("spacetime"))
+    assert least.status == "converged"
+    u, t = np.linspace(0.0, 1.0, 65), np.linspace(0.0, 1.2, 65)
+    apart = np.linalg.norm(least.surface.positions(u, t) - marched.surface.positions(u, t), axis=-1)
+    assert apart.max() < 3e-4
+    pull, expected = (answer.grasps[1].reaction[-1] for answer in (least, marched))
+    np.testing.assert_allclose(pull, expected, rtol=0.15)
+
+
+@pytest.mark.parametrize("soft", [0.1, 1.0])
+def test_strained_as_the_march_it_bears_the_tension_of_the_march(soft: float) -> None:
+    problem = pose(pulled_taut("spacetime"))
+    monitor = Monitor(None, None, None)
+    motion = march(problem, start_grid(problem, 9, monitor), 40, monitor)
+    tables, stiffness = motion.grid.tables, problem.stretch.axial_stiffness
+    step = np.diff(motion.times)[:, None]
+    between = 0.5 * (motion.times[1:] + motion.times[:-1])
+    index = tables.axial_first[:, None] + np.arange(4)
+    slopes = np.einsum("pi,kpid->kpd", tables.axial_b1, motion.states[:, index])
+    strains = np.linalg.norm(slopes, axis=-1) - 1.0
+    mean = 0.5 * (strains[1:] + strains[:-1])
+    damping = problem.stretch_damping
+    assert damping is not None
+    tension = stiffness * mean + damping.axial_damping * np.diff(strains, axis=0) / step
+    resting = behind_softer(problem, motion, between, soft * stiffness).axial[..., 0]
+    expected = tension if soft < 1.0 else stiffness * mean  # of the true stiffness the march is no guide
+    np.testing.assert_allclose(soft * stiffness * (mean - resting), expected, atol=1e-9 * np.abs(tension).max())
