@@ -28,6 +28,8 @@ Floats = NDArray[np.float64]
 
 LEVELS = (9, 13, 17, 25, 33, 49, 65, 97)
 _WOUND = np.pi  # [rad]: a start that turns by more along its length may have other equilibria beside the one downhill
+_COARSE = 12  # control points: on so few a start may settle to another of several equilibria than on more
+_ELSEWHERE = 0.02  # of the length: farther apart starts may lie in two equilibria
 _FINER = (1.5, 2.0)  # times the control points, with which a start that finds no rest may
 
 
@@ -160,8 +162,9 @@ def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None =
     """Return the grid of a motion's start: settled to equilibrium where the scene asks for it.
 
     Where a grid `like` it, of the same problem, has settled, the start is settled from there: of several equilibria it
-    is the same one, and near. Where none has, and this one finds no rest from the given start, or folds within a span,
-    it is settled from that of a finer grid.
+    is the same one, and near; but from the given start too where that grid is coarse and its start went far, and that
+    counts if it is another one. Where none has, and this one finds no rest from the given start, or folds within a
+    span, it is settled from that of a finer grid.
 
     Raises:
         SceneError: the start was to settle and found no equilibrium.
@@ -170,6 +173,10 @@ def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None =
     if not problem.scene.shape.settle:
         return grid
     found = _settled(problem, grid, monitor, like)
+    if found is not None and like is not None and like.n_u <= _COARSE and _is_elsewhere(problem, grid, found):
+        afresh = _settled(problem, grid, monitor, None)
+        if afresh is not None and _is_elsewhere(problem, found, afresh):
+            found = afresh
     for finer in _FINER if like is None or starts_folded(like) else ():
         if _is_wanting(problem, found):
             other = _settled(problem, make_grid(problem, round(finer * n_u)), monitor, None)
@@ -200,6 +207,12 @@ def _settled(problem: Problem, grid: Grid, monitor: Monitor, like: Grid | None) 
     if begin is not None and rest == "restless":
         q, rest, _, history = settle(problem, grid, 0.0, monitor)
     return slid if rest == "restless" else grid.changed(start=q, history=history)
+
+
+def _is_elsewhere(problem: Problem, one: Grid, other: Grid) -> bool:
+    """Tell whether the starts of two grids with the same knots may lie in two equilibria."""
+    apart = (one.start - other.start)[:, : problem.plane.dimensions]
+    return float(np.abs(apart).max()) > _ELSEWHERE * problem.scene.cable.length
 
 
 def _is_wanting(problem: Problem, start: Grid | None) -> bool:

@@ -43,7 +43,7 @@ def by_method(case: Case, method: str) -> Scene:
     if method == "march":
         return scene
     quality = GRIDS[method]
-    return replace(scene, quality=replace(quality, delta=quality.delta * scene.cable.length))
+    return replace(scene, quality=replace(quality, delta=quality.threshold * scene.cable.length))
 
 
 def row(case: Case, method: str) -> dict[str, Any]:

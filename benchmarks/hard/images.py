@@ -115,6 +115,8 @@ def seen(scene: Scene, image: Image) -> Scene:
     quality = scene.quality
     if quality.target_error is not None:
         quality = replace(quality, target_error=a * quality.target_error)
+    if quality.delta is not None:
+        quality = replace(quality, delta=float(np.clip(a * quality.delta, 1e-10, 1e-2)))
     return replace(
         scene,
         cable=type(scene.cable)(**cable),
@@ -123,7 +125,7 @@ def seen(scene: Scene, image: Image) -> Scene:
         loads=loads,
         environment=environment,
         horizon=when(scene.horizon),
-        quality=replace(quality, delta=float(np.clip(a * quality.delta, 1e-10, 1e-2))),
+        quality=quality,
     )
 
 

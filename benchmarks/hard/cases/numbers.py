@@ -57,7 +57,7 @@ def _above(p: Prediction) -> float:
     """Return what the last update has too much; a march has none that delta could limit."""
     if p.accuracy.method == "march":
         return 0.0
-    return max(0.0, p.iterations[-1].update - p.scene.quality.delta)
+    return max(0.0, p.iterations[-1].update - p.scene.quality.threshold)
 
 
 @case("numbers", "all laws; the error is told")
