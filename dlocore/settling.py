@@ -1,6 +1,6 @@
 """Bring a held cable to rest: relaxations held back by springs, ever weaker ones."""
 
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,6 @@ from dlocore.spline import greville
 
 Floats = NDArray[np.float64]
 Rest = Literal["settled", "restless", "time"]  # at rest; no rest found; the time was up
-Settled = tuple[Floats, Rest, Held, History]
 
 TOLERANCE = 1e-10  # of the length, on the last Newton update
 RESTING = 1e-8  # of the length, as near to the equilibrium as a march solves its steps
@@ -41,11 +40,28 @@ _ITERATIONS = 60  # of a relaxation with a line search
 _ROUGH = 1e-5  # of the length: the tolerance of the first of those, which others follow
 
 
+class Settled(NamedTuple):
+    """Where a cable came to rest, or not.
+
+    Attributes:
+        q: control points (n_u, nc) [m].
+        rest: how they rest.
+        held: what is held of them.
+        history: what lies behind them.
+        at: the grasps are at their poses of this time [s].
+    """
+
+    q: Floats
+    rest: Rest
+    held: Held
+    history: History
+    at: float
+
+
 def settle(
     problem: Problem, grid: Grid, at: float, monitor: Monitor, begin: tuple[Floats, History] | None = None
 ) -> Settled:
-    """Return control points (n_u, nc) [m] with the grasps at their poses of time `at`, how they rest, what is held of
-    them, and what lies behind them.
+    """Bring the cable to rest with the grasps at their poses of time `at` [s].
 
     Relaxations held back by a spring towards where they started: the first strongly, later ones less, so that a cable
     without a stable tangent (buckling, free rotation) walks downhill instead of jumping. Each is Newton's method alone,
@@ -76,15 +92,14 @@ def settle(
         rest = _relaxed(problem, grid, q, history, held, applied, rounds, 1.0 if begin is None else _NEARBY, monitor)
         if rest == "time":
             break
-    return q, rest, held, history._replace(tension=grid.history.tension)
+    return Settled(q, rest, held, history._replace(tension=grid.history.tension), before_t)
 
 
-def holding(problem: Problem, grid: Grid, at: float, settled: Settled) -> WindowForces:
-    """Return what holds a cable that has settled at the time `at` [s]."""
-    q, _, held, history = settled
-    applied = applied_forces(problem, grid, np.array([at]))[0]
-    forces = _unbalanced(problem, grid, history, q, applied).reshape(1, -1)[:, held.elimination.held]
-    return WindowForces(held, np.array([at]), forces, q[None])
+def holding(problem: Problem, grid: Grid, settled: Settled) -> WindowForces:
+    """Return what holds a cable that has settled."""
+    q, at = settled.q, np.array([settled.at])
+    forces = _unbalanced(problem, grid, settled.history, q, applied_forces(problem, grid, at)[0])
+    return WindowForces(settled.held, at, forces.reshape(1, -1)[:, settled.held.elimination.held], q[None])
 
 
 def _relaxed(

@@ -98,12 +98,12 @@ def equilibrium(
     least = smallest_n_u(problem)
     sizes = [n_u] if n_u is not None else [max(n, least + 2 * i) for i, n in enumerate(LEVELS)]
     rest = _refined(problem, sizes, at, target, monitor)
-    if rest.status == "converged" and is_unstable(problem, rest.grid, rest.settled[0], closed_grasps(scene, at, at)):
+    if rest.status == "converged" and is_unstable(problem, rest.grid, rest.settled.q, closed_grasps(scene, at, at)):
         problem = pose(scene, {"side": UNSTABLE}, at_rest=True)
         rest = _refined(problem, sizes, at, target, monitor)
-    grid, (q, _, _, history) = rest.grid, rest.settled
+    grid, q, history = rest.grid, rest.settled.q, rest.settled.history
     world = problem.world(free_of_frames(problem, grid, q[None], history.past[None])[0])
-    held = reactions(problem, grid, (holding(problem, grid, at, rest.settled),))
+    held = reactions(problem, grid, (holding(problem, grid, rest.settled),))
     return Equilibrium(
         status=rest.status,
         message=rest.message,
@@ -134,15 +134,14 @@ def _refined(problem: Problem, sizes: list[int], at: float, target: float, monit
     for n in sizes:
         grid = make_grid(problem, n)
         settled = settle(problem, grid, at, monitor)
-        q, rest = settled[:2]
-        if rest == "time" and found is not None:
+        if settled.rest == "time" and found is not None:
             break
         if found is not None:
             u = np.linspace(0.0, problem.scene.cable.length, 65)
-            before = design_matrix(found[0].knots, u) @ found[1][0][:, :3]
-            change = float(np.linalg.norm(design_matrix(grid.knots, u) @ q[:, :3] - before, axis=1).max())
+            before = design_matrix(found[0].knots, u) @ found[1].q[:, :3]
+            change = float(np.linalg.norm(design_matrix(grid.knots, u) @ settled.q[:, :3] - before, axis=1).max())
         found = grid, settled
-        if rest == "time":
+        if settled.rest == "time":
             break
         one = len(sizes) == 1
         status, message = "converged", "Forces balance." if one else f"Two grids agree to {change * 1e3:.2g} mm."
@@ -150,7 +149,7 @@ def _refined(problem: Problem, sizes: list[int], at: float, target: float, monit
             break
     assert found is not None, "every list of sizes has a first"
     grid, settled = found
-    if settled[1] == "restless":
+    if settled.rest == "restless":
         status = "stalled"
         message = "The relaxation did not come to rest. The scene may have no equilibrium, or many side by side."
     elif status == "converged" and len(sizes) > 1 and not change <= target:
@@ -203,10 +202,10 @@ def _settled(problem: Problem, grid: Grid, monitor: Monitor, like: Grid | None) 
         if problem.friction is not None or not _is_wanting(problem, slid):
             return slid
     begin = None if like is None else begin_on(problem, grid, like)
-    q, rest, _, history = settle(problem, grid, 0.0, monitor, begin)
-    if begin is not None and rest == "restless":
-        q, rest, _, history = settle(problem, grid, 0.0, monitor)
-    return slid if rest == "restless" else grid.changed(start=q, history=history)
+    found = settle(problem, grid, 0.0, monitor, begin)
+    if begin is not None and found.rest == "restless":
+        found = settle(problem, grid, 0.0, monitor)
+    return slid if found.rest == "restless" else grid.changed(start=found.q, history=found.history)
 
 
 def _is_elsewhere(problem: Problem, one: Grid, other: Grid) -> bool:

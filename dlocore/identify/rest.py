@@ -81,9 +81,9 @@ class Rest:
             scene = self.scene(candidate, frame)
             problem = pose(scene)
             grid = make_grid(problem, self.resolution.n_u)
-            q, rest, _, _ = settle(problem, grid, 0.0, Monitor(None, None, None))
-            stopped |= rest != "settled"
-            shapes.append(self.span.scaled(candidate.length_ratio).rows(grid.knots) @ problem.world(q)[:, :3])
+            found = settle(problem, grid, 0.0, Monitor(None, None, None))
+            stopped |= found.rest != "settled"
+            shapes.append(self.span.scaled(candidate.length_ratio).rows(grid.knots) @ problem.world(found.q)[:, :3])
         return Settled(np.array(shapes), stopped)
 
     def scene(self, candidate: Candidate, frame: int) -> Scene:

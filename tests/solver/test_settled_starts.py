@@ -125,10 +125,10 @@ def test_a_start_that_coarse_grids_fold_is_not_handed_on_and_settles_from_more_c
     # a stiff loop hung from a point straightens and hangs; on 10 control points alone it stays folded within a span
     problem = pose(draw(4, 182).make())
     grid = make_grid(problem, 10)
-    q, rest, _, history = settle(problem, grid, 0.0, Monitor())
-    folded = grid.changed(start=q, history=history)
+    found = settle(problem, grid, 0.0, Monitor())
+    folded = grid.changed(start=found.q, history=found.history)
     own = start_grid(problem, 28, Monitor())
-    assert rest == "settled"
+    assert found.rest == "settled"
     assert starts_folded(folded)
     assert apart(problem, folded, own) > 0.2
     assert apart(problem, start_grid(problem, 28, Monitor(), folded), own) < 1e-3
