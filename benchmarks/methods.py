@@ -10,6 +10,7 @@ import os
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
 
 import argparse
+import itertools
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
@@ -43,19 +44,12 @@ class Both(NamedTuple):
 
 
 def given_grids(seed: int, count: int) -> Iterator[Scene]:
-    """Yield so many random scenes of smooth motions on given grids."""
-    index = 0
-    while count > 0:
-        drawn = draw(seed, index)
-        index += 1
-        scene = drawn.make() if drawn.possible else None
-        quality = None if scene is None else scene.quality
-        if scene is None or quality is None or quality.n_u is None or quality.method == "paper":
-            continue
-        scene = replace(scene, quality=replace(quality, method="auto"))
-        if automatic_method(pose(scene)) == "spacetime":
-            yield scene
-            count -= 1
+    """Return so many random scenes of smooth motions on given grids."""
+    possible = (drawn.make() for drawn in (draw(seed, index) for index in itertools.count()) if drawn.possible)
+    given = (scene for scene in possible if scene.quality.n_u is not None and scene.quality.method != "paper")
+    asked = (replace(scene, quality=replace(scene.quality, method="auto")) for scene in given)
+    smooth = (scene for scene in asked if automatic_method(pose(scene)) == "spacetime")
+    return itertools.islice(smooth, count)
 
 
 def measure(scene: Scene) -> Both | None:
@@ -74,7 +68,7 @@ def measure(scene: Scene) -> Both | None:
     true = solved(Quality(target_error=TRUE * length)) if least.status == "converged" else least
     if true.status != "converged":
         return Both(least.status == "converged", None, times)
-    u, t = np.linspace(0.0, length, 65), np.linspace(0.0, true.scene.horizon or 1.0, 65)
+    u, t = np.linspace(0.0, length, 65), np.linspace(0.0, true.surface.horizon, 65)
 
     def error(found: Prediction) -> float:
         apart = found.surface.positions(u, t) - true.surface.positions(u, t)

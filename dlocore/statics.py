@@ -161,9 +161,8 @@ def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None =
     """Return the grid of a motion's start: settled to equilibrium where the scene asks for it.
 
     Where a grid `like` it, of the same problem, has settled, the start is settled from there: of several equilibria it
-    is the same one, and near; but from the given start too where that grid is coarse and its start went far, and that
-    counts if it is another one. Where none has, and this one finds no rest from the given start, or folds within a
-    span, it is settled from that of a finer grid.
+    is the same one, and near. Where none has, and this one finds no rest from the given start, or folds within a span,
+    it is settled from that of a finer grid.
 
     Raises:
         SceneError: the start was to settle and found no equilibrium.
@@ -172,10 +171,6 @@ def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None =
     if not problem.scene.shape.settle:
         return grid
     found = _settled(problem, grid, monitor, like)
-    if found is not None and like is not None and like.n_u <= _COARSE and _is_elsewhere(problem, grid, found):
-        afresh = _settled(problem, grid, monitor, None)
-        if afresh is not None and _is_elsewhere(problem, found, afresh):
-            found = afresh
     for finer in _FINER if like is None or starts_folded(like) else ():
         if _is_wanting(problem, found):
             other = _settled(problem, make_grid(problem, round(finer * n_u)), monitor, None)
@@ -192,7 +187,9 @@ def _settled(problem: Problem, grid: Grid, monitor: Monitor, like: Grid | None) 
 
     What friction holds depends on the way, and of several equilibria that a wound start may have, or one with obstacles
     below it, relaxations may jump to another: such starts slide downhill from the given one, on every grid. One that
-    folds within a span as it slides, which no energy sees, relaxes all the same where nothing is in its way.
+    folds within a span as it slides, which no energy sees, relaxes all the same where nothing is in its way. Where the
+    grid like it is coarse and its start went far, this one settles from the given start too, and that counts if it is
+    another equilibrium.
     """
     slid: Grid | None = None
     if problem.friction is not None or problem.obstacles or problem.start.turning > _WOUND:
@@ -203,14 +200,18 @@ def _settled(problem: Problem, grid: Grid, monitor: Monitor, like: Grid | None) 
             return slid
     begin = None if like is None else begin_on(problem, grid, like)
     found = settle(problem, grid, 0.0, monitor, begin)
-    if begin is not None and found.rest == "restless":
-        found = settle(problem, grid, 0.0, monitor)
+    if like is not None and begin is not None:
+        lost = found.rest == "restless"
+        if lost or (like.n_u <= _COARSE and _is_elsewhere(problem, grid.start, found.q)):
+            afresh = settle(problem, grid, 0.0, monitor)
+            if lost or (afresh.rest != "restless" and _is_elsewhere(problem, found.q, afresh.q)):
+                found = afresh
     return slid if found.rest == "restless" else grid.changed(start=found.q, history=found.history)
 
 
-def _is_elsewhere(problem: Problem, one: Grid, other: Grid) -> bool:
-    """Tell whether the starts of two grids with the same knots may lie in two equilibria."""
-    apart = (one.start - other.start)[:, : problem.plane.dimensions]
+def _is_elsewhere(problem: Problem, one: Floats, other: Floats) -> bool:
+    """Tell whether control points (n_u, nc) of two starts on one grid may lie in two equilibria."""
+    apart = (one - other)[:, : problem.plane.dimensions]
     return float(np.abs(apart).max()) > _ELSEWHERE * problem.scene.cable.length
 
 
