@@ -1,4 +1,4 @@
-"""Print, and save, what each method does on each named hard case: the table of docs/stability.md.
+"""Print, and save, what each method does on each named hard case: the table of docs/hard-cases.md.
 
     python -m benchmarks.hard --json hard.json
 
