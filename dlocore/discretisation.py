@@ -18,7 +18,7 @@ from dlocore.kernels.entry import remember_start
 from dlocore.kernels.relax import relax
 from dlocore.kernels.tension import COLUMNS
 from dlocore.kernels.twisted import start_frames
-from dlocore.kernels.twisted_rows import DIRECTOR, PAST
+from dlocore.kernels.twisted_rows import DIRECTOR, PAST, room_for
 from dlocore.paths import Waypoints
 from dlocore.plane import leftwards
 from dlocore.problem import Problem
@@ -97,6 +97,7 @@ def _no_history(problem: Problem, tables: Tables) -> History:
         stick=np.zeros((len(tables.contact_w) if rubs else 0, 6)),
         slide=np.zeros((len(tables.body_w) if lies else 0, 2)),
         tension=np.zeros((0, COLUMNS)),
+        room=np.zeros(0 if problem.twist is None else room_for(points)),
     )
 
 

@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 from dlocore.events import closed_grasps
 from dlocore.frames import angles_of, rates_of
 from dlocore.grid import Grid
-from dlocore.kernels.assembly import History, remember, slopes
+from dlocore.kernels.assembly import History, slopes
+from dlocore.kernels.entry import remember_start
 from dlocore.kernels.tension import ASSUMED, COLUMNS
 from dlocore.problem import Problem
 from dlocore.shape import SplineCurve, fit_to_knots
@@ -39,7 +40,7 @@ def begin_on(problem: Problem, grid: Grid, settled: Grid) -> tuple[Floats, Histo
     history = grid.past()
     if problem.twist is not None:
         q[:, 3] = 0.0
-        remember(problem.axes, q, grid.tables, *problem.laws, history, 0.0, True)
+        remember_start(problem.axes, q, grid.tables, *problem.laws, history)
         there = rates_of(problem, settled, settled.start[None], settled.history.past[None])[0]
         missing = np.interp(grid.tables.curvature_u, settled.tables.curvature_u, there)
         missing -= rates_of(problem, grid, q[None], history.past[None])[0]

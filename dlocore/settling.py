@@ -9,8 +9,9 @@ from dlocore.discretisation import applied_forces
 from dlocore.events import closed_grasps
 from dlocore.grid import Grid
 from dlocore.holding import Held, Starts, close_grasps, hold
-from dlocore.kernels.assembly import NO_RATES, History, assemble, remember
+from dlocore.kernels.assembly import NO_RATES, History, assemble
 from dlocore.kernels.contact import passes
+from dlocore.kernels.entry import remember_start
 from dlocore.kernels.relax import descend, relax
 from dlocore.kernels.tension import COLUMNS
 from dlocore.problem import Problem
@@ -158,7 +159,7 @@ def _relaxed(
             history.tension[:] = 0.0
         rounds -= 1
         if problem.twist is not None:
-            remember(axes, q, tables, active, parameters, history, 0.0, True)
+            remember_start(axes, q, tables, active, parameters, history)
         last, moved = moved, float(np.abs(q - before).max())
         near = scale * moved <= RESTING * length
         if near and update <= RESTING * length:  # rounding may keep a stiff cable from TOLERANCE

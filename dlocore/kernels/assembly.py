@@ -26,8 +26,8 @@ from dlocore.effects.laws import (
 from dlocore.kernels import contact, plane, space, twisted
 from dlocore.kernels.banded import clear
 from dlocore.kernels.basis import row_of
-from dlocore.kernels.compile import kernel, leaf
-from dlocore.kernels.strain import space_curvature
+from dlocore.kernels.compile import kernel, leaf, part
+from dlocore.kernels.strain import space_curvature, squared_slope
 from dlocore.kernels.twisted_rows import PAST
 
 PAST_IN_PLANE, PAST_IN_SPACE = 2, 9  # columns of `History.past`, in space without twist
@@ -47,6 +47,7 @@ class History(NamedTuple):
         stick: (contact nodes, 6) anchor of the friction there, and position at the last step [m]; (0, 6) without.
         slide: (body points, 2) anchor of the friction of a cable that lies on the table [m]; (0, 2) without.
         tension: (axial points, 4) what the tangent of a march knows of the tension, see `tension.py`; (0, 4) elsewhere.
+        room: (`twisted_rows.room_for`,) what an assembly with twist writes over, and nothing is kept in; (0,) without.
     """
 
     memory: Any
@@ -55,6 +56,7 @@ class History(NamedTuple):
     stick: Any
     slide: Any
     tension: Any
+    room: Any
 
 
 @kernel
@@ -62,7 +64,7 @@ def history_at(histories: Any, k: int) -> Any:
     """Return the `History` of time k from one with arrays (1 or more times, ...)."""
     at = min(k, len(histories.memory) - 1)
     h = histories
-    return History(h.memory[at], h.past[at], h.axial[min(k, len(h.axial) - 1)], h.stick, h.slide, h.tension)
+    return History(h.memory[at], h.past[at], h.axial[min(k, len(h.axial) - 1)], h.stick, h.slide, h.tension, h.room)
 
 
 @leaf
@@ -98,7 +100,8 @@ def assemble(
         past, tension = history.axial, history.tension
         space.axial(len(axes), q, v, tables, active, p, past, tension, rates, scales, tangent, f, K)
         if len(axes) == 4:
-            twisted.curvature(q, v, tables, active, p, history.memory, history.past, rates, scales, tangent, f, K)
+            memory, room = history.memory, history.room
+            twisted.curvature(q, v, tables, active, p, memory, history.past, rates, scales, tangent, room, f, K)
         elif bends:
             space.curvature(q, v, tables, active, p, history.past, rates, scales, tangent, f, K)
         if active[QUADRATIC_DRAG]:
@@ -109,7 +112,7 @@ def assemble(
         contact.lying(len(axes), q, v, tables, p, history.slide, rates[3], scales, tangent, f, K)
 
 
-@leaf
+@part
 def remember(axes: Any, q: Any, tables: Any, active: Any, p: Any, history: Any, h: float, loose: bool) -> float:
     """Note in `history` the strain of q (n, nc) as that of the last step, of length h, what yielded and slipped in it.
 
@@ -125,23 +128,20 @@ def remember(axes: Any, q: Any, tables: Any, active: Any, p: Any, history: Any, 
         contact.drag_anchors(len(axes), q, tables, p, history.slide, loose)
     if active[STRETCH_MEMORY] or active[STRETCH_DAMPING]:
         for n in range(len(tables.axial_w)):
-            square = 0.0
-            for d in range(min(len(axes), 3)):
-                value = 0.0
-                for i in range(4):
-                    value += tables.axial_b1[n, i] * q[tables.axial_first[n] + i, d]
-                square += value * value
-            strain = np.sqrt(square) - 1.0
+            slope = squared_slope(q, tables.axial_first[n], row_of(tables.axial_b1, n), min(len(axes), 3))
+            strain = np.sqrt(slope) - 1.0
             free, _ = axial_memory(active, p, strain, history.axial[n, 0], history.axial[n, 1], h)
             history.axial[n, 0] = free
             history.axial[n, 2] = history.axial[n, 1]
             history.axial[n, 1] = strain
+    if len(history.past) == 0:
+        return deepest
     if len(axes) == 2:
         plane.remember(q, tables, active, p, history.memory, history.past, h)
     elif len(axes) == 3:
         space.remember(q, tables, history.past)
     else:
-        twisted.remember(q, tables, active, p, history.memory, history.past, h)
+        twisted.remember(q, tables, active, p, history.memory, history.past, h, history.room)
     return deepest
 
 
@@ -188,12 +188,7 @@ def slopes(states: Any, every: int, first: Any, b1: Any) -> tuple[float, float]:
     least, largest = np.inf, 0.0
     for s in range(0, len(states), every):
         for n in range(len(first)):
-            square = 0.0
-            for d in range(min(states.shape[2], 3)):
-                value = 0.0
-                for i in range(4):
-                    value += b1[n, i] * states[s, first[n] + i, d]
-                square += value * value
+            square = squared_slope(states[s], first[n], row_of(b1, n), min(states.shape[2], 3))
             least, largest = min(least, square), max(largest, square)
     return np.sqrt(least), np.sqrt(largest)
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dlocore.kernels.compile import brief, kernel, law, leaf
+from dlocore.kernels.compile import brief, kernel, law, leaf, part
 
 
 @law
@@ -192,11 +192,11 @@ def expand_rows(e: Any, x: Any, n: int) -> Any:
     return out
 
 
-@leaf
-def place_held(e: Any, offset: Any, q: Any) -> None:
-    """Set the held degrees of freedom of q (n nc,) from the free ones and `offset` (m,)."""
+@part
+def place_held(e: Any, offsets: Any, row: int, q: Any) -> None:
+    """Set the held degrees of freedom of q (n nc,) from the free ones and a row of `offsets` (rows, m)."""
     for k in range(len(e.held)):
-        value = offset[k]
+        value = offsets[row, k]
         for s in range(e.start[k], e.start[k + 1]):
             value += e.coefficient[s] * q[e.dof[s]]
         q[e.held[k]] = value
@@ -206,12 +206,12 @@ def place_held(e: Any, offset: Any, q: Any) -> None:
 def place_rows(e: Any, offsets: Any, C: Any, begin: int) -> None:
     """Set the held degrees of freedom of C[begin:] (n_t, n, nc) from the free ones and `offsets` (n_t, m)."""
     for j in range(begin, len(C)):
-        place_held(e, offsets[j], C[j].ravel())
+        place_held(e, offsets, j, C[j].ravel())
 
 
-@leaf
-def holding(e: Any, A: Any, x: Any, R: Any, forces: Any, out: Any) -> None:
-    """Write A x (n nc,), where x solves Z' A x = -Z' R, and the forces R + A x (held,) that hold the held ones.
+@part
+def holding(e: Any, A: Any, x: Any, R: Any, forces: Any, at: int, out: Any) -> None:
+    """Write A x (n nc,), where x solves Z' A x = -Z' R, and to a row of `forces` what holds the held ones, R + A x.
 
     Only their rows of the banded A (n nc, 4 nc) are multiplied: the others are what makes Z' (R + A x) = 0.
     """
@@ -226,9 +226,9 @@ def holding(e: Any, A: Any, x: Any, R: Any, forces: Any, out: Any) -> None:
         for o in range(min(width, n - row)):
             total += A[row, o] * x[row + o]
         out[row] = total
-        forces[k] = R[row] + total
+        forces[at, k] = R[row] + total
         for s in range(e.start[k], e.start[k + 1]):
-            out[e.dof[s]] -= e.coefficient[s] * forces[k]
+            out[e.dof[s]] -= e.coefficient[s] * forces[at, k]
 
 
 @leaf

@@ -7,9 +7,10 @@ import numpy as np
 from dlocore.effects.laws import has_viscosity
 from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, history_at, multiply_scalar_band
 from dlocore.kernels.banded import reduce_matrix, reduce_vector, solve_rows
-from dlocore.kernels.basis import GAUSS_2, basis_rows
+from dlocore.kernels.basis import GAUSS_2, basis_rows, row_of
 from dlocore.kernels.compile import brief, kernel, leaf
 from dlocore.kernels.narrow import ROOM, factor_step, solve_step
+from dlocore.kernels.strain import squared_slope
 
 POINTS = 2  # collocation points in each time span
 
@@ -69,13 +70,8 @@ def collocation(knots: Any) -> Any:
 @leaf
 def _strain(tables: Any, n: int, q: Any) -> float:
     """Return the axial strain of control points q (n, nc) at the n-th axial point."""
-    square = 0.0
-    for d in range(min(q.shape[1], 3)):
-        slope = 0.0
-        for i in range(4):
-            slope += tables.axial_b1[n, i] * q[tables.axial_first[n] + i, d]
-        square += slope * slope
-    return np.sqrt(square) - 1.0
+    row = row_of(tables.axial_b1, n)
+    return np.sqrt(squared_slope(q, tables.axial_first[n], row, min(q.shape[1], 3))) - 1.0
 
 
 @kernel

@@ -54,7 +54,7 @@ def constrained_mass_solve(nc: int, mass: Any, e: Any, held: Any, right: Any) ->
     """
     n = len(mass)
     x = np.zeros((n, nc))
-    place_held(e, held, x.ravel())
+    place_held(e, held.reshape((1, len(held))), 0, x.reshape(n * nc))
     rest = right.copy()
     multiply_scalar_band(mass, x, -1.0, rest)
     full = np.zeros((n * nc, 4 * nc))
@@ -148,15 +148,17 @@ def march_steps(
     moved = np.empty(size)
     step_change = change.reshape((n, nc))
     q1 = np.empty((n, nc))
+    flat_q = q1.reshape(size)
     v1 = np.empty((n, nc))
     a1 = np.empty((n, nc))
     # contact of the cable with itself: nodes before, at and after an update, pairs, and the widened tangent
     shape = (len(tables.strand_u) if tight else 0, min(nc, 3))
     x0, x1, x2 = np.empty(shape), np.empty(shape), np.empty(shape)
-    found = np.empty((64 if tight else 0, 2), np.int64)
+    found = [np.empty((64 if tight else 0, 2), np.int64)]  # in a list: as a variable it costs counts in every step
     row_end = np.empty(free if tight else 0, np.int64)
     S = np.empty((free if tight else 0, free if tight else 0))
     filled, columns = np.empty_like(row_end), np.empty(S.shape, np.int32)
+    thick, separation = p[SELF_CONTACT, 0], p[SELF_CONTACT, 4]
     pairs, wide, depth, share = 0, False, 0.0, 1.0
     first_contraction, first_update, unmeasured = 1.0, 1.0, _UNMEASURED  # of the first update of a step, as measured
     # the acceleration at the start knows of no damping yet, which would make too much of it
@@ -200,7 +202,7 @@ def march_steps(
                         q1[i, d] = ahead
                     else:
                         q1[i, d] = q0[i, d] + h * v[i, d] + (0.0 if late else bent * h * h * a[i, d])
-            place_held(e, offsets[k], q1.ravel())
+            place_held(e, offsets, k, flat_q)
             for i in range(n):
                 for d in range(nc):
                     a1[i, d] = ta * (q1[i, d] - q0[i, d] - h * v[i, d]) - carry * a[i, d]
@@ -209,7 +211,7 @@ def march_steps(
                 place_nodes(q0, tables, x0)
                 if robust:
                     place_nodes(q1, tables, x1)
-                    found, share = clear_way(x0, x1, tables.strand_u, p[SELF_CONTACT, 0], p[SELF_CONTACT, 4], found)
+                    found[0], share = clear_way(x0, x1, tables.strand_u, thick, separation, found[0])
                     if share < 1.0:
                         converged = False
                         continue  # what is held passes through a strand
@@ -224,7 +226,7 @@ def march_steps(
                 scales = (1.0, tv, 1.0) if refactor else (0.0, 0.0, 0.0)
                 assemble(axes, q1, v1, tables, active, p, history, rates, scales, f, K)
                 if tight:
-                    found, pairs, depth = press(q1, v1, tables, p, x1, found, f)
+                    found[0], pairs, depth = press(q1, v1, tables, p, x1, found[0], f)
                 residual(nc, rows, density, dragged, al_m, al_f, a, a1, v1, load, G, f, R, stacked)
                 reduce_vector(e, flat, x)
                 if refactor:
@@ -233,7 +235,7 @@ def march_steps(
                     wide = pairs > 0
                     if wide:
                         part = (1.0 - al_f, (1.0 - al_f) * tv, 1.0 - al_f)
-                        widen(nc, v1, tables, p, x1, found, pairs, part, e, A[:free], row_end, S)
+                        widen(nc, v1, tables, p, x1, found[0], pairs, part, e, A[:free], row_end, S)
                     if (factor_wide(S, row_end, filled, columns) if wide else factor_step(A, free)) >= 0:
                         if not robust:
                             break
@@ -244,7 +246,7 @@ def march_steps(
                         reduce_matrix(e, K, A)
                         if wide:
                             part = (1.0 - al_f, (1.0 - al_f) * tv, 0.0)
-                            widen(nc, v1, tables, p, x1, found, pairs, part, e, A[:free], row_end, S)
+                            widen(nc, v1, tables, p, x1, found[0], pairs, part, e, A[:free], row_end, S)
                         if (factor_wide(S, row_end, filled, columns) if wide else factor_step(A, free)) >= 0:
                             break
                     fresh = True
@@ -269,7 +271,7 @@ def march_steps(
                 length = 1.0
                 if tight and robust:
                     place_nodes(q1 + step_change, tables, x2)
-                    found, length = clear_way(x1, x2, tables.strand_u, p[SELF_CONTACT, 0], p[SELF_CONTACT, 4], found)
+                    found[0], length = clear_way(x1, x2, tables.strand_u, thick, separation, found[0])
                 work = 0.0
                 if robust and update > tolerance:
                     for i in range(free):
@@ -283,7 +285,7 @@ def march_steps(
                         a2 = a1 + (length * ta) * step_change
                         assemble(axes, q2, v2, tables, active, p, history, rates, (0.0, 0.0, 0.0), f, K)
                         if tight:
-                            found, pairs, depth = press(q2, v2, tables, p, x2, found, f)
+                            found[0], pairs, depth = press(q2, v2, tables, p, x2, found[0], f)
                         residual(nc, rows, density, dragged, al_m, al_f, a, a2, v2, load, G, f, R, stacked)
                         reduce_vector(e, flat, x)
                         after = 0.0
@@ -330,13 +332,13 @@ def march_steps(
             if converged and tight:
                 place_nodes(q1, tables, x1)
                 if not robust:
-                    found, share = clear_way(x0, x1, tables.strand_u, p[SELF_CONTACT, 0], p[SELF_CONTACT, 4], found)
+                    found[0], share = clear_way(x0, x1, tables.strand_u, thick, separation, found[0])
                     converged = share == 1.0
             struck = 0.0
             if converged and not late and touches:
                 struck = strikes(nc, q0, q1, tables, active, p)
             if converged and not late and pairs > 0:
-                struck = max(struck, closing(x0, x1, tables.strand_u, p[SELF_CONTACT, 0], found, pairs))
+                struck = max(struck, closing(x0, x1, tables.strand_u, thick, found[0], pairs))
             if struck > _STRIKE * h:
                 if k >= info[DIVIDED_FROM]:
                     info[FAILED_STEP], info[STRUCK] = k, 1.0
@@ -356,7 +358,7 @@ def march_steps(
         if anew:
             assemble(axes, q1, v1, tables, active, p, history, rates, (0.0, 0.0, 0.0), f, K)
             if tight:
-                found, pairs, depth = press(q1, v1, tables, p, x1, found, f)
+                found[0], pairs, depth = press(q1, v1, tables, p, x1, found[0], f)
                 info[DEEPEST] = max(info[DEEPEST], depth)
             residual(nc, rows, density, dragged, al_m, al_f, a, a1, v1, load, G, f, R, stacked)
         if keeps:
@@ -374,7 +376,7 @@ def march_steps(
                 for i in range(len(e.held)):
                     reactions[k, i] = flat[e.held[i]] + moved[e.held[i]]
             else:
-                holding(e, K, change, flat, reactions[k], moved)
+                holding(e, K, change, flat, reactions, k, moved)
             follow(nc, rows, inertia, 1.0 - al_f, step_change, moved, f, stacked)
         for i in range(n):
             for d in range(nc):

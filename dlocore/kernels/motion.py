@@ -67,6 +67,7 @@ def smooth_motion(
         np.zeros((0, 6)),
         np.zeros((0, 2)),
         np.full((stretched, COLUMNS), np.nan),
+        np.empty(0),
     )
     if keeps_history(active):
         remember_start(axes, start, tables, active, p, history)

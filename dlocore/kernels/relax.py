@@ -81,7 +81,7 @@ def relax(
     w = np.empty((n, nc))
     x = np.empty(free)
     change = np.empty(size)
-    place_held(e, offset, q.ravel())
+    place_held(e, offset.reshape((1, len(offset))), 0, q.reshape(q.size))
     energy = _merit(axes, q, target, strength, applied, tables, active, p, history, w)
     update = np.inf
     damping = 0.0
@@ -132,7 +132,7 @@ def relax(
                 after = np.nan
         q -= length * step
         if len(axes) == 4:
-            carry(q, tables, active, p, history.memory, history.past, 0.0)
+            carry(q, tables, active, p, history.memory, history.past, 0.0, history.room)
         if update <= tolerance:
             return update, it + 1
         if np.isfinite(after):  # carried frames change nothing but rounding
@@ -171,7 +171,7 @@ def descend(
     change = np.empty(size)
     step = change.reshape((n, nc))
     target, past, memory, tension = q.copy(), history.past.copy(), history.memory.copy(), history.tension.copy()
-    place_held(e, offset, q.ravel())
+    place_held(e, offset.reshape((1, len(offset))), 0, q.reshape(q.size))
     largest = 0.25 * np.sum(tables.weight)  # a step no longer than a quarter of the cable
     enough, previous = tolerance, np.inf
     it = 0
@@ -195,7 +195,7 @@ def descend(
             break
         q += step
         if nc == 4:
-            carry(q, tables, active, p, history.memory, history.past, 0.0)
+            carry(q, tables, active, p, history.memory, history.past, 0.0, history.room)
         point_on(nc, q, step, tables, history.tension)
         if it == 1:
             enough = max(tolerance, close * update)

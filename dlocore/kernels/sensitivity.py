@@ -123,7 +123,7 @@ def follow_steps(
                 q1[i, d] = known[k, i, d] + q0[i, d] - known[k - 1, i, d]
                 if k > 1:
                     q1[i, d] += q0[i, d] - known[k - 1, i, d] - Q[k - 2, i, d] + known[k - 2, i, d]
-        place_held(e, offsets[k], q1.ravel())
+        place_held(e, offsets, k, q1.reshape(size))
         previous = np.inf
         left = np.inf
         for it in range(_ITERATIONS):

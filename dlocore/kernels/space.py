@@ -214,8 +214,6 @@ def remember(q: Any, tables: Any, past: Any) -> None:
     """Make kappa and t of q the last ones in `past` (points, 9), and the last kappa, carried along, the one before."""
     points = len(past)
     state, before = np.empty((points, STATE)), np.empty((points, 3))
-    if points == 0:
-        return
     _write_state(q, tables, state)
     carry(tables.curvature_w, state, past, 1.0, 1.0, 0.0, before)
     for n in range(points):

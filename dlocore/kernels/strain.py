@@ -24,6 +24,16 @@ def vector(table: Any, n: int, at: int) -> Vector:
 
 
 @law
+def squared_slope(q: Any, first: int, b1: tuple[float, float, float, float], dimensions: int) -> float:
+    """Return |r'|^2 of the control points q (n, nc) where the functions of four of them have the derivatives b1."""
+    square = 0.0
+    for d in range(dimensions):
+        slope = b1[0] * q[first, d] + b1[1] * q[first + 1, d] + b1[2] * q[first + 2, d] + b1[3] * q[first + 3, d]
+        square += slope * slope
+    return square
+
+
+@law
 def plane_curvature(ax: float, ay: float, cx: float, cy: float) -> tuple[float, tuple[float, float, float, float]]:
     """Return kappa [1/m] of r' = (ax, ay), r'' = (cx, cy), and its derivatives by r' and r''."""
     inverse = 1.0 / (ax * ax + ay * ay)

@@ -55,7 +55,7 @@ from dlocore.kernels.lanes import (
 from dlocore.kernels.space import combine
 from dlocore.kernels.strain import space_curvature, transport, twist_increment
 from dlocore.kernels.strands import dot
-from dlocore.kernels.twisted_angles import KNOT, correct_angles
+from dlocore.kernels.twisted_angles import correct_angles
 from dlocore.kernels.twisted_rows import (
     ALONG,
     ANGLE,
@@ -63,6 +63,7 @@ from dlocore.kernels.twisted_rows import (
     B2,
     BEFORE,
     BEND,
+    BLOCK,
     BY_FIRST,
     COS,
     D0,
@@ -76,6 +77,7 @@ from dlocore.kernels.twisted_rows import (
     K1,
     K2,
     KAPPA,
+    KNOT,
     LAST,
     LENGTH,
     M1,
@@ -220,28 +222,19 @@ def _direct(W: Any) -> None:
         put(W, K2, n, dot(kappa, m2))
 
 
-@kernel
+@leaf
 def curvature(
     q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any, tangent: bool,
-    f: Any, K: Any,
+    room: Any, f: Any, K: Any,
 ) -> None:  # fmt: skip
     """Add the forces and tangents of curvature and twist.
 
     The derivatives of k1 and k2 are O by r', P by r'' and A by theta; that of the twist rate is the mean of its points'
     over a span, or their straight line. The material part of the tangent is E' S E with the derivatives E by the
     control points. The geometric part is that at the carried frame: what the carrying adds vanishes with the step.
+    `room` is that of a `History`.
     """
-    _add_curvature(
-        q, v, tables, active, p, memory, past, rates, scales, tangent, np.empty(SIZE), np.empty(16 * SPANS), f, K
-    )
-
-
-@part
-def _add_curvature(
-    q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any, tangent: bool,
-    W: Any, block: Any, f: Any, K: Any,
-) -> None:  # fmt: skip
-    """Do the work of `curvature` in the room made there."""
+    W, block = room[:SIZE], room[SIZE : SIZE + BLOCK]
     first, inverse = tables.curvature_first, p[TWIST, 1]
     damped = active[DAMPING] or active[TWIST_DAMPING]
     for group in range(len(tables.curvature_lanes)):
@@ -377,18 +370,10 @@ def _scatter_force(first: Any, count: int, group: int, W: Any, f: Any) -> None:
                 f[k + i, d] += W[F + (4 * i + d) * SPANS + s]
 
 
-@kernel
-def remember(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h: float) -> None:
+@leaf
+def remember(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h: float, room: Any) -> None:
     """Carry the frames to q, note its strain, and let what yielded in a step h become memory."""
-    room = np.empty((len(past) // POINTS + 1, KNOT))
-    _remember(q, tables, active, p, memory, past, h, np.empty(SIZE), room)
-
-
-@part
-def _remember(
-    q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h: float, W: Any, room: Any
-) -> None:  # fmt: skip
-    """Do the work of `remember` in the room made there."""
+    W, knots = room[:SIZE], room[SIZE + BLOCK :].reshape((len(past) // POINTS + 1, KNOT))
     turns = bool(active[DAMPING] or active[BENDING_MEMORY])
     for n in range(len(memory)):
         turns = turns or memory[n, 0] != 0.0 or memory[n, 1] != 0.0
@@ -397,7 +382,7 @@ def _remember(
         _measure_bends(active, memory, group, W)
         _note(active, p, memory, past, h, group, W)
     if turns:
-        correct_angles(q, tables, p[TWIST, 1], past, room)
+        correct_angles(q, tables, p[TWIST, 1], past, knots)
 
 
 @leaf

@@ -18,7 +18,7 @@ from dlocore.kernels.twisted_rows import FRAME, LAST, OFFSET
 
 _ORDERS = np.arange(1, POINTS + 1)
 # integrals from the beginning of a span to its points, of values at these, in parts of its length
-INTEGRALS = (
+_INTEGRALS = (
     (GAUSS_3[0][:, None] ** _ORDERS - (-1.0) ** _ORDERS)
     / (2.0 * _ORDERS)
     @ np.linalg.inv(np.vander(GAUSS_3[0], increasing=True))
@@ -28,7 +28,6 @@ _Z = 0.5 + 0.5 / _BETWEEN  # where its end lies, in parts of that, from the firs
 # of the values and the slopes at the first and the last point, of a cubic at the end
 _V1, _D1 = 2.0 * _Z**3 - 3.0 * _Z**2 + 1.0, _Z**3 - 2.0 * _Z**2 + _Z
 _V3, _D3 = 3.0 * _Z**2 - 2.0 * _Z**3, _Z**3 - _Z**2
-KNOT = 3  # place [m], S and R [rad] of a knot
 
 
 @part
@@ -41,7 +40,7 @@ def correct_angles(q: Any, tables: Any, inverse: float, past: Any, knots: Any) -
         q: (n, 4) the state that the frames have been carried to.
         inverse: of the radius that theta is in q times [1/m].
         past: (points, PAST).
-        knots: (spans + 1, KNOT), room.
+        knots: (spans + 1, KNOT), written over.
     """
     first, w = tables.curvature_first, tables.curvature_w
     spans = len(past) // POINTS
@@ -72,7 +71,7 @@ def correct_angles(q: Any, tables: Any, inverse: float, past: Any, knots: Any) -
                 smooth += share * knots[k, 1]
             turned, angle = knots[s, 2], 0.0
             for j in range(POINTS):
-                turned += h * INTEGRALS[m, j] * past[n + j, FRAME]
+                turned += h * _INTEGRALS[m, j] * past[n + j, FRAME]
             for i in range(4):
                 angle += inverse * tables.body_b0[n + m, i] * q[first[n] + i, 3]
             offset = smooth - turned - angle

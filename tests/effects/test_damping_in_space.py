@@ -11,8 +11,9 @@ from benchmarks.rod import simulate
 from dlocore import Cable, ControlPoints, Environment, Grasp, Quality, Scene, Waypoints, predict
 from dlocore.effects import laws
 from dlocore.effects.damping import Damping
-from dlocore.kernels.assembly import NO_RATES, History, assemble, remember
+from dlocore.kernels.assembly import NO_RATES, History, assemble
 from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, build_tables
+from dlocore.kernels.entry import remember_start
 from dlocore.sensitivity import sensitivities
 from dlocore.spline import design_matrix, uniform_knots
 
@@ -35,10 +36,10 @@ class Damped:
         points = len(self.tables.curvature_w)
         history = History(
             np.zeros((points, 6)), np.zeros((points, 9)), np.zeros((len(self.tables.axial_w), 3)), np.zeros((0, 6)),
-            np.zeros((0, 2)), np.zeros((0, 4)),
+            np.zeros((0, 2)), np.zeros((0, 4)), np.zeros(0),
         )  # fmt: skip
         for x in past:
-            remember(AXES, x, self.tables, self.active, self.parameters, history, 0.0, False)
+            remember_start(AXES, x, self.tables, self.active, self.parameters, history)
         rates = (1.5 / h, -2.0 / h, 0.5 / h, h) if past else NO_RATES
         f = np.empty_like(q)
         assemble(

@@ -12,8 +12,9 @@ from dlocore.effects.bend import Bend
 from dlocore.effects.damping import Damping
 from dlocore.effects.drag import QuadraticDrag
 from dlocore.effects.stretch import Stretch, StretchDamping
-from dlocore.kernels.assembly import NO_RATES, History, assemble, remember, stored_energy
+from dlocore.kernels.assembly import NO_RATES, History, assemble, stored_energy
 from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, Tables, build_tables, graded_knots
+from dlocore.kernels.entry import remember_start
 from dlocore.spline import design_matrix
 
 Floats = NDArray[np.float64]
@@ -45,7 +46,7 @@ class Body:
     def after(self, h: float, *steps: Floats) -> "Body":
         """Return this body with the rate of curvature by backward differences of step h from the two last `steps`."""
         for q in steps:
-            remember(tuple(range(self.nc)), q, self.tables, self.active, self.parameters, self.history, 0.0, False)
+            remember_start(tuple(range(self.nc)), q, self.tables, self.active, self.parameters, self.history)
         return replace(self, rates=(1.5 / h, -2.0 / h, 0.5 / h, h))
 
     def forces(self, q: Floats, v: Floats) -> Floats:
@@ -89,7 +90,7 @@ def body(name: str, nc: int, n_u: int = N_U, rest: float = 0.0) -> Body:
     if name.endswith("memory") and nc == 2:
         memory[:] = rest or 3.0
     past = np.zeros((len(memory), 2 if nc == 2 else 9))
-    none = np.zeros((0, 6)), np.zeros((0, 2)), np.zeros((0, 4))
+    none = np.zeros((0, 6)), np.zeros((0, 2)), np.zeros((0, 4)), np.zeros(0)
     history = History(memory, past, np.zeros((len(tables.axial_w), 3)), *none)
     return Body(nc, knots, tables, active, parameters, history)
 

@@ -13,7 +13,7 @@ from dlocore.effects.twist import Twist
 from dlocore.kernels.assembly import NO_RATES, History, assemble, remember, stored_energy
 from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, Tables, build_tables, graded_knots
 from dlocore.kernels.twisted import start_frames
-from dlocore.kernels.twisted_rows import LAST, PAST
+from dlocore.kernels.twisted_rows import LAST, PAST, room_for
 
 Floats = NDArray[np.float64]
 N_U, LENGTH = 9, 1.0
@@ -38,8 +38,9 @@ class Body:
         memory = np.tile([2.0, -1.0, 0.7, 2.0, -1.0, 0.7], (points, 1)) * remembered
         axial = np.zeros((len(self.tables.axial_w), 3))
         self.history = History(
-            memory, np.zeros((points, PAST)), axial, np.zeros((0, 6)), np.zeros((0, 2)), np.zeros((0, 4))
-        )
+            memory, np.zeros((points, PAST)), axial, np.zeros((0, 6)), np.zeros((0, 2)), np.zeros((0, 4)),
+            np.zeros(room_for(points)),
+        )  # fmt: skip
 
     def carry_frames(self, q: Floats) -> None:
         start_frames(self.knots, q, self.tables, np.array([0.0, 1.0, 0.2]), self.history.past)

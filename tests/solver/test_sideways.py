@@ -198,7 +198,7 @@ def _in_space(problem: Problem) -> Problem:
 
 def _forces(problem: Problem, x: Floats, tables: Any) -> Floats:
     points, stretched = len(tables.curvature_w), len(tables.axial_w)
-    past = np.zeros((stretched, 3)), np.zeros((0, 6)), np.zeros((0, 2)), np.zeros((0, COLUMNS))
+    past = np.zeros((stretched, 3)), np.zeros((0, 6)), np.zeros((0, 2)), np.zeros((0, COLUMNS)), np.zeros(0)
     history = History(np.zeros((points, 6)), np.zeros((0, 9)), *past)
     f, K = np.empty((len(x), 3)), np.empty((3 * len(x), 12))
     active, parameters = problem.law_table()
