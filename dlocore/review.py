@@ -18,8 +18,7 @@ from dlocore.effects.selfcontact import CLOSE as CLOSE_STRANDS
 from dlocore.effects.selfcontact import nearest_strands
 from dlocore.events import moments
 from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, largest_curvature, times_scalar_band
-from dlocore.kernels.banded import expand_vector, factor, reduce_matrix, reduce_vector
-from dlocore.kernels.banded import solve as solve_factored
+from dlocore.kernels.banded import solve_free
 from dlocore.kernels.twisted_rows import TWIST_RATE
 from dlocore.mirrored import goes_elsewhere
 from dlocore.problem import Problem
@@ -316,18 +315,13 @@ def _given_way(level: Level, window: WindowForces, look: _Look, force: Force) ->
     nc, e = problem.nc, window.held.elimination
     active, parameters = problem.law_table()
     slow = problem.scene.cable.linear_density * (2.0 / problem.horizon**2 + tau**-2)
-    K, A = np.empty((q.size, 4 * nc)), np.empty((q.size - len(e.held), e.width))
-    f, x, change = np.empty_like(q), np.empty(len(A)), np.empty(q.size)
+    K, f = np.empty((q.size, 4 * nc)), np.empty_like(q)
+    right = np.ascontiguousarray(force(q, v, a, level)).ravel()
     for geometric in (1.0, 0.0):  # of a cable that is about to give way only the positive part is of use
         scales = (1.0, 0.0, geometric)
         assemble(problem.axes, q, v, grid.tables, active, parameters, grid.history, NO_RATES, scales, f, K)
         add_scalar_band(nc, grid.tables.mass, slow + problem.drag_coefficient() / problem.horizon, K)
-        reduce_matrix(e, K, A)
-        if factor(A) < 0:
-            break
-    else:
-        return 0.0
-    reduce_vector(e, np.ascontiguousarray(force(q, v, a, level)).ravel(), x)
-    solve_factored(A, x)
-    expand_vector(e, x, change)
-    return float(np.linalg.norm(change.reshape(-1, nc)[:, : problem.plane.dimensions], axis=1).max())
+        change, positive = solve_free(e, K, right)
+        if positive:
+            return float(np.linalg.norm(change.reshape(-1, nc)[:, : problem.plane.dimensions], axis=1).max())
+    return 0.0

@@ -231,6 +231,23 @@ def holding(e: Any, A: Any, x: Any, R: Any, forces: Any, at: int, out: Any) -> N
             out[e.dof[s]] -= e.coefficient[s] * forces[at, k]
 
 
+@brief
+def solve_free(e: Any, K: Any, right: Any) -> Any:
+    """Return Z x, the change (n nc,) with Z' K Z x = Z' right, and whether the banded K (n nc, 4 nc) is positive.
+
+    Where it is not the change is zero.
+    """
+    free = len(right) - len(e.held)
+    A, x, change = np.empty((free, e.width)), np.empty(free), np.zeros(len(right))
+    reduce_matrix(e, K, A)
+    if factor(A) >= 0:
+        return change, False
+    reduce_vector(e, right, x)
+    solve(A, x)
+    expand_vector(e, x, change)
+    return change, True
+
+
 @leaf
 def reduce_matrix(e: Any, A: Any, out: Any) -> None:
     """Write Z' A Z of the banded A (n nc, 4 nc) to the banded out (free, e.width)."""

@@ -16,7 +16,7 @@ from dlocore.kernels.assembly import (
     remember,
     times_scalar_band,
 )
-from dlocore.kernels.banded import expand_vector, factor, multiply_band, reduce_matrix, reduce_vector, solve
+from dlocore.kernels.banded import multiply_band, solve_free
 from dlocore.kernels.compile import brief
 from dlocore.kernels.march import constrained_mass_solve
 from dlocore.kernels.selfcontact import press
@@ -93,20 +93,16 @@ def lasting(
         unit: (n, 4) mass matrix of unit density; `density` [kg/m] is that of the cable.
         h: time step [s].
     """
-    nc, free = len(axes), q.size - len(e.held)
+    nc = len(axes)
     f, K = np.empty_like(q), np.empty((q.size, 4 * nc))
     assemble(axes, q, np.zeros_like(q), tables, active, p, history, NO_RATES, (1.0, 0.0, 0.0), f, K)
     K *= _LASTS * h * h
-    force, x, change = np.empty(q.size), np.empty(free), np.empty(q.size)
+    force = np.empty(q.size)
     multiply_band(K, a.ravel(), force)
     add_scalar_band(nc, unit, density, K)
-    A = np.empty((free, e.width))
-    reduce_matrix(e, K, A)
-    if factor(A) >= 0:
+    change, positive = solve_free(e, K, force)
+    if not positive:
         return a, G
-    reduce_vector(e, force, x)
-    solve(A, x)
-    expand_vector(e, x, change)
     fast = change.reshape(q.shape)
     return a - fast, G + density * times_scalar_band(unit, fast)
 

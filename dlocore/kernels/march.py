@@ -14,13 +14,12 @@ from dlocore.kernels.assembly import (
 )
 from dlocore.kernels.banded import (
     expand_vector,
-    factor,
     holding,
     multiply_band,
     place_held,
     reduce_matrix,
     reduce_vector,
-    solve,
+    solve_free,
 )
 from dlocore.kernels.compile import brief, kernel, leaf
 from dlocore.kernels.contact import passes, strikes
@@ -59,15 +58,7 @@ def constrained_mass_solve(nc: int, mass: Any, e: Any, held: Any, right: Any) ->
     multiply_scalar_band(mass, x, -1.0, rest)
     full = np.zeros((n * nc, 4 * nc))
     add_scalar_band(nc, mass, 1.0, full)
-    free = n * nc - len(e.held)
-    reduced = np.empty((free, e.width))
-    reduce_matrix(e, full, reduced)
-    y = np.empty(free)
-    reduce_vector(e, rest.ravel(), y)
-    factor(reduced)
-    solve(reduced, y)
-    change = np.empty(n * nc)
-    expand_vector(e, y, change)
+    change, _ = solve_free(e, full, rest.reshape(n * nc))
     return x + change.reshape((n, nc))
 
 

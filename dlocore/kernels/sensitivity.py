@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.effects.laws import DAMPING, has_jumps, keeps_history
+from dlocore.effects.laws import DAMPING, keeps_history
 from dlocore.kernels.assembly import assemble, remember
 from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_matrix, reduce_vector, solve
 from dlocore.kernels.compile import kernel
@@ -21,14 +21,14 @@ _ITERATIONS = 40
 
 
 @kernel
-def newmark(rho: float, jumps: bool, h: float, late: bool) -> Any:
-    """Return (alpha_m, alpha_f, gamma, to_a, to_v, carry) of a step, as in `march_steps`.
+def newmark(rho: float, h: float, late: bool) -> Any:
+    """Return (alpha_m, alpha_f, gamma, to_a, to_v, carry) of a step, as in `march_steps` without forces that jump.
 
     It is one of generalised alpha, or where it is `late` of backward Euler.
     """
     if late:
         return 0.0, 0.0, 1.0, 1.0 / (h * h), 1.0 / h, 0.0
-    alpha_m, alpha_f, gamma, beta = coefficients(rho, jumps)
+    alpha_m, alpha_f, gamma, beta = coefficients(rho, False)
     return alpha_m, alpha_f, gamma, 1.0 / (beta * h * h), gamma / (beta * h), 0.5 / beta - 1.0
 
 
@@ -54,7 +54,7 @@ def factor_steps(
     keeps = keeps_history(active)
     softened = 0
     for k in range(1, len(Q)):
-        al_m, al_f, gm, ta, tv, carry = newmark(rho, has_jumps(active), h, jumps and k == 1)
+        al_m, al_f, gm, ta, tv, carry = newmark(rho, h, jumps and k == 1)
         q0, q1 = Q[k - 1], Q[k]
         rates = (1.5 / h, -2.0 / h, 0.5 / h, h) if k > 1 else (1.0 / h, -1.0 / h, 0.0, h)
         for i in range(n):
@@ -114,7 +114,7 @@ def follow_steps(
     mixing, differences = room(len(x) if mixes else 0), -1
     worst = 0.0
     for k in range(1, len(Q)):
-        al_m, al_f, gm, ta, _, carry = newmark(rho, has_jumps(active), h, jumps and k == 1)
+        al_m, al_f, gm, ta, _, carry = newmark(rho, h, jumps and k == 1)
         load = applied[min(k, len(applied) - 1)]
         q0 = Q[k - 1]
         rates = (1.5 / h, -2.0 / h, 0.5 / h, h) if k > 1 else (1.0 / h, -1.0 / h, 0.0, h)

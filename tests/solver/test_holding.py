@@ -10,16 +10,7 @@ from dlocore import Cable, ControlPoints, Environment, Grasp, Move, Scene, Strai
 from dlocore.discretisation import make_grid
 from dlocore.grid import Grid
 from dlocore.holding import SMOOTH, Held, Starts, close_grasps, hold
-from dlocore.kernels.banded import (
-    expand_vector,
-    factor,
-    holding,
-    multiply_band,
-    place_held,
-    reduce_matrix,
-    reduce_vector,
-    solve,
-)
+from dlocore.kernels.banded import holding, multiply_band, place_rows, solve_free
 from dlocore.kernels.entry import to_ends_of_steps
 from dlocore.paths import Path, Still
 from dlocore.problem import Problem, pose
@@ -69,7 +60,7 @@ def test_the_spline_passes_where_the_path_is_whatever_the_free_control_points_do
     random = np.random.default_rng(0)
     for k, t in enumerate(TIMES):
         q = random.standard_normal(grid.start.shape)
-        place_held(held.elimination, held.offsets[k], q.ravel())
+        place_rows(held.elimination, held.offsets[k : k + 1], q[None], 0)
         wanted = path.at(np.array([t]), np.array([0.5, 0.0, 0.0]))[0]
         assert np.abs(world_at(problem, grid, q, 0.5, 0) - wanted).max() < ROUNDING
         assert np.abs(world_at(problem, grid, q, 0.9, 0) - [0.9, 0.0, 0.0]).max() < ROUNDING
@@ -85,7 +76,7 @@ def test_a_held_direction_turns_with_the_gripper(u):
     random = np.random.default_rng(1)
     for k, t in enumerate(TIMES):
         q = random.standard_normal(grid.start.shape)
-        place_held(held.elimination, held.offsets[k], q.ravel())
+        place_rows(held.elimination, held.offsets[k : k + 1], q[None], 0)
         rotation = path.rotation_at(np.array([t]))
         assert rotation is not None
         assert np.abs(world_at(problem, grid, q, u, 1) - rotation[0] @ [1.0, 0.0, 0.0]).max() < 100 * ROUNDING
@@ -106,7 +97,7 @@ def test_in_the_plane_rows_hold_in_its_coordinates():
     problem, grid, held = held_in(scene(Grasp(u=0.3, hold="tangent"), Grasp(u=0.7, path=path), planar=True))
     assert problem.nc == 2
     q = np.random.default_rng(2).standard_normal(grid.start.shape)
-    place_held(held.elimination, held.offsets[2], q.ravel())
+    place_rows(held.elimination, held.offsets[2:3], q[None], 0)
     assert np.abs(world_at(problem, grid, q, 0.3, 1) - [1.0, 0.0, 0.0]).max() < 100 * ROUNDING
     wanted = path.at(TIMES[2:3], np.array([0.7, 0.0, 0.0]))[0]
     assert np.abs(world_at(problem, grid, q, 0.7, 0) - wanted).max() < ROUNDING
@@ -154,17 +145,13 @@ def test_what_an_update_does_to_forces_follows_from_the_balance_of_what_is_free(
     K[:, 0] += 60.0
     K[np.add.outer(np.arange(size), np.arange(4 * nc)) >= size] = 0.0
     R = random.normal(size=size)
-    A, y, x = np.empty((size - len(e.held), e.width)), np.empty(size - len(e.held)), np.empty(size)
-    reduce_matrix(e, K, A)
-    reduce_vector(e, -R, y)
-    assert factor(A) == -1
-    solve(A, y)
-    expand_vector(e, y, x)
-    whole, found, forces = np.empty(size), np.empty(size), np.empty(len(e.held))
+    x, positive = solve_free(e, K, -R)
+    assert positive
+    whole, found, forces = np.empty(size), np.empty(size), np.empty((2, len(e.held)))
     multiply_band(K, x, whole)
-    holding(e, K, x, R, forces, found)
+    holding(e, K, x, R, forces, 1, found)
     assert np.abs(found - whole).max() < ROUNDING * np.abs(whole).max() * size
-    assert np.abs(forces - (R + whole)[e.held]).max() < ROUNDING * np.abs(whole).max() * size
+    assert np.abs(forces[1] - (R + whole)[e.held]).max() < ROUNDING * np.abs(whole).max() * size
 
 
 def test_forces_of_steps_are_brought_to_their_ends():
