@@ -12,13 +12,14 @@ from dlocore.errors import SceneError
 from dlocore.features import LASTING, OPENING, find_features, free_ends
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
+from dlocore.kernels import space, twisted_rows
 from dlocore.kernels.assembly import MEMORY_IN_PLANE, MEMORY_IN_SPACE, PAST_IN_PLANE, PAST_IN_SPACE, History
 from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, Tables, build_tables, graded_knots
 from dlocore.kernels.entry import remember_start
 from dlocore.kernels.relax import relax
 from dlocore.kernels.tension import COLUMNS
 from dlocore.kernels.twisted import start_frames
-from dlocore.kernels.twisted_rows import DIRECTOR, PAST, room_for
+from dlocore.kernels.twisted_rows import DIRECTOR, PAST
 from dlocore.paths import Waypoints
 from dlocore.plane import leftwards
 from dlocore.problem import Problem
@@ -84,6 +85,14 @@ def _tables_of(problem: Problem, knots: Floats) -> Tables:
     return cast(Tables, build_tables(knots, *free_ends(problem.scene), *rules, *spacings))
 
 
+def room_for(nc: int, points: int) -> int:
+    """Return how many numbers an assembly with so many coordinates and curvature points writes over."""
+    if nc == 2:
+        return 0
+    of = space if nc == 3 else twisted_rows
+    return of.ROOM + of.ROOM_OF_POINT * points
+
+
 def _no_history(problem: Problem, tables: Tables) -> History:
     points, nc = len(tables.curvature_w), problem.nc
     kept = points if problem.keeps_curvature else 0
@@ -97,7 +106,7 @@ def _no_history(problem: Problem, tables: Tables) -> History:
         stick=np.zeros((len(tables.contact_w) if rubs else 0, 6)),
         slide=np.zeros((len(tables.body_w) if lies else 0, 2)),
         tension=np.zeros((0, COLUMNS)),
-        room=np.zeros(0 if problem.twist is None else room_for(points)),
+        room=np.zeros(room_for(nc, points)),
     )
 
 

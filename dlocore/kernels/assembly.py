@@ -47,7 +47,8 @@ class History(NamedTuple):
         stick: (contact nodes, 6) anchor of the friction there, and position at the last step [m]; (0, 6) without.
         slide: (body points, 2) anchor of the friction of a cable that lies on the table [m]; (0, 2) without.
         tension: (axial points, 4) what the tangent of a march knows of the tension, see `tension.py`; (0, 4) elsewhere.
-        room: (`twisted_rows.room_for`,) what an assembly with twist writes over, and nothing is kept in; (0,) without.
+        room: what assemblies in space write over and keep nothing in, of `ROOM` numbers in `space` or `twisted_rows`
+            and so many for each point; (0,) in the plane. Kernels that hand the GIL over need one of their own.
     """
 
     memory: Any
@@ -103,7 +104,7 @@ def assemble(
             memory, room = history.memory, history.room
             twisted.curvature(q, v, tables, active, p, memory, history.past, rates, scales, tangent, room, f, K)
         elif bends:
-            space.curvature(q, v, tables, active, p, history.past, rates, scales, tangent, f, K)
+            space.curvature(q, v, tables, active, p, history.past, rates, scales, tangent, history.room, f, K)
         if active[QUADRATIC_DRAG]:
             space.body(len(axes), q, v, tables, active, p, scales, tangent, f, K)
     if active[CONTACT]:
@@ -139,7 +140,7 @@ def remember(axes: Any, q: Any, tables: Any, active: Any, p: Any, history: Any, 
     if len(axes) == 2:
         plane.remember(q, tables, active, p, history.memory, history.past, h)
     elif len(axes) == 3:
-        space.remember(q, tables, history.past)
+        space.remember(q, tables, history.past, history.room)
     else:
         twisted.remember(q, tables, active, p, history.memory, history.past, h, history.room)
     return deepest

@@ -157,7 +157,7 @@ def elimination(n: int, nc: int, dimensions: int, pivots: Any, follow: Any, turn
     return Elimination(index, held, start, dof, coefficient, width, entry, place, share)
 
 
-@leaf
+@part
 def reduce_vector(e: Any, f: Any, out: Any) -> None:
     """Write Z' f for the full vector f (n nc,)."""
     out[:] = 0.0
@@ -170,7 +170,7 @@ def reduce_vector(e: Any, f: Any, out: Any) -> None:
                 out[e.index[e.dof[s]]] += e.coefficient[s] * f[i]
 
 
-@leaf
+@part
 def expand_vector(e: Any, x: Any, out: Any) -> None:
     """Write Z x, the full vector (n nc,) of a change x of the free degrees of freedom."""
     for i in range(len(out)):

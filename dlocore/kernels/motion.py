@@ -20,6 +20,7 @@ from dlocore.kernels.compile import kernel
 from dlocore.kernels.entry import begin_stretch, lasting, remember_start, to_ends_of_steps
 from dlocore.kernels.holding import hold_rows
 from dlocore.kernels.march import march_steps
+from dlocore.kernels.space import ROOM, ROOM_OF_POINT
 from dlocore.kernels.tension import COLUMNS
 from dlocore.kernels.timefit import fitted
 
@@ -67,7 +68,7 @@ def smooth_motion(
         np.zeros((0, 6)),
         np.zeros((0, 2)),
         np.full((stretched, COLUMNS), np.nan),
-        np.empty(0),
+        np.zeros(0 if nc == 2 else ROOM + ROOM_OF_POINT * points),
     )
     if keeps_history(active):
         remember_start(axes, start, tables, active, p, history)

@@ -34,18 +34,12 @@ def pair_products(b1: Any, b2: Any) -> Any:
     return out
 
 
-@kernel
-def no_blocks(nc: int) -> Any:
-    """Return room (SUMS + PAIRS, nc nc) for the blocks of a point and the sums of a span, all zero.
+@part
+def add_point(blocks: Any, products: Any) -> None:
+    """Add the blocks of a point, the first rows, to the sums of its span, (SUMS + PAIRS, nc nc) together.
 
     Column nc e + d is the entry of coordinate d of control point i and coordinate e of j.
     """
-    return np.zeros((SUMS + PAIRS, nc * nc))
-
-
-@part
-def add_point(blocks: Any, products: Any) -> None:
-    """Add the blocks of a point, the first rows, to the sums of its span."""
     columns = blocks.shape[1]  # a number that the compiler knew would be unrolled, not made vectors of
     for pair in range(PAIRS):
         bb, bc, cb, cc = products[pair, BB], products[pair, BC], products[pair, CB], products[pair, CC]

@@ -19,12 +19,15 @@ from dlocore.effects.laws import (
 )
 from dlocore.kernels.basis import row_of
 from dlocore.kernels.bishop import BEND, LENGTH, STATE, TANGENT, H, carry, rate_by_steps, rate_by_velocity, torques
-from dlocore.kernels.compile import kernel, law, leaf, part
-from dlocore.kernels.pairs import BB, BC, CB, CC, add_point, add_span, no_blocks
+from dlocore.kernels.compile import law, leaf, part
+from dlocore.kernels.pairs import BB, BC, CB, CC, PAIRS, SUMS, add_point, add_span
 from dlocore.kernels.strain import space_curvature, space_curvature_rate, space_moment, vector
 from dlocore.kernels.tension import AT_HAND, MODULUS, assumed
 
 STRAIGHT = (0.0, 0.0, 0.0)  # the stress-free curvature without a twist coordinate
+# Numbers that an assembly writes over: the blocks of a point and the sums of a span, see `pairs.py`, all zero to begin
+# with, as a span clears its sums; and for each curvature point.
+ROOM, ROOM_OF_POINT = 9 * (SUMS + PAIRS), 3 * STATE
 
 
 @law
@@ -122,37 +125,33 @@ def _write_rate(v: Any, tables: Any, state: Any, turning: Any, rate: Any) -> Non
             rate[n, d] = change[d]
 
 
-@kernel
+@law
+def _rows(room: Any, points: int) -> Any:
+    """Return three arrays (points, STATE) in the room of a `History`."""
+    rows = room[ROOM:].reshape((len(room) - ROOM) // STATE, STATE)
+    return rows[:points], rows[points : 2 * points], rows[2 * points : 3 * points]
+
+
+@leaf
 def curvature(
-    q: Any, v: Any, tables: Any, active: Any, p: Any, past: Any, rates: Any, scales: Any, tangent: bool, f: Any,
-    K: Any,
+    q: Any, v: Any, tables: Any, active: Any, p: Any, past: Any, rates: Any, scales: Any, tangent: bool, room: Any,
+    f: Any, K: Any,
 ) -> None:  # fmt: skip
     """Add the forces and tangents of the curvature site; `past` holds kappa of two steps and t of the last (points, 9).
 
     With J = -h P / l^2 - kappa t' / l by r', and P / l by r'', the derivatives of kappa, the material part of the
     tangent is J' S J, where S is a number, P kappa = kappa and P t = 0; the geometric part is M . d2kappa. Of damping,
     what the spin of the sections depends on, all of the cable, and the torque that keeps them from twisting are in the
-    forces only.
+    forces only. `room` is that of a `History`.
     """
     damped = len(tables.curvature_w) if active[DAMPING] else 0
-    _add_curvature(
-        q, v, tables, active, p, past, rates, scales, tangent, no_blocks(3 if tangent else 0),
-        np.empty((damped, STATE)), np.empty((damped, 3)), np.empty((damped, 3)), f, K,
-    )  # fmt: skip
-
-
-@part
-def _add_curvature(
-    q: Any, v: Any, tables: Any, active: Any, p: Any, past: Any, rates: Any, scales: Any, tangent: bool, blocks: Any,
-    state: Any, rate: Any, by_torque: Any, f: Any, K: Any,
-) -> None:  # fmt: skip
-    """Do the work of `curvature` in the room made there."""
+    blocks = room[:ROOM].reshape(SUMS + PAIRS, 9)
+    state, rate, by_torque = _rows(room, damped)
     elastic, viscous, geometric = scales
     if viscous != 0.0 and rates[0] != 0.0:
         viscous = rates[0]
     firsts, b1, b2, weights = tables.curvature_first, tables.curvature_b1, tables.curvature_b2, tables.curvature_w
     pairs = tables.curvature_pairs
-    damped = len(state)
     if damped:
         _write_state(q, tables, state)
         if rates[0] != 0.0:
@@ -209,11 +208,11 @@ def _add_curvature(
             add_span(3, K, k, blocks)
 
 
-@kernel
-def remember(q: Any, tables: Any, past: Any) -> None:
+@leaf
+def remember(q: Any, tables: Any, past: Any, room: Any) -> None:
     """Make kappa and t of q the last ones in `past` (points, 9), and the last kappa, carried along, the one before."""
     points = len(past)
-    state, before = np.empty((points, STATE)), np.empty((points, 3))
+    state, before, _ = _rows(room, points)
     _write_state(q, tables, state)
     carry(tables.curvature_w, state, past, 1.0, 1.0, 0.0, before)
     for n in range(points):

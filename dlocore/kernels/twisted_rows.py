@@ -27,11 +27,8 @@ MEAN, RISE = F + 19 * SPANS, F + 35 * SPANS
 SIZE = F + 51 * SPANS
 BLOCK = 16 * SPANS  # numbers of the blocks of the tangent that two control points have in each of the spans
 KNOT = 3  # place [m], S and R [rad] of a knot, see `twisted_angles.py`
-
-
-def room_for(points: int) -> int:
-    """Return how many numbers an assembly with so many curvature points writes over: W, a block, and knots."""
-    return SIZE + BLOCK + KNOT * (points // POINTS + 1)
+# Numbers that an assembly writes over: W, a block and the first knot; and for each curvature point.
+ROOM, ROOM_OF_POINT = SIZE + BLOCK + KNOT, KNOT // POINTS
 
 
 @law

@@ -139,7 +139,7 @@ class March:
 
     def behind(self, times: Floats) -> History:
         """Return what lies behind the motion at the times (k,) [s]: a `History` with arrays (1 or k, ...)."""
-        start = self.grid.history
+        start = self.grid.past()
         if len(self.log) == 0:
             return start._replace(memory=start.memory[None], past=start.past[None], axial=start.axial[None])
         at = np.clip(np.searchsorted(self.times[self.logged], times, side="right") - 1, 0, len(self.log) - 1)

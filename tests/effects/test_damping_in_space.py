@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.rod import simulate
 from dlocore import Cable, ControlPoints, Environment, Grasp, Quality, Scene, Waypoints, predict
+from dlocore.discretisation import room_for
 from dlocore.effects import laws
 from dlocore.effects.damping import Damping
 from dlocore.kernels.assembly import NO_RATES, History, assemble
@@ -36,7 +37,7 @@ class Damped:
         points = len(self.tables.curvature_w)
         history = History(
             np.zeros((points, 6)), np.zeros((points, 9)), np.zeros((len(self.tables.axial_w), 3)), np.zeros((0, 6)),
-            np.zeros((0, 2)), np.zeros((0, 4)), np.zeros(0),
+            np.zeros((0, 2)), np.zeros((0, 4)), np.zeros(room_for(3, points)),
         )  # fmt: skip
         for x in past:
             remember_start(AXES, x, self.tables, self.active, self.parameters, history)

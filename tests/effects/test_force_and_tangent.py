@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from dlocore.discretisation import room_for
 from dlocore.effects import laws
 from dlocore.effects.bend import Bend
 from dlocore.effects.damping import Damping
@@ -90,7 +91,7 @@ def body(name: str, nc: int, n_u: int = N_U, rest: float = 0.0) -> Body:
     if name.endswith("memory") and nc == 2:
         memory[:] = rest or 3.0
     past = np.zeros((len(memory), 2 if nc == 2 else 9))
-    none = np.zeros((0, 6)), np.zeros((0, 2)), np.zeros((0, 4)), np.zeros(0)
+    none = np.zeros((0, 6)), np.zeros((0, 2)), np.zeros((0, 4)), np.zeros(room_for(nc, len(memory)))
     history = History(memory, past, np.zeros((len(tables.axial_w), 3)), *none)
     return Body(nc, knots, tables, active, parameters, history)
 

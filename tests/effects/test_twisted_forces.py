@@ -6,14 +6,16 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from dlocore import SplineSurface
+from dlocore.discretisation import room_for
 from dlocore.effects import laws
 from dlocore.effects.bend import Bend
 from dlocore.effects.stretch import Stretch
 from dlocore.effects.twist import Twist
-from dlocore.kernels.assembly import NO_RATES, History, assemble, remember, stored_energy
+from dlocore.kernels.assembly import NO_RATES, History, assemble, stored_energy
 from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, Tables, build_tables, graded_knots
+from dlocore.kernels.entry import remember_start
 from dlocore.kernels.twisted import start_frames
-from dlocore.kernels.twisted_rows import LAST, PAST, room_for
+from dlocore.kernels.twisted_rows import LAST, PAST
 
 Floats = NDArray[np.float64]
 N_U, LENGTH = 9, 1.0
@@ -39,7 +41,7 @@ class Body:
         axial = np.zeros((len(self.tables.axial_w), 3))
         self.history = History(
             memory, np.zeros((points, PAST)), axial, np.zeros((0, 6)), np.zeros((0, 2)), np.zeros((0, 4)),
-            np.zeros(room_for(points)),
+            np.zeros(room_for(4, points)),
         )  # fmt: skip
 
     def carry_frames(self, q: Floats) -> None:
@@ -63,7 +65,7 @@ class Body:
         return K
 
     def remember(self, q: Floats) -> None:
-        remember(AXES, q, self.tables, self.active, self.p, self.history, 0.0, False)
+        remember_start(AXES, q, self.tables, self.active, self.p, self.history)
 
     def _assemble(self, q: Floats, scales: tuple[float, float, float], f: Floats, K: Floats) -> None:
         assemble(AXES, q, 0 * q, self.tables, self.active, self.p, self.history, NO_RATES, scales, f, K)

@@ -58,6 +58,29 @@ def test_each_is_bit_for_bit_what_predict_gives(threads: int):
         assert (one.status, one.message) == (alone.status, alone.message)
 
 
+def test_solves_on_one_grid_leave_each_other_alone():
+    arc = np.column_stack([np.linspace(0.0, 0.72, 9), np.zeros(9), -0.28 * np.sin(np.linspace(0.0, np.pi, 9))])
+    quality = Quality(n_u=9, n_t=13, method="spacetime", estimate=False)
+
+    def clamped(turn: float) -> Scene:
+        turned = Move(displacement=(-0.05, 0.02, 0.0), rotation=(turn, 0.0, 0.0), duration=1.0)
+        grasps = (Grasp(u=0.0, hold="clamp"), Grasp(u=1.0, hold="clamp", path=turned))
+        environment = Environment(drag=0.1)
+        return Scene(
+            cable=Cable.preset("paper"), shape=Points(points=arc, settle=True), grasps=grasps, environment=environment,
+            quality=quality,
+        )  # fmt: skip
+
+    first = predict(clamped(0.1))
+    assert first.accuracy.dimensions == 3
+    scenes = [clamped(0.1 + 1e-3 * k) for k in range(24)]
+    for given, one in zip(scenes, predict_many(scenes, like=first, threads=4), strict=True):
+        assert isinstance(one, Prediction)
+        alone = predict(given, like=first)
+        assert "from the beginning" not in alone.message
+        assert np.array_equal(one.surface.control_points, alone.surface.control_points)
+
+
 @pytest.mark.parametrize("threads", [1, 3, 64])
 def test_each_answer_is_in_the_place_of_its_scene(threads: int):
     scenes = [scene(u) for u in np.linspace(0.0, 1.0, 50)]

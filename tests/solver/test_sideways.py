@@ -22,6 +22,7 @@ from dlocore import (
     equilibrium,
     predict,
 )
+from dlocore.discretisation import room_for
 from dlocore.kernels.across import stiffness_across
 from dlocore.kernels.assembly import NO_RATES, History, assemble
 from dlocore.kernels.tension import COLUMNS
@@ -198,7 +199,13 @@ def _in_space(problem: Problem) -> Problem:
 
 def _forces(problem: Problem, x: Floats, tables: Any) -> Floats:
     points, stretched = len(tables.curvature_w), len(tables.axial_w)
-    past = np.zeros((stretched, 3)), np.zeros((0, 6)), np.zeros((0, 2)), np.zeros((0, COLUMNS)), np.zeros(0)
+    past = (
+        np.zeros((stretched, 3)),
+        np.zeros((0, 6)),
+        np.zeros((0, 2)),
+        np.zeros((0, COLUMNS)),
+        np.zeros(room_for(3, points)),
+    )
     history = History(np.zeros((points, 6)), np.zeros((0, 9)), *past)
     f, K = np.empty((len(x), 3)), np.empty((3 * len(x), 12))
     active, parameters = problem.law_table()
