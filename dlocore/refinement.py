@@ -239,6 +239,8 @@ class _Climb:
         if self.direction == "time" and self.problem.self_contact is None:
             # on the same steps strongly damped marches err by far more; but strands that strike each other rebound less
             self.rho = RHO
+        if self.direction == "space" and level.motion.rho == STRONGLY_DAMPED:
+            self.rho = STRONGLY_DAMPED  # without, the same steps went astray
         hope = _AT_BEST ** self._left(sizes[self.direction])
         return None if change is not None and hope * change.moved > self.enough else sizes[self.direction]
 

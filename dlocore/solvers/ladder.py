@@ -149,7 +149,11 @@ def run_level(
     if booked:
         monitor.phase("setup")
     plain = None if grid.watched else march_smooth(problem, grid, steps, knots_t, monitor, rho)
-    motion = march(problem, grid, steps, monitor, rho=rho, whole=whole) if plain is None else plain[0]
+    damped: March | None = None
+    if plain is None:
+        motion, damped = _march(problem, grid, steps, monitor, rho, whole, credible)
+    else:
+        motion = plain[0]
     if hardness > 1.0 and motion.stopped == "step":  # too stiff for this grid
         problem = posed
         motion = march(problem, grid, steps, monitor, rho=rho, whole=whole)
@@ -165,9 +169,9 @@ def run_level(
             break  # what is this deep was not pushed in
         problem, motion = harder, again
     doubtful = motion.stopped == "step" or motion.largest_strain > credible
-    if doubtful and (rho > STRONGLY_DAMPED or motion.stopped == "step"):
+    if doubtful and motion is not damped and (rho > STRONGLY_DAMPED or motion.stopped == "step"):
         other_rho = RHO if rho == STRONGLY_DAMPED else STRONGLY_DAMPED
-        again = march(problem, grid, steps, monitor, rho=other_rho, whole=whole)
+        again = damped or march(problem, grid, steps, monitor, rho=other_rho, whole=whole)
         less = TEARS * again.largest_strain < motion.largest_strain
         if again.reached > motion.reached or (again.reached == motion.reached and less):
             motion = again
@@ -185,6 +189,26 @@ def run_level(
     if booked:
         monitor.phase("fit")
     return Level(Size(n_u, n_t, steps), posed, problem, motion, knots_t, control, largest(off), np.inf)
+
+
+def _march(
+    problem: Problem, grid: Grid, steps: int, monitor: Monitor, rho: float, whole: bool, credible: float
+) -> tuple[March, March | None]:
+    """March; return the march, and one with strong damping where it is known.
+
+    What goes astray is given up there and then, if strong damping does not. Waves that gain energy strain the cable
+    beyond belief, and most of their steps find equilibrium only in smaller ones: what comes to its end so, with strong
+    damping to follow, takes forty times as long.
+    """
+    if rho == STRONGLY_DAMPED or problem.touches:
+        return march(problem, grid, steps, monitor, rho=rho, whole=whole), None
+    motion = march(problem, grid, steps, monitor, rho=rho, whole=whole, credible=credible)
+    if motion.stopped != "strain":
+        return motion, None
+    damped = march(problem, grid, steps, monitor, rho=STRONGLY_DAMPED, whole=whole)
+    if not damped.stopped and TEARS * damped.largest_strain < motion.largest_strain:
+        return damped, damped
+    return march(problem, grid, steps, monitor, rho=rho, whole=whole), damped
 
 
 def hardness(level: Level) -> float:

@@ -73,7 +73,7 @@ class March:
         log: frames and memory at the steps `logged` (rows, points, columns), see `kernels.assembly.note`; (0, 0, 0)
             where nothing is kept.
         reached: last step that found equilibrium.
-        stopped: why it ended there: "" (the end), "step" (no equilibrium) or "time" (deadline).
+        stopped: why it ended there: "" (the end), "step" (no equilibrium), "time" (deadline) or "strain" (given up).
         rho: spectral radius it was marched with.
         split: steps that found equilibrium only in smaller ones.
         largest_strain: largest |axial strain| of the motion.
@@ -153,8 +153,9 @@ class March:
 
 
 def march(
-    problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: float = RHO, whole: bool = False
-) -> March:
+    problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: float = RHO, whole: bool = False,
+    credible: float = math.inf,
+) -> March:  # fmt: skip
     """March the motion of a problem on `grid` in about `steps` equal steps, more where events lie close.
 
     Args:
@@ -164,6 +165,7 @@ def march(
         monitor: that of the solve.
         rho: spectral radius.
         whole: whether a march that the deadline ends is of no use: there is an answer that it was to better.
+        credible: axial strain beyond which it is given up.
 
     Raises:
         Cancelled: the caller asked to stop.
@@ -174,7 +176,7 @@ def march(
     problem = firmer(problem, problem.horizon / steps)
     if problem.inertia is None or (problem.friction is not None and problem.friction.lying > 0.0):
         rho = STRONGLY_DAMPED  # without waves, or where a rough table stops them, there is nothing to keep
-    walk = _Walk(problem, grid, monitor, step_times(marks, counts), rho)
+    walk = _Walk(problem, grid, monitor, step_times(marks, counts), rho, credible)
     first = 0
     for begin, end, count in zip(marks[:-1], marks[1:], counts, strict=True):
         walk.go(begin, end, first, first + count)
@@ -221,10 +223,14 @@ class _Walk:
         monitor: that of the solve.
         times: (steps + 1,) [s].
         rho: spectral radius.
+        credible: axial strain beyond which it is given up.
     """
 
-    def __init__(self, problem: Problem, grid: Grid, monitor: Monitor, times: Floats, rho: float) -> None:
+    def __init__(
+        self, problem: Problem, grid: Grid, monitor: Monitor, times: Floats, rho: float, credible: float
+    ) -> None:
         self._problem, self._grid, self._monitor, self._times, self._rho = problem, grid, monitor, times, rho
+        self._credible = credible
         at_ends = problem.contact is not None or problem.friction is not None  # forces that jump, see `newmark.py`
         self._lag = 0.0 if at_ends else rho / (1.0 + rho)  # of the times at which steps balance forces, in steps
         self._laws = problem.laws
@@ -258,10 +264,12 @@ class _Walk:
                     stretch, at, until, smooth, jumps, stretch.h, self._rho, self._states, self._applied,
                     stretch.offsets, stretch.reactions, self._log,
                 )  # fmt: skip
+                at = until if failed < 0 else failed - 1
+                self.stopped = self._astray(at)
+                if self.stopped:
+                    break
                 if failed < 0:
-                    at = until
                     continue
-                at = failed - 1
                 if self._in_smaller_steps(stretch, failed, jumps and at == smooth):
                     at = smooth = failed
                     jumps = bool(self._info[STRUCK])
@@ -278,6 +286,12 @@ class _Walk:
         self._forces.append(
             WindowForces(stretch.entry.held, self._times[part], stretch.reactions[part], self._states[part])
         )
+
+    def _astray(self, at: int) -> str:
+        """Return why it is given up at a step, "" where it is not."""
+        if self._credible < math.inf and self._grid.largest_strain(self._states[at : at + 1]) > self._credible:
+            return "strain"
+        return ""
 
     def ended(self) -> March:
         """Return the march, whose last state stays where it stopped early."""

@@ -3,6 +3,7 @@
 import time
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -31,13 +32,15 @@ from dlocore.discretisation import corners, make_grid
 from dlocore.features import find_features
 from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.banded import reduce_matrix
-from dlocore.problem import pose
+from dlocore.problem import Problem, pose
 from dlocore.refinement import AUTO_ENOUGH
 from dlocore.shape import start_curve
-from dlocore.solvers.ladder import hardness, run_level
+from dlocore.solvers import ladder
+from dlocore.solvers.ladder import Level, Size, hardness, run_level
+from dlocore.solvers.march import STRONGLY_DAMPED, March
 from dlocore.solvers.march import march as take_steps
 from dlocore.solvers.monitor import Monitor
-from dlocore.whole_march import is_folded
+from dlocore.whole_march import is_folded, march_level
 from tests.solver.scenes import apart, cable, march, paper_scene, refined
 
 
@@ -490,3 +493,40 @@ def test_a_strongly_damped_grid_that_agrees_with_one_that_was_not_is_not_believe
     truth = predict(replace(scene, quality=Quality(target_error=5e-4 * scene.cable.length)))
     assert found.status == truth.status == "converged"
     assert apart(found.surface, truth.surface).max() < 2.0 * found.accuracy.error_estimate
+
+
+def test_a_march_that_gains_energy_from_its_waves_is_given_up_on_its_way(monkeypatch: pytest.MonkeyPatch):
+    # a wire of 40 m whose gripper starts with a jump: on 315 control points waves along it grow without strong damping,
+    # and a tenth of the steps found equilibrium only in smaller ones, forty times as long for the same answer
+    scene = draw(34, 14055).make()
+    problem = pose(scene, {"side": "it leaves its plane"})
+    marches = []
+
+    def noted(*args: Any, **options: Any) -> March:
+        marches.append(take_steps(*args, **options))
+        return marches[-1]
+
+    monkeypatch.setattr(ladder, "march", noted)
+    level = run_level(problem, 315, 60, 5120, Monitor(None, None, None))
+    assert [motion.stopped for motion in marches] == ["strain", ""]
+    assert marches[0].reached < 0.1 * marches[1].reached
+    assert level.motion is marches[1]
+    assert level.motion.rho == STRONGLY_DAMPED
+
+
+def test_a_grid_finer_along_the_cable_is_damped_as_the_one_before(monkeypatch: pytest.MonkeyPatch):
+    # else two grids differ by their damping, and one that went astray without strong damping does so again
+    asked = []
+
+    def noted(problem: Problem, size: Size, monitor: Monitor, rho: float, **options: Any) -> Level:
+        asked.append((size, rho))
+        return march_level(problem, size, monitor, STRONGLY_DAMPED, **options)
+
+    monkeypatch.setattr(refinement, "march_level", noted)
+    found = predict(swinging(Quality(target_error=0.002, method="march")))
+    assert found.level is not None
+    finer = [
+        rho for (before, _), (size, rho) in pairwise(asked) if size.n_u > before.n_u and size.steps == before.steps
+    ]
+    assert finer
+    assert set(finer) == {STRONGLY_DAMPED}
