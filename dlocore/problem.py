@@ -1,5 +1,6 @@
 """From a scene to the equations of its motion, before any grid: dimensions, effects, features, prescribed motion."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -368,14 +369,20 @@ def stiffer(problem: Problem, ratio: float) -> Problem:
     )
 
 
-def stiffer_for(problem: Problem, deepest: float) -> Problem:
+def stiffer_for(problem: Problem, deepest: float, speed: float = 0.0) -> Problem:
     """Return the problem with contact about so much stiffer that what was `deepest` [m] will be as deep as is allowed.
 
-    At once it is made _STIFFENING times as stiff at most.
+    At once it is made _STIFFENING times as stiff at most, or as stiff as stops there what strikes with a `speed` [m/s]:
+    critically damped, it comes as deep as speed sqrt(mu/k)/e.
     """
+    cable = problem.scene.cable
+    allowed = DEEPEST * cable.diameter
     # where strands strike each other, the depth goes only with the root of the stiffness
-    ratio = 1.5 * deepest / (DEEPEST * problem.scene.cable.diameter)
-    return stiffer(problem, min(ratio ** (1 if problem.self_contact is None else 2), _STIFFENING))
+    ratio = min((1.5 * deepest / allowed) ** (1 if problem.self_contact is None else 2), _STIFFENING)
+    contact = problem.self_contact or problem.contact
+    assert contact is not None
+    stops = cable.linear_density * (speed / (math.e * allowed)) ** 2
+    return stiffer(problem, max(ratio, stops / contact.stiffness))
 
 
 def firmer(problem: Problem, step: float) -> Problem:

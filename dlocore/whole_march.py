@@ -10,11 +10,19 @@ from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
 from dlocore.progress import record_level
 from dlocore.review import called_for, called_for_by_fine
-from dlocore.solvers.ladder import CREDIBLE_STRAIN, Level, Size, credible_after, hardness, run_level, stretched
+from dlocore.solvers.ladder import (
+    CREDIBLE_STRAIN,
+    TOO_DEEP,
+    Level,
+    Size,
+    credible_after,
+    hardness,
+    run_level,
+    stretched,
+)
 from dlocore.solvers.march import RHO
 from dlocore.solvers.monitor import Monitor
 
-TOO_DEEP = 0.25  # of the diameter, in the table, an obstacle or itself
 TORN = 0.2  # axial strain: no cable of this kind follows
 FOLDED = 0.4  # of |r'| between the points that watch over the length: less is a fold that no energy sees
 _LOOKS = (1, 2, 3)  # grids on which a motion is looked at for whether it leaves its plane

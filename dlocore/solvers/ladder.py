@@ -37,6 +37,7 @@ TEARS = 1.5  # times the strain of another march: what strains a cable so much m
 _STIFFER = 5  # times that contact is made stiffer on one grid
 _MISSED = 0.01  # of the diameter: what the time spline may miss of a motion with contact
 _SAMPLES = 33  # along the cable, and in time while it swings once, at which surfaces are compared
+TOO_DEEP = 0.25  # of the diameter, in the table, an obstacle or itself: no cable is pressed in so far
 _YIELDING = 0.8  # of the depth, at most, is left by a stiffer contact where it is one of stiffness
 ACCEPT = 0.75  # of the target: an answer with a smaller estimated error is believed
 
@@ -151,7 +152,7 @@ def run_level(
     plain = None if grid.watched else march_smooth(problem, grid, steps, knots_t, monitor, rho)
     damped: March | None = None
     if plain is None:
-        motion, damped = _march(problem, grid, steps, monitor, rho, whole, credible)
+        problem, motion, damped = _march(problem, grid, steps, monitor, rho, whole, credible)
     else:
         motion = plain[0]
     if hardness > 1.0 and motion.stopped == "step":  # too stiff for this grid
@@ -191,24 +192,41 @@ def run_level(
     return Level(Size(n_u, n_t, steps), posed, problem, motion, knots_t, control, largest(off), np.inf)
 
 
+def _fastest(motion: March) -> float:
+    """Return the largest speed of a control point in a motion, as far as it came [m/s]."""
+    states = motion.states[: motion.reached + 1, :, : min(3, motion.states.shape[2])]
+    moved = np.linalg.norm(np.diff(states, axis=0), axis=2).max(axis=1)
+    return float((moved / np.diff(motion.times[: motion.reached + 1])).max(initial=0.0))
+
+
 def _march(
     problem: Problem, grid: Grid, steps: int, monitor: Monitor, rho: float, whole: bool, credible: float
-) -> tuple[March, March | None]:
-    """March; return the march, and one with strong damping where it is known.
+) -> tuple[Problem, March, March | None]:
+    """March; return what was solved, its march, and one with strong damping where it is known.
 
-    What goes astray is given up there and then, if strong damping does not. Waves that gain energy strain the cable
+    What goes astray is given up there and then, if something else does not. Waves that gain energy strain the cable
     beyond belief, and most of their steps find equilibrium only in smaller ones: what comes to its end so, with strong
-    damping to follow, takes forty times as long.
+    damping to follow, takes forty times as long. What is struck so fast that it goes through what it strikes, or
+    through itself, jams or goes another way: contact is made so stiff at once that it stops what is as fast as anything
+    was until then.
     """
-    if rho == STRONGLY_DAMPED or problem.touches:
-        return march(problem, grid, steps, monitor, rho=rho, whole=whole), None
-    motion = march(problem, grid, steps, monitor, rho=rho, whole=whole, credible=credible)
-    if motion.stopped != "strain":
-        return motion, None
-    damped = march(problem, grid, steps, monitor, rho=STRONGLY_DAMPED, whole=whole)
-    if not damped.stopped and TEARS * damped.largest_strain < motion.largest_strain:
-        return damped, damped
-    return march(problem, grid, steps, monitor, rho=rho, whole=whole), damped
+    damped: March | None = None
+    shallow = TOO_DEEP * problem.scene.cable.diameter
+    believed = np.inf if rho == STRONGLY_DAMPED or problem.touches else credible
+    motion = march(problem, grid, steps, monitor, rho=rho, whole=whole, credible=believed, shallow=shallow)
+    if motion.stopped == "strain":
+        damped = march(problem, grid, steps, monitor, rho=STRONGLY_DAMPED, whole=whole)
+        less = TEARS * damped.largest_strain < motion.largest_strain
+        if damped.stopped == "time" or (less and not damped.stopped):
+            return problem, damped, damped
+    elif motion.stopped == "depth":
+        harder = stiffer_for(problem, motion.deepest, _fastest(motion))
+        again = march(harder, grid, steps, monitor, rho=rho, whole=whole, shallow=shallow)
+        if again.stopped in ("", "time"):
+            return harder, again, None
+    else:
+        return problem, motion, None
+    return problem, march(problem, grid, steps, monitor, rho=rho, whole=whole), damped
 
 
 def hardness(level: Level) -> float:

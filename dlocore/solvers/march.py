@@ -73,7 +73,8 @@ class March:
         log: frames and memory at the steps `logged` (rows, points, columns), see `kernels.assembly.note`; (0, 0, 0)
             where nothing is kept.
         reached: last step that found equilibrium.
-        stopped: why it ended there: "" (the end), "step" (no equilibrium), "time" (deadline) or "strain" (given up).
+        stopped: why it ended there: "" (the end), "step" (no equilibrium), "time" (deadline), or as it was given
+            up: "strain" or "depth".
         rho: spectral radius it was marched with.
         split: steps that found equilibrium only in smaller ones.
         largest_strain: largest |axial strain| of the motion.
@@ -154,7 +155,7 @@ class March:
 
 def march(
     problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: float = RHO, whole: bool = False,
-    credible: float = math.inf,
+    credible: float = math.inf, shallow: float = math.inf,
 ) -> March:  # fmt: skip
     """March the motion of a problem on `grid` in about `steps` equal steps, more where events lie close.
 
@@ -165,7 +166,7 @@ def march(
         monitor: that of the solve.
         rho: spectral radius.
         whole: whether a march that the deadline ends is of no use: there is an answer that it was to better.
-        credible: axial strain beyond which it is given up.
+        credible, shallow: axial strain, and depth in an obstacle, the table or itself [m], beyond which it is given up.
 
     Raises:
         Cancelled: the caller asked to stop.
@@ -176,7 +177,7 @@ def march(
     problem = firmer(problem, problem.horizon / steps)
     if problem.inertia is None or (problem.friction is not None and problem.friction.lying > 0.0):
         rho = STRONGLY_DAMPED  # without waves, or where a rough table stops them, there is nothing to keep
-    walk = _Walk(problem, grid, monitor, step_times(marks, counts), rho, credible)
+    walk = _Walk(problem, grid, monitor, step_times(marks, counts), rho, credible, shallow)
     first = 0
     for begin, end, count in zip(marks[:-1], marks[1:], counts, strict=True):
         walk.go(begin, end, first, first + count)
@@ -223,14 +224,14 @@ class _Walk:
         monitor: that of the solve.
         times: (steps + 1,) [s].
         rho: spectral radius.
-        credible: axial strain beyond which it is given up.
+        credible, shallow: axial strain and depth [m] beyond which it is given up.
     """
 
     def __init__(
-        self, problem: Problem, grid: Grid, monitor: Monitor, times: Floats, rho: float, credible: float
+        self, problem: Problem, grid: Grid, monitor: Monitor, times: Floats, rho: float, credible: float, shallow: float
     ) -> None:
         self._problem, self._grid, self._monitor, self._times, self._rho = problem, grid, monitor, times, rho
-        self._credible = credible
+        self._credible, self._shallow = credible, shallow
         at_ends = problem.contact is not None or problem.friction is not None  # forces that jump, see `newmark.py`
         self._lag = 0.0 if at_ends else rho / (1.0 + rho)  # of the times at which steps balance forces, in steps
         self._laws = problem.laws
@@ -289,6 +290,8 @@ class _Walk:
 
     def _astray(self, at: int) -> str:
         """Return why it is given up at a step, "" where it is not."""
+        if self._info[DEEPEST] > self._shallow:
+            return "depth"
         if self._credible < math.inf and self._grid.largest_strain(self._states[at : at + 1]) > self._credible:
             return "strain"
         return ""
