@@ -165,14 +165,16 @@ class _Climb:
         before = self.best
         if before is not None:
             self.monitor.check()
+        rho = self.rho
+        if before is not None and size.steps == before.size.steps and before.motion.rho == STRONGLY_DAMPED:
+            rho = STRONGLY_DAMPED  # without, the same steps went astray
         level = march_level(
-            self.problem, size, self.monitor, self.rho, free_knots=True, rough=True, before=before,
-            whole=before is not None,
-        )  # fmt: skip
+            self.problem, size, self.monitor, rho, free_knots=True, rough=True, before=before, whole=before is not None
+        )
         if before is not None and level.posed is self.problem:
             level = replace(level, change=distance(before, level, self.problem))
             if not self._is_rough(level):  # so strands do not meet because of the grid
-                level = march_level(self.problem, size, self.monitor, self.rho, free_knots=True, known=level)
+                level = march_level(self.problem, size, self.monitor, rho, free_knots=True, known=level)
         if level.posed is not self.problem:
             self.best, self.changes, self.estimate = None, {}, np.inf  # another motion
         self.problem = level.posed  # a rough grid may have needed contact that is too stiff for a fine one
@@ -239,8 +241,6 @@ class _Climb:
         if self.direction == "time" and self.problem.self_contact is None:
             # on the same steps strongly damped marches err by far more; but strands that strike each other rebound less
             self.rho = RHO
-        if self.direction == "space" and level.motion.rho == STRONGLY_DAMPED:
-            self.rho = STRONGLY_DAMPED  # without, the same steps went astray
         hope = _AT_BEST ** self._left(sizes[self.direction])
         return None if change is not None and hope * change.moved > self.enough else sizes[self.direction]
 

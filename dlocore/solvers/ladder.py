@@ -207,8 +207,8 @@ def _march(
     What goes astray is given up there and then, if something else does not. Waves that gain energy strain the cable
     beyond belief, and most of their steps find equilibrium only in smaller ones: what comes to its end so, with strong
     damping to follow, takes forty times as long. What is struck so fast that it goes through what it strikes, or
-    through itself, jams or goes another way: contact is made so stiff at once that it stops what is as fast as anything
-    was until then.
+    through itself, jams or goes another way: contact is made stiffer, and where that is not enough, so stiff at once
+    that it stops what is as fast as anything was until then.
     """
     damped: March | None = None
     shallow = TOO_DEEP * problem.scene.cable.diameter
@@ -220,10 +220,11 @@ def _march(
         if damped.stopped == "time" or (less and not damped.stopped):
             return problem, damped, damped
     elif motion.stopped == "depth":
-        harder = stiffer_for(problem, motion.deepest, _fastest(motion))
-        again = march(harder, grid, steps, monitor, rho=rho, whole=whole, shallow=shallow)
-        if again.stopped in ("", "time"):
-            return harder, again, None
+        for speed in (0.0, _fastest(motion)):
+            harder = stiffer_for(problem, motion.deepest, speed)
+            again = march(harder, grid, steps, monitor, rho=rho, whole=whole, shallow=shallow)
+            if again.stopped in ("", "time"):
+                return harder, again, None
     else:
         return problem, motion, None
     return problem, march(problem, grid, steps, monitor, rho=rho, whole=whole), damped
