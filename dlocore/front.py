@@ -329,6 +329,11 @@ def warm_up() -> None:
     turn = Move(displacement=(0.0, 0.01, 0.0), rotation=(0.0, 0.0, 0.1), duration=1.0)
     grasp = Grasp(u=0.3, hold="clamp", path=turn)
     beside = (Sphere(center=(0.5, 0.3, 0.0), radius=0.2),)
+    # whole smooth motions first: what they are compiled of is fastest as it was compiled for them, and the first code of
+    # a function that is loaded serves all
+    for table in (Table(), None):
+        smooth = Environment(drag=0.1, table=table)
+        predict(Scene(cable=Cable.preset("paper"), shape=Points(points=arc), grasps=(grasp,), environment=smooth))
     kinds: tuple[tuple[Table | None, Switch], ...] = ((Table(friction=0.1), "auto"), (None, "off"), (None, "on"))
     for table, twist in kinds:  # two, three and four coordinates
         environment = Environment(drag=0.1, drag_quadratic=0.1, table=table, obstacles=beside)
@@ -345,8 +350,6 @@ def warm_up() -> None:
             for effects in (scene.effects, {"twist": twist, "obstacles": "off"}):
                 _read_all(predict(replace(scene, effects=effects)))
         equilibrium(scene, n_u=9)
-    smooth = Environment(drag=0.1, table=Table())
-    predict(Scene(cable=Cable.preset("paper"), shape=Points(points=arc), grasps=(grasp,), environment=smooth))
     hangs = Scene(cable=cable, shape=Straight(direction=(0.0, 0.0, -1.0)), grasps=(Grasp(u=0.0),), horizon=1.0)
     equilibrium(hangs, n_u=9)  # in a plane, without contact
     loop = np.column_stack([np.cos(np.linspace(0.0, 7.0, 9)), np.sin(np.linspace(0.0, 7.0, 9)), 0.1 * u[:9, 0]])
