@@ -329,8 +329,8 @@ def warm_up() -> None:
     turn = Move(displacement=(0.0, 0.01, 0.0), rotation=(0.0, 0.0, 0.1), duration=1.0)
     grasp = Grasp(u=0.3, hold="clamp", path=turn)
     beside = (Sphere(center=(0.5, 0.3, 0.0), radius=0.2),)
-    # whole smooth motions first: the code of a function that is loaded first serves all who call it, and they run faster
-    # with what was compiled for them
+    # whole smooth motions first: the code of a function that is loaded first serves all who call it, and they run
+    # faster with what was compiled for them
     for table in (Table(), None):
         smooth = Environment(drag=0.1, table=table)
         predict(Scene(cable=Cable.preset("paper"), shape=Points(points=arc), grasps=(grasp,), environment=smooth))
