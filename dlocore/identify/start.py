@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from dlocore.bands import dense_of
 from dlocore.cable import Cable
-from dlocore.discretisation import make_grid
+from dlocore.discretisation import make_grid, room_for
 from dlocore.effects import laws
 from dlocore.grid import Grid
 from dlocore.kernels.assembly import NO_RATES, assemble, stored_energy
@@ -91,7 +91,8 @@ class StartFit:
         active[[laws.STRETCH, laws.BEND]] = 1
         p = np.zeros((laws.COUNT, laws.PARAMETERS))
         p[laws.STRETCH, 0], p[laws.BEND, 0] = _AXIAL, bending
-        history = self.grid.past()
+        # a motion in a plane, too, starts from a shape that is found in space
+        history = self.grid.past()._replace(room=np.zeros(room_for(len(_AXES), len(tables.curvature_w))))
         B = design_matrix(knots, u)
         load = np.asarray(tables.weight)[:, None] * weight
         springs = _SPRING * np.kron(rows.free.T @ (B.T @ B) @ rows.free, np.eye(3))

@@ -125,13 +125,6 @@ def _write_rate(v: Any, tables: Any, state: Any, turning: Any, rate: Any) -> Non
             rate[n, d] = change[d]
 
 
-@law
-def _rows(room: Any, points: int) -> Any:
-    """Return three arrays (points, STATE) in the room of a `History`."""
-    rows = room[ROOM:].reshape((len(room) - ROOM) // STATE, STATE)
-    return rows[:points], rows[points : 2 * points], rows[2 * points : 3 * points]
-
-
 @leaf
 def curvature(
     q: Any, v: Any, tables: Any, active: Any, p: Any, past: Any, rates: Any, scales: Any, tangent: bool, room: Any,
@@ -146,7 +139,8 @@ def curvature(
     """
     damped = len(tables.curvature_w) if active[DAMPING] else 0
     blocks = room[:ROOM].reshape(SUMS + PAIRS, 9)
-    state, rate, by_torque = _rows(room, damped)
+    rows = room[ROOM:].reshape((len(room) - ROOM) // STATE, STATE)
+    state, rate, by_torque = rows[:damped], rows[damped : 2 * damped], rows[2 * damped : 3 * damped]
     elastic, viscous, geometric = scales
     if viscous != 0.0 and rates[0] != 0.0:
         viscous = rates[0]
@@ -212,7 +206,8 @@ def curvature(
 def remember(q: Any, tables: Any, past: Any, room: Any) -> None:
     """Make kappa and t of q the last ones in `past` (points, 9), and the last kappa, carried along, the one before."""
     points = len(past)
-    state, before, _ = _rows(room, points)
+    rows = room[ROOM:].reshape((len(room) - ROOM) // STATE, STATE)
+    state, before = rows[:points], rows[points : 2 * points]
     _write_state(q, tables, state)
     carry(tables.curvature_w, state, past, 1.0, 1.0, 0.0, before)
     for n in range(points):
