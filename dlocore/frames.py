@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dlocore.discretisation import start_director
 from dlocore.grid import Grid
 from dlocore.kernels.angles import angles_with
+from dlocore.kernels.basis import spline_values
 from dlocore.kernels.timefit import fit_time
 from dlocore.kernels.twisted import twist_rates
 from dlocore.prediction import MaterialMotion
@@ -72,9 +73,8 @@ def free_control(problem: Problem, grid: Grid, knots_t: Floats, control: Floats,
         log: those frames at the times (k, points, PAST).
     """
     assert problem.twist is not None
-    from scipy.interpolate import BSpline  # slow to import, and not needed without twist
-
-    states = BSpline(knots_t, control, DEGREE)(times)
+    flat = np.ascontiguousarray(control).reshape(len(control), -1)
+    states = np.asarray(spline_values(knots_t, flat, times, 0)).reshape(-1, *control.shape[1:])
     theta = free_of_frames(problem, grid, states, log)[:, :, 3]
     starved = _starved(knots_t, times)
     if len(starved):
@@ -92,10 +92,10 @@ def free_control(problem: Problem, grid: Grid, knots_t: Floats, control: Floats,
 
 def _starved(knots_t: Floats, times: Floats) -> Floats:
     """Return the middles [s] of those spans of the time knots that have none of the times (k,) [s] well inside."""
-    breaks = np.unique(knots_t)
-    margin = _INSIDE * np.diff(breaks)
-    first = np.searchsorted(times, breaks[:-1] + margin, side="right")
-    return (0.5 * (breaks[1:] + breaks[:-1]))[first == np.searchsorted(times, breaks[1:] - margin)]
+    begin, end = knots_t[DEGREE : -DEGREE - 1], knots_t[DEGREE + 1 : -DEGREE]
+    margin = _INSIDE * (end - begin)
+    none = np.searchsorted(times, begin + margin, side="right") == np.searchsorted(times, end - margin)
+    return (0.5 * (begin + end))[none & (end > begin)]
 
 
 def carried(director: Floats, tangents: Floats) -> Floats:

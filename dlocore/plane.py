@@ -15,6 +15,7 @@ Floats = NDArray[np.float64]
 
 FLATNESS = 1e-9  # of the length: a start and a motion this close to a plane are planar
 _BEGINNING = np.zeros(1)  # [s]
+_ALONG = np.array([1.0, 0.0, 0.0])  # of no vector at all
 _SEEN = 0.005, 0.02  # [m] and of the length: points seen this close to the table lie on it
 
 
@@ -181,9 +182,7 @@ def flat_plane(scene: Scene, start: StartCurve, *, still: bool = False) -> Plane
     if start.material is not None:
         spread.append(_remembered_bends(start))
     vectors = np.concatenate(spread)
-    _, sizes, principal = np.linalg.svd(np.concatenate([vectors, np.zeros((2, 3))]), full_matrices=False)
-    collinear = not sizes[1] > FLATNESS * sizes[0]
-    normal = unit_across(principal[0]) if collinear else principal[2]
+    normal = _normal_of(vectors)
     off_plane = float(np.abs(vectors @ normal).max())
     if not off_plane <= FLATNESS * max(1.0, np.abs(vectors).max()):
         return Plane(np.eye(3), origin, "start, motion and forces do not lie in one plane")
@@ -197,6 +196,24 @@ def flat_plane(scene: Scene, start: StartCurve, *, still: bool = False) -> Plane
     normal = normal * (1.0 if normal[np.argmax(np.abs(normal))] > 0 else -1.0)
     first = unit_across(normal)
     return Plane(np.array([first, _cross(normal, first)]), origin, "start, motion and forces lie in one plane")
+
+
+def _normal_of(vectors: Floats) -> Floats:
+    """Return a unit vector (3,) across the largest of some vectors (k, 3) and the one that lies farthest off its line.
+
+    Where they lie in one plane it is normal to that; where they lie in a line, across it.
+    """
+    squares = np.einsum("ij,ij->i", vectors, vectors)
+    k = int(squares.argmax())
+    size = math.sqrt(squares[k])
+    first = vectors[k] / size if size > 0.0 else _ALONG
+    off = vectors - (vectors @ first)[:, None] * first
+    squares = np.einsum("ij,ij->i", off, off)
+    k = int(squares.argmax())
+    if not math.sqrt(squares[k]) > FLATNESS * size:
+        return unit_across(first)
+    normal = _cross(first, off[k])
+    return normal / math.sqrt(normal @ normal)
 
 
 def _turns(path: Path, times: int) -> Floats | None:

@@ -17,6 +17,7 @@ from dlocore.grid import Grid
 from dlocore.kernels.across import stiffness_across
 from dlocore.kernels.assembly import NO_RATES, assemble
 from dlocore.kernels.banded import factor
+from dlocore.kernels.basis import basis_rows
 from dlocore.problem import Problem, pose
 from dlocore.scene import Grasp, Scene
 from dlocore.solvers.march import March
@@ -26,6 +27,7 @@ Floats = NDArray[np.float64]
 _FLAT = 1e-6  # of the length: so near to a plane a motion is planar, but for rounding
 _LOOKS = 7  # states of a motion
 _NEUTRAL = 1e-8  # of the largest stiffness: what rounding leaves of none
+_COLUMN, _BELOW = np.array([(j, o) for j in range(4) for o in range(4 - j)]).T  # of a lower triangle (4, 4)
 _FIRM = 1e6  # times the largest stiffness, with which what is held stays in the plane
 
 
@@ -155,10 +157,9 @@ def _held_band(grid: Grid, held: list[Grasp], stiffness: float) -> Floats:
     """Return springs that keep grasps, and held directions, in the plane: a lower band (n, 4)."""
     band = np.zeros((grid.n_u, 4))
     for grasp in held:
-        for order in range(1 if grasp.hold == "point" else 2):
-            first, b = grid.rows(grasp.u, order)
-            for j in range(4):
-                band[first + j, : 4 - j] += stiffness / (b @ b) * b[j] * b[j:]
+        first, table = basis_rows(grid.knots, np.array([grasp.u]), 1)
+        for b in table[0, : 1 if grasp.hold == "point" else 2]:
+            band[first[0] + _COLUMN, _BELOW] += stiffness / (b @ b) * b[_COLUMN] * b[_COLUMN + _BELOW]
     return band
 
 
