@@ -1,11 +1,18 @@
-"""Finer grids where one that was given can't show the motion: what is asked for instead, and what is said of it."""
+"""What takes the place of a given grid or of a least squares that fails on it, and what is said of that.
 
+A least squares that was asked for and does not converge is solved once more with more control points in time; where it
+does not converge on them either its march is the answer, as the last resort. A march that can't show the motion on its
+grid is left for finer ones.
+"""
+
+from collections.abc import Sequence
 from dataclasses import replace
 
 from dlocore.errors import SceneError
 from dlocore.prediction import Prediction
 from dlocore.refinement import AUTO_ENOUGH
 from dlocore.scene import MAX_N_T, Quality, Scene
+from dlocore.solvers.ladder import Level
 from dlocore.solvers.monitor import Monitor
 
 _MORE_IN_TIME = 2  # times the control points in time of a least squares
@@ -14,28 +21,72 @@ _MORE_IN_TIME = 2  # times the control points in time of a least squares
 _MOST_WORK = 2e9
 
 
-def quality_instead(found: Prediction) -> Quality | None:
-    """Return what to ask for where a given grid could not show the motion, None where it did or nothing is left.
+def falls_short(found: Prediction) -> bool:
+    """Tell whether something else is to be solved in place of an answer on a given grid.
 
-    Knots are added: to a march until two grids agree to AUTO_ENOUGH of the length; in time to a least squares that was
-    asked for, whose residual the time spline keeps large most often. The printed scheme stays as it is.
+    The printed scheme stays as it is.
+    """
+    asked = found.scene.quality
+    given = asked.n_u is not None and asked.method != "paper" and found.level is not None
+    return given and found.status not in ("converged", "time_limit")
+
+
+def more_in_time(found: Prediction) -> Quality | None:
+    """Return what to ask for where a least squares did not converge, None where that would take too long.
+
+    It is more control points in time: the time spline is what keeps the residual large most often.
     """
     asked, level = found.scene.quality, found.level
-    if asked.n_u is None or asked.n_t is None or level is None or found.status in ("converged", "time_limit"):
-        return None
-    if asked.method != "spacetime":
-        target = AUTO_ENOUGH * found.scene.cable.length
-        free = replace(asked, n_u=None, n_t=None, target_error=target, method="march")
-        return None if asked.method == "paper" else free
+    assert asked.n_u is not None
+    assert asked.n_t is not None
+    assert level is not None
     n_t = _MORE_IN_TIME * asked.n_t
     affordable = n_t <= MAX_N_T and n_t * (level.problem.nc * asked.n_u) ** 3 <= _MOST_WORK
     return replace(asked, n_t=n_t) if affordable else None
 
 
-def no_grid_for(scene: Scene) -> str:
-    """Return what to say where a scene goes on from one like it that left the grid that both ask for."""
-    quality = scene.quality
-    return f"The {quality.n_u} x {quality.n_t} control points that were asked for were left before."
+def free_grids(scene: Scene) -> Quality:
+    """Return what to ask for where a given grid can't show the motion: two finer ones that agree to AUTO_ENOUGH."""
+    target = AUTO_ENOUGH * scene.cable.length
+    return replace(scene.quality, n_u=None, n_t=None, target_error=target, method="march")
+
+
+def as_marched(level: Level) -> Level:
+    """Return the march that a least squares started from as one that was asked for itself."""
+    scene = level.posed.scene
+    scene = replace(scene, quality=replace(scene.quality, method="march"))
+    return replace(level, posed=replace(level.posed, scene=scene), problem=replace(level.problem, scene=scene))
+
+
+def left_before(scene: Scene, solved: Scene) -> str:
+    """Return what to say where a scene goes on from one like it that was not solved as both ask for."""
+    asked, kept = scene.quality, solved.quality
+    said = []
+    if asked.method == "spacetime" != kept.method:
+        said.append("The least squares that was asked for did not converge before: this is a march.")
+    if (asked.n_u, asked.n_t) != (kept.n_u, kept.n_t):
+        said.append(f"The {asked.n_u} x {asked.n_t} control points that were asked for were left before.")
+    return " ".join(said)
+
+
+def by_march(marched: Prediction, tried: Sequence[tuple[Quality, Prediction | SceneError]], spent: float) -> Prediction:
+    """Return the march that is the answer as no least squares converges, and say what was tried.
+
+    Args:
+        marched: the march.
+        tried: the least squares, and what came of each.
+        spent: on them [s].
+    """
+    ends = [f"on {quality.n_u} x {quality.n_t} control points {_end(found)}" for quality, found in tried]
+    least = f"the least squares that was asked for, which did not converge in {spent * 1e3:.0f} ms"
+    return replace(marched, said=f"{marched.said} A march is the answer in place of {least}: {'; '.join(ends)}.")
+
+
+def _end(found: Prediction | SceneError) -> str:
+    """Return how a solve ended, in words, as a part of a sentence."""
+    said = str(found) if isinstance(found, SceneError) else found.said
+    first = said.split(". ")[0].removesuffix(".")
+    return first[:1].lower() + first[1:]
 
 
 def with_finer(found: Prediction, finer: Prediction | SceneError, spent: float, monitor: Monitor) -> Prediction:
@@ -52,7 +103,7 @@ def with_finer(found: Prediction, finer: Prediction | SceneError, spent: float, 
         accuracy = finer.accuracy
         error = accuracy.error_estimate
         known = "an error that is not known" if error is None else f"an estimated error of {error * 1e3:.2g} mm"
-        failed = "did not converge" if quality.method == "spacetime" else "could not show the motion"
+        failed = "did not converge" if accuracy.method == "spacetime" else "could not show the motion"
         said = (
             f"{finer.said} The {quality.n_u} x {quality.n_t} control points that were asked for {failed}, which took "
             f"{spent * 1e3:.0f} ms to find: {found.said} This is the answer on {accuracy.n_u} x {accuracy.n_t}, with "

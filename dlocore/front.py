@@ -12,7 +12,7 @@ from dlocore.companion import by_coarser, by_finer
 from dlocore.cost import Cost
 from dlocore.errors import SceneError
 from dlocore.events import smallest_n_t
-from dlocore.fallback import no_grid_for, quality_instead, with_finer
+from dlocore.fallback import as_marched, by_march, falls_short, free_grids, left_before, more_in_time, with_finer
 from dlocore.frames import material_of
 from dlocore.given import evenly_fitted, given_status, march_given
 from dlocore.prediction import Accuracy, GraspReaction, MaterialMotion, OnIteration, Prediction, Status
@@ -56,8 +56,9 @@ def predict(
         cancelled: asked between iterations; where it returns True the solve stops.
         cost: what solves cost on this machine (`dlocore.calibration.stored_cost`), by which a time budget begins with a
             grid that fits; without it with the coarsest.
-        keep_grid: answer on a given grid (n_u and n_t) also where it can't show the motion, as who measures grids
-            wants. Else finer ones are solved there, and are the answer where they show it, which `message` tells.
+        keep_grid: answer on a given grid (n_u and n_t), and by a least squares that was asked for, also where it can't
+            show the motion, or does not converge, as who measures them wants. Else finer grids, or a march, are the
+            answer where they show it, which `message` tells.
 
     Returns:
         The prediction. Not converging is a status, not an exception.
@@ -74,26 +75,49 @@ def predict(
     again = march_again(problem, like, monitor)
     if isinstance(again, Again):
         found = replace(_solved(problem, monitor, cost, again), scene=scene)
-        if quality_instead(found) is None or keep_grid:
-            return found if asked is scene else replace(found, said=f"{found.said} {no_grid_for(scene)}")
+        if keep_grid or not falls_short(found):
+            return found if asked is scene else replace(found, said=f"{found.said} {left_before(scene, asked)}")
         again = found.said
     fresh = _shown(scene, monitor, cost, keep_grid)
     return replace(fresh, said=f"{fresh.said} Solved from the beginning: {again}")
 
 
 def _shown(scene: Scene, monitor: Monitor, cost: Cost | None, keep_grid: bool) -> Prediction:
-    """Solve a scene; where a grid that is given can't show its motion, on finer ones."""
+    """Solve a scene; where what it asks for can't show its motion, by a march, or on finer grids."""
     found = _solved(pose(scene), monitor, cost)
-    instead = None if keep_grid else quality_instead(found)
-    if instead is None:
+    if keep_grid or not falls_short(found):
         return found
+    if scene.quality.method == "spacetime":
+        found = _last_resort(found, monitor)
+        if found.status == "converged":
+            return found
     spent = monitor.elapsed()
-    finer: Prediction | SceneError
+    return with_finer(found, _tried(scene, free_grids(scene), monitor), spent, monitor)
+
+
+def _tried(scene: Scene, quality: Quality, monitor: Monitor) -> Prediction | SceneError:
+    """Return the answer of a scene with another quality, or why it has none."""
     try:
-        finer = _solved(pose(replace(scene, quality=instead)), monitor, cost)
+        return _solved(pose(replace(scene, quality=quality)), monitor, None)
     except SceneError as error:  # a start that comes to rest on the given grid need not on others
-        finer = error
-    return with_finer(found, finer, spent, monitor)
+        return error
+
+
+def _last_resort(found: Prediction, monitor: Monitor) -> Prediction:
+    """Return the answer where a least squares did not converge: once more, or that of the march it started from."""
+    scene, level, spent = found.scene, found.level, monitor.elapsed()
+    assert level is not None
+    tried: list[tuple[Quality, Prediction | SceneError]] = [(scene.quality, found)]
+    more = more_in_time(found)
+    if more is not None:
+        finer = _tried(scene, more, monitor)
+        if isinstance(finer, Prediction) and (finer.status, finer.accuracy.method) == ("converged", "spacetime"):
+            return with_finer(found, finer, spent, monitor)
+        tried.append((more, finer))
+    spent = monitor.elapsed()
+    level = as_marched(level)
+    outcome = _given(level.problem, level.posed.scene.quality, monitor, level)
+    return replace(by_march(_answer(monitor, "march", outcome), tried, spent), scene=scene)
 
 
 def _solved(problem: Problem, monitor: Monitor, cost: Cost | None, again: Again | None = None) -> Prediction:
@@ -220,12 +244,13 @@ def _check_n_t(problem: Problem, n_t: int) -> None:
         raise SceneError("quality.n_t", n_t, f"at least {least} in this scene", reason)
 
 
-def _given(problem: Problem, quality: Quality, monitor: Monitor) -> Outcome:
-    """March on the given grid."""
+def _given(problem: Problem, quality: Quality, monitor: Monitor, level: Level | None = None) -> Outcome:
+    """March on the given grid, where its march and time spline are not known."""
     assert quality.n_u is not None
     assert quality.n_t is not None
-    _check_n_t(problem, quality.n_t)
-    level = evenly_fitted(march_given(problem, quality.n_u, quality.n_t, monitor))
+    if level is None:
+        _check_n_t(problem, quality.n_t)
+        level = evenly_fitted(march_given(problem, quality.n_u, quality.n_t, monitor))
     problem = level.problem
     record_level(problem, level, monitor)
     estimate, doubt = by_coarser(problem, level, monitor) if quality.estimate else (None, "")

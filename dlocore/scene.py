@@ -296,7 +296,8 @@ class Quality:
             without it 1e-5.
         method: "march", "spacetime", "paper", "reference" (docs/reference.md), or "auto": `march`, which is nearer to
             the motion on the same grid and takes less time; but `spacetime` where a grid is given with a `delta`, which
-            a march has no use for, and the motion is smooth.
+            a march has no use for, and the motion is smooth. Where "spacetime" does not converge, `march` is the last
+            resort, and the answer says so; `keep_grid=True` of `predict` does without.
         estimate: with a given grid, estimate the error by a second march on another grid; False saves its time.
     """
 

@@ -132,7 +132,8 @@ class QualityModel(Model):
     method: Literal["auto", "march", "spacetime", "paper", "reference"] = Field(
         default="auto",
         description="How to solve; the answer names the method used. `auto` is `march`, but `spacetime` where a grid "
-        "is given with a `delta` and nothing touches, slips or yields.",
+        "is given with a `delta` and nothing touches, slips or yields. A `spacetime` that does not converge leaves the "
+        "answer to `march`, and its message says so.",
         examples=["auto"],
     )
 

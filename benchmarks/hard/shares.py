@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.hard.judge import DISTURBED, WRONG, is_undetermined
+from benchmarks.hard.judge import DISTURBED, WRONG, by_a_march, is_undetermined
 
 GROWTHS = (WRONG / DISTURBED, 0.1 * WRONG / DISTURBED)  # of a change of the start: beyond it a motion is not determined
 _DRAWS = 200_000
@@ -46,8 +46,12 @@ def is_left(record: dict[str, Any]) -> bool:
     return told and record["possible"] and record.get("method") != "paper"
 
 
-def strata(seed: int, first: list[dict[str, Any]], again: list[dict[str, Any]], growth: float) -> Strata:
+def strata(
+    seed: int, first: list[dict[str, Any]], again: list[dict[str, Any]], growth: float, *, as_asked: bool = False
+) -> Strata:
     """Count the records of both stages; scenes that are shown to amplify a change by more than `growth` are left out.
+
+    With `as_asked` a march in the place of a least squares counts as a failure.
 
     Of the second stage those count that were run before the first that was drawn and is missing: which ones are missing
     where a run was interrupted is no chance.
@@ -62,8 +66,11 @@ def strata(seed: int, first: list[dict[str, Any]], again: list[dict[str, Any]], 
             break
         drawn.append(run[index])
     determined = [r for r in drawn if not is_undetermined(r, growth)]
-    good = sum(r["status"] == "converged" for r in determined)
-    converged = sum(r["status"] == "converged" for r in known)
+
+    def is_good(record: dict[str, Any]) -> bool:
+        return record["status"] == "converged" and not (as_asked and by_a_march(record))
+
+    good, converged = sum(map(is_good, determined)), sum(map(is_good, known))
     return Strata(
         converged=converged,
         lost=len(known) - converged,

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.hard.judge import DISTURBED, is_undetermined, left_its_grid
+from benchmarks.hard.judge import DISTURBED, by_a_march, is_undetermined, left_its_grid
 from benchmarks.hard.shares import GROWTHS, Strata, drawn_again, is_left, share, strata
-from benchmarks.random_scenes import counts
+from benchmarks.random_scenes import counts, in_the_end, summary
 
 SEED = 5
 
@@ -74,6 +74,28 @@ def test_records_of_both_stages_are_counted_once():
     again.append(record(order[7], "converged"))  # of an interrupted run: the one before it is missing
     assert strata(SEED, first, again, GROWTHS[0]) == Strata(20, 1, 10, 4, 1, 1)
     assert strata(SEED, first, again, GROWTHS[1]) == Strata(20, 1, 10, 4, 0, 2)
+
+
+def test_a_march_in_place_of_a_least_squares_is_counted_with_the_others_and_apart():
+    marched = {"method": "spacetime", "solved_by": "march"}
+    first = [record(0, "converged"), record(1, "converged", **marched), record(2, "time_limit"), record(3, "stalled")]
+    order = drawn_again(SEED, [2, 3], 2)
+    again = [record(order[0], "converged", **marched), record(order[1], "converged", method="spacetime")]
+    assert strata(SEED, first, again, GROWTHS[0]) == Strata(2, 0, 2, 2, 0, 0)
+    assert strata(SEED, first, again, GROWTHS[0], as_asked=True) == Strata(1, 1, 2, 1, 1, 0)
+    asked, both = in_the_end(SEED, first, again)[2], in_the_end(SEED, first, again)[0]
+    assert asked.endswith("50.00%")
+    assert ": 100.00%" in both
+    of_six = {"seconds": 0.0, "families": ["numbers: odd"], "estimate": None, "asked": [9, 13], "n_u": 9, "n_t": 13}
+    lines = summary([{**of_six, **r} for r in [*first, *again]]).splitlines()
+    assert "converged, as asked: 2 of 6, 33.33%" in lines
+    assert "converged, as asked or by a march in place of a least squares: 4 of 6, 66.67%" in lines
+
+
+def test_before_there_was_that_last_resort_a_march_was_tried_by_the_judge():
+    old = record(0, "max_iterations", method="spacetime", solved_by="spacetime", free="converged")
+    assert by_a_march(old)
+    assert not by_a_march({**old, "free": "stalled"})
 
 
 def test_an_exception_counts_as_a_failure_that_no_time_mends():

@@ -225,14 +225,6 @@ def test_a_least_squares_that_does_not_converge_gets_more_control_points_in_time
     assert f"in {len(found.iterations) - len(given.iterations)} iterations" in found.message
 
 
-def test_a_least_squares_that_more_control_points_in_time_do_not_mend_is_told_so():
-    scene = draw(33, 417).make()
-    found = predict(scene)
-    assert (found.status, found.accuracy.method) == ("max_iterations", "spacetime")
-    assert control_points(found) == (scene.quality.n_u, scene.quality.n_t)
-    assert "The surface is that of the march it started from. Finer grids were tried for" in found.message
-
-
 def test_a_motion_like_one_on_finer_grids_goes_on_on_them():
     scene = draw(8, 277).make()
     before = predict(scene)
