@@ -188,6 +188,8 @@ def summary(records: list[dict[str, Any]]) -> str:
     possible = [r for r in records if r["possible"]]
     printed = [r for r in possible if r.get("method") == "paper"]
     judged = [r for r in possible if r.get("method") != "paper"]
+    shown = [r["index"] for r in records if r.get("driven")]
+    lines.append(f"of the others {len(shown)} are shown to be impossible by their motion: {' '.join(map(str, shown))}")
     undetermined = [r for r in judged if is_undetermined(r)]
     told = sum(r["status"] != "converged" or (r["estimate"] or 0.0) > WRONG for r in undetermined)
     determined = [r for r in judged if not is_undetermined(r)]

@@ -82,9 +82,10 @@ def check_above(scene: Scene, start: StartCurve) -> None:
         reason = f"The start is {table.height - lowest:.3g} m below a cable that lies on the table"
         raise SceneError("environment.table.height", table.height, f"at most {lowest:.6g} [m] with this start", reason)
     for i, grasp in enumerate(scene.grasps):
-        if isinstance(grasp.path, Still) or (
-            isinstance(grasp.path, Move) and cast(Floats, grasp.path.displacement)[2] >= 0
-        ):
+        late = grasp.start > 0.0 and not isinstance(grasp.path, Waypoints)  # from where the cable is by then
+        if late or isinstance(grasp.path, Still):
+            continue
+        if isinstance(grasp.path, Move) and cast(Floats, grasp.path.displacement)[2] >= 0:
             continue
         path = grasp.path.at(np.linspace(0.0, grasp.path.duration, 65), start(grasp.u)[0])
         below = table.height - float(path[:, 2].min())

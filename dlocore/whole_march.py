@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from dlocore.discretisation import smallest_n_u
+from dlocore.driven import driven, words
 from dlocore.events import smallest_n_t
 from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
@@ -105,6 +106,9 @@ def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
         least, most = motion.slopes
         seen = f"|r'| is {least:.2g} to {most:.2g} within a span"
         return "stalled", f"The cable is folded finer than its control points can show: {seen}. Take more of them."
+    inside = None if motion.stopped == "time" else driven(problem, motion)
+    if inside is not None:
+        return "stalled", words(problem, inside)
     deep = motion.deepest / problem.scene.cable.diameter
     if not motion.stopped and deep > TOO_DEEP:
         pushed = f"The cable is pressed {deep:.0%} of its diameter into the table, an obstacle or itself."

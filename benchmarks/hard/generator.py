@@ -32,7 +32,8 @@ class Drawn:
     Attributes:
         seed, index: it is drawn from these alone.
         families: kinds of hardness, "group: kind".
-        possible: a cable can follow; else it has to be refused, or to end with a status that says so.
+        possible: a cable can follow, as far as is known before its motion (`judge.shown_impossible`); else it has to
+            be refused, or to end with a status that says so.
         make: returns the scene, or raises SceneError.
     """
 

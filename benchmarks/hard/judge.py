@@ -11,6 +11,7 @@ from benchmarks.hard.generator import Drawn
 from benchmarks.hard.laws import measure
 from dlocore import Prediction, Scene, SceneError, predict
 from dlocore.discretisation import smallest_n_u
+from dlocore.driven import driven, words
 from dlocore.events import moments
 from dlocore.given import evenly_fitted, given_status
 from dlocore.problem import Problem, pose
@@ -29,6 +30,8 @@ ASTRAY = 1e-4  # of the length: of a gripper's path by the time spline, between 
 GAINED = 0.02  # of the energy that was about
 LOST = 0.05  # of the impulses that were about
 DISTURBED = 1e-6  # of the length: a start that is this much different is the same to any hand
+
+DRIVEN = "impossible: a gripper drives what it holds into something"
 
 Whose = Literal["checked", "failed", "all"]
 
@@ -57,7 +60,10 @@ def run(
         record["laws"] = asdict(measure(prediction))
         if checked:
             record |= compare(prediction, scene, patience)
-        failed = measured != "checked" and prediction.status != "converged"
+        driven_in = shown_impossible(prediction, scene, patience)
+        if driven_in:
+            record |= {"possible": False, "driven": driven_in, "families": (DRIVEN, *drawn.families)}
+        failed = measured != "checked" and prediction.status != "converged" and not driven_in
         if failed or measured == "all" or record.get("apart", 0.0) > WRONG:
             record["disturbed"] = disturbed(prediction, scene, patience)
     except SceneError as error:
@@ -125,9 +131,7 @@ def disturbed(prediction: Prediction, scene: Scene, deadline: float) -> float | 
     where each finds its equilibria and keeps the cable's length.
     """
     problem = _posed(prediction, scene)
-    level = stretched(problem, 3)
-    n_u = max(50, smallest_n_u(problem), prediction.accuracy.n_u)
-    steps = max(8 * level.steps, prediction.accuracy.steps)
+    n_u, steps = _finest(prediction, problem)
     t = np.linspace(0.0, problem.horizon, 65)
     shapes = []
     for seed in range(3):
@@ -144,6 +148,29 @@ def disturbed(prediction: Prediction, scene: Scene, deadline: float) -> float | 
         shapes.append(motion.states[at][:, :, : waves.shape[1]])
     away = max(float(np.linalg.norm(x - shapes[0], axis=-1).max()) for x in shapes[1:])
     return away / scene.cable.length
+
+
+def shown_impossible(prediction: Prediction, scene: Scene, deadline: float) -> str:
+    """Return where a gripper drives what it holds into something, as the motion shows, "" where none does.
+
+    A grasp that closes late has its path begin where the cable is by then, which the generator does not know. A coarse
+    grid may have it elsewhere: a march on one as fine as the finest that the prediction tried has to show it, too.
+    """
+    level = prediction.level
+    if level is None or prediction.status != "stalled" or driven(level.problem, level.motion) is None:
+        return ""
+    problem = _posed(prediction, scene)
+    n_u, steps = _finest(prediction, problem)
+    monitor = Monitor(None, deadline)
+    motion = march(problem, start_grid(problem, n_u, monitor), steps, monitor)
+    found = driven(problem, motion)
+    return "" if found is None else words(problem, found)
+
+
+def _finest(prediction: Prediction, problem: Problem) -> tuple[int, int]:
+    """Return control points along the cable and steps: as many as the finest grid that a prediction tried, or more."""
+    n_u = max(50, smallest_n_u(problem), prediction.accuracy.n_u)
+    return n_u, max(8 * stretched(problem, 3).steps, prediction.accuracy.steps)
 
 
 def _posed(prediction: Prediction, scene: Scene) -> Problem:

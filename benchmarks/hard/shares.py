@@ -21,7 +21,7 @@ class Strata(NamedTuple):
         left: the others.
         again_converged: of those left that were drawn for the second stage: that converge in it, ...
         again_failed: ... that do not, ...
-        again_excluded: ... and that do not determine their motion.
+        again_excluded: ... and that do not determine their motion, or are shown by it to be impossible.
     """
 
     converged: int
@@ -65,7 +65,7 @@ def strata(
         if index not in run:
             break
         drawn.append(run[index])
-    determined = [r for r in drawn if not is_undetermined(r, growth)]
+    determined = [r for r in drawn if r["possible"] and not is_undetermined(r, growth)]
 
     def is_good(record: dict[str, Any]) -> bool:
         return record["status"] == "converged" and not (as_asked and by_a_march(record))
