@@ -1,5 +1,6 @@
 """Run a drawn scene and judge what came back: a record of plain numbers and words, one line of JSON."""
 
+import itertools
 import time
 import traceback
 from dataclasses import asdict
@@ -29,6 +30,7 @@ HELD = 1e-9  # [m]
 ASTRAY = 1e-4  # of the length: of a gripper's path by the time spline, between the ends
 GAINED = 0.02  # of the energy that was about
 LOST = 0.05  # of the impulses that were about
+MIDWAY = (0.25, 0.5, 0.75)  # of the time of a motion
 DISTURBED = 1e-6  # of the length: a start that is this much different is the same to any hand
 
 DRIVEN = "impossible: a gripper drives what it holds into something"
@@ -66,6 +68,8 @@ def run(
         failed = measured != "checked" and prediction.status != "converged" and not driven_in
         if failed or measured == "all" or record.get("apart", 0.0) > WRONG:
             record["disturbed"] = disturbed(prediction, scene, patience)
+            if not is_undetermined(record):
+                record["midway"] = disturbed_midway(prediction, scene, patience)
     except SceneError as error:
         record |= {"status": "refused", "message": str(error), "field": error.field}
     except Exception as error:  # whatever it is, it is what this looks for
@@ -137,17 +141,50 @@ def disturbed(prediction: Prediction, scene: Scene, deadline: float) -> float | 
     for seed in range(3):
         monitor = Monitor(None, deadline)
         grid = start_grid(problem, n_u, monitor)
-        u = np.linspace(0.0, np.pi, grid.n_u)[:, None]
-        waves = np.sin(u * [1.0, 2.0, 3.0]) @ np.random.default_rng(seed).normal(size=(3, problem.plane.dimensions)) / 2
-        start = grid.start.copy()
-        start[:, : waves.shape[1]] += DISTURBED * scene.cable.length * waves * (seed > 0)
+        start = grid.start + DISTURBED * scene.cable.length * _waves(problem, grid.n_u, seed) * (seed > 0)
         motion = march(problem, grid.changed(start=start), steps, monitor)
         if motion.stopped or motion.largest_strain > MOST_STRAIN:
             return None
         at = np.searchsorted(motion.times, t).clip(0, len(motion.times) - 1)
-        shapes.append(motion.states[at][:, :, : waves.shape[1]])
+        shapes.append(motion.states[at][:, :, : problem.plane.dimensions])
     away = max(float(np.linalg.norm(x - shapes[0], axis=-1).max()) for x in shapes[1:])
     return away / scene.cable.length
+
+
+def disturbed_midway(prediction: Prediction, scene: Scene, deadline: float) -> float | None:
+    """Return the same of a motion that is bent at a quarter, a half and three quarters of its time; None if none tells.
+
+    A motion that goes through equilibria, or is damped strongly, forgets its start, and may snap, or be struck, all the
+    same: what decides on how is whatever disturbs it by then. The bend is that of `disturbed`, and so is the grid, but
+    for the steps that begin at those times in all of the marches. All of them share the deadline.
+    """
+    problem = _posed(prediction, scene)
+    n_u, steps = _finest(prediction, problem)
+    monitor = Monitor(None, deadline)
+    grid = start_grid(problem, n_u, monitor)
+    none, dimensions = np.zeros_like(grid.start), problem.plane.dimensions
+    at = {part * problem.horizon: none for part in MIDWAY}
+    bends = [DISTURBED * scene.cable.length * _waves(problem, grid.n_u, seed) for seed in (1, 2)]
+    plain, most = march(problem, grid, steps, monitor, knocks=at), None
+    if plain.stopped or plain.largest_strain > MOST_STRAIN:
+        return None
+    for moment, bend in itertools.product(at, bends):
+        motion = march(problem, grid, steps, monitor, knocks={**at, moment: bend})
+        if motion.stopped == "time":
+            break
+        if not motion.stopped and motion.largest_strain <= MOST_STRAIN:
+            away = np.linalg.norm((motion.states - plain.states)[..., :dimensions], axis=-1).max()
+            most = max(most or 0.0, float(away) / scene.cable.length)
+    return most
+
+
+def _waves(problem: Problem, n_u: int, seed: int) -> np.ndarray:
+    """Return control points (n_u, nc) of some half waves along the cable, of size 1 about, drawn by a seed."""
+    u = np.linspace(0.0, np.pi, n_u)[:, None]
+    sizes = np.random.default_rng(seed).normal(size=(3, problem.plane.dimensions)) / 2
+    waves = np.zeros((n_u, problem.nc))
+    waves[:, : problem.plane.dimensions] = np.sin(u * [1.0, 2.0, 3.0]) @ sizes
+    return waves
 
 
 def shown_impossible(prediction: Prediction, scene: Scene, deadline: float) -> str:
@@ -195,8 +232,8 @@ def left_its_grid(record: dict[str, Any]) -> bool:
 
 
 def is_undetermined(record: dict[str, Any], growth: float = WRONG / DISTURBED) -> bool:
-    """Tell whether a scene was proven not to determine its motion: it amplifies a change of the start by more."""
-    return (record.get("disturbed") or 0.0) > growth * DISTURBED
+    """Tell whether a scene was proven not to determine its motion: a change, at first or midway, grows by more."""
+    return max(record.get("disturbed") or 0.0, record.get("midway") or 0.0) > growth * DISTURBED
 
 
 def faults(record: dict[str, Any]) -> list[str]:

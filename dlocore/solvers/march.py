@@ -1,7 +1,7 @@
 """The compiled march: implicit steps of the spatial spline, fitted by the time spline."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -155,7 +155,7 @@ class March:
 
 def march(
     problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: float = RHO, whole: bool = False,
-    credible: float = math.inf, shallow: float = math.inf,
+    credible: float = math.inf, shallow: float = math.inf, knocks: Mapping[float, Floats] | None = None,
 ) -> March:  # fmt: skip
     """March the motion of a problem on `grid` in about `steps` equal steps, more where events lie close.
 
@@ -167,12 +167,15 @@ def march(
         rho: spectral radius.
         whole: whether a march that the deadline ends is of no use: there is an answer that it was to better.
         credible, shallow: axial strain, and depth in an obstacle, the table or itself [m], beyond which it is given up.
+        knocks: by how much the control points (n_u, nc) [m] are displaced at some times [s] inside the motion, to see
+            what becomes of a disturbance; a stretch ends there.
 
     Raises:
         Cancelled: the caller asked to stop.
         TimeIsUp: the deadline passed, where it had to be `whole`.
     """
-    marks = marks_of(problem)
+    knocks = knocks or {}
+    marks = sorted({*marks_of(problem), *knocks})
     counts = step_counts(marks, steps)
     problem = firmer(problem, problem.horizon / steps)
     if problem.inertia is None or (problem.friction is not None and problem.friction.lying > 0.0):
@@ -180,6 +183,8 @@ def march(
     walk = _Walk(problem, grid, monitor, step_times(marks, counts), rho, credible, shallow)
     first = 0
     for begin, end, count in zip(marks[:-1], marks[1:], counts, strict=True):
+        if begin in knocks:
+            walk.knock(first, knocks[begin])
         walk.go(begin, end, first, first + count)
         if whole and walk.stopped == "time":
             raise TimeIsUp
@@ -251,6 +256,10 @@ class _Walk:
             note(problem.axes, self._history, self._log[0])
         self._reached, self._split = 0, 0
         self.stopped = ""  # why it ended early
+
+    def knock(self, at: int, by: Floats) -> None:
+        """Displace the state at the step that was reached by control points (n_u, nc) [m]."""
+        self._states[at] += by
 
     def go(self, begin: float, end: float, first: int, last: int) -> None:
         """Walk through the stretch from `begin` to `end` [s], steps `first` to `last`, or until it has to stop."""
