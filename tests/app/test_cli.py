@@ -109,6 +109,32 @@ def test_not_converging_exits_with_3_and_still_writes(tmp_path: Path, capsys: py
     assert all(output.stat().st_size > 1000 for output in outputs)
 
 
+def test_a_least_squares_that_does_not_converge_is_answered_by_a_march(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = {"kind": "move", "displacement": [0.3, 0, 0], "duration": 0.15, "profile": "linear"}
+    scene = {
+        "cable": {"length": 0.6, "diameter": 0.005, "linear_density": 0.08, "bending_stiffness": 1.2e-4},
+        "shape": {"kind": "straight", "direction": [0, 0, -1]},
+        "primitives": [{"u": 0.0, "hold": "tangent", "path": path}],
+        "environment": {"drag": 0.013},
+        "horizon": 1.6,
+        "quality": {"n_u": 17, "n_t": 41, "delta": 1e-9, "method": "spacetime"},
+    }
+    document = tmp_path / "out.json"
+    assert main(["predict", written(tmp_path, scene), "--json", str(document)]) == 0
+    message = capsys.readouterr().err
+    assert message.startswith("converged: ")
+    assert "method   march, 17 x 41" in message
+    assert (
+        "A march is the answer in place of the least squares that was asked for, which did not converge in" in message
+    )
+    answer = json.loads(document.read_text())
+    assert (answer["status"], answer["accuracy"]["method"]) == ("converged", "march")
+    assert answer["accuracy"]["error_estimate"] > 0
+    assert len(answer["iterations"]) > 40
+
+
 def test_an_output_that_cannot_be_written_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     missing = tmp_path / "none" / "out.npz"
     assert main(["predict", written(tmp_path, paper_scene()), "-o", str(missing)]) == 1

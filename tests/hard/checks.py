@@ -24,6 +24,8 @@ def hold_to(case: Case) -> None:
             predict(posed(case))
         return
     prediction = predict(posed(case))
+    asked = prediction.scene.quality.method
+    assert asked in ("auto", prediction.accuracy.method)  # a march in place of a least squares is none
     length = prediction.surface.length
     estimate = prediction.accuracy.error_estimate
     told = prediction.status != "converged" or (estimate is not None and estimate > 0.01 * length)
