@@ -39,6 +39,7 @@ _FINE_IN_TIME = 0.3  # of the target: a time spline that misses its march by les
 _AT_BEST = 0.2  # of an error, is left by one refinement: what is still too much after all of them is not begun
 _STALE = 4.0  # times what a refinement in one direction moved the surface by: once those in the other moved it by more,
 # and by more than the target, what the first has left is measured again
+_DEAR = 0.25  # of the time left: a march that takes more is not done only to tell what steps err by
 _FAILURES = 2  # refinements in time of a march that found no equilibrium
 
 
@@ -154,6 +155,7 @@ class _Climb:
                 unfolded = self._unfolded(level, size)
                 if unfolded is not None:
                     return unfolded
+                self._look_back(level, size)
                 finer = self._next(level, size, unfolds)
             if finer is not None and not self._in_time(size, finer, spent):
                 return self._within_budget(level)
@@ -217,6 +219,32 @@ class _Climb:
                     self.direction = direction
                     return finer
         return None
+
+    def _look_back(self, level: Level, size: Size) -> None:
+        """Where nothing is known of what steps err by, and twice as many are dear, learn it from half as many.
+
+        So it is where a motion calls for another effect on a fine grid: the grids before tell nothing of it.
+        """
+        known = "both" in self.changes or "time" in self.changes
+        if known or self.number < len(LEVELS) - 1 or level.motion.stopped or is_folded(level):
+            return
+        finer, left = _finer(size, "time", False), min(self.monitor.remaining(), self.budget - self.monitor.elapsed())
+        if left == np.inf or self.pace * self._work(finer) <= _DEAR * left:
+            return
+        half = size._replace(steps=size.steps // 2)
+        try:
+            coarse = march_level(
+                self.problem, half, self.monitor, level.motion.rho, free_knots=True, rough=True, before=level,
+                whole=True,
+            )  # fmt: skip
+        except TimeIsUp:
+            return
+        if coarse.posed is not self.problem or march_status(self.problem, coarse)[0] != "converged":
+            return
+        moved = distance(coarse, level, self.problem)
+        record_level(self.problem, replace(coarse, change=moved, note="tells what steps err by"), self.monitor)
+        self.changes["time"] = weighed(replace(level, change=moved), coarse, None, True)
+        self.estimate = max(_error(self.changes), MISSED_COUNTS * level.missed)
 
     def _next(self, level: Level, size: Size, unfolds: Size | None) -> Size | None:
         """Return the next size, None where no finer grid is worth its time; `unfolds` is for a motion that folds."""

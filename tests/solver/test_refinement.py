@@ -124,6 +124,20 @@ def test_who_gives_a_deadline_gets_more_work_for_a_target_that_ends_before_it(mo
     assert predict(scene, deadline=60.0).status == "max_iterations"
 
 
+def test_what_steps_err_by_is_learned_from_half_as_many_where_twice_as_many_are_dear(monkeypatch: pytest.MonkeyPatch):
+    # its strands meet only on the last of the grids that refine both: those before tell nothing of that motion
+    scene = draw(34, 31518).make()
+    scene = replace(scene, quality=Quality(target_error=0.05 * scene.cable.length))
+    monkeypatch.setattr(refinement, "_DEAR", 0.0)  # as if the time were nearly up
+    found = predict(scene, deadline=60.0)
+    assert found.status == "converged"
+    assert sum("tells what steps err by" in step.note for step in found.iterations) == 1
+    truth = predict(replace(scene, quality=Quality(target_error=0.01 * scene.cable.length)))
+    estimate = found.accuracy.error_estimate
+    assert estimate is not None
+    assert apart(found.surface, truth.surface).max() < estimate
+
+
 def test_auto_goes_as_far_as_the_target_that_it_is_content_with():
     # a stiff arc on a table that springs straight: a thirty-second of a target's work leaves it at 1.6 % of the length
     scene = draw(2, 80).make()
