@@ -129,10 +129,14 @@ class Problem:
         """The plane of start, paths and forces, or of all but the paths where the start settles in it first."""
         return rest_plane(self.scene, self.start)
 
-    @cached_property
+    @property
     def line(self) -> Self:
         """The same without the angle of the sections: that of the centreline alone."""
-        return self if self.twist is None else replace(self, twist=None)
+        return self if self.twist is None else self._untwisted  # itself it would keep alive until a search for garbage
+
+    @cached_property
+    def _untwisted(self) -> Self:
+        return replace(self, twist=None)
 
     @cached_property
     def nc(self) -> int:

@@ -1,5 +1,6 @@
 """predict_many: each scene as predict would, whatever runs beside it."""
 
+import gc
 import threading
 from collections.abc import Callable
 
@@ -145,3 +146,32 @@ def test_grids_are_kept_where_that_is_asked_for():
     assert isinstance(kept, Prediction)
     assert kept.accuracy.n_t == given.quality.n_t < left.accuracy.n_t
     assert kept.status != left.status == "converged"
+
+
+def test_old_garbage_waits_for_the_last_of_the_batches_under_way():
+    before = gc.get_threshold()
+    seen: list[tuple[int, int, int]] = []
+
+    def watched() -> bool:
+        seen.append(gc.get_threshold())
+        if len(seen) == 1:
+            predict_many([scene(0.5)], threads=1)  # a batch within the batch
+            seen.append(gc.get_threshold())
+        return False
+
+    predict_many([scene(0.2), scene(0.4)], threads=1, cancelled=watched)
+    assert len(seen) > 2
+    assert all(x[:2] == before[:2] and x[2] > 1_000_000 for x in seen)
+    assert gc.get_threshold() == before
+    with pytest.raises(Cancelled):
+        predict_many([scene(0.2)], cancelled=lambda: True)
+    assert gc.get_threshold() == before
+
+
+def test_predictions_make_no_garbage_that_only_a_search_finds():
+    predict_many([scene(0.3)], threads=1)
+    gc.collect()
+    answers = predict_many([scene(u) for u in (0.1, 0.3, 0.7)] + [hanging(0.9)], threads=1)
+    assert gc.collect() == 0
+    del answers
+    assert gc.collect() == 0
