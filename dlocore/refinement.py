@@ -22,6 +22,7 @@ from dlocore.solvers.ladder import (
 )
 from dlocore.solvers.march import MOST_FRAMES, RHO, STRONGLY_DAMPED
 from dlocore.solvers.monitor import Monitor, TimeIsUp
+from dlocore.statics import RESTLESS
 from dlocore.whole_march import MISSED_COUNTS, Outcome, is_folded, march_level, march_status
 
 AUTO_ENOUGH = 1e-2  # of the length: the estimated error with which it is content where the finest grids reach no closer
@@ -115,6 +116,7 @@ class _Climb:
     def outcome(self) -> Outcome:
         """March until an answer is found, and return it."""
         size: Size | None = stretched(self.problem, self.number)
+        shown: Level | None = None  # the best one on grids whose start rests, where on finer ones it does not
         while size is not None:
             began = self.monitor.elapsed()
             try:
@@ -122,10 +124,18 @@ class _Climb:
             except TimeIsUp:
                 self.monitor.phase("march")
                 break
-            except SceneError:  # a start that finds no rest on few control points may do so on more
-                self.number += 1
-                if self.best is not None or self.number == len(LEVELS):
+            except SceneError as error:
+                if error.field != RESTLESS:
                     raise
+                self.number += 1
+                shown = self.best or shown
+                if self.number >= len(LEVELS):
+                    if shown is None:
+                        raise
+                    return self._restless(shown, error)
+                # a start that finds no rest on few control points may do so on more; one that did on fewer still was at
+                # rest as they can't bend the way that it would go
+                self.best, self.changes, self.estimate = None, {}, np.inf
                 size = stretched(self.problem, self.number)
                 continue
             spent = self.monitor.elapsed() - began
@@ -305,7 +315,8 @@ class _Climb:
         return not growth(self.problem, self.cost, size, finer) * spent > self.budget - self.monitor.elapsed()
 
     def _agreed(self, level: Level) -> str:
-        return f"Two grids agree to {level.change * 1e3:.2g} mm, target {self.target * 1e3:.2g} mm."
+        points = f"which points to an error of {self.estimate * 1e3:.2g} mm"
+        return f"Two grids agree to {level.change * 1e3:.2g} mm, {points}; target {self.target * 1e3:.2g} mm."
 
     def _unfolded(self, level: Level, size: Size) -> Outcome | None:
         """Return the answer of a march that watches over the length at more points, if a fold is all that is amiss.
@@ -347,6 +358,10 @@ class _Climb:
         status, message = march_status(self.problem, level)
         errors = _parts(self.changes, best) or ({"grid": best.change} if np.isfinite(best.change) else None)
         return Outcome(best, status, f"A finer grid was not finished: {message}", errors)
+
+    def _restless(self, best: Level, error: SceneError) -> Outcome:
+        """Return the best one, where the start on finer grids finds no rest, so that its error is not known."""
+        return Outcome(best, "stalled", f"On finer grids the start did not come to rest: {error}", None)
 
     def _ended(self) -> Outcome:
         """Return the best one, where no finer grid is to be tried or the time is up."""

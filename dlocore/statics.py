@@ -26,6 +26,7 @@ from dlocore.spline import design_matrix
 
 Floats = NDArray[np.float64]
 
+RESTLESS = "shape.settle"  # the field of the error of a start that finds no rest
 LEVELS = (9, 13, 17, 25, 33, 49, 65, 97)
 _WOUND = np.pi  # [rad]: a start that turns by more along its length may have other equilibria beside the one downhill
 _COARSE = 12  # control points: on so few a start may settle to another of several equilibria than on more
@@ -178,7 +179,7 @@ def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None =
             found = again or found
     if found is None:
         allowed = "false, or a start that grasps hold in an equilibrium"
-        raise SceneError("shape.settle", True, allowed, "The start did not come to rest")
+        raise SceneError(RESTLESS, True, allowed, "The start did not come to rest")
     return found
 
 

@@ -9,7 +9,7 @@ from benchmarks.catalogue import catalogue
 from benchmarks.hard.generator import draw
 from benchmarks.random_reference import PATIENT
 from benchmarks.random_reference import compare as compare_with_reference
-from dlocore import Cable, Environment, Grasp, Points, Quality, Scene, predict
+from dlocore import Cable, Environment, Grasp, Points, Quality, Scene, SceneError, predict, refinement
 from dlocore.discretisation import applied_forces, make_grid
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
@@ -18,9 +18,11 @@ from dlocore.kernels.tension import COLUMNS
 from dlocore.problem import Problem, pose
 from dlocore.regrid import begin_on, starts_folded
 from dlocore.settling import settle
+from dlocore.solvers.ladder import Level, Size
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import design_matrix
 from dlocore.statics import start_grid
+from dlocore.whole_march import march_level
 from tests.solver.scenes import WEIGHTLESS, Floats, arc, cable
 from tests.solver.test_handling import spanned_between_two
 from tests.solver.test_two_grippers import hanging
@@ -176,6 +178,32 @@ def test_a_start_that_finds_no_rest_on_few_control_points_settles_from_more():
     coarse, fine = (start_grid(problem, n_u, Monitor()) for n_u in (9, 19))
     assert coarse.n_u == 9
     assert apart(problem, coarse, fine) < 1e-3
+
+
+def test_a_start_that_rests_on_few_control_points_alone_is_begun_anew_on_more():
+    # a stiff cusp between two grippers: 9 control points rest in the plane that they can't leave, 13 find no rest
+    scene = draw(71, 639).make()
+    length, u, t = scene.cable.length, np.linspace(0.0, scene.cable.length, 33), np.linspace(0.0, 2.8, 17)
+    found, finer = (
+        predict(replace(scene, quality=Quality(target_error=target * length)), deadline=60.0)
+        for target in (5.4e-3, 1e-3)
+    )
+    assert (found.status, finer.status) == ("converged", "converged")
+    assert found.accuracy.error_estimate is not None
+    away = np.linalg.norm(found.surface.positions(u, t) - finer.surface.positions(u, t), axis=-1).max()
+    assert away < found.accuracy.error_estimate
+
+
+def test_an_answer_whose_start_finds_no_rest_on_a_finer_grid_is_given_and_says_so(monkeypatch: pytest.MonkeyPatch):
+    def on_few_only(problem: Problem, size: Size, *given: object, **named: object) -> Level:
+        if size.n_u > 13:
+            raise SceneError("shape.settle", True, "false", "The start did not come to rest")
+        return march_level(problem, size, *given, **named)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(refinement, "march_level", on_few_only)
+    found = predict(replace(hanging("point"), quality=Quality(target_error=1e-6)))
+    assert found.status == "stalled"
+    assert "did not come to rest" in found.message
 
 
 @pytest.mark.parametrize(("seed", "index"), [(14, 274), (21, 35), (22, 36)])
