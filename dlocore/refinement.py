@@ -315,8 +315,8 @@ class _Climb:
         return not growth(self.problem, self.cost, size, finer) * spent > self.budget - self.monitor.elapsed()
 
     def _agreed(self, level: Level) -> str:
-        points = f"which points to an error of {self.estimate * 1e3:.2g} mm"
-        return f"Two grids agree to {level.change * 1e3:.2g} mm, {points}; target {self.target * 1e3:.2g} mm."
+        error = f"the estimated error is {self.estimate * 1e3:.2g} mm, target {self.target * 1e3:.2g} mm"
+        return f"Two grids agree to {level.change * 1e3:.2g} mm; {error}."
 
     def _unfolded(self, level: Level, size: Size) -> Outcome | None:
         """Return the answer of a march that watches over the length at more points, if a fold is all that is amiss.
@@ -375,8 +375,7 @@ class _Climb:
         if status == "converged" and self.estimate <= self.enough:
             message = self._agreed(best)
             if self.estimate > self.target:
-                above = f"the estimated error of {self.estimate * 1e3:.2g} mm is above the target."
-                message += f" No finer grid was tried; {above}"
+                message += " No finer grid was tried."
         elif status == "converged" and self.monitor.remaining() <= 0:
             status, message = "time_limit", f"The time limit passed; {left}. {advice}"
         elif status == "converged":

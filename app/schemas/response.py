@@ -128,7 +128,7 @@ class PredictionResponse(BaseModel):
     status: Status = Field(description="`converged`, or why not.", examples=["converged"])
     message: str = Field(
         description="The status in words, and what to do about it.",
-        examples=["Two grids agree to 0.89 mm, which points to an error of 0.4 mm; target 2 mm."],
+        examples=["Two grids agree to 0.89 mm; the estimated error is 0.4 mm, target 2 mm."],
     )
     surface: SurfaceModel = Field(description="The predicted surface, sampled as `output` asks.")
     control_points: list[list[list[float]]] = Field(
