@@ -96,7 +96,7 @@ class _OldGarbage:
     """Waits: Python looks for garbage among what has lived for long only after the last of the batches under way.
 
     Each such look takes as long as there are objects in the process, and comes the more often the more answers a batch
-    has made, none of which are garbage: with thousands of them it is a seventh of the time. Young objects are looked
+    has made, none of which are garbage: with thousands of them it is a fifth of the time. Young objects are looked
     through as ever.
     """
 
