@@ -26,7 +26,7 @@ import numpy as np
 
 from benchmarks.hard.generator import as_python, draw
 from benchmarks.hard.judge import WRONG, Whose, by_a_march, is_undetermined, left_its_grid, run
-from benchmarks.hard.shares import GROWTHS, drawn_again, is_left, share, strata
+from benchmarks.hard.shares import GROWTHS, Strata, drawn_again, is_left, share, strata
 from benchmarks.machine import machine_line
 from dlocore import SceneError, warm_up
 
@@ -158,8 +158,12 @@ def counts(records: list[dict[str, Any]]) -> list[str]:
     lines = []
     for name, faults in COUNTED.items():
         found = [r["index"] for r in judged if set(faults) & set(r["faults"])]
-        lines.append(f"{name}: {len(found)}{': ' if found else ''}{' '.join(map(str, found[:8]))}")
+        lines.append(_listed(name, found))
     return lines
+
+
+def _listed(name: str, found: list[int]) -> str:
+    return f"{name}: {len(found)}{': ' if found else ''}{' '.join(map(str, found[:8]))}"
 
 
 def in_the_end(seed: int, first: list[dict[str, Any]], again: list[dict[str, Any]]) -> list[str]:
@@ -188,17 +192,19 @@ def summary(records: list[dict[str, Any]]) -> str:
     possible = [r for r in records if r["possible"]]
     printed = [r for r in possible if r.get("method") == "paper"]
     judged = [r for r in possible if r.get("method") != "paper"]
-    shown = [r["index"] for r in records if r.get("driven")]
-    lines.append(f"of the others {len(shown)} are shown to be impossible by their motion: {' '.join(map(str, shown))}")
     undetermined = [r for r in judged if is_undetermined(r)]
     told = sum(r["status"] != "converged" or (r["estimate"] or 0.0) > WRONG for r in undetermined)
     determined = [r for r in judged if not is_undetermined(r)]
     free = [r for r in determined if not r["families"][-1].endswith(("march", "grid", "odd"))]
     given = [r for r in determined if r["families"][-1].endswith(("march", "grid", "odd"))]
     lines.append(f"{len(records)} scenes, {len(possible)} of them possible, {len(printed)} of these by method paper")
+    shown = [r["index"] for r in records if r.get("driven")]
+    lines.append(_listed("impossible, as their motion shows", shown))
     lines.append(f"undetermined: {len(undetermined)}, {told} of them told")
     for name, part in (("of the others", determined), ("grid free", free), ("grid given", given)):
-        lines.append(f"converged, {name}: {_part(sum(r['status'] == 'converged' for r in part), len(part))}")
+        count = sum(r["status"] == "converged" for r in part)
+        _, low, high = share(Strata(count, len(part) - count, 0, 0, 0, 0))
+        lines.append(f"converged, {name}: {_part(count, len(part))}, 95 % interval {low:.2%} to {high:.2%}")
     finer = sum(r["status"] == "converged" and left_its_grid(r) for r in given)
     lines.append(f"of them on finer grids than the one given, as that could not show the motion: {finer}")
     good = [r for r in determined if r["status"] == "converged" or by_a_march(r)]
@@ -222,6 +228,10 @@ def summary(records: list[dict[str, Any]]) -> str:
         f"compared with a refined march: {len(checked)}; both converged: {len(compared)}; "
         f"within 1 % of the length: {right}"
     )
+    for name, part in (("free", free), ("given", given)):
+        sure = [r for r in compared if r in part and r["apart"] <= WRONG]
+        near = sum(r["error"] < WRONG for r in sure)
+        lines.append(f"of those whose references agree, grid {name}, within 1 %: {_part(near, len(sure))}")
     lines += ["", "faults (scenes, first indices):"]
     found = Counter(f for r in judged + [r for r in records if not r["possible"]] for f in r["faults"])
     for fault, count in found.most_common():

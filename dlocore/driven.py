@@ -47,7 +47,8 @@ def driven(problem: Problem, motion: March) -> Driven | None:
     to their end, from where the motion has the point as the gripper closes: the motion itself may have ended before.
     """
     scene = problem.scene
-    if all(g.start == 0.0 for g in scene.grasps) and (problem.self_contact is None or len(scene.grasps) < 2):
+    late = any(g.start > 0.0 for g in scene.grasps) and problem.contact is not None
+    if not late and (problem.self_contact is None or len(scene.grasps) < 2):
         return None
     begins = [_begin(problem, motion, grasp) for grasp in scene.grasps]
     found = [*_into_surroundings(problem, begins), *_into_each_other(problem, begins)]

@@ -135,7 +135,7 @@ class _Climb:
                     return self._restless(shown, error)
                 # a start that finds no rest on few control points may do so on more; one that did on fewer still was at
                 # rest as they can't bend the way that it would go
-                self.best, self.changes, self.estimate = None, {}, np.inf
+                self._forget()
                 size = stretched(self.problem, self.number)
                 continue
             spent = self.monitor.elapsed() - began
@@ -188,9 +188,13 @@ class _Climb:
             if not self._is_rough(level):  # so strands do not meet because of the grid
                 level = march_level(self.problem, size, self.monitor, rho, free_knots=True, known=level)
         if level.posed is not self.problem:
-            self.best, self.changes, self.estimate = None, {}, np.inf  # another motion
+            self._forget()  # another motion
         self.problem = level.posed  # a rough grid may have needed contact that is too stiff for a fine one
         return level
+
+    def _forget(self) -> None:
+        """Forget the grids before."""
+        self.best, self.changes, self.estimate = None, {}, np.inf
 
     def _is_rough(self, level: Level) -> bool:
         return not level.change <= ROUGH * self.problem.scene.cable.length
@@ -315,8 +319,13 @@ class _Climb:
         return not growth(self.problem, self.cost, size, finer) * spent > self.budget - self.monitor.elapsed()
 
     def _agreed(self, level: Level) -> str:
-        error = f"the estimated error is {self.estimate * 1e3:.2g} mm, target {self.target * 1e3:.2g} mm"
-        return f"Two grids agree to {level.change * 1e3:.2g} mm; {error}."
+        return f"Two grids agree to {level.change * 1e3:.2g} mm; {self._left_over()}."
+
+    def _left_over(self) -> str:
+        """Return the estimated error and the target, in words."""
+        finite = np.isfinite(self.estimate)
+        known = f"the estimated error is {self.estimate * 1e3:.3g} mm" if finite else "its error is not known"
+        return f"{known}, target {self.target * 1e3:.3g} mm"
 
     def _unfolded(self, level: Level, size: Size) -> Outcome | None:
         """Return the answer of a march that watches over the length at more points, if a fold is all that is amiss.
@@ -368,9 +377,7 @@ class _Climb:
         best = self.best
         assert best is not None
         status, message = march_status(self.problem, best)
-        finite = np.isfinite(self.estimate)
-        known = f"the estimated error is {self.estimate * 1e3:.3g} mm" if finite else "its error is not known"
-        left = f"{known}, target {self.target * 1e3:.3g} mm"
+        left = self._left_over()
         advice = "Allow a larger target_error, more time or a shorter motion."
         if status == "converged" and self.estimate <= self.enough:
             message = self._agreed(best)
