@@ -6,7 +6,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore import Cable, Environment, Grasp, Move, Prediction, Quality, Scene, SplineSurface, Straight, Table, predict
+from benchmarks.hard.curves import corner
+from dlocore import (
+    Cable,
+    Environment,
+    Grasp,
+    Move,
+    Points,
+    Prediction,
+    Quality,
+    Scene,
+    SplineSurface,
+    Straight,
+    Table,
+    predict,
+)
 
 Floats = NDArray[np.float64]
 G = 9.81  # [m/s^2]
@@ -96,3 +110,36 @@ def arc(length: float, angle: float, count: int = 41) -> Floats:
     """Return points (count, 3) of an arc in the x-y plane from the origin that turns left by `angle` [rad]."""
     turned = np.linspace(0.0, angle, count)
     return length / angle * np.column_stack([np.sin(turned), 1.0 - np.cos(turned), np.zeros(count)])
+
+
+def swinging(quality: Quality) -> Scene:
+    """Return a limp cable hung by its end and carried off, whose free end cracks and trembles on."""
+    return Scene(
+        cable=Cable(length=0.6, diameter=0.005, linear_density=0.08, bending_stiffness=1.2e-4),
+        shape=Straight(direction=(0.0, 0.0, -1.0)),
+        grasps=(Grasp(u=0.0, hold="tangent", path=Move(displacement=(0.3, 0.0, 0.0), duration=0.6)),),
+        environment=Environment(drag=0.013),
+        horizon=1.6,
+        quality=quality,
+    )
+
+
+def jerked(n_t: int) -> Scene:
+    """Return the cable that swings, jerked at once to its speed: its least squares does not converge."""
+    path = Move(displacement=(0.3, 0.0, 0.0), duration=0.15, profile="linear")
+    scene = swinging(Quality(n_u=17, n_t=n_t, delta=1e-9))
+    return replace(scene, grasps=(Grasp(u=0.0, path=path),))
+
+
+def kinked(quality: Quality) -> Scene:
+    """Return a wire that is bent by a right angle within a hundredth of its length, and carried by its end."""
+    return Scene(
+        cable=Cable(
+            length=1.0, diameter=0.004, linear_density=0.05, bending_stiffness=0.02, rest_shape="initial"
+        ),
+        shape=Points(points=corner(1.0, 0.5 * np.pi, 0.4, "upright")),
+        grasps=(Grasp(u=0.0, hold="clamp", path=Move(displacement=(0.0, 0.2, 0.1), duration=0.5)),),
+        environment=Environment(drag=0.1),
+        horizon=0.8,
+        quality=quality,
+    )  # fmt: skip

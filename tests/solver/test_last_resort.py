@@ -12,7 +12,7 @@ from dlocore import Cable, Grasp, Iteration, Move, Prediction, Quality, Scene, S
 from dlocore.refinement import AUTO_ENOUGH
 from dlocore.study.plan import Plan
 from dlocore.study.running import run_study
-from tests.solver.test_refinement import jerked
+from tests.solver.scenes import jerked
 
 NOT_CONVERGED = "A march is the answer in place of the least squares that was asked for, which did not converge in "
 
