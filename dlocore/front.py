@@ -294,7 +294,7 @@ def _answer(
             n_u=grid.n_u,
             n_t=len(level.control),
             delta=problem.scene.quality.threshold,
-            steps=len(level.motion.times) - 1,
+            steps=level.motion.steps,
             dimensions=problem.plane.dimensions,
             dimensions_reason=problem.plane.reason,
             phases=dict(monitor.phases),

@@ -35,7 +35,7 @@ def goes_elsewhere(problem: Problem, motion: March) -> float:
     history = grid.past()
     history.memory[:] += plane_curvature_of(grid.tables, bent) - plane_curvature_of(grid.tables, grid.start)
     lopsided = grid.changed(history=history)
-    other = march(problem, lopsided, len(motion.times) - 1, Monitor(None, None, None), rho=motion.rho)
+    other = march(problem, lopsided, motion.steps, Monitor(None, None, None), rho=motion.rho)
     if other.stopped or len(other.states) != len(motion.states):
         return 0.0
     away = float(np.linalg.norm(other.states - motion.states, axis=2).max())

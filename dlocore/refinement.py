@@ -29,8 +29,8 @@ AUTO_ENOUGH = 1e-2  # of the length: the estimated error with which it is conten
 ROUGH = 0.05  # of the length: two grids that differ more are in no order yet: the next is marched with strong damping
 MOST_WORK = 3.2e7  # control points times steps of one march in the plane; each coordinate more costs twice the time
 _FRAMES = 3  # a control point in time, at least, that are kept of a motion with twist: what its time spline needs
-PATIENT = 4.0  # times as much, of a march that will end before a deadline or within a time budget, ...
-MOST_STATES = 6.4e7  # ... and whose states are no more numbers than these: 0.5 GB, as of one of MOST_WORK in the plane
+PATIENT = 64.0  # times as much, of a march that will end before a deadline or within a time budget, ...
+MOST_STEPS = 1_000_000  # ... and has no more steps: what holds the cable is kept of all of them, see `Kept`
 _SLOWER = 1.3  # times as long as its work tells, a march may take
 CONTACT_COSTS = 2  # times as much work counts with contact, which takes more of the time of a step
 AUTO_SHARE = 1 / 32  # of it for who asked for no target, once the estimated error is AUTO_ENOUGH
@@ -303,8 +303,7 @@ class _Climb:
     def _ends_in_time(self, size: Size) -> bool:
         """Tell whether there is a deadline or a budget, and a march of a size will end before it."""
         left = min(self.monitor.remaining(), self.budget - self.monitor.elapsed())
-        few = size.n_u * size.steps * self.problem.nc <= MOST_STATES
-        return left < np.inf and few and _SLOWER * self.pace * self._work(size) < left
+        return left < np.inf and size.steps <= MOST_STEPS and _SLOWER * self.pace * self._work(size) < left
 
     def _left(self, size: Size | None) -> int:
         """Return how many refinements in the direction are left, from a size on."""

@@ -21,6 +21,7 @@ from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, larges
 from dlocore.kernels.banded import solve_free
 from dlocore.kernels.twisted_rows import TWIST_RATE
 from dlocore.mirrored import goes_elsewhere
+from dlocore.obstacles import Obstacle
 from dlocore.problem import Problem
 from dlocore.report import WindowForces
 from dlocore.sideways import leaves_plane
@@ -34,6 +35,7 @@ MATTERS = 0.001  # of the length: what a neglected effect may move the cable bef
 _STRAINED = 0.05  # axial strain: few cables bear more
 _FAR_MORE = 2.0  # times the strain of the march: what its spline adds is worth a word
 _PLACES, _MOMENTS = 4, 33  # in a span, and in time while it swings once, at which a surface is searched for strain
+_BLOCK = 4096  # states whose gaps to obstacles are found at once
 _LOOKS = 5  # states of each stretch of a motion at which neglected forces are weighed
 _LONGER = 4  # times as long, each time that a motion is searched for turns
 _SKIPPED = 3  # of so many control points one is searched: their neighbours turn with them
@@ -184,19 +186,26 @@ def _touches(level: Level) -> dict[str, str]:
     left_out = [o for o in problem.scene.environment.obstacles if o not in problem.obstacles]
     if not left_out:
         return {}
-    motion = level.motion
-    u = np.linspace(0.0, problem.scene.cable.length, 65)
-    points = np.einsum("ui,kid->kud", design_matrix(motion.grid.knots, u), motion.states)
-    world = problem.plane.world(points[..., : problem.plane.dimensions])
-    way = np.linalg.norm(np.diff(world, axis=0), axis=2)
-    between = 0.5 * np.maximum(np.vstack([way, way[-1:]]), np.vstack([way[:1], way]))  # of steps it may come nearer
-    rows = np.array([o.row() for o in left_out])
-    gaps = distances(rows, world.reshape(-1, 3)).min(axis=1) - 0.5 * problem.scene.cable.diameter
-    if (gaps - between.ravel()).min() > CLOSE * problem.scene.cable.length:
+    gap, nearer = np.inf, np.inf  # and how near it may have come between the states
+    for first in range(0, max(1, len(level.motion.states) - 1), _BLOCK):  # all at once may be more than memory holds
+        gaps, between = _gaps(level, left_out, slice(first, first + _BLOCK + 1))
+        gap, nearer = min(gap, float(gaps.min())), min(nearer, float((gaps - between).min()))
+    if nearer > CLOSE * problem.scene.cable.length:
         return {}
-    gap = float(gaps.min())
     what = f"comes within {gap * 1e3:.2g} mm of" if gap > 0 else "passes through"
     return {"obstacles": f"the motion {what} an obstacle"}
+
+
+def _gaps(level: Level, obstacles: list[Obstacle], part: slice) -> tuple[Floats, Floats]:
+    """Return the gaps (k points,) [m] to obstacles in some states, and how much less they may be half-way to others."""
+    problem, motion = level.problem, level.motion
+    u = np.linspace(0.0, problem.scene.cable.length, 65)
+    points = np.einsum("ui,kid->kud", design_matrix(motion.grid.knots, u), motion.states[part])
+    world = problem.plane.world(points[..., : problem.plane.dimensions])
+    way = np.linalg.norm(np.diff(world, axis=0), axis=2)
+    between = 0.5 * np.maximum(np.vstack([way, way[-1:]]), np.vstack([way[:1], way]))
+    rows = np.array([o.row() for o in obstacles])
+    return distances(rows, world.reshape(-1, 3)).min(axis=1) - 0.5 * problem.scene.cable.diameter, between.ravel()
 
 
 def _meets_itself(level: Level) -> dict[str, str]:

@@ -83,6 +83,8 @@ def objection(problem: Problem, motion: March) -> str:
         return "the motion stopped before its end"
     if motion.split:
         return "some steps found equilibrium only in smaller ones"
+    if len(motion.times) <= motion.steps:
+        return "not all of its states were kept"
     return ""
 
 

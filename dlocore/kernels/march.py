@@ -21,7 +21,7 @@ from dlocore.kernels.banded import (
     reduce_vector,
     solve_free,
 )
-from dlocore.kernels.compile import brief, kernel, leaf
+from dlocore.kernels.compile import brief, kernel
 from dlocore.kernels.contact import passes, strikes
 from dlocore.kernels.inertia import both_sides, effective, follow, padded, residual
 from dlocore.kernels.mixing import mixed, room
@@ -62,15 +62,6 @@ def constrained_mass_solve(nc: int, mass: Any, e: Any, held: Any, right: Any) ->
     return x + change.reshape((n, nc))
 
 
-@leaf
-def row_of_step(k: int, states: int, rows: int) -> int:
-    """Return the row of a log that step k writes: of every so many steps, and of the last, the last one stays in it."""
-    if rows == states:
-        return k
-    every = -(-(states - 1) // (rows - 1))
-    return -(-k // every)
-
-
 @kernel
 def march_steps(
     axes: Any, start: int, stop: int, begin: int, jumps: bool, h: float, rho: float, tolerance: float, Q: Any, v: Any,
@@ -102,7 +93,7 @@ def march_steps(
         e: elimination of the held degrees of freedom.
         offsets: (steps + 1, held) their prescribed part [m].
         reactions: (steps + 1, held) forces that hold them [N]; written.
-        log: (rows, points, columns) of the steps of `row_of_step` the frames and the memory, see `note`; or (0, 0, 0).
+        log: (steps + 1, points, columns) frames and memory, see `note`; or (0, 0, 0).
         info: (5,) the step that found no equilibrium or is to be divided, or -1, the largest error that Newton's
             iterations left [m], the largest depth in an obstacle or the table [m], read: the first step that is to be
             divided if the cable strikes something in it, and 1 where that is why a step is to be divided.
@@ -355,7 +346,7 @@ def march_steps(
         if keeps:
             info[DEEPEST] = max(info[DEEPEST], remember(axes, q1, tables, active, p, history, h, False))
             if len(log) > 0:
-                note(axes, history, log[row_of_step(k, len(Q), len(log))])
+                note(axes, history, log[k])
         # the last update is not in R and f yet
         if anew:
             for i in range(len(e.held)):

@@ -58,7 +58,7 @@ def weighed(level: Level, before: Level, last: Change | None, first: bool = Fals
             grids, and two of these agree by chance.
     """
     moved_before = np.inf if last is None else last.moved
-    more = (len(level.motion.times) - 1) / (len(before.motion.times) - 1)
+    more = level.motion.steps / before.motion.steps
     if more <= _MORE:
         return Change(level.change, moved_before, _LEFT_ALONG)
     # the errors of the steps are of second order: what twice as many take away is three times what they leave

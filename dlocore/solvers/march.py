@@ -26,13 +26,13 @@ from dlocore.kernels.march import (
     STRUCK,
     constrained_mass_solve,
     march_steps,
-    row_of_step,
 )
 from dlocore.kernels.tension import COLUMNS
 from dlocore.kernels.twisted_rows import PAST
 from dlocore.problem import Problem, firmer
 from dlocore.report import WindowForces
 from dlocore.scene import Grasp
+from dlocore.solvers.kept import Kept
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.stretch import Entry, enter
 
@@ -66,13 +66,14 @@ class March:
 
     Attributes:
         grid: space discretisation.
-        times: (steps + 1,) [s].
-        states: (steps + 1, n_u, nc) control points at those times.
+        times: (k,) [s], of all steps, or of every so many of a march of very many, see `Kept`.
+        states: (k, n_u, nc) control points at those times.
+        steps: time steps that were to be taken.
         velocity: (n_u, nc) [m/s] just after t = 0.
         history: what the motion leaves behind at its end.
-        log: frames and memory at the steps `logged` (rows, points, columns), see `kernels.assembly.note`; (0, 0, 0)
+        log: frames and memory at the times `logged` (rows, points, columns), see `kernels.assembly.note`; (0, 0, 0)
             where nothing is kept.
-        reached: last step that found equilibrium.
+        reached: which of the times is the last before it ended.
         stopped: why it ended there: "" (the end), "step" (no equilibrium), "time" (deadline), or as it was given
             up: "strain" or "depth".
         rho: spectral radius it was marched with.
@@ -87,6 +88,7 @@ class March:
     grid: Grid
     times: Floats
     states: Floats
+    steps: int
     velocity: Floats
     history: History
     log: Floats
@@ -112,26 +114,26 @@ class March:
 
     @property
     def logged(self) -> NDArray[np.int64]:
-        """Steps (rows,) that the rows of the log are of; all where nothing is kept."""
-        steps = np.arange(len(self.times))
+        """Which of the times (rows,) the rows of the log are of; all where nothing is kept."""
+        at = np.arange(len(self.times))
         if len(self.log) == 0:
-            return steps
-        every = -(-steps[-1] // (len(self.log) - 1))
-        return np.append(steps[:-1:every], steps[-1])
+            return at
+        every = -(-at[-1] // (len(self.log) - 1))
+        return np.append(at[:-1:every], at[-1])
 
     @property
     def frames(self) -> Floats:
-        """Frames of the curvature points at the steps `logged` (rows, points, PAST); no columns without twist."""
+        """Frames of the curvature points at the times `logged` (rows, points, PAST); no columns without twist."""
         return self.log[:, : len(self.grid.tables.curvature_w), : self.log.shape[2] - self._remembered]
 
     @property
     def memory(self) -> Floats:
-        """Stress-free strain of the curvature points at the steps `logged` (rows, points, 1 in the plane or 3)."""
+        """Stress-free strain of the curvature points at the times `logged` (rows, points, 1 in the plane or 3)."""
         return self.log[:, : len(self.grid.tables.curvature_w), self.log.shape[2] - self._remembered :]
 
     @property
     def axial_memory(self) -> Floats:
-        """Stress-free axial strain at the steps `logged` (rows, axial points); no columns where none is kept."""
+        """Stress-free axial strain at the times `logged` (rows, axial points); no columns where none is kept."""
         return np.asarray(self.log[:, len(self.grid.tables.curvature_w) :, :1].sum(axis=2))
 
     @property
@@ -180,11 +182,11 @@ def march(
     problem = firmer(problem, problem.horizon / steps)
     if problem.inertia is None or (problem.friction is not None and problem.friction.lying > 0.0):
         rho = STRONGLY_DAMPED  # without waves, or where a rough table stops them, there is nothing to keep
-    walk = _Walk(problem, grid, monitor, step_times(marks, counts), rho, credible, shallow)
+    walk = _Walk(problem, grid, monitor, marks, counts, rho, credible, shallow)
     first = 0
     for begin, end, count in zip(marks[:-1], marks[1:], counts, strict=True):
         if begin in knocks:
-            walk.knock(first, knocks[begin])
+            walk.knock(knocks[begin])
         walk.go(begin, end, first, first + count)
         if whole and walk.stopped == "time":
             raise TimeIsUp
@@ -204,8 +206,7 @@ class _Stretch:
         grasps: that hold in it.
         entry: how it begins.
         v, a, G: velocity [m/s], acceleration [m/s^2] and forces [N], see `march_steps`.
-        offsets: (steps + 1, held) prescribed part of the held degrees of freedom [m].
-        reactions: (steps + 1, held) forces that hold them [N].
+        reactions: (its steps + 1, held) forces [N] that hold the held degrees of freedom.
     """
 
     h: float
@@ -216,7 +217,6 @@ class _Stretch:
     v: Floats
     a: Floats
     G: Floats
-    offsets: Floats
     reactions: Floats
 
 
@@ -227,39 +227,39 @@ class _Walk:
         problem: what is solved.
         grid: its space discretisation, with the start on it.
         monitor: that of the solve.
-        times: (steps + 1,) [s].
+        marks: times [s] between which the motion is smooth.
+        counts: steps of each stretch between two of them.
         rho: spectral radius.
         credible, shallow: axial strain and depth [m] beyond which it is given up.
     """
 
     def __init__(
-        self, problem: Problem, grid: Grid, monitor: Monitor, times: Floats, rho: float, credible: float, shallow: float
-    ) -> None:
-        self._problem, self._grid, self._monitor, self._times, self._rho = problem, grid, monitor, times, rho
+        self, problem: Problem, grid: Grid, monitor: Monitor, marks: list[float], counts: list[int], rho: float,
+        credible: float, shallow: float,
+    ) -> None:  # fmt: skip
+        self._problem, self._grid, self._monitor, self._rho = problem, grid, monitor, rho
+        self._times = times = step_times(marks, counts)
         self._credible, self._shallow = credible, shallow
         at_ends = problem.contact is not None or problem.friction is not None  # forces that jump, see `newmark.py`
         self._lag = 0.0 if at_ends else rho / (1.0 + rho)  # of the times at which steps balance forces, in steps
         self._laws = problem.laws
         self._mass = grid.tables.mass * problem.mass_density()
-        self._applied = applied_forces(problem, grid, times)
         self._tolerance = tolerance_of(problem, grid, problem.horizon / len(times))
-        self._states = np.empty((len(times), grid.n_u, problem.nc))
-        self._states[0] = grid.start
+        self._kept = Kept(grid.start, counts, _frames(problem), _columns(problem, grid))
         self._v = self._velocity = grid.velocity.copy()
         self._info = np.zeros(5)
         self._info[FAILED_STEP] = -1
         self._starts: Starts = {}
         self._forces: list[WindowForces] = []
         self._history = grid.past()._replace(tension=np.full((len(grid.tables.axial_w), COLUMNS), np.nan))
-        self._log = _empty_log(problem, grid, len(times))
-        if len(self._log):
-            note(problem.axes, self._history, self._log[0])
-        self._reached, self._split = 0, 0
+        if len(self._kept.log):
+            note(problem.axes, self._history, self._kept.log[0])
+        self._reached, self._split, self._strain = 0, 0, 0.0
         self.stopped = ""  # why it ended early
 
-    def knock(self, at: int, by: Floats) -> None:
+    def knock(self, by: Floats) -> None:
         """Displace the state at the step that was reached by control points (n_u, nc) [m]."""
-        self._states[at] += by
+        self._kept.knock(by, self._reached)
 
     def go(self, begin: float, end: float, first: int, last: int) -> None:
         """Walk through the stretch from `begin` to `end` [s], steps `first` to `last`, or until it has to stop."""
@@ -270,12 +270,17 @@ class _Walk:
             while at < last and not self.stopped:
                 self._monitor.check()
                 until = min(at + chunk_of(self._problem, self._grid), last)
+                before, (base, states, log) = at, self._kept.window(at, until, first)
                 failed = self._steps(
-                    stretch, at, until, smooth, jumps, stretch.h, self._rho, self._states, self._applied,
-                    stretch.offsets, stretch.reactions, self._log,
+                    stretch, at - base, until - base, max(smooth - base, 0), jumps, stretch.h, self._rho, states,
+                    self._times[base : until + 1], stretch.entry.offsets[base - first :],
+                    stretch.reactions[base - first :], log, base,
                 )  # fmt: skip
                 at = until if failed < 0 else failed - 1
-                self.stopped = self._astray(at)
+                self._kept.keep(base, states, log, before, at)
+                if self._kept.thin:
+                    self._strain = max(self._strain, self._grid.largest_strain(states[: at - base + 1]))
+                self.stopped = self._astray()
                 if self.stopped:
                     break
                 if failed < 0:
@@ -291,42 +296,43 @@ class _Walk:
         except TimeIsUp:
             self.stopped = "time"
         self._reached, self._v = at, stretch.v
-        to_ends_of_steps(stretch.reactions, first, at, self._lag)
-        part = slice(first, last + 1)
+        to_ends_of_steps(stretch.reactions, 0, at - first, self._lag)
+        kept = self._kept
+        begins, ends = np.searchsorted(kept.steps, (first, last))
+        rows = slice(begins, ends + 1)
+        steps = kept.steps[rows]
         self._forces.append(
-            WindowForces(stretch.entry.held, self._times[part], stretch.reactions[part], self._states[part])
+            WindowForces(stretch.entry.held, self._times[steps], stretch.reactions[steps - first], kept.states[rows])
         )
 
-    def _astray(self, at: int) -> str:
-        """Return why it is given up at a step, "" where it is not."""
+    def _astray(self) -> str:
+        """Return why it is given up at the step that was reached, "" where it is not."""
         if self._info[DEEPEST] > self._shallow:
             return "depth"
-        if self._credible < math.inf and self._grid.largest_strain(self._states[at : at + 1]) > self._credible:
+        if self._credible < math.inf and self._grid.largest_strain(self._kept.now[None]) > self._credible:
             return "strain"
         return ""
 
     def ended(self) -> March:
         """Return the march, whose last state stays where it stopped early."""
-        reached, states, log = self._reached, self._states, self._log
-        states[reached + 1 :] = states[reached]
-        if len(log):
-            last = row_of_step(reached, len(states), len(log))
-            log[last + 1 :] = log[last]
+        kept = self._kept
+        reached, states = kept.stand_still(self._reached), kept.states
         grid, forces = self._grid, tuple(self._forces)
         tables, every = grid.tables, every_of(len(states))
         least, most = slopes(states, every, tables.curvature_first, tables.curvature_b1)
         return March(
             grid=grid,
-            times=self._times,
+            times=self._times[kept.steps],
             states=states,
+            steps=len(self._times) - 1,
             velocity=self._velocity,
             history=self._history,
-            log=log,
+            log=kept.log,
             reached=reached,
             stopped=self.stopped,
             rho=self._rho,
             split=self._split,
-            largest_strain=grid.largest_strain(states),
+            largest_strain=max(self._strain, grid.largest_strain(states)),
             slopes=(float(least), float(most)),
             update=float(self._info[LEFT]),
             deepest=float(self._info[DEEPEST]),
@@ -338,10 +344,10 @@ class _Walk:
         problem, grid, times = self._problem, self._grid, self._times
         h = (end - begin) / (last - first)
         grasps = closed_grasps(problem.scene, begin, end)
-        load = self._applied[min(first, len(self._applied) - 1)]
+        load = applied_forces(problem, grid, times[first : first + 1])[0]
         before = float(times[first] - times[first - 1]) if first > 0 else 0.0
         entry = enter(
-            problem, grid, grasps, self._starts, times[first : last + 1], h, before, self._states[first], self._v,
+            problem, grid, grasps, self._starts, times[first : last + 1], h, before, self._kept.now, self._v,
             self._history, load,
         )  # fmt: skip
         e, a = entry.held.elimination, entry.a
@@ -353,60 +359,65 @@ class _Walk:
                 a = _lean_on_anchors(problem, grid, entry.v, a, self._mass, e, entry.G, self._history)
                 if problem.inertia is None:
                     a = np.zeros_like(entry.v)
-        offsets = np.zeros((len(times), len(e.held)))
-        offsets[first : last + 1] = entry.offsets
-        reactions = np.zeros((len(times), len(e.held)))
-        reactions[first] = (times_scalar_band(self._mass, a) + entry.G).reshape(-1)[e.held]
+        reactions = np.zeros((last - first + 1, len(e.held)))
+        reactions[0] = (times_scalar_band(self._mass, a) + entry.G).reshape(-1)[e.held]
         G = entry.G
         if problem.inertia is not None:
             tables, density = grid.tables, problem.mass_density()
             a, G = lasting(
-                problem.axes, self._states[first], a, G, tables.mass, density, h, tables, *self._laws, self._history, e
+                problem.axes, self._kept.now, a, G, tables.mass, density, h, tables, *self._laws, self._history, e
             )
-        return _Stretch(h, first, last, grasps, entry, entry.v, a, G, offsets, reactions)
+        return _Stretch(h, first, last, grasps, entry, entry.v, a, G, reactions)
 
     def _steps(
         self, stretch: _Stretch, start: int, stop: int, begin: int, jumps: bool, h: float, rho: float, states: Floats,
-        applied: Floats, offsets: Floats, reactions: Floats, log: Floats,
+        times: Floats, offsets: Floats, reactions: Floats, log: Floats, base: int = 0,
     ) -> int:  # fmt: skip
-        """Take the steps from `start` to `stop`, as `march_steps` does; return the one that failed, or -1."""
+        """Take steps as `march_steps` does, which counts them from the step `base`; return the one that failed, or -1.
+
+        `times` (rows of states,) [s] are those of the states.
+        """
+        applied = applied_forces(self._problem, self._grid, times)
+        self._info[DIVIDED_FROM] -= base
         march_steps(
             self._problem.axes, start, stop, begin, jumps, h, rho, self._tolerance, states, stretch.v, stretch.a,
             stretch.G, self._problem.mass_density(), self._problem.drag_coefficient(), self._grid.tables, *self._laws,
             self._history, applied, stretch.entry.held.elimination, offsets, reactions, log, self._info,
         )  # fmt: skip
+        self._info[DIVIDED_FROM] += base
         failed = int(self._info[FAILED_STEP])
         self._info[FAILED_STEP] = -1
-        return failed
+        return base + failed if failed >= 0 else -1
 
     def _in_smaller_steps(self, stretch: _Stretch, failed: int, jumps: bool) -> bool:
         """Take a step that was left in smaller ones, which damp what they can't resolve, if they find equilibrium."""
-        states, times, at = self._states, self._times, failed - 1
+        times, now, at = self._times, self._kept.now, failed - 1
         under_way = (stretch.v, stretch.a, stretch.G, *self._history)
         kept = [x.copy() for x in under_way]
         divided_from, self._info[DIVIDED_FROM] = self._info[DIVIDED_FROM], np.inf
         for parts in _STRUCK if self._info[STRUCK] else _SPLITS:
             inner = np.linspace(times[at], times[failed], parts + 1)
-            offsets = hold(self._problem, self._grid, stretch.grasps, inner, self._starts, states[at]).offsets
-            inner_states = np.empty((parts + 1, *states.shape[1:]))
-            inner_states[0] = states[at]
+            offsets = hold(self._problem, self._grid, stretch.grasps, inner, self._starts, now).offsets
+            inner_states = np.empty((parts + 1, *now.shape))
+            inner_states[0] = now
             reactions = np.zeros((parts + 1, stretch.reactions.shape[1]))
-            applied = applied_forces(self._problem, self._grid, inner)
             k, found = 0, -1
             while k < parts and found < 0:
                 self._monitor.check()
                 begun, k = k, min(k + chunk_of(self._problem, self._grid), parts)
                 found = self._steps(
-                    stretch, begun, k, 0, jumps, stretch.h / parts, STRONGLY_DAMPED, inner_states, applied, offsets,
-                    reactions, self._log[:0],
+                    stretch, begun, k, 0, jumps, stretch.h / parts, STRONGLY_DAMPED, inner_states, inner, offsets,
+                    reactions, self._kept.log[:0],
                 )  # fmt: skip
             if found < 0:
-                states[failed] = inner_states[-1]
+                base, states, log = self._kept.window(at, failed, stretch.first)
+                states[-1] = inner_states[-1]
+                if len(log):
+                    note(self._problem.axes, self._history, log[-1])
+                self._kept.keep(base, states, log, at, failed)
                 # a strike pulls at the grasps for an instant: what lasts is the impulse
-                stretch.reactions[failed] = reactions[1:].mean(axis=0) if self._info[STRUCK] else reactions[-1]
-                if len(self._log):
-                    row = row_of_step(failed, len(states), len(self._log))
-                    note(self._problem.axes, self._history, self._log[row])
+                lasts = reactions[1:].mean(axis=0) if self._info[STRUCK] else reactions[-1]
+                stretch.reactions[failed - stretch.first] = lasts
                 self._split += 1
                 break
             for x, before in zip(under_way, kept, strict=True):
@@ -484,12 +495,15 @@ def _lean_on_table(problem: Problem, grid: Grid, a: Floats, history: History) ->
     history.stick[:, :2] -= problem.friction.parameters()[0] * pull * rests[:, None]
 
 
-def _empty_log(problem: Problem, grid: Grid, times: int) -> Floats:
-    """Return room for frames and memory of a motion, (0, 0, 0) where it keeps none."""
+def _frames(problem: Problem) -> float:
+    """Return how many control points times steps may have rows in the log."""
+    return MOST_FRAMES if problem.twist is not None else math.inf
+
+
+def _columns(problem: Problem, grid: Grid) -> tuple[int, int]:
+    """Return the points and columns of frames and memory of a motion, (0, 0) where it keeps none."""
     kept = (problem.twist, problem.bending_memory, problem.twist_memory, problem.stretch_memory)
     if all(effect is None for effect in kept):
-        return np.zeros((0, 0, 0))
-    columns = PAST + 3 if problem.twist is not None else 1
+        return 0, 0
     points = len(grid.tables.curvature_w) + (len(grid.tables.axial_w) if problem.stretch_memory is not None else 0)
-    every = -(-times * grid.n_u // MOST_FRAMES) if problem.twist is not None else 1
-    return np.zeros((1 - -(times - 1) // every, points, columns))
+    return points, PAST + 3 if problem.twist is not None else 1

@@ -72,6 +72,7 @@ def march_smooth(
         grid=grid,
         times=times,
         states=states,
+        steps=steps,
         velocity=closed,
         find_forces=partial(_forces, problem, grid, grasps, starts, times, forces, states),
         history=history,

@@ -1,0 +1,162 @@
+"""Marches of very many steps, of which not every state is kept: the motion is the same, seen at fewer times."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from dlocore import Cable, Environment, Grasp, Load, Move, Points, Quality, Scene, Sphere, Table, predict, review
+from dlocore.events import marks_of, step_counts
+from dlocore.problem import pose
+from dlocore.sensitivity import objection
+from dlocore.solvers import kept
+from dlocore.solvers.ladder import Size
+from dlocore.solvers.march import March, march
+from dlocore.solvers.monitor import Monitor
+from dlocore.spline import design_matrix
+from dlocore.statics import start_grid
+from dlocore.whole_march import march_level
+
+BENT = tuple((float(x), 0.0, float(0.02 + 0.15 * np.sin(np.pi * x))) for x in np.linspace(0.0, 0.95, 9))
+CABLE = Cable(length=1.0, diameter=0.008, linear_density=0.05, bending_stiffness=5e-3)
+LIFT = Move(displacement=(-0.1, 0.05, 0.1), duration=0.4)
+
+SCENES = {
+    "let go": Scene(
+        cable=CABLE,
+        shape=Points(points=BENT),
+        grasps=(Grasp(u=0.0, hold="clamp"), Grasp(u=1.0, path=LIFT, release_time=0.25)),
+        horizon=0.6,
+    ),
+    "twisted and yielding": Scene(
+        cable=dataclasses.replace(CABLE, yield_strain=0.004, memory_rate=10.0),
+        shape=Points(points=BENT),
+        grasps=(
+            Grasp(u=0.0, hold="clamp"),
+            Grasp(u=1.0, hold="clamp", path=dataclasses.replace(LIFT, rotation=(2.0, 0.0, 0.0))),
+        ),
+        effects={"plasticity": "on", "twist": "on"},
+        horizon=0.5,
+    ),
+    "loaded": Scene(
+        cable=CABLE,
+        shape=Points(points=BENT),
+        grasps=(Grasp(u=0.0), Grasp(u=1.0)),
+        loads=(Load(u=0.4, force=((0.0, 0.0, 0.0), (0.0, 0.1, 0.3), (0.1, 0.0, 0.0)), times=(0.0, 0.2, 0.4)),),
+        horizon=0.5,
+    ),
+    "dropped on a table": Scene(
+        cable=CABLE,
+        shape=Points(points=tuple((x, y, z + 0.05) for x, y, z in BENT)),
+        grasps=(Grasp(u=0.0, release_time=0.05), Grasp(u=1.0, path=LIFT)),
+        environment=Environment(table=Table(height=0.0, friction=0.3)),
+        horizon=0.5,
+    ),
+}
+
+
+def marched(scene: Scene, steps: int = 150) -> March:
+    problem, monitor = pose(scene), Monitor(None, None)
+    return march(problem, start_grid(problem, 11, monitor), steps, monitor)
+
+
+def thinned(scene: Scene, every: int, monkeypatch: pytest.MonkeyPatch) -> March:
+    full = marched(scene)
+    monkeypatch.setattr(kept, "MOST_NUMBERS", full.states.size / every)
+    return marched(scene)
+
+
+@pytest.mark.parametrize("every", [2, 7, 1000])
+@pytest.mark.parametrize("name", SCENES)
+def test_every_so_many_states_are_those_of_the_whole_march(name: str, every: int, monkeypatch: pytest.MonkeyPatch):
+    scene = SCENES[name]
+    full, thin = marched(scene), thinned(scene, every, monkeypatch)
+    rows = np.flatnonzero(np.isin(full.times, thin.times))
+    assert len(thin.times) < len(full.times) / min(every, 20) + 8
+    assert len(rows) == len(thin.times)
+    np.testing.assert_array_equal(thin.states, full.states[rows])
+    if len(full.log):
+        np.testing.assert_array_equal(thin.log, full.log[rows])
+    assert (thin.steps, thin.stopped, thin.split, thin.deepest) == (full.steps, "", full.split, full.deepest)
+    assert thin.largest_strain == full.largest_strain
+    assert thin.reached == len(thin.times) - 1
+    for few, all_of_them in zip(thin.forces, full.forces, strict=True):
+        at = np.flatnonzero(np.isin(all_of_them.times, few.times))
+        assert (few.times[0], few.times[-1]) == (all_of_them.times[0], all_of_them.times[-1])
+        np.testing.assert_array_equal(few.forces, all_of_them.forces[at])
+        np.testing.assert_array_equal(few.states, all_of_them.states[at])
+
+
+def test_the_ends_of_all_stretches_are_kept(monkeypatch: pytest.MonkeyPatch):
+    scene = SCENES["let go"]
+    marks = marks_of(pose(scene))
+    thin = thinned(scene, 1000, monkeypatch)
+    np.testing.assert_allclose(thin.times, marks, rtol=0.0, atol=1e-12)
+    np.testing.assert_array_equal(kept.rows_of(1000, step_counts(marks, 150)), np.cumsum([0, *step_counts(marks, 150)]))
+
+
+def test_a_knock_moves_what_is_kept_and_what_follows(monkeypatch: pytest.MonkeyPatch):
+    problem, monitor = pose(SCENES["let go"]), Monitor(None, None)
+    grid = start_grid(problem, 11, monitor)
+    knocks = {0.1: 1e-3 * np.cos(np.arange(11.0))[:, None] * np.ones(problem.nc)}
+    full = march(problem, grid, 150, monitor, knocks=knocks)
+    monkeypatch.setattr(kept, "MOST_NUMBERS", full.states.size / 9)
+    thin = march(problem, grid, 150, monitor, knocks=knocks)
+    assert len(thin.times) < len(full.times) / 5
+    np.testing.assert_array_equal(thin.states, full.states[np.isin(full.times, thin.times)])
+
+
+def test_a_march_that_ends_early_stands_still_from_there(monkeypatch: pytest.MonkeyPatch):
+    problem, monitor = pose(SCENES["let go"]), Monitor(None, None)
+    grid = start_grid(problem, 11, monitor)
+    strain = 0.5 * march(problem, grid, 150, monitor).largest_strain
+    monkeypatch.setattr("dlocore.solvers.march.CHUNK", 5)
+    full = march(problem, grid, 150, monitor, credible=strain)
+    monkeypatch.setattr(kept, "MOST_NUMBERS", full.states.size / 4)
+    thin = march(problem, grid, 150, monitor, credible=strain)
+    assert (full.stopped, thin.stopped) == ("strain", "strain")
+    assert 0 < thin.reached < len(thin.times) - 1
+    assert thin.times[thin.reached] <= full.times[full.reached] < thin.times[thin.reached + 1]
+    np.testing.assert_array_equal(thin.states[thin.reached + 1 :] - full.states[full.reached], 0.0)
+
+
+def test_a_surface_of_few_states_is_that_of_all(monkeypatch: pytest.MonkeyPatch):
+    scene = dataclasses.replace(SCENES["twisted and yielding"], quality=Quality(n_u=11, n_t=17, method="march"))
+    full = predict(scene)
+    assert full.level is not None
+    monkeypatch.setattr(kept, "MOST_NUMBERS", full.level.motion.states.size / 3)
+    thin = predict(scene)
+    assert thin.level is not None
+    assert len(thin.level.motion.times) < 0.5 * len(full.level.motion.times)
+    u, t = np.linspace(0.0, 1.0, 21), np.linspace(0.0, 0.5, 33)
+    missed = full.level.missed
+    assert missed > 0.0
+    np.testing.assert_allclose(thin.surface.positions(u, t), full.surface.positions(u, t), rtol=0.0, atol=missed)
+    assert thin.material is not None
+    assert full.material is not None
+    np.testing.assert_allclose(thin.material.memory[-1], full.material.memory[-1], rtol=1e-12)
+    assert thin.accuracy.steps == full.accuracy.steps
+
+
+def test_steps_whose_states_were_not_kept_are_not_differentiated(monkeypatch: pytest.MonkeyPatch):
+    scene = SCENES["loaded"]
+    assert objection(pose(scene), marched(scene)) == ""
+    assert "not all of its states" in objection(pose(scene), thinned(scene, 3, monkeypatch))
+
+
+@pytest.mark.parametrize(("gap", "says"), [(-0.02, "passes through"), (0.005, "comes within 5"), (1.0, "")])
+def test_obstacles_are_looked_for_in_a_few_states_at_once(gap: float, says: str, monkeypatch: pytest.MonkeyPatch):
+    problem = pose(SCENES["loaded"])
+    motion = marched(SCENES["loaded"], 100)
+    places = design_matrix(motion.grid.knots, np.linspace(0.0, 1.0, 65))
+    passed = problem.world(places @ motion.states)[..., :3].reshape(-1, 3)
+    x, y, z = passed[passed[:, 2].argmax()]  # the highest place on the way
+    ball = Sphere(center=(x, y, z + 0.03 + 0.5 * CABLE.diameter + gap), radius=0.03)
+    scene = dataclasses.replace(
+        SCENES["loaded"], environment=Environment(obstacles=(ball,)), effects={"obstacles": "off"}
+    )
+    level = march_level(pose(scene), Size(11, 17, 100), Monitor(None, None))
+    at_once = review._touches(level)
+    monkeypatch.setattr(review, "_BLOCK", 7)
+    assert review._touches(level) == at_once
+    assert says in at_once.get("obstacles", "") if says else at_once == {}
