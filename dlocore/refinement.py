@@ -6,6 +6,7 @@ import numpy as np
 
 from dlocore.budget import first_level, growth
 from dlocore.cost import Cost
+from dlocore.determined import DISTURBED, UNDETERMINED, goes_astray
 from dlocore.errors import SceneError
 from dlocore.problem import Problem
 from dlocore.progress import record_level
@@ -55,7 +56,8 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
     So from there on each grid is finer in one direction, that whose last refinement moved the surface most, and the
     error is the sum of both. A cable that folds between its control points gets more of them, whatever grids agree on.
     The error is at least what the time spline misses of its march: a cable that trembles faster than
-    two grids can show looks alike on both. A march that finds no equilibrium is tried with more steps before it is
+    two grids can show looks alike on both. A motion that its scene does not determine is none to agree on: where two
+    grids say so in turn that is the answer. A march that finds no equilibrium is tried with more steps before it is
     given up. Within a time budget the first grid is the one that what solves cost on this machine allows. Who gives a
     time, as a budget or a deadline, is given more grids within it than who doesn't, who would wait for minutes.
 
@@ -94,6 +96,7 @@ class _Climb:
         estimate: error of the best one [m].
         rho: spectral radius of the next march.
         failures: marches in a row that found less than the best one, or no equilibrium as that.
+        doubted: whether the scene does not determine the motion, as a coarser grid that agreed has it.
         pace: time that the last march took for each of its points and steps [s].
     """
 
@@ -111,6 +114,7 @@ class _Climb:
     estimate: float = np.inf
     rho: float = RHO
     failures: int = 0
+    doubted: bool = False
     pace: float = np.inf
 
     def outcome(self) -> Outcome:
@@ -158,9 +162,15 @@ class _Climb:
             finer: Size | None
             if self.estimate <= ACCEPT * self.target and self.budget == np.inf and unfolds is None:
                 finer = self._once_more(size)
+                if finer is None and status != "converged":
+                    return Outcome(level, status, message, _parts(self.changes, level))
                 if finer is None:
-                    agreed = self._agreed(level) if status == "converged" else message
-                    return Outcome(level, status, agreed, _parts(self.changes, level))
+                    astray = self._astray(level)
+                    # on a coarse grid disturbances may grow that do not on a fine one
+                    finer = self._next(level, size, None) if astray and not self.doubted else None
+                    self.doubted = astray > 0.0
+                    if finer is None:
+                        return self._agreeing(level, astray)
             else:
                 unfolded = self._unfolded(level, size)
                 if unfolded is not None:
@@ -317,6 +327,29 @@ class _Climb:
         """Tell whether the next grid is done within the budget, if one of `size` took a time `spent` [s]."""
         return not growth(self.problem, self.cost, size, finer) * spent > self.budget - self.monitor.elapsed()
 
+    def _astray(self, level: Level) -> float:
+        """Return how far a start that is hardly another would go elsewhere [m], 0 where that does not matter."""
+        try:
+            moved = goes_astray(level.problem, level.motion, self.monitor)
+        except TimeIsUp:
+            return 0.0
+        finally:
+            self.monitor.phase("estimate")
+        return moved if moved > UNDETERMINED * self.problem.scene.cable.length else 0.0
+
+    def _agreeing(self, level: Level, astray: float) -> Outcome:
+        """Return the answer where grids agree, which is none where its start may take it `astray` [m]."""
+        parts = _parts(self.changes, level)
+        if not astray:
+            return Outcome(level, "converged", self._agreed(level), parts)
+        length = self.problem.scene.cable.length
+        bend = f"a start bent by a millionth of the length, {DISTURBED * length * 1e6:.2g} um,"
+        message = f"{self._agreed(level)} But the scene does not determine its motion: {bend} ends elsewhere by up to"
+        advice = "Make the motion slower, damp it, or hold the cable in more places."
+        return Outcome(
+            level, "stalled", f"{message} {astray * 1e3:.2g} mm. {advice}", {**(parts or {}), "start": astray}
+        )
+
     def _agreed(self, level: Level) -> str:
         return f"Two grids agree to {level.change * 1e3:.2g} mm; {self._left_over()}."
 
@@ -379,9 +412,9 @@ class _Climb:
         left = self._left_over()
         advice = "Allow a larger target_error, more time or a shorter motion."
         if status == "converged" and self.estimate <= self.enough:
-            message = self._agreed(best)
-            if self.estimate > self.target:
-                message += " No finer grid was tried."
+            outcome = self._agreeing(best, 0.0 if self.budget < np.inf else self._astray(best))
+            finest = " No finer grid was tried." if self.estimate > self.target else ""
+            return outcome._replace(message=outcome.message + finest)
         elif status == "converged" and self.monitor.remaining() <= 0:
             status, message = "time_limit", f"The time limit passed; {left}. {advice}"
         elif status == "converged":

@@ -11,6 +11,7 @@ import numpy as np
 from benchmarks.hard.generator import Drawn
 from benchmarks.hard.laws import measure
 from dlocore import Prediction, Scene, SceneError, predict
+from dlocore.determined import DISTURBED, bent
 from dlocore.discretisation import smallest_n_u
 from dlocore.driven import driven, words
 from dlocore.events import moments
@@ -31,7 +32,6 @@ ASTRAY = 1e-4  # of the length: of a gripper's path by the time spline, between 
 GAINED = 0.02  # of the energy that was about
 LOST = 0.05  # of the impulses that were about
 MIDWAY = (0.25, 0.5, 0.75)  # of the time of a motion
-DISTURBED = 1e-6  # of the length: a start that is this much different is the same to any hand
 
 DRIVEN = "impossible: a gripper drives what it holds into something"
 
@@ -141,7 +141,7 @@ def disturbed(prediction: Prediction, scene: Scene, deadline: float) -> float | 
     for seed in range(3):
         monitor = Monitor(None, deadline)
         grid = start_grid(problem, n_u, monitor)
-        start = grid.start + DISTURBED * scene.cable.length * _waves(problem, grid.n_u, seed) * (seed > 0)
+        start = grid.start + bent(problem, grid, seed) * (seed > 0)
         motion = march(problem, grid.changed(start=start), steps, monitor)
         if motion.stopped or motion.largest_strain > MOST_STRAIN:
             return None
@@ -164,7 +164,7 @@ def disturbed_midway(prediction: Prediction, scene: Scene, deadline: float) -> f
     grid = start_grid(problem, n_u, monitor)
     none, dimensions = np.zeros_like(grid.start), problem.plane.dimensions
     at = {part * problem.horizon: none for part in MIDWAY}
-    bends = [DISTURBED * scene.cable.length * _waves(problem, grid.n_u, seed) for seed in (1, 2)]
+    bends = [bent(problem, grid, seed) for seed in (1, 2)]
     plain, most = march(problem, grid, steps, monitor, knocks=at), None
     if plain.stopped or plain.largest_strain > MOST_STRAIN:
         return None
@@ -176,15 +176,6 @@ def disturbed_midway(prediction: Prediction, scene: Scene, deadline: float) -> f
             away = np.linalg.norm((motion.states - plain.states)[..., :dimensions], axis=-1).max()
             most = max(most or 0.0, float(away) / scene.cable.length)
     return most
-
-
-def _waves(problem: Problem, n_u: int, seed: int) -> np.ndarray:
-    """Return control points (n_u, nc) of some half waves along the cable, of size 1 about, drawn by a seed."""
-    u = np.linspace(0.0, np.pi, n_u)[:, None]
-    sizes = np.random.default_rng(seed).normal(size=(3, problem.plane.dimensions)) / 2
-    waves = np.zeros((n_u, problem.nc))
-    waves[:, : problem.plane.dimensions] = np.sin(u * [1.0, 2.0, 3.0]) @ sizes
-    return waves
 
 
 def shown_impossible(prediction: Prediction, scene: Scene, deadline: float) -> str:

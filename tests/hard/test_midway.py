@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from benchmarks.hard import curves
-from benchmarks.hard.judge import DISTURBED, WRONG, disturbed, disturbed_midway, is_undetermined
+from benchmarks.hard.judge import WRONG, disturbed, disturbed_midway, is_undetermined
 from dlocore import Cable, Environment, Grasp, Move, Points, Prediction, Quality, Scene, predict
+from dlocore.determined import DISTURBED
 from dlocore.problem import pose
 from dlocore.shape import start_curve
 from dlocore.solvers.march import march

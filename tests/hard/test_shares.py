@@ -5,9 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.hard.judge import DISTURBED, by_a_march, is_undetermined, left_its_grid
+from benchmarks.hard.judge import by_a_march, is_undetermined, left_its_grid
 from benchmarks.hard.shares import GROWTHS, Strata, drawn_again, is_left, share, strata
 from benchmarks.random_scenes import counts, in_the_end, summary
+from dlocore.determined import DISTURBED
 
 SEED = 5
 

@@ -1,0 +1,48 @@
+"""How fast a disturbance of a motion may grow."""
+
+from typing import Any
+
+import numpy as np
+
+from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, history_at
+from dlocore.kernels.banded import factor, reduce_matrix
+from dlocore.kernels.compile import kernel
+
+_DOUBLINGS = 12  # of a rate, at most
+
+
+@kernel
+def fastest_growth(
+    axes: Any, states: Any, histories: Any, tables: Any, active: Any, p: Any, density: float, dragged: float, e: Any,
+    slowest: float,
+) -> Any:  # fmt: skip
+    """Return rates (k,) [1/s] that no disturbance of the states (k, n, nc) exceeds, each up to twice too large.
+
+    A disturbance that grows like exp(s t) has (s^2 M + s (C + D) + K) x = 0, of symmetric matrices: where these add up
+    to a positive definite one it is slower than s. That is tried at `slowest`, below which it is none (0), and then at
+    twice and twice as much.
+
+    Args:
+        axes: (0, 1), (0, 1, 2) or (0, 1, 2, 3).
+        states: (k, n, nc) [m].
+        histories: what lies behind the states, a `History` with arrays (1 or k, ...).
+        density: linear density [kg/m].
+        dragged: drag coefficient [N s/m^2].
+        e: elimination of the held degrees of freedom.
+        slowest: rate [1/s].
+    """
+    nc, n = len(axes), states.shape[1]
+    rates = np.zeros(len(states))
+    still, f, K = np.zeros((n, nc)), np.empty((n, nc)), np.empty((n * nc, 4 * nc))
+    A = np.empty((n * nc - len(e.held), e.width))
+    for k in range(len(states)):
+        history, s = history_at(histories, k), slowest
+        for _ in range(_DOUBLINGS):
+            assemble(axes, states[k], still, tables, active, p, history, NO_RATES, (1.0, s, 1.0), f, K)
+            add_scalar_band(nc, tables.mass, density * s * s + dragged * s, K)
+            reduce_matrix(e, K, A)
+            if factor(A) < 0:
+                break
+            s *= 2.0
+            rates[k] = s
+    return rates

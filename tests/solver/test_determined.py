@@ -1,0 +1,142 @@
+"""Scenes that do not determine their motion: what their answers say, and what finds them out."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks.hard.generator import draw
+from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, determined, predict, refinement
+from dlocore.determined import DISTURBED, UNDETERMINED, bent, goes_astray, may_grow
+from dlocore.events import closed_grasps
+from dlocore.holding import Starts, close_grasps, hold
+from dlocore.kernels.growth import fastest_growth
+from dlocore.problem import pose
+from dlocore.solvers.march import march
+from dlocore.solvers.monitor import Monitor, TimeIsUp
+from dlocore.statics import start_grid
+from tests.solver.scenes import WEIGHTLESS
+
+LENGTH = 1.0
+EI, MU = 0.02, 0.1  # [N m^2], [kg/m]
+
+
+def column(shortened: float, drag: float = 0.0) -> Scene:
+    """Return a rod with a bow of a thousandth, pinned at its ends, which come nearer by a part of its length."""
+    u = np.linspace(0.0, LENGTH, 41)
+    bow = 1e-3 * LENGTH * np.sin(np.pi * u / LENGTH)
+    points = np.column_stack([u, bow, 0.3 * bow])
+    return Scene(
+        cable=Cable(length=LENGTH, diameter=0.01, linear_density=MU, bending_stiffness=EI, axial_stiffness=1e5),
+        shape=Points(points=points),
+        grasps=(Grasp(u=0.0), Grasp(u=LENGTH, path=Move(displacement=(-shortened, 0.0, 0.0), duration=1.0))),
+        environment=dataclasses.replace(WEIGHTLESS, drag=drag),
+        effects={"twist": "on"},
+        horizon=1.0,
+    )
+
+
+@pytest.mark.parametrize("drag", [0.0, 3.0])
+def test_a_column_under_twice_its_critical_load_grows_as_beam_theory_says(drag: float):
+    scene = column(0.0, drag)
+    problem = pose(scene)
+    grid = start_grid(problem, 41, Monitor(None, None))
+    critical = EI * (np.pi / LENGTH) ** 2
+    squeezed = grid.start.copy()
+    x = problem.world(squeezed)[:, 0]
+    strain = 2.0 * critical / 1e5
+    along = problem.world(np.eye(problem.nc)[:1]) - problem.world(np.zeros((1, problem.nc)))
+    assert abs(along[0, 0]) == pytest.approx(1.0, abs=1e-2)
+    squeezed[:, 0] -= strain * x * np.sign(along[0, 0])
+    grasps, starts = closed_grasps(scene, 0.0, 1.0), Starts()
+    close_grasps(problem, grid, grasps, starts, grid.start)
+    held = hold(problem, grid, grasps, np.array([0.0]), starts, grid.start)
+    past = grid.past()
+    history = past._replace(memory=past.memory[None], past=past.past[None], axial=past.axial[None])
+
+    def fastest(slowest: float) -> float:
+        laws = (problem.mass_density(), problem.drag_coefficient(), held.elimination, slowest)
+        return float(fastest_growth(problem.axes, squeezed[None], history, grid.tables, *problem.laws, *laws)[0])
+
+    # mu s^2 + drag s = (P - P_c) (pi/L)^2 of the first mode
+    load = critical * (np.pi / LENGTH) ** 2
+    rate = (math.sqrt(drag**2 + 4.0 * MU * load) - drag) / (2.0 * MU)
+    assert fastest(1.03 * rate) == 0.0
+    assert fastest(0.97 * rate) == pytest.approx(2.0 * 0.97 * rate)
+    assert rate < fastest(0.1 * rate) <= 2.0 * rate
+
+
+def test_a_motion_that_is_pulled_straight_is_not_looked_at_again(monkeypatch: pytest.MonkeyPatch):
+    scene = dataclasses.replace(column(-1e-4), environment=Environment(drag=1.0))
+    answer = predict(scene)
+    assert answer.status == "converged"
+    assert answer.level is not None
+    assert not may_grow(answer.level.problem, answer.level.motion)
+    monkeypatch.setattr(determined, "march", None)  # none is needed
+    assert goes_astray(answer.level.problem, answer.level.motion, Monitor(None, None)) == 0.0
+
+
+def test_a_scene_that_does_not_determine_its_motion_is_no_success():
+    scene = draw(90, 184).make()
+    answer = predict(scene)
+    length = scene.cable.length
+    assert answer.status == "stalled"
+    assert "does not determine its motion" in answer.message
+    elsewhere = answer.accuracy.error_parts["start"]
+    assert elsewhere > UNDETERMINED * length
+    assert answer.accuracy.error_estimate is not None
+    assert answer.accuracy.error_estimate >= elsewhere
+    assert answer.level is not None
+    # the start of another hand, which is bent another way by as much
+    problem, motion = answer.level.problem, answer.level.motion
+    start = motion.grid.start + bent(problem, motion.grid, seed=2)
+    assert np.abs(start - motion.grid.start).max() < 4 * DISTURBED * length
+    other = march(problem, motion.grid.changed(start=start), motion.steps, Monitor(None, None), rho=motion.rho)
+    assert np.linalg.norm((other.states - motion.states)[..., :3], axis=-1).max() > UNDETERMINED * length
+
+
+def test_where_a_start_was_bowed_twice_the_notes_tell(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(determined, "march", None)  # none is needed
+    answer = predict(draw(90, 219).make())
+    assert answer.status == "converged"
+    assert "bow of 1 mm to its" in answer.message
+    assert "out of it, and its mirror image is as likely" in answer.message
+
+
+def test_two_grids_that_agree_on_what_is_not_determined_are_not_believed():
+    """Grids of 13 and 19 points agreed to 5 mm on a wire twisted by 1.8 turns; finer ones are 50 mm from there."""
+    scene = draw(90, 11778).make()
+    answer = predict(scene)
+    rows = [(i.n_u, i.update) for i in answer.iterations]
+    assert rows[2][1] < 0.012 * scene.cable.length
+    assert max(update for _, update in rows[3:]) > 0.05 * scene.cable.length
+    assert answer.status == "stalled"
+    assert answer.accuracy.error_parts["start"] > UNDETERMINED * scene.cable.length
+
+
+def test_a_grid_that_is_finer_decides_whether_a_motion_is_determined(monkeypatch: pytest.MonkeyPatch):
+    scene = dataclasses.replace(column(0.1, drag=1.0), quality=Quality(target_error=0.01))
+    plain = predict(scene)
+    assert plain.status == "converged"
+    seen: list[tuple[int, int]] = []
+
+    def on_the_first(problem: object, motion: determined.March, monitor: object) -> float:
+        seen.append((motion.grid.n_u, motion.steps))
+        return 0.5 * LENGTH if len(seen) == 1 else 0.0
+
+    monkeypatch.setattr(refinement, "goes_astray", on_the_first)
+    answer = predict(scene)
+    assert answer.status == "converged"
+    assert seen[0] == (plain.accuracy.n_u, plain.accuracy.steps)
+    assert seen[1] == (answer.accuracy.n_u, answer.accuracy.steps)
+    assert np.prod(seen[1]) > np.prod(seen[0])
+    assert "start" not in answer.accuracy.error_parts
+
+
+def test_a_deadline_that_leaves_no_time_to_look_leaves_the_answer(monkeypatch: pytest.MonkeyPatch):
+    def late(*_: object) -> float:
+        raise TimeIsUp
+
+    monkeypatch.setattr(refinement, "goes_astray", late)
+    assert predict(dataclasses.replace(column(0.1, drag=1.0), quality=Quality(target_error=0.01))).status == "converged"
