@@ -45,7 +45,7 @@ class Kept:
         self._every_log = max(1, int(-(-rows * len(start) // most_frames)))
         self.log = np.zeros((1 - -(rows - 1) // self._every_log if columns[1] else 0, *columns))
         self._behind = self.states[:1]  # the last states, in a row of steps, up to the one reached
-        self._noted = np.zeros(columns)
+        self._noted = self.log[:1]  # the last row of the log
 
     @property
     def thin(self) -> bool:
@@ -84,7 +84,7 @@ class Kept:
             self.states[rows] = states[self.steps[rows] - base]
         if len(self.log) == 0:
             return
-        self._noted = log[at - base]
+        self._noted = log[at - base : at - base + 1]
         if self._every_log > 1 or self._every > 1:
             logged = rows[(rows % self._every_log == 0) | (rows == len(self.steps) - 1)]
             self.log[-(-logged // self._every_log)] = log[self.steps[logged] - base]

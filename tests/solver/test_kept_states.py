@@ -120,6 +120,16 @@ def test_a_march_that_ends_early_stands_still_from_there(monkeypatch: pytest.Mon
     np.testing.assert_array_equal(thin.states[thin.reached + 1 :] - full.states[full.reached], 0.0)
 
 
+def test_a_march_without_time_stays_at_its_start():
+    problem = pose(SCENES["twisted and yielding"])
+    grid = start_grid(problem, 11, Monitor(None, None))
+    motion = march(problem, grid, 150, Monitor(None, 0.0))
+    assert (motion.stopped, motion.reached) == ("time", 0)
+    np.testing.assert_array_equal(motion.states, np.broadcast_to(grid.start, motion.states.shape))
+    assert np.abs(motion.log[0]).max() > 0.0
+    np.testing.assert_array_equal(motion.log, np.broadcast_to(motion.log[0], motion.log.shape))
+
+
 def test_a_surface_of_few_states_is_that_of_all(monkeypatch: pytest.MonkeyPatch):
     scene = dataclasses.replace(SCENES["twisted and yielding"], quality=Quality(n_u=11, n_t=17, method="march"))
     full = predict(scene)
