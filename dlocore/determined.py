@@ -48,7 +48,7 @@ def goes_astray(problem: Problem, motion: March, monitor: Monitor) -> float:
         return 0.0
     grid = motion.grid
     start = grid.start + bent(problem, grid, seed=1)
-    other = march(problem, grid.changed(start=start), motion.steps, monitor, rho=motion.rho, whole=True)
+    other = march(problem, grid.changed(start=start), motion.asked, monitor, rho=motion.rho, whole=True)
     if other.stopped:
         return 0.0
     dimensions = problem.plane.dimensions

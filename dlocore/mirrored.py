@@ -35,8 +35,8 @@ def goes_elsewhere(problem: Problem, motion: March) -> float:
     history = grid.past()
     history.memory[:] += plane_curvature_of(grid.tables, bent) - plane_curvature_of(grid.tables, grid.start)
     lopsided = grid.changed(history=history)
-    other = march(problem, lopsided, motion.steps, Monitor(None, None, None), rho=motion.rho)
-    if other.stopped or len(other.states) != len(motion.states):
+    other = march(problem, lopsided, motion.asked, Monitor(None, None, None), rho=motion.rho)
+    if other.stopped:
         return 0.0
     away = float(np.linalg.norm(other.states - motion.states, axis=2).max())
     return away if away > MATTERS * BOW * length else 0.0

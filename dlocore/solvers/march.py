@@ -69,6 +69,7 @@ class March:
         times: (k,) [s], of all steps, or of every so many of a march of very many, see `Kept`.
         states: (k, n_u, nc) control points at those times.
         steps: time steps that were to be taken.
+        asked: of how many it was asked for: events may need more.
         velocity: (n_u, nc) [m/s] just after t = 0.
         history: what the motion leaves behind at its end.
         log: frames and memory at the times `logged` (rows, points, columns), see `kernels.assembly.note`; (0, 0, 0)
@@ -89,6 +90,7 @@ class March:
     times: Floats
     states: Floats
     steps: int
+    asked: int
     velocity: Floats
     history: History
     log: Floats
@@ -193,7 +195,7 @@ def march(
         if walk.stopped:
             break
         first += count
-    return walk.ended()
+    return walk.ended(steps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -313,8 +315,8 @@ class _Walk:
             return "strain"
         return ""
 
-    def ended(self) -> March:
-        """Return the march, whose last state stays where it stopped early."""
+    def ended(self, asked: int) -> March:
+        """Return the march, `asked` for that many steps, whose last state stays where it stopped early."""
         kept = self._kept
         reached, states = kept.stand_still(self._reached), kept.states
         grid, forces = self._grid, tuple(self._forces)
@@ -325,6 +327,7 @@ class _Walk:
             times=self._times[kept.steps],
             states=states,
             steps=len(self._times) - 1,
+            asked=asked,
             velocity=self._velocity,
             history=self._history,
             log=kept.log,

@@ -73,6 +73,7 @@ def march_smooth(
         times=times,
         states=states,
         steps=steps,
+        asked=steps,
         velocity=closed,
         find_forces=partial(_forces, problem, grid, grasps, starts, times, forces, states),
         history=history,

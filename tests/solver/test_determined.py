@@ -67,6 +67,17 @@ def test_a_column_under_twice_its_critical_load_grows_as_beam_theory_says(drag: 
     assert rate < fastest(0.1 * rate) <= 2.0 * rate
 
 
+@pytest.mark.parametrize("index", [1020, 1882, 47209])
+def test_a_motion_with_events_is_marched_again_in_the_same_steps(index: int):
+    """Stretches between events that lie close have more steps than their share: of 8 at least."""
+    answer = predict(draw(90, index).make())
+    assert answer.level is not None
+    problem, motion = answer.level.problem, answer.level.motion
+    assert motion.asked < motion.steps
+    assert motion.split or may_grow(problem, motion)
+    assert goes_astray(problem, motion, Monitor(None, None)) < UNDETERMINED * problem.scene.cable.length
+
+
 def test_a_motion_that_is_pulled_straight_is_not_looked_at_again(monkeypatch: pytest.MonkeyPatch):
     scene = dataclasses.replace(column(-1e-4), environment=Environment(drag=1.0))
     answer = predict(scene)
@@ -92,7 +103,7 @@ def test_a_scene_that_does_not_determine_its_motion_is_no_success():
     problem, motion = answer.level.problem, answer.level.motion
     start = motion.grid.start + bent(problem, motion.grid, seed=2)
     assert np.abs(start - motion.grid.start).max() < 4 * DISTURBED * length
-    other = march(problem, motion.grid.changed(start=start), motion.steps, Monitor(None, None), rho=motion.rho)
+    other = march(problem, motion.grid.changed(start=start), motion.asked, Monitor(None, None), rho=motion.rho)
     assert np.linalg.norm((other.states - motion.states)[..., :3], axis=-1).max() > UNDETERMINED * length
 
 
