@@ -39,6 +39,17 @@ def test_an_arch_that_turns_freely_at_its_ends_could_tip_to_either_side() -> Non
     assert NOTE in prediction.message
 
 
+def test_so_it_could_where_it_is_let_go_at_last() -> None:
+    scene = pushed_through("point")
+    *ends, middle = scene.grasps
+    let_go = replace(scene, grasps=(*ends, replace(middle, release_time=1.95)))  # few steps would do for what is left
+    prediction = predict(let_go)
+    assert prediction.status == "converged", prediction.message
+    assert prediction.level is not None
+    assert prediction.level.motion.steps > prediction.level.motion.asked
+    assert NOTE in prediction.message
+
+
 def test_it_does_tip_where_it_is_lopsided() -> None:
     symmetric = pushed_through("point")
     u = np.linspace(0.0, 1.0, 41)[:, None]
