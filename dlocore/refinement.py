@@ -35,7 +35,8 @@ MOST_STEPS = 1_000_000  # ... and has no more steps: what holds the cable is kep
 _SLOWER = 1.3  # times as long as its work tells, a march may take
 CONTACT_COSTS = 2  # times as much work counts with contact, which takes more of the time of a step
 AUTO_SHARE = 1 / 32  # of it for who asked for no target, once the estimated error is AUTO_ENOUGH
-_MOST_POINTS = 800  # along the cable
+_MOST_POINTS = 800  # along the cable, ...
+_PATIENT_POINTS = 4  # ... or so many times as many, of a march that will end before a deadline
 _FINER = {"space": 1.5, "time": 2.0}
 _FINE_IN_TIME = 0.3  # of the target: a time spline that misses its march by less keeps its knots as the steps halve
 _AT_BEST = 0.2  # of an error, is left by one refinement: what is still too much after all of them is not begun
@@ -301,9 +302,11 @@ class _Climb:
         work = self._work(size)
         success = self.best is None or not is_folded(self.best)
         content = self.enough > self.target and self.estimate <= self.enough and success
-        most = MOST_WORK * (AUTO_SHARE if content else PATIENT if self._ends_in_time(size) else 1.0)
+        in_time = self._ends_in_time(size)
+        most = MOST_WORK * (AUTO_SHARE if content else PATIENT if in_time else 1.0)
         fits = self.problem.twist is None or _FRAMES * size.n_t * size.n_u <= MOST_FRAMES
-        return size if fits and size.n_u <= _MOST_POINTS and work <= most else None
+        points = _MOST_POINTS * (_PATIENT_POINTS if in_time and not content else 1)
+        return size if fits and size.n_u <= points and work <= most else None
 
     def _work(self, size: Size) -> float:
         """Return the control points times steps of a march in the plane that takes as long as one of a size."""
