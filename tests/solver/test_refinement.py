@@ -102,8 +102,22 @@ def test_who_gives_a_deadline_gets_more_work_for_a_target_that_ends_before_it(mo
     found = predict(scene, deadline=60.0)
     assert found.status == "converged"
     assert (found.accuracy.n_u, found.accuracy.steps) == (free.n_u, free.steps)
-    monkeypatch.setattr(refinement, "_SLOWER", 1e9)  # the next march would not end before it: it is not begun
+    with monkeypatch.context() as patch:
+        patch.setattr(refinement, "_SLOWER", 1e9)  # the next march would not end before it: it is not begun
+        assert predict(scene, deadline=60.0).status == "max_iterations"
+    monkeypatch.setattr(refinement, "MOST_STEPS", free.steps // 2)
     assert predict(scene, deadline=60.0).status == "max_iterations"
+
+
+def test_who_gives_a_deadline_gets_more_control_points_too(monkeypatch: pytest.MonkeyPatch):
+    scene = swinging(Quality(target_error=1e-4))
+    scene = replace(scene, cable=replace(scene.cable, bending_stiffness=1e-6))
+    free = predict(scene).accuracy
+    monkeypatch.setattr(refinement, "_MOST_POINTS", free.n_u - 1)
+    assert predict(scene).status == "max_iterations"
+    found = predict(scene, deadline=60.0)
+    assert found.status == "converged"
+    assert found.accuracy.n_u == free.n_u
 
 
 def test_what_steps_err_by_is_learned_from_half_as_many_where_twice_as_many_are_dear(monkeypatch: pytest.MonkeyPatch):
