@@ -198,7 +198,7 @@ def summary(records: list[dict[str, Any]]) -> str:
     free = [r for r in determined if not r["families"][-1].endswith(("march", "grid", "odd"))]
     given = [r for r in determined if r["families"][-1].endswith(("march", "grid", "odd"))]
     lines.append(f"{len(records)} scenes, {len(possible)} of them possible, {len(printed)} of these by method paper")
-    shown = [r["index"] for r in records if r.get("driven")]
+    shown = [r["index"] for r in records if r.get("shown")]
     lines.append(_listed("impossible, as their motion shows", shown))
     lines.append(f"undetermined: {len(undetermined)}, {told} of them told")
     for name, part in (("of the others", determined), ("grid free", free), ("grid given", given)):

@@ -32,7 +32,7 @@ class Drawn:
     Attributes:
         seed, index: it is drawn from these alone.
         families: kinds of hardness, "group: kind".
-        possible: a cable can follow, as far as is known before its motion (`judge.shown_impossible`); else it has to
+        possible: a cable can follow, as far as is known before its motion (`judge.py`); else it has to
             be refused, or to end with a status that says so.
         make: returns the scene, or raises SceneError.
     """

@@ -10,6 +10,7 @@ import numpy as np
 
 from benchmarks.hard.generator import Drawn
 from benchmarks.hard.laws import measure
+from benchmarks.hard.taut import words_if_too_short
 from dlocore import Prediction, Scene, SceneError, predict
 from dlocore.determined import DISTURBED, bent
 from dlocore.discretisation import smallest_n_u
@@ -34,6 +35,7 @@ LOST = 0.05  # of the impulses that were about
 MIDWAY = (0.25, 0.5, 0.75)  # of the time of a motion
 
 DRIVEN = "impossible: a gripper drives what it holds into something"
+TOO_SHORT = "impossible: the cable is too short for what is in its way"
 
 Whose = Literal["checked", "failed", "all"]
 
@@ -62,10 +64,14 @@ def run(
         record["laws"] = asdict(measure(prediction))
         if checked:
             record |= compare(prediction, scene, patience)
-        driven_in = shown_impossible(prediction, scene, patience)
-        if driven_in:
-            record |= {"possible": False, "driven": driven_in, "families": (DRIVEN, *drawn.families)}
-        failed = measured != "checked" and prediction.status != "converged" and not driven_in
+        shown = {
+            DRIVEN: driven_into(prediction, scene, patience),
+            TOO_SHORT: words_if_too_short(prediction, scene, patience),
+        }
+        for why, how in shown.items():
+            if how:
+                record |= {"possible": False, "shown": how, "families": (why, *drawn.families)}
+        failed = measured != "checked" and prediction.status != "converged" and record["possible"]
         if failed or measured == "all" or record.get("apart", 0.0) > WRONG:
             record["disturbed"] = disturbed(prediction, scene, patience)
             if not is_undetermined(record):
@@ -178,7 +184,7 @@ def disturbed_midway(prediction: Prediction, scene: Scene, deadline: float) -> f
     return most
 
 
-def shown_impossible(prediction: Prediction, scene: Scene, deadline: float) -> str:
+def driven_into(prediction: Prediction, scene: Scene, deadline: float) -> str:
     """Return where a gripper drives what it holds into something, as the motion shows, "" where none does.
 
     A grasp that closes late has its path begin where the cable is by then, which the generator does not know. A coarse

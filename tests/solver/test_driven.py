@@ -114,7 +114,7 @@ def test_the_judge_counts_such_a_scene_as_impossible():
     assert drawn.possible
     assert not record["possible"]
     assert record["status"] == "stalled"
-    assert record["driven"] in record["message"] or "into obstacles[0]" in record["driven"]
+    assert record["shown"] in record["message"] or "into obstacles[0]" in record["shown"]
     assert record["families"] == (DRIVEN, *drawn.families)
     assert record["faults"] == []
     assert faults({**record, "status": "converged"}) == ["converged on an impossible scene"]
