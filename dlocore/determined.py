@@ -19,6 +19,7 @@ UNDETERMINED = 1e-2  # of the length: what moves by more when its start is bent 
 _GROWTH = math.log(100.0)  # of a disturbance, from which on it is looked for how much
 _SLOWEST = 1.0  # rate of growth that counts, over the time of the motion
 _LOOKS = 6  # states of a motion
+_COMPARED = 1025  # states of two motions, at most
 
 
 def bent(problem: Problem, grid: Grid, seed: int) -> Floats:
@@ -51,8 +52,9 @@ def goes_astray(problem: Problem, motion: March, monitor: Monitor) -> float:
     other = march(problem, grid.changed(start=start), motion.asked, monitor, rho=motion.rho, whole=True)
     if other.stopped:
         return 0.0
-    dimensions = problem.plane.dimensions
-    return float(np.linalg.norm((other.states - motion.states)[..., :dimensions], axis=-1).max())
+    at = np.unique(np.linspace(0, len(motion.states) - 1, _COMPARED).round().astype(int))
+    apart = (other.states[at] - motion.states[at])[..., : problem.plane.dimensions]
+    return float(np.linalg.norm(apart, axis=-1).max())
 
 
 def may_grow(problem: Problem, motion: March) -> bool:

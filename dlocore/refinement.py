@@ -97,7 +97,8 @@ class _Climb:
         estimate: error of the best one [m].
         rho: spectral radius of the next march.
         failures: marches in a row that found less than the best one, or no equilibrium as that.
-        doubted: whether the scene does not determine the motion, as a coarser grid that agreed has it.
+        astray: how far a start that is hardly another goes elsewhere, as the last grid that agreed has it [m], 0 where
+            that does not matter.
         pace: time that the last march took for each of its points and steps [s].
     """
 
@@ -115,7 +116,7 @@ class _Climb:
     estimate: float = np.inf
     rho: float = RHO
     failures: int = 0
-    doubted: bool = False
+    astray: float = 0.0
     pace: float = np.inf
 
     def outcome(self) -> Outcome:
@@ -166,12 +167,11 @@ class _Climb:
                 if finer is None and status != "converged":
                     return Outcome(level, status, message, _parts(self.changes, level))
                 if finer is None:
-                    astray = self._astray(level)
+                    before, self.astray = self.astray, self._find_astray(level)
                     # on a coarse grid disturbances may grow that do not on a fine one
-                    finer = self._next(level, size, None) if astray and not self.doubted else None
-                    self.doubted = astray > 0.0
+                    finer = self._next(level, size, None) if self.astray and not before else None
                     if finer is None:
-                        return self._agreeing(level, astray)
+                        return self._agreeing(level)
             else:
                 unfolded = self._unfolded(level, size)
                 if unfolded is not None:
@@ -205,7 +205,7 @@ class _Climb:
 
     def _forget(self) -> None:
         """Forget the grids before."""
-        self.best, self.changes, self.estimate = None, {}, np.inf
+        self.best, self.changes, self.estimate, self.astray = None, {}, np.inf, 0.0
 
     def _is_rough(self, level: Level) -> bool:
         return not level.change <= ROUGH * self.problem.scene.cable.length
@@ -330,7 +330,7 @@ class _Climb:
         """Tell whether the next grid is done within the budget, if one of `size` took a time `spent` [s]."""
         return not growth(self.problem, self.cost, size, finer) * spent > self.budget - self.monitor.elapsed()
 
-    def _astray(self, level: Level) -> float:
+    def _find_astray(self, level: Level) -> float:
         """Return how far a start that is hardly another would go elsewhere [m], 0 where that does not matter."""
         try:
             moved = goes_astray(level.problem, level.motion, self.monitor)
@@ -340,9 +340,9 @@ class _Climb:
             self.monitor.phase("estimate")
         return moved if moved > UNDETERMINED * self.problem.scene.cable.length else 0.0
 
-    def _agreeing(self, level: Level, astray: float) -> Outcome:
-        """Return the answer where grids agree, which is none where its start may take it `astray` [m]."""
-        parts = _parts(self.changes, level)
+    def _agreeing(self, level: Level) -> Outcome:
+        """Return the answer where grids agree, which is no success where its start may take it `astray`."""
+        parts, astray = _parts(self.changes, level), self.astray
         if not astray:
             return Outcome(level, "converged", self._agreed(level), parts)
         length = self.problem.scene.cable.length
@@ -415,7 +415,9 @@ class _Climb:
         left = self._left_over()
         advice = "Allow a larger target_error, more time or a shorter motion."
         if status == "converged" and self.estimate <= self.enough:
-            outcome = self._agreeing(best, 0.0 if self.budget < np.inf else self._astray(best))
+            if not self.astray and self.budget == np.inf:
+                self.astray = self._find_astray(best)
+            outcome = self._agreeing(best)
             finest = " No finer grid was tried." if self.estimate > self.target else ""
             return outcome._replace(message=outcome.message + finest)
         elif status == "converged" and self.monitor.remaining() <= 0:

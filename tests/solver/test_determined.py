@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from dlocore.problem import pose
 from dlocore.solvers.march import march
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.statics import start_grid
+from dlocore.whole_march import march_level
 from tests.solver.scenes import WEIGHTLESS
 
 LENGTH = 1.0
@@ -143,6 +145,27 @@ def test_a_grid_that_is_finer_decides_whether_a_motion_is_determined(monkeypatch
     assert seen[1] == (answer.accuracy.n_u, answer.accuracy.steps)
     assert np.prod(seen[1]) > np.prod(seen[0])
     assert "start" not in answer.accuracy.error_parts
+
+
+def test_what_a_grid_says_is_not_forgotten_as_the_time_ends(monkeypatch: pytest.MonkeyPatch):
+    found: list[float] = []
+
+    def astray(*_: object) -> float:
+        if found:
+            raise TimeIsUp
+        found.append(0.5 * LENGTH)
+        return found[0]
+
+    def marched(*arguments: Any, **options: Any) -> Any:
+        if found:
+            raise TimeIsUp
+        return march_level(*arguments, **options)
+
+    monkeypatch.setattr(refinement, "goes_astray", astray)
+    monkeypatch.setattr(refinement, "march_level", marched)
+    answer = predict(dataclasses.replace(column(0.1, drag=1.0), quality=Quality(target_error=0.01)))
+    assert answer.status == "stalled"
+    assert answer.accuracy.error_parts["start"] == found[0]
 
 
 def test_a_deadline_that_leaves_no_time_to_look_leaves_the_answer(monkeypatch: pytest.MonkeyPatch):
