@@ -11,12 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.discretisation import applied_forces
-from dlocore.effects.friction import SLIP_SPEED
 from dlocore.events import closed_grasps, marks_of, step_counts, step_times
 from dlocore.grid import Grid
 from dlocore.holding import Starts, hold
 from dlocore.kernels.assembly import History, note, slopes, times_scalar_band
-from dlocore.kernels.banded import Elimination
 from dlocore.kernels.entry import lasting, to_ends_of_steps
 from dlocore.kernels.march import (
     DEEPEST,
@@ -24,7 +22,6 @@ from dlocore.kernels.march import (
     FAILED_STEP,
     LEFT,
     STRUCK,
-    constrained_mass_solve,
     march_steps,
 )
 from dlocore.kernels.tension import COLUMNS
@@ -33,6 +30,7 @@ from dlocore.problem import Problem, firmer
 from dlocore.report import WindowForces
 from dlocore.scene import Grasp
 from dlocore.solvers.kept import Kept
+from dlocore.solvers.leaning import lean_on_anchors, lean_on_table
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.stretch import Entry, enter
 
@@ -48,7 +46,6 @@ COARSE = 1 / 256  # of the period of a cable that swings: the tolerance goes wit
 _SHORT = 20.0  # times the shortest knot span are the mean, where forces begin to need more than positions do
 _STIFF = 3e6  # EA L^2/EI up to which tension is no noise: that of cables whose EA is not given is mostly below
 _NOISELESS = 1e-4  # of the tolerance, at least
-_RESTS = 0.05  # of the diameter above the table: nearer to it the cable rests on it
 CHUNK = 256  # steps between looks at the clock, at most
 # of these steps, at most: times control points and their coordinates squared; some hundredths of a second
 _WORK = 2.5e5
@@ -357,9 +354,9 @@ class _Walk:
         if first == 0:
             self._velocity = entry.closed
             if problem.friction is not None and problem.table is not None:
-                _lean_on_table(problem, grid, a, self._history)
+                lean_on_table(problem, grid, a, self._history)
             if problem.friction is not None and problem.friction.lying > 0:
-                a = _lean_on_anchors(problem, grid, entry.v, a, self._mass, e, entry.G, self._history)
+                a = lean_on_anchors(problem, grid, entry.v, a, self._mass, e, entry.G, self._history)
                 if problem.inertia is None:
                     a = np.zeros_like(entry.v)
         reactions = np.zeros((last - first + 1, len(e.held)))
@@ -456,46 +453,6 @@ def tolerance_of(problem: Problem, grid: Grid, step: float) -> float:
     noisy = max(short**2 * min(1.0, _STIFF / stiff), _NOISELESS)
     least = TOLERANCE if problem.touches else LEAST_TOLERANCE
     return min(max(TOLERANCE * of_coarse**2 * noisy, least), MOST_TOLERANCE) * length
-
-
-def _lean_on_anchors(
-    problem: Problem, grid: Grid, v: Floats, a: Floats, mass: Floats, e: Elimination, G: Floats, history: History
-) -> Floats:
-    """Put the anchors of a lying cable where friction holds it back from the acceleration `a` that it would else take.
-
-    With anchors right under it the cable would run into the stick, and swing past it. Returns the acceleration that is
-    left, and adds the friction to G, both (n_u, nc).
-    """
-    assert problem.friction is not None
-    stick, _, limit = problem.friction.parameters()
-    index = grid.tables.body_first[:, None] + np.arange(4)
-    acceleration, velocity = (np.einsum("pi,pid->pd", grid.tables.body_b0, x[index]) for x in (a, v))
-    pull = problem.scene.cable.linear_density * acceleration / limit
-    pull = pull / np.maximum(np.linalg.norm(pull, axis=1, keepdims=True), 1.0)
-    speed = np.linalg.norm(velocity, axis=1, keepdims=True)
-    moves = speed > SLIP_SPEED  # friction on what slides is in `a` and G already
-    history.slide[:] = history.slide - stick * np.where(moves, velocity / np.maximum(speed, SLIP_SPEED), pull)
-    pull = np.where(moves, 0.0, pull)
-    force = np.zeros_like(a)
-    weights = limit * grid.tables.body_w[:, None] * grid.tables.body_b0
-    np.add.at(force, index, weights[:, :, None] * pull[:, None, :])
-    G += force
-    return a + constrained_mass_solve(problem.nc, mass, e, np.zeros(len(e.held)), -force)
-
-
-def _lean_on_table(problem: Problem, grid: Grid, a: Floats, history: History) -> None:
-    """Put the anchors of what rests on a table in space where friction holds it back, as `_lean_on_anchors` does."""
-    assert problem.friction is not None
-    assert problem.table is not None
-    fall = -float(problem.weight()[2]) / problem.scene.cable.linear_density
-    if not fall > 0.0 or not problem.table.friction > 0.0:
-        return
-    index = grid.tables.contact_first[:, None] + np.arange(4)
-    acceleration = np.einsum("pi,pid->pd", grid.tables.contact_b0, a[index])[:, :2]
-    pull = acceleration / (problem.table.friction * fall)
-    pull /= np.maximum(np.linalg.norm(pull, axis=1, keepdims=True), 1.0)
-    rests = history.stick[:, 5] - problem.table.height < _RESTS * problem.scene.cable.diameter
-    history.stick[:, :2] -= problem.friction.parameters()[0] * pull * rests[:, None]
 
 
 def _frames(problem: Problem) -> float:

@@ -1,0 +1,55 @@
+"""What friction holds as a stretch of motion begins: its anchors lie where it holds the cable back from the first."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.effects.friction import SLIP_SPEED
+from dlocore.grid import Grid
+from dlocore.kernels.assembly import History
+from dlocore.kernels.banded import Elimination
+from dlocore.kernels.march import constrained_mass_solve
+from dlocore.problem import Problem
+
+Floats = NDArray[np.float64]
+
+_RESTS = 0.05  # of the diameter above the table: nearer to it the cable rests on it
+
+
+def lean_on_anchors(
+    problem: Problem, grid: Grid, v: Floats, a: Floats, mass: Floats, e: Elimination, G: Floats, history: History
+) -> Floats:
+    """Put the anchors of a lying cable where friction holds it back from the acceleration `a` that it would else take.
+
+    With anchors right under it the cable would run into the stick, and swing past it. Returns the acceleration that is
+    left, and adds the friction to G, both (n_u, nc).
+    """
+    assert problem.friction is not None
+    stick, _, limit = problem.friction.parameters()
+    index = grid.tables.body_first[:, None] + np.arange(4)
+    acceleration, velocity = (np.einsum("pi,pid->pd", grid.tables.body_b0, x[index]) for x in (a, v))
+    pull = problem.scene.cable.linear_density * acceleration / limit
+    pull = pull / np.maximum(np.linalg.norm(pull, axis=1, keepdims=True), 1.0)
+    speed = np.linalg.norm(velocity, axis=1, keepdims=True)
+    moves = speed > SLIP_SPEED  # friction on what slides is in `a` and G already
+    history.slide[:] = history.slide - stick * np.where(moves, velocity / np.maximum(speed, SLIP_SPEED), pull)
+    pull = np.where(moves, 0.0, pull)
+    force = np.zeros_like(a)
+    weights = limit * grid.tables.body_w[:, None] * grid.tables.body_b0
+    np.add.at(force, index, weights[:, :, None] * pull[:, None, :])
+    G += force
+    return a + constrained_mass_solve(problem.nc, mass, e, np.zeros(len(e.held)), -force)
+
+
+def lean_on_table(problem: Problem, grid: Grid, a: Floats, history: History) -> None:
+    """Put the anchors of what rests on a table in space where friction holds it back, as `lean_on_anchors` does."""
+    assert problem.friction is not None
+    assert problem.table is not None
+    fall = -float(problem.weight()[2]) / problem.scene.cable.linear_density
+    if not fall > 0.0 or not problem.table.friction > 0.0:
+        return
+    index = grid.tables.contact_first[:, None] + np.arange(4)
+    acceleration = np.einsum("pi,pid->pd", grid.tables.contact_b0, a[index])[:, :2]
+    pull = acceleration / (problem.table.friction * fall)
+    pull /= np.maximum(np.linalg.norm(pull, axis=1, keepdims=True), 1.0)
+    rests = history.stick[:, 5] - problem.table.height < _RESTS * problem.scene.cable.diameter
+    history.stick[:, :2] -= problem.friction.parameters()[0] * pull * rests[:, None]
