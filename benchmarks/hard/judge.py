@@ -64,11 +64,8 @@ def run(
         record["laws"] = asdict(measure(prediction))
         if checked:
             record |= compare(prediction, scene, patience)
-        shown = {
-            DRIVEN: driven_into(prediction, scene, patience),
-            TOO_SHORT: words_if_too_short(prediction, scene, patience),
-        }
-        for why, how in shown.items():
+        for why, find in ((DRIVEN, driven_into), (TOO_SHORT, words_if_too_short)):
+            how = find(prediction, scene, patience) if "shown" not in record else ""
             if how:
                 record |= {"possible": False, "shown": how, "families": (why, *drawn.families)}
         failed = measured != "checked" and prediction.status != "converged" and record["possible"]
