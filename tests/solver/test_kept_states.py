@@ -7,6 +7,7 @@ import pytest
 
 from dlocore import Cable, Environment, Grasp, Load, Move, Points, Quality, Scene, Sphere, Table, predict, review
 from dlocore.events import marks_of, step_counts
+from dlocore.kernels.predictor import differences_of
 from dlocore.problem import pose
 from dlocore.sensitivity import objection
 from dlocore.solvers import kept
@@ -118,6 +119,35 @@ def test_a_march_that_ends_early_stands_still_from_there(monkeypatch: pytest.Mon
     assert 0 < thin.reached < len(thin.times) - 1
     assert thin.times[thin.reached] <= full.times[full.reached] < thin.times[thin.reached + 1]
     np.testing.assert_array_equal(thin.states[thin.reached + 1 :] - full.states[full.reached], 0.0)
+
+
+@pytest.mark.parametrize("every", [2, 5])
+def test_a_thin_log_stands_still_from_there_too(every: int, monkeypatch: pytest.MonkeyPatch):
+    problem, monitor = pose(SCENES["twisted and yielding"]), Monitor(None, None)
+    grid = start_grid(problem, 11, monitor)
+    strain = 0.5 * march(problem, grid, 150, monitor).largest_strain
+    monkeypatch.setattr("dlocore.solvers.march.CHUNK", 5)
+    full = march(problem, grid, 150, monitor, credible=strain)
+    monkeypatch.setattr("dlocore.solvers.march.MOST_FRAMES", -(-11 * 151 // every))
+    thin = march(problem, grid, 150, monitor, credible=strain)
+    assert full.stopped == "strain"
+    assert 0 < full.reached < 150
+    assert len(thin.log) < len(full.log) / every + 2
+    np.testing.assert_array_equal(thin.log, full.log[thin.logged])
+
+
+@pytest.mark.parametrize("every", [1, 4])
+def test_steps_are_predicted_from_all_the_states_behind_them(every: int, monkeypatch: pytest.MonkeyPatch):
+    states = np.random.default_rng(0).normal(size=(61, 7, 3))
+    monkeypatch.setattr(kept, "MOST_NUMBERS", states.size / every)
+    held = kept.Kept(states[0], [60], np.inf, (0, 0))
+    assert held.thin == (every > 1)
+    for at, until in ((0, 20), (20, 21), (21, 23), (23, 60)):
+        base, window, log = held.window(at, until, 0)
+        np.testing.assert_array_equal(differences_of(window[: at - base + 1]), differences_of(states[: at + 1]))
+        window[at - base + 1 :] = states[at + 1 : until + 1]
+        held.keep(base, window, log, at, until)
+    np.testing.assert_array_equal(held.states, states[held.steps])
 
 
 def test_a_march_without_time_stays_at_its_start():
