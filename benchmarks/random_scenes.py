@@ -5,7 +5,7 @@
 Every scene is drawn from (seed, index) alone; `--index 17` runs that one and prints it as Python. With `--again` all
 scenes are run with the short `--deadline` and judged by the laws. Of those that do not converge in it so many, drawn by
 the seed, are run once more with `--again-deadline`, and asked whether they determine their motion. Without it all are
-asked that do not converge.
+asked that do not converge. With `--last-deadline` those that fail in this second stage are run a third time, with that.
 """
 
 import argparse
@@ -26,7 +26,7 @@ import numpy as np
 
 from benchmarks.hard.generator import as_python, draw
 from benchmarks.hard.judge import WRONG, Whose, by_a_march, is_undetermined, left_its_grid, run
-from benchmarks.hard.shares import GROWTHS, Strata, drawn_again, is_left, share, strata
+from benchmarks.hard.shares import GROWTHS, Strata, drawn_again, has_failed, in_place_of, is_left, share, strata
 from benchmarks.machine import machine_line
 from dlocore import SceneError, warm_up
 
@@ -167,7 +167,7 @@ def _listed(name: str, found: list[int]) -> str:
 
 
 def in_the_end(seed: int, first: list[dict[str, Any]], again: list[dict[str, Any]]) -> list[str]:
-    """Return the share that converges given the time of the second stage, by what counts as determined."""
+    """Return the share that converges given the time of a later stage, by what counts as determined."""
     lines = []
     for growth in GROWTHS:
         found = strata(seed, first, again, growth)
@@ -276,12 +276,15 @@ def main() -> None:
     parser.add_argument("--deadline", type=float, default=30.0, help="seconds that a prediction is allowed")
     parser.add_argument("--again", type=int, default=0, help="of the scenes that do not converge, run again so many")
     parser.add_argument("--again-deadline", type=float, default=60.0, help="seconds that a prediction is allowed then")
+    parser.add_argument("--last-deadline", type=float, help="seconds that those which fail then are allowed once more")
     parser.add_argument("--index", type=int, help="run this scene alone and print it as Python")
     parser.add_argument("--summary", action="store_true", help="only print the summary of the file")
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that no process is left behind
     os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
     staged = options.again > 0
+    if options.last_deadline is not None and not staged:
+        parser.error("--last-deadline is for those that fail in a second stage: give --again too")
     patience = options.again_deadline if staged else options.deadline
     part = options.check / options.count
     if options.index is not None:
@@ -293,29 +296,39 @@ def main() -> None:
         return
     records = _read(options.resume)
 
-    def add(stage: Stage, indices: list[int], again: bool) -> None:
-        done = {r["index"] for r in records if r.get("again", False) == again}
+    def of_stage(number: int) -> list[dict[str, Any]]:
+        return [r for r in records if r["stage"] == number]
+
+    def add(stage: Stage, indices: list[int], number: int) -> list[dict[str, Any]]:
+        done = {r["index"] for r in of_stage(number)}
         left = [] if options.summary else [i for i in indices if i not in done]
         if left:
             warm_up()  # so that no process compiles while its time runs
         for record in run_all(stage, left, options.jobs):
-            records.append({**record, "again": again})
+            records.append({**record, "stage": number})
             if options.resume is not None:
                 with options.resume.open("a") as file:
                     file.write(json.dumps(records[-1]) + "\n")
+        return of_stage(number)
 
     measured: Whose = "checked" if staged else "failed"
-    add(Stage(options.seed, options.deadline, patience, part, measured), list(range(options.count)), False)
-    first = [r for r in records if not r.get("again", False)]
+    once = Stage(options.seed, options.deadline, patience, part, measured)
+    first = add(once, list(range(options.count)), 1)
+    again: list[dict[str, Any]] = []
+    last: list[dict[str, Any]] = []
     if staged:
         left = [r["index"] for r in first if is_left(r)]
-        stage = Stage(options.seed, options.again_deadline, patience, 0.0, "all")
-        add(stage, drawn_again(options.seed, left, options.again), True)
-    again = [r for r in records if r.get("again", False)]
+        twice = once._replace(deadline=options.again_deadline, checked=0.0, measured="all")
+        again = add(twice, drawn_again(options.seed, left, options.again), 2)
+        if options.last_deadline is not None:
+            thrice = twice._replace(deadline=options.last_deadline)
+            last = add(thrice, [r["index"] for r in again if has_failed(r)], 3)
     print("\n".join([f"seed {options.seed}", *counts(records), "", summary(first)]))
-    if again:
-        print("\n".join(["", f"run again with {options.again_deadline:g} s:", *in_the_end(options.seed, first, again)]))
-        print(summary(again))
+    for some, deadline in ((again, options.again_deadline), (last, options.last_deadline)):
+        if some:
+            again = in_place_of(again, some)
+            print("\n".join(["", f"run again with {deadline:g} s:", *in_the_end(options.seed, first, again)]))
+            print(summary(some))
     print(machine_line())
 
 

@@ -1,4 +1,4 @@
-"""What share of random scenes converges: from all of them in little time, and a sample of the rest in more."""
+"""What share of random scenes converges: from all of them in little time, a sample of the rest in more and more."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -14,7 +14,7 @@ _PRIOR = 0.5  # Jeffreys'
 
 
 class Strata(NamedTuple):
-    """Counts of a run in two stages.
+    """Counts of a run in stages.
 
     Attributes:
         converged: scenes that converge in the first stage.
@@ -47,10 +47,23 @@ def is_left(record: dict[str, Any]) -> bool:
     return told and record["possible"] and record.get("method") != "paper"
 
 
+def has_failed(record: dict[str, Any]) -> bool:
+    """Tell whether a record of a later stage is of a scene that determines its motion and did not converge."""
+    return is_left(record) and not is_undetermined(record)
+
+
+def in_place_of(again: list[dict[str, Any]], last: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the records of the second stage, in the place of each that of the third where there is one."""
+    newer = {r["index"]: r for r in last}
+    return [newer.get(r["index"], r) for r in again]
+
+
 def strata(
     seed: int, first: list[dict[str, Any]], again: list[dict[str, Any]], growth: float, *, as_asked: bool = False
 ) -> Strata:
-    """Count the records of both stages; scenes that are shown to amplify a change by more than `growth` are left out.
+    """Count the records of the first stage and of a later one.
+
+    Left out are scenes that are shown to amplify a change by more than `growth`.
 
     With `as_asked` a march in the place of a least squares counts as a failure.
 

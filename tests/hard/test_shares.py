@@ -1,4 +1,4 @@
-"""The arithmetic of runs of random scenes in two stages."""
+"""The arithmetic of runs of random scenes in stages."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.hard.judge import by_a_march, is_undetermined, left_its_grid
-from benchmarks.hard.shares import GROWTHS, Strata, drawn_again, is_left, share, strata
+from benchmarks.hard.shares import GROWTHS, Strata, drawn_again, has_failed, in_place_of, is_left, share, strata
 from benchmarks.random_scenes import counts, in_the_end, summary
 from dlocore.determined import DISTURBED
 
@@ -75,6 +75,23 @@ def test_records_of_both_stages_are_counted_once():
     again.append(record(order[7], "converged"))  # of an interrupted run: the one before it is missing
     assert strata(SEED, first, again, GROWTHS[0]) == Strata(20, 1, 10, 4, 1, 1)
     assert strata(SEED, first, again, GROWTHS[1]) == Strata(20, 1, 10, 4, 0, 2)
+
+
+def test_a_third_stage_runs_those_that_failed_and_takes_the_place_of_the_second():
+    again = [
+        record(0, "converged"),
+        record(1, "time_limit"),
+        record(2, "stalled", disturbed=0.3),  # not determined
+        record(3, "max_iterations"),
+        record(4, "stalled", possible=False),  # shown to be impossible
+    ]
+    assert [r["index"] for r in again if has_failed(r)] == [1, 3]
+    first = [record(index, "time_limit") for index in range(5)]
+    drawn = [again[index] for index in drawn_again(SEED, range(5), 5)]
+    assert strata(SEED, first, drawn, GROWTHS[0]) == Strata(0, 0, 5, 1, 2, 2)
+    newer = in_place_of(drawn, [record(3, "converged"), record(1, "max_iterations")])
+    assert [r["index"] for r in newer] == [r["index"] for r in drawn]
+    assert strata(SEED, first, newer, GROWTHS[0]) == Strata(0, 0, 5, 2, 1, 2)
 
 
 def test_a_march_in_place_of_a_least_squares_is_counted_with_the_others_and_apart():
