@@ -65,6 +65,8 @@ def choose(page: Page, label: str, option: str) -> None:
 def drawn(page: Page, time: str, tab: str, file: str) -> None:
     """Draw a scene at a time [s], with a tab of its panel open."""
     page.get_by_role("button", name="Pause").click()
+    page.get_by_role("button", name="Play").wait_for()
+    page.wait_for_timeout(WAIT)  # what was played before it paused may still come, and write the time again
     box = page.locator("input[type=text]").first
     box.fill(time)
     box.press("Enter")
