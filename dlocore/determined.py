@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.grid import Grid
-from dlocore.kernels.growth import fastest_growth
+from dlocore.kernels.growth import LOOKS, SLOWEST, fastest_growth, looked_at
 from dlocore.problem import Problem
 from dlocore.report import WindowForces
 from dlocore.solvers.march import March, march
@@ -17,8 +17,6 @@ Floats = NDArray[np.float64]
 DISTURBED = 1e-6  # of the length: bend of a start
 UNDETERMINED = 1e-2  # of the length: what moves by more when its start is bent so much is not determined
 _GROWTH = math.log(100.0)  # of a disturbance, from which on it is looked for how much
-_SLOWEST = 1.0  # rate of growth that counts, over the time of the motion
-_LOOKS = 6  # states of a motion
 _COMPARED = 1025  # states of two motions, at most
 
 
@@ -32,20 +30,21 @@ def bent(problem: Problem, grid: Grid, seed: int) -> Floats:
     return DISTURBED * problem.scene.cable.length * waves
 
 
-def goes_astray(problem: Problem, motion: March, monitor: Monitor) -> float:
+def goes_astray(problem: Problem, motion: March, monitor: Monitor, hard: bool) -> float:
     """Return how far a motion goes elsewhere when its start is bent by DISTURBED of the length [m].
 
-    It is marched once more for that, where a disturbance may grow: not in the plane, where nothing is touched, as
-    whatever is unstable there is so fast that grids do not agree on it; nor where the start has a bow in a plane and
-    another out of it (`buckling.py`), which is no larger, and of which the answer tells. Else, and where that march
-    finds no equilibrium, it is 0.
+    It is marched once more for that, where a disturbance may grow, or where tangents can't tell: where the cable strikes
+    something, and where it touches or rubs and is `hard`, needed grids beyond the first few. Not where the start has a
+    bow in a plane and another out of it (`buckling.py`), which is no larger, and of which the answer tells. Else, and
+    where that march finds no equilibrium, it is 0.
 
     Raises:
         Cancelled: the caller asked to stop.
         TimeIsUp: the deadline passed.
     """
     bowed_twice = bool(problem.start.bow and problem.start.aside)
-    if bowed_twice or motion.stopped or not (motion.split or may_grow(problem, motion)):
+    untold = motion.split or (hard and problem.touches)
+    if bowed_twice or motion.stopped or not (untold or may_grow(problem, motion)):
         return 0.0
     grid = motion.grid
     start = grid.start + bent(problem, grid, seed=1)
@@ -58,19 +57,19 @@ def goes_astray(problem: Problem, motion: March, monitor: Monitor) -> float:
 
 
 def may_grow(problem: Problem, motion: March) -> bool:
-    """Tell whether a disturbance may grow by much in a motion in space, as tangents of some states tell (eq. 18a)."""
-    if problem.nc == 2:
-        return False
-    return sum(_growth(problem, motion, window) for window in motion.forces) > _GROWTH
+    """Tell whether a disturbance may grow by much in a motion, as tangents of some states tell (eq. 18a)."""
+    growth = motion.growth
+    if growth is None:
+        growth = sum(_growth(problem, motion, window) for window in motion.forces)
+    return growth > _GROWTH
 
 
 def _growth(problem: Problem, motion: March, window: WindowForces) -> float:
     """Return the logarithm of what a disturbance grows by in a stretch of a motion at most, about."""
     lasts = float(window.times[-1] - window.times[0])
-    looks = max(2, round(_LOOKS * lasts / problem.horizon))
-    at = np.unique(np.linspace(0, len(window.times) - 1, looks + 1).round().astype(int)[1:])
+    at = looked_at(len(window.times) - 1, max(2, round(LOOKS * lasts / problem.horizon)))
     rates = fastest_growth(
         problem.axes, window.states[at], motion.behind(window.times[at]), motion.grid.tables, *problem.laws,
-        problem.mass_density(), problem.drag_coefficient(), window.held.elimination, _SLOWEST / problem.horizon,
+        problem.mass_density(), problem.drag_coefficient(), window.held.elimination, SLOWEST / problem.horizon,
     )  # fmt: skip
     return float(rates.sum()) * lasts / len(at)

@@ -333,7 +333,7 @@ class _Climb:
     def _find_astray(self, level: Level) -> float:
         """Return how far a start that is hardly another would go elsewhere [m], 0 where that does not matter."""
         try:
-            moved = goes_astray(level.problem, level.motion, self.monitor)
+            moved = goes_astray(level.problem, level.motion, self.monitor, self.number >= len(LEVELS))
         except TimeIsUp:
             return 0.0
         finally:

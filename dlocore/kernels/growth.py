@@ -6,9 +6,17 @@ import numpy as np
 
 from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, history_at
 from dlocore.kernels.banded import factor, reduce_matrix
-from dlocore.kernels.compile import kernel
+from dlocore.kernels.compile import brief, kernel
 
+LOOKS = 6  # states of a motion
+SLOWEST = 1.0  # rate of growth that counts, over the time of the motion
 _DOUBLINGS = 12  # of a rate, at most
+
+
+@brief
+def looked_at(last: int, looks: int) -> Any:
+    """Return the numbers (k,) of so many states of a motion that are looked at, of which the last is `last`."""
+    return np.unique(np.round(last / looks * np.arange(1, looks + 1)).astype(np.int64))
 
 
 @kernel

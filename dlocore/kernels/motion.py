@@ -18,13 +18,15 @@ from dlocore.kernels.assembly import (
 from dlocore.kernels.basis import build_tables
 from dlocore.kernels.compile import kernel
 from dlocore.kernels.entry import begin_stretch, lasting, remember_start, to_ends_of_steps
+from dlocore.kernels.growth import SLOWEST, fastest_growth, looked_at
 from dlocore.kernels.holding import hold_rows
 from dlocore.kernels.march import march_steps
 from dlocore.kernels.space import ROOM, ROOM_OF_POINT
 from dlocore.kernels.tension import COLUMNS
 from dlocore.kernels.timefit import fitted
 
-STRAIN, LEAST_SLOPE, MOST_SLOPE, SEEN = 5, 6, 7, 8  # places in `info` after those of `march_steps`, and their number
+# places in `info` after those of `march_steps`, and their number
+STRAIN, LEAST_SLOPE, MOST_SLOPE, GROWTH, SEEN = 5, 6, 7, 8, 9
 
 
 @kernel
@@ -32,7 +34,7 @@ def smooth_motion(
     axes: Any, knots: Any, free_start: bool, free_end: bool, rule2: Any, w2: Any, rule3: Any, w3: Any, rule4: Any,
     w4: Any, start: Any, velocity: Any, memory: Any, times: Any, near: Any, rows: Any, sampled: Any, origin: Any,
     directions: Any, knots_t: Any, active: Any, p: Any, density: float, dragged: float, weight: Any, rho: float,
-    tolerance: float, least_jump: float, every: int, info: Any,
+    tolerance: float, least_jump: float, every: int, looks: int, info: Any,
 ) -> Any:  # fmt: skip
     """March a smooth motion without twist from its start, and fit the time spline to it.
 
@@ -50,8 +52,9 @@ def smooth_motion(
         weight: (nc,) [N/m] per unit length.
         least_jump: of the velocity, in a step, that counts as a jump [m].
         every: of how many states one is searched for folds.
-        info: (SEEN,) as in `march_steps`, and the largest axial strain of the motion, and the least and the largest
-            |r'| at the curvature points.
+        looks: how many states are looked at for whether a disturbance may grow.
+        info: (SEEN,) as in `march_steps`, and the largest axial strain of the motion, the least and the largest |r'| at
+            the curvature points, and the logarithm of what a disturbance grows by at most, about.
 
     Returns:
         The states (steps + 1, n, nc) [m], the velocity (n, nc) [m/s] as the grasps close, the forces (steps + 1, held)
@@ -103,4 +106,12 @@ def smooth_motion(
     least, most = slopes(states, 1, tables.axial_first, tables.axial_b1)
     info[STRAIN] = max(0.0, most - 1.0, 1.0 - least)
     info[LEAST_SLOPE], info[MOST_SLOPE] = slopes(states, every, tables.curvature_first, tables.curvature_b1)
+    if looks > 0:
+        kept = np.expand_dims(history.memory, 0), np.expand_dims(history.past, 0), np.expand_dims(history.axial, 0)
+        behind = History(*kept, history.stick, history.slide, np.zeros((0, COLUMNS)), history.room)
+        at, lasts = looked_at(steps, looks), times[-1] - times[near]
+        rates = fastest_growth(
+            axes, states[at], behind, tables, active, p, density, dragged, e, SLOWEST / lasts,
+        )  # fmt: skip
+        info[GROWTH] = rates.sum() * lasts / len(at)
     return states, closed, reactions, history, control, off

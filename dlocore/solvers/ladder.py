@@ -11,6 +11,7 @@ from dlocore.discretisation import smallest_n_u
 from dlocore.effects.contact import DEEPEST
 from dlocore.events import moments, smallest_n_t, swings, time_knots
 from dlocore.grid import Grid
+from dlocore.kernels.growth import LOOKS
 from dlocore.kernels.timefit import farthest, sampled
 from dlocore.problem import Problem, stiffer, stiffer_for
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, march
@@ -125,7 +126,8 @@ def run_level(
     Args:
         rho: spectral radius of the march.
         booked: whether to book the time by phase.
-        free_knots: whether to add time knots where the cable strikes something.
+        free_knots: whether to add time knots where the cable strikes something; the grid is free to be refined, and it
+            is of interest whether a disturbance may grow.
         hardness: times that contact is stiffer to begin with, as it had to be made on a grid before.
         credible: axial strain up to which a march is believed.
         watch: watch over the stretch at more points, between which the cable can't fold.
@@ -149,7 +151,8 @@ def run_level(
     assert knots_t is not None, "the caller asks for enough control points"
     if booked:
         monitor.phase("setup")
-    plain = None if grid.watched else march_smooth(problem, grid, steps, knots_t, monitor, rho)
+    looks = LOOKS if free_knots else 0
+    plain = None if grid.watched else march_smooth(problem, grid, steps, knots_t, monitor, rho, looks)
     damped: March | None = None
     if plain is None:
         problem, motion, damped = _march(problem, grid, steps, monitor, rho, whole, credible)

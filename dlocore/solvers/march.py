@@ -81,6 +81,7 @@ class March:
         update: largest error left by the Newton iterations of a step, as estimated [m].
         deepest: largest depth of the cable in an obstacle, the table or itself [m].
         find_forces: finds `forces`, as they are first read.
+        growth: logarithm of what a disturbance grows by at most, about, where it was looked for.
     """
 
     grid: Grid
@@ -100,6 +101,7 @@ class March:
     update: float
     deepest: float
     find_forces: Callable[[], tuple[WindowForces, ...]] = field(repr=False)
+    growth: float | None = None
 
     @cached_property
     def forces(self) -> tuple[WindowForces, ...]:

@@ -11,7 +11,7 @@ from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, constraint_rows, hold
 from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4
 from dlocore.kernels.march import FAILED_STEP, LEFT
-from dlocore.kernels.motion import LEAST_SLOPE, MOST_SLOPE, SEEN, STRAIN, smooth_motion
+from dlocore.kernels.motion import GROWTH, LEAST_SLOPE, MOST_SLOPE, SEEN, STRAIN, smooth_motion
 from dlocore.problem import Problem
 from dlocore.report import WindowForces
 from dlocore.scene import Grasp
@@ -26,13 +26,14 @@ _NO_LOG = np.zeros((0, 0, 0))
 
 
 def march_smooth(
-    problem: Problem, grid: Grid, steps: int, knots_t: Floats, monitor: Monitor, rho: float
+    problem: Problem, grid: Grid, steps: int, knots_t: Floats, monitor: Monitor, rho: float, looks: int = 0
 ) -> tuple[March, Floats, Floats] | None:
     """March a motion without events and without twist, and fit the time spline to it.
 
     Args:
         knots_t: (n_t + 4,) [s] of the time spline.
         rho: spectral radius.
+        looks: how many states are looked at for whether a disturbance may grow.
 
     Returns:
         What `march` and `fit` return, and None where they have to do it: where there is more to the motion, it takes
@@ -63,7 +64,7 @@ def march_smooth(
         memory, times, len(NEAR), rows, sampled, problem.plane.origin, problem.plane.axes, knots_t, *problem.laws,
         problem.mass_density(), problem.drag_coefficient(), problem.weight(), rho,
         tolerance_of(problem, grid, problem.horizon / (steps + 1)), JUMPS * problem.scene.cable.length,
-        every_of(steps + 1), info,
+        every_of(steps + 1), looks, info,
     )  # fmt: skip
     if info[FAILED_STEP] >= 0:
         return None
@@ -86,6 +87,7 @@ def march_smooth(
         slopes=(float(info[LEAST_SLOPE]), float(info[MOST_SLOPE])),
         update=float(info[LEFT]),
         deepest=0.0,
+        growth=float(info[GROWTH]) if looks > 0 else None,
     )
     return motion, control, off
 
