@@ -7,16 +7,20 @@ from numpy.typing import NDArray
 
 from dlocore.grid import Grid
 from dlocore.kernels.growth import LOOKS, SLOWEST, fastest_growth, looked_at
+from dlocore.plane import FLATNESS
 from dlocore.problem import Problem
 from dlocore.report import WindowForces
+from dlocore.shape import StartCurve
 from dlocore.solvers.march import March, march
 from dlocore.solvers.monitor import Monitor
+from dlocore.spline import DEGREE
 
 Floats = NDArray[np.float64]
 
 DISTURBED = 1e-6  # of the length: bend of a start
 UNDETERMINED = 1e-2  # of the length: what moves by more when its start is bent so much is not determined
-_GROWTH = math.log(100.0)  # of a disturbance, from which on it is looked for how much
+_GROWTH = math.log(20.0)  # of a disturbance, as looks at some states tell, from which on it is looked for how much
+_HARDLY = 1e-4  # of the length: a start that is no farther from a line is hardly bent
 _COMPARED = 1025  # states of two motions, at most
 
 
@@ -33,17 +37,18 @@ def bent(problem: Problem, grid: Grid, seed: int) -> Floats:
 def goes_astray(problem: Problem, motion: March, monitor: Monitor, hard: bool) -> float:
     """Return how far a motion goes elsewhere when its start is bent by DISTURBED of the length [m].
 
-    It is marched once more for that, where a disturbance may grow, or where tangents can't tell: where the cable strikes
-    something, and where it touches or rubs and is `hard`, needed grids beyond the first few. Not where the start has a
-    bow in a plane and another out of it (`buckling.py`), which is no larger, and of which the answer tells. Else, and
-    where that march finds no equilibrium, it is 0.
+    It is marched once more for that, where a disturbance may grow, or where tangents can't tell: where the cable
+    strikes something, where it touches or rubs and is `hard`, needed grids beyond the first few, and where it starts so
+    nearly straight that it buckles between any two looks. Not where the start has a bow in a plane and another out of
+    it (`buckling.py`), which is no larger, and of which the answer tells. Else, and where that march finds no
+    equilibrium, it is 0.
 
     Raises:
         Cancelled: the caller asked to stop.
         TimeIsUp: the deadline passed.
     """
     bowed_twice = bool(problem.start.bow and problem.start.aside)
-    untold = motion.split or (hard and problem.touches)
+    untold = motion.split or (hard and problem.touches) or _hardly_bent(problem.start)
     if bowed_twice or motion.stopped or not (untold or may_grow(problem, motion)):
         return 0.0
     grid = motion.grid
@@ -54,6 +59,16 @@ def goes_astray(problem: Problem, motion: March, monitor: Monitor, hard: bool) -
     at = np.unique(np.linspace(0, len(motion.states) - 1, _COMPARED).round().astype(int))
     apart = (other.states[at] - motion.states[at])[..., : problem.plane.dimensions]
     return float(np.linalg.norm(apart, axis=-1).max())
+
+
+def _hardly_bent(start: StartCurve) -> bool:
+    """Tell whether a start is nearly straight, and not quite: too little decides on the side to which it buckles."""
+    ways = start.control_points - start.control_points[0]
+    chord = ways[-1]
+    if start.bow or len(ways) <= DEGREE + 1 or not chord @ chord > 0.0:
+        return False
+    off = float(np.abs(ways - np.outer(ways @ chord / (chord @ chord), chord)).max())
+    return FLATNESS < off / float(start.knots[-1]) < _HARDLY
 
 
 def may_grow(problem: Problem, motion: March) -> bool:
