@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmarks.hard.generator import as_python, draw
-from benchmarks.hard.judge import WRONG, Whose, by_a_march, is_undetermined, left_its_grid, run
+from benchmarks.hard.judge import WRONG, Whose, by_a_march, is_undetermined, left_its_grid, run, tells
 from benchmarks.hard.shares import GROWTHS, Strata, drawn_again, has_failed, in_place_of, is_left, share, strata
 from benchmarks.machine import machine_line
 from dlocore import SceneError, warm_up
@@ -193,7 +193,7 @@ def summary(records: list[dict[str, Any]]) -> str:
     printed = [r for r in possible if r.get("method") == "paper"]
     judged = [r for r in possible if r.get("method") != "paper"]
     undetermined = [r for r in judged if is_undetermined(r)]
-    told = sum(r["status"] != "converged" or (r["estimate"] or 0.0) > WRONG for r in undetermined)
+    told = sum(map(tells, undetermined))
     determined = [r for r in judged if not is_undetermined(r)]
     free = [r for r in determined if not r["families"][-1].endswith(("march", "grid", "odd"))]
     given = [r for r in determined if r["families"][-1].endswith(("march", "grid", "odd"))]

@@ -61,6 +61,12 @@ def goes_astray(problem: Problem, motion: March, monitor: Monitor, hard: bool) -
     return float(np.linalg.norm(apart, axis=-1).max())
 
 
+def in_words(problem: Problem, moved: float) -> str:
+    """Return in words that a start which is hardly another goes elsewhere by so much [m]."""
+    bend = f"a start bent by a millionth of the length, {DISTURBED * problem.scene.cable.length * 1e6:.2g} um,"
+    return f"the scene does not determine its motion: {bend} ends elsewhere by up to {moved * 1e3:.2g} mm"
+
+
 def _hardly_bent(start: StartCurve) -> bool:
     """Tell whether a start is nearly straight, and not quite: too little decides on the side to which it buckles."""
     ways = start.control_points - start.control_points[0]

@@ -6,7 +6,7 @@ import numpy as np
 
 from dlocore.budget import first_level, growth
 from dlocore.cost import Cost
-from dlocore.determined import DISTURBED, UNDETERMINED, goes_astray
+from dlocore.determined import UNDETERMINED, goes_astray, in_words
 from dlocore.errors import SceneError
 from dlocore.problem import Problem
 from dlocore.progress import record_level
@@ -345,13 +345,9 @@ class _Climb:
         parts, astray = _parts(self.changes, level), self.astray
         if not astray:
             return Outcome(level, "converged", self._agreed(level), parts)
-        length = self.problem.scene.cable.length
-        bend = f"a start bent by a millionth of the length, {DISTURBED * length * 1e6:.2g} um,"
-        message = f"{self._agreed(level)} But the scene does not determine its motion: {bend} ends elsewhere by up to"
         advice = "Make the motion slower, damp it, or hold the cable in more places."
-        return Outcome(
-            level, "stalled", f"{message} {astray * 1e3:.2g} mm. {advice}", {**(parts or {}), "start": astray}
-        )
+        message = f"{self._agreed(level)} But {in_words(self.problem, astray)}. {advice}"
+        return Outcome(level, "stalled", message, {**(parts or {}), "start": astray})
 
     def _agreed(self, level: Level) -> str:
         return f"Two grids agree to {level.change * 1e3:.2g} mm; {self._left_over()}."

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.buckling import BOW, UNSTABLE, side_notes
+from dlocore.determined import UNDETERMINED, goes_astray, in_words
 from dlocore.effects import laws
 from dlocore.effects.damping import Damping
 from dlocore.effects.distance import distances
@@ -26,6 +27,7 @@ from dlocore.problem import Problem
 from dlocore.report import WindowForces
 from dlocore.sideways import leaves_plane
 from dlocore.solvers.ladder import CREDIBLE_STRAIN, Level
+from dlocore.solvers.monitor import Monitor
 from dlocore.spline import SplineSurface, design_matrix
 
 Floats = NDArray[np.float64]
@@ -104,6 +106,7 @@ def objections(level: Level) -> list[str]:
     found += side_notes(problem.start)
     if problem.scene.quality.n_u is not None and leaves_plane(problem, level.motion):
         found.append(f"{UNSTABLE}: without a given grid it is solved in space, with a bow out of the plane")
+    found += _undetermined(level)
     elsewhere = goes_elsewhere(problem, level.motion)
     if elsewhere:
         lopsided = f"a cable lopsided by {BOW * problem.scene.cable.length * 1e3:.2g} mm"
@@ -129,6 +132,15 @@ def objections(level: Level) -> list[str]:
             if moved > allowed:
                 found.append(f"{name} is off, though it would move the cable by about {moved * 1e3:.2g} mm")
     return found
+
+
+def _undetermined(level: Level) -> list[str]:
+    """Return in words that the scene of a given grid does not determine its motion; on free grids the status tells."""
+    problem = level.problem
+    if problem.scene.quality.n_u is None:
+        return []
+    moved = goes_astray(problem, level.motion, Monitor(), hard=False)
+    return [in_words(problem, moved)] if moved > UNDETERMINED * problem.scene.cable.length else []
 
 
 def _stretched(level: Level) -> list[str]:

@@ -230,6 +230,12 @@ def is_undetermined(record: dict[str, Any], growth: float = WRONG / DISTURBED) -
     return max(record.get("disturbed") or 0.0, record.get("midway") or 0.0) > growth * DISTURBED
 
 
+def tells(record: dict[str, Any]) -> bool:
+    """Tell whether an answer says that it may be wrong by more than WRONG, or that its scene leaves its motion open."""
+    told = record["status"] != "converged" or (record["estimate"] or 0.0) > WRONG
+    return told or "does not determine its motion" in record["message"]
+
+
 def faults(record: dict[str, Any]) -> list[str]:
     """Return what is wrong with an answer, in words; nothing where it is right."""
     status, found = record["status"], []
@@ -259,9 +265,8 @@ def faults(record: dict[str, Any]) -> list[str]:
             told = estimate is not None and estimate > min(WRONG, 0.5 * error)
             found.append("wrong and told" if told else "lie")
         elif error is not None and record["apart"] > WRONG:
-            told = estimate is not None and estimate > WRONG
             kind = "undetermined" if is_undetermined(record) else "no reference"
-            found.append(f"{kind} and told" if told else f"{kind} and not told")
+            found.append(f"{kind} and told" if tells(record) else f"{kind} and not told")
     elif is_undetermined(record):
         found.append(f"undetermined and told: {status}")
     else:

@@ -197,6 +197,17 @@ def test_a_scene_that_does_not_determine_its_motion_is_no_success():
     assert np.linalg.norm((other.states - motion.states)[..., :3], axis=-1).max() > UNDETERMINED * length
 
 
+def test_on_a_given_grid_a_note_tells_that_a_scene_does_not_determine_its_motion():
+    scene = draw(90, 42943).make()
+    found = predict(scene)
+    grid = Quality(n_u=found.accuracy.n_u, n_t=found.accuracy.n_t, method="march", estimate=False)
+    answer = predict(dataclasses.replace(scene, quality=grid))
+    assert answer.status == "converged"
+    assert "Note: the scene does not determine its motion: a start bent by a millionth of the length" in answer.message
+    plain = predict(dataclasses.replace(drawn_over_a_table(0.0), quality=dataclasses.replace(grid, n_u=9, n_t=13)))
+    assert "determine" not in plain.message
+
+
 def test_where_a_start_was_bowed_twice_the_notes_tell(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(determined, "march", None)  # none is needed
     answer = predict(draw(90, 219).make())
