@@ -135,12 +135,12 @@ def objections(level: Level) -> list[str]:
 
 
 def _undetermined(level: Level) -> list[str]:
-    """Return in words that the scene of a given grid does not determine its motion; on free grids the status tells."""
+    """Return in words that a scene does not determine its motion on a given grid; on free grids the status tells."""
     problem = level.problem
     if problem.scene.quality.n_u is None:
         return []
     moved = goes_astray(problem, level.motion, Monitor(), hard=False)
-    return [in_words(problem, moved)] if moved > UNDETERMINED * problem.scene.cable.length else []
+    return [f"on this grid {in_words(problem, moved)}"] if moved > UNDETERMINED * problem.scene.cable.length else []
 
 
 def _stretched(level: Level) -> list[str]:

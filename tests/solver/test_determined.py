@@ -203,7 +203,10 @@ def test_on_a_given_grid_a_note_tells_that_a_scene_does_not_determine_its_motion
     grid = Quality(n_u=found.accuracy.n_u, n_t=found.accuracy.n_t, method="march", estimate=False)
     answer = predict(dataclasses.replace(scene, quality=grid))
     assert answer.status == "converged"
-    assert "Note: the scene does not determine its motion: a start bent by a millionth of the length" in answer.message
+    assert (
+        "Note: on this grid the scene does not determine its motion: a start bent by a millionth of the length"
+        in answer.message
+    )
     plain = predict(dataclasses.replace(drawn_over_a_table(0.0), quality=dataclasses.replace(grid, n_u=9, n_t=13)))
     assert "determine" not in plain.message
 
