@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from benchmarks.catalogue import bow, sagging
+from benchmarks.catalogue.parts import bow, sagging
 from dlocore import Cable, Environment, Grasp, Move, Points, Scene, Straight, Table
 
 HOLDS = ("point", "tangent", "clamp")
