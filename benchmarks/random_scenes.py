@@ -277,6 +277,10 @@ def main() -> None:
     parser.add_argument("--again", type=int, default=0, help="of the scenes that do not converge, run again so many")
     parser.add_argument("--again-deadline", type=float, default=60.0, help="seconds that a prediction is allowed then")
     parser.add_argument("--last-deadline", type=float, help="seconds that those which fail then are allowed once more")
+    parser.add_argument(
+        "--measure", choices=("failed", "all"), default="failed",
+        help="whose start is disturbed in a run of one stage, beside those compared (default: of those that fail)",
+    )  # fmt: skip
     parser.add_argument("--index", type=int, help="run this scene alone and print it as Python")
     parser.add_argument("--summary", action="store_true", help="only print the summary of the file")
     options = parser.parse_args()
@@ -311,7 +315,7 @@ def main() -> None:
                     file.write(json.dumps(records[-1]) + "\n")
         return of_stage(number)
 
-    measured: Whose = "checked" if staged else "failed"
+    measured: Whose = "checked" if staged else options.measure
     once = Stage(options.seed, options.deadline, patience, part, measured)
     first = add(once, list(range(options.count)), 1)
     again: list[dict[str, Any]] = []

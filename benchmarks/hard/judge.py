@@ -32,6 +32,7 @@ HELD = 1e-9  # [m]
 ASTRAY = 1e-4  # of the length: of a gripper's path by the time spline, between the ends
 GAINED = 0.02  # of the energy that was about
 LOST = 0.05  # of the impulses that were about
+OPEN = ("does not determine its motion", "mirror image")  # words of an answer that is one of several
 MIDWAY = (0.25, 0.5, 0.75)  # of the time of a motion
 
 DRIVEN = "impossible: a gripper drives what it holds into something"
@@ -50,8 +51,8 @@ def run(
         deadline: time that a prediction is allowed [s].
         checked: compare it with a refined march too.
         patience: time that each further solve of the judge is allowed [s]; the same where it is None.
-        measured: whose start is disturbed, to tell whether it determines the motion: of scenes that do not converge,
-            of "all", or, as always, only of those whose refined marches differ ("checked").
+        measured: whose start is disturbed, to tell whether it determines the motion: of scenes that do not converge
+            ("failed"), of "all", or, as always, only of those that are compared ("checked").
     """
     patience = deadline if patience is None else patience
     record: dict[str, Any] = {"index": drawn.index, "families": drawn.families, "possible": drawn.possible}
@@ -69,7 +70,7 @@ def run(
             if how:
                 record |= {"possible": False, "shown": how, "families": (why, *drawn.families)}
         failed = measured != "checked" and prediction.status != "converged" and record["possible"]
-        if failed or measured == "all" or record.get("apart", 0.0) > WRONG:
+        if failed or measured == "all" or checked:
             record["disturbed"] = disturbed(prediction, scene, patience)
             if not is_undetermined(record):
                 record["midway"] = disturbed_midway(prediction, scene, patience)
@@ -231,9 +232,9 @@ def is_undetermined(record: dict[str, Any], growth: float = WRONG / DISTURBED) -
 
 
 def tells(record: dict[str, Any]) -> bool:
-    """Tell whether an answer says that it may be wrong by more than WRONG, or that its scene leaves its motion open."""
+    """Tell whether an answer says that it may be wrong by more than WRONG, or that another motion is as likely."""
     told = record["status"] != "converged" or (record["estimate"] or 0.0) > WRONG
-    return told or "does not determine its motion" in record["message"]
+    return told or any(words in record["message"] for words in OPEN)
 
 
 def faults(record: dict[str, Any]) -> list[str]:
@@ -249,6 +250,8 @@ def faults(record: dict[str, Any]) -> list[str]:
     laws = record["laws"]
     if not laws["finite"]:
         return ["not finite"]
+    if is_undetermined(record):
+        found.append(f"undetermined and told: {status}" if tells(record) else "undetermined and not told")
     if status == "converged":
         if laws["strain"] > MOST_STRAIN:
             found.append("strained")
@@ -260,15 +263,14 @@ def faults(record: dict[str, Any]) -> list[str]:
             found.append("gained energy")
         if laws["momentum"] is not None and laws["momentum"] > LOST:
             found.append("lost momentum")
-        error, estimate = record.get("error"), record["estimate"]
-        if error is not None and error > WRONG and record["apart"] < SURE * error:
+        error, estimate = record.get("error", 0.0), record["estimate"]
+        if is_undetermined(record):
+            return found  # another motion is as right
+        if error > WRONG and record["apart"] < SURE * error:
             told = estimate is not None and estimate > min(WRONG, 0.5 * error)
             found.append("wrong and told" if told else "lie")
-        elif error is not None and record["apart"] > WRONG:
-            kind = "undetermined" if is_undetermined(record) else "no reference"
-            found.append(f"{kind} and told" if tells(record) else f"{kind} and not told")
-    elif is_undetermined(record):
-        found.append(f"undetermined and told: {status}")
-    else:
+        elif record.get("apart", 0.0) > WRONG:
+            found.append("no reference and told" if tells(record) else "no reference and not told")
+    elif not is_undetermined(record):
         found.append(f"not converged: {status}")
     return found

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.hard.judge import by_a_march, is_undetermined, left_its_grid
+from benchmarks.hard.judge import by_a_march, faults, is_undetermined, left_its_grid
 from benchmarks.hard.shares import GROWTHS, Strata, drawn_again, has_failed, in_place_of, is_left, share, strata
 from benchmarks.random_scenes import counts, in_the_end, summary
 from dlocore.determined import DISTURBED
@@ -140,6 +140,30 @@ def test_what_never_may_happen_is_counted_by_kind():
     assert "lies: 1: 0" in counts(records)
     assert "hangs and crashes: 2: 1 2" in counts(records)
     assert "exceptions: 0" in counts(records[:3])
+
+
+@pytest.mark.parametrize(
+    ("more", "expected"),
+    [
+        ({}, []),
+        ({"disturbed": 0.3}, ["undetermined and not told"]),
+        ({"midway": 0.3}, ["undetermined and not told"]),
+        ({"disturbed": 0.3, "estimate": 0.02}, ["undetermined and told: converged"]),
+        ({"disturbed": 0.3, "message": "On it the scene does not determine its motion."},
+         ["undetermined and told: converged"]),
+        ({"disturbed": 0.3, "message": "Its mirror image is as likely."}, ["undetermined and told: converged"]),
+        ({"disturbed": 0.3, "error": 0.5, "apart": 0.0}, ["undetermined and not told"]),
+        ({"error": 0.5, "apart": 0.0}, ["lie"]),
+        ({"error": 0.5, "apart": 0.0, "estimate": 0.3}, ["wrong and told"]),
+        ({"error": 0.5, "apart": 0.4}, ["no reference and not told"]),
+        ({"status": "stalled"}, ["not converged: stalled"]),
+        ({"status": "stalled", "disturbed": 0.3}, ["undetermined and told: stalled"]),
+    ],
+)  # fmt: skip
+def test_an_answer_that_is_one_of_several_has_to_say_so(more: dict[str, Any], expected: list[str]):
+    laws = {"finite": True, "strain": 0.0, "held": 0.0, "held_between": 0.0, "energy": None, "momentum": None}
+    answer = {"status": "converged", "possible": True, "message": "", "estimate": 1e-3, "length": 1.0, "laws": laws}
+    assert faults({**answer, **more}) == expected
 
 
 def test_grids_that_were_left_are_told_from_those_that_were_kept():
