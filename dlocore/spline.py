@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 DEGREE = 3
+_TINY = 1e-300  # the least |r'|^3 that is divided by
 
 
 def uniform_knots(n: int, end: float) -> Floats:
@@ -85,10 +86,10 @@ class SplineSurface:
         return u, t, self(u, t)
 
     def curvature(self, u: ArrayLike, t: ArrayLike) -> Floats:
-        """Return the curvature |r' x r''| / |r'|^3 on the grid; (k_t, k_u) [1/m]."""
+        """Return the curvature |r' x r''| / |r'|^3 on the grid; (k_t, k_u) [1/m]. Where r' is zero it is 0."""
         first, second = self(u, t, du=1)[..., :3], self(u, t, du=2)[..., :3]
         cross = np.linalg.norm(np.cross(first, second), axis=-1)
-        return cross / np.maximum(np.linalg.norm(first, axis=-1), 1e-300) ** 3
+        return cross / np.maximum(np.linalg.norm(first, axis=-1) ** 3, _TINY)
 
     def twist_rate(self, u: ArrayLike, t: ArrayLike) -> Floats:
         """Return the twist strain tau = theta' on the grid (docs/model.md eq. 19); (k_t, k_u) [rad/m]."""

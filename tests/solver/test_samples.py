@@ -1,7 +1,8 @@
-"""Where two marches are compared: their surfaces at evenly spaced times and places."""
+"""Surfaces at evenly spaced times and places, where two marches are compared, and how they are curved there."""
 
 import numpy as np
 import pytest
+from scipy.interpolate import make_interp_spline
 
 from dlocore import Cable, Environment, Grasp, Move, Scene, Straight
 from dlocore.events import moments
@@ -40,3 +41,15 @@ def test_what_a_second_of_a_long_motion_brings_is_seen() -> None:
     u, t = np.linspace(0.0, 1.0, 33), np.linspace(0.0, 2.0, 401)
     first, second = (surface_at(level.problem, level, level.control).positions(u, t) for level in (a, b))
     assert distance(a, b, problem) > 0.5 * np.linalg.norm(first - second, axis=-1).max()
+
+
+def test_curvature_is_that_of_a_circle_and_none_where_the_surface_stands_in_one_point():
+    angle = np.linspace(0.0, 2.0, 161)
+    knots_t = uniform_knots(4, 1.0)
+    circle = make_interp_spline(
+        0.5 * angle, 0.5 * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle, 0 * angle])
+    )
+    surface = SplineSurface(np.tile(circle.c, (4, 1, 1)), circle.t, knots_t)
+    np.testing.assert_allclose(surface.curvature(np.linspace(0.05, 0.95, 9), [0.0, 0.5]), 2.0, rtol=1e-4)
+    still = SplineSurface(np.zeros_like(surface.control_points), circle.t, knots_t)
+    assert (still.curvature([0.0, 0.5], [0.0, 1.0]) == 0.0).all()
