@@ -6,7 +6,7 @@ length.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple, cast
@@ -58,9 +58,10 @@ def with_side(scene: Scene, start: StartCurve, at_rest: bool) -> StartCurve:
     along = _line(scene, start)
     if along is None:
         return start
-    bowed = [part for part, growth in _growths(scene, start, along, at_rest).items() if growth > GROWTH]
-    if not bowed:
+    pushed = [part for part, growth in _growths(scene, start, along, at_rest).items() if growth > GROWTH]
+    if not pushed:
         return start
+    bowed = list(dict.fromkeys(piece for part in pushed for piece in _pieces(scene, part)))
     knots = _knots(bowed, scene.cable.length)
     u = greville(knots)
     # by turns, as beyond a grasp that lets the cable turn it bends on the other way
@@ -218,7 +219,18 @@ def _growths(scene: Scene, start: StartCurve, along: Floats, at_rest: bool) -> d
 
 
 def _parts(held: list[Grasp], length: float) -> Iterator[_Part]:
-    ends: list[tuple[float, Grasp | None]] = [(0.0, None), *((g.u, g) for g in held), (length, None)]
+    return _between([(0.0, None), *((g.u, g) for g in held), (length, None)], length)
+
+
+def _pieces(scene: Scene, part: _Part) -> Iterator[_Part]:
+    """Return the pieces of a part between the grasps of t = 0, which close where the start was given, not on a bow."""
+    length = scene.cable.length
+    inside = [g for g in scene.grasps if g.start == 0.0 and part.begin < g.u < part.end]
+    held = [(g.u, g) for g in sorted(inside, key=lambda g: g.u)]
+    return _between([(part.begin, part.grasps[0]), *held, (part.end, part.grasps[1])], length)
+
+
+def _between(ends: Sequence[tuple[float, Grasp | None]], length: float) -> Iterator[_Part]:
     for (begin, first), (end, second) in pairwise(ends):
         if end - begin > FLATNESS * length:
             yield _Part(begin, end, (first, second))

@@ -135,6 +135,20 @@ def test_what_is_grasped_stays_on_the_line_and_the_bow_is_at_rest() -> None:
     assert bow(scene) == pytest.approx(0.6 * BOW, rel=0.02)  # of the part that is pushed alone
 
 
+@pytest.mark.parametrize("hold", ["point", "tangent"])
+def test_a_part_that_is_pushed_later_has_no_bow_where_a_grasp_holds_it_first(hold: Any) -> None:
+    """A hanging cable is let go as a grasp below closes: above that it stands, and buckles."""
+    first = Grasp(u=0.4, hold=hold, release_time=1.0)
+    grasps = (first, Grasp(u=0.9, hold="tangent", grasp_time=1.0))
+    shape = Straight(direction=(0.0, 0.0, -1.0))
+    limp = cord(bending_stiffness=1e-3)
+    scene = Scene(cable=limp, shape=shape, grasps=grasps, environment=HANGING, horizon=2.0)
+    assert abs(bow(scene)) > 0.3 * BOW
+    prediction = predict(replace(scene, quality=Quality(n_u=31, n_t=61, estimate=False)))
+    held = prediction.surface.positions([0.4], [0.0, 0.5])[:, 0]
+    assert np.abs(held - [0.0, 0.0, -0.4]).max() < 1e-9
+
+
 @pytest.mark.parametrize("hold", ["tangent", "clamp"])
 def test_held_directions_stay(hold: str) -> None:
     prediction = predict(pushed(hold=hold))
