@@ -331,11 +331,14 @@ class _Climb:
         return not growth(self.problem, self.cost, size, finer) * spent > self.budget - self.monitor.elapsed()
 
     def _find_astray(self, level: Level) -> float:
-        """Return how far a start that is hardly another would go elsewhere [m], 0 where that does not matter."""
+        """Return how far a start that is hardly another would go elsewhere [m], 0 where that does not matter.
+
+        Where there is no time left to look, what the grid before says counts.
+        """
         try:
             moved = goes_astray(level.problem, level.motion, self.monitor, self.number >= len(LEVELS))
         except TimeIsUp:
-            return 0.0
+            return self.astray
         finally:
             self.monitor.phase("estimate")
         return moved if moved > UNDETERMINED * self.problem.scene.cable.length else 0.0
