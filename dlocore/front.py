@@ -24,7 +24,7 @@ from dlocore.review import neglected, objections
 from dlocore.scene import Method, Quality, Scene
 from dlocore.solvers.ladder import Level
 from dlocore.solvers.monitor import Monitor, TimeIsUp
-from dlocore.solvers.paper import solve_as_printed
+from dlocore.solvers.paper import BEYOND, solve_as_printed
 from dlocore.solvers.spacetime import solve
 from dlocore.spline import uniform_knots
 from dlocore.whole_march import MISSED_COUNTS, TORN, Outcome, march_status, sided
@@ -223,7 +223,7 @@ def _least_squares(
             )
         else:
             message += " The surface is that of the march it started from."
-    elif not np.isfinite(control).all():
+    elif not np.abs(control).max() <= BEYOND * problem.scene.cable.length:
         status = "stalled"
         message += " The iterates grew beyond all bounds; the surface is that of a march."
         control, left = level.control, level.motion.update

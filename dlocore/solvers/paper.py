@@ -26,6 +26,7 @@ Floats = NDArray[np.float64]
 
 MAX_ITERATIONS = 50
 LARGEST_NET = 600  # control points: the least squares is dense, as printed
+BEYOND = 1e6  # times the length: iterates that went so far do not come back
 
 
 def solve_as_printed(
@@ -86,7 +87,7 @@ def solve_as_printed(
         control = control + step
         update = float(np.linalg.norm(step))
         on_step(control, update, float(np.sqrt(np.mean(R * R))))
-        if not np.isfinite(update) or update < delta:
+        if not update <= BEYOND * problem.scene.cable.length or update < delta:
             break
     return control, update < delta, update
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import warnings
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.hard.generator import draw
 from benchmarks.rod import converged
 from dlocore import Cable, Environment, Grasp, Move, Prediction, Quality, Scene, Straight, predict
 from tests.solver.scenes import PAPER_GRASPS, Floats, apart, paper_scene, refined, rms, samples, without_table
@@ -106,6 +108,18 @@ def test_the_printed_scheme_never_claims_what_its_update_denies(u, EI):
 def test_the_printed_scheme_fails_on_the_default_case():
     scene = paper_scene(0.25, quality=Quality(n_u=9, n_t=13, delta=1e-5, method="paper"))
     assert predict(scene).status in ("max_iterations", "stalled")
+
+
+def test_where_the_printed_scheme_goes_astray_the_surface_is_that_of_a_march():
+    """Its iterates grew to 1e154 m, where their squares overflow, and one of them was the answer."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        answer = predict(draw(91, 8406).make())
+        assert np.isfinite([i.surface.control_points for i in answer.iterations]).all()
+    assert answer.status == "stalled"
+    assert "grew beyond all bounds; the surface is that of a march" in answer.message
+    length = answer.scene.cable.length
+    assert np.abs(answer.surface.control_points[..., :3]).max() < 10.0 * length
 
 
 def test_a_coarse_grid_for_a_limp_cable_says_when_it_has_not_converged():
