@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dlocore.effects.distance import distances
 from dlocore.events import closed_grasps
 from dlocore.paths import Move, Path, Still
-from dlocore.plane import FLATNESS, is_straight, leftwards, natural_points, table_tolerance
+from dlocore.plane import FLATNESS, is_straight, leftwards, natural_points, off_line, table_tolerance
 from dlocore.scene import Grasp, Scene
 from dlocore.shape import StartCurve, fit_to_knots
 from dlocore.spline import greville
@@ -141,21 +141,15 @@ def _line(scene: Scene, start: StartCurve) -> Floats | None:
     forces = [_gravity(scene, start)[None], *(np.atleast_2d(cast(Floats, load.force)) for load in scene.loads)]
     if start.velocity is not None:
         forces.append(start.velocity.control_points)
-    if any(_off(vectors, along) > flat * float(np.abs(vectors).max()) for vectors in forces):
+    if any(off_line(vectors, along) > flat * float(np.abs(vectors).max()) for vectors in forces):
         return None
     natural, material = natural_points(scene), start.material
-    if natural is not None and _off(natural - natural[0], natural[-1] - natural[0]) > FLATNESS * scene.cable.length:
+    if natural is not None and off_line(natural - natural[0], natural[-1] - natural[0]) > FLATNESS * scene.cable.length:
         return None
     if material is not None and bool(cast(Floats, material.memory)[:, :2].any()):
         return None
-    straight = _off(start.control_points - start.control_points[0], along) <= flat * size
+    straight = off_line(start.control_points - start.control_points[0], along) <= flat * size
     return np.asarray(along) if straight else None
-
-
-def _off(vectors: Floats, along: Floats) -> float:
-    """Return the largest part of vectors (k, 3) across a direction (3,)."""
-    unit = along / math.sqrt(along @ along)
-    return float(np.abs(vectors - np.outer(vectors @ unit, unit)).max())
 
 
 def _aside(path: Path, u: float, start: StartCurve, along: Floats, length: float, flat: float) -> bool:
@@ -169,7 +163,7 @@ def _aside(path: Path, u: float, start: StartCurve, along: Floats, length: float
             return True
     else:
         from_start = path.at(np.linspace(0.0, path.duration, _TIMES), start(u)[0]) - start(u)[0]
-        if _off(from_start, along) > flat * length:
+        if off_line(from_start, along) > flat * length:
             return True
     turns = path.rotation_at(np.linspace(0.0, path.duration, _TIMES))
     return turns is not None and bool(np.abs(turns @ along - along).max() > flat)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from dlocore.grid import Grid
 from dlocore.kernels.growth import LOOKS, SLOWEST, fastest_growth, looked_at
-from dlocore.plane import FLATNESS
+from dlocore.plane import FLATNESS, off_line
 from dlocore.problem import Problem
 from dlocore.report import WindowForces
 from dlocore.shape import StartCurve
@@ -73,8 +73,7 @@ def _hardly_bent(start: StartCurve) -> bool:
     chord = ways[-1]
     if start.bow or len(ways) <= DEGREE + 1 or not chord @ chord > 0.0:
         return False
-    off = float(np.abs(ways - np.outer(ways @ chord / (chord @ chord), chord)).max())
-    return FLATNESS < off / float(start.knots[-1]) < _HARDLY
+    return FLATNESS < off_line(ways, chord) / float(start.knots[-1]) < _HARDLY
 
 
 def may_grow(problem: Problem, motion: March) -> bool:

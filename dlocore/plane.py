@@ -74,6 +74,12 @@ def is_straight(start: StartCurve) -> bool:
     return float(np.linalg.svd(chord, compute_uv=False)[1]) <= FLATNESS * float(np.abs(chord).max())
 
 
+def off_line(vectors: Floats, along: Floats) -> float:
+    """Return the largest part of vectors (k, 3) across a direction (3,)."""
+    unit = along / math.sqrt(along @ along)
+    return float(np.abs(vectors - np.outer(vectors @ unit, unit)).max())
+
+
 def table_tolerance(scene: Scene) -> float:
     """Return how far off the table, or in something, what was seen of a cable that touches it may lie [m]."""
     absolute, relative = _SEEN

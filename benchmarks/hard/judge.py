@@ -250,7 +250,8 @@ def faults(record: dict[str, Any]) -> list[str]:
     laws = record["laws"]
     if not laws["finite"]:
         return ["not finite"]
-    if is_undetermined(record):
+    undetermined = is_undetermined(record)  # another motion is as right
+    if undetermined:
         found.append(f"undetermined and told: {status}" if tells(record) else "undetermined and not told")
     if status == "converged":
         if laws["strain"] > MOST_STRAIN:
@@ -264,13 +265,13 @@ def faults(record: dict[str, Any]) -> list[str]:
         if laws["momentum"] is not None and laws["momentum"] > LOST:
             found.append("lost momentum")
         error, estimate = record.get("error", 0.0), record["estimate"]
-        if is_undetermined(record):
-            return found  # another motion is as right
+        if undetermined:
+            return found
         if error > WRONG and record["apart"] < SURE * error:
             told = estimate is not None and estimate > min(WRONG, 0.5 * error)
             found.append("wrong and told" if told else "lie")
         elif record.get("apart", 0.0) > WRONG:
             found.append("no reference and told" if tells(record) else "no reference and not told")
-    elif not is_undetermined(record):
+    elif not undetermined:
         found.append(f"not converged: {status}")
     return found

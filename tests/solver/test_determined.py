@@ -55,6 +55,19 @@ def column(shortened: float, drag: float = 0.0, flat: bool = False) -> Scene:
     )
 
 
+@pytest.fixture
+def again(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Steps of each march that was asked for to look whether a motion is determined."""
+    steps: list[int] = []
+
+    def march_again(*arguments: Any, **options: Any) -> Any:
+        steps.append(arguments[2])
+        return march(*arguments, **options)
+
+    monkeypatch.setattr(determined, "march", march_again)
+    return steps
+
+
 @pytest.mark.parametrize("flat", [False, True])
 @pytest.mark.parametrize("drag", [0.0, 3.0])
 def test_a_column_under_twice_its_critical_load_grows_as_beam_theory_says(drag: float, flat: bool):
@@ -130,24 +143,18 @@ def test_what_a_march_in_one_call_says_of_its_growth_is_what_its_states_say(dime
 
 
 @pytest.mark.parametrize(("height", "marched"), [(0.0, False), (1e-6, True), (1e-3, False)])
-def test_a_start_that_is_hardly_bent_is_bent_once_more(height: float, marched: bool, monkeypatch: pytest.MonkeyPatch):
+def test_a_start_that_is_hardly_bent_is_bent_once_more(height: float, marched: bool, again: list[int]):
     u = np.linspace(0.0, LENGTH, 41)
     points = np.column_stack([u, height * np.sin(np.pi * u), 0.0 * u])
     answer = predict(dataclasses.replace(drawn_over_a_table(0.0), shape=Points(points=points)))
     assert answer.level is not None
-    seen: list[int] = []
-
-    def march_again(*arguments: Any, **options: Any) -> Any:
-        seen.append(arguments[2])
-        return march(*arguments, **options)
-
-    monkeypatch.setattr(determined, "march", march_again)
+    again.clear()
     moved = goes_astray(answer.level.problem, answer.level.motion, Monitor(None, None), hard=False)
-    assert bool(seen) == marched
+    assert bool(again) == marched
     assert moved < 1e-4 * LENGTH  # it has grown by less than a hundredfold
 
 
-def test_what_touches_is_marched_again_where_it_needed_more_than_the_first_grids(monkeypatch: pytest.MonkeyPatch):
+def test_what_touches_is_marched_again_where_it_needed_more_than_the_first_grids(again: list[int]):
     """Tangents know nothing of where friction lets go."""
     answer = predict(drawn_over_a_table(0.3))
     assert answer.level is not None
@@ -155,18 +162,11 @@ def test_what_touches_is_marched_again_where_it_needed_more_than_the_first_grids
     assert problem.touches
     assert not motion.split
     assert not may_grow(problem, motion)
-    marched: list[int] = []
-
-    def march_again(*arguments: Any, **options: Any) -> Any:
-        marched.append(arguments[2])
-        return march(*arguments, **options)
-
-    monkeypatch.setattr(determined, "march", march_again)
     assert goes_astray(problem, motion, Monitor(None, None), hard=False) == 0.0
-    assert not marched
+    assert not again
     moved = goes_astray(problem, motion, Monitor(None, None), hard=True)
     assert 0.0 < moved < UNDETERMINED * problem.scene.cable.length
-    assert marched == [motion.asked]
+    assert again == [motion.asked]
 
 
 @pytest.mark.parametrize("index", [42943, 20480, 39792, 45737])
