@@ -26,18 +26,11 @@ from dlocore import (
     predict,
 )
 from dlocore.obstacles import Obstacle
-from tests.solver.scenes import WEIGHTLESS, Floats, G, apart, cable, march
+from tests.solver.scenes import WEIGHTLESS, Floats, G, apart, cable, converged, march
 
 D = 0.005  # [m] of the paper's cable
 WEIGHT = 0.05 * G  # [N/m]
 DEEPEST = 0.05 * D  # the penetration that is promised at most
-
-
-def converged(scene: Scene) -> Prediction:
-    """Return a prediction that met its target."""
-    prediction = predict(scene)
-    assert prediction.status == "converged", prediction.message
-    return prediction
 
 
 def speed(surface: SplineSurface, t: float) -> float:

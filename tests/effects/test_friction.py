@@ -26,7 +26,7 @@ from dlocore import (
     predict,
 )
 from dlocore.effects.friction import slip_of
-from tests.solver.scenes import Floats, G, apart, cable, march, momentum, refined
+from tests.solver.scenes import Floats, G, apart, cable, converged, march, momentum, refined
 
 MASS = 0.05  # [kg] of the paper's cable, 1 m long
 STICK = 1e-4  # [m] that a sticking cable gives way before it slides
@@ -35,13 +35,6 @@ STICK = 1e-4  # [m] that a sticking cable gives way before it slides
 def rough(mu: float, gravity: tuple[float, float, float] = (0.0, 0.0, -G)) -> Environment:
     """Return a table with friction."""
     return Environment(gravity=gravity, table=Table(friction=mu))
-
-
-def converged(scene: Scene) -> Prediction:
-    """Return a prediction that met its target."""
-    prediction = predict(scene)
-    assert prediction.status == "converged", prediction.message
-    return prediction
 
 
 def at(prediction: Prediction, times: Floats, grasp: int = 0) -> Floats:

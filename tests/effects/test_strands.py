@@ -12,23 +12,15 @@ from dlocore import (
     Grasp,
     Move,
     Points,
-    Prediction,
     Scene,
     SplineSurface,
     Table,
     Waypoints,
     predict,
 )
-from tests.solver.scenes import WEIGHTLESS
+from tests.solver.scenes import WEIGHTLESS, converged
 
 D = 0.005  # [m] of the pinched cable
-
-
-def solved(scene: Scene) -> Prediction:
-    """Return a prediction that met its target."""
-    prediction = predict(scene)
-    assert prediction.status == "converged", prediction.message
-    return prediction
 
 
 def closest_strands(surface: SplineSurface, apart_by: float) -> float:
@@ -81,7 +73,7 @@ def twisted_pair(**changes: Any) -> Scene:
 
 @pytest.mark.slow
 def test_strands_that_are_wound_around_each_other_do_not_pass_through():
-    wound = solved(twisted_pair())
+    wound = converged(twisted_pair())
     assert closest_strands(wound.surface, 0.05) > 0.95 * 0.006
     # without contact they do
     assert closest_strands(predict(twisted_pair(effects={"self_contact": "off"})).surface, 0.05) < 0.5 * 0.006
@@ -116,7 +108,7 @@ def knotted(**changes: Any) -> Scene:
 
 @pytest.mark.slow
 def test_a_tightened_knot_stays_a_knot():
-    tightened = solved(knotted())
+    tightened = converged(knotted())
     assert closest_strands(tightened.surface, 0.05) > 0.95 * 0.004
 
 
@@ -144,7 +136,7 @@ def hairpin(**changes: Any) -> Scene:
 
 @pytest.mark.slow
 def test_the_tails_of_a_pinched_loop_on_a_table_do_not_cross():
-    pinched = solved(hairpin())
+    pinched = converged(hairpin())
     assert pinched.accuracy.dimensions == 2
     assert closest_strands(pinched.surface, 0.05) > 0.95 * D
     assert closest_strands(predict(hairpin(effects={"self_contact": "off"})).surface, 0.05) < 0.5 * D

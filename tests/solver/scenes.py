@@ -52,6 +52,13 @@ def paper_scene(u: float, EI: float = 1e-3, *, hold: str = "point", quality: Qua
     )
 
 
+def converged(scene: Scene) -> Prediction:
+    """Return a prediction that met its target."""
+    prediction = predict(scene)
+    assert prediction.status == "converged", prediction.message
+    return prediction
+
+
 def without_table(scene: Scene) -> Scene:
     """Return a scene on a frictionless table as one without weight, which is the same motion."""
     around = Environment(gravity=(0.0, 0.0, 0.0), drag=scene.environment.drag)
