@@ -103,7 +103,7 @@ def _no_history(problem: Problem, tables: Tables) -> History:
         memory=np.zeros((points, MEMORY_IN_PLANE if nc == 2 else MEMORY_IN_SPACE)),
         past=np.zeros((kept, columns)),
         axial=np.zeros((len(tables.axial_w), 3)),
-        stick=np.zeros((len(tables.contact_w) if rubs else 0, 6)),
+        stick=np.zeros((len(tables.contact_w) if rubs else 0, 3)),
         slide=np.zeros((len(tables.body_w) if lies else 0, 2)),
         tension=np.zeros((0, COLUMNS)),
         room=np.zeros(room_for(nc, points)),

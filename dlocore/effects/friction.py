@@ -5,8 +5,8 @@
 with s the displacement along the surface from an anchor. Where |s| passes s_0 the anchor is dragged behind, so that a
 cable at rest stays at rest under any force below mu N, and moves by less than s_0 while it sticks. Coulomb's law is
 the limit of a small s_0, which goes with the square of the step: so its refinement is part of that of the steps. N is
-that of the last step, which keeps the tangent symmetric. Where there is no step (space-time least squares) the law is
--mu N v/sqrt(v^2 + v_0^2).
+the whole normal force (eq. 21); that it changes is left out of the tangent, which stays symmetric. Where there is no
+step (space-time least squares) the law is -mu N v/sqrt(v^2 + v_0^2).
 """
 
 import math

@@ -44,7 +44,7 @@ class History(NamedTuple):
         past: (points, 2, 9 or 16) strain, and with twist frames, of the last steps: see `plane.remember`,
             `space.remember`, `twisted.py`; (0, ...) where no law reads it.
         axial: (axial points, 3) stress-free axial strain, and the axial strain of the two last steps.
-        stick: (contact nodes, 6) anchor of the friction there, and position at the last step [m]; (0, 6) without.
+        stick: (contact nodes, 3) anchor of the friction there [m]; (0, 3) without.
         slide: (body points, 2) anchor of the friction of a cable that lies on the table [m]; (0, 2) without.
         tension: (axial points, 4) what the tangent of a march knows of the tension, see `tension.py`; (0, 4) elsewhere.
         room: what assemblies in space write over and keep nothing in, of `ROOM` numbers in `space` or `twisted_rows`

@@ -1,8 +1,8 @@
 """Assembly of contact and friction, in the plane and in space.
 
 Contact acts at nodes as close as the cable is thick. The distance to an obstacle grows at most as fast as one goes
-along the cable, so from a node that is far away the next ones are skipped. `stick` (nodes, 6) holds the anchor of the
-friction and the position at the last step, `slide` (body points, 2) the anchor of a cable that lies on the table.
+along the cable, so from a node that is far away the next ones are skipped. `stick` (nodes, 3) holds the anchor of the
+friction, `slide` (body points, 2) that of a cable that lies on the table.
 """
 
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from dlocore.effects.base import Symmetric, Vector
-from dlocore.effects.contact import pressure
+from dlocore.effects.contact import normal_force
 from dlocore.effects.distance import signed_distance
 from dlocore.effects.friction import friction
 from dlocore.effects.kinds import BOX, CYLINDER
@@ -44,6 +44,11 @@ def _gap(p: Any, i: int, x: Vector) -> tuple[float, Vector, Symmetric, float]:
         return x[2] - p[TABLE, 0], _UP, _FLAT, p[TABLE, 1]
     d, n, H = signed_distance(p, i, x)
     return d - p[CONTACT, 0], n, H, p[i, 16]
+
+
+@law
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @law
@@ -108,28 +113,20 @@ def contact(
             if gap >= 0.0:
                 continue
             u = _point(nc, v, k, b)
-            N, stiffness = pressure(k_n, width, -gap)
-            ratio = damping * stiffness / k_n
-            approach = u[0] * normal[0] + u[1] * normal[1] + u[2] * normal[2]
-            if N - ratio * approach <= 0.0:
+            N, stiffness, viscosity = normal_force(k_n, width, damping, -gap, _dot(u, normal))
+            if N <= 0.0:
                 continue
-            total = N - ratio * approach
-            _spread(nc, f, k, b, w, (total * normal[0], total * normal[1], total * normal[2]))
+            _spread(nc, f, k, b, w, (N * normal[0], N * normal[1], N * normal[2]))
             if tangent:
-                s = elastic * stiffness + viscous * ratio
+                s = elastic * stiffness + viscous * viscosity
                 nn = (
                     normal[0] * normal[0], normal[1] * normal[1], normal[2] * normal[2],
                     normal[0] * normal[1], normal[0] * normal[2], normal[1] * normal[2],
                 )  # fmt: skip
-                _add(nc, K, k, b, w, _mixed(s, nn, -geometric * total, bend))
+                _add(nc, K, k, b, w, _mixed(s, nn, -geometric * N, bend))
             if active[FRICTION] and mu > 0.0:
-                limit = mu * N
-                if h != 0.0:
-                    before, _, _, _ = _gap(p, i, (stick[n, 3], stick[n, 4], stick[n, 5]))
-                    if before < 0.0:  # else it touches anew, and no earlier force is known
-                        limit = mu * pressure(k_n, width, -before)[0]
                 slip = (x[0] - stick[n, 0], x[1] - stick[n, 1], x[2] - stick[n, 2])
-                force, S, V = friction(limit, normal, slip, u, p[FRICTION, 0], p[FRICTION, 1], h != 0.0)
+                force, S, V = friction(mu * N, normal, slip, u, p[FRICTION, 0], p[FRICTION, 1], h != 0.0)
                 _spread(nc, f, k, b, w, force)
                 if tangent:
                     _add(nc, K, k, b, w, _mixed(elastic, S, viscous, V))
@@ -237,7 +234,7 @@ def passes(nc: int, q0: Any, q1: Any, tables: Any, p: Any) -> bool:
 
 @leaf
 def remember(nc: int, q: Any, tables: Any, active: Any, p: Any, stick: Any, loose: bool) -> float:
-    """Drag the anchors of the friction behind q, note its positions, and return the largest depth [m].
+    """Drag the anchors of the friction behind q, and return the largest depth [m].
 
     Where the cable is `loose`, as at the start, the anchors are put under it.
     """
@@ -269,8 +266,6 @@ def remember(nc: int, q: Any, tables: Any, active: Any, p: Any, stick: Any, loos
         else:
             for d in range(3):
                 stick[n, d] = x[d]
-        for d in range(3):
-            stick[n, 3 + d] = x[d]
     return deepest
 
 

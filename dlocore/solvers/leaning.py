@@ -51,5 +51,5 @@ def lean_on_table(problem: Problem, grid: Grid, a: Floats, history: History) -> 
     acceleration = np.einsum("pi,pid->pd", grid.tables.contact_b0, a[index])[:, :2]
     pull = acceleration / (problem.table.friction * fall)
     pull /= np.maximum(np.linalg.norm(pull, axis=1, keepdims=True), 1.0)
-    rests = history.stick[:, 5] - problem.table.height < _RESTS * problem.scene.cable.diameter
+    rests = history.stick[:, 2] - problem.table.height < _RESTS * problem.scene.cable.diameter
     history.stick[:, :2] -= problem.friction.parameters()[0] * pull * rests[:, None]

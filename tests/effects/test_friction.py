@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from scipy.special import j0, jn_zeros
 
 from dlocore import (
+    Box,
     Cable,
     Cylinder,
     Environment,
@@ -122,6 +123,22 @@ def test_a_thrown_cable_stops_after_v_squared_over_2_mu_g(along):
     # the target error of 2 mm, and what sticking gives way
     np.testing.assert_allclose(stopped @ np.array(velocity), way, atol=2e-3 + STICK)
     assert np.linalg.norm(thrown.surface(u, [0.8], dt=1)[..., :3], axis=-1).max() < 2e-3  # [m/s]
+
+
+@pytest.mark.parametrize("fall", [0.3, 1.0])
+@pytest.mark.parametrize("body", ["table", "box"])
+def test_a_strike_slows_a_sliding_cable_by_mu_times_its_impulse(body, fall):
+    mu, speed, end = 0.25, 1.5, 0.25
+    ground = rough(mu)
+    if body == "box":
+        box = Box(center=(0.5, 0.0, -0.05), size=(2.0, 2.0, 0.1), friction=mu)
+        ground = Environment(gravity=(0.0, 0.0, -G), obstacles=(box,))
+    shape = Straight(start=(0.0, 0.0, 0.04), velocity=(0.0, speed, -fall))
+    thrown = converged(Scene(cable=cable(), shape=shape, environment=ground, horizon=end))
+    across, up = thrown.surface(np.linspace(0, 1, 9), [end], dt=1)[0, :, 1:3].T
+    # dv_y = -mu (dv_z + g t) for as long as it slides, however the cable bounces
+    np.testing.assert_allclose(speed - across, mu * (up + fall + G * end), rtol=0.02)
+    assert (across > 0.3).all()
 
 
 def test_a_spinning_rod_stops_after_omega_squared_l_over_6_mu_g():
