@@ -63,7 +63,7 @@ class TableContact(Effect):
 
 
 @law
-def _elastic(k: float, w: float, depth: float) -> tuple[float, float]:
+def pressure(k: float, w: float, depth: float) -> tuple[float, float]:
     """Return k phi(depth) [N/m] and its derivative [N/m^2]."""
     if depth <= 0.0:
         return 0.0, 0.0
@@ -75,6 +75,6 @@ def _elastic(k: float, w: float, depth: float) -> tuple[float, float]:
 @law
 def normal_force(k: float, w: float, c: float, depth: float, leaving: float) -> tuple[float, float, float]:
     """Return N [N/m], its derivative by depth [N/m^2], and minus that by the speed n.v of `leaving` [N s/m^2]."""
-    elastic, stiffness = _elastic(k, w, depth)
+    elastic, stiffness = pressure(k, w, depth)
     viscosity = c * stiffness / k
     return max(elastic - viscosity * leaving, 0.0), stiffness, viscosity
