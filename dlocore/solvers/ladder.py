@@ -161,17 +161,20 @@ def run_level(
     if hardness > 1.0 and motion.stopped == "step":  # too stiff for this grid
         problem = posed
         motion = march(problem, grid, steps, monitor, rho=rho, whole=whole)
-    allowed = DEEPEST * problem.scene.cable.diameter
+    allowed, tried = DEEPEST * problem.scene.cable.diameter, problem
     for _ in range(_STIFFER):
         if motion.stopped == "time" or motion.deepest <= allowed:
             break
         if motion.stopped and problem.self_contact is None:
             break  # a soft contact may be why strands got through each other, and the march ended
-        harder = stiffer_for(problem, motion.deepest)
+        harder = stiffer_for(tried, motion.deepest)
         again = march(harder, grid, steps, monitor, rho=rho, whole=whole)
         if (again.reached, -again.deepest) < (motion.reached, -_YIELDING * motion.deepest):
-            break  # what is this deep was not pushed in
-        problem, motion = harder, again
+            if problem.self_contact is None or tried is not problem or again.reached < motion.reached:
+                break  # what is this deep was not pushed in
+            tried = harder  # strands that strike each other harder by chance are tried once more
+        else:
+            problem, motion, tried = harder, again, harder
     doubtful = motion.stopped == "step" or motion.largest_strain > credible
     if doubtful and motion is not damped and (rho > STRONGLY_DAMPED or motion.stopped == "step"):
         other_rho = RHO if rho == STRONGLY_DAMPED else STRONGLY_DAMPED
