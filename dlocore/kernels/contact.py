@@ -17,6 +17,7 @@ from dlocore.effects.kinds import BOX, CYLINDER
 from dlocore.effects.laws import CONTACT, COUNT, FRICTION, TABLE
 from dlocore.kernels.basis import row_of
 from dlocore.kernels.compile import law, leaf, part
+from dlocore.kernels.strands import dot
 
 _UP = (0.0, 0.0, 1.0)
 _ANY = (0.0, 0.0, 0.0)
@@ -44,11 +45,6 @@ def _gap(p: Any, i: int, x: Vector) -> tuple[float, Vector, Symmetric, float]:
         return x[2] - p[TABLE, 0], _UP, _FLAT, p[TABLE, 1]
     d, n, H = signed_distance(p, i, x)
     return d - p[CONTACT, 0], n, H, p[i, 16]
-
-
-@law
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @law
@@ -113,7 +109,7 @@ def contact(
             if gap >= 0.0:
                 continue
             u = _point(nc, v, k, b)
-            N, stiffness, viscosity = normal_force(k_n, width, damping, -gap, _dot(u, normal))
+            N, stiffness, viscosity = normal_force(k_n, width, damping, -gap, dot(u, normal))
             if N <= 0.0:
                 continue
             _spread(nc, f, k, b, w, (N * normal[0], N * normal[1], N * normal[2]))

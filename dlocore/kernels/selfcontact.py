@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from dlocore.effects.base import Vector
-from dlocore.effects.contact import pressure
+from dlocore.effects.contact import normal_force
 from dlocore.effects.laws import SELF_CONTACT
 from dlocore.kernels.compile import kernel, law, leaf
 from dlocore.kernels.strands import between, between_nodes, closest, dot, near_pairs
@@ -88,14 +88,6 @@ def _rate(v: Any, point: Any, c: Any, m: int, y: Vector) -> float:
     return total
 
 
-@law
-def _push(D: float, k: float, w: float, c: float, rho: float, rate: float) -> tuple[float, float, float]:
-    """Return the force per length with its damping [N/m], its stiffness [N/m^2] and viscosity [N s/m^2]."""
-    N, stiffness = pressure(k, w, D - rho)
-    viscosity = c * stiffness / k
-    return N - viscosity * rate, stiffness, viscosity
-
-
 @kernel
 def press(q: Any, v: Any, tables: Any, p: Any, x: Any, found: Any, f: Any) -> Any:
     """Subtract the forces of the contact from f (n, nc); return (found, count, depth), the pairs and the deepest [m].
@@ -119,7 +111,7 @@ def press(q: Any, v: Any, tables: Any, p: Any, x: Any, found: Any, f: Any) -> An
         if rho >= D:
             continue
         _, m = _spread(first, b0, i, j, s, t, point, c)
-        total, _, _ = _push(D, stiffness, passage, damping, rho, _rate(v, point, c, m, y) / rho)
+        total, _, _ = normal_force(stiffness, passage, damping, D - rho, _rate(v, point, c, m, y) / rho)
         if total <= 0.0:
             continue
         found[kept, 0], found[kept, 1] = i, j
@@ -142,7 +134,8 @@ def _pair_tangent(
     y, rho, s, t, a, b, pull_a, pull_b = _pair(x, u, push[0], i, j)
     c = np.empty(2 * _WINDOW)
     ni, m = _spread(first, b0, i, j, s, t, point, c)
-    total, stiffness, viscosity = _push(push[0], push[1], push[2], push[3], rho, _rate(v, point, c, m, y) / rho)
+    leaving = _rate(v, point, c, m, y) / rho
+    total, stiffness, viscosity = normal_force(push[1], push[2], push[3], push[0] - rho, leaving)
     w = min(u[i + 1] - u[i], u[j + 1] - u[j])
     size = m * nd
     # derivatives of half rho^2: by the control points (g), and of its derivatives by s and t (vs, vt)
