@@ -17,7 +17,7 @@ from dlocore.effects.damping import Damping
 from dlocore.effects.distance import distances
 from dlocore.effects.selfcontact import CLOSE as CLOSE_STRANDS
 from dlocore.effects.selfcontact import nearest_strands
-from dlocore.events import moments
+from dlocore.events import closed_grasps, moments
 from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, largest_curvature, times_scalar_band
 from dlocore.kernels.banded import solve_free
 from dlocore.kernels.twisted_rows import TWIST_RATE
@@ -28,12 +28,14 @@ from dlocore.report import WindowForces
 from dlocore.sideways import leaves_plane
 from dlocore.solvers.ladder import CREDIBLE_STRAIN, Level
 from dlocore.solvers.monitor import Monitor
+from dlocore.spin import bends_sharply, spin_forces
 from dlocore.spline import SplineSurface, design_matrix
 
 Floats = NDArray[np.float64]
 
 CLOSE = 0.01  # of the length: a cable that comes this near to an obstacle left out calls for it
 MATTERS = 0.001  # of the length: what a neglected effect may move the cable before it is worth a word
+_TURNS = 0.1  # of that, and of the target: what the sections' spin may move it, which a motion that snaps enlarges
 _STRAINED = 0.05  # axial strain: few cables bear more
 _FAR_MORE = 2.0  # times the strain of the march: what its spline adds is worth a word
 _PLACES, _MOMENTS = 4, 33  # in a span, and in time while it swings once, at which a surface is searched for strain
@@ -55,13 +57,20 @@ def called_for(level: Level, fine: bool = True) -> dict[str, str]:
     if not problem.choices["obstacles"].active and switch("obstacles", "auto") == "auto":
         found.update(_touches(level))
     if problem.inertia is None and switch("inertia", "auto") == "auto":
-        moved = neglected(level)
+        moved = _response(level, "inertia")
         if level.motion.stopped == "step":
             reached = level.motion.times[level.motion.reached]
             found["inertia"] = f"without it the cable has no equilibrium to go on to at {reached:.3g} s"
         elif moved > MATTERS * problem.scene.cable.length:
             most = min(moved, problem.scene.cable.length)  # where the cable is about to give way it tells no distance
             found["inertia"] = f"without it a first solve is {most * 1e3:.2g} mm off"
+    if switch("twist", "auto") == "auto":
+        moved = _spun(level)
+        allowed = min(MATTERS * problem.scene.cable.length, problem.scene.quality.target_error or np.inf)
+        if moved > _TURNS * allowed:
+            found["twist"] = (
+                f"sections that turn at sharp bends resist, which moves the cable by {moved * 1e3:.2g} mm or more"
+            )
     if fine and not found:  # they are of the motion that has all the others
         found.update(called_for_by_fine(level))
     return found
@@ -166,10 +175,18 @@ def _stretched(level: Level) -> list[str]:
 
 def neglected(level: Level) -> float:
     """Return how far the effects that `auto` has left out would have moved the cable, at most, about [m]."""
-    problem = level.problem
-    if problem.inertia is not None or problem.scene.effects.get("inertia", "auto") != "auto":
-        return 0.0
-    return _response(level, "inertia")
+    problem, switch = level.problem, level.problem.scene.effects.get
+    moved = _spun(level) if switch("twist", "auto") == "auto" else 0.0
+    if problem.inertia is None and switch("inertia", "auto") == "auto":
+        moved += _response(level, "inertia")
+    return moved
+
+
+def _spun(level: Level) -> float:
+    """Return how far the inertia of sections that turn would move a cable that is solved without twist, about [m]."""
+    problem, motion = level.problem, level.motion
+    turns = "twist" in _forces(problem) and bends_sharply(problem, motion.grid, motion.states)
+    return _response(level, "twist") if turns else 0.0
 
 
 def _yields(level: Level) -> dict[str, str]:
@@ -231,7 +248,17 @@ def _meets_itself(level: Level) -> dict[str, str]:
     return {"self_contact": f"two strands {meet}"}
 
 
-Force = Callable[[Floats, Floats, Floats, Level], Floats]
+class _Look(NamedTuple):
+    """Control points (n_u, nc) [m] at a time [s], their velocities and accelerations, taken over the time tau [s]."""
+
+    time: float
+    q: Floats
+    v: Floats
+    a: Floats
+    tau: float
+
+
+Force = Callable[[_Look, Level], Floats]
 
 
 def _forces(problem: Problem) -> dict[str, Force]:
@@ -239,43 +266,55 @@ def _forces(problem: Problem) -> dict[str, Force]:
     scene = problem.scene
     density = scene.cable.linear_density
 
-    def inertia(q: Floats, v: Floats, a: Floats, level: Level) -> Floats:
-        return density * times_scalar_band(level.motion.grid.tables.mass, a)
+    def inertia(look: _Look, level: Level) -> Floats:
+        return density * times_scalar_band(level.motion.grid.tables.mass, look.a)
 
-    def drag(q: Floats, v: Floats, a: Floats, level: Level) -> Floats:
-        speed = float(np.linalg.norm(v, axis=1).max())
+    def drag(look: _Look, level: Level) -> Floats:
+        speed = float(np.linalg.norm(look.v, axis=1).max())
         drag = scene.environment.drag + scene.environment.drag_quadratic * speed
-        return drag * times_scalar_band(level.motion.grid.tables.mass, v)
+        return drag * times_scalar_band(level.motion.grid.tables.mass, look.v)
 
-    def gravity(q: Floats, v: Floats, a: Floats, level: Level) -> Floats:
+    def gravity(look: _Look, level: Level) -> Floats:
         pull = cast(Floats, scene.environment.gravity)
         weight = problem.rates(density * pull) * (0.0 if problem.on_table else 1.0)
         return np.asarray(level.motion.grid.tables.weight[:, None] * weight)
 
-    def damping(q: Floats, v: Floats, a: Floats, level: Level) -> Floats:
+    def damping(look: _Look, level: Level) -> Floats:
         active, parameters = problem.law_table()
         law = Damping(scene.cable.bending_damping)
         with_damping, table = active * 0, parameters.copy()
         with_damping[laws.DAMPING], with_damping[laws.TWIST] = 1, active[laws.TWIST]
         table[laws.DAMPING, :2] = law.parameters()
         table[[laws.STRETCH, laws.TWIST], 0] = 0.0
-        f = np.empty_like(q)
+        f = np.empty_like(look.q)
         grid = level.motion.grid
         assemble(
-            problem.axes, q, v, grid.tables, with_damping, table, grid.history, NO_RATES, (0.0, 0.0, 0.0), f,
-            np.empty((1, 1)),
+            problem.axes, look.q, look.v, grid.tables, with_damping, table, grid.history, NO_RATES, (0.0, 0.0, 0.0),
+            f, np.empty((1, 1)),
         )  # fmt: skip
         return f
 
-    def friction(q: Floats, v: Floats, a: Floats, level: Level) -> Floats:
+    def friction(look: _Look, level: Level) -> Floats:
         table = scene.environment.table
         if table is None or not problem.on_table:
-            return np.zeros_like(q)
+            return np.zeros_like(look.q)
         load = table.friction * density * abs(float(cast(Floats, scene.environment.gravity)[2]))
-        speed = np.linalg.norm(v, axis=1, keepdims=True)
-        return load * times_scalar_band(level.motion.grid.tables.mass, v / np.maximum(speed, 1e-3))
+        speed = np.linalg.norm(look.v, axis=1, keepdims=True)
+        return load * times_scalar_band(level.motion.grid.tables.mass, look.v / np.maximum(speed, 1e-3))
 
-    return {"inertia": inertia, "drag": drag, "gravity": gravity, "damping": damping, "friction": friction}
+    def twist(look: _Look, level: Level) -> Floats:
+        clamps = [g.u for g in closed_grasps(scene, look.time, look.time) if g.hold == "clamp"]
+        return spin_forces(problem, level.motion.grid, look.q, look.v, look.a, clamps[0] if clamps else None)
+
+    along: dict[str, Force] = {
+        "inertia": inertia,
+        "drag": drag,
+        "gravity": gravity,
+        "damping": damping,
+        "friction": friction,
+    }
+    turns = problem.twist is None and problem.plane.dimensions == 3 and problem.inertia is not None
+    return along | ({"twist": twist} if turns else {})
 
 
 def _response(level: Level, name: str) -> float:
@@ -293,20 +332,11 @@ def _response(level: Level, name: str) -> float:
     return most
 
 
-class _Look(NamedTuple):
-    """Control points (n_u, nc) [m], their velocities and accelerations, and the time that these were taken over [s]."""
-
-    q: Floats
-    v: Floats
-    a: Floats
-    tau: float
-
-
 def _look(window: WindowForces, k: int, stride: int) -> _Look:
     """Return a look at the state k of a stretch, with rates over so many of its (equal) steps to both sides."""
     before, q, after = window.states[k - stride], window.states[k], window.states[k + stride]
     tau = stride * float(window.times[-1] - window.times[0]) / (len(window.times) - 1)
-    return _Look(q, (after - before) / (2.0 * tau), (after - 2.0 * q + before) / tau**2, tau)
+    return _Look(float(window.times[k]), q, (after - before) / (2.0 * tau), (after - 2.0 * q + before) / tau**2, tau)
 
 
 def _evenly(window: WindowForces) -> list[_Look]:
@@ -332,15 +362,14 @@ def _turns(window: WindowForces) -> list[_Look]:
 def _given_way(level: Level, window: WindowForces, look: _Look, force: Force) -> float:
     """Return how far a force moves the cable at most, from where it is looked at [m]; 0 where it gives way anyway."""
     problem, grid = level.problem, level.motion.grid
-    q, v, a, tau = look
     nc, e = problem.nc, window.held.elimination
     active, parameters = problem.law_table()
-    slow = problem.scene.cable.linear_density * (2.0 / problem.horizon**2 + tau**-2)
-    K, f = np.empty((q.size, 4 * nc)), np.empty_like(q)
-    right = np.ascontiguousarray(force(q, v, a, level)).ravel()
+    slow = problem.scene.cable.linear_density * (2.0 / problem.horizon**2 + look.tau**-2)
+    K, f = np.empty((look.q.size, 4 * nc)), np.empty_like(look.q)
+    right = np.ascontiguousarray(force(look, level)).ravel()
     for geometric in (1.0, 0.0):  # of a cable that is about to give way only the positive part is of use
         scales = (1.0, 0.0, geometric)
-        assemble(problem.axes, q, v, grid.tables, active, parameters, grid.history, NO_RATES, scales, f, K)
+        assemble(problem.axes, look.q, look.v, grid.tables, active, parameters, grid.history, NO_RATES, scales, f, K)
         add_scalar_band(nc, grid.tables.mass, slow + problem.drag_coefficient() / problem.horizon, K)
         change, positive = solve_free(e, K, right)
         if positive:

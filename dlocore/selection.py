@@ -100,7 +100,8 @@ def choose(
             found[name] = Choice(False, "switched off in the scene")
         elif name in optional and switch == "on" and not found[name].active:
             found[name] = Choice(True, "switched on in the scene")
-    found["twist"] = _twist(scene, start, dimensions, bent, found["plasticity"].active, found["damping"].active)
+    if "twist" not in called_for:
+        found["twist"] = _twist(scene, start, dimensions, bent, found["plasticity"].active, found["damping"].active)
     return {name: found[name] for name in EFFECTS}
 
 

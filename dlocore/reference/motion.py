@@ -195,14 +195,14 @@ def _window(link: Chain, state: State, tolerance: float, watch: Watch, record: _
     """Step through a window and return the state at its end, or None where a step finds no solution."""
     t, end = link.begin, link.end
     h = FIRST * (end - t)
-    told = np.zeros(3)
+    period, told = link.rod.problem.horizon, np.zeros(3)
     while t < end:
         watch.check()
         h = end - t if end - t < (1.0 + LAST) * h else h
         after = State(*(np.zeros_like(x) for x in state))
         reaction, torque = np.zeros_like(state.q), np.zeros_like(state.t)
         guide = link.guide(t + h * SDIRK4.times)
-        flag = take_step(link.body, SDIRK4, h, False, state, guide, NEWTON * tolerance, after, reaction, torque, told)
+        flag = take_step(link.body, SDIRK4, h, period, state, guide, NEWTON * tolerance, after, reaction, torque, told)
         failed = flag != DONE or goes_through(link.body, state.q, after.q)
         if failed or not told[0] <= tolerance:
             record.rejected += 1
@@ -244,7 +244,7 @@ def settled(rod: Rod, watch: Watch) -> tuple[Snapshot, float]:
         for rate in (guide.velocity, guide.tangent_rate, guide.spin):
             rate[:] = 0.0
         flag = take_step(
-            link.body, BACKWARD_EULER, h, True, state, guide, 0.1 * SETTLED * length, after, np.zeros_like(state.q),
+            link.body, BACKWARD_EULER, h, 0.0, state, guide, 0.1 * SETTLED * length, after, np.zeros_like(state.q),
             np.zeros_like(state.t), told,
         )  # fmt: skip
         moved = float(np.abs(after.q[:, :3] - state.q[:, :3]).max())

@@ -21,6 +21,7 @@ LEVELS = 6  # of refinement: up to 640 elements
 LEAST = 3  # rods, of which two changes tell how fast they converge
 FIRMER = 4.0  # times: friction holds within a quarter of the way with each refinement
 STEP = 1e-2  # of the target: the error of a step of the coarsest rod; a quarter of it with each refinement
+SECOND = 4.0  # change over next change, of the second order: a faster fall may be chance
 ORDERLY = (2.5, 8.0)  # change over next change, about 4: motions that converge with the second order
 SLOWEST = 1.5  # change over next change, below which nothing is said of the limit
 SLOW = 2.0  # times the last change: the estimate where nothing is said of the limit
@@ -135,8 +136,13 @@ def _compared(problem: Problem, levels: list[Level], motion: Motion) -> Level:
         limit = fine + (fine - coarse) / 3.0
         last = coarse[:, ::2] + (coarse[:, ::2] - levels[-2].taken.positions(t)) / 3.0
         return Level(motion, taken, change, max(_farthest(limit[:, ::2], last), change / FOURTH), True)
-    ratio = before / max(change, 1e-300)
-    return Level(motion, taken, change, change / (ratio - 1.0) if ratio > SLOWEST else SLOW * change, False)
+    return Level(motion, taken, change, left(before, change), False)
+
+
+def left(before: float, change: float) -> float:
+    """Return what the next refinements will change, about, after the last two changes [m]."""
+    ratio = min(before / max(change, 1e-300), SECOND)
+    return change / (ratio - 1.0) if ratio > SLOWEST else SLOW * change
 
 
 def _farthest(a: Floats, b: Floats) -> float:

@@ -42,8 +42,48 @@ def _scatter(body: Any, x: Any, out: Any) -> None:
 
 
 @compiled
+def _largest(body: Any, dx: Any) -> float:
+    """Return the largest coordinate of a displacement (n dims,), spins as lengths [m]."""
+    found = 0.0
+    for k in range(len(dx) // body.dims):
+        for d in range(body.dims):
+            found = max(found, abs(dx[k * body.dims + d]) * (1.0 if d < 3 else body.law[GYRATION]))
+    return found
+
+
+@compiled
+def _remains(body: Any, period: float, state: Any, end: Any, tangent_rate: Any, lengths: Any, b: Any, e: Any) -> float:
+    """Return how far an error e (n, 4) of the velocities moves the rod within `period` [s], about [m].
+
+    It is that of the impulse M e spread over the period, by one implicit step: T e where the rod is free, and e/(T w^2)
+    where it is held so stiffly that it swings at w.
+    """
+    n, dims = len(body.rest) + 1, body.dims
+    K, dx = np.zeros((n * dims, 6 if dims == 2 else 11)), np.empty(n * dims)
+    R, torque, memory = np.empty((n, 4)), np.empty_like(end.t), np.empty_like(end.memory)
+    axial, turn, anchor = np.empty_like(end.axial), np.empty_like(end.turn), np.empty_like(end.anchor)
+    for mode in (1, 2):  # the tangent, or where the rod is unstable its definite part
+        K[:] = 0.0
+        for k in range(n):
+            for d in range(dims):
+                K[k * dims + d, 0] = 1.0 if body.fixed[k, d] else body.mass[k, d] / (period * period)
+        add_edges(body, end.v, end.axial, period, end.t, lengths, axial, R, K, mode)
+        add_hinges(
+            body, end.v, state.turn, end.memory, period, end.t, end.a, b, lengths, tangent_rate, turn, memory, torque,
+            R, K, mode,
+        )  # fmt: skip
+        add_drag(body, end.v, period, R, K, mode)
+        add_contact(body, end.q, end.v, end.anchor, period, anchor, R, K, mode)
+        if factor(K):
+            _scatter(body, e * body.mass / period, dx)
+            solve(K, dx)
+            return _largest(body, dx)
+    return np.inf
+
+
+@compiled
 def take_step(
-    body: Any, tableau: Any, h: float, static: bool, state: Any, guide: Any, tolerance: float, after: Any,
+    body: Any, tableau: Any, h: float, period: float, state: Any, guide: Any, tolerance: float, after: Any,
     reaction: Any, torque: Any, told: Any,
 ) -> int:  # fmt: skip
     """Step from `state` to `after`; return DONE or FAILED.
@@ -51,7 +91,8 @@ def take_step(
     Args:
         body, tableau: the rod and the method.
         h: step [s].
-        static: forget the velocity: the step then goes downhill, damped by inertia alone.
+        period: for which an error of the velocity lasts [s]; 0: forget the velocity, so that the step goes downhill,
+            damped by inertia alone.
         state: at the beginning.
         guide: what is prescribed at the stages.
         tolerance: of Newton's iteration [m].
@@ -60,7 +101,7 @@ def take_step(
         torque: the moments that held directions take there (n - 1, 3) [N m].
         told: receives the estimated error [m], the last update [m] and the largest depth in a surface [m].
     """
-    n, dims = len(body.rest) + 1, body.dims
+    n, dims, static = len(body.rest) + 1, body.dims, period == 0.0
     stages, hinges, edges, points = len(tableau.times), n - 2, n - 1, len(body.point_edge)
     width = 5 if dims == 2 else 10
     V, A = np.zeros((stages, n, 4)), np.zeros((stages, n, 4))
@@ -192,18 +233,16 @@ def take_step(
             for d in range(3):
                 anchor_rate[i, k, d] = (after.anchor[k, d] - anchor[k, d]) / implicit
     told[2] = deepest
-    # the error of the step, less what the tangent says is stiff and hence decays
-    error = np.zeros((n, 4))
+    told[0] = 0.0
+    if static:
+        return DONE
+    # the error of the step, less what the tangent says is stiff and hence decays, and where that of the velocity leads
+    error, slip = np.zeros((n, 4)), np.zeros((n, 4))
     implicit = h * tableau.coefficients[stages - 1, stages - 1]
     for j in range(stages):
         error += h * tableau.error[j] * V[j]
-    for k in range(n):
-        for d in range(4):
-            error[k, d] *= body.mass[k, d] / (implicit * implicit)
-    _scatter(body, error, dx)
+        slip += h * tableau.error[j] * A[j]
+    _scatter(body, error * body.mass / (implicit * implicit), dx)
     solve(K, dx)
-    told[0] = 0.0
-    for k in range(n):
-        for d in range(dims):
-            told[0] = max(told[0], abs(dx[k * dims + d]) * (1.0 if d < 3 else gyration))
+    told[0] = _largest(body, dx) + _remains(body, period, state, after, tangent_rate, lengths, b, slip)
     return DONE

@@ -76,6 +76,21 @@ def test_the_error_in_time_falls_with_the_tolerance():
     assert errors[0] < 100 * 1e-5  # of some 50 steps
 
 
+def test_the_errors_of_the_steps_add_up_to_no_more_than_their_sum():
+    # a cable that hardly stretches, dragged off and released: what a step leaves of error in the velocity goes on
+    scene = Scene(
+        cable=cable(linear_density=0.04, bending_stiffness=0.02, bending_damping=2e-3, axial_stiffness=4e6),
+        shape=Straight(),
+        grasps=(Grasp(u=0.25, path=Move(displacement=(0.4, 0.0, 0.0), duration=0.6), release_time=0.3),),
+        environment=Environment(),
+        horizon=0.9,
+    )
+    t, tolerance = np.linspace(0.0, 0.9, 19), 1e-6
+    exact = samples(motion(scene, 20, 1e-2 * tolerance, 1)).positions(t)
+    found = motion(scene, 20, tolerance, 1)
+    assert np.linalg.norm(samples(found).positions(t) - exact, axis=-1).max() < found.steps * tolerance
+
+
 @pytest.mark.parametrize("turn", [np.eye(3), TILTED], ids=["plane", "space"])
 def test_a_swing_keeps_its_energy(turn):
     scene = Scene(
