@@ -28,7 +28,7 @@ def bends_sharply(problem: Problem, grid: Grid, states: Floats) -> bool:
 
 
 def spin_forces(problem: Problem, grid: Grid, q: Floats, v: Floats, a: Floats, clamped: float | None = None) -> Floats:
-    """Return the generalised forces (n_u, 3) [N] of the torque that the sections' inertia takes.
+    """Return the generalised forces (n_u, 3) [N] of the sections' inertia, on the side of M q_ddot in eq. 10.
 
     Args:
         problem: of a motion in space, without twist.
