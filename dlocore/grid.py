@@ -25,6 +25,7 @@ class Grid:
         find_tables: finds `tables` of the knots, and
         find_history: `history` of the grid, as they are first read.
         watched: the tables have more points than the knots ask for, see `solvers/watched.py`.
+        tipped: the start had settled where it would fall, see `tipping.py`.
     """
 
     knots: Floats
@@ -33,6 +34,7 @@ class Grid:
     find_tables: Callable[[Floats], Tables] = field(repr=False)
     find_history: Callable[[Self], History] = field(repr=False)
     watched: bool = False
+    tipped: bool = False
 
     @cached_property
     def tables(self) -> Tables:
@@ -45,7 +47,12 @@ class Grid:
         return self.find_history(self)
 
     def changed(
-        self, *, start: Floats | None = None, tables: Tables | None = None, history: History | None = None
+        self,
+        *,
+        start: Floats | None = None,
+        tables: Tables | None = None,
+        history: History | None = None,
+        tipped: bool = False,
     ) -> "Grid":
         """Return the grid with another start, other tables, or something else behind it; the rest as it is."""
         kept_tables, kept_history = tables or self.tables, history or self.history
@@ -56,6 +63,7 @@ class Grid:
             lambda knots: kept_tables,
             lambda grid: kept_history,
             self.watched or tables is not None,
+            self.tipped or tipped,
         )
 
     def past(self) -> History:

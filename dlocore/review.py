@@ -30,6 +30,8 @@ from dlocore.solvers.ladder import CREDIBLE_STRAIN, Level
 from dlocore.solvers.monitor import Monitor
 from dlocore.spin import bends_sharply, spin_forces
 from dlocore.spline import SplineSurface, design_matrix
+from dlocore.tipping import TIPPED
+from dlocore.turning import turn_notes
 
 Floats = NDArray[np.float64]
 
@@ -113,6 +115,10 @@ def objections(level: Level) -> list[str]:
         found.append(f"the motion strains the cable by up to {level.motion.largest_strain:.0%} along itself")
     found += _stretched(level)
     found += side_notes(problem.start)
+    found += turn_notes(problem, level.motion.grid)
+    if level.motion.grid.tipped:
+        tip = f"it is tipped by {BOW * problem.scene.cable.length * 1e3:.2g} mm, and another side may be as likely"
+        found.append(f"{TIPPED}: {tip}")
     if problem.scene.quality.n_u is not None and leaves_plane(problem, level.motion):
         found.append(f"{UNSTABLE}: without a given grid it is solved in space, with a bow out of the plane")
     found += _undetermined(level)

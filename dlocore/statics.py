@@ -23,6 +23,7 @@ from dlocore.settling import Settled, holding, settle
 from dlocore.sideways import is_unstable
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import design_matrix
+from dlocore.tipping import tipped
 
 Floats = NDArray[np.float64]
 
@@ -135,6 +136,9 @@ def _refined(problem: Problem, sizes: list[int], at: float, target: float, monit
     for n in sizes:
         grid = make_grid(problem, n)
         settled = settle(problem, grid, at, monitor)
+        if at == 0.0 and settled.rest == "settled":
+            stays = tipped(problem, grid.changed(start=settled.q, history=settled.history), monitor)
+            settled = settled._replace(q=stays.start, history=stays.history)
         if settled.rest == "time" and found is not None:
             break
         if found is not None:
@@ -184,6 +188,12 @@ def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None =
 
 
 def _settled(problem: Problem, grid: Grid, monitor: Monitor, like: Grid | None) -> Grid | None:
+    """Return a grid with its start settled where it stays, or None where it finds no rest; see `_at_rest`."""
+    found = _at_rest(problem, grid, monitor, like)
+    return None if found is None else tipped(problem, found, monitor)
+
+
+def _at_rest(problem: Problem, grid: Grid, monitor: Monitor, like: Grid | None) -> Grid | None:
     """Return a grid with its start settled, first from that of a grid like it, or None where it finds no rest.
 
     What friction holds depends on the way, and of several equilibria that a wound start may have, or one with obstacles
@@ -207,7 +217,9 @@ def _settled(problem: Problem, grid: Grid, monitor: Monitor, like: Grid | None) 
             afresh = settle(problem, grid, 0.0, monitor)
             if lost or (afresh.rest != "restless" and _is_elsewhere(problem, found.q, afresh.q)):
                 found = afresh
-    return slid if found.rest == "restless" else grid.changed(start=found.q, history=found.history)
+    if found.rest == "restless":
+        return slid
+    return grid.changed(start=found.q, history=found.history, tipped=like is not None and like.tipped)
 
 
 def _is_elsewhere(problem: Problem, one: Floats, other: Floats) -> bool:

@@ -1,0 +1,100 @@
+"""Starts that settle on an equilibrium that any disturbance leaves: they are tipped off it, and settle on.
+
+An arch that stands on two points that let it turn, as a start that is symmetric to the vertical slides up to: forces
+balance there, and no cable stays. The tangent K of such a state has a negative eigenvalue.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.buckling import BOW
+from dlocore.discretisation import applied_forces
+from dlocore.events import closed_grasps
+from dlocore.grid import Grid
+from dlocore.holding import Starts, close_grasps, hold
+from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, times_scalar_band
+from dlocore.kernels.banded import solve_free
+from dlocore.problem import Problem
+from dlocore.settling import settle
+from dlocore.solvers.monitor import Monitor
+from dlocore.spline import greville
+
+Floats = NDArray[np.float64]
+
+TIPPED = "at rest the start stands on an equilibrium that any disturbance leaves"
+_SLACK = 1e-4  # of what weighs on the cable and bends it: a stiffness that rounding may make of none
+_STIFFER = 4.0  # times: the springs that are tried until they hold the cable
+_SPRINGS = 20  # of them
+_ITERATIONS = 30  # to the way in which it falls
+_SIDE = np.array([1.0, 0.7, 0.4])  # in which it falls, rather than the other way: the same on every grid
+_LOPSIDED = 0.37  # more of the end than of the beginning, which may go to two sides
+_FALLS = 3  # from one such equilibrium to another, at most
+
+
+def tipped(problem: Problem, grid: Grid, monitor: Monitor) -> Grid:
+    """Return a grid that has settled in space, free of contact, tipped off where it would fall and settled on.
+
+    The tip is one of `BOW` of the length, in the shape of the fastest fall. Where it finds no rest after it, or falls
+    again and again, the grid is returned as it is.
+
+    Raises:
+        Cancelled: the caller asked to stop.
+    """
+    if problem.plane.dimensions == 2 or problem.contact is not None or problem.self_contact is not None:
+        return grid
+    now = grid
+    for _ in range(_FALLS):
+        way = falls(problem, now)
+        if way is None:
+            return now
+        found = settle(problem, now.changed(start=now.start + BOW * problem.scene.cable.length * way), 0.0, monitor)
+        if found.rest != "settled":
+            return grid
+        now = now.changed(start=found.q, history=found.history, tipped=True)
+    return grid if falls(problem, now) is not None else now
+
+
+def falls(problem: Problem, grid: Grid) -> Floats | None:
+    """Return the way (n_u, nc) in which a start at rest falls, its largest part one, or None where it stays.
+
+    It is the eigenvector of the least eigenvalue of its tangent, if that is negative: found by inverse iteration, held
+    by springs just strong enough for it to stay.
+    """
+    cable, nc, q = problem.scene.cable, problem.nc, grid.start
+    grasps = closed_grasps(problem.scene, 0.0, 0.0)
+    starts: Starts = {}
+    close_grasps(problem, grid, grasps, starts, q)
+    elimination = hold(problem, grid, grasps, np.zeros(2), starts, q).elimination
+    active, parameters = problem.law_table()
+    bending = problem.bend.bending_stiffness if problem.bend else 0.0
+    load = float(np.linalg.norm(problem.weight())) + float(np.abs(applied_forces(problem, grid, np.zeros(1))).max())
+    scale = bending / cable.length**4 + load / cable.length
+
+    def pushed(springs: float, right: Floats) -> Floats | None:
+        f, K = np.empty_like(q), np.empty((q.size, 4 * nc))
+        assemble(
+            problem.axes, q, np.zeros_like(q), grid.tables, active, parameters, grid.past(), NO_RATES, (1.0, 0.0, 1.0),
+            f, K,
+        )  # fmt: skip
+        add_scalar_band(nc, grid.tables.mass, springs, K)
+        change, positive = solve_free(elimination, K, np.ascontiguousarray(right).ravel())
+        return change.reshape(q.shape) if positive else None
+
+    u = greville(grid.knots) / cable.length
+    way = np.zeros_like(q)
+    way[:, :3] = (1.0 + _LOPSIDED * u)[:, None] * _SIDE
+    springs = _SLACK * scale
+    if pushed(springs, way) is not None:
+        return None
+    for _ in range(_SPRINGS):
+        springs *= _STIFFER
+        if pushed(springs, way) is not None:
+            break
+    else:
+        return None
+    side = way.copy()
+    for _ in range(_ITERATIONS):
+        moved = pushed(springs, times_scalar_band(grid.tables.mass, way))
+        assert moved is not None, "these springs hold it"
+        way = moved / np.abs(moved[:, :3]).max()
+    return way if float(np.sum(way * side)) >= 0.0 else -way

@@ -1,0 +1,75 @@
+"""Starts that settle on an equilibrium that any disturbance leaves are tipped off it."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dlocore import Cable, Environment, Grasp, Move, Points, Scene, equilibrium, predict
+from dlocore.problem import pose
+from dlocore.solvers.monitor import Monitor
+from dlocore.statics import start_grid
+from dlocore.tipping import TIPPED, falls
+
+SPAN = np.linspace(0.0, 0.6, 33)
+X = (SPAN - 0.3) / 0.3
+SIDEWAYS = 0.01 * np.sin(np.pi * X)  # to one side and to the other: half a turn about the vertical keeps it
+
+
+def arch(height: float, **changes: Any) -> Scene:
+    """Return an arch on two points that let it turn, which moves up; it is not planar, and half a turn keeps it."""
+    points = np.column_stack([SPAN, SIDEWAYS, height * (1.0 - X**2)])
+    length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    lift = Move(displacement=(0.0, 0.0, 0.05), duration=1.0)
+    values: dict[str, Any] = {"grasps": (Grasp(u=0.0, path=lift), Grasp(u=length, path=lift))}
+    cable = Cable(length=length, diameter=0.005, linear_density=0.1, bending_stiffness=0.2)
+    return Scene(cable=cable, shape=Points(points=points, settle=True), **(values | changes))
+
+
+def settled(scene: Scene, n_u: int) -> Any:
+    problem = pose(scene)
+    return problem, start_grid(problem, n_u, Monitor())
+
+
+def test_an_arch_on_two_points_falls_and_hangs():
+    found = predict(arch(0.3))
+    assert found.status == "converged", found.message
+    assert TIPPED in found.message
+    hanging = predict(arch(-0.3))
+    assert TIPPED not in hanging.message
+    u, t = np.linspace(0.0, found.scene.cable.length, 33), [0.0, 0.5, 1.0]
+    apart = found.surface.positions(u, t) - hanging.surface.positions(u, t)
+    told = found.accuracy.error_estimate + hanging.accuracy.error_estimate
+    assert np.linalg.norm(apart, axis=-1).max() < told < 5e-3
+
+
+@pytest.mark.parametrize("n_u", [9, 14, 25, 40])
+def test_it_falls_to_one_side_on_every_grid(n_u):
+    scene = arch(0.3)
+    problem, grid = settled(scene, n_u)
+    assert grid.tipped
+    assert falls(problem, grid) is None
+    assert problem.world(grid.start[None, n_u // 2])[0, 2] < -0.2
+
+
+def test_equilibria_are_tipped_too():
+    u = np.linspace(0.0, arch(0.3).cable.length, 9)
+    up, down = (equilibrium(arch(height)).positions(u) for height in (0.3, -0.3))
+    np.testing.assert_allclose(up, down, atol=1e-3)
+    assert up[4, 2] < -0.2
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        arch(-0.3),
+        arch(0.3, environment=Environment(gravity=(0.0, 0.0, 0.0))),  # free to turn, and nothing makes it
+        arch(-0.3, grasps=(Grasp(u=0.2),), horizon=1.0),
+        arch(0.3, grasps=(Grasp(u=0.0, hold="clamp"),), horizon=1.0),
+    ],
+    ids=["hangs", "weightless", "hangs from a point", "cantilever"],
+)
+def test_what_stays_is_left_alone(scene):
+    problem, grid = settled(scene, 17)
+    assert falls(problem, grid) is None
+    assert not grid.tipped
