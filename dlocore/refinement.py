@@ -28,7 +28,12 @@ from dlocore.whole_march import MISSED_COUNTS, Outcome, is_folded, march_level, 
 
 AUTO_ENOUGH = 1e-2  # of the length: the estimated error with which it is content where the finest grids reach no closer
 ROUGH = 0.05  # of the length: two grids that differ more are in no order yet: the next is marched with strong damping
-MOST_WORK = 3.2e7  # control points times steps of one march in the plane; each coordinate more costs twice the time
+MOST_WORK = 3.2e7  # control points times steps of one march in the plane
+_COSTS = {
+    2: 1.0,
+    3: 2.0,
+    4: 2.9,
+}  # times the time, by coordinates: in space, and with twist, which takes 1.4 times that
 _FRAMES = 3  # a control point in time, at least, that are kept of a motion with twist: what its time spline needs
 PATIENT = 64.0  # times as much, of a march that will end before a deadline or within a time budget, ...
 MOST_STEPS = 1_000_000  # ... and has no more steps: what holds the cable is kept of all of them, see `Kept`
@@ -311,7 +316,7 @@ class _Climb:
     def _work(self, size: Size) -> float:
         """Return the control points times steps of a march in the plane that takes as long as one of a size."""
         touches = self.problem.contact is not None or self.problem.self_contact is not None
-        return size.n_u * size.steps * 2.0 ** (self.problem.nc - 2) * (CONTACT_COSTS if touches else 1.0)
+        return size.n_u * size.steps * _COSTS[self.problem.nc] * (CONTACT_COSTS if touches else 1.0)
 
     def _ends_in_time(self, size: Size) -> bool:
         """Tell whether there is a deadline or a budget, and a march of a size will end before it."""

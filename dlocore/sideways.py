@@ -1,7 +1,7 @@
 """Whether a planar motion stays in its plane: whether a disturbance out of it would grow."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from typing import cast
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dlocore.bands import dense_of
 from dlocore.buckling import BOW, GROWTH, UNSTABLE
-from dlocore.discretisation import plane_curvature_of
+from dlocore.discretisation import grid_on, plane_curvature_of
 from dlocore.effects import laws
 from dlocore.events import closed_grasps
 from dlocore.grid import Grid
@@ -18,6 +18,7 @@ from dlocore.kernels.across import stiffness_across
 from dlocore.kernels.assembly import NO_RATES, assemble
 from dlocore.kernels.banded import factor
 from dlocore.kernels.basis import basis_rows
+from dlocore.kernels.entry import remember_start
 from dlocore.problem import Problem, pose
 from dlocore.scene import Grasp, Scene
 from dlocore.solvers.march import March
@@ -40,23 +41,73 @@ def leaves_plane(problem: Problem, motion: March) -> bool:
     if problem.scene.shape.settle and is_unstable(problem, grid, grid.start, closed_grasps(problem.scene, 0.0, 0.0)):
         return True
     looks = np.unique(np.linspace(0, len(motion.times) - 1, _LOOKS).round().astype(int))
-    states = _in_plane(problem, motion.states[looks])
-    if states is None:
-        return False
-    bands, unit = _bands(problem, grid, motion.states[looks], states)
     density, drag = problem.scene.cable.linear_density, problem.drag_coefficient()
     slowest = GROWTH / problem.horizon  # [1/s]: rate of growth that matters
     slack = density * slowest**2 + drag * slowest
     growth = 0.0
-    for t, q, band in zip(motion.times[looks].tolist(), states, bands, strict=True):
-        held = closed_grasps(problem.scene, t, t)
-        stiff = band + _held_band(grid, held, _FIRM * float(np.abs(band).max()))
-        if factor(stiff + slack * unit) >= 0:
-            least = _least(dense_of(stiff) + _twisting(problem, grid, q, held), unit)
-            growth += (np.sqrt(drag**2 - 4.0 * density * min(least, 0.0)) - drag) / (2.0 * density)
+    for least in _leasts(problem, grid, motion.states[looks], motion.times[looks].tolist(), slack):
+        growth += (np.sqrt(drag**2 - 4.0 * density * min(least, 0.0)) - drag) / (2.0 * density)
     # a straight cable that buckles may do so to any side: until it has, all grow alike
     both = math.log(1.0 / BOW) if problem.start.bow else 0.0
     return growth * problem.horizon / len(looks) > GROWTH + both
+
+
+def _leasts(problem: Problem, grid: Grid, states: Floats, times: list[float], slack: float) -> Iterator[float]:
+    """Yield the least stiffness [N/m^2] against leaving their plane of the states (k, n, nc) with one below -slack."""
+    flat = _in_plane(problem, states)
+    if flat is None:
+        if _bends_in_plane(problem):
+            yield from _leasts_of_bent(problem, grid, states, times, slack)
+        return
+    bands, unit = _bands(problem, grid, states, flat)
+    for t, q, band in zip(times, flat, bands, strict=True):
+        held = closed_grasps(problem.scene, t, t)
+        stiff = band + _held_band(grid, held, _FIRM * float(np.abs(band).max()))
+        if factor(stiff + slack * unit) >= 0:
+            yield _least(dense_of(stiff) + _twisting(problem, grid, q, held), dense_of(unit))
+
+
+def _bends_in_plane(problem: Problem) -> bool:
+    """Tell whether a cable that is bent without stress moves in a plane that it may leave."""
+    if problem.on_table or problem.plane.dimensions == 3 or problem.scene.effects.get("twist", "auto") == "off":
+        return False
+    return problem.start.material is None and problem.start.theta is None and problem.bending_memory is None
+
+
+def _leasts_of_bent(problem: Problem, grid: Grid, states: Floats, times: list[float], slack: float) -> Iterator[float]:
+    """Do what `_leasts` does for a cable that is bent without stress: its sections turn as it leaves the plane.
+
+    The stiffness is that of the motion in space with twist, in the planar states, against displacements out of the
+    plane and turns of the sections.
+    """
+    posed = pose(problem.scene, {**problem.called_for, "side": UNSTABLE})
+    if posed.twist is None:
+        return
+    space = grid_on(posed, grid.knots)
+    history, (active, parameters) = space.past(), posed.law_table()
+    n, nc = grid.n_u, posed.nc
+    away = np.zeros((2, nc))
+    away[0, :3], away[1, 3] = np.cross(*problem.plane.axes), 1.0
+    unit: Floats = np.kron(dense_of(grid.tables.mass), np.eye(2)).astype(np.float64)
+    f, K = np.empty((n, nc)), np.empty((n * nc, 4 * nc))
+    for t, flat in zip(times, states, strict=True):
+        q = np.zeros((n, nc))
+        q[:, :3] = posed.plane.points(problem.plane.world(flat))
+        remember_start(posed.axes, q, space.tables, active, parameters, history)  # carries the frames on to it
+        still = np.zeros_like(q)
+        assemble(
+            posed.axes, q, still, space.tables, active, parameters, history, NO_RATES, (1.0, 0.0, 1.0), f, K
+        )  # fmt: skip
+        stiff = np.einsum("xa,iajb,yb->ixjy", away, dense_of(K).reshape(n, nc, n, nc), away)
+        held = closed_grasps(problem.scene, t, t)
+        firm = _FIRM * float(np.abs(stiff).max())
+        stiff[:, 0, :, 0] += dense_of(_held_band(grid, held, firm))
+        stiff[:, 1, :, 1] += dense_of(_held_band(grid, [g for g in held if g.hold == "clamp"], firm, direction=False))
+        whole = stiff.reshape(2 * n, 2 * n)
+        try:
+            np.linalg.cholesky(whole + slack * unit)
+        except np.linalg.LinAlgError:
+            yield _least(whole, unit)
 
 
 def is_unstable(problem: Problem, grid: Grid, q: Floats, held: list[Grasp]) -> bool:
@@ -70,7 +121,7 @@ def is_unstable(problem: Problem, grid: Grid, q: Floats, held: list[Grasp]) -> b
     stiff = bands[0] + _held_band(grid, held, _FIRM * largest)
     if factor(stiff + slack * unit) < 0:
         return False
-    return _least(dense_of(stiff) + _twisting(problem, grid, states[0], held), unit) < -slack
+    return _least(dense_of(stiff) + _twisting(problem, grid, states[0], held), dense_of(unit)) < -slack
 
 
 def _in_plane(problem: Problem, states: Floats) -> Floats | None:
@@ -153,12 +204,12 @@ def slipping_across(problem: Problem, grid: Grid, states: Floats) -> Floats:
     return bands
 
 
-def _held_band(grid: Grid, held: list[Grasp], stiffness: float) -> Floats:
+def _held_band(grid: Grid, held: list[Grasp], stiffness: float, direction: bool = True) -> Floats:
     """Return springs that keep grasps, and held directions, in the plane: a lower band (n, 4)."""
     band = np.zeros((grid.n_u, 4))
     for grasp in held:
         first, table = basis_rows(grid.knots, np.array([grasp.u]), 1)
-        for b in table[0, : 1 if grasp.hold == "point" else 2]:
+        for b in table[0, : 1 if grasp.hold == "point" or not direction else 2]:
             band[first[0] + _COLUMN, _BELOW] += stiffness / (b @ b) * b[_COLUMN] * b[_COLUMN + _BELOW]
     return band
 
@@ -184,7 +235,7 @@ def _twisting(problem: Problem, grid: Grid, q: Floats, held: list[Grasp]) -> Flo
 
 
 def _least(stiff: Floats, unit: Floats) -> float:
-    """Return the least eigenvalue k [N/m^2] of K w = k U w, of a stiffness (n, n) and the lower band (n, 4) of U."""
-    root = np.linalg.cholesky(dense_of(unit))
+    """Return the least eigenvalue k [N/m^2] of K w = k U w, of a stiffness and U, both (n, n)."""
+    root = np.linalg.cholesky(unit)
     inner = np.linalg.solve(root, np.linalg.solve(root, stiff).T)
     return float(np.linalg.eigvalsh(inner)[0])
