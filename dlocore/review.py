@@ -191,8 +191,14 @@ def neglected(level: Level) -> float:
 def _spun(level: Level) -> float:
     """Return how far the inertia of sections that turn would move a cable that is solved without twist, about [m]."""
     problem, motion = level.problem, level.motion
-    turns = "twist" in _forces(problem) and bends_sharply(problem, motion.grid, motion.states)
-    return _response(level, "twist") if turns else 0.0
+    if not _turns_sections(problem) or not bends_sharply(problem, motion.grid, motion.states):
+        return 0.0
+    return _response(level, "twist")
+
+
+def _turns_sections(problem: Problem) -> bool:
+    """Tell whether a motion turns sections whose inertia is left out: in space, without twist."""
+    return problem.plane.dimensions == 3 and problem.twist is None and problem.inertia is not None
 
 
 def _yields(level: Level) -> dict[str, str]:
@@ -319,8 +325,7 @@ def _forces(problem: Problem) -> dict[str, Force]:
         "damping": damping,
         "friction": friction,
     }
-    turns = problem.twist is None and problem.plane.dimensions == 3 and problem.inertia is not None
-    return along | ({"twist": twist} if turns else {})
+    return along | ({"twist": twist} if _turns_sections(problem) else {})
 
 
 def _response(level: Level, name: str) -> float:
