@@ -10,6 +10,7 @@ import pytest
 import dlocore.reference
 from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, SceneError, Straight, Table, predict
 from dlocore.errors import Cancelled
+from dlocore.reference.refine import left
 from dlocore.reference.solve import converged
 from tests.reference.rods import cable
 
@@ -48,6 +49,21 @@ def test_the_estimate_bounds_the_error_and_the_target_is_met():
     assert loose.tolerance_met
     assert tight.tolerance_met
     assert error < loose.error_estimate + tight.error_estimate < 1.1e-3
+
+
+@pytest.mark.parametrize(
+    ("before", "change", "expected"),
+    [
+        (4e-3, 2e-3, 2e-3),
+        (4e-3, 1e-3, 1e-3 / 3.0),
+        (4.6e-3, 1.3e-4, 1.3e-4 / 3.0),
+        (3e-3, 2.5e-3, 5e-3),
+        (1e-3, 0.0, 0.0),
+    ],
+    ids=["first order", "second order", "by chance", "hardly", "none"],
+)
+def test_what_is_left_of_changes_is_that_of_the_second_order_at_best(before, change, expected):
+    assert left(before, change) == pytest.approx(expected)
 
 
 def test_the_surface_is_the_motion_of_the_rods():
