@@ -55,10 +55,11 @@ def tipped(problem: Problem, grid: Grid, monitor: Monitor) -> Grid:
 
 
 def falls(problem: Problem, grid: Grid) -> Floats | None:
-    """Return the way (n_u, nc) in which a start at rest falls, its largest part one, or None where it stays.
+    """Return the way (n_u, nc) in which a start at rest falls, or None where it stays.
 
-    It is the eigenvector of the least eigenvalue of its tangent, if that is negative: found by inverse iteration, held
-    by springs just strong enough for it to stay.
+    Its largest displacement is one, or less where sections turn by more than that over the length. It is the
+    eigenvector of the least eigenvalue of its tangent, if that is negative: found by inverse iteration, held by springs
+    just strong enough for it to stay.
     """
     cable, nc, q = problem.scene.cable, problem.nc, grid.start
     grasps = closed_grasps(problem.scene, 0.0, 0.0)
@@ -93,8 +94,10 @@ def falls(problem: Problem, grid: Grid) -> Floats | None:
     else:
         return None
     side = way.copy()
+    turn = cable.length / problem.twist.radius if problem.twist is not None else 0.0
     for _ in range(_ITERATIONS):
         moved = pushed(springs, times_scalar_band(grid.tables.mass, way))
         assert moved is not None, "these springs hold it"
-        way = moved / np.abs(moved[:, :3]).max()
+        turned = float(np.abs(moved[:, 3:]).max()) * turn if problem.twist is not None else 0.0
+        way = moved / max(float(np.abs(moved[:, :3]).max()), turned)
     return way if float(np.sum(way * side)) >= 0.0 else -way

@@ -43,9 +43,10 @@ def test_an_arch_on_two_points_falls_and_hangs():
     assert np.linalg.norm(apart, axis=-1).max() < told < 5e-3
 
 
+@pytest.mark.parametrize("twist", ["off", "on"])
 @pytest.mark.parametrize("n_u", [9, 14, 25, 40])
-def test_it_falls_to_one_side_on_every_grid(n_u):
-    scene = arch(0.3)
+def test_it_falls_to_one_side_on_every_grid(n_u, twist):
+    scene = arch(0.3, effects={"twist": twist})
     problem, grid = settled(scene, n_u)
     assert grid.tipped
     assert falls(problem, grid) is None
