@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dlocore.bands import dense_of
 from dlocore.buckling import BOW, GROWTH, UNSTABLE
-from dlocore.discretisation import grid_on, plane_curvature_of
+from dlocore.discretisation import grid_on, plane_curvature_of, start_director
 from dlocore.effects import laws
 from dlocore.events import closed_grasps
 from dlocore.grid import Grid
@@ -18,7 +18,7 @@ from dlocore.kernels.across import stiffness_across
 from dlocore.kernels.assembly import NO_RATES, assemble
 from dlocore.kernels.banded import factor
 from dlocore.kernels.basis import basis_rows
-from dlocore.kernels.entry import remember_start
+from dlocore.kernels.twisted import start_frames
 from dlocore.problem import Problem, pose
 from dlocore.scene import Grasp, Scene
 from dlocore.solvers.march import March
@@ -80,20 +80,28 @@ def _leasts_of_bent(problem: Problem, grid: Grid, states: Floats, times: list[fl
     The stiffness is that of the motion in space with twist, in the planar states, against displacements out of the
     plane and turns of the sections.
     """
+    from scipy.spatial.transform import Rotation  # slow to import, and seldom needed
+
     posed = pose(problem.scene, {**problem.called_for, "side": UNSTABLE})
     if posed.twist is None:
         return
     space = grid_on(posed, grid.knots)
     history, (active, parameters) = space.past(), posed.law_table()
     n, nc = grid.n_u, posed.nc
+    normal = np.cross(*problem.plane.axes)
     away = np.zeros((2, nc))
-    away[0, :3], away[1, 3] = np.cross(*problem.plane.axes), 1.0
+    away[0, :3], away[1, 3] = normal, 1.0
+    begun, director = posed.start(0.0, 1)[0], start_director(posed)
     unit: Floats = np.kron(dense_of(grid.tables.mass), np.eye(2)).astype(np.float64)
     f, K = np.empty((n, nc)), np.empty((n * nc, 4 * nc))
     for t, flat in zip(times, states, strict=True):
         q = np.zeros((n, nc))
         q[:, :3] = posed.plane.points(problem.plane.world(flat))
-        remember_start(posed.axes, q, space.tables, active, parameters, history)  # carries the frames on to it
+        # in a plane the sections turn as the tangent does
+        now = space.at(q, 0.0, 1)[:3]
+        angle = math.atan2(float(normal @ np.cross(begun, now)), float(begun @ now))
+        turned = Rotation.from_rotvec(angle * normal).apply(director)
+        start_frames(grid.knots, q, space.tables, turned, history.past)
         still = np.zeros_like(q)
         assemble(
             posed.axes, q, still, space.tables, active, parameters, history, NO_RATES, (1.0, 0.0, 1.0), f, K

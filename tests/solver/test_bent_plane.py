@@ -75,3 +75,16 @@ def test_an_arc_that_stays_is_solved_in_its_plane(rest):
     found = predict(scene(shape, rest, *held("clamp")))
     assert found.accuracy.dimensions == 2
     assert UNSTABLE not in found.message
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.5 * np.pi, np.pi, 3.0, -2.0])
+def test_what_tells_does_not_depend_on_how_far_the_cable_has_turned(turn):
+    problem = pose(scene(arc(1.2), arc(1.2, turned=-1.0)[:, :2], *held("tangent")))
+    grid = make_grid(problem, 33)
+    c, s = np.cos(turn), np.sin(turn)
+    given, turned = (
+        min(_leasts(problem, grid, (grid.start @ q.T)[None], [0.0], 0.0))
+        for q in (np.eye(2), np.array([[c, -s], [s, c]]))
+    )
+    assert turned == pytest.approx(given, rel=1e-3)
+    assert given < 0.0
