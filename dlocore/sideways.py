@@ -132,14 +132,21 @@ def is_unstable(problem: Problem, grid: Grid, q: Floats, held: list[Grasp]) -> b
     return _least(dense_of(stiff) + _twisting(problem, grid, states[0], held), dense_of(unit)) < -slack
 
 
+def is_looked_at(problem: Problem) -> bool:
+    """Tell whether `is_unstable` can tell of an equilibrium in a plane: of a straight cable that may leave it."""
+    start, rest = problem.start, problem.scene.cable.rest_shape
+    bent = not isinstance(rest, str) or rest != "straight" or start.material is not None
+    return not (
+        problem.on_table or bent or start.aside or start.theta is not None or problem.bending_memory is not None
+    )
+
+
 def _in_plane(problem: Problem, states: Floats) -> Floats | None:
     """Return the coordinates (k, n, 2) of states (k, n, nc) in their plane, None where none is or they can't leave it.
 
     That is a cable on a table, and one with bends without stress, whose stiffness is another.
     """
-    start, rest = problem.start, problem.scene.cable.rest_shape
-    bent = not isinstance(rest, str) or rest != "straight" or start.material is not None
-    if problem.on_table or bent or start.aside or start.theta is not None or problem.bending_memory is not None:
+    if not is_looked_at(problem):
         return None
     if problem.plane.dimensions == 2:
         return states

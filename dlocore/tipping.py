@@ -16,6 +16,7 @@ from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, times_
 from dlocore.kernels.banded import solve_free
 from dlocore.problem import Problem
 from dlocore.settling import settle
+from dlocore.sideways import is_looked_at
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import greville
 
@@ -34,6 +35,8 @@ _FALLS = 3  # from one such equilibrium to another, at most
 def tipped(problem: Problem, grid: Grid, monitor: Monitor) -> Grid:
     """Return a grid that has settled in space, free of contact, tipped off where it would fall and settled on.
 
+    One that lies in a plane, and of which `sideways.py` tells whether it leaves that, is left to it.
+
     The tip is one of `BOW` of the length, in the shape of the fastest fall. Where it finds no rest after it, or falls
     again and again, the grid is returned as it is.
 
@@ -42,6 +45,8 @@ def tipped(problem: Problem, grid: Grid, monitor: Monitor) -> Grid:
     """
     if problem.plane.dimensions == 2 or problem.contact is not None or problem.self_contact is not None:
         return grid
+    if problem.rest_plane.dimensions == 2 and is_looked_at(problem):
+        return grid  # `is_unstable` tells, and gives it a bow
     now = grid
     for _ in range(_FALLS):
         way = falls(problem, now)
