@@ -173,7 +173,9 @@ def test_what_touches_is_marched_again_where_it_needed_more_than_the_first_grids
 @pytest.mark.parametrize("index", [42943, 20480, 39792, 45737])
 def test_in_the_plane_too_a_scene_that_does_not_determine_its_motion_is_no_success(index: int):
     """Growth tells of the first; the next two start nearly straight; the last one slides on a rough table."""
-    answer = predict(draw(90, index).make())
+    scene = draw(90, index).make()
+    # without twist a cable that is bent without stress stays in its plane, whatever would grow out of it
+    answer = predict(dataclasses.replace(scene, effects={**scene.effects, "twist": "off"}))
     assert answer.accuracy.dimensions == 2
     assert answer.status == "stalled"
     assert answer.accuracy.error_parts["start"] > UNDETERMINED * answer.scene.cable.length
