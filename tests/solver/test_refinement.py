@@ -122,8 +122,10 @@ def test_who_gives_a_deadline_gets_more_control_points_too(monkeypatch: pytest.M
 
 def test_what_steps_err_by_is_learned_from_half_as_many_where_twice_as_many_are_dear(monkeypatch: pytest.MonkeyPatch):
     # its strands meet only on the last of the grids that refine both: those before tell nothing of that motion
+    # without twist it stays in its plane; out of it, as it goes with it, an estimate of 2.8 % is 4.2 % off
     scene = draw(34, 31518).make()
-    scene = replace(scene, quality=Quality(target_error=0.05 * scene.cable.length))
+    effects = {**scene.effects, "twist": "off"}
+    scene = replace(scene, quality=Quality(target_error=0.05 * scene.cable.length), effects=effects)
     monkeypatch.setattr(refinement, "_DEAR", 0.0)  # as if the time were nearly up
     found = predict(scene, deadline=60.0)
     assert found.status == "converged"
