@@ -73,7 +73,8 @@ def falls(problem: Problem, grid: Grid) -> Floats | None:
     elimination = hold(problem, grid, grasps, np.zeros(2), starts, q).elimination
     active, parameters = problem.law_table()
     bending = problem.bend.bending_stiffness if problem.bend else 0.0
-    load = float(np.linalg.norm(problem.weight())) + float(np.abs(applied_forces(problem, grid, np.zeros(1))).max())
+    pull = float(np.abs(applied_forces(problem, grid, np.zeros(1))).max())  # of any control point [N]
+    load = float(np.linalg.norm(problem.weight())) + pull / cable.length
     scale = bending / cable.length**4 + load / cable.length
 
     def pushed(springs: float, right: Floats) -> Floats | None:
@@ -103,6 +104,5 @@ def falls(problem: Problem, grid: Grid) -> Floats | None:
     for _ in range(_ITERATIONS):
         moved = pushed(springs, times_scalar_band(grid.tables.mass, way))
         assert moved is not None, "these springs hold it"
-        turned = float(np.abs(moved[:, 3:]).max()) * turn if problem.twist is not None else 0.0
-        way = moved / max(float(np.abs(moved[:, :3]).max()), turned)
+        way = moved / max(float(np.abs(moved[:, :3]).max()), turn * float(np.abs(moved[:, 3:]).max(initial=0.0)))
     return way if float(np.sum(way * side)) >= 0.0 else -way

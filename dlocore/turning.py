@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from dlocore.events import closed_grasps
 from dlocore.grid import Grid
 from dlocore.problem import Problem
+from dlocore.spline import design_matrix
 
 Floats = NDArray[np.float64]
 
@@ -52,8 +53,8 @@ def turn_notes(problem: Problem, grid: Grid) -> list[str]:
     if not about:
         return []
     u = np.linspace(0.0, problem.scene.cable.length, _LOOKS)
-    at_rest = np.array([grid.at(grid.start, x) for x in u])
-    moved = problem.plane.world(at_rest[:, : problem.plane.dimensions]) - problem.start(u)
+    at_rest = design_matrix(grid.knots, u) @ grid.start[:, : problem.plane.dimensions]
+    moved = problem.plane.world(at_rest) - problem.start(u)
     if np.linalg.norm(moved, axis=1).max() <= _MOVES * problem.scene.cable.length:
         return []
     return [f"nothing holds the start from turning about {about}: where to it turns as it settles depends on the way"]
