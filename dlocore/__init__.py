@@ -13,11 +13,12 @@ from dlocore.spline import SplineSurface
 
 if TYPE_CHECKING:
     from dlocore.balance import effect_forces, energies
-    from dlocore.front import predict, warm_up
+    from dlocore.front import predict
     from dlocore.many import predict_many
     from dlocore.planning import Plan, plan
     from dlocore.sensitivity import Sensitivities, sensitivities
     from dlocore.statics import Equilibrium, equilibrium
+    from dlocore.warming import warm_up
 
 __all__ = [
     "PRESETS",
@@ -69,7 +70,7 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import the solver on first use: its compiler takes longer to import than the rest of the package together."""
-    homes = {"predict": "front", "warm_up": "front", "equilibrium": "statics", "Equilibrium": "statics"}
+    homes = {"predict": "front", "warm_up": "warming", "equilibrium": "statics", "Equilibrium": "statics"}
     homes |= {"plan": "planning", "Plan": "planning", "energies": "balance", "effect_forces": "balance"}
     homes |= {"predict_many": "many"}
     homes |= {"sensitivities": "sensitivity", "Sensitivities": "sensitivity"}

@@ -26,7 +26,6 @@ from dlocore.solvers.ladder import Level
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.paper import BEYOND, solve_as_printed
 from dlocore.solvers.spacetime import solve
-from dlocore.spline import uniform_knots
 from dlocore.whole_march import MISSED_COUNTS, TORN, Outcome, march_status, sided
 
 Floats = NDArray[np.float64]
@@ -327,57 +326,3 @@ def _material(problem: Problem, level: Level) -> MaterialMotion | None:
     if len(motion.log) == 0 or axial.shape[1] == 0:
         axial = np.broadcast_to(motion.grid.history.axial[:, 0], (len(kept), len(motion.history.axial)))
     return material_of(problem, motion.grid, motion.times[kept], motion.states[kept], memory, axial)
-
-
-def _read_all(answer: Prediction) -> None:
-    """Read all that is found only as it is read, and ask for its energies, so that what that takes is compiled, too."""
-    from dlocore.balance import energies
-
-    _ = answer.message, answer.grasps, answer.effects, answer.material, answer.start_energy
-    _ = [(iteration.surface, iteration.energy) for iteration in answer.iterations]
-    energies(answer.scene, answer.surface, [0.0])
-
-
-def warm_up() -> None:
-    """Compile, or load from the cache, every kernel, so that the first prediction is as fast as the next."""
-    from dlocore.cable import Cable
-    from dlocore.effects.selfcontact import nearest_strands
-    from dlocore.obstacles import Sphere
-    from dlocore.paths import Move
-    from dlocore.scene import Environment, Grasp, Points, Straight, Switch, Table
-    from dlocore.statics import equilibrium
-
-    # yields at a bend that is not reached, rubs, and lies beside something: so all that looks for that is compiled, too
-    cable = Cable.preset("paper", bending_damping=1e-4, yield_strain=0.1, memory_rate=1.0)
-    u = np.linspace(0.0, 1.0, 12)[:, None]
-    arc = u * [1.0, 0.0, 0.0] + 0.05 * np.sin(3.0 * u) * [0.0, 1.0, 0.0]
-    turn = Move(displacement=(0.0, 0.01, 0.0), rotation=(0.0, 0.0, 0.1), duration=1.0)
-    grasp = Grasp(u=0.3, hold="clamp", path=turn)
-    beside = (Sphere(center=(0.5, 0.3, 0.0), radius=0.2),)
-    # whole smooth motions first: the code of a function that is loaded first serves all who call it, and they run
-    # faster with what was compiled for them
-    for table in (Table(), None):
-        smooth = Environment(drag=0.1, table=table)
-        predict(Scene(cable=Cable.preset("paper"), shape=Points(points=arc), grasps=(grasp,), environment=smooth))
-    kinds: tuple[tuple[Table | None, Switch], ...] = ((Table(friction=0.1), "auto"), (None, "off"), (None, "on"))
-    for table, twist in kinds:  # two, three and four coordinates
-        environment = Environment(drag=0.1, drag_quadratic=0.1, table=table, obstacles=beside)
-        for quality in (Quality(), Quality(n_u=9, n_t=9), Quality(n_u=9, n_t=9, method="spacetime")):
-            plastic: Switch = "on" if quality.method == "auto" and twist != "off" else "off"
-            scene = Scene(
-                cable=cable,
-                shape=Points(points=arc, settle=table is None),
-                grasps=(grasp,),
-                environment=environment,
-                effects={"twist": twist, "plasticity": plastic},
-                quality=quality,
-            )
-            for effects in (scene.effects, {"twist": twist, "obstacles": "off"}):
-                _read_all(predict(replace(scene, effects=effects)))
-        equilibrium(scene, n_u=9)
-    hangs = Scene(cable=cable, shape=Straight(direction=(0.0, 0.0, -1.0)), grasps=(Grasp(u=0.0),), horizon=1.0)
-    equilibrium(hangs, n_u=9)  # in a plane, without contact
-    loop = np.column_stack([np.cos(np.linspace(0.0, 7.0, 9)), np.sin(np.linspace(0.0, 7.0, 9)), 0.1 * u[:9, 0]])
-    nearest_strands(uniform_knots(9, 1.0), loop[None], 3, 0.01, 0.03)
-    still = Scene(cable=cable, shape=scene.shape, environment=Environment(gravity=(0.0, 0.0, 0.0)), horizon=1e-3)
-    predict(replace(still, quality=Quality(method="reference", target_error=1.0)))

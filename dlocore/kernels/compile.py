@@ -7,6 +7,8 @@ from typing import Any
 
 import numba
 
+from dlocore.caching import kept
+
 
 def _digest() -> str:
     """Hash the source of everything that is compiled."""
@@ -50,7 +52,4 @@ part = law  # of a kernel, into it: handing over a table, which is a hundred num
 
 
 def _compiled(function: Callable[..., Any], **options: bool) -> Any:
-    compiled = _njit(cache=True, error_model="numpy", **options)(function)
-    if hasattr(compiled, "_cache"):  # not where compilation is switched off for debugging
-        compiled._cache._cache_file._source_stamp = _SOURCE
-    return compiled
+    return kept(_njit(cache=True, error_model="numpy", **options)(function), _SOURCE)

@@ -7,6 +7,8 @@ from typing import Any
 
 import numba
 
+from dlocore.caching import kept
+
 _FILES = ("compile", "body", "banded", "hinge", "surface", "forces", "energy", "step")  # what is compiled, or read so
 _SOURCE = hashlib.sha256(b"".join(Path(__file__).with_name(f"{name}.py").read_bytes() for name in _FILES)).hexdigest()
 
@@ -17,6 +19,4 @@ def compiled(function: Callable[..., Any]) -> Any:
     numba looks only at the age of a function's own file, so the stamp of its cache is the hash of all of these.
     """
     made: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-    if hasattr(made, "_cache"):  # not where compilation is switched off for debugging
-        made._cache._cache_file._source_stamp = _SOURCE
-    return made
+    return kept(made, _SOURCE)

@@ -11,13 +11,14 @@ import numpy as np
 from dlocore.calibration import Calibration, Measured, source_mark
 from dlocore.cost import Cost, Sample, fitted_rates
 from dlocore.errors import Cancelled
-from dlocore.front import predict, warm_up
+from dlocore.front import predict
 from dlocore.machine import machine
 from dlocore.prediction import Prediction
 from dlocore.scene import Method, Quality, Scene
 from dlocore.study.judge import Truth, finest_march, largest_error
 from dlocore.study.scenes import accuracy_scenes, effect_scenes, hanging, paper_case
 from dlocore.study.timing import Times, timed
+from dlocore.warming import warm_up
 
 Grid = tuple[int, int]
 OnProgress = Callable[[int, int, str], None]

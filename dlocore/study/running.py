@@ -8,7 +8,7 @@ import numpy as np
 
 from dlocore.calibration import source_mark
 from dlocore.errors import Cancelled, SceneError
-from dlocore.front import predict, warm_up
+from dlocore.front import predict
 from dlocore.machine import machine
 from dlocore.prediction import Prediction
 from dlocore.scene import Scene
@@ -17,6 +17,7 @@ from dlocore.study.plan import Case, Plan
 from dlocore.study.record import EffectCost, Run, Scaled, Step, Study
 from dlocore.study.scaling import effect_pairs, sizes
 from dlocore.study.timing import Times, timed
+from dlocore.warming import warm_up
 
 OnProgress = Callable[[int, int, str], None]
 _PATIENCE = 2.0  # [s] for the repeats of one solve

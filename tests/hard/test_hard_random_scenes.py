@@ -12,14 +12,15 @@ from benchmarks.random_reference import compare as compare_with_reference
 SEED = 2
 COUNT = 300
 BATCH = 30
-DEADLINE = 15.0  # [s]: an answer that is cut off has a status too
+DEADLINE = 3.0  # [s]: an answer that is cut off, one in twenty, has a status too
+PATIENCE = 15.0  # [s]
 
 
 @pytest.mark.parametrize("first", range(0, COUNT, BATCH))
 def test_random_scene_ends_with_a_finite_answer_or_is_refused_for_a_reason(first: int):
     for index in range(first, first + BATCH):
         drawn = draw(SEED, index, small=True)
-        record = run(drawn, DEADLINE, False)
+        record = run(drawn, DEADLINE, False, measured="checked")
         assert record["status"] != "exception", (index, record["message"])
         if record["status"] == "refused" and record["field"] == "shape.settle":
             continue  # a start that did not come to rest is refused in words; docs/stability.md counts them
@@ -36,7 +37,7 @@ def test_random_scene_ends_with_a_finite_answer_or_is_refused_for_a_reason(first
 
 @pytest.mark.parametrize(("seed", "index"), [(2, 125), (3, 28), (10, 783)])
 def test_a_cable_pushed_exactly_along_itself_buckles(seed, index):
-    record = run(draw(seed, index), DEADLINE, False)
+    record = run(draw(seed, index), PATIENCE, False)
     assert record["status"] == "converged", record["message"]
     assert record["faults"] == []
 

@@ -8,7 +8,7 @@ from dlocore import Cable, Environment, Grasp, Move, Points, Scene, SceneError, 
 from tests.solver.scenes import samples
 from tests.solver.test_two_grippers import for_the_rod
 
-COUNT = 30
+COUNT = 20
 APART = {"self_contact": "off"}  # the rod's strands pass through each other
 
 

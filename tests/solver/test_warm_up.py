@@ -1,7 +1,13 @@
 """After `warm_up` nothing is left to compile, whatever a scene calls for."""
 
+import os
 import subprocess
 import sys
+from pathlib import Path
+
+import pytest
+
+from dlocore import warm_up
 
 PROGRAM = """
 import sys
@@ -37,3 +43,36 @@ def test_nothing_is_compiled_in_a_solve_after_warm_up():
     # in a process of its own: the tests before have compiled other things
     done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=540)
     assert done.returncode == 0, done.stderr
+
+
+LEFT_BEHIND = """
+import threading, time
+from dlocore import warming
+started = []
+class Seen(warming.subprocess.Popen):
+    def __init__(self, *args, **options):
+        super().__init__(*args, **options)
+        started.append(self.pid)
+warming.subprocess.Popen = Seen
+threading.Thread(target=warming.warm_up, args=(2,), daemon=True).start()
+while len(started) < 2:
+    time.sleep(0.05)
+print(*started)
+"""
+
+
+def test_a_program_that_ends_while_it_compiles_takes_its_processes_along(tmp_path: Path) -> None:
+    cold = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", LEFT_BEHIND], env=cold, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    processes = [int(pid) for pid in done.stdout.split()]
+    assert len(processes) == 2
+    for pid in processes:
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
+
+
+@pytest.mark.parametrize("processes", [0, -1])
+def test_it_takes_one_process_at_least(processes: int) -> None:
+    with pytest.raises(ValueError, match="processes"):
+        warm_up(processes)

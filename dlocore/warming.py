@@ -1,0 +1,134 @@
+"""Compile every kernel, by predictions that between them call for all of them; from the cache where it has them."""
+
+import atexit
+import os
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from dlocore.balance import energies
+from dlocore.cable import Cable
+from dlocore.caching import is_kept
+from dlocore.effects.selfcontact import nearest_strands
+from dlocore.front import predict
+from dlocore.kernels.march import march_steps
+from dlocore.obstacles import Sphere
+from dlocore.paths import Move
+from dlocore.prediction import Prediction
+from dlocore.scene import Environment, Grasp, Points, Quality, Scene, Straight, Switch, Table
+from dlocore.spline import uniform_knots
+from dlocore.statics import equilibrium
+
+U = np.linspace(0.0, 1.0, 12)[:, None]
+ARC = Points(points=U * [1.0, 0.0, 0.0] + 0.05 * np.sin(3.0 * U) * [0.0, 1.0, 0.0])
+GRASP = Grasp(u=0.3, hold="clamp", path=Move(displacement=(0.0, 0.01, 0.0), rotation=(0.0, 0.0, 0.1), duration=1.0))
+# yields at a bend that is not reached, and has a memory, so that all that looks for that is compiled, too
+CABLE = Cable.preset("paper", bending_damping=1e-4, yield_strain=0.1, memory_rate=1.0)
+
+
+def warm_up(processes: int | None = None) -> None:
+    """Compile, or load from the cache, every kernel, so that the first prediction is as fast as the next.
+
+    Args:
+        processes: how many compile at once where nothing is compiled yet; by default one a core.
+
+    Raises:
+        ValueError: fewer than one process.
+    """
+    if processes is not None and processes < 1:
+        raise ValueError(f"processes: {processes} is not allowed; at least 1")
+    at_once = processes or os.cpu_count() or 1
+    by_python = Path(sys.executable or "").name.startswith("python")  # not a program that has one inside
+    if at_once > 1 and by_python and not is_kept(march_steps):
+        _compile_in_processes(at_once)
+    for part in PARTS.values():
+        part()
+
+
+def _compile_in_processes(at_once: int) -> None:
+    """Compile every share in a process of its own; what one fails to do is left to the caller."""
+    waiting, running = list(SHARES), list[subprocess.Popen[bytes]]()
+
+    def stop() -> None:
+        waiting.clear()
+        for process in running:
+            process.kill()
+            process.wait()
+
+    atexit.register(stop)  # where this thread is left behind as the program ends
+    try:
+        while waiting or running:
+            while waiting and len(running) < at_once:
+                command = [sys.executable, "-m", "dlocore.warming", *waiting.pop(0)]
+                running.append(subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+            time.sleep(0.1)
+            running[:] = [process for process in running if process.poll() is None]
+    finally:
+        stop()
+        atexit.unregister(stop)
+
+
+def _smooth(table: Table | None) -> None:
+    """A whole smooth motion."""
+    around = Environment(drag=0.1, table=table)
+    predict(Scene(cable=Cable.preset("paper"), shape=ARC, grasps=(GRASP,), environment=around))
+
+
+def _rough(table: Table | None, twist: Switch) -> None:
+    """Motions of two, three or four coordinates that rub, lie beside something, and may yield."""
+    beside = (Sphere(center=(0.5, 0.3, 0.0), radius=0.2),)
+    environment = Environment(drag=0.1, drag_quadratic=0.1, table=table, obstacles=beside)
+    for quality in (Quality(), Quality(n_u=9, n_t=9), Quality(n_u=9, n_t=9, method="spacetime")):
+        plastic: Switch = "on" if quality.method == "auto" and twist != "off" else "off"
+        scene = Scene(
+            cable=CABLE,
+            shape=replace(ARC, settle=table is None),
+            grasps=(GRASP,),
+            environment=environment,
+            effects={"twist": twist, "plasticity": plastic},
+            quality=quality,
+        )
+        for effects in (scene.effects, {"twist": twist, "obstacles": "off"}):
+            _read_all(predict(replace(scene, effects=effects)))
+    equilibrium(scene, n_u=9)
+
+
+def _read_all(answer: Prediction) -> None:
+    """Read all that is found only as it is read, and ask for its energies, so that what that takes is compiled, too."""
+    _ = answer.message, answer.grasps, answer.effects, answer.material, answer.start_energy
+    _ = [(iteration.surface, iteration.energy) for iteration in answer.iterations]
+    energies(answer.scene, answer.surface, [0.0])
+
+
+def _others() -> None:
+    """An equilibrium in a plane, without contact, strands that meet, and the reference."""
+    hangs = Scene(cable=CABLE, shape=Straight(direction=(0.0, 0.0, -1.0)), grasps=(Grasp(u=0.0),), horizon=1.0)
+    equilibrium(hangs, n_u=9)
+    turned = np.linspace(0.0, 7.0, 9)
+    loop = np.column_stack([np.cos(turned), np.sin(turned), 0.1 * U[:9, 0]])
+    nearest_strands(uniform_knots(9, 1.0), loop[None], 3, 0.01, 0.03)
+    still = Environment(gravity=(0.0, 0.0, 0.0))
+    by_reference = Quality(method="reference", target_error=1.0)
+    predict(Scene(cable=CABLE, shape=replace(ARC, settle=True), environment=still, horizon=1e-3, quality=by_reference))
+
+
+# whole smooth motions first: the code of a function that is loaded first serves all who call it, and they run faster
+# with what was compiled for them
+PARTS = {
+    "smooth in a plane": lambda: _smooth(Table()),
+    "smooth in space": lambda: _smooth(None),
+    "in a plane": lambda: _rough(Table(friction=0.1), "auto"),
+    "in space": lambda: _rough(None, "off"),
+    "with twist": lambda: _rough(None, "on"),
+    "others": _others,
+}
+# what one process compiles, the longest first
+SHARES = (("with twist",), ("smooth in space", "in space"), ("smooth in a plane", "in a plane"), ("others",))
+
+if __name__ == "__main__":
+    for name in sys.argv[1:]:
+        PARTS[name]()
