@@ -23,13 +23,13 @@ run: $(VENV)/.run-installed
 setup: $(VENV)/.dev-installed
 
 compile: $(VENV)/.dev-installed
-	@echo 'Compiling; this takes five minutes or so the first time.'
+	@echo 'Compiling; this takes some minutes the first time.'
 	$(BIN)/python -c 'import dlocore; dlocore.warm_up()'
 
 test: compile
 	@command -v chromium >/dev/null || command -v chromium-browser >/dev/null || command -v google-chrome >/dev/null || \
 		echo 'No Chromium found: the browser tests will be skipped.'
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(PYTEST_ARGS)
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder $(PYTEST_ARGS)
 
 check: $(VENV)/.dev-installed
 	$(BIN)/ruff check .
