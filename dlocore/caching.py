@@ -4,7 +4,7 @@ import hashlib
 import pickle
 import uuid
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numba
 from numba.core.serialize import dumps
@@ -22,13 +22,13 @@ class OverloadFiles:
     def __init__(self, folder: str, name: str, source: str) -> None:
         """Keep what is compiled of `source`, a hash, in `folder`, in files whose names begin with `name`."""
         self._folder, self._name = Path(folder), name
-        self._stamp = (numba.__version__, source)
+        self._stamp = f"{numba.__version__} {source}\n".encode()
 
     def load(self, key: Any) -> Any:
         """Return what was saved for `key`, or None where that is nothing, or of another source."""
         try:
             with self._path(key).open("rb") as file:
-                if pickle.load(file) != self._stamp:
+                if not self._is_of_source(file):
                     return None
                 saved_key, data = pickle.load(file)
         except FileNotFoundError:
@@ -39,7 +39,7 @@ class OverloadFiles:
         """Return whether something of the present source is kept."""
         for path in self._folder.glob(f"{self._name}.*.nbc"):
             with path.open("rb") as file:
-                if pickle.load(file) == self._stamp:
+                if self._is_of_source(file):
                     return True
         return False
 
@@ -49,7 +49,7 @@ class OverloadFiles:
         written = path.with_suffix(f".{uuid.uuid4().hex[:16]}")
         try:
             with written.open("wb") as file:
-                pickle.dump(self._stamp, file)
+                file.write(self._stamp)
                 file.write(dumps((key, data)))
             written.replace(path)
         except BaseException:
@@ -60,6 +60,10 @@ class OverloadFiles:
         """Forget all that was saved."""
         for path in self._folder.glob(f"{self._name}.*.nbc"):
             path.unlink(missing_ok=True)
+
+    def _is_of_source(self, file: BinaryIO) -> bool:
+        """Read the stamp that a file begins with: what is of another source, or numba's own, is not unpickled."""
+        return file.read(len(self._stamp)) == self._stamp
 
     def _path(self, key: Any) -> Path:
         return self._folder / f"{self._name}.{hashlib.sha256(repr(key).encode()).hexdigest()[:16]}.nbc"

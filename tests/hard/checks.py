@@ -1,19 +1,15 @@
 """What every hard case is held to: its true answer, its laws, and a status that tells the truth."""
 
-from dataclasses import replace
-
 import pytest
 
 from benchmarks.hard.cases import CASES, Case, posed
 from benchmarks.hard.laws import measure
-from dlocore import Prediction, Quality, SceneError, predict
+from dlocore import Prediction, SceneError, predict
 
 STRAIN = 0.02  # the cases are built so that weight and inertia strain them by less than 0.5 per cent
 HELD = 1e-9  # of the length: the ends of a hold are interpolated, so that only rounding is left
 GAIN = 0.02  # of the energy that was about: the velocities of the time spline, and trapezoids of the power
 LOST = 0.05  # of the impulses that were about: the same
-# These take a minute or two for the target error of the cases, and are held to their truth at 1 % of the length.
-DEAR = ("bending stiffness of 1e minus 6", "heavy cable", "half a metre in 50 ms")
 
 
 def of_group(group: str) -> list[object]:
@@ -27,10 +23,7 @@ def hold_to(case: Case) -> None:
         with pytest.raises(SceneError):
             predict(posed(case))
         return
-    scene = posed(case)
-    if case.name in DEAR:
-        scene = replace(scene, quality=Quality(target_error=0.01 * scene.cable.length))
-    prediction = predict(scene)
+    prediction = predict(posed(case))
     asked = prediction.scene.quality.method
     assert asked in ("auto", prediction.accuracy.method)  # a march in place of a least squares is none
     length = prediction.surface.length

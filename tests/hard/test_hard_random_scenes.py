@@ -13,7 +13,7 @@ SEED = 2
 COUNT = 300
 BATCH = 30
 DEADLINE = 3.0  # [s]: an answer that is cut off, one in twenty, has a status too
-PATIENCE = 15.0  # [s]
+PATIENCE = 15.0  # [s]: for scenes that have to converge
 
 
 @pytest.mark.parametrize("first", range(0, COUNT, BATCH))

@@ -15,7 +15,6 @@ ROOT = Path(__file__).parents[2]
 # One function, compiled for a signature of each process, as two processes do that begin at once.
 PROGRAM = """
 import sys
-from pathlib import Path
 import numba, numpy as np
 from dlocore.caching import is_kept, kept
 sys.path.insert(0, sys.argv[1])
@@ -61,3 +60,14 @@ def test_what_cant_be_written_whole_is_not_kept(tmp_path: Path) -> None:
         files.save("signature", (_ for _ in ()))
     assert list(tmp_path.iterdir()) == []
     assert files.load("signature") is None
+
+
+def test_what_is_not_of_the_present_source_is_not_read(tmp_path: Path) -> None:
+    (tmp_path / "f.1.nbc").write_bytes(b"no pickle, as of another program")
+    OverloadFiles(str(tmp_path), "f", "before").save("signature", 1)
+    files = OverloadFiles(str(tmp_path), "f", "now")
+    assert not files.any()
+    assert files.load("signature") is None
+    files.save("signature", 2)
+    assert files.any()
+    assert files.load("signature") == 2

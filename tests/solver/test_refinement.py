@@ -130,7 +130,7 @@ def test_what_steps_err_by_is_learned_from_half_as_many_where_twice_as_many_are_
     found = predict(scene, deadline=60.0)
     assert found.status == "converged"
     assert sum("tells what steps err by" in step.note for step in found.iterations) == 1
-    truth = predict(replace(scene, quality=Quality(target_error=0.02 * scene.cable.length)))
+    truth = predict(replace(scene, quality=Quality(target_error=0.01 * scene.cable.length)))
     estimate = found.accuracy.error_estimate
     assert estimate is not None
     assert apart(found.surface, truth.surface).max() < estimate
