@@ -101,7 +101,7 @@ def _motion(
     yields = any(x is not None for x in (cable.yield_strain, cable.yield_twist, cable.yield_stretch))
     called = material is not None and yields and scene.effects.get("plasticity", "auto") != "off"
     shown = {"plasticity": "it shows in the motion"} if called else {}
-    problem = pose_as_shown(scene, shown, surface.control_points[0, :, :3])
+    problem = pose_as_shown(scene, shown, surface.control_points)
     grid = grid_on(problem, surface.knots_u)
     at = np.clip(np.atleast_1d(np.asarray(times, dtype=float)), 0.0, surface.horizon)
     moved = [

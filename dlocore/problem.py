@@ -283,12 +283,13 @@ def pose(scene: Scene, called_for: Mapping[str, str] | None = None, *, at_rest: 
     met = reached(scene, start, called_for)
     check_outside(scene, start, met)
     leaves = off_the_table(scene, start, met) if with_table else "there is no table"
+    leaves = leaves or called_for.get("side", "")
     on_table = not leaves
     if on_table:
         start = lay_on_table(scene, start)
     start = with_side(scene, start, at_rest)
     plane = find_plane(scene, start, on_table, bool(met))
-    flat = rest_plane(scene, start) if "side" in called_for and not on_table else None
+    flat = rest_plane(scene, start) if "side" in called_for else None
     if flat is not None and flat.dimensions == 2:
         start = out_of_plane(scene, start, np.cross(*flat.axes))
         reason = called_for["side"] if plane.dimensions == 2 else plane.reason

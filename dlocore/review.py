@@ -25,7 +25,7 @@ from dlocore.mirrored import goes_elsewhere
 from dlocore.obstacles import Obstacle
 from dlocore.problem import Problem
 from dlocore.report import WindowForces
-from dlocore.sideways import leaves_plane
+from dlocore.sideways import lacks_twist, leaves_plane
 from dlocore.solvers.ladder import CREDIBLE_STRAIN, Level
 from dlocore.solvers.monitor import Monitor
 from dlocore.spin import bends_sharply, spin_forces
@@ -90,7 +90,8 @@ def called_for_by_fine(level: Level) -> dict[str, str]:
 def _side(level: Level) -> dict[str, str]:
     problem, motion = level.problem, level.motion
     credible = not motion.stopped and motion.largest_strain <= CREDIBLE_STRAIN
-    if credible and problem.scene.quality.n_u is None and leaves_plane(problem, motion):
+    free = problem.scene.quality.n_u is None and not lacks_twist(problem)
+    if credible and free and leaves_plane(problem, motion):
         return {"side": UNSTABLE}
     return {}
 
@@ -119,8 +120,12 @@ def objections(level: Level) -> list[str]:
     if level.motion.grid.tipped:
         tip = f"it is tipped by {BOW * problem.scene.cable.length * 1e3:.2g} mm, and another side may be as likely"
         found.append(f"{TIPPED}: {tip}")
-    if problem.scene.quality.n_u is not None and leaves_plane(problem, level.motion):
-        found.append(f"{UNSTABLE}: without a given grid it is solved in space, with a bow out of the plane")
+    kept = [
+        *(["with effects.twist on or auto"] if lacks_twist(problem) else []),
+        *(["without a given grid"] if problem.scene.quality.n_u is not None else []),
+    ]
+    if kept and leaves_plane(problem, level.motion):
+        found.append(f"{UNSTABLE}: {' and '.join(kept)} it is solved in space")
     found += _undetermined(level)
     elsewhere = goes_elsewhere(problem, level.motion)
     if elsewhere:

@@ -230,7 +230,7 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     found = {report.name: "" for report in prediction.effects if report.active}
     called = {name: "the prediction found it" for name in found if name in ("plasticity", "self_contact", "obstacles")}
     values = [_number(scene, name) for name in wrt]
-    problem = pose_as_shown(scene, called, prediction.surface.control_points[0, :, :3])
+    problem = pose_as_shown(scene, called, prediction.surface.control_points)
     monitor = Monitor(None, None, None)
     steps = _asked_for(problem, accuracy.steps)
     grid = start_grid(problem, accuracy.n_u, monitor)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from itertools import pairwise
 from typing import cast
 
@@ -57,7 +58,8 @@ def _leasts(problem: Problem, grid: Grid, states: Floats, times: list[float], sl
     flat = _in_plane(problem, states)
     if flat is None:
         if _bends_in_plane(problem):
-            yield from _leasts_of_bent(problem, grid, states, times, slack)
+            leasts = _leasts_of_lying if _is_weighed_down(problem) else _leasts_of_bent
+            yield from leasts(problem, grid, states, times, slack)
         return
     bands, unit = _bands(problem, grid, states, flat)
     for t, q, band in zip(times, flat, bands, strict=True):
@@ -67,11 +69,22 @@ def _leasts(problem: Problem, grid: Grid, states: Floats, times: list[float], sl
             yield _least(dense_of(stiff) + _twisting(problem, grid, q, held), dense_of(unit))
 
 
+def may_leave_plane(problem: Problem) -> bool:
+    """Tell whether `leaves_plane` can tell anything of a motion, but for what it may touch on its way."""
+    return _bends_in_plane(problem) or not (problem.on_table or problem.rest_plane.dimensions == 3)
+
+
+def lacks_twist(problem: Problem) -> bool:
+    """Tell whether a cable that is bent without stress could not leave its plane, as the scene switches twist off."""
+    return problem.scene.effects.get("twist", "auto") == "off" and _bends_in_plane(problem)
+
+
 def _bends_in_plane(problem: Problem) -> bool:
-    """Tell whether a cable that is bent without stress moves in a plane that it may leave."""
-    if problem.on_table or problem.plane.dimensions == 3 or problem.scene.effects.get("twist", "auto") == "off":
+    """Tell whether a cable that is bent without stress moves in a plane that it may leave, or turn over in."""
+    rest, start = problem.scene.cable.rest_shape, problem.start
+    if problem.plane.dimensions == 3 or (isinstance(rest, str) and rest == "straight") or start.material is not None:
         return False
-    return problem.start.material is None and problem.start.theta is None and problem.bending_memory is None
+    return start.theta is None and problem.bending_memory is None
 
 
 def _leasts_of_bent(problem: Problem, grid: Grid, states: Floats, times: list[float], slack: float) -> Iterator[float]:
@@ -82,7 +95,8 @@ def _leasts_of_bent(problem: Problem, grid: Grid, states: Floats, times: list[fl
     """
     from scipy.spatial.transform import Rotation  # slow to import, and seldom needed
 
-    posed = pose(problem.scene, {**problem.called_for, "side": UNSTABLE})
+    free = {name: switch for name, switch in problem.scene.effects.items() if name != "twist"}
+    posed = pose(replace(problem.scene, effects=free), {**problem.called_for, "side": UNSTABLE})
     if posed.twist is None:
         return
     space = grid_on(posed, grid.knots)
@@ -116,6 +130,40 @@ def _leasts_of_bent(problem: Problem, grid: Grid, states: Floats, times: list[fl
             np.linalg.cholesky(whole + slack * unit)
         except np.linalg.LinAlgError:
             yield _least(whole, unit)
+
+
+def _is_weighed_down(problem: Problem) -> bool:
+    """Tell whether weight holds the cable on a table, against any small displacement off it."""
+    return problem.on_table and bool(cast(Floats, problem.scene.environment.gravity)[2] < 0.0)
+
+
+def _leasts_of_lying(problem: Problem, grid: Grid, states: Floats, times: list[float], slack: float) -> Iterator[float]:
+    """Do what `_leasts` does for a cable that is bent without stress and lies on a table: its sections may turn over.
+
+    Of the energy of turns p of the sections, the integral over two of EI kappa kappa_0 p^2 + GJ p'^2: the bend kappa_0
+    without stress turns with them. As elsewhere they count as the way D/sqrt(8) p.
+    """
+    cable, tables = problem.scene.cable, grid.tables
+    first, basis = basis_rows(grid.knots, tables.curvature_u, 1)
+    natural = grid.history.memory[:, 1]
+    scale = 8.0 / cable.diameter**2 * tables.curvature_w[:, None]
+    twists = scale * cast(float, cable.torsional_stiffness) * _products(basis[:, 1])
+    for t, q in zip(times, states, strict=True):
+        turning = cast(float, cable.bending_stiffness) * plane_curvature_of(tables, q)[:, 0] * natural
+        if turning.min() >= 0.0:
+            continue
+        stiff = np.zeros((grid.n_u, 4))
+        added = twists + scale * turning[:, None] * _products(basis[:, 0])
+        np.add.at(stiff, (first[:, None] + _COLUMN, _BELOW), added)
+        clamps = [g for g in closed_grasps(problem.scene, t, t) if g.hold == "clamp"]
+        stiff += _held_band(grid, clamps, _FIRM * float(np.abs(stiff).max()), direction=False)
+        if factor(stiff + slack * tables.mass) >= 0:
+            yield _least(dense_of(stiff), dense_of(tables.mass))
+
+
+def _products(rows: Floats) -> Floats:
+    """Return the products (k, 10) of the four values of each row (k, 4) that a lower band has, in its order."""
+    return np.asarray(rows[:, _COLUMN] * rows[:, _COLUMN + _BELOW])
 
 
 def is_unstable(problem: Problem, grid: Grid, q: Floats, held: list[Grasp]) -> bool:
@@ -160,13 +208,18 @@ def _in_plane(problem: Problem, states: Floats) -> Floats | None:
     return plane.points(r) if plane.distance(r) <= _FLAT * scene.cable.length else None
 
 
-def pose_as_shown(scene: Scene, called_for: Mapping[str, str], start: Floats) -> Problem:
-    """Return the problem of a motion that began at control points (n, 3) [m], bowed out of its plane as they are."""
+def pose_as_shown(scene: Scene, called_for: Mapping[str, str], control_points: Floats) -> Problem:
+    """Return the problem of a motion with control points (n_t, n_u, 4) [m, rad].
+
+    Its start is bowed out of its plane where they begin so, and it may leave a table where its sections turn.
+    """
     problem = pose(scene, called_for)
-    plane = problem.rest_plane
-    if problem.on_table or plane.dimensions == 3 or plane.distance(start) <= 0.1 * BOW**2 * scene.cable.length:
-        return problem
-    return pose(scene, {**called_for, "side": UNSTABLE})
+    if problem.on_table:
+        shown = bool(control_points[..., 3].any())
+    else:
+        plane, off = problem.rest_plane, 0.1 * BOW**2 * scene.cable.length
+        shown = plane.dimensions == 2 and plane.distance(control_points[0, :, :3]) > off
+    return pose(scene, {**called_for, "side": UNSTABLE}) if shown else problem
 
 
 def _bands(problem: Problem, grid: Grid, states: Floats, flat: Floats) -> tuple[Floats, Floats]:

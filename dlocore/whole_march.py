@@ -11,6 +11,7 @@ from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
 from dlocore.progress import record_level
 from dlocore.review import called_for, called_for_by_fine
+from dlocore.sideways import may_leave_plane
 from dlocore.solvers.ladder import (
     CREDIBLE_STRAIN,
     TOO_DEEP,
@@ -86,7 +87,7 @@ def march_level(
 
 def sided(problem: Problem, monitor: Monitor) -> Problem:
     """Return the problem, with a side to go to where a march says that its motion leaves its plane."""
-    if problem.on_table or problem.rest_plane.dimensions == 3:
+    if not may_leave_plane(problem):
         return problem
     for number in _LOOKS:
         called = march_level(problem, stretched(problem, number), monitor).posed.called_for

@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, predict
+from benchmarks.hard.generator import draw
+from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, Table, predict
 from dlocore.buckling import UNSTABLE
 from dlocore.discretisation import make_grid
 from dlocore.problem import pose
-from dlocore.sideways import _leasts
+from dlocore.sideways import _leasts, pose_as_shown
 
 WEIGHTLESS = Environment(gravity=(0.0, 0.0, 0.0), drag=0.2)
 EI, GJ, LENGTH = 0.01, 0.006, 1.0
@@ -88,3 +89,62 @@ def test_what_tells_does_not_depend_on_how_far_the_cable_has_turned(turn):
     )
     assert turned == pytest.approx(given, rel=1e-3)
     assert given < 0.0
+
+
+def lying(share: float, hold: str, **changes: Any) -> Scene:
+    """Return a cable on a table, bent the other way than it is without stress; at 1 its sections just turn over.
+
+    With ends clamped, EI kappa^2 = GJ (pi/L)^2 for turns sin(pi u/L) of its sections.
+    """
+    angle = share * np.pi * np.sqrt(GJ / EI)
+    on_table: dict[str, Any] = {"environment": Environment(drag=0.2, table=Table())}
+    return scene(arc(angle), arc(angle, turned=-1.0)[:, :2], *held(hold), **(on_table | changes))
+
+
+@pytest.mark.parametrize(("share", "stays"), [(0.98, True), (1.02, False)])
+def test_on_a_table_sections_turn_over_from_the_exact_bend_on(share, stays):
+    assert (least(lying(share, "clamp")) == 0.0) == stays
+
+
+def test_on_a_table_sections_turn_over_where_nothing_holds_them():
+    # turns by as much everywhere: p (EI kappa kappa_0) p, in the unit of a way D/sqrt(8)
+    kappa = 0.3 * np.pi * np.sqrt(GJ / EI) / LENGTH
+    assert least(lying(0.3, "tangent")) == pytest.approx(-EI * kappa**2 * 8.0 / 0.005**2, rel=1e-2)
+
+
+def test_a_cable_whose_sections_turn_over_on_a_table_may_leave_it():
+    posed = lying(1.1, "tangent")
+    found = predict(posed)
+    assert found.accuracy.dimensions == 3
+    reasons = {effect.name: effect.reason for effect in found.effects}
+    assert reasons["table"] == UNSTABLE
+    assert np.abs(found.surface.control_points[..., 3]).max() > 1.0
+    assert pose_as_shown(posed, {}, found.surface.control_points).twist is not None
+    given = predict(replace(posed, quality=Quality(n_u=17, n_t=33, method="march")))
+    assert given.accuracy.dimensions == 2
+    assert f"{UNSTABLE}: without a given grid it is solved in space" in given.message
+    assert not pose_as_shown(posed, {}, given.surface.control_points).called_for
+
+
+def test_scene_40_148_lifts_off_the_table_as_it_snaps_through():
+    snaps = replace(draw(40, 148).make(), quality=Quality(), effects={})
+    found = predict(snaps)
+    assert found.status == "converged"
+    u, t = np.linspace(0.0, snaps.cable.length, 33), np.linspace(0.0, found.surface.horizon, 33)
+    assert found.surface.positions(u, t)[..., 2].max() == pytest.approx(4e-3, rel=0.1)
+
+
+@pytest.mark.parametrize("around", [WEIGHTLESS, Environment(drag=0.2, table=Table())], ids=["in a plane", "on a table"])
+def test_a_cable_that_is_kept_flat_as_twist_is_off_says_so(around):
+    found = predict(lying(1.1, "tangent", environment=around, effects={"twist": "off"}))
+    assert found.accuracy.dimensions == 2
+    assert f"{UNSTABLE}: with effects.twist on or auto it is solved in space" in found.message
+
+
+def test_without_weight_a_cable_on_a_table_leaves_it():
+    floats = replace(WEIGHTLESS, table=Table())
+    rough = Quality(target_error=0.02)
+    found = predict(lying(2.0, "clamp", environment=floats, horizon=0.4, quality=rough))
+    assert found.accuracy.dimensions == 3
+    u, t = np.linspace(0.0, LENGTH, 33), np.linspace(0.0, 0.4, 9)
+    assert found.surface.positions(u, t)[..., 2].max() > 0.05

@@ -82,12 +82,12 @@ def test_a_motion_is_posed_anew_with_the_bow_that_its_start_shows(touches: bool)
         replace(FALLS, environment=replace(HEAVY, obstacles=(far,)), effects={"obstacles": "on"}) if touches else FALLS
     )
     prediction = predict(scene)
-    shown = pose_as_shown(scene, {}, prediction.surface.control_points[0, :, :3])
+    shown = pose_as_shown(scene, {}, prediction.surface.control_points)
     level = cast(Level, prediction.level)
     assert level.posed.start.aside > 0.0
     assert shown.start.aside == level.posed.start.aside
     hangs = between(1.0, False, "point", HEAVY, 0.3, stiffness=1e-3)
-    assert pose_as_shown(hangs, {}, predict(hangs).surface.control_points[0, :, :3]).start.aside == 0.0
+    assert pose_as_shown(hangs, {}, predict(hangs).surface.control_points).start.aside == 0.0
 
 
 @pytest.mark.parametrize(("closer", "leaves"), [(0.5, False), (0.9, True)])
@@ -109,7 +109,7 @@ def test_a_column_leaves_the_plane_of_its_bow_only_where_that_is_unstable(closer
     y, z = (np.abs(prediction.surface.positions(u, t)[..., d]).max() for d in (1, 2))
     assert y > 0.3
     assert (z > 0.1) if leaves else (z < 1.1e-3 * y)
-    shown = pose_as_shown(scene, {}, prediction.surface.control_points[0, :, :3])
+    shown = pose_as_shown(scene, {}, prediction.surface.control_points)
     assert shown.start.aside == cast(Level, prediction.level).posed.start.aside > 0.0
 
 
