@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dlocore.bands import dense_of
 from dlocore.buckling import BOW, GROWTH, UNSTABLE
-from dlocore.discretisation import grid_on, plane_curvature_of, start_director
+from dlocore.discretisation import grid_on, plane_curvature_of
 from dlocore.effects import laws
 from dlocore.events import closed_grasps
 from dlocore.grid import Grid
@@ -39,34 +39,54 @@ def leaves_plane(problem: Problem, motion: March) -> bool:
     So it would where the start has settled to an equilibrium that is none of a cable that may leave the plane.
     """
     grid = motion.grid
-    if problem.scene.shape.settle and is_unstable(problem, grid, grid.start, closed_grasps(problem.scene, 0.0, 0.0)):
+    if problem.scene.shape.settle and is_unstable(problem, grid, grid.start, 0.0, grid.history.memory[:, 0]):
         return True
     looks = np.unique(np.linspace(0, len(motion.times) - 1, _LOOKS).round().astype(int))
     density, drag = problem.scene.cable.linear_density, problem.drag_coefficient()
     slowest = GROWTH / problem.horizon  # [1/s]: rate of growth that matters
     slack = density * slowest**2 + drag * slowest
     growth = 0.0
-    for least in _leasts(problem, grid, motion.states[looks], motion.times[looks].tolist(), slack):
+    times, states = motion.times[looks], motion.states[looks]
+    bends = np.broadcast_to(motion.behind(times).memory[..., 0], (len(looks), len(grid.tables.curvature_w)))
+    for least in _leasts(problem, grid, states, times.tolist(), bends, slack):
         growth += (np.sqrt(drag**2 - 4.0 * density * min(least, 0.0)) - drag) / (2.0 * density)
     # a straight cable that buckles may do so to any side: until it has, all grow alike
     both = math.log(1.0 / BOW) if problem.start.bow else 0.0
     return growth * problem.horizon / len(looks) > GROWTH + both
 
 
-def _leasts(problem: Problem, grid: Grid, states: Floats, times: list[float], slack: float) -> Iterator[float]:
-    """Yield the least stiffness [N/m^2] against leaving their plane of the states (k, n, nc) with one below -slack."""
+def _leasts(
+    problem: Problem, grid: Grid, states: Floats, times: list[float], bends: Floats, slack: float | None = None
+) -> Iterator[float]:
+    """Yield the least stiffness [N/m^2] against leaving their plane of the states (k, n, nc) with one below -slack.
+
+    `bends` (k, points) [1/m] are those that the cable has there without stress in a plane. By default the slack is what
+    rounding leaves of no stiffness.
+    """
     flat = _in_plane(problem, states)
     if flat is None:
         if _bends_in_plane(problem):
             leasts = _leasts_of_lying if _is_weighed_down(problem) else _leasts_of_bent
-            yield from leasts(problem, grid, states, times, slack)
+            yield from leasts(problem, grid, states, times, bends, slack)
         return
     bands, unit = _bands(problem, grid, states, flat)
     for t, q, band in zip(times, flat, bands, strict=True):
         held = closed_grasps(problem.scene, t, t)
-        stiff = band + _held_band(grid, held, _FIRM * float(np.abs(band).max()))
-        if factor(stiff + slack * unit) >= 0:
-            yield _least(dense_of(stiff) + _twisting(problem, grid, q, held), dense_of(unit))
+        stiff, allowed = band + _held_band(grid, held, _firm(band)), _allowed(slack, band, unit)
+        if factor(stiff + allowed * unit) >= 0:
+            least = _least(dense_of(stiff) + _twisting(problem, grid, q, held), dense_of(unit))
+            if least < -allowed:
+                yield least
+
+
+def _allowed(slack: float | None, stiff: Floats, unit: Floats) -> float:
+    """Return the slack, by default what rounding leaves of no stiffness, of one and a unit matrix or bands of them."""
+    return _NEUTRAL * float(np.abs(stiff).max()) / float(unit.max()) if slack is None else slack
+
+
+def _firm(stiff: Floats) -> float:
+    """Return the stiffness of springs that hold against one, a matrix or bands of it."""
+    return _FIRM * float(np.abs(stiff).max())
 
 
 def may_leave_plane(problem: Problem) -> bool:
@@ -82,52 +102,49 @@ def lacks_twist(problem: Problem) -> bool:
 def _bends_in_plane(problem: Problem) -> bool:
     """Tell whether a cable that is bent without stress moves in a plane that it may leave, or turn over in."""
     rest, start = problem.scene.cable.rest_shape, problem.start
-    if problem.plane.dimensions == 3 or (isinstance(rest, str) and rest == "straight") or start.material is not None:
-        return False
-    return start.theta is None and problem.bending_memory is None
+    straight = isinstance(rest, str) and rest == "straight" and start.material is None
+    bends = not straight or problem.bending_memory is not None
+    return bends and problem.plane.dimensions == 2 and start.theta is None
 
 
-def _leasts_of_bent(problem: Problem, grid: Grid, states: Floats, times: list[float], slack: float) -> Iterator[float]:
+def _leasts_of_bent(
+    problem: Problem, grid: Grid, states: Floats, times: list[float], bends: Floats, slack: float | None
+) -> Iterator[float]:
     """Do what `_leasts` does for a cable that is bent without stress: its sections turn as it leaves the plane.
 
     The stiffness is that of the motion in space with twist, in the planar states, against displacements out of the
     plane and turns of the sections.
     """
-    from scipy.spatial.transform import Rotation  # slow to import, and seldom needed
-
-    free = {name: switch for name, switch in problem.scene.effects.items() if name != "twist"}
-    posed = pose(replace(problem.scene, effects=free), {**problem.called_for, "side": UNSTABLE})
-    if posed.twist is None:
-        return
+    elastic = {**problem.scene.effects, "twist": "on", "plasticity": "off"}
+    posed = pose(replace(problem.scene, effects=elastic), {**problem.called_for, "side": UNSTABLE})
     space = grid_on(posed, grid.knots)
     history, (active, parameters) = space.past(), posed.law_table()
+    history.memory[:] = 0.0
     n, nc = grid.n_u, posed.nc
     normal = np.cross(*problem.plane.axes)
     away = np.zeros((2, nc))
     away[0, :3], away[1, 3] = normal, 1.0
-    begun, director = posed.start(0.0, 1)[0], start_director(posed)
     unit: Floats = np.kron(dense_of(grid.tables.mass), np.eye(2)).astype(np.float64)
     f, K = np.empty((n, nc)), np.empty((n * nc, 4 * nc))
-    for t, flat in zip(times, states, strict=True):
+    for t, flat, natural in zip(times, states, bends, strict=True):
         q = np.zeros((n, nc))
         q[:, :3] = posed.plane.points(problem.plane.world(flat))
         # in a plane the sections turn as the tangent does
-        now = space.at(q, 0.0, 1)[:3]
-        angle = math.atan2(float(normal @ np.cross(begun, now)), float(begun @ now))
-        turned = Rotation.from_rotvec(angle * normal).apply(director)
-        start_frames(grid.knots, q, space.tables, turned, history.past)
+        across = np.cross(normal, space.at(q, 0.0, 1)[:3])
+        start_frames(grid.knots, q, space.tables, across / np.linalg.norm(across), history.past)
+        history.memory[:, 0] = natural
         still = np.zeros_like(q)
         assemble(
             posed.axes, q, still, space.tables, active, parameters, history, NO_RATES, (1.0, 0.0, 1.0), f, K
         )  # fmt: skip
         stiff = np.einsum("xa,iajb,yb->ixjy", away, dense_of(K).reshape(n, nc, n, nc), away)
         held = closed_grasps(problem.scene, t, t)
-        firm = _FIRM * float(np.abs(stiff).max())
+        firm, allowed = _firm(stiff), _allowed(slack, stiff, unit)
         stiff[:, 0, :, 0] += dense_of(_held_band(grid, held, firm))
         stiff[:, 1, :, 1] += dense_of(_held_band(grid, [g for g in held if g.hold == "clamp"], firm, direction=False))
         whole = stiff.reshape(2 * n, 2 * n)
         try:
-            np.linalg.cholesky(whole + slack * unit)
+            np.linalg.cholesky(whole + allowed * unit)
         except np.linalg.LinAlgError:
             yield _least(whole, unit)
 
@@ -137,7 +154,9 @@ def _is_weighed_down(problem: Problem) -> bool:
     return problem.on_table and bool(cast(Floats, problem.scene.environment.gravity)[2] < 0.0)
 
 
-def _leasts_of_lying(problem: Problem, grid: Grid, states: Floats, times: list[float], slack: float) -> Iterator[float]:
+def _leasts_of_lying(
+    problem: Problem, grid: Grid, states: Floats, times: list[float], bends: Floats, slack: float | None
+) -> Iterator[float]:
     """Do what `_leasts` does for a cable that is bent without stress and lies on a table: its sections may turn over.
 
     Of the energy of turns p of the sections, the integral over two of EI kappa kappa_0 p^2 + GJ p'^2: the bend kappa_0
@@ -145,10 +164,9 @@ def _leasts_of_lying(problem: Problem, grid: Grid, states: Floats, times: list[f
     """
     cable, tables = problem.scene.cable, grid.tables
     first, basis = basis_rows(grid.knots, tables.curvature_u, 1)
-    natural = grid.history.memory[:, 1]
     scale = 8.0 / cable.diameter**2 * tables.curvature_w[:, None]
     twists = scale * cast(float, cable.torsional_stiffness) * _products(basis[:, 1])
-    for t, q in zip(times, states, strict=True):
+    for t, q, natural in zip(times, states, bends, strict=True):
         turning = cast(float, cable.bending_stiffness) * plane_curvature_of(tables, q)[:, 0] * natural
         if turning.min() >= 0.0:
             continue
@@ -156,8 +174,9 @@ def _leasts_of_lying(problem: Problem, grid: Grid, states: Floats, times: list[f
         added = twists + scale * turning[:, None] * _products(basis[:, 0])
         np.add.at(stiff, (first[:, None] + _COLUMN, _BELOW), added)
         clamps = [g for g in closed_grasps(problem.scene, t, t) if g.hold == "clamp"]
-        stiff += _held_band(grid, clamps, _FIRM * float(np.abs(stiff).max()), direction=False)
-        if factor(stiff + slack * tables.mass) >= 0:
+        allowed = _allowed(slack, stiff, tables.mass)
+        stiff += _held_band(grid, clamps, _firm(stiff), direction=False)
+        if factor(stiff + allowed * tables.mass) >= 0:
             yield _least(dense_of(stiff), dense_of(tables.mass))
 
 
@@ -166,22 +185,16 @@ def _products(rows: Floats) -> Floats:
     return np.asarray(rows[:, _COLUMN] * rows[:, _COLUMN + _BELOW])
 
 
-def is_unstable(problem: Problem, grid: Grid, q: Floats, held: list[Grasp]) -> bool:
-    """Tell whether control points q (n, nc) at rest would leave their plane, as in `leaves_plane`."""
-    states = _in_plane(problem, q[None])
-    if states is None:
-        return False
-    bands, unit = _bands(problem, grid, q[None], states)
-    largest = float(np.abs(bands).max())
-    slack = _NEUTRAL * largest / float(unit.max())
-    stiff = bands[0] + _held_band(grid, held, _FIRM * largest)
-    if factor(stiff + slack * unit) < 0:
-        return False
-    return _least(dense_of(stiff) + _twisting(problem, grid, states[0], held), dense_of(unit)) < -slack
+def is_unstable(problem: Problem, grid: Grid, q: Floats, t: float, bends: Floats) -> bool:
+    """Tell whether control points q (n, nc) at rest at a time t [s] would leave their plane, as in `leaves_plane`.
+
+    `bends` (points,) [1/m] are those that the cable has there without stress in a plane.
+    """
+    return any(True for _ in _leasts(problem, grid, q[None], [t], bends[None]))
 
 
 def is_looked_at(problem: Problem) -> bool:
-    """Tell whether `is_unstable` can tell of an equilibrium in a plane: of a straight cable that may leave it."""
+    """Tell whether the stiffness across its plane is that of a cable that is straight without stress, and may leave."""
     start, rest = problem.start, problem.scene.cable.rest_shape
     bent = not isinstance(rest, str) or rest != "straight" or start.material is not None
     return not (

@@ -20,7 +20,7 @@ from dlocore.report import elastic_energy, reactions
 from dlocore.resting import slide_to_rest
 from dlocore.scene import Scene
 from dlocore.settling import Settled, holding, settle
-from dlocore.sideways import is_unstable
+from dlocore.sideways import is_unstable, lacks_twist
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import design_matrix
 from dlocore.tipping import tipped
@@ -100,9 +100,14 @@ def equilibrium(
     least = smallest_n_u(problem)
     sizes = [n_u] if n_u is not None else [max(n, least + 2 * i) for i, n in enumerate(LEVELS)]
     rest = _refined(problem, sizes, at, target, monitor)
-    if rest.status == "converged" and is_unstable(problem, rest.grid, rest.settled.q, closed_grasps(scene, at, at)):
-        problem = pose(scene, {"side": UNSTABLE}, at_rest=True)
-        rest = _refined(problem, sizes, at, target, monitor)
+    found = rest.settled
+    if rest.status == "converged" and is_unstable(problem, rest.grid, found.q, at, found.history.memory[:, 0]):
+        if lacks_twist(problem):
+            note = f" Note: {UNSTABLE}: with effects.twist on or auto it is solved in space."
+            rest = rest._replace(message=rest.message + note)
+        else:
+            problem = pose(scene, {"side": UNSTABLE}, at_rest=True)
+            rest = _refined(problem, sizes, at, target, monitor)
     grid, q, history = rest.grid, rest.settled.q, rest.settled.history
     world = problem.world(free_of_frames(problem, grid, q[None], history.past[None])[0])
     held = reactions(problem, grid, (holding(problem, grid, rest.settled),))

@@ -7,7 +7,21 @@ import numpy as np
 import pytest
 
 from benchmarks.hard.generator import draw
-from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, Table, predict
+from dlocore import (
+    Cable,
+    ControlPoints,
+    Environment,
+    Grasp,
+    Material,
+    Move,
+    Points,
+    Quality,
+    Scene,
+    Still,
+    Table,
+    equilibrium,
+    predict,
+)
 from dlocore.buckling import UNSTABLE
 from dlocore.discretisation import make_grid
 from dlocore.problem import pose
@@ -45,7 +59,7 @@ def least(posed: Scene) -> float:
     """Return the least stiffness against leaving the plane of the given shape, 0 where there is none below zero."""
     problem = pose(posed)
     grid = make_grid(problem, 33)
-    return min(_leasts(problem, grid, grid.start[None], [0.0], 0.0), default=0.0)
+    return min(_leasts(problem, grid, grid.start[None], [0.0], grid.history.memory[None, :, 0], 0.0), default=0.0)
 
 
 @pytest.mark.parametrize(("share", "stays"), [(0.98, True), (1.02, False)])
@@ -57,6 +71,36 @@ def test_a_straightened_arc_turns_over_from_the_exact_bend_on(share, stays):
     straight = np.column_stack([x, 0.0 * x, 0.0 * x])
     angle = share * 2.0 * np.pi * np.sqrt(GJ / EI)
     assert (least(scene(straight, arc(angle)[:, :2], *held("clamp"))) == 0.0) == stays
+
+
+@pytest.mark.parametrize("lies", [False, True], ids=["in a plane", "on a table"])
+def test_bends_that_sections_remember_count_as_those_of_the_stress_free_shape(lies):
+    # the arc is bent back, and has in its sections the bend that another has by its stress-free shape
+    angle = 1.5 * np.pi * np.sqrt(GJ / EI)
+    around = Environment(drag=0.2, table=Table()) if lies else WEIGHTLESS
+    by_shape = scene(arc(angle), arc(angle, turned=-1.0)[:, :2], *held("clamp"), environment=around)
+    problem = pose(by_shape)
+    given = make_grid(problem, 33)
+    control = np.column_stack([problem.plane.world(given.start), np.zeros(given.n_u)])
+    bends = [[-angle / LENGTH, 0.0, 0.0]] * 2
+    left = np.cross([0.0, 0.0, 1.0], control[1, :3] - control[0, :3])
+    material = Material(director=left / np.linalg.norm(left), u=[0.0, LENGTH], memory=bends)
+    shape = ControlPoints(control_points=control, knots=given.knots, material=material)
+    remembered = replace(by_shape, cable=replace(by_shape.cable, rest_shape="straight"), shape=shape)
+    assert least(by_shape) < 0.0
+    assert least(remembered) == pytest.approx(least(by_shape), rel=1e-3)
+
+
+@pytest.mark.parametrize("lies", [False, True], ids=["in a plane", "on a table"])
+def test_a_wire_that_yields_slowly_as_it_is_bent_back_is_solved_in_space(lies):
+    posed = scene(arc(1.2), arc(1.2, turned=-1.0)[:, :2], *held("tangent"))
+    around = Environment(drag=0.2, table=Table()) if lies else WEIGHTLESS
+    wire = replace(posed.cable, yield_strain=0.004, memory_rate=0.1)
+    found = predict(replace(posed, cable=wire, environment=around))
+    assert found.accuracy.dimensions == 3
+    reasons = {effect.name: effect.reason for effect in found.effects if effect.active}
+    assert "yields" in reasons["plasticity"]
+    assert UNSTABLE in (reasons["table"] if lies else found.message)
 
 
 def test_an_arc_that_is_bent_back_is_solved_in_space():
@@ -84,7 +128,7 @@ def test_what_tells_does_not_depend_on_how_far_the_cable_has_turned(turn):
     grid = make_grid(problem, 33)
     c, s = np.cos(turn), np.sin(turn)
     given, turned = (
-        min(_leasts(problem, grid, (grid.start @ q.T)[None], [0.0], 0.0))
+        min(_leasts(problem, grid, (grid.start @ q.T)[None], [0.0], grid.history.memory[None, :, 0], 0.0))
         for q in (np.eye(2), np.array([[c, -s], [s, c]]))
     )
     assert turned == pytest.approx(given, rel=1e-3)
@@ -148,3 +192,46 @@ def test_without_weight_a_cable_on_a_table_leaves_it():
     assert found.accuracy.dimensions == 3
     u, t = np.linspace(0.0, LENGTH, 33), np.linspace(0.0, 0.4, 9)
     assert found.surface.positions(u, t)[..., 2].max() > 0.05
+
+
+def hung(turned: float, hold: str, gravity: float, **changes: Any) -> Scene:
+    """Return an arc that sags or stands between its ends; turned by 1 it is so without stress, by -1 the other way."""
+    angle = 2.0
+    s = np.linspace(-0.5 * angle, 0.5 * angle, 61)
+    up = 1.0 if gravity == 0.0 else -1.0
+    curve = LENGTH / angle * np.column_stack([np.sin(s), 0.0 * s, up * np.cos(s)])
+    around = Environment(gravity=(0.0, 0.0, gravity), drag=0.2)
+    posed = scene(curve - curve[0], (curve - curve[0]) * [1.0, 1.0, turned], *held(hold), environment=around, **changes)
+    return replace(posed, shape=replace(posed.shape, settle=True))
+
+
+@pytest.mark.parametrize("gravity", [-9.81, 0.0])
+@pytest.mark.parametrize("hold", ["point", "tangent"])
+def test_in_equilibrium_sections_have_turned_over(hold, gravity):
+    # held so that sections may turn it comes to the same rest from either side, and stores hardly anything there
+    there, back = (equilibrium(hung(turned, hold, gravity)) for turned in (1.0, -1.0))
+    flat = equilibrium(hung(-1.0, hold, gravity, effects={"twist": "off"}))
+    assert there.status == back.status == flat.status == "converged"
+    assert back.energy < 1e-3 * flat.energy
+    u = np.linspace(0.0, LENGTH, 33)
+    assert np.abs(back.positions(u) - there.positions(u)).max() < 1.5e-3  # of a bow
+    assert f"{UNSTABLE}: with effects.twist on or auto it is solved in space" in flat.message
+    assert UNSTABLE not in there.message
+
+
+@pytest.mark.parametrize("turned", [1.0, -1.0])
+def test_in_equilibrium_clamps_keep_sections_from_turning_over(turned):
+    # GJ (pi/L)^2 is above EI kappa^2
+    stays = equilibrium(hung(turned, "clamp", -9.81))
+    assert stays.energy == pytest.approx(equilibrium(hung(turned, "clamp", -9.81, effects={"twist": "off"})).energy)
+
+
+@pytest.mark.parametrize("horizon", [1e-3, 1.0])
+def test_a_start_settles_to_where_its_sections_have_turned_over_however_short_the_motion_is(horizon):
+    posed = hung(-1.0, "tangent", -9.81, horizon=horizon)
+    stands = replace(posed, grasps=tuple(replace(g, path=Still()) for g in posed.grasps))
+    found = predict(stands)
+    u = np.linspace(0.0, LENGTH, 33)
+    apart = found.surface.positions(u, [0.0]).reshape(-1, 3) - equilibrium(stands).positions(u)
+    assert np.abs(apart).max() < 1.5e-3
+    assert UNSTABLE in found.message

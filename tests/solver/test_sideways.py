@@ -22,6 +22,7 @@ from dlocore import (
     equilibrium,
     predict,
 )
+from dlocore.buckling import UNSTABLE
 from dlocore.discretisation import room_for
 from dlocore.kernels.across import stiffness_across
 from dlocore.kernels.assembly import NO_RATES, History, assemble
@@ -157,7 +158,8 @@ def test_what_it_says_of_a_state_is_what_a_disturbed_motion_does(hold: str, clos
     scene = between(0.3, True, hold, replace(WEIGHTLESS, drag=1.0), closer)
     planar = predict(replace(scene, horizon=4.0, quality=Quality(n_u=25, n_t=61, method="march")))
     level = cast(Level, planar.level)
-    says = is_unstable(level.problem, level.motion.grid, level.motion.states[-1], list(scene.grasps))
+    grid = level.motion.grid
+    says = is_unstable(level.problem, grid, level.motion.states[-1], 4.0, grid.history.memory[:, 0])
     u = np.linspace(0.0, np.pi, 41)
     bent = scene.shape.points + np.outer(1e-4 * (np.sin(u) ** 2 + np.sin(u) * np.sin(2.0 * u)), [0.0, 1.0, 0.0])  # type: ignore[union-attr]
     quality = Quality(n_u=25, n_t=121, method="march")
@@ -228,9 +230,16 @@ def test_the_reference_leaves_the_plane_too() -> None:
     assert np.linalg.norm(away, axis=-1).max() < 1e-2
 
 
-def test_a_motion_is_not_taken_out_of_its_plane_for_what_only_the_elastic_cable_would_do() -> None:
-    # it yields as it falls to both sides of a gripper: of the motion with that no disturbance grows; the reference,
-    # which was told of both at once, went 0.04 of the length elsewhere
+def test_a_motion_that_yields_is_taken_out_of_its_plane_where_a_disturbance_grows_in_it() -> None:
+    # it yields as it falls to both sides of a gripper; of the elastic motion a disturbance grows more
     scene = replace(draw(24, 204).make(), quality=Quality(), effects={"self_contact": "off"})
-    assert sided(pose(scene), Monitor()).plane.dimensions == 2
-    assert "plasticity" in predict(scene).level.posed.called_for
+    assert sided(pose(scene), Monitor()).plane.dimensions == 3
+    found = predict(scene)
+    assert "plasticity" in cast(Level, found.level).posed.called_for
+    assert UNSTABLE in found.message
+    begin, u = cast(Straight, scene.shape), np.linspace(0.0, 1.0, 201)
+    bent = begin.start + np.outer(u, begin.direction) + np.outer(1e-6 * np.cos(np.pi * u) ** 2, [0.0, 1.0, 0.0])  # type: ignore[arg-type, operator]
+    off = predict(replace(scene, shape=Points(points=bent)))
+    assert UNSTABLE not in off.message  # in space by itself
+    y = off.surface.positions([0.0, 1.0], np.linspace(0.0, off.surface.horizon, 33))[..., 1]
+    assert np.abs(y).max() > 10.0 * np.abs(y[0]).max() > 0.0
