@@ -116,7 +116,7 @@ def _leasts_of_bent(
     plane and turns of the sections.
     """
     elastic = {**problem.scene.effects, "twist": "on", "plasticity": "off"}
-    posed = pose(replace(problem.scene, effects=elastic), {**problem.called_for, "side": UNSTABLE})
+    posed = pose(replace(problem.scene, effects=elastic), problem.called_for)
     space = grid_on(posed, grid.knots)
     history, (active, parameters) = space.past(), posed.law_table()
     history.memory[:] = 0.0

@@ -219,6 +219,13 @@ def test_in_equilibrium_sections_have_turned_over(hold, gravity):
     assert UNSTABLE not in there.message
 
 
+def test_in_equilibrium_on_a_table_sections_have_turned_over():
+    assert equilibrium(lying(1.5, "tangent")).energy < 1e-6
+    flat = equilibrium(lying(1.5, "tangent", effects={"twist": "off"}))
+    assert flat.energy > 0.1
+    assert UNSTABLE in flat.message
+
+
 @pytest.mark.parametrize("turned", [1.0, -1.0])
 def test_in_equilibrium_clamps_keep_sections_from_turning_over(turned):
     # GJ (pi/L)^2 is above EI kappa^2
