@@ -54,6 +54,8 @@ class Problem:
         start: start curve [m].
         plane: coordinates of the centreline in the solve.
         on_table: the cable lies on the table, which carries its weight.
+        lies_over: it lies on a table, where one strand may lie over another, though it may leave that as its sections
+            turn over.
         choices: for each effect whether it is simulated, and why.
         called_for: the effects that a result has called for, and why; "side": a bow out of the plane of the motion.
         inertia, drag, gravity, ...: the active effects, None where inactive.
@@ -63,6 +65,7 @@ class Problem:
     start: StartCurve
     plane: Plane
     on_table: bool
+    lies_over: bool
     choices: Mapping[str, Choice]
     called_for: Mapping[str, str]
     inertia: Inertia | None
@@ -283,6 +286,7 @@ def pose(scene: Scene, called_for: Mapping[str, str] | None = None, *, at_rest: 
     met = reached(scene, start, called_for)
     check_outside(scene, start, met)
     leaves = off_the_table(scene, start, met) if with_table else "there is no table"
+    lies_over = not leaves
     leaves = leaves or called_for.get("side", "")
     on_table = not leaves
     if on_table:
@@ -295,7 +299,8 @@ def pose(scene: Scene, called_for: Mapping[str, str] | None = None, *, at_rest: 
         reason = called_for["side"] if plane.dimensions == 2 else plane.reason
         plane = Plane(np.eye(3), plane.origin, reason)
     bent = _is_bent(scene, start)
-    choices = choose(scene, start, plane.dimensions, on_table, leaves, met, bent or start.bow != 0.0, called_for)
+    bent_or_bowed = bent or start.bow != 0.0
+    choices = choose(scene, start, plane.dimensions, on_table, lies_over, leaves, met, bent_or_bowed, called_for)
     if choices["self_contact"].active:
         check_apart(scene, start)
     if plane.dimensions == 3 and not choices["twist"].active:
@@ -324,6 +329,7 @@ def pose(scene: Scene, called_for: Mapping[str, str] | None = None, *, at_rest: 
         start=start,
         plane=plane,
         on_table=on_table,
+        lies_over=lies_over,
         choices=choices,
         called_for=called_for,
         inertia=Inertia(cable.linear_density) if active("inertia") else None,

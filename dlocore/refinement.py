@@ -24,7 +24,7 @@ from dlocore.solvers.ladder import (
 from dlocore.solvers.march import MOST_FRAMES, RHO, STRONGLY_DAMPED
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.statics import RESTLESS
-from dlocore.whole_march import MISSED_COUNTS, Outcome, is_folded, march_level, march_status
+from dlocore.whole_march import MISSED_COUNTS, Outcome, is_folded, is_uneven, march_level, march_status
 
 AUTO_ENOUGH = 1e-2  # of the length: the estimated error with which it is content where the finest grids reach no closer
 ROUGH = 0.05  # of the length: two grids that differ more are in no order yet: the next is marched with strong damping
@@ -48,6 +48,7 @@ _AT_BEST = 0.2  # of an error, is left by one refinement: what is still too much
 _STALE = 4.0  # times what a refinement in one direction moved the surface by: once those in the other moved it by more,
 # and by more than the target, what the first has left is measured again
 _DEAR = 0.25  # of the time left: a march that takes more is not done only to tell what steps err by
+_EVENED = 3  # refinements in space, at most, of a grid that agrees with the one before on strain within a span
 _FAILURES = 2  # refinements in time of a march that found no equilibrium
 
 
@@ -104,6 +105,7 @@ class _Climb:
         failures: marches in a row that found less than the best one, or no equilibrium as that.
         astray: how far a start that is hardly another goes elsewhere, as the last grid that agreed has it [m], 0 where
             that does not matter.
+        evened: how often more control points were taken as the cable was strained between the points that watch it.
         pace: time that the last march took for each of its points and steps [s].
     """
 
@@ -122,6 +124,7 @@ class _Climb:
     rho: float = RHO
     failures: int = 0
     astray: float = 0.0
+    evened: int = 0
     pace: float = np.inf
 
     def outcome(self) -> Outcome:
@@ -165,9 +168,12 @@ class _Climb:
             status, message = march_status(self.problem, level)
             if level.motion.stopped == "time" or self.failures > len(LEVELS):
                 return Outcome(level, status, message, None)
-            unfolds = self._affordable(_finer(size, "space", False)) if is_folded(level) else None
+            agrees = self.estimate <= ACCEPT * self.target and self.budget == np.inf
+            uneven = agrees and is_uneven(level) and self.evened < _EVENED
+            self.evened += uneven
+            unfolds = self._affordable(_finer(size, "space", False)) if uneven or is_folded(level) else None
             finer: Size | None
-            if self.estimate <= ACCEPT * self.target and self.budget == np.inf and unfolds is None:
+            if agrees and unfolds is None:
                 finer = self._once_more(size)
                 if finer is None and status != "converged":
                     return Outcome(level, status, message, _parts(self.changes, level))

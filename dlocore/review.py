@@ -38,8 +38,8 @@ Floats = NDArray[np.float64]
 CLOSE = 0.01  # of the length: a cable that comes this near to an obstacle left out calls for it
 MATTERS = 0.001  # of the length: what a neglected effect may move the cable before it is worth a word
 _TURNS = 0.1  # of that, and of the target: what the sections' spin may move it, which a motion that snaps enlarges
-_STRAINED = 0.05  # axial strain: few cables bear more
-_FAR_MORE = 2.0  # times the strain of the march: what its spline adds is worth a word
+STRAINED = 0.05  # axial strain: few cables bear more
+FAR_MORE = 2.0  # times the strain of the march: what its spline adds is worth a word
 _PLACES, _MOMENTS = 4, 33  # in a span, and in time while it swings once, at which a surface is searched for strain
 _BLOCK = 4096  # states whose gaps to obstacles are found at once
 _LOOKS = 5  # states of each stretch of a motion at which neglected forces are weighed
@@ -102,7 +102,7 @@ def _strands(level: Level) -> dict[str, str]:
     left_out = not problem.choices["self_contact"].active
     automatic = problem.scene.effects.get("self_contact", "auto") == "auto"
     # a strand that lies on the table can be crossed by another on top of it
-    return _meets_itself(level) if credible and left_out and automatic and not problem.on_table else {}
+    return _meets_itself(level) if credible and left_out and automatic and not problem.lies_over else {}
 
 
 def objections(level: Level) -> list[str]:
@@ -112,7 +112,7 @@ def objections(level: Level) -> list[str]:
     that few bear.
     """
     problem, found = level.problem, []
-    if level.motion.largest_strain > _STRAINED:
+    if level.motion.largest_strain > STRAINED:
         found.append(f"the motion strains the cable by up to {level.motion.largest_strain:.0%} along itself")
     found += _stretched(level)
     found += side_notes(problem.start)
@@ -137,7 +137,7 @@ def objections(level: Level) -> list[str]:
     for name, test in (("plasticity", _yields), ("obstacles", _touches), ("self_contact", _meets_itself)):
         if name in off:
             found += [f"{name} is off, though {reason}" for reason in test(level).values()]
-    if problem.on_table and not problem.choices["self_contact"].active and "self_contact" not in off:
+    if problem.lies_over and not problem.choices["self_contact"].active and "self_contact" not in off:
         crossings = _meets_itself(level).values()
         found += [
             f"{reason}: one lies over the other; effects.self_contact on keeps them apart" for reason in crossings
@@ -176,7 +176,7 @@ def _stretched(level: Level) -> list[str]:
     slopes = SplineSurface(level.control, knots, level.knots_t)(u, t, du=1)[..., : level.problem.plane.dimensions]
     strain = np.abs(np.linalg.norm(slopes, axis=2) - 1.0)
     k, s = np.unravel_index(np.argmax(strain), strain.shape)
-    if not strain[k, s] > max(_STRAINED, _FAR_MORE * level.motion.largest_strain):
+    if not strain[k, s] > max(STRAINED, FAR_MORE * level.motion.largest_strain):
         return []
     return [
         f"the surface stretches the cable by up to {strain[k, s]:.0%} within a span, at {u[s]:.4g} m and {t[k]:.3g} s: "

@@ -48,6 +48,7 @@ def choose(
     start: StartCurve,
     dimensions: int,
     on_table: bool,
+    lies_over: bool,
     leaves: str,
     met: tuple[int, ...],
     bent: bool,
@@ -60,6 +61,7 @@ def choose(
         start: start curve.
         dimensions: 2 where the motion is planar, else 3.
         on_table: the cable lies on the table and moves in its plane.
+        lies_over: it lies there, though it may leave the plane.
         leaves: why it does not, in words.
         met: the obstacles that are simulated.
         bent: its stress-free shape is bent or twisted.
@@ -88,7 +90,7 @@ def choose(
         "plasticity": _YIELDS_NOT if plastic else _ELASTIC,
         "friction": _RUBS if rough else _SMOOTH,
         "obstacles": Choice(bool(met), near),
-        "self_contact": _self_contact(scene, start, on_table),
+        "self_contact": _self_contact(scene, start, lies_over),
     }
     if on_table and heavy:
         found["gravity"] = _CARRIED if down[:2] == (0.0, 0.0) else Choice(True, "the table slopes")
@@ -125,9 +127,9 @@ def _inertia(scene: Scene, start: StartCurve, on_table: bool) -> Choice:
     return _MOVES
 
 
-def _self_contact(scene: Scene, start: StartCurve, on_table: bool) -> Choice:
+def _self_contact(scene: Scene, start: StartCurve, lies_over: bool) -> Choice:
     """Choose contact of the cable with itself where two strands of the start are near each other."""
-    if on_table:
+    if lies_over:
         return _LIES_OVER
     diameter, control = scene.cable.diameter, np.ascontiguousarray(start.control_points)
     apart = np.inf

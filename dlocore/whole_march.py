@@ -10,7 +10,7 @@ from dlocore.events import smallest_n_t
 from dlocore.prediction import Status
 from dlocore.problem import Problem, pose
 from dlocore.progress import record_level
-from dlocore.review import called_for, called_for_by_fine
+from dlocore.review import FAR_MORE, STRAINED, called_for, called_for_by_fine
 from dlocore.sideways import may_leave_plane
 from dlocore.solvers.ladder import (
     CREDIBLE_STRAIN,
@@ -125,6 +125,13 @@ def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
         "stalled",
         f"A time step found no equilibrium. {rest} Allow more control points, or a slower or smoother motion.",
     )
+
+
+def is_uneven(level: Level) -> bool:
+    """Tell whether a whole motion strains the cable within a span, and far more than where that is watched."""
+    least, most = level.motion.slopes
+    strain = max(1.0 - least, most - 1.0)
+    return not level.motion.stopped and strain > max(STRAINED, FAR_MORE * level.motion.largest_strain)
 
 
 def is_folded(level: Level) -> bool:

@@ -178,6 +178,14 @@ def test_scene_40_148_lifts_off_the_table_as_it_snaps_through():
     assert found.surface.positions(u, t)[..., 2].max() == pytest.approx(4e-3, rel=0.1)
 
 
+def test_a_loop_on_a_table_whose_sections_turn_over_lies_over_itself_as_before():
+    # strands that cross on the table are none that collide in space
+    found = predict(draw(93, 20353).make())
+    assert found.status == "converged"
+    assert found.accuracy.dimensions == 3
+    assert "one lies over the other" in found.message
+
+
 @pytest.mark.parametrize("around", [WEIGHTLESS, Environment(drag=0.2, table=Table())], ids=["in a plane", "on a table"])
 def test_a_cable_that_is_kept_flat_as_twist_is_off_says_so(around):
     found = predict(lying(1.1, "tangent", environment=around, effects={"twist": "off"}))

@@ -34,7 +34,7 @@ from dlocore.solvers.ladder import Level, Size, hardness, run_level
 from dlocore.solvers.march import STRONGLY_DAMPED, March
 from dlocore.solvers.march import march as take_steps
 from dlocore.solvers.monitor import Monitor
-from dlocore.whole_march import is_folded, march_level
+from dlocore.whole_march import is_folded, is_uneven, march_level
 from tests.solver.scenes import apart, march, paper_scene, refined, swinging
 
 
@@ -300,6 +300,15 @@ def test_two_grids_that_agree_by_chance_are_not_believed():
     truth = predict(replace(scene, quality=Quality(target_error=5e-4 * scene.cable.length)))
     assert found.status == truth.status == "converged"
     assert apart(found.surface, truth.surface).max() < 2.0 * found.accuracy.error_estimate
+
+
+def test_grids_that_agree_on_a_strain_within_a_span_are_not_believed():
+    # from a cusp, 13 control points stretched by 15 % between the points that watch the length; 4 % off at 0.7 %
+    scene = draw(93, 13634).make()
+    found, fine = predict(scene), predict(replace(scene, quality=Quality(target_error=1e-3)))
+    assert found.status == fine.status == "converged"
+    assert apart(found.surface, fine.surface).max() < 2.0 * found.accuracy.error_estimate
+    assert not is_uneven(found.level)
 
 
 def test_two_coarse_grids_with_friction_that_agree_are_not_believed_alone():
