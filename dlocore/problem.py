@@ -57,7 +57,8 @@ class Problem:
         lies_over: it lies on a table, where one strand may lie over another, though it may leave that as its sections
             turn over.
         choices: for each effect whether it is simulated, and why.
-        called_for: the effects that a result has called for, and why; "side": a bow out of the plane of the motion.
+        called_for: the effects that a result has called for, and why; "side": off the plane of the motion, by
+            a bow or off the table.
         inertia, drag, gravity, ...: the active effects, None where inactive.
     """
 

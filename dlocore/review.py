@@ -25,7 +25,7 @@ from dlocore.mirrored import goes_elsewhere
 from dlocore.obstacles import Obstacle
 from dlocore.problem import Problem
 from dlocore.report import WindowForces
-from dlocore.sideways import lacks_twist, leaves_plane
+from dlocore.sideways import WITH_TWIST, lacks_twist, leaves_plane, solved_in_space
 from dlocore.solvers.ladder import CREDIBLE_STRAIN, Level
 from dlocore.solvers.monitor import Monitor
 from dlocore.spin import bends_sharply, spin_forces
@@ -121,11 +121,11 @@ def objections(level: Level) -> list[str]:
         tip = f"it is tipped by {BOW * problem.scene.cable.length * 1e3:.2g} mm, and another side may be as likely"
         found.append(f"{TIPPED}: {tip}")
     kept = [
-        *(["with effects.twist on or auto"] if lacks_twist(problem) else []),
+        *([WITH_TWIST] if lacks_twist(problem) else []),
         *(["without a given grid"] if problem.scene.quality.n_u is not None else []),
     ]
     if kept and leaves_plane(problem, level.motion):
-        found.append(f"{UNSTABLE}: {' and '.join(kept)} it is solved in space")
+        found.append(solved_in_space(kept))
     found += _undetermined(level)
     elsewhere = goes_elsewhere(problem, level.motion)
     if elsewhere:

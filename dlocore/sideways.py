@@ -30,6 +30,7 @@ _FLAT = 1e-6  # of the length: so near to a plane a motion is planar, but for ro
 _LOOKS = 7  # states of a motion
 _NEUTRAL = 1e-8  # of the largest stiffness: what rounding leaves of none
 _COLUMN, _BELOW = np.array([(j, o) for j in range(4) for o in range(4 - j)]).T  # of a lower triangle (4, 4)
+WITH_TWIST = "with effects.twist on or auto"  # a way to have a motion leave its plane
 _FIRM = 1e6  # times the largest stiffness, with which what is held stays in the plane
 
 
@@ -39,6 +40,8 @@ def leaves_plane(problem: Problem, motion: March) -> bool:
     So it would where the start has settled to an equilibrium that is none of a cable that may leave the plane.
     """
     grid = motion.grid
+    if not (is_looked_at(problem) or _bends_in_plane(problem)):
+        return False
     if problem.scene.shape.settle and is_unstable(problem, grid, grid.start, 0.0, grid.history.memory[:, 0]):
         return True
     looks = np.unique(np.linspace(0, len(motion.times) - 1, _LOOKS).round().astype(int))
@@ -47,12 +50,19 @@ def leaves_plane(problem: Problem, motion: March) -> bool:
     slack = density * slowest**2 + drag * slowest
     growth = 0.0
     times, states = motion.times[looks], motion.states[looks]
-    bends = np.broadcast_to(motion.behind(times).memory[..., 0], (len(looks), len(grid.tables.curvature_w)))
-    for least in _leasts(problem, grid, states, times.tolist(), bends, slack):
+    for least in _leasts(problem, grid, states, times.tolist(), _bends_of(problem, motion, times), slack):
         growth += (np.sqrt(drag**2 - 4.0 * density * min(least, 0.0)) - drag) / (2.0 * density)
     # a straight cable that buckles may do so to any side: until it has, all grow alike
     both = math.log(1.0 / BOW) if problem.start.bow else 0.0
     return growth * problem.horizon / len(looks) > GROWTH + both
+
+
+def _bends_of(problem: Problem, motion: March, times: Floats) -> Floats:
+    """Return the bends [1/m] that a cable has without stress in a plane (k, points) at times (k,), none if straight."""
+    if not _bends_in_plane(problem):
+        return np.zeros((len(times), 0))
+    memory = motion.behind(times).memory[..., 0]
+    return np.broadcast_to(memory, (len(times), memory.shape[1]))
 
 
 def _leasts(
@@ -63,11 +73,12 @@ def _leasts(
     `bends` (k, points) [1/m] are those that the cable has there without stress in a plane. By default the slack is what
     rounding leaves of no stiffness.
     """
+    if _bends_in_plane(problem):
+        leasts = _leasts_of_lying if _is_weighed_down(problem) else _leasts_of_bent
+        yield from leasts(problem, grid, states, times, bends, slack)
+        return
     flat = _in_plane(problem, states)
     if flat is None:
-        if _bends_in_plane(problem):
-            leasts = _leasts_of_lying if _is_weighed_down(problem) else _leasts_of_bent
-            yield from leasts(problem, grid, states, times, bends, slack)
         return
     bands, unit = _bands(problem, grid, states, flat)
     for t, q, band in zip(times, flat, bands, strict=True):
@@ -99,12 +110,21 @@ def lacks_twist(problem: Problem) -> bool:
     return problem.scene.effects.get("twist", "auto") == "off" and _bends_in_plane(problem)
 
 
+def solved_in_space(ways: list[str]) -> str:
+    """Return in words that a motion is kept in a plane that it would leave, and the ways to have it leave."""
+    return f"{UNSTABLE}: {' and '.join(ways)} it is solved in space"
+
+
 def _bends_in_plane(problem: Problem) -> bool:
     """Tell whether a cable that is bent without stress moves in a plane that it may leave, or turn over in."""
-    rest, start = problem.scene.cable.rest_shape, problem.start
-    straight = isinstance(rest, str) and rest == "straight" and start.material is None
-    bends = not straight or problem.bending_memory is not None
-    return bends and problem.plane.dimensions == 2 and start.theta is None
+    return _may_be_bent(problem) and problem.plane.dimensions == 2 and problem.start.theta is None
+
+
+def _may_be_bent(problem: Problem) -> bool:
+    """Tell whether the cable may have bends without stress: by its shape, as it yields, or of an earlier motion."""
+    rest = problem.scene.cable.rest_shape
+    bent = not isinstance(rest, str) or rest != "straight"
+    return bent or problem.start.material is not None or problem.bending_memory is not None
 
 
 def _leasts_of_bent(
@@ -195,11 +215,8 @@ def is_unstable(problem: Problem, grid: Grid, q: Floats, t: float, bends: Floats
 
 def is_looked_at(problem: Problem) -> bool:
     """Tell whether the stiffness across its plane is that of a cable that is straight without stress, and may leave."""
-    start, rest = problem.start, problem.scene.cable.rest_shape
-    bent = not isinstance(rest, str) or rest != "straight" or start.material is not None
-    return not (
-        problem.on_table or bent or start.aside or start.theta is not None or problem.bending_memory is not None
-    )
+    start = problem.start
+    return not (problem.on_table or _may_be_bent(problem) or start.aside or start.theta is not None)
 
 
 def _in_plane(problem: Problem, states: Floats) -> Floats | None:

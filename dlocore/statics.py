@@ -20,7 +20,7 @@ from dlocore.report import elastic_energy, reactions
 from dlocore.resting import slide_to_rest
 from dlocore.scene import Scene
 from dlocore.settling import Settled, holding, settle
-from dlocore.sideways import is_unstable, lacks_twist
+from dlocore.sideways import WITH_TWIST, is_unstable, lacks_twist, solved_in_space
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import design_matrix
 from dlocore.tipping import tipped
@@ -103,8 +103,7 @@ def equilibrium(
     found = rest.settled
     if rest.status == "converged" and is_unstable(problem, rest.grid, found.q, at, found.history.memory[:, 0]):
         if lacks_twist(problem):
-            note = f" Note: {UNSTABLE}: with effects.twist on or auto it is solved in space."
-            rest = rest._replace(message=rest.message + note)
+            rest = rest._replace(message=f"{rest.message} Note: {solved_in_space([WITH_TWIST])}.")
         else:
             problem = pose(scene, {"side": UNSTABLE}, at_rest=True)
             rest = _refined(problem, sizes, at, target, monitor)
