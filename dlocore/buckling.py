@@ -21,6 +21,7 @@ from dlocore.plane import FLATNESS, is_straight, leftwards, natural_points, off_
 from dlocore.scene import Grasp, Scene
 from dlocore.shape import StartCurve, fit_to_knots
 from dlocore.spline import greville
+from dlocore.straightening import straightened
 
 Floats = NDArray[np.float64]
 
@@ -47,30 +48,49 @@ def with_side(scene: Scene, start: StartCurve, at_rest: bool) -> StartCurve:
     """Return the start, bowed to the left, or by turns, where it is straight and the motion pushes it along itself.
 
     The left is that of its direction, horizontally; that of a vertical one is the x axis. A start that settles is
-    straight then if it is nearly so: what it deviates from a line, by a bow at most, it does without stress, too, and
-    the bow is on that side.
+    straight, too, where it comes to rest on a line, and where it is nearly so: what it deviates from a line then, by a
+    bow at most, it does without stress. The bow is on the side on which such a start was given.
 
     Args:
         scene: the scene.
         start: start curve.
         at_rest: a disturbance has all the time that it needs to grow, as where only the equilibrium is asked for.
     """
-    along = _line(scene, start)
+    given = start
+    # settled, a cable is straight that deviates from a line by less than a bow: its direction is no surer than that
+    flat = BOW if scene.shape.settle and not is_straight(start) else FLATNESS
+    start = _straightened(scene, given, flat) or given
+    along = _line(scene, start, flat)
     if along is None:
-        return start
+        return given
     pushed = [part for part, growth in _growths(scene, start, along, at_rest).items() if growth > GROWTH]
     if not pushed:
-        return start
+        return given
     bowed = list(dict.fromkeys(piece for part in pushed for piece in _pieces(scene, part)))
     knots = _knots(bowed, scene.cable.length)
     u = greville(knots)
     # by turns, as beyond a grasp that lets the cable turn it bends on the other way
     aside = np.sum([(-1) ** k * _bow(part, u) for k, part in enumerate(bowed)], axis=0)
     left = leftwards(along)
-    if float(np.mean((start.control_points - start.control_points[0]) @ left)) < -FLATNESS * scene.cable.length:
+    if float(np.mean((given.control_points - given.control_points[0]) @ left)) < -FLATNESS * scene.cable.length:
         aside *= -1.0
     control = fit_to_knots(start, knots) + np.outer(aside, left)
     return replace(start, knots=knots, control_points=control, bow=float(aside[np.abs(aside).argmax()]))
+
+
+def _straightened(scene: Scene, start: StartCurve, flat: float) -> StartCurve | None:
+    """Return the straight line on which a start that settles comes to rest, or None where it does not; see `_line`."""
+    straight = None if is_straight(start) else straightened(scene, start, _gravity(scene, start))
+    along = None if straight is None else _line(scene, straight, flat)
+    if straight is None or along is None:
+        return None
+    held = tuple(replace(g, path=Still()) for g in scene.grasps if g.start == 0.0)
+    at_rest, times = replace(scene, grasps=held), np.array([0.0, cast(float, scene.horizon)])
+    for part in _parts(sorted(held, key=lambda g: g.u), scene.cable.length):
+        push, torque = _loaded(at_rest, straight, along, part, times)
+        if _buckles(scene, part, push, torque)[0]:
+            return None
+    return straight
 
 
 def out_of_plane(scene: Scene, start: StartCurve, normal: Floats) -> StartCurve:
@@ -127,15 +147,13 @@ def _bow(part: _Part, u: Floats) -> Floats:
     return np.asarray(BOW * length * shape)
 
 
-def _line(scene: Scene, start: StartCurve) -> Floats | None:
-    """Return the direction (3,) of a start from which nothing in the scene leads away, None where something does."""
+def _line(scene: Scene, start: StartCurve, flat: float) -> Floats | None:
+    """Return the direction (3,) of a start from which nothing leads away by more than a part `flat`, or None."""
     chord = start.control_points[-1] - start.control_points[0]
     size = math.sqrt(chord @ chord)
     if not size > 0.5 * scene.cable.length:
         return None
     along = chord / size
-    # settled, a cable is straight that deviates from a line by less than a bow: its direction is no surer than that
-    flat = BOW if scene.shape.settle and not is_straight(start) else FLATNESS
     if any(_aside(g.path, g.u, start, along, scene.cable.length, flat) for g in scene.grasps):
         return None
     forces = [_gravity(scene, start)[None], *(np.atleast_2d(cast(Floats, load.force)) for load in scene.loads)]
@@ -199,17 +217,26 @@ def _growths(scene: Scene, start: StartCurve, along: Floats, at_rest: bool) -> d
         held = closed_grasps(scene, a, b)
         t = np.linspace(a, b, _TIMES)
         for part in _parts(sorted(held, key=lambda g: g.u), cable.length):
-            length = part.end - part.begin
-            clamped = None not in part.grasps
-            least = np.pi / (length if clamped else 2.0 * length)  # wave number
             push, torque = _loaded(scene, start, along, part, t)
-            unstable = push + torque**2 / (4.0 * EI) > EI * least**2
-            k = np.maximum((3.0 * torque + np.sqrt(9.0 * torque**2 + 32.0 * EI * push)) / (8.0 * EI), least)
-            drive = np.where(unstable, torque * k**3 + push * k**2 - EI * k**4, 0.0)
+            k = (3.0 * torque + np.sqrt(9.0 * torque**2 + 32.0 * EI * push)) / (8.0 * EI)
+            k = np.maximum(k, _least_wave_number(part))
+            drive = np.where(_buckles(scene, part, push, torque), torque * k**3 + push * k**2 - EI * k**4, 0.0)
             rate = (np.sqrt(c**2 + 4.0 * mu * np.maximum(drive, 0.0)) - c) / (2.0 * mu)
             growth = float(np.sum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t)))
             growths[part] = growths.get(part, 0.0) + patience * growth
     return growths
+
+
+def _buckles(scene: Scene, part: _Part, push: Floats, torque: Floats) -> NDArray[np.bool_]:
+    """Tell whether a push (k,) [N] and a torque (k,) [N m] bend a straight part."""
+    EI = cast(float, scene.cable.bending_stiffness)
+    return push + torque**2 / (4.0 * EI) > EI * _least_wave_number(part) ** 2
+
+
+def _least_wave_number(part: _Part) -> float:
+    """Return the wave number of the longest bend of a part [1/m]."""
+    length = part.end - part.begin
+    return math.pi / (length if None not in part.grasps else 2.0 * length)
 
 
 def _parts(held: list[Grasp], length: float) -> Iterator[_Part]:
@@ -253,6 +280,8 @@ def _loaded(scene: Scene, start: StartCurve, along: Floats, part: _Part, t: Floa
         apart = _way(second, start, along, t) - _way(first, start, along, t)
         met = np.array([max(first.start, second.start)])
         closer = float((_way(second, start, along, met) - _way(first, start, along, met))[0]) - apart
+        if scene.shape.settle and met == 0.0:
+            closer += length - _way_along(start, part)
         elastic = cast(float, cable.axial_stiffness) * closer / length
         push = elastic + 0.5 * np.abs(needed) * length + np.sum([np.abs(force) for _, force in loads], axis=0)
         turned = np.abs(_spin(second, along, t) - _spin(first, along, t) + _twist(start, part))
@@ -274,6 +303,11 @@ def _loaded(scene: Scene, start: StartCurve, along: Floats, part: _Part, t: Floa
 def _way(grasp: Grasp, start: StartCurve, along: Floats, t: Floats) -> Floats:
     """Return how far a grasp has gone along a direction at times t (k,) [s]; (k,) [m]."""
     return (grasp.path.at(t - grasp.start, start(grasp.u)[0]) - start(grasp.u)[0]) @ along
+
+
+def _way_along(start: StartCurve, part: _Part) -> float:
+    """Return the length of the start between the ends of a part [m]."""
+    return float(np.linalg.norm(np.diff(start(np.linspace(part.begin, part.end, _TIMES)), axis=0), axis=1).sum())
 
 
 def _free_way(start: StartCurve, along: Floats, acceleration: Floats, t: Floats) -> Floats:

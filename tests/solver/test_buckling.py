@@ -29,6 +29,7 @@ from dlocore import (
 )
 from dlocore.buckling import BOW
 from dlocore.problem import pose
+from dlocore.shape import start_curve
 
 WEIGHTLESS = Environment(gravity=(0.0, 0.0, 0.0), drag=0.3)
 LYING = Environment(drag=0.3, table=Table())
@@ -112,6 +113,116 @@ def test_a_start_that_settles_straight_buckles_to_the_side_that_it_was_given_on(
     assert ends[0][1] * side > 0.1
     assert np.abs(ends[1] - ends[0]).max() < 2e-3
     assert np.abs(ends[2] - ends[0]).max() < 2e-3
+
+
+def arc(turn: float, **changes: Any) -> Points:
+    """Return an arc of length one that turns to the left from the x axis, and is to settle."""
+    a = np.linspace(0.0, turn, 49)
+    return Points(points=np.column_stack([np.sin(a), 1.0 - np.cos(a), np.zeros(49)]) / turn, settle=True, **changes)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_points_that_grippers_press_straight_buckle_to_the_side_that_they_were_given_on(side: float) -> None:
+    """93:19917: an arc 1.7 mm high between two pins is shorter than the cable by less than buckles it."""
+    points = np.asarray(arc(8.0 * 1.7e-3).points)
+    points = points @ [[1.0, 0.0, 0.0], [0.0, side, 0.0], [0.0, 0.0, 1.0]]
+    inwards = -0.8 * points[-1] / np.linalg.norm(points[-1])
+    grasps = (Grasp(u=0.0), Grasp(u=1.0, path=Move(displacement=inwards, duration=4.0)))
+    scene = Scene(
+        cable=cord(diameter=0.012, linear_density=0.2, bending_stiffness=2e-2),
+        shape=Points(points=points, settle=True), grasps=grasps, environment=replace(WEIGHTLESS, drag=1.2), horizon=4.0,
+    )  # fmt: skip
+    assert bow(scene) == pytest.approx(-side * BOW, rel=0.02)  # an arc to the left lies on the right of its chord
+    prediction = predict(scene)
+    assert prediction.status == "converged", prediction.message
+    chord = at_end(prediction, 1.0) - at_end(prediction, 0.0)
+    across = np.cross(chord, at_end(prediction, 0.5) - at_end(prediction, 0.0))[2] / np.linalg.norm(chord)
+    assert across == pytest.approx(-side * elastica(0.2), abs=3e-3)
+
+
+@pytest.mark.parametrize("hold", ["tangent", "clamp"])
+def test_an_arc_that_comes_to_rest_on_a_line_moves_as_one_that_was_given_there(hold: Any) -> None:
+    ahead = (Grasp(u=0.0, hold=hold, path=way(0.2, 0.0, 0.0, time=1.0)),)
+    scene = Scene(
+        cable=cord(bending_stiffness=1e-3, linear_density=0.1), shape=arc(0.6), grasps=ahead,
+        environment=replace(WEIGHTLESS, drag=5.0),
+    )  # fmt: skip
+    settled, given = predict(scene), predict(replace(scene, shape=Straight()))
+    assert settled.status == given.status == "converged", settled.message
+    away = settled.surface.sample()[2][..., :3] - given.surface.sample()[2][..., :3]
+    assert np.linalg.norm(away, axis=-1).max() < 1e-3
+    # a push that it bears needs no bow, and neither does a pull
+    assert bow(replace(scene, cable=cord(bending_stiffness=1.0))) == 0.0
+    assert bow(replace(scene, grasps=(replace(ahead[0], path=way(-0.2, 0.0, 0.0, time=1.0)),))) == 0.0
+
+
+def test_a_cable_that_comes_to_hang_has_a_bow_where_it_is_lowered_to_a_table() -> None:
+    u = np.linspace(0.0, 1.0, 49)
+    shape = Points(points=np.column_stack([0.2 * u * (1.0 - u * u), 0.0 * u, 1.05 - u]), settle=True)
+    lowered = (Grasp(u=0.0, path=way(0.0, 0.0, -0.2)),)
+    scene = Scene(cable=cord(bending_stiffness=1e-3), shape=shape, grasps=lowered, environment=LYING)
+    assert bow(scene) == pytest.approx(BOW, rel=0.02)
+    assert bow(replace(scene, grasps=(replace(lowered[0], path=way(0.0, 0.0, 0.2)),))) == 0.0
+
+
+def test_a_cable_that_would_fall_from_its_line_as_it_settles_is_not_straight_first() -> None:
+    u = np.linspace(0.0, 1.0, 49)
+    shape = Points(points=np.column_stack([0.05 * u * u, 0.0 * u, u]), settle=True)
+    foot = (Grasp(u=0.0, hold="tangent", path=way(0.0, 0.0, 4.0, time=0.5)),)
+    scene = Scene(cable=cord(bending_stiffness=1e-2), shape=shape, grasps=foot, environment=HANGING)
+    assert bow(scene) == 0.0
+    assert bow(replace(scene, cable=cord(bending_stiffness=0.1))) != 0.0  # it stands, until it is pushed up
+
+
+AHEAD = (Grasp(u=0.0, hold="tangent", path=way(0.2, 0.0, 0.0, time=1.0)),)
+STAYS_BENT = {
+    "does not settle": {"shape": replace(arc(0.6), settle=False)},
+    "bent without stress": {"cable": cord(bending_stiffness=1e-3, rest_shape="initial")},
+    "on a rough table": {"environment": replace(LYING, drag=5.0, table=Table(friction=0.5))},
+    "beside an obstacle": {
+        "environment": replace(WEIGHTLESS, drag=5.0, obstacles=(Sphere(center=(0.8, 0.1, 0.0), radius=0.04),))
+    },
+    "held elsewhere": {"grasps": (*AHEAD, Grasp(u=0.7, path=way(0.2, 0.0, 0.0, time=1.0)))},
+    "directions apart": {"grasps": (*AHEAD, Grasp(u=1.0, hold="tangent", path=way(0.1, 0.0, 0.0, time=1.0)))},
+}
+
+
+@pytest.mark.parametrize("changes", STAYS_BENT.values(), ids=STAYS_BENT)
+def test_a_start_that_something_keeps_bent_is_not_straight(changes: dict[str, Any]) -> None:
+    scene = Scene(
+        cable=cord(bending_stiffness=1e-3), shape=arc(0.6), grasps=AHEAD, environment=replace(WEIGHTLESS, drag=5.0)
+    )
+    assert bow(scene) != 0.0
+    assert bow(replace(scene, **changes)) == 0.0
+
+
+def test_what_buckles_as_it_settles_is_not_straight_first() -> None:
+    """Between two pins as before, but the cable hardly shortens: it comes to rest on its side."""
+    points = np.asarray(arc(8.0 * 1.7e-3).points)
+    grasps = (Grasp(u=0.0), Grasp(u=1.0, path=Move(displacement=-0.2 * points[-1], duration=2.0)))
+    scene = Scene(
+        cable=cord(axial_stiffness=1e5), shape=Points(points=points, settle=True), grasps=grasps,
+        environment=WEIGHTLESS,
+    )  # fmt: skip
+    assert bow(scene) == 0.0
+    assert bow(replace(scene, cable=cord(axial_stiffness=1e3))) != 0.0
+
+
+def test_parts_that_are_pressed_unevenly_settle_on_their_line() -> None:
+    """Three pins on a line, the middle one where both parts are pressed, one more than the other."""
+    x = np.linspace(0.0, 1.0, 97)
+    points = np.column_stack([x, 2e-3 * x * np.sin(4.0 * np.pi * x), 0.0 * x])
+    grasps = tuple(Grasp(u=u, path=way(0.2 * (0.5 - u), 0.0, 0.0)) for u in (0.0, 0.5, 1.0))
+    scene = Scene(
+        cable=cord(diameter=0.012, bending_stiffness=2e-2), shape=Points(points=points, settle=True), grasps=grasps,
+        environment=replace(LYING, drag=1.0), horizon=4.0,
+    )  # fmt: skip
+    prediction = predict(scene)
+    assert prediction.status == "converged", prediction.message
+    assert "no side to buckle to" in prediction.message
+    given = start_curve(scene.shape, 1.0)([0.0, 0.5, 1.0])
+    assert prediction.surface.positions([0.0, 0.5, 1.0], 0.0)[0] == pytest.approx(given, abs=1e-9)
+    assert abs(given[0, 0] + given[2, 0] - 2.0 * given[1, 0]) > 1e-6
 
 
 def test_the_scene_of_the_answer_is_the_one_that_was_given() -> None:
