@@ -29,6 +29,8 @@ GHOSTS = 9
 GHOST_COLUMNS = 65
 LIFT = 0.45  # height of the raised surface, of the cable's length
 CONTACT_SIZE = 1.7  # of the cable's diameter
+SKY_LIGHT = 2.5  # beside the viewer's lamps, so that no side is black
+GROUND_LIGHT = (200, 205, 210)
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,7 @@ class Picture:
         self._points = np.zeros((CABLE_SEGMENTS + 1, 3))
         self._size: tuple[float, float, int] | None = None  # length, diameter, grippers of what is drawn
         self._grippers: list[GripperPicture] = []
+        _light(scene)
         self._strips = [
             self._scene.add_mesh_simple(
                 f"/surface/{k}",
@@ -207,3 +210,12 @@ class Picture:
         colours = self._scale.colours(self._prediction, u, t)
         self._ghosts.points = np.concatenate([geometry.segments(row) for row in points]).astype(np.float32)
         self._ghosts.colors = np.concatenate([np.stack([row[:-1], row[1:]], axis=1) for row in colours])
+
+
+def _light(scene: SceneApi) -> None:
+    """Light a scene from the sky and its ground alone.
+
+    The viewer's own environment map makes the first picture take twice as long where there is no GPU.
+    """
+    scene.configure_environment_map(hdri=None)
+    scene.add_light_hemisphere("/sky", ground_color=GROUND_LIGHT, intensity=SKY_LIGHT)
