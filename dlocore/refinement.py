@@ -216,7 +216,7 @@ class _Climb:
 
     def _forget(self) -> None:
         """Forget the grids before."""
-        self.best, self.changes, self.estimate, self.astray = None, {}, np.inf, 0.0
+        self.best, self.changes, self.estimate, self.astray, self.evened = None, {}, np.inf, 0.0, 0
 
     def _is_rough(self, level: Level) -> bool:
         return not level.change <= ROUGH * self.problem.scene.cable.length

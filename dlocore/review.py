@@ -30,7 +30,7 @@ from dlocore.solvers.ladder import CREDIBLE_STRAIN, Level
 from dlocore.solvers.monitor import Monitor
 from dlocore.spin import bends_sharply, spin_forces
 from dlocore.spline import SplineSurface, design_matrix
-from dlocore.tipping import TIPPED
+from dlocore.tipping import tip_notes
 from dlocore.turning import turn_notes
 
 Floats = NDArray[np.float64]
@@ -117,9 +117,7 @@ def objections(level: Level) -> list[str]:
     found += _stretched(level)
     found += side_notes(problem.start)
     found += turn_notes(problem, level.motion.grid)
-    if level.motion.grid.tipped:
-        tip = f"it is tipped by {BOW * problem.scene.cable.length * 1e3:.2g} mm, and another side may be as likely"
-        found.append(f"{TIPPED}: {tip}")
+    found += tip_notes(level.motion.grid)
     kept = [
         *([WITH_TWIST] if lacks_twist(problem) else []),
         *(["without a given grid"] if problem.scene.quality.n_u is not None else []),

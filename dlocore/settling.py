@@ -50,6 +50,7 @@ class Settled(NamedTuple):
         held: what is held of them.
         history: what lies behind them.
         at: the grasps are at their poses of this time [s].
+        starts: where the paths of the grasps begin.
     """
 
     q: Floats
@@ -57,11 +58,13 @@ class Settled(NamedTuple):
     held: Held
     history: History
     at: float
+    starts: Starts
 
 
 def settle(
-    problem: Problem, grid: Grid, at: float, monitor: Monitor, begin: tuple[Floats, History] | None = None
-) -> Settled:
+    problem: Problem, grid: Grid, at: float, monitor: Monitor, begin: tuple[Floats, History] | None = None,
+    starts: Starts | None = None,
+) -> Settled:  # fmt: skip
     """Bring the cable to rest with the grasps at their poses of time `at` [s].
 
     Relaxations held back by a spring towards where they started: the first strongly, later ones less, so that a cable
@@ -71,6 +74,8 @@ def settle(
 
     Args:
         begin: control points and history at t = 0 that are near the equilibrium; the start of the grid without.
+        starts: where the paths of the grasps begin, of a cable that has been brought to their poses already; without,
+            it is brought there along the paths.
 
     Raises:
         Cancelled: the caller asked to stop.
@@ -78,14 +83,15 @@ def settle(
     q, history = (grid.start.copy(), grid.past()) if begin is None else begin
     if len(history.tension) == 0:
         history = history._replace(tension=np.zeros((len(grid.tables.axial_w), COLUMNS)))
-    starts: Starts = {}
-    before_t = 0.0
-    times = np.linspace(0.0, at, PATH_STEPS + 1)[1:] if at > 0 else np.zeros(1)
+    carried = at > 0.0 and starts is None
+    starts = {} if starts is None else starts
+    before_t = 0.0 if carried else at
+    times = np.linspace(0.0, at, PATH_STEPS + 1)[1:] if carried else np.array([at])
     for t in times:
         grasps = closed_grasps(problem.scene, t, t)
         close_grasps(problem, grid, grasps, starts, q)
         held = hold(problem, grid, grasps, np.array([before_t, t]), starts, q if t > 0.0 else grid.start)
-        if t > 0.0:
+        if carried:
             _carry(problem, grid, grasps, starts, t, q)
         before_t = t
         applied = applied_forces(problem, grid, np.array([t]))[0]
@@ -93,7 +99,7 @@ def settle(
         rest = _relaxed(problem, grid, q, history, held, applied, rounds, 1.0 if begin is None else _NEARBY, monitor)
         if rest == "time":
             break
-    return Settled(q, rest, held, history._replace(tension=grid.history.tension), before_t)
+    return Settled(q, rest, held, history._replace(tension=grid.history.tension), before_t, starts)
 
 
 def holding(problem: Problem, grid: Grid, settled: Settled) -> WindowForces:

@@ -7,7 +7,7 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dlocore.buckling import UNSTABLE
+from dlocore.buckling import UNSTABLE, side_notes
 from dlocore.discretisation import make_grid, smallest_n_u
 from dlocore.errors import SceneError, number
 from dlocore.events import closed_grasps
@@ -23,7 +23,7 @@ from dlocore.settling import Settled, holding, settle
 from dlocore.sideways import WITH_TWIST, is_unstable, lacks_twist, solved_in_space
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import design_matrix
-from dlocore.tipping import tipped
+from dlocore.tipping import tip_notes, tipped
 
 Floats = NDArray[np.float64]
 
@@ -99,20 +99,21 @@ def equilibrium(
     target = scene.quality.target_error or 1e-4 * scene.cable.length
     least = smallest_n_u(problem)
     sizes = [n_u] if n_u is not None else [max(n, least + 2 * i) for i, n in enumerate(LEVELS)]
-    rest = _refined(problem, sizes, at, target, monitor)
+    rest, notes = _refined(problem, sizes, at, target, monitor), list[str]()
     found = rest.settled
     if rest.status == "converged" and is_unstable(problem, rest.grid, found.q, at, found.history.memory[:, 0]):
         if lacks_twist(problem):
-            rest = rest._replace(message=f"{rest.message} Note: {solved_in_space([WITH_TWIST])}.")
+            notes.append(solved_in_space([WITH_TWIST]))
         else:
             problem = pose(scene, {"side": UNSTABLE}, at_rest=True)
             rest = _refined(problem, sizes, at, target, monitor)
+    notes += [*side_notes(problem.start), *tip_notes(rest.grid)]
     grid, q, history = rest.grid, rest.settled.q, rest.settled.history
     world = problem.world(free_of_frames(problem, grid, q[None], history.past[None])[0])
     held = reactions(problem, grid, (holding(problem, grid, rest.settled),))
     return Equilibrium(
         status=rest.status,
-        message=rest.message,
+        message=" ".join([rest.message, *(f"Note: {note}." for note in notes)]),
         control_points=world,
         knots_u=grid.knots,
         reactions=np.array([g.reaction[-1] for g in held]).reshape(-1, 3),
@@ -140,9 +141,11 @@ def _refined(problem: Problem, sizes: list[int], at: float, target: float, monit
     for n in sizes:
         grid = make_grid(problem, n)
         settled = settle(problem, grid, at, monitor)
-        if at == 0.0 and settled.rest == "settled":
-            stays = tipped(problem, grid.changed(start=settled.q, history=settled.history), monitor)
+        if settled.rest == "settled":
+            stays = grid.changed(start=settled.q, history=settled.history)
+            stays = tipped(problem, stays, monitor, at, settled.starts)
             settled = settled._replace(q=stays.start, history=stays.history)
+            grid = grid.changed(tipped=stays.tipped)
         if settled.rest == "time" and found is not None:
             break
         if found is not None:

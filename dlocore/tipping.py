@@ -22,7 +22,7 @@ from dlocore.spline import greville
 
 Floats = NDArray[np.float64]
 
-TIPPED = "at rest the start stands on an equilibrium that any disturbance leaves"
+TIPPED = "at rest the cable stands on an equilibrium that any disturbance leaves"
 _SLACK = 1e-4  # of what weighs on the cable and bends it: a stiffness that rounding may make of none
 _STIFFER = 4.0  # times: the springs that are tried until they hold the cable
 _SPRINGS = 20  # of them
@@ -32,13 +32,20 @@ _LOPSIDED = 0.37  # more of the end than of the beginning, which may go to two s
 _FALLS = 3  # from one such equilibrium to another, at most
 
 
-def tipped(problem: Problem, grid: Grid, monitor: Monitor) -> Grid:
+def tipped(problem: Problem, grid: Grid, monitor: Monitor, at: float = 0.0, starts: Starts | None = None) -> Grid:
     """Return a grid that has settled in space, free of contact, tipped off where it would fall and settled on.
 
     One that lies in a plane, and of which `sideways.py` tells whether it leaves that, is left to it.
 
     The tip is one of `BOW` of the length, in the shape of the fastest fall. Where it finds no rest after it, or falls
     again and again, the grid is returned as it is.
+
+    Args:
+        problem: the equations.
+        grid: the grid.
+        monitor: that of the solve.
+        at: the grasps are at their poses of this time [s].
+        starts: where the paths of the grasps begin; without, all at t = 0.
 
     Raises:
         Cancelled: the caller asked to stop.
@@ -49,31 +56,38 @@ def tipped(problem: Problem, grid: Grid, monitor: Monitor) -> Grid:
         return grid  # `is_unstable` tells, and gives it a bow
     now = grid
     for _ in range(_FALLS):
-        way = falls(problem, now)
+        way = falls(problem, now, at, starts)
         if way is None:
             return now
-        found = settle(problem, now.changed(start=now.start + BOW * problem.scene.cable.length * way), 0.0, monitor)
+        off = now.changed(start=now.start + BOW * problem.scene.cable.length * way)
+        found = settle(problem, off, at, monitor, starts=starts)
         if found.rest != "settled":
             return grid
         now = now.changed(start=found.q, history=found.history, tipped=True)
-    return grid if falls(problem, now) is not None else now
+    return grid if falls(problem, now, at, starts) is not None else now
 
 
-def falls(problem: Problem, grid: Grid) -> Floats | None:
-    """Return the way (n_u, nc) in which a start at rest falls, or None where it stays.
+def tip_notes(grid: Grid) -> list[str]:
+    """Return what is to be known of a grid that was tipped, in words."""
+    tip = f"it is tipped by {BOW * float(grid.knots[-1]) * 1e3:.2g} mm, and another side may be as likely"
+    return [f"{TIPPED}: {tip}"] if grid.tipped else []
+
+
+def falls(problem: Problem, grid: Grid, at: float = 0.0, starts: Starts | None = None) -> Floats | None:
+    """Return the way (n_u, nc) in which a start at rest falls, or None where it stays; see `tipped`.
 
     Its largest displacement is one, or less where sections turn by more than that over the length. It is the
     eigenvector of the least eigenvalue of its tangent, if that is negative: found by inverse iteration, held by springs
     just strong enough for it to stay.
     """
     cable, nc, q = problem.scene.cable, problem.nc, grid.start
-    grasps = closed_grasps(problem.scene, 0.0, 0.0)
-    starts: Starts = {}
+    grasps = closed_grasps(problem.scene, at, at)
+    starts = {} if starts is None else starts
     close_grasps(problem, grid, grasps, starts, q)
-    elimination = hold(problem, grid, grasps, np.zeros(2), starts, q).elimination
+    elimination = hold(problem, grid, grasps, np.full(2, at), starts, q).elimination
     active, parameters = problem.law_table()
     bending = problem.bend.bending_stiffness if problem.bend else 0.0
-    pull = float(np.abs(applied_forces(problem, grid, np.zeros(1))).max())  # of any control point [N]
+    pull = float(np.abs(applied_forces(problem, grid, np.array([at]))).max())  # of any control point [N]
     load = float(np.linalg.norm(problem.weight())) + pull / cable.length
     scale = bending / cable.length**4 + load / cable.length
 

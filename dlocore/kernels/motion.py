@@ -107,7 +107,9 @@ def smooth_motion(
     info[STRAIN] = max(0.0, most - 1.0, 1.0 - least)
     info[LEAST_SLOPE], info[MOST_SLOPE] = slopes(states, every, tables.curvature_first, tables.curvature_b1)
     if looks > 0:
-        kept = np.expand_dims(history.memory, 0), np.expand_dims(history.past, 0), np.expand_dims(history.axial, 0)
+        # by np.expand_dims they would be arrays of another kind, for which the rest would be compiled anew
+        m, past, axial = history.memory, history.past, history.axial
+        kept = m.reshape((1, *m.shape)), past.reshape((1, *past.shape)), axial.reshape((1, *axial.shape))
         behind = History(*kept, history.stick, history.slide, np.zeros((0, COLUMNS)), history.room)
         at, lasts = looked_at(steps, looks), times[-1] - times[near]
         rates = fastest_growth(

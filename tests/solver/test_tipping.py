@@ -1,11 +1,12 @@
 """Starts that settle on an equilibrium that any disturbance leaves are tipped off it."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from dlocore import Cable, Environment, Grasp, Move, Points, Scene, equilibrium, predict
+from dlocore import Cable, Environment, Grasp, Load, Move, Points, Scene, equilibrium, predict
 from dlocore.problem import pose
 from dlocore.solvers.monitor import Monitor
 from dlocore.statics import start_grid
@@ -53,11 +54,28 @@ def test_it_falls_to_one_side_on_every_grid(n_u, twist):
     assert problem.world(grid.start[None, n_u // 2])[0, 2] < -0.2
 
 
-def test_equilibria_are_tipped_too():
+@pytest.mark.parametrize("at", [0.0, 0.5, 1.0])
+def test_equilibria_are_tipped_too(at):
     u = np.linspace(0.0, arch(0.3).cable.length, 9)
-    up, down = (equilibrium(arch(height)).positions(u) for height in (0.3, -0.3))
-    np.testing.assert_allclose(up, down, atol=1e-3)
-    assert up[4, 2] < -0.2
+    up, down = (equilibrium(arch(height), at=at) for height in (0.3, -0.3))
+    np.testing.assert_allclose(up.positions(u), down.positions(u), atol=1e-3)
+    lifted = arch(0.3).grasps[0].path.at(np.array([at]), np.zeros(3))[0, 2]
+    assert up.positions(u)[4, 2] < lifted - 0.2
+    assert TIPPED in up.message
+    assert TIPPED not in down.message
+
+
+def test_what_stands_until_its_load_is_taken_off_falls_then():
+    """A cable that a load holds up stands, and hangs without it."""
+    standing = arch(0.3)
+    length = standing.cable.length
+    force = [[0.0, 0.0, 3.0], [0.0, 0.0, 3.0], [0.0, 0.0, 0.0]]
+    held = replace(standing, loads=(Load(u=0.5 * length, force=force, times=[0.0, 0.5, 1.0]),), horizon=1.0)
+    before, after = (equilibrium(held, at=at) for at in (0.5, 1.0))
+    assert before.positions([0.5 * length])[0, 2] > 0.2
+    assert TIPPED not in before.message
+    assert after.positions([0.5 * length])[0, 2] < -0.2
+    assert TIPPED in after.message
 
 
 @pytest.mark.parametrize(
