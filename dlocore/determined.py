@@ -87,9 +87,9 @@ def may_grow(problem: Problem, motion: March) -> bool:
 def _growth(problem: Problem, motion: March, window: WindowForces) -> float:
     """Return the logarithm of what a disturbance grows by in a stretch of a motion at most, about."""
     lasts = float(window.times[-1] - window.times[0])
-    at = looked_at(len(window.times) - 1, max(2, round(LOOKS * lasts / problem.horizon)))
+    at, shares = looked_at(len(window.times) - 1, max(2, round(LOOKS * lasts / problem.horizon)))
     rates = fastest_growth(
         problem.axes, window.states[at], motion.behind(window.times[at]), motion.grid.tables, *problem.laws,
         problem.mass_density(), problem.drag_coefficient(), window.held.elimination, SLOWEST / problem.horizon,
     )  # fmt: skip
-    return float(rates.sum()) * lasts / len(at)
+    return float(rates @ shares) * lasts

@@ -111,9 +111,9 @@ def smooth_motion(
         m, past, axial = history.memory, history.past, history.axial
         kept = m.reshape((1, *m.shape)), past.reshape((1, *past.shape)), axial.reshape((1, *axial.shape))
         behind = History(*kept, history.stick, history.slide, np.zeros((0, COLUMNS)), history.room)
-        at, lasts = looked_at(steps, looks), times[-1] - times[near]
+        (at, shares), lasts = looked_at(steps, looks), times[-1] - times[near]
         rates = fastest_growth(
             axes, states[at], behind, tables, active, p, density, dragged, e, SLOWEST / lasts,
         )  # fmt: skip
-        info[GROWTH] = rates.sum() * lasts / len(at)
+        info[GROWTH] = (rates * shares).sum() * lasts
     return states, closed, reactions, history, control, off

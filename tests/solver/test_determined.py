@@ -200,6 +200,16 @@ def test_a_scene_that_does_not_determine_its_motion_is_no_success():
     assert np.linalg.norm((other.states - motion.states)[..., :3], axis=-1).max() > UNDETERMINED * length
 
 
+def test_what_falls_as_a_long_motion_begins_is_looked_at():
+    """94:1642: a cable that stands on a point falls within 3 of 30 seconds, to where a micrometre sends it."""
+    foot = Grasp(u=0.0, path=Move(displacement=(0.05, 0.0, 0.0), duration=30.0))
+    cord = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-2)
+    shape = Straight(direction=(0.0, 0.0, 1.0))
+    found = predict(Scene(cable=cord, shape=shape, grasps=(foot,), environment=Environment(drag=0.3)))
+    assert found.status == "stalled"
+    assert "does not determine its motion" in found.message
+
+
 def test_on_a_given_grid_a_note_tells_that_a_scene_does_not_determine_its_motion():
     scene = draw(90, 42943).make()
     found = predict(scene)

@@ -26,10 +26,11 @@ from dlocore.buckling import UNSTABLE
 from dlocore.discretisation import room_for
 from dlocore.kernels.across import stiffness_across
 from dlocore.kernels.assembly import NO_RATES, History, assemble
+from dlocore.kernels.growth import AT_ONCE, looked_at
 from dlocore.kernels.tension import COLUMNS
 from dlocore.plane import Plane
 from dlocore.problem import Problem, pose
-from dlocore.sideways import is_unstable, pose_as_shown
+from dlocore.sideways import _looks, is_unstable, pose_as_shown
 from dlocore.solvers.ladder import Level
 from dlocore.solvers.monitor import Monitor
 from dlocore.whole_march import sided
@@ -112,6 +113,30 @@ def test_a_column_leaves_the_plane_of_its_bow_only_where_that_is_unstable(closer
     assert (z > 0.1) if leaves else (z < 1.1e-3 * y)
     shown = pose_as_shown(scene, {}, prediction.surface.control_points)
     assert shown.start.aside == cast(Level, prediction.level).posed.start.aside > 0.0
+
+
+@pytest.mark.parametrize("duration", [5.0, 120.0])
+def test_a_cable_that_stands_falls_out_of_its_plane_however_slowly_its_foot_is_carried(duration: float) -> None:
+    """94:1642: it has fallen long before the second of some evenly spaced looks at a motion of minutes."""
+    foot = Grasp(u=0.0, hold="tangent", path=Move(displacement=(0.05, 0.0, 0.0), duration=duration))
+    cable = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-2)
+    shape = Straight(direction=(0.0, 0.0, 1.0))
+    found = predict(Scene(cable=cable, shape=shape, grasps=(foot,), environment=replace(HEAVY, drag=0.3)))
+    assert found.status == "converged", found.message
+    assert UNSTABLE in found.message
+    assert np.abs(found.surface.positions([1.0], [2.5, duration])[:, 0, 1]).max() > 0.1
+
+
+@pytest.mark.parametrize("last", [0, 5, 440, 1000, 30_000])
+def test_the_first_states_of_long_motions_are_looked_at_closely(last: int) -> None:
+    for looks, (at, shares) in ((7, _looks(last)), (6, looked_at(last, 6))):
+        assert len(at) == len(shares) >= looks
+        assert at[-1] == last
+        assert np.all(np.diff(at) >= 0)
+        assert shares.sum() == pytest.approx(float(last > 0 or looks == 7))
+        early = at[at > 0].min(initial=last)
+        assert early <= max(2 * AT_ONCE, last / 6)
+        assert len(at) == looks or early >= AT_ONCE
 
 
 def test_its_equilibrium_hangs() -> None:
