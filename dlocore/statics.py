@@ -28,7 +28,7 @@ from dlocore.tipping import tip_notes, tipped
 Floats = NDArray[np.float64]
 
 RESTLESS = "shape.settle"  # the field of the error of a start that finds no rest
-LEVELS = (9, 13, 17, 25, 33, 49, 65, 97)
+LEVELS = (9, 13, 17, 25, 33, 49, 65, 97, 129, 193, 257, 385)
 _WOUND = np.pi  # [rad]: a start that turns by more along its length may have other equilibria beside the one downhill
 _COARSE = 12  # control points: on so few a start may settle to another of several equilibria than on more
 _ELSEWHERE = 0.02  # of the length: farther apart starts may lie in two equilibria

@@ -90,6 +90,21 @@ def test_a_limp_cable_hangs_as_a_catenary(ratio, sag, bend):
     assert -lowest / d == pytest.approx(sag, abs=3e-4)
 
 
+@pytest.mark.parametrize("stiffness", [1e-6, 1e-5])
+def test_a_limp_cable_that_is_held_level_bends_down_within_a_few_millimetres(stiffness):
+    """EI phi'' = T sin phi from the level to the vertical, far from its end: it hangs sqrt(2 EI/T) from the grasp."""
+    held = Scene(
+        cable=cable(bending_stiffness=stiffness, axial_stiffness=1e3),
+        shape=Straight(),
+        grasps=(Grasp(u=0.0, hold="tangent"),),
+        horizon=1.0,
+    )
+    found = equilibrium(held)
+    assert found.status == "converged", found.message
+    tension = held.cable.linear_density * 9.81
+    assert found.positions([1.0])[0, 0] == pytest.approx(np.sqrt(2.0 * stiffness / tension), abs=1e-4)
+
+
 def elastica_column(shortening: float) -> tuple[float, float]:
     """Return the modulus k and P L^2/EI of a pinned column whose ends have approached by `shortening` L."""
     k = np.sqrt(brentq(lambda m: 2 * ellipe(m) / ellipk(m) - 1 - (1 - shortening), 1e-9, 0.9))
