@@ -43,7 +43,7 @@ def straightened(scene: Scene, start: StartCurve, gravity: Floats) -> StartCurve
     if any(t @ along < (1.0 - 0.5 * _EXACT**2) * math.sqrt(t @ t) for t in tangents):
         return None
     # straight, the sections at the ends of a curve in space would be turned against each other otherwise
-    if len(tangents) > 1 and _off_plane(start) > _EXACT * length:
+    if sum(g.hold == "clamp" for g in held) > 1 and _off_plane(start) > _EXACT * length:
         return None
     knots = np.concatenate([np.zeros(4), np.repeat(u[(u > 0.0) & (u < length)], 3), np.full(4, length)])
     straight = replace(start, knots=knots, control_points=_places(greville(knots), u, at, along))

@@ -30,6 +30,7 @@ from dlocore import (
 from dlocore.buckling import BOW
 from dlocore.problem import pose
 from dlocore.shape import start_curve
+from dlocore.spline import greville, uniform_knots
 
 WEIGHTLESS = Environment(gravity=(0.0, 0.0, 0.0), drag=0.3)
 LYING = Environment(drag=0.3, table=Table())
@@ -194,6 +195,20 @@ def test_a_start_that_something_keeps_bent_is_not_straight(changes: dict[str, An
     )
     assert bow(scene) != 0.0
     assert bow(replace(scene, **changes)) == 0.0
+
+
+@pytest.mark.parametrize("hold", ["tangent", "clamp"])
+@pytest.mark.parametrize("space", [0.0, 2e-3])
+def test_clamps_twist_a_curve_in_space_as_it_comes_to_rest_on_a_line(hold: Any, space: float) -> None:
+    control = np.column_stack([greville(uniform_knots(9, 1.0)), np.zeros((9, 3))])
+    control[2:-2, 1], control[2:-2, 2] = 2e-3, space * np.array([1.0, 0.5, 0.0, -0.5, -1.0])
+    grasps = (Grasp(u=0.0, hold=hold), Grasp(u=1.0, hold=hold, path=way(-0.3, 0.0, 0.0)))
+    scene = Scene(
+        cable=cord(diameter=0.012, bending_stiffness=2e-2),
+        shape=ControlPoints(control_points=control, settle=True), grasps=grasps, environment=WEIGHTLESS,
+    )  # fmt: skip
+    # by the holonomy of the curve, which no bow of a straight cable has
+    assert (bow(scene) == 0.0) == (hold == "clamp" and space > 0.0)
 
 
 def test_what_buckles_as_it_settles_is_not_straight_first() -> None:
