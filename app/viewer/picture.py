@@ -60,7 +60,6 @@ class Picture:
         self._points = np.zeros((CABLE_SEGMENTS + 1, 3))
         self._size: tuple[float, float, int] | None = None  # length, diameter, grippers of what is drawn
         self._grippers: list[GripperPicture] = []
-        _light(scene)
         self._strips = [
             self._scene.add_mesh_simple(
                 f"/surface/{k}",
@@ -212,10 +211,11 @@ class Picture:
         self._ghosts.colors = np.concatenate([np.stack([row[:-1], row[1:]], axis=1) for row in colours])
 
 
-def _light(scene: SceneApi) -> None:
-    """Light a scene from the sky and its ground alone.
+def light(scene: SceneApi) -> None:
+    """Light the scene of a client from the sky and its ground alone.
 
-    The viewer's own environment map makes the first picture take twice as long where there is no GPU.
+    The viewer's own environment map makes the first picture take twice as long where there is no GPU. A playback keeps
+    it: each time it begins again its lights are set anew, and with them all its materials.
     """
     scene.configure_environment_map(hdri=None)
     scene.add_light_hemisphere("/sky", ground_color=GROUND_LIGHT, intensity=SKY_LIGHT)

@@ -18,7 +18,7 @@ from app.viewer.outbox import Outbox, Runs
 from app.viewer.palette import BRAND
 from app.viewer.panel import Actions, Panel
 from app.viewer.picking import GripperClick
-from app.viewer.picture import Look, Picture
+from app.viewer.picture import Look, Picture, light
 from app.viewer.playback import Playback
 from app.viewer.shape_editor import ShapeEditor
 from app.viewer.shapes import straightened, with_points
@@ -141,6 +141,7 @@ class Session:
         client.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=BRAND, control_width="medium")
         client.gui.set_panel_label("Cable")
         client.scene.set_up_direction("+z")
+        light(client.scene)
         if client.camera.image_width > PHONE:
             client.gui.main_panel.dock_right()
         client.camera.fov = FIELD_OF_VIEW
