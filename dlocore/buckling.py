@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dlocore.effects.distance import distances
 from dlocore.events import closed_grasps
 from dlocore.paths import Move, Path, Still
-from dlocore.plane import FLATNESS, is_straight, leftwards, natural_points, off_line, table_tolerance
+from dlocore.plane import FLATNESS, is_straight, leftwards, lies_on, natural_points, off_line
 from dlocore.scene import Grasp, Scene
 from dlocore.shape import StartCurve, fit_to_knots
 from dlocore.spline import greville
@@ -58,8 +58,9 @@ def with_side(scene: Scene, start: StartCurve, at_rest: bool) -> StartCurve:
     """
     given = start
     # settled, a cable is straight that deviates from a line by less than a bow: its direction is no surer than that
-    flat = BOW if scene.shape.settle and not is_straight(start) else FLATNESS
-    start = _straightened(scene, given, flat) or given
+    settles = scene.shape.settle and not is_straight(given)
+    flat = BOW if settles else FLATNESS
+    start = (_straightened(scene, given, flat) if settles else None) or given
     along = _line(scene, start, flat)
     if along is None:
         return given
@@ -80,7 +81,7 @@ def with_side(scene: Scene, start: StartCurve, at_rest: bool) -> StartCurve:
 
 def _straightened(scene: Scene, start: StartCurve, flat: float) -> StartCurve | None:
     """Return the straight line on which a start that settles comes to rest, or None where it does not; see `_line`."""
-    straight = None if is_straight(start) else straightened(scene, start, _gravity(scene, start))
+    straight = straightened(scene, start, _gravity(scene, start))
     along = None if straight is None else _line(scene, straight, flat)
     if straight is None or along is None:
         return None
@@ -193,8 +194,7 @@ def _gravity(scene: Scene, start: StartCurve) -> Floats:
     g = cast(Floats, scene.environment.gravity)
     if scene.effects.get("gravity", "auto") == "off":
         return np.zeros(3)
-    lies = table is not None and scene.effects.get("table", "auto") != "off"
-    if lies and table is not None and max(abs(z - table.height) for z in start.heights) <= table_tolerance(scene):
+    if table is not None and scene.effects.get("table", "auto") != "off" and lies_on(table, scene, start):
         return np.array([g[0], g[1], 0.0])
     return g
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.paths import Move, Path, Waypoints
-from dlocore.scene import Scene
+from dlocore.scene import Scene, Table
 from dlocore.shape import StartCurve
 
 Floats = NDArray[np.float64]
@@ -84,6 +84,11 @@ def table_tolerance(scene: Scene) -> float:
     """Return how far off the table, or in something, what was seen of a cable that touches it may lie [m]."""
     absolute, relative = _SEEN
     return min(absolute, relative * scene.cable.length)
+
+
+def lies_on(table: Table, scene: Scene, start: StartCurve) -> bool:
+    """Tell whether a start lies on a table, as well as it was seen."""
+    return max(abs(z - table.height) for z in start.heights) <= table_tolerance(scene)
 
 
 def off_the_table(scene: Scene, start: StartCurve, met: tuple[int, ...]) -> str:

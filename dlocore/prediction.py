@@ -19,6 +19,11 @@ Floats = NDArray[np.float64]
 Status = Literal["converged", "max_iterations", "stalled", "time_limit"]
 
 
+def with_notes(said: str, notes: list[str]) -> str:
+    """Return what was said of an answer and the notes on it, each in words, as one message."""
+    return " ".join([said, *[f"Note: {note}." for note in notes]])
+
+
 @dataclass(frozen=True)
 class EffectReport:
     """Whether an effect was simulated, why, and how large it was.
@@ -212,7 +217,7 @@ class Prediction:
     @cached_property
     def message(self) -> str:
         """The status in words, what to do about it, and what effects that the scene switches off would have done."""
-        return " ".join([self.said, *[f"Note: {objection}." for objection in self.find_objections()]])
+        return with_notes(self.said, self.find_objections())
 
     @cached_property
     def grasps(self) -> tuple[GraspReaction, ...]:

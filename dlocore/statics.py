@@ -13,7 +13,7 @@ from dlocore.errors import SceneError, number
 from dlocore.events import closed_grasps
 from dlocore.frames import free_of_frames
 from dlocore.grid import Grid
-from dlocore.prediction import Status
+from dlocore.prediction import Status, with_notes
 from dlocore.problem import Problem, pose
 from dlocore.regrid import begin_on, starts_folded
 from dlocore.report import elastic_energy, reactions
@@ -113,7 +113,7 @@ def equilibrium(
     held = reactions(problem, grid, (holding(problem, grid, rest.settled),))
     return Equilibrium(
         status=rest.status,
-        message=" ".join([rest.message, *(f"Note: {note}." for note in notes)]),
+        message=with_notes(rest.message, notes),
         control_points=world,
         knots_u=grid.knots,
         reactions=np.array([g.reaction[-1] for g in held]).reshape(-1, 3),

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.effects.distance import distances
-from dlocore.plane import off_line, table_tolerance
+from dlocore.plane import lies_on, off_line
 from dlocore.scene import Scene
 from dlocore.shape import StartCurve
 from dlocore.spline import greville
@@ -32,7 +32,7 @@ def straightened(scene: Scene, start: StartCurve, gravity: Floats) -> StartCurve
     """
     held = sorted((g for g in scene.grasps if g.start == 0.0), key=lambda g: g.u)
     rest = scene.cable.rest_shape
-    if not scene.shape.settle or not held or (isinstance(rest, str) and rest == "initial"):
+    if not held or (isinstance(rest, str) and rest == "initial"):
         return None
     length, u = scene.cable.length, np.array([g.u for g in held])
     at = np.array([g.path.at(np.zeros(1), start(g.u)[0])[0] for g in held])
@@ -98,7 +98,7 @@ def _is_free(scene: Scene, start: StartCurve, straight: StartCurve, at: Floats, 
     table = environment.table
     if table is not None and switch("table", "auto") != "off":
         hangs = float((at[:, 2, None] - np.abs(held[:, None] - u)).max(axis=0).min())
-        if max(abs(z - table.height) for z in start.heights) <= table_tolerance(scene):
+        if lies_on(table, scene, start):
             if table.friction > 0.0 and switch("friction", "auto") != "off":
                 return False
         elif not max(hangs, float(places[..., 2].min()) - goes) > table.height + radius:
