@@ -214,8 +214,8 @@ class Picture:
 def light(scene: SceneApi) -> None:
     """Light the scene of a client from the sky and its ground alone.
 
-    The viewer's own environment map delays the first picture by seconds where there is no GPU. A playback keeps it: each
-    time it begins again its lights are set anew, and with them all its materials.
+    The viewer's own environment map delays the first picture by seconds where there is no GPU. A playback keeps it:
+    each time it begins again its lights are set anew, and with them all its materials.
     """
     scene.configure_environment_map(hdri=None)
     scene.add_light_hemisphere("/sky", ground_color=GROUND_LIGHT, intensity=SKY_LIGHT)
