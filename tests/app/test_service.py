@@ -26,8 +26,6 @@ from app.worker import Worker
 from tests.app.conftest import ROOT, SLOW, paper_scene, start
 from tests.app.test_bad_requests import the_problem
 
-# the finest grid there is: some tenths of a second
-
 
 def scene_of(request: dict[str, Any]) -> Any:
     return to_scene(PredictionRequest.model_validate(request), lambda id: None)
@@ -72,19 +70,27 @@ def test_a_solve_beyond_the_time_limit_offers_its_best_iterate(tmp_path: Path) -
         assert np.isfinite(best.json()["surface"]["positions"]).all()
 
 
-def test_a_cancelled_solve_stops_at_once() -> None:
-    in_plane = paper_scene(quality={"n_u": 129, "n_t": 513, "method": "march"})
+class Asked(threading.Event):
+    """A wish to cancel that comes up while the solve looks for it the `at`-th time, and counts the looks."""
 
-    async def run() -> float:
-        worker, cancelled = Worker(workers=1, queue_size=0, time_limit=60.0), threading.Event()
-        threading.Timer(0.05, cancelled.set).start()
-        began = time.perf_counter()
-        with pytest.raises(ProblemError, match="cancelled"):
-            await worker.solve(scene_of(in_plane), cancelled)
-        return time.perf_counter() - began
+    def __init__(self, at: int) -> None:
+        super().__init__()
+        self.at, self.looks = at, 0
 
-    anyio.run(run)  # compiled now
-    assert anyio.run(run) < 0.05 + 0.1  # s: it stops within 100 ms
+    def is_set(self) -> bool:
+        self.looks += 1
+        return super().is_set() or self.looks >= self.at
+
+
+def test_a_cancelled_solve_stops_at_its_next_look() -> None:
+    async def run(cancelled: Asked) -> None:
+        await Worker(workers=1, queue_size=0, time_limit=60.0).solve(scene_of(SLOW), cancelled)
+
+    whole, cancelled = Asked(at=sys.maxsize), Asked(at=5)
+    anyio.run(run, whole)
+    with pytest.raises(ProblemError, match="cancelled"):
+        anyio.run(run, cancelled)
+    assert cancelled.looks == 5 < whole.looks / 3
 
 
 def test_a_worker_shutting_down_cancels_and_refuses() -> None:
