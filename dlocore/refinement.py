@@ -105,6 +105,7 @@ class _Climb:
         failures: marches in a row that found less than the best one, or no equilibrium as that.
         astray: how far a start that is hardly another goes elsewhere, as the last grid that agreed has it [m], 0 where
             that does not matter.
+        unseen: whether no time was left to see how far it goes.
         evened: how often more control points were taken as the cable was strained between the points that watch it.
         pace: time that the last march took for each of its points and steps [s].
     """
@@ -124,6 +125,7 @@ class _Climb:
     rho: float = RHO
     failures: int = 0
     astray: float = 0.0
+    unseen: bool = False
     evened: int = 0
     pace: float = np.inf
 
@@ -216,7 +218,8 @@ class _Climb:
 
     def _forget(self) -> None:
         """Forget the grids before."""
-        self.best, self.changes, self.estimate, self.astray, self.evened = None, {}, np.inf, 0.0, 0
+        self.best, self.changes, self.estimate, self.evened = None, {}, np.inf, 0
+        self.astray, self.unseen = 0.0, False
 
     def _is_rough(self, level: Level) -> bool:
         return not level.change <= ROUGH * self.problem.scene.cable.length
@@ -346,9 +349,12 @@ class _Climb:
 
         Where there is no time left to look, what the grid before says counts.
         """
+        monitor = self.monitor if self.budget == np.inf else self.monitor.within(self.budget - self.monitor.elapsed())
         try:
-            moved = goes_astray(level.problem, level.motion, self.monitor, self.number >= len(LEVELS))
+            moved = goes_astray(level.problem, level.motion, monitor, self.number >= len(LEVELS))
+            self.unseen = False
         except TimeIsUp:
+            self.unseen = True
             return self.astray
         finally:
             self.monitor.phase("estimate")
@@ -358,10 +364,16 @@ class _Climb:
         """Return the answer where grids agree, which is no success where its start may take it `astray`."""
         parts, astray = _parts(self.changes, level), self.astray
         if not astray:
-            return Outcome(level, "converged", self._agreed(level), parts)
+            return Outcome(level, "converged", f"{self._agreed(level)}{self._unseen()}", parts)
         advice = "Make the motion slower, damp it, or hold the cable in more places."
         message = f"{self._agreed(level)} But {in_words(self.problem, astray)}. {advice}"
         return Outcome(level, "stalled", message, {**(parts or {}), "start": astray})
+
+    def _unseen(self) -> str:
+        """Return in words, to be added to others, that no time was left to see what a disturbance would do."""
+        if not self.unseen:
+            return ""
+        return " A disturbance may grow in this motion; the time was up before it was seen how far it takes it."
 
     def _agreed(self, level: Level) -> str:
         return f"Two grids agree to {level.change * 1e3:.2g} mm; {self._left_over()}."
@@ -402,8 +414,12 @@ class _Climb:
         if not np.isfinite(level.change):
             return Outcome(level, "time_limit", f"{self.budget * 1e3:.3g} ms allow one grid, unchecked.", None)
         moved = f"the last refinement moved the surface by {level.change * 1e3:.2g} mm"
-        message = f"The best grid in {self.budget * 1e3:.3g} ms; {moved}."
-        return Outcome(level, march_status(self.problem, level)[0], message, _parts(self.changes, level))
+        parts, astray = _parts(self.changes, level), self._find_astray(level)
+        but = f" But {in_words(self.problem, astray)}." if astray else self._unseen()
+        message = f"The best grid in {self.budget * 1e3:.3g} ms; {moved}.{but}"
+        if astray:
+            parts = {**(parts or {}), "start": astray}
+        return Outcome(level, march_status(self.problem, level)[0], message, parts)
 
     def _unfinished(self, level: Level, best: Level) -> Outcome:
         """Return the best one, where a finer grid was not finished."""
@@ -425,8 +441,7 @@ class _Climb:
         left = self._left_over()
         advice = "Allow a larger target_error, more time or a shorter motion."
         if status == "converged" and self.estimate <= self.enough:
-            if not self.astray and self.budget == np.inf:
-                self.astray = self._find_astray(best)
+            self.astray = self.astray or self._find_astray(best)
             outcome = self._agreeing(best)
             finest = " No finer grid was tried." if self.estimate > self.target else ""
             return outcome._replace(message=outcome.message + finest)

@@ -176,7 +176,10 @@ def _stretched(level: Level) -> list[str]:
     k, s = np.unravel_index(np.argmax(strain), strain.shape)
     if not strain[k, s] > max(STRAINED, FAR_MORE * level.motion.largest_strain):
         return []
-    advice = "ask for a smaller target_error" if level.problem.scene.quality.n_u is None else "take more control points"
+    quality = level.problem.scene.quality
+    advice = "take more control points" if quality.n_u is not None else "ask for a smaller target_error"
+    if quality.time_budget is not None:
+        advice = "allow a larger time_budget"
     return [
         f"the surface stretches the cable by up to {strain[k, s]:.0%} within a span, at {u[s]:.4g} m and {t[k]:.3g} s: "
         f"positions are as near as the error says, lengths and directions there are not; {advice}"

@@ -36,6 +36,10 @@ class Monitor:
         """Time to the deadline [s]."""
         return float("inf") if self._end is None else self._end - time.perf_counter()
 
+    def within(self, time: float) -> "Monitor":
+        """Return a monitor of a part of the solve, which has so much time from now on [s], and no more than all."""
+        return Monitor(deadline=min(time, self.remaining()), cancelled=self._cancelled)
+
     def check(self) -> None:
         """Raise Cancelled where the caller asked to stop, TimeIsUp where the deadline has passed."""
         if self._cancelled is not None and self._cancelled():

@@ -10,6 +10,7 @@ import pytest
 from benchmarks.hard.generator import draw
 from dlocore import (
     Cable,
+    Cancelled,
     Environment,
     Grasp,
     Move,
@@ -285,9 +286,63 @@ def test_what_a_grid_says_is_not_forgotten_as_the_time_ends(marches: bool, monke
     assert answer.accuracy.error_parts["start"] == found[0]
 
 
-def test_a_deadline_that_leaves_no_time_to_look_leaves_the_answer(monkeypatch: pytest.MonkeyPatch):
+UNSEEN = "A disturbance may grow in this motion; the time was up before it was seen how far it takes it."
+
+
+@pytest.mark.parametrize("quality", [Quality(target_error=0.01), Quality(time_budget=0.5)])
+def test_where_no_time_is_left_to_look_the_answer_says_so(quality: Quality, monkeypatch: pytest.MonkeyPatch):
     def late(*_: object) -> float:
         raise TimeIsUp
 
+    scene = dataclasses.replace(column(0.1, drag=1.0), quality=quality)
+    assert UNSEEN not in predict(scene).message
     monkeypatch.setattr(refinement, "goes_astray", late)
-    assert predict(dataclasses.replace(column(0.1, drag=1.0), quality=Quality(target_error=0.01))).status == "converged"
+    found = predict(scene)
+    assert found.status == "converged"
+    assert UNSEEN in found.message
+
+
+def test_a_finer_grid_may_still_look_where_a_coarse_one_had_no_time(monkeypatch: pytest.MonkeyPatch):
+    said = iter([0.5 * LENGTH, TimeIsUp, 0.0])
+
+    def astray(*_: object) -> float:
+        moved = next(said)
+        if isinstance(moved, float):
+            return moved
+        raise moved
+
+    climb = refinement._Climb(
+        problem=pose(column(0.1)), monitor=Monitor(), cost=None, target=1.0, enough=1.0, budget=1.0, number=0
+    )
+    level = march_level(climb.problem, refinement.stretched(climb.problem, 0), climb.monitor)
+    monkeypatch.setattr(refinement, "goes_astray", astray)
+    for unseen in (False, True, False):
+        climb._find_astray(level)
+        assert climb.unseen is unseen
+
+
+def test_within_a_time_budget_the_answer_tells_what_is_not_determined(monkeypatch: pytest.MonkeyPatch):
+    left: list[float] = []
+
+    def astray(problem: object, motion: object, monitor: Monitor, hard: bool) -> float:
+        left.append(monitor.remaining())
+        return 0.3 * LENGTH
+
+    monkeypatch.setattr(refinement, "goes_astray", astray)
+    found = predict(dataclasses.replace(column(0.1, drag=1.0), quality=Quality(time_budget=0.5)))
+    assert "But the scene does not determine its motion" in found.message
+    assert found.accuracy.error_parts["start"] == 0.3 * LENGTH
+    assert found.accuracy.error_estimate == pytest.approx(sum(found.accuracy.error_parts.values()))
+    assert len(left) == 1
+    assert left[0] < 0.5
+
+
+def test_a_part_of_a_solve_has_no_more_time_than_all_of_it():
+    whole = Monitor(deadline=10.0, cancelled=lambda: True)
+    assert whole.within(20.0).remaining() < 10.0
+    assert 4.0 < whole.within(5.0).remaining() <= 5.0
+    assert 4.0 < Monitor().within(5.0).remaining() <= 5.0
+    with pytest.raises(Cancelled):
+        whole.within(5.0).check()
+    with pytest.raises(TimeIsUp):
+        Monitor().within(-1.0).check()

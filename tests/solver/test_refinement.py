@@ -29,6 +29,7 @@ from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.banded import reduce_matrix
 from dlocore.problem import Problem, pose
 from dlocore.refinement import AUTO_ENOUGH
+from dlocore.review import objections
 from dlocore.solvers import ladder
 from dlocore.solvers.ladder import Level, Size, hardness, run_level
 from dlocore.solvers.march import STRONGLY_DAMPED, March
@@ -246,13 +247,6 @@ def test_a_fold_is_unfolded_with_all_the_work_that_a_target_is_worth():
     assert not is_folded(prediction.level)
 
 
-# noisy waypoints, twice, a rough table, and the jump in velocity of the last test
-
-
-# held by a direction and by a clamp, on free grids and on a given one: tips of 1e-4 of the length, which what the time
-# spline misses stretched to up to 98 times their length
-
-
 def test_a_surface_that_its_time_spline_stretches_is_told_of():
     scene = draw(28, 2367).make()
     free = replace(scene, quality=Quality(target_error=0.01 * scene.cable.length))
@@ -262,6 +256,9 @@ def test_a_surface_that_its_time_spline_stretches_is_told_of():
         assert found.level.motion.largest_strain < 0.05
         assert "the surface stretches the cable by up to" in found.message
         assert advice in found.message
+    problem = found.level.problem
+    hurried = replace(problem, scene=replace(scene, quality=Quality(time_budget=1.0)))
+    assert "allow a larger time_budget" in " ".join(objections(replace(found.level, problem=hurried)))
 
 
 def test_contact_that_a_grid_had_to_make_stiffer_begins_so_on_the_next():
