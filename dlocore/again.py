@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.determined import UNDETERMINED, UNSEEN, goes_astray, in_words, may_grow
 from dlocore.given import given_status
 from dlocore.paths import Waypoints
 from dlocore.plane import Plane
@@ -19,7 +20,7 @@ from dlocore.problem import Problem
 from dlocore.review import called_for
 from dlocore.scene import Grasp, Scene
 from dlocore.solvers.ladder import Level, distance, hardness, run_level
-from dlocore.solvers.monitor import Monitor
+from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.whole_march import MISSED_COUNTS, march_status
 
 _NOT_OF_THE_GRID = ("neglected", "iteration")  # parts of an estimate that each solve has of its own
@@ -35,18 +36,21 @@ class Again:
         level: the march.
         judged: the prediction like it whose error was estimated.
         errors: the parts of that estimate [m], None where there is none.
+        unseen: whether no time was left to see how far a disturbance takes it.
     """
 
     level: Level
     judged: Prediction
     errors: Mapping[str, float] | None
+    unseen: bool = False
 
     @property
     def said(self) -> str:
         """What to say of the estimate, in words."""
         if self.errors is None:
             return ""
-        return f" On the grid of a motion {self.level.change * 1e3:.2g} mm away, whose error was estimated."
+        away = f" On the grid of a motion {self.level.change * 1e3:.2g} mm away, whose error was estimated."
+        return away + (f" {UNSEEN}" if self.unseen else "")
 
 
 def as_solved(scene: Scene, like: Prediction) -> Scene:
@@ -100,7 +104,20 @@ def march_again(problem: Problem, like: Prediction, monitor: Monitor) -> Again |
     target = problem.scene.quality.target_error
     if target is not None and sum(errors.values()) > target:
         return f"Its estimated error of {sum(errors.values()) * 1e3:.2g} mm is above the target."
-    return Again(level, judged, errors or None)
+    astray = _astray(level, monitor) if free_knots else 0.0
+    if astray > UNDETERMINED * length:
+        return f"On the grid of one like it {in_words(problem, astray)}."
+    return Again(level, judged, errors or None, unseen=np.isnan(astray))
+
+
+def _astray(level: Level, monitor: Monitor) -> float:
+    """Return how far a start that is hardly another goes elsewhere where a disturbance may grow [m], NaN if unseen."""
+    if not may_grow(level.problem, level.motion):
+        return 0.0
+    try:
+        return goes_astray(level.problem, level.motion, monitor, hard=False)
+    except TimeIsUp:
+        return np.nan
 
 
 def _objection(problem: Problem, like: Prediction, before: Problem) -> str:

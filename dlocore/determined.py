@@ -19,6 +19,7 @@ Floats = NDArray[np.float64]
 
 DISTURBED = 1e-6  # of the length: bend of a start
 UNDETERMINED = 1e-2  # of the length: what moves by more when its start is bent so much is not determined
+UNSEEN = "A disturbance may grow in this motion; the time was up before it was seen how far it takes it."
 _GROWTH = math.log(20.0)  # of a disturbance, as looks at some states tell, from which on it is looked for how much
 _HARDLY = 1e-4  # of the length: a start that is no farther from a line is hardly bent
 _COMPARED = 1025  # states of two motions, at most

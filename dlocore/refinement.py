@@ -6,7 +6,7 @@ import numpy as np
 
 from dlocore.budget import first_level, growth
 from dlocore.cost import Cost
-from dlocore.determined import UNDETERMINED, goes_astray, in_words
+from dlocore.determined import UNDETERMINED, UNSEEN, goes_astray, in_words
 from dlocore.errors import SceneError
 from dlocore.problem import Problem
 from dlocore.progress import record_level
@@ -364,16 +364,10 @@ class _Climb:
         """Return the answer where grids agree, which is no success where its start may take it `astray`."""
         parts, astray = _parts(self.changes, level), self.astray
         if not astray:
-            return Outcome(level, "converged", f"{self._agreed(level)}{self._unseen()}", parts)
+            return Outcome(level, "converged", self._agreed(level) + (f" {UNSEEN}" if self.unseen else ""), parts)
         advice = "Make the motion slower, damp it, or hold the cable in more places."
         message = f"{self._agreed(level)} But {in_words(self.problem, astray)}. {advice}"
         return Outcome(level, "stalled", message, {**(parts or {}), "start": astray})
-
-    def _unseen(self) -> str:
-        """Return in words, to be added to others, that no time was left to see what a disturbance would do."""
-        if not self.unseen:
-            return ""
-        return " A disturbance may grow in this motion; the time was up before it was seen how far it takes it."
 
     def _agreed(self, level: Level) -> str:
         return f"Two grids agree to {level.change * 1e3:.2g} mm; {self._left_over()}."
@@ -415,7 +409,7 @@ class _Climb:
             return Outcome(level, "time_limit", f"{self.budget * 1e3:.3g} ms allow one grid, unchecked.", None)
         moved = f"the last refinement moved the surface by {level.change * 1e3:.2g} mm"
         parts, astray = _parts(self.changes, level), self._find_astray(level)
-        but = f" But {in_words(self.problem, astray)}." if astray else self._unseen()
+        but = f" But {in_words(self.problem, astray)}." if astray else f" {UNSEEN}" if self.unseen else ""
         message = f"The best grid in {self.budget * 1e3:.3g} ms; {moved}.{but}"
         if astray:
             parts = {**(parts or {}), "start": astray}

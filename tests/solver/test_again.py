@@ -16,10 +16,15 @@ from dlocore import (
     SceneError,
     Sphere,
     Straight,
+    Table,
     predict,
     predict_many,
 )
+from dlocore import again as again_module
+from dlocore.determined import UNDETERMINED, UNSEEN
+from dlocore.solvers.monitor import TimeIsUp
 from tests.solver.scenes import WEIGHTLESS, apart, cable, march, paper_scene, samples
+from tests.solver.test_determined import column
 from tests.solver.test_two_grippers import hanging
 
 AFRESH = "Solved from the beginning: "
@@ -188,3 +193,29 @@ def test_a_bad_scene_is_refused_as_ever(paper):
             replace(paper.scene, grasps=(Grasp(u=0.0), Grasp(u=1.0, path=Move(displacement=(1.0, 0, 0), duration=1)))),
             like=paper,
         )
+
+
+def pushed(shortened: float) -> Scene:
+    """Return a nearly straight rod on a table, without friction, whose ends come nearer by a part of its length."""
+    flat = column(shortened, flat=True)
+    return replace(flat, environment=replace(flat.environment, drag=1.0, table=Table()))
+
+
+def test_a_motion_like_it_that_its_scene_does_not_determine_is_no_success():
+    before = predict(pushed(-1e-4))
+    assert before.status == "converged"
+    again = predict(pushed(5e-4), like=before)
+    assert again.status == "stalled"
+    assert f"{AFRESH}On the grid of one like it the scene does not determine its motion" in again.message
+    assert again.accuracy.error_parts["start"] > UNDETERMINED
+
+
+def test_a_motion_like_it_says_so_where_no_time_is_left_to_look(monkeypatch: pytest.MonkeyPatch):
+    def late(*_: object, **__: object) -> float:
+        raise TimeIsUp
+
+    before = predict(pushed(-1e-4))
+    monkeypatch.setattr(again_module, "goes_astray", late)
+    again = predict(pushed(5e-4), like=before)
+    assert again.status == "converged"
+    assert UNSEEN in again.message

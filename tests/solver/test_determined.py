@@ -23,7 +23,7 @@ from dlocore import (
     predict,
     refinement,
 )
-from dlocore.determined import DISTURBED, UNDETERMINED, bent, goes_astray, may_grow
+from dlocore.determined import DISTURBED, UNDETERMINED, UNSEEN, bent, goes_astray, may_grow
 from dlocore.events import closed_grasps
 from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.growth import fastest_growth
@@ -284,9 +284,6 @@ def test_what_a_grid_says_is_not_forgotten_as_the_time_ends(marches: bool, monke
     answer = predict(dataclasses.replace(column(0.1, drag=1.0), quality=Quality(target_error=0.01)))
     assert answer.status == "stalled"
     assert answer.accuracy.error_parts["start"] == found[0]
-
-
-UNSEEN = "A disturbance may grow in this motion; the time was up before it was seen how far it takes it."
 
 
 @pytest.mark.parametrize("quality", [Quality(target_error=0.01), Quality(time_budget=0.5)])
