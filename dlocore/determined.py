@@ -19,6 +19,7 @@ Floats = NDArray[np.float64]
 
 DISTURBED = 1e-6  # of the length: bend of a start
 UNDETERMINED = 1e-2  # of the length: what moves by more when its start is bent so much is not determined
+DOUBTFUL = 1e-3  # of the length: what moves by more may go elsewhere when its start is bent the other way
 UNSEEN = "A disturbance may grow in this motion; the time was up before it was seen how far it takes it."
 _GROWTH = math.log(20.0)  # of a disturbance, as looks at some states tell, from which on it is looked for how much
 _HARDLY = 1e-4  # of the length: a start that is no farther from a line is hardly bent
@@ -38,11 +39,11 @@ def bent(problem: Problem, grid: Grid, seed: int) -> Floats:
 def goes_astray(problem: Problem, motion: March, monitor: Monitor, hard: bool) -> float:
     """Return how far a motion goes elsewhere when its start is bent by DISTURBED of the length [m].
 
-    It is marched once more for that, where a disturbance may grow, or where tangents can't tell: where the cable
-    strikes something, where it touches or rubs and is `hard`, needed grids beyond the first few, and where it starts so
-    nearly straight that it buckles between any two looks. Not where the start has a bow in a plane and another out of
-    it (`buckling.py`), which is no larger, and of which the answer tells. Else, and where that march finds no
-    equilibrium, it is 0.
+    It is marched once more for that, and again with the opposite bend where the first makes it `doubtful`: where a
+    disturbance may grow, or where tangents can't tell. They can't where the cable strikes something, where it touches
+    or rubs and is `hard`, needed grids beyond the first few, and where it starts so nearly straight that it buckles
+    between any two looks. Not where the start has a bow in a plane and another out of it (`buckling.py`), which is no
+    larger, and of which the answer tells. Else, and where that march finds no equilibrium, it is 0.
 
     Raises:
         Cancelled: the caller asked to stop.
@@ -52,14 +53,26 @@ def goes_astray(problem: Problem, motion: March, monitor: Monitor, hard: bool) -
     untold = motion.split or (hard and problem.touches) or _hardly_bent(problem.start)
     if bowed_twice or motion.stopped or not (untold or may_grow(problem, motion)):
         return 0.0
-    grid = motion.grid
-    start = grid.start + bent(problem, grid, seed=1)
-    other = march(problem, grid.changed(start=start), motion.asked, monitor, rho=motion.rho, whole=True)
-    if other.stopped:
-        return 0.0
+    grid, moved = motion.grid, 0.0
     at = np.unique(np.linspace(0, len(motion.states) - 1, _COMPARED).round().astype(int))
-    apart = (other.states[at] - motion.states[at])[..., : problem.plane.dimensions]
-    return float(np.linalg.norm(apart, axis=-1).max())
+    for way in (1.0, -1.0):
+        start = grid.start + way * bent(problem, grid, seed=1)
+        other = march(problem, grid.changed(start=start), motion.asked, monitor, rho=motion.rho, whole=True)
+        if other.stopped:
+            break
+        apart = (other.states[at] - motion.states[at])[..., : problem.plane.dimensions]
+        moved = max(moved, float(np.linalg.norm(apart, axis=-1).max()))
+        if not doubtful(moved / problem.scene.cable.length):
+            break
+    return moved
+
+
+def doubtful(moved: float) -> bool:
+    """Tell whether a motion that a bend of its start moves by so much of the length may go elsewhere by its opposite.
+
+    It grows by so much that it may be on its way to the same of two sides, only sooner or later.
+    """
+    return DOUBTFUL < moved <= UNDETERMINED
 
 
 def in_words(problem: Problem, moved: float) -> str:

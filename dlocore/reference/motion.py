@@ -160,8 +160,10 @@ class _Record:
         )
 
 
-def simulate(rod: Rod, tolerance: float, watch: Watch) -> Motion:
+def simulate(rod: Rod, tolerance: float, watch: Watch, bend: Floats | None = None) -> Motion:
     """Simulate a rod from its start to the horizon, each step to an estimated error of `tolerance` [m].
+
+    By `bend` (n, 3) [m] nodes that no gripper holds are displaced as it begins.
 
     Raises:
         what `watch.check` raises, but for `TimeIsUp`.
@@ -174,6 +176,8 @@ def simulate(rod: Rod, tolerance: float, watch: Watch) -> Motion:
     if problem.scene.shape.settle:
         with suppress(TimeIsUp):
             now, record.deepest = settled(rod, watch)
+    if bend is not None:
+        now = replace(now, x=now.x + bend)
     for begin, end in pairwise(events_of(problem)):
         middle = 0.5 * (begin + end)
         hold = [i for i, g in enumerate(grasps) if g.start <= middle and (g.release_time or np.inf) > middle]

@@ -7,10 +7,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.determined import DISTURBED, UNDETERMINED, doubtful
 from dlocore.events import moments
 from dlocore.problem import Problem, pose
 from dlocore.reference.motion import Motion, Watch, events_of, simulate
-from dlocore.reference.rod import build, nodes_of, solid
+from dlocore.reference.rod import Rod, build, nodes_of, solid
 from dlocore.reference.sampling import Samples, samples
 from dlocore.reference.surface import gap
 
@@ -29,6 +30,7 @@ FOURTH = 15.0  # what is left of a change by an extrapolation of the fourth orde
 DEEP = 0.02  # of the diameter: a motion that goes deeper into a surface is done again with stiffer contact
 STIFFER = (2.0, 30.0)  # at least and at most by these ratios
 STIFFEST = 1e5  # times the stiffness that bears the weight
+HELD = 0.1  # of the length: so near to what holds it a start is hardly bent
 TIMES = 129  # while a cable swings once, at which motions are compared, besides events
 
 
@@ -59,11 +61,14 @@ class Refined:
         problem: the posed scene, with the obstacles that the motion met.
         levels: the rods, by rising number of elements.
         ended: "agreed" within the target, "finest" rod, out of "time", or a "step" without solution.
+        astray: how far a start that is hardly another ends elsewhere [m], 0 where that does not matter, NaN where the
+            time was up before that was known.
     """
 
     problem: Problem
     levels: tuple[Level, ...]
     ended: Literal["agreed", "finest", "time", "step"]
+    astray: float = 0.0
 
     @property
     def estimate(self) -> float:
@@ -96,7 +101,7 @@ def refine(problem: Problem, target: float, watch: Watch, on_level: Callable[[Pr
     while len(levels) < LEVELS:
         k = len(levels)
         rod = build(problem, nodes_of(problem, ELEMENTS, k), stiffening, FIRMER**k)
-        motion = simulate(rod, STEP * target * 0.25**k, watch)
+        motion = simulate(rod, _tolerance(target, k), watch)
         if motion.stopped == "time" and levels:
             return Refined(problem, tuple(levels), "time")
         if motion.stopped == "step" and levels:
@@ -115,9 +120,53 @@ def refine(problem: Problem, target: float, watch: Watch, on_level: Callable[[Pr
             ended = motion.stopped
             break
         if len(levels) >= LEAST and levels[-1].estimate <= target:
-            ended = "agreed"
-            break
+            return Refined(problem, tuple(levels), "agreed", goes_astray(levels, target, watch))
     return Refined(problem, tuple(levels), ended)
+
+
+def goes_astray(levels: list[Level], target: float, watch: Watch) -> float:
+    """Return how far a start that is bent by DISTURBED of the length ends elsewhere [m], see `Refined.astray`.
+
+    The last rod but one is asked, and where it ends more than UNDETERMINED of the length elsewhere the last one, too.
+    """
+    moved, length = 0.0, levels[-1].motion.rod.problem.scene.cable.length
+    for k in (len(levels) - 2, len(levels) - 1):
+        taken, rod, moved = levels[k].taken, levels[k].motion.rod, 0.0
+        t = np.linspace(0.0, rod.problem.horizon, moments(rod.problem.scene, TIMES))
+        for way in (1.0, -1.0):
+            other = simulate(rod, _tolerance(target, k), watch, way * bend_of(rod))
+            if other.stopped:
+                return np.nan if other.stopped == "time" else 0.0
+            moved = max(moved, _farthest(samples(other).positions(t), taken.positions(t)))
+            if not doubtful(moved / length):
+                break
+        if moved <= UNDETERMINED * length:
+            return 0.0
+    return moved
+
+
+def bend_of(rod: Rod) -> Floats:
+    """Return displacements (n, 3) [m] across a rod, in some half waves of up to DISTURBED of its length.
+
+    They vanish at what holds it at t = 0.
+    """
+    scene, u = rod.problem.scene, rod.u[:, None]
+    length = scene.cable.length
+    waves = np.sin(np.pi * u / length * [1.0, 2.0, 3.0]) @ np.random.default_rng(1).normal(size=(3, 3))
+    for g in scene.grasps:
+        if g.start == 0.0:
+            waves *= 1.0 - np.exp(-(((u - g.u) / (HELD * length)) ** 2))
+    if rod.planar:
+        waves[:, 2] = 0.0
+    along = np.gradient(rod.start.x, rod.u, axis=0)
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
+    across = waves - (waves * along).sum(axis=1, keepdims=True) * along
+    return np.asarray(DISTURBED * length / np.linalg.norm(across, axis=1).max() * across)
+
+
+def _tolerance(target: float, k: int) -> float:
+    """Return the error [m] of each step of the rod `k`."""
+    return STEP * target * 0.25**k
 
 
 def _compared(problem: Problem, levels: list[Level], motion: Motion) -> Level:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.buckling import side_notes
+from dlocore.determined import UNSEEN, in_words
 from dlocore.errors import SceneError
 from dlocore.events import closed_grasps
 from dlocore.prediction import Accuracy, EffectReport, GraspReaction, Iteration, Prediction, Status
@@ -159,7 +160,7 @@ def _elastic_energy(level: Level, k: int) -> float:
 def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) -> Prediction:
     problem, last = refined.problem, refined.levels[-1]
     motion = last.motion
-    estimate = refined.estimate + fitted.missed
+    estimate = sum(_parts(refined, fitted).values())
     status, message = _status(refined, target)
     control = fitted.surface.control_points
     return Prediction(
@@ -171,7 +172,7 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
         accuracy=Accuracy(
             method="reference",
             error_estimate=estimate if np.isfinite(estimate) else None,
-            error_parts={"grid": refined.estimate, "time": fitted.missed} if np.isfinite(estimate) else {},
+            error_parts=_parts(refined, fitted) if np.isfinite(estimate) else {},
             neglected=0.0,
             wall_time=monitor.elapsed(),
             n_u=control.shape[1],
@@ -194,6 +195,12 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
     )
 
 
+def _parts(refined: Refined, fitted: Fit) -> dict[str, float]:
+    """Return the parts of the error [m]."""
+    parts = {"grid": refined.estimate, "time": fitted.missed}
+    return {**parts, "start": refined.astray} if refined.astray > 0.0 else parts
+
+
 def _status(refined: Refined, target: float) -> tuple[Status, str]:
     last = refined.levels[-1]
     motion = last.motion
@@ -207,7 +214,9 @@ def _status(refined: Refined, target: float) -> tuple[Status, str]:
         agreed = (
             f"Rods of up to {count} elements agree to {refined.estimate * 1e3:.2g} mm, target {target * 1e3:.2g} mm."
         )
-        return "converged", agreed
+        if refined.astray > 0.0:
+            return "stalled", f"{agreed} But {in_words(refined.problem, refined.astray)}."
+        return "converged", agreed + (f" {UNSEEN}" if np.isnan(refined.astray) else "")
     if refined.ended == "time":
         return "time_limit", f"The time limit passed; {moved}. Allow more time or a larger target_error."
     if refined.ended == "step":

@@ -3,16 +3,24 @@
 import ast
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import dlocore.reference
 from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, SceneError, Straight, Table, predict
+from dlocore.determined import DISTURBED, UNDETERMINED, UNSEEN
 from dlocore.errors import Cancelled
+from dlocore.problem import pose
+from dlocore.reference import refine
+from dlocore.reference.motion import Motion, Watch
 from dlocore.reference.refine import left
+from dlocore.reference.rod import Rod, build
 from dlocore.reference.solve import converged
+from dlocore.solvers.monitor import Monitor
 from tests.reference.rods import cable
+from tests.solver.test_again import pushed as pushed_along_itself
 
 GRASP = Grasp(u=0.25, path=Move(displacement=(0.0, 0.3, 0.0), duration=0.8))
 SCENE = Scene(
@@ -183,3 +191,69 @@ def test_contact_is_stiffened_until_the_table_is_hardly_entered():
     )
     prediction = predict(scene)
     assert prediction.surface.positions(np.linspace(0, 1, 41), np.linspace(0, 0.15, 41))[..., 2].min() > -0.1 * 0.005
+
+
+@pytest.fixture(scope="module")
+def pushed() -> Scene:
+    """A nearly straight rod on a table that is pushed along itself: a micrometre decides to which side it buckles."""
+    scene = pushed_along_itself(1e-3)
+    return replace(scene, quality=Quality(method="reference", target_error=1e-2))
+
+
+def test_a_scene_that_does_not_determine_its_motion_is_no_success(pushed: Scene):
+    found = predict(pushed)
+    assert found.status == "stalled"
+    assert "But the scene does not determine its motion: a start bent by a millionth of the length" in found.message
+    assert found.accuracy.error_parts["start"] > UNDETERMINED
+    assert found.accuracy.error_estimate == pytest.approx(sum(found.accuracy.error_parts.values()))
+
+
+def test_where_no_time_is_left_to_see_that_the_answer_says_so(pushed: Scene, monkeypatch: pytest.MonkeyPatch):
+    plain = refine.simulate
+
+    def late(rod: Rod, tolerance: float, watch: Watch, bend: Any = None) -> Motion:
+        motion = plain(rod, tolerance, watch)
+        return motion if bend is None else replace(motion, stopped="time")
+
+    monkeypatch.setattr(refine, "simulate", late)
+    found = predict(pushed)
+    assert found.status == "converged"
+    assert UNSEEN in found.message
+    assert "start" not in found.accuracy.error_parts
+
+
+@pytest.mark.parametrize(
+    ("moves", "ways", "moved"),
+    [
+        ((0.0005,), "+", 0.0),
+        ((0.005, 0.005), "+-", 0.0),
+        ((0.5, 0.5), "++", 0.5),
+        ((0.005, 0.5, 0.005, 0.5), "+-+-", 0.5),
+        ((0.5, 0.005, 0.005), "++-", 0.0),
+    ],
+)
+def test_it_is_bent_the_other_way_where_the_first_is_in_doubt_and_the_finest_rod_decides(
+    moves: tuple[float, ...], ways: str, moved: float, pushed: Scene, monkeypatch: pytest.MonkeyPatch
+):
+    levels = refine.refine(pose(replace(pushed, horizon=0.1)), 1.0, Monitor(), lambda problem, level: None).levels
+    left, seen = list(moves), ""
+
+    def bent(rod: Rod, tolerance: float, watch: Watch, bend: Any) -> Motion:
+        nonlocal seen
+        motion = next(level.motion for level in levels if level.motion.rod is rod)
+        seen += "+" if np.array_equal(bend, refine.bend_of(rod)) else "-"
+        away = np.array([0.0, left.pop(0), 0.0])
+        return replace(motion, states=tuple(replace(s, x=s.x + away) for s in motion.states))
+
+    monkeypatch.setattr(refine, "simulate", bent)
+    assert refine.goes_astray(list(levels), 1.0, Monitor()) == pytest.approx(moved)
+    assert seen == ways
+
+
+def test_a_bend_of_the_start_leaves_what_holds_it(pushed: Scene):
+    rod = build(pose(pushed), np.linspace(0.0, 1.0, 21))
+    bend = refine.bend_of(rod)
+    assert np.linalg.norm(bend, axis=1).max() == pytest.approx(DISTURBED)
+    assert not bend[[0, -1]].any()
+    assert not bend[:, 2].any()
+    assert np.abs(bend[:, 0]).max() < 1e-10

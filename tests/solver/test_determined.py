@@ -25,10 +25,11 @@ from dlocore import (
 )
 from dlocore.determined import DISTURBED, UNDETERMINED, UNSEEN, bent, goes_astray, may_grow
 from dlocore.events import closed_grasps
+from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
 from dlocore.kernels.growth import fastest_growth
 from dlocore.problem import pose
-from dlocore.solvers.march import march
+from dlocore.solvers.march import March, march
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.statics import start_grid
 from dlocore.whole_march import march_level
@@ -121,6 +122,29 @@ def test_a_motion_that_is_pulled_straight_is_not_looked_at_again(monkeypatch: py
     assert not may_grow(answer.level.problem, answer.level.motion)
     monkeypatch.setattr(determined, "march", None)  # none is needed
     assert goes_astray(answer.level.problem, answer.level.motion, Monitor(None, None), hard=True) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("moves", "moved"),
+    [((0.0005,), 0.0005), ((0.005, 0.002), 0.005), ((0.005, 0.5), 0.5), ((0.5,), 0.5)],
+)
+def test_where_a_bend_leaves_it_in_doubt_the_opposite_one_is_tried(
+    moves: tuple[float, ...], moved: float, monkeypatch: pytest.MonkeyPatch
+):
+    answer = predict(dataclasses.replace(column(-1e-4), environment=Environment(drag=1.0)))
+    assert answer.level is not None
+    problem, motion = answer.level.problem, answer.level.motion
+    left, bends = list(moves), []
+
+    def bent_motion(problem: object, grid: Grid, *_: object, **__: object) -> March:
+        bends.append(grid.start - motion.grid.start)
+        return dataclasses.replace(motion, states=motion.states + np.array([0.0, left.pop(0), 0.0, 0.0]))
+
+    monkeypatch.setattr(determined, "may_grow", lambda *_: True)
+    monkeypatch.setattr(determined, "march", bent_motion)
+    assert goes_astray(problem, motion, Monitor(), hard=False) == pytest.approx(moved)
+    assert not left
+    np.testing.assert_allclose(bends[-1], bends[0] * (-1.0) ** (len(bends) - 1), atol=1e-15)
 
 
 def drawn_over_a_table(friction: float) -> Scene:
@@ -286,15 +310,30 @@ def test_what_a_grid_says_is_not_forgotten_as_the_time_ends(marches: bool, monke
     assert answer.accuracy.error_parts["start"] == found[0]
 
 
-@pytest.mark.parametrize("quality", [Quality(target_error=0.01), Quality(time_budget=0.5)])
-def test_where_no_time_is_left_to_look_the_answer_says_so(quality: Quality, monkeypatch: pytest.MonkeyPatch):
-    def late(*_: object) -> float:
-        raise TimeIsUp
+@pytest.fixture
+def hurried(monkeypatch: pytest.MonkeyPatch) -> Scene:
+    """A scene with a time budget that two grids use up, however fast the machine is."""
+    monkeypatch.setattr(refinement._Climb, "_in_time", lambda climb, *_: climb.estimate == np.inf)
+    return dataclasses.replace(column(0.1, drag=1.0), quality=Quality(time_budget=600.0))
 
-    scene = dataclasses.replace(column(0.1, drag=1.0), quality=quality)
+
+def late(*_: object) -> float:
+    raise TimeIsUp
+
+
+def test_where_no_time_is_left_to_look_the_answer_says_so(monkeypatch: pytest.MonkeyPatch):
+    scene = dataclasses.replace(column(0.1, drag=1.0), quality=Quality(target_error=0.01))
     assert UNSEEN not in predict(scene).message
     monkeypatch.setattr(refinement, "goes_astray", late)
     found = predict(scene)
+    assert found.status == "converged"
+    assert UNSEEN in found.message
+
+
+def test_where_no_time_is_left_of_a_budget_the_answer_says_so(hurried: Scene, monkeypatch: pytest.MonkeyPatch):
+    assert UNSEEN not in predict(hurried).message
+    monkeypatch.setattr(refinement, "goes_astray", late)
+    found = predict(hurried)
     assert found.status == "converged"
     assert UNSEEN in found.message
 
@@ -318,7 +357,7 @@ def test_a_finer_grid_may_still_look_where_a_coarse_one_had_no_time(monkeypatch:
         assert climb.unseen is unseen
 
 
-def test_within_a_time_budget_the_answer_tells_what_is_not_determined(monkeypatch: pytest.MonkeyPatch):
+def test_within_a_time_budget_the_answer_tells_what_is_not_determined(hurried: Scene, monkeypatch: pytest.MonkeyPatch):
     left: list[float] = []
 
     def astray(problem: object, motion: object, monitor: Monitor, hard: bool) -> float:
@@ -326,12 +365,12 @@ def test_within_a_time_budget_the_answer_tells_what_is_not_determined(monkeypatc
         return 0.3 * LENGTH
 
     monkeypatch.setattr(refinement, "goes_astray", astray)
-    found = predict(dataclasses.replace(column(0.1, drag=1.0), quality=Quality(time_budget=0.5)))
+    found = predict(hurried)
     assert "But the scene does not determine its motion" in found.message
     assert found.accuracy.error_parts["start"] == 0.3 * LENGTH
     assert found.accuracy.error_estimate == pytest.approx(sum(found.accuracy.error_parts.values()))
     assert len(left) == 1
-    assert left[0] < 0.5
+    assert left[0] < 600.0
 
 
 def test_a_part_of_a_solve_has_no_more_time_than_all_of_it():
