@@ -12,7 +12,7 @@ from benchmarks.hard.generator import Drawn
 from benchmarks.hard.laws import measure
 from benchmarks.hard.taut import words_if_too_short
 from dlocore import Prediction, Scene, SceneError, predict
-from dlocore.determined import DISTURBED, bent
+from dlocore.determined import DISTURBED, UNSEEN, bent
 from dlocore.discretisation import smallest_n_u
 from dlocore.driven import driven, words
 from dlocore.events import moments
@@ -32,7 +32,7 @@ HELD = 1e-9  # [m]
 ASTRAY = 1e-4  # of the length: of a gripper's path by the time spline, between the ends
 GAINED = 0.02  # of the energy that was about
 LOST = 0.05  # of the impulses that were about
-OPEN = ("does not determine its motion", "mirror image")  # words of an answer that is one of several
+OPEN = ("does not determine its motion", "mirror image", UNSEEN)  # words of an answer that may be one of several
 MIDWAY = (0.25, 0.5, 0.75)  # of the time of a motion
 
 DRIVEN = "impossible: a gripper drives what it holds into something"
