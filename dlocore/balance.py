@@ -13,7 +13,7 @@ from dlocore.prediction import MaterialMotion
 from dlocore.problem import Problem
 from dlocore.scene import Scene
 from dlocore.sideways import pose_as_shown
-from dlocore.spline import SplineSurface, design_matrix
+from dlocore.spline import SplineSurface
 
 Floats = NDArray[np.float64]
 
@@ -104,9 +104,7 @@ def _motion(
     problem = pose_as_shown(scene, shown, surface.control_points)
     grid = grid_on(problem, surface.knots_u)
     at = np.clip(np.atleast_1d(np.asarray(times, dtype=float)), 0.0, surface.horizon)
-    moved = [
-        np.tensordot(design_matrix(surface.knots_t, at, order), surface.control_points, axes=1) for order in range(3)
-    ]
+    moved = [surface.states(at, order) for order in range(3)]
     states = problem.coordinates(moved[0][..., :3], moved[0][..., 3])
     rates, accelerations = (problem.rates(x[..., :3], x[..., 3]) for x in moved[1:])
     histories = [grid.past() for _ in at]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dlocore.errors import number
 from dlocore.scene import ControlPoints, Material, Scene
-from dlocore.spline import SplineSurface, design_matrix
+from dlocore.spline import SplineSurface
 
 if TYPE_CHECKING:
     from dlocore.solvers.ladder import Level
@@ -257,8 +257,7 @@ def continued(surface: SplineSurface, material: MaterialMotion | None, t: float 
         SceneError: `t` is outside the predicted time.
     """
     at = surface.horizon if t is None else number("t", t, at_least=0.0, at_most=surface.horizon, unit="s")
-    over = [design_matrix(surface.knots_t, [at], order)[0] for order in (0, 1)]
-    control, velocity = (np.tensordot(row, surface.control_points, axes=1) for row in over)
+    control, velocity = (surface.states(at, order)[0] for order in (0, 1))
     return ControlPoints(
         control_points=control,
         knots=surface.knots_u,

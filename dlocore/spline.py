@@ -31,6 +31,13 @@ def design_matrix(knots: Floats, x: ArrayLike, derivative: int = 0) -> Floats:
     return BSpline(knots, np.eye(n), DEGREE)(np.asarray(x, dtype=float), derivative)
 
 
+def spline_at(knots: Floats, control_points: Floats, x: ArrayLike, derivative: int = 0) -> Floats:
+    """Return the spline with control points (n, ...), or a derivative of it, at the points `x` (k,); (k, ...)."""
+    from scipy.interpolate import BSpline
+
+    return np.asarray(BSpline(knots, control_points, DEGREE)(np.asarray(x, dtype=float), derivative))
+
+
 @dataclass(frozen=True, eq=False)
 class SplineSurface:
     """A predicted space-time surface.
@@ -67,13 +74,14 @@ class SplineSurface:
         Returns:
             (k_t, k_u, 4) [m, m, m, rad], per m^du s^dt.
         """
-        return np.asarray(design_matrix(self.knots_u, np.atleast_1d(u), du) @ self.states(t, dt))
+        over, t = design_matrix(self.knots_u, np.atleast_1d(u), du), np.atleast_1d(t)
+        if len(t) < len(self.control_points):
+            return np.asarray(over @ self.states(t, dt))
+        return spline_at(self.knots_t, over @ self.control_points, t, dt)
 
     def states(self, t: ArrayLike, dt: int = 0) -> Floats:
         """Return the control points of the spatial spline, or their derivatives, at times `t` (k,) [s]; (k, n_u, 4)."""
-        n_t, n_u, columns = self.control_points.shape
-        over = design_matrix(self.knots_t, np.atleast_1d(t), dt)
-        return (over @ self.control_points.reshape(n_t, n_u * columns)).reshape(-1, n_u, columns)
+        return spline_at(self.knots_t, self.control_points, np.atleast_1d(t), dt)
 
     def positions(self, u: ArrayLike, t: ArrayLike) -> Floats:
         """Return r on the grid of `t` and `u`; (k_t, k_u, 3) [m]."""
