@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.buckling import side_notes
-from dlocore.determined import UNSEEN, in_words
+from dlocore.determined import in_words
 from dlocore.errors import SceneError
 from dlocore.events import closed_grasps
 from dlocore.prediction import Accuracy, EffectReport, GraspReaction, Iteration, Prediction, Status
@@ -27,6 +27,7 @@ Floats = NDArray[np.float64]
 
 TARGET = 1e-3  # of the length, where no target error is asked for
 FITTED = 0.05  # of the target: by how much the spline may miss the rods
+UNSEEN = "The time was up before it was seen whether the scene determines its motion."
 
 
 @dataclass(frozen=True, eq=False)

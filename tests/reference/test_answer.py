@@ -10,14 +10,14 @@ import pytest
 
 import dlocore.reference
 from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, SceneError, Straight, Table, predict
-from dlocore.determined import DISTURBED, UNDETERMINED, UNSEEN
+from dlocore.determined import DISTURBED, UNDETERMINED
 from dlocore.errors import Cancelled
 from dlocore.problem import pose
 from dlocore.reference import refine
 from dlocore.reference.motion import Motion, Watch
 from dlocore.reference.refine import left
 from dlocore.reference.rod import Rod, build
-from dlocore.reference.solve import converged
+from dlocore.reference.solve import UNSEEN, converged
 from dlocore.solvers.monitor import Monitor
 from tests.reference.rods import cable
 from tests.solver.test_again import pushed as pushed_along_itself
