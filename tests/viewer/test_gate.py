@@ -4,12 +4,12 @@ import time
 
 import httpx
 import pytest
-from conftest import MOST_SCENES
 from protocol_client import SUBPROTOCOL, SceneClient, connected
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from app.viewer.examples import example_names
+from tests.viewer.conftest import MOST_SCENES
 
 
 def test_a_foreign_origin_is_refused(service):
