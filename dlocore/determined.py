@@ -1,6 +1,7 @@
 """Whether a scene determines its motion: a start that is known to a millionth of the length may end anywhere."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,8 +40,8 @@ def bent(problem: Problem, grid: Grid, seed: int) -> Floats:
 def goes_astray(problem: Problem, motion: March, monitor: Monitor, hard: bool) -> float:
     """Return how far a motion goes elsewhere when its start is bent by DISTURBED of the length [m].
 
-    It is marched once more for that, and again with the opposite bend where the first makes it `doubtful`: where a
-    disturbance may grow, or where tangents can't tell. They can't where the cable strikes something, where it touches
+    It is marched once more for that, and again with the opposite bend where that leaves it in doubt (`farther`): where
+    a disturbance may grow, or where tangents can't tell. They can't where the cable strikes something, where it touches
     or rubs and is `hard`, needed grids beyond the first few, and where it starts so nearly straight that it buckles
     between any two looks. Not where the start has a bow in a plane and another out of it (`buckling.py`), which is no
     larger, and of which the answer tells. Else, and where that march finds no equilibrium, it is 0.
@@ -53,26 +54,28 @@ def goes_astray(problem: Problem, motion: March, monitor: Monitor, hard: bool) -
     untold = motion.split or (hard and problem.touches) or _hardly_bent(problem.start)
     if bowed_twice or motion.stopped or not (untold or may_grow(problem, motion)):
         return 0.0
-    grid, moved = motion.grid, 0.0
+    grid, bend = motion.grid, bent(problem, motion.grid, seed=1)
     at = np.unique(np.linspace(0, len(motion.states) - 1, _COMPARED).round().astype(int))
-    for way in (1.0, -1.0):
-        start = grid.start + way * bent(problem, grid, seed=1)
+
+    def moved(way: float) -> float:
+        start = grid.start + way * bend
         other = march(problem, grid.changed(start=start), motion.asked, monitor, rho=motion.rho, whole=True)
         if other.stopped:
-            break
+            return 0.0
         apart = (other.states[at] - motion.states[at])[..., : problem.plane.dimensions]
-        moved = max(moved, float(np.linalg.norm(apart, axis=-1).max()))
-        if not doubtful(moved / problem.scene.cable.length):
-            break
-    return moved
+        return float(np.linalg.norm(apart, axis=-1).max())
+
+    return farther(moved, problem.scene.cable.length)
 
 
-def doubtful(moved: float) -> bool:
-    """Tell whether a motion that a bend of its start moves by so much of the length may go elsewhere by its opposite.
+def farther(moved: Callable[[float], float], length: float) -> float:
+    """Return by how much a bend of a start, moved(1.0), or its opposite, moved(-1.0), moves a motion [m].
 
-    It grows by so much that it may be on its way to the same of two sides, only sooner or later.
+    The opposite is asked where the first leaves it in doubt: what grows by more than DOUBTFUL may have gone to the same
+    of two sides, only sooner or later.
     """
-    return DOUBTFUL < moved <= UNDETERMINED
+    first = moved(1.0)
+    return max(first, moved(-1.0)) if DOUBTFUL * length < first <= UNDETERMINED * length else first
 
 
 def in_words(problem: Problem, moved: float) -> str:

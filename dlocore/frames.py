@@ -17,7 +17,7 @@ from dlocore.kernels.timefit import fit_time
 from dlocore.kernels.twisted import twist_rates
 from dlocore.prediction import MaterialMotion
 from dlocore.problem import Problem
-from dlocore.spline import DEGREE, SplineSurface, spline_at
+from dlocore.spline import DEGREE, SplineSurface
 from dlocore.transport import transported
 
 Floats = NDArray[np.float64]
@@ -81,7 +81,7 @@ def free_control(problem: Problem, grid: Grid, knots_t: Floats, control: Floats,
         differ = theta - states[:, :, 3]
         k = np.searchsorted(times, starved) - 1
         share = ((starved - times[k]) / (times[k + 1] - times[k]))[:, None]
-        own = spline_at(knots_t, control[:, :, 3], starved)
+        own = spline_values(knots_t, np.ascontiguousarray(control[:, :, 3]), starved, 0)
         theta = np.insert(theta, k + 1, own + (1.0 - share) * differ[k] + share * differ[k + 1], axis=0)
         times = np.insert(times, k + 1, starved)
     rate = 3.0 * (control[1, :, 3] - control[0, :, 3]) / (knots_t[4] - knots_t[1])

@@ -362,12 +362,18 @@ class _Climb:
 
     def _agreeing(self, level: Level) -> Outcome:
         """Return the answer where grids agree, which is no success where its start may take it `astray`."""
-        parts, astray = _parts(self.changes, level), self.astray
-        if not astray:
-            return Outcome(level, "converged", self._agreed(level) + (f" {UNSEEN}" if self.unseen else ""), parts)
+        message, parts = self._doubted(level, self._agreed(level))
+        if not self.astray:
+            return Outcome(level, "converged", message, parts)
         advice = "Make the motion slower, damp it, or hold the cable in more places."
-        message = f"{self._agreed(level)} But {in_words(self.problem, astray)}. {advice}"
-        return Outcome(level, "stalled", message, {**(parts or {}), "start": astray})
+        return Outcome(level, "stalled", f"{message} {advice}", parts)
+
+    def _doubted(self, level: Level, message: str) -> tuple[str, dict[str, float] | None]:
+        """Return a message and the parts of the error [m], with what is known of where its start may take a motion."""
+        parts = _parts(self.changes, level)
+        if self.astray:
+            return f"{message} But {in_words(self.problem, self.astray)}.", {**(parts or {}), "start": self.astray}
+        return message + (f" {UNSEEN}" if self.unseen else ""), parts
 
     def _agreed(self, level: Level) -> str:
         return f"Two grids agree to {level.change * 1e3:.2g} mm; {self._left_over()}."
@@ -408,11 +414,8 @@ class _Climb:
         if not np.isfinite(level.change):
             return Outcome(level, "time_limit", f"{self.budget * 1e3:.3g} ms allow one grid, unchecked.", None)
         moved = f"the last refinement moved the surface by {level.change * 1e3:.2g} mm"
-        parts, astray = _parts(self.changes, level), self._find_astray(level)
-        but = f" But {in_words(self.problem, astray)}." if astray else f" {UNSEEN}" if self.unseen else ""
-        message = f"The best grid in {self.budget * 1e3:.3g} ms; {moved}.{but}"
-        if astray:
-            parts = {**(parts or {}), "start": astray}
+        self.astray = self._find_astray(level)
+        message, parts = self._doubted(level, f"The best grid in {self.budget * 1e3:.3g} ms; {moved}.")
         return Outcome(level, march_status(self.problem, level)[0], message, parts)
 
     def _unfinished(self, level: Level, best: Level) -> Outcome:

@@ -25,15 +25,12 @@ def greville(knots: Floats) -> Floats:
 
 def design_matrix(knots: Floats, x: ArrayLike, derivative: int = 0) -> Floats:
     """Return the basis functions, or a derivative of them, at the points `x`; (len(x), n) [1/unit^derivative]."""
-    from scipy.interpolate import BSpline  # slow to import, and not needed to make a scene
-
-    n = len(knots) - DEGREE - 1
-    return BSpline(knots, np.eye(n), DEGREE)(np.asarray(x, dtype=float), derivative)
+    return spline_at(knots, np.eye(len(knots) - DEGREE - 1), x, derivative)
 
 
 def spline_at(knots: Floats, control_points: Floats, x: ArrayLike, derivative: int = 0) -> Floats:
     """Return the spline with control points (n, ...), or a derivative of it, at the points `x` (k,); (k, ...)."""
-    from scipy.interpolate import BSpline
+    from scipy.interpolate import BSpline  # slow to import, and not needed to make a scene
 
     return np.asarray(BSpline(knots, control_points, DEGREE)(np.asarray(x, dtype=float), derivative))
 

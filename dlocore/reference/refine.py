@@ -2,18 +2,20 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.determined import DISTURBED, UNDETERMINED, doubtful
+from dlocore.determined import DISTURBED, UNDETERMINED, farther
 from dlocore.events import moments
 from dlocore.problem import Problem, pose
 from dlocore.reference.motion import Motion, Watch, events_of, simulate
 from dlocore.reference.rod import Rod, build, nodes_of, solid
 from dlocore.reference.sampling import Samples, samples
 from dlocore.reference.surface import gap
+from dlocore.solvers.monitor import TimeIsUp
 
 Floats = NDArray[np.float64]
 
@@ -61,8 +63,8 @@ class Refined:
         problem: the posed scene, with the obstacles that the motion met.
         levels: the rods, by rising number of elements.
         ended: "agreed" within the target, "finest" rod, out of "time", or a "step" without solution.
-        astray: how far a start that is hardly another ends elsewhere [m], 0 where that does not matter, NaN where the
-            time was up before that was known.
+        astray: how far a start that is hardly another ends elsewhere [m], 0 where that does not matter or was not asked
+            (`goes_astray`), NaN where the time was up before that was known.
     """
 
     problem: Problem
@@ -120,29 +122,39 @@ def refine(problem: Problem, target: float, watch: Watch, on_level: Callable[[Pr
             ended = motion.stopped
             break
         if len(levels) >= LEAST and levels[-1].estimate <= target:
-            return Refined(problem, tuple(levels), "agreed", goes_astray(levels, target, watch))
+            ended = "agreed"
+            break
     return Refined(problem, tuple(levels), ended)
 
 
-def goes_astray(levels: list[Level], target: float, watch: Watch) -> float:
+def goes_astray(refined: Refined, target: float, watch: Watch) -> float:
     """Return how far a start that is bent by DISTURBED of the length ends elsewhere [m], see `Refined.astray`.
 
-    The last rod but one is asked, and where it ends more than UNDETERMINED of the length elsewhere the last one, too.
+    Where rods agree the last but one is asked, and where it ends more than UNDETERMINED of the length elsewhere the
+    last one, too.
     """
-    moved, length = 0.0, levels[-1].motion.rod.problem.scene.cable.length
-    for k in (len(levels) - 2, len(levels) - 1):
-        taken, rod, moved = levels[k].taken, levels[k].motion.rod, 0.0
-        t = np.linspace(0.0, rod.problem.horizon, moments(rod.problem.scene, TIMES))
-        for way in (1.0, -1.0):
-            other = simulate(rod, _tolerance(target, k), watch, way * bend_of(rod))
-            if other.stopped:
-                return np.nan if other.stopped == "time" else 0.0
-            moved = max(moved, _farthest(samples(other).positions(t), taken.positions(t)))
-            if not doubtful(moved / length):
-                break
+    moved, length = 0.0, refined.problem.scene.cable.length
+    t = np.linspace(0.0, refined.problem.horizon, moments(refined.problem.scene, TIMES))
+    for k in (len(refined.levels) - 2, len(refined.levels) - 1) if refined.ended == "agreed" else ():
+        try:
+            moved = farther(partial(_moved, refined.levels[k], _tolerance(target, k), watch, t), length)
+        except TimeIsUp:
+            return np.nan
         if moved <= UNDETERMINED * length:
             return 0.0
     return moved
+
+
+def _moved(level: Level, tolerance: float, watch: Watch, t: Floats, way: float) -> float:
+    """Return how far a bend of its start, times `way`, moves a rod at times t (m,) [s] [m]; 0 where no step tells.
+
+    Raises:
+        TimeIsUp: the deadline passed.
+    """
+    other = simulate(level.motion.rod, tolerance, watch, way * bend_of(level.motion.rod))
+    if other.stopped == "time":
+        raise TimeIsUp
+    return 0.0 if other.stopped else _farthest(samples(other).positions(t), level.taken.positions(t))
 
 
 def bend_of(rod: Rod) -> Floats:

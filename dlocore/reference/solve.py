@@ -15,7 +15,7 @@ from dlocore.problem import Problem, pose
 from dlocore.reference.chain import chain, grip
 from dlocore.reference.energy import energies
 from dlocore.reference.fit import LEAST_TIMES, MOST_TIMES, Fit, fit
-from dlocore.reference.refine import Level, Refined, refine
+from dlocore.reference.refine import Level, Refined, goes_astray, refine
 from dlocore.reference.sampling import between, material_of
 from dlocore.reference.strands import refuse_meeting
 from dlocore.scene import Scene
@@ -125,6 +125,7 @@ def reference(problem: Problem, monitor: Monitor) -> Prediction:
 
     refined = refine(problem, target, monitor, on_level)
     refuse_meeting(refined)
+    refined = replace(refined, astray=goes_astray(refined, target, monitor))
     monitor.phase("simulation")
     fitted = _surface(refined.problem, refined, FITTED * target)
     monitor.phase("fit")

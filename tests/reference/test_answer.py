@@ -235,18 +235,18 @@ def test_where_no_time_is_left_to_see_that_the_answer_says_so(pushed: Scene, mon
 def test_it_is_bent_the_other_way_where_the_first_is_in_doubt_and_the_finest_rod_decides(
     moves: tuple[float, ...], ways: str, moved: float, pushed: Scene, monkeypatch: pytest.MonkeyPatch
 ):
-    levels = refine.refine(pose(replace(pushed, horizon=0.1)), 1.0, Monitor(), lambda problem, level: None).levels
+    refined = refine.refine(pose(replace(pushed, horizon=0.1)), 1.0, Monitor(), lambda problem, level: None)
     left, seen = list(moves), ""
 
     def bent(rod: Rod, tolerance: float, watch: Watch, bend: Any) -> Motion:
         nonlocal seen
-        motion = next(level.motion for level in levels if level.motion.rod is rod)
+        motion = next(level.motion for level in refined.levels if level.motion.rod is rod)
         seen += "+" if np.array_equal(bend, refine.bend_of(rod)) else "-"
         away = np.array([0.0, left.pop(0), 0.0])
         return replace(motion, states=tuple(replace(s, x=s.x + away) for s in motion.states))
 
     monkeypatch.setattr(refine, "simulate", bent)
-    assert refine.goes_astray(list(levels), 1.0, Monitor()) == pytest.approx(moved)
+    assert refine.goes_astray(refined, 1.0, Monitor()) == pytest.approx(moved)
     assert seen == ways
 
 
