@@ -32,10 +32,11 @@ RUNS = 100
 WRITERS = 8
 CAP = 30  # runs that the store keeps, well below what is written before a kill
 KILLS = 4
-MOST_KILLS = 60  # until one comes while a run is being written: on a fast machine that is seldom
-# Saves one prediction over and over, on threads, and says the id of every run that is kept.
+MOST_KILLS = 60  # until one comes while a run is being written
+# Predicts once; then, for every file that it is told of, a process of its own saves that prediction over and over, on
+# threads, and notes the id of every run that is kept.
 WRITER = """
-import json, sys, threading
+import json, os, sys, threading
 from pathlib import Path
 from app.runs import RunStore
 from app.schemas import PredictionRequest, to_scene
@@ -44,17 +45,25 @@ from dlocore import predict
 
 scene = json.loads(sys.argv[2])
 prediction = predict(to_scene(PredictionRequest.model_validate(scene), lambda id: None))
-store = RunStore(Settings(data_dir=Path(sys.argv[1]), max_runs=int(sys.argv[3])))
 
-def write():
+def write(store, notes):
     while True:
         id = store.save(scene, prediction)
-        print(id + chr(10), end='', flush=True)  # in one piece, whatever other threads print
+        os.write(notes, (id + chr(10)).encode())  # in one piece, whatever other threads write
         store.recording(id)
 
 print("ready", flush=True)
-for _ in range(4):
-    threading.Thread(target=write).start()
+for name in sys.stdin:
+    child = os.fork()
+    if not child:
+        notes = os.open(name.strip(), os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+        store = RunStore(Settings(data_dir=Path(sys.argv[1]), max_runs=int(sys.argv[3])))
+        for _ in range(4):
+            threading.Thread(target=write, args=(store, notes)).start()
+        threading.Event().wait()
+    print(child, flush=True)
+    os.waitpid(child, 0)
+    print("gone", flush=True)
 """
 
 
@@ -161,24 +170,33 @@ def check_answer(client: httpx.Client, link: str, run: dict[str, Any], directory
 def test_a_store_killed_at_any_moment_has_whole_runs_only(tmp_path: Path) -> None:
     data, moments = tmp_path / "data", random.Random(5)
     interrupted = kills = 0
-    while kills < KILLS or (interrupted == 0 and kills < MOST_KILLS):
-        kills += 1
-        command = [sys.executable, "-c", WRITER, str(data), json.dumps(paper_scene()), str(CAP)]
-        with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
-            assert process.stdout is not None
-            assert process.stdout.readline() == "ready\n"
-            first = process.stdout.readline()  # so that one is kept, however busy the machine is
-            time.sleep(moments.uniform(0.0, 0.6))
-            process.kill()
-            kept = [first.strip(), *process.stdout.read().split()]
-        interrupted += bool(leftovers(data))
-        ids = check_store(RunStore(Settings(data_dir=data, max_runs=CAP)), tmp_path)
-        assert leftovers(data) == []
-        assert len(ids) <= CAP  # the cap holds through all the kills
-        whole = [id for id in kept if len(id) == 28]  # the last may have been cut
-        assert whole
-        newest = sorted(whole)[-CAP // 3 :]  # well inside the cap: four threads may finish out of order
-        assert set(newest) <= set(ids)
+    command = [sys.executable, "-c", WRITER, str(data), json.dumps(paper_scene()), str(CAP)]
+    with subprocess.Popen(command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        while kills < KILLS or (interrupted == 0 and kills < MOST_KILLS):
+            kills += 1
+            notes = tmp_path / f"kept-{kills}"
+            print(notes, file=process.stdin, flush=True)
+            writer = int(process.stdout.readline())
+            while not (notes.exists() and "\n" in notes.read_text()):  # so that one is kept
+                time.sleep(0.01)
+            end = time.monotonic() + moments.uniform(0.0, 0.6)
+            in_sight = kills % 2 == 0  # that something is being written; a kill at any moment seldom meets that
+            while time.monotonic() < end and not (in_sight and leftovers(data)):
+                time.sleep(0.0 if in_sight else 0.01)
+            os.kill(writer, signal.SIGKILL)
+            assert process.stdout.readline() == "gone\n"
+            interrupted += bool(leftovers(data))
+            ids = check_store(RunStore(Settings(data_dir=data, max_runs=CAP)), tmp_path)
+            assert leftovers(data) == []
+            assert len(ids) <= CAP  # the cap holds through all the kills
+            whole = [id for id in notes.read_text().split() if len(id) == 28]  # the last may have been cut
+            newest = sorted(whole)[-CAP // 3 :]  # well inside the cap: four threads may finish out of order
+            assert newest
+            assert set(newest) <= set(ids)
+        process.stdin.close()
     assert interrupted > 0  # else no kill came while a run was being written, and nothing was tested
 
 
