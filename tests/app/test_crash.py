@@ -166,37 +166,62 @@ def check_answer(client: httpx.Client, link: str, run: dict[str, Any], directory
     check_recording(client.get(document["links"]["recording"]).raise_for_status().content, directory, run["id"])
 
 
+@contextmanager
+def writer(data: Path) -> Iterator["subprocess.Popen[str]"]:
+    """Run WRITER; kill it and the process that it may have begun, whatever happens."""
+    command = [sys.executable, "-c", WRITER, str(data), json.dumps(paper_scene()), str(CAP)]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen(command, cwd=ROOT, text=True, start_new_session=True, **pipes) as process:
+        try:
+            assert line_of(process) == "ready"
+            yield process
+        finally:
+            os.killpg(process.pid, signal.SIGKILL)
+
+
+def line_of(process: "subprocess.Popen[str]") -> str:
+    assert process.stdout is not None
+    return process.stdout.readline().strip()
+
+
+def killed(process: "subprocess.Popen[str]", data: Path, notes: Path, after: float, in_sight: bool) -> list[str]:
+    """Have runs written, kill what writes them, and return the ids of those that it kept.
+
+    Args:
+        process: a `writer` to the store.
+        data: directory of the store.
+        notes: file for the ids.
+        after: from the first that is kept to the kill [s], ...
+        in_sight: ... or sooner, as soon as something half-written is in sight.
+    """
+    print(notes, file=process.stdin, flush=True)
+    child = int(line_of(process))
+    while not (notes.exists() and "\n" in notes.read_text()):  # so that one is kept, however busy the machine is
+        time.sleep(0.01)
+    end = time.monotonic() + after
+    while time.monotonic() < end and not (in_sight and leftovers(data)):
+        time.sleep(0.0 if in_sight else 0.01)
+    os.kill(child, signal.SIGKILL)
+    assert line_of(process) == "gone"
+    return [id for id in notes.read_text().split() if len(id) == 28]  # the last may have been cut
+
+
 @pytest.mark.slow
 def test_a_store_killed_at_any_moment_has_whole_runs_only(tmp_path: Path) -> None:
     data, moments = tmp_path / "data", random.Random(5)
     interrupted = kills = 0
-    command = [sys.executable, "-c", WRITER, str(data), json.dumps(paper_scene()), str(CAP)]
-    with subprocess.Popen(command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdin is not None
-        assert process.stdout is not None
-        assert process.stdout.readline() == "ready\n"
+    with writer(data) as process:
         while kills < KILLS or (interrupted == 0 and kills < MOST_KILLS):
             kills += 1
-            notes = tmp_path / f"kept-{kills}"
-            print(notes, file=process.stdin, flush=True)
-            writer = int(process.stdout.readline())
-            while not (notes.exists() and "\n" in notes.read_text()):  # so that one is kept
-                time.sleep(0.01)
-            end = time.monotonic() + moments.uniform(0.0, 0.6)
-            in_sight = kills % 2 == 0  # that something is being written; a kill at any moment seldom meets that
-            while time.monotonic() < end and not (in_sight and leftovers(data)):
-                time.sleep(0.0 if in_sight else 0.01)
-            os.kill(writer, signal.SIGKILL)
-            assert process.stdout.readline() == "gone\n"
+            in_sight = kills % 2 == 0  # a kill at any moment seldom comes while a run is being written
+            kept = killed(process, data, tmp_path / f"kept-{kills}", moments.uniform(0.0, 0.6), in_sight)
             interrupted += bool(leftovers(data))
             ids = check_store(RunStore(Settings(data_dir=data, max_runs=CAP)), tmp_path)
             assert leftovers(data) == []
             assert len(ids) <= CAP  # the cap holds through all the kills
-            whole = [id for id in notes.read_text().split() if len(id) == 28]  # the last may have been cut
-            newest = sorted(whole)[-CAP // 3 :]  # well inside the cap: four threads may finish out of order
+            newest = sorted(kept)[-CAP // 3 :]  # well inside the cap: four threads may finish out of order
             assert newest
             assert set(newest) <= set(ids)
-        process.stdin.close()
     assert interrupted > 0  # else no kill came while a run was being written, and nothing was tested
 
 
