@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 
 from app.archive import pack
-from app.runs import RunStore
+from app.runs import SUMMARY, RunStore
 from app.schemas import PredictionRequest, to_scene
 from app.settings import Settings
 from dlocore import predict
@@ -98,6 +98,10 @@ def ready(address: str) -> bool:
 
 def leftovers(data: Path) -> list[str]:
     return sorted(path.name for path in (data / "runs").glob(".*"))
+
+
+def being_written(data: Path) -> bool:
+    return any(not (path / SUMMARY).is_file() for path in (data / "runs").iterdir())
 
 
 def check_recording(content: bytes, directory: Path, id: str) -> None:
@@ -199,7 +203,7 @@ def killed(process: "subprocess.Popen[str]", data: Path, notes: Path, after: flo
     while not (notes.exists() and "\n" in notes.read_text()):  # so that one is kept, however busy the machine is
         time.sleep(0.01)
     end = time.monotonic() + after
-    while time.monotonic() < end and not (in_sight and leftovers(data)):
+    while time.monotonic() < end and not (in_sight and being_written(data)):
         time.sleep(0.0 if in_sight else 0.01)
     os.kill(child, signal.SIGKILL)
     assert line_of(process) == "gone"
@@ -218,6 +222,7 @@ def test_a_store_killed_at_any_moment_has_whole_runs_only(tmp_path: Path) -> Non
             interrupted += bool(leftovers(data))
             ids = check_store(RunStore(Settings(data_dir=data, max_runs=CAP)), tmp_path)
             assert leftovers(data) == []
+            assert sorted(path.name for path in (data / "runs").iterdir()) == ids  # nor half-written by its id
             assert len(ids) <= CAP  # the cap holds through all the kills
             newest = sorted(kept)[-CAP // 3 :]  # well inside the cap: four threads may finish out of order
             assert newest
