@@ -1,7 +1,7 @@
 """Whether a scene determines its motion: a start that is known to a millionth of the length may end anywhere."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,6 @@ from dlocore.grid import Grid
 from dlocore.kernels.growth import LOOKS, SLOWEST, fastest_growth, looked_at
 from dlocore.plane import FLATNESS, off_line
 from dlocore.problem import Problem
-from dlocore.report import WindowForces
 from dlocore.shape import StartCurve
 from dlocore.solvers.march import March, march
 from dlocore.solvers.monitor import Monitor
@@ -40,7 +39,8 @@ def bent(problem: Problem, grid: Grid, seed: int) -> Floats:
 def goes_astray(problem: Problem, motion: March, monitor: Monitor, hard: bool) -> float:
     """Return how far a motion goes elsewhere when its start is bent by DISTURBED of the length [m].
 
-    It is marched once more for that, and again with the opposite bend where that leaves it in doubt (`farther`): where
+    Where a disturbance grows most later on, it is displaced by as much as that begins (`_onset`), too. It is marched
+    once more for that, and again with the opposite bend where that leaves it in doubt (`farther`): where
     a disturbance may grow, or where tangents can't tell. They can't where the cable strikes something, where it touches
     or rubs and is `hard`, needed grids beyond the first few, and where it starts so nearly straight that it buckles
     between any two looks. Not where the start has a bow in a plane and another out of it (`buckling.py`), which is no
@@ -55,14 +55,23 @@ def goes_astray(problem: Problem, motion: March, monitor: Monitor, hard: bool) -
     if bowed_twice or motion.stopped or not (untold or may_grow(problem, motion)):
         return 0.0
     grid, bend = motion.grid, bent(problem, motion.grid, seed=1)
-    at = np.unique(np.linspace(0, len(motion.states) - 1, _COMPARED).round().astype(int))
+    onset = _onset(problem, motion)
+
+    def marched(way: float) -> March:
+        knocks = {onset: way * bend} if onset > 0.0 else None
+        start = grid.start + way * bend
+        return march(
+            problem, grid.changed(start=start), motion.asked, monitor, rho=motion.rho, whole=True, knocks=knocks
+        )
+
+    plain = marched(0.0) if onset > 0.0 else motion  # in the same steps, of which some begin at the onset
+    at = np.unique(np.linspace(0, len(plain.states) - 1, _COMPARED).round().astype(int))
 
     def moved(way: float) -> float:
-        start = grid.start + way * bend
-        other = march(problem, grid.changed(start=start), motion.asked, monitor, rho=motion.rho, whole=True)
-        if other.stopped:
+        other = marched(way)
+        if other.stopped or plain.stopped:
             return 0.0
-        apart = (other.states[at] - motion.states[at])[..., : problem.plane.dimensions]
+        apart = (other.states[at] - plain.states[at])[..., : problem.plane.dimensions]
         return float(np.linalg.norm(apart, axis=-1).max())
 
     return farther(moved, problem.scene.cable.length)
@@ -79,9 +88,9 @@ def farther(moved: Callable[[float], float], length: float) -> float:
 
 
 def in_words(problem: Problem, moved: float) -> str:
-    """Return in words that a start which is hardly another goes elsewhere by so much [m]."""
-    bend = f"a start bent by a millionth of the length, {DISTURBED * problem.scene.cable.length * 1e6:.2g} um,"
-    return f"the scene does not determine its motion: {bend} ends elsewhere by up to {moved * 1e3:.2g} mm"
+    """Return in words that a cable which is hardly bent goes elsewhere by so much [m]."""
+    bend = f"a cable bent by a millionth of the length, {DISTURBED * problem.scene.cable.length * 1e6:.2g} um,"
+    return f"the scene does not determine its motion: {bend} goes elsewhere by up to {moved * 1e3:.2g} mm"
 
 
 def _hardly_bent(start: StartCurve) -> bool:
@@ -97,16 +106,35 @@ def may_grow(problem: Problem, motion: March) -> bool:
     """Tell whether a disturbance may grow by much in a motion, as tangents of some states tell (eq. 18a)."""
     growth = motion.growth
     if growth is None:
-        growth = sum(_growth(problem, motion, window) for window in motion.forces)
+        growth = sum(float(rates @ np.diff(times)) for times, rates in _rates(problem, motion))
     return growth > _GROWTH
 
 
-def _growth(problem: Problem, motion: March, window: WindowForces) -> float:
-    """Return the logarithm of what a disturbance grows by in a stretch of a motion at most, about."""
-    lasts = float(window.times[-1] - window.times[0])
-    at, shares = looked_at(len(window.times) - 1, max(2, round(LOOKS * lasts / problem.horizon)))
-    rates = fastest_growth(
-        problem.axes, window.states[at], motion.behind(window.times[at]), motion.grid.tables, *problem.laws,
-        problem.mass_density(), problem.drag_coefficient(), window.held.elimination, SLOWEST / problem.horizon,
-    )  # fmt: skip
-    return float(rates @ shares) * lasts
+def _onset(problem: Problem, motion: March) -> float:
+    """Return when the stretch of a motion begins in which a disturbance grows most [s]; 0 where it grows in none.
+
+    A motion that is damped has forgotten by then what disturbed its start.
+    """
+    onset = most = grown = begin = 0.0
+    for times, rates in _rates(problem, motion):
+        for k, rate in enumerate(rates):
+            begin = begin if grown > 0.0 else times[k]
+            grown = grown + rate * (times[k + 1] - times[k]) if rate > 0.0 else 0.0
+            if grown > most:
+                onset, most = begin, grown
+    return float(onset)
+
+
+def _rates(problem: Problem, motion: March) -> Iterator[tuple[Floats, Floats]]:
+    """Yield times (k + 1,) [s] in each stretch of a motion, and how fast a disturbance grows at most between them.
+
+    The rates (k,) [1/s] are those of the states at the later ones.
+    """
+    for window in motion.forces:
+        lasts = float(window.times[-1] - window.times[0])
+        at = looked_at(len(window.times) - 1, max(2, round(LOOKS * lasts / problem.horizon)))
+        times, states = window.times[at], window.states[at[1:]]
+        yield times, fastest_growth(
+            problem.axes, states, motion.behind(times[1:]), motion.grid.tables, *problem.laws,
+            problem.mass_density(), problem.drag_coefficient(), window.held.elimination, SLOWEST / problem.horizon,
+        )  # fmt: skip

@@ -8,6 +8,7 @@ from dlocore.budget import first_level, growth
 from dlocore.cost import Cost
 from dlocore.determined import UNDETERMINED, UNSEEN, goes_astray, in_words
 from dlocore.errors import SceneError
+from dlocore.prediction import Status
 from dlocore.problem import Problem
 from dlocore.progress import record_level
 from dlocore.scene import AUTO_TARGET, Quality
@@ -361,12 +362,14 @@ class _Climb:
         return moved if moved > UNDETERMINED * self.problem.scene.cable.length else 0.0
 
     def _agreeing(self, level: Level) -> Outcome:
-        """Return the answer where grids agree, which is no success where its start may take it `astray`."""
-        message, parts = self._doubted(level, self._agreed(level))
-        if not self.astray:
-            return Outcome(level, "converged", message, parts)
-        advice = "Make the motion slower, damp it, or hold the cable in more places."
-        return Outcome(level, "stalled", f"{message} {advice}", parts)
+        return self._answer(level, "converged", self._agreed(level))
+
+    def _answer(self, level: Level, status: Status, message: str, advice: str = "") -> Outcome:
+        """Return an answer, which is no success where its start may take it `astray`."""
+        message, parts = self._doubted(level, message)
+        if self.astray:
+            status, advice = "stalled", " Make the motion slower, damp it, or hold the cable in more places."
+        return Outcome(level, status, message + advice, parts)
 
     def _doubted(self, level: Level, message: str) -> tuple[str, dict[str, float] | None]:
         """Return a message and the parts of the error [m], with what is known of where its start may take a motion."""
@@ -445,7 +448,8 @@ class _Climb:
         elif status == "converged" and self.monitor.remaining() <= 0:
             status, message = "time_limit", f"The time limit passed; {left}. {advice}"
         elif status == "converged":
-            status, message = "max_iterations", f"No finer grid was tried; {left}. {advice}"
+            self.astray = self.astray or self._find_astray(best)
+            return self._answer(best, "max_iterations", f"No finer grid was tried; {left}.", f" {advice}")
         return Outcome(best, status, message, _parts(self.changes, best))
 
 

@@ -19,7 +19,7 @@ from dlocore.kernels.across import stiffness_across
 from dlocore.kernels.assembly import NO_RATES, assemble
 from dlocore.kernels.banded import factor
 from dlocore.kernels.basis import basis_rows
-from dlocore.kernels.growth import AT_ONCE
+from dlocore.kernels.growth import LOOKS, looked_at
 from dlocore.kernels.twisted import start_frames
 from dlocore.problem import Problem, pose
 from dlocore.scene import Grasp, Scene
@@ -28,7 +28,6 @@ from dlocore.solvers.march import March
 Floats = NDArray[np.float64]
 
 _FLAT = 1e-6  # of the length: so near to a plane a motion is planar, but for rounding
-_LOOKS = 7  # states of a motion
 _NEUTRAL = 1e-8  # of the largest stiffness: what rounding leaves of none
 _COLUMN, _BELOW = np.array([(j, o) for j in range(4) for o in range(4 - j)]).T  # of a lower triangle (4, 4)
 WITH_TWIST = "with effects.twist on or auto"  # a way to have a motion leave its plane
@@ -45,32 +44,16 @@ def leaves_plane(problem: Problem, motion: March) -> bool:
         return False
     if problem.scene.shape.settle and is_unstable(problem, grid, grid.start, 0.0, grid.history.memory[:, 0]):
         return True
-    looks, shares = _looks(len(motion.times) - 1)
+    looks = looked_at(len(motion.times) - 1, LOOKS)
     density, drag = problem.scene.cable.linear_density, problem.drag_coefficient()
     slowest = GROWTH / problem.horizon  # [1/s]: rate of growth that matters
     slack = density * slowest**2 + drag * slowest
-    growth = 0.0
     times, states = motion.times[looks], motion.states[looks]
-    for k, least in _leasts(problem, grid, states, times.tolist(), _bends_of(problem, motion, times), slack):
-        growth += shares[k] * (np.sqrt(drag**2 - 4.0 * density * min(least, 0.0)) - drag) / (2.0 * density)
+    leasts = _leasts(problem, grid, states, times.tolist(), _bends_of(problem, motion, times), slack)
+    rates = sum((math.sqrt(drag**2 - 4.0 * density * min(least, 0.0)) - drag) / (2.0 * density) for least in leasts)
     # a straight cable that buckles may do so to any side: until it has, all grow alike
     both = math.log(1.0 / BOW) if problem.start.bow else 0.0
-    return growth * problem.horizon > GROWTH + both
-
-
-def _looks(last: int) -> tuple[NDArray[np.int64], Floats]:
-    """Return the numbers (k,) of states that are looked at, and the share (k,) of the time that each stands for.
-
-    They are `_LOOKS` from the first to the last, and some within the share of the first, half and half again: what
-    begins unstable, as a cable that stands, falls at once, however long the motion is.
-    """
-    share = 1.0 / _LOOKS
-    halves = max(0, math.floor(math.log2(max(share * last, 1.0) / AT_ONCE)))
-    early = share * 0.5 ** np.arange(halves, 0, -1)
-    at = np.concatenate([[0], np.round(early * last), np.linspace(0, last, _LOOKS)[1:].round()]).astype(np.int64)
-    shares = np.full(len(at), share)
-    shares[: halves + 1] = np.diff([0.0, *early, share])
-    return at, shares
+    return rates / len(looks) * problem.horizon > GROWTH + both
 
 
 def _bends_of(problem: Problem, motion: March, times: Floats) -> Floats:
@@ -83,8 +66,8 @@ def _bends_of(problem: Problem, motion: March, times: Floats) -> Floats:
 
 def _leasts(
     problem: Problem, grid: Grid, states: Floats, times: list[float], bends: Floats, slack: float | None = None
-) -> Iterator[tuple[int, float]]:
-    """Yield the number and the least stiffness [N/m^2] against leaving their plane of states (k, n, nc) below -slack.
+) -> Iterator[float]:
+    """Yield the least stiffness [N/m^2] against leaving their plane of states (k, n, nc) below -slack.
 
     `bends` (k, points) [1/m] are those that the cable has there without stress in a plane. By default the slack is what
     rounding leaves of no stiffness.
@@ -97,13 +80,13 @@ def _leasts(
     if flat is None:
         return
     bands, unit = _bands(problem, grid, states, flat)
-    for k, (t, q, band) in enumerate(zip(times, flat, bands, strict=True)):
+    for t, q, band in zip(times, flat, bands, strict=True):
         held = closed_grasps(problem.scene, t, t)
         stiff, allowed = band + _held_band(grid, held, _firm(band)), _allowed(slack, band, unit)
         if factor(stiff + allowed * unit) >= 0:
             least = _least(dense_of(stiff) + _twisting(problem, grid, q, held), dense_of(unit))
             if least < -allowed:
-                yield k, least
+                yield least
 
 
 def _allowed(slack: float | None, stiff: Floats, unit: Floats) -> float:
@@ -145,7 +128,7 @@ def _may_be_bent(problem: Problem) -> bool:
 
 def _leasts_of_bent(
     problem: Problem, grid: Grid, states: Floats, times: list[float], bends: Floats, slack: float | None
-) -> Iterator[tuple[int, float]]:
+) -> Iterator[float]:
     """Do what `_leasts` does for a cable that is bent without stress: its sections turn as it leaves the plane.
 
     The stiffness is that of the motion in space with twist, in the planar states, against displacements out of the
@@ -162,7 +145,7 @@ def _leasts_of_bent(
     away[0, :3], away[1, 3] = normal, 1.0
     unit: Floats = np.kron(dense_of(grid.tables.mass), np.eye(2)).astype(np.float64)
     f, K = np.empty((n, nc)), np.empty((n * nc, 4 * nc))
-    for k, (t, flat, natural) in enumerate(zip(times, states, bends, strict=True)):
+    for t, flat, natural in zip(times, states, bends, strict=True):
         q = np.zeros((n, nc))
         q[:, :3] = posed.plane.points(problem.plane.world(flat))
         # in a plane the sections turn as the tangent does
@@ -182,7 +165,7 @@ def _leasts_of_bent(
         try:
             np.linalg.cholesky(whole + allowed * unit)
         except np.linalg.LinAlgError:
-            yield k, _least(whole, unit)
+            yield _least(whole, unit)
 
 
 def _is_weighed_down(problem: Problem) -> bool:
@@ -192,7 +175,7 @@ def _is_weighed_down(problem: Problem) -> bool:
 
 def _leasts_of_lying(
     problem: Problem, grid: Grid, states: Floats, times: list[float], bends: Floats, slack: float | None
-) -> Iterator[tuple[int, float]]:
+) -> Iterator[float]:
     """Do what `_leasts` does for a cable that is bent without stress and lies on a table: its sections may turn over.
 
     Of the energy of turns p of the sections, the integral over two of EI kappa kappa_0 p^2 + GJ p'^2: the bend kappa_0
@@ -202,7 +185,7 @@ def _leasts_of_lying(
     first, basis = basis_rows(grid.knots, tables.curvature_u, 1)
     scale = 8.0 / cable.diameter**2 * tables.curvature_w[:, None]
     twists = scale * cast(float, cable.torsional_stiffness) * _products(basis[:, 1])
-    for k, (t, q, natural) in enumerate(zip(times, states, bends, strict=True)):
+    for t, q, natural in zip(times, states, bends, strict=True):
         turning = cast(float, cable.bending_stiffness) * plane_curvature_of(tables, q)[:, 0] * natural
         if turning.min() >= 0.0:
             continue
@@ -213,7 +196,7 @@ def _leasts_of_lying(
         allowed = _allowed(slack, stiff, tables.mass)
         stiff += _held_band(grid, clamps, _firm(stiff), direction=False)
         if factor(stiff + allowed * tables.mass) >= 0:
-            yield k, _least(dense_of(stiff), dense_of(tables.mass))
+            yield _least(dense_of(stiff), dense_of(tables.mass))
 
 
 def _products(rows: Floats) -> Floats:

@@ -8,30 +8,20 @@ from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, histor
 from dlocore.kernels.banded import factor, reduce_matrix
 from dlocore.kernels.compile import brief, kernel
 
-LOOKS = 6  # states of a motion
-AT_ONCE = 64  # steps: what is unstable for a shorter time at the beginning is not looked for
+LOOKS = 6  # states of a motion, at least
+AT_ONCE = 64  # steps from one state that is looked at to the next, at most: what is unstable for less is not looked for
 SLOWEST = 1.0  # rate of growth that counts, over the time of the motion
 _DOUBLINGS = 12  # of a rate, at most
 
 
 @brief
 def looked_at(last: int, looks: int) -> Any:
-    """Return the numbers (k,) of states of a motion that are looked at, and the share (k,) of its time each stands for.
+    """Return the numbers (k + 1,) of states, the last of which is `last`, between which a motion is looked at.
 
-    Of the states, the last of which is `last`, so many are looked at, each at the end of its share, and of the first
-    share its middle, its first quarter and so on, each for what is left of it: what begins unstable, as a cable that
-    stands, falls at once, however long the motion is.
+    The first is 0. They are evenly spaced, so many `looks` or more: a motion of minutes may be unstable for seconds.
     """
-    share, halves = last / looks, 0
-    while share * 0.5 ** (halves + 1) >= AT_ONCE:
-        halves += 1
-    ends = np.empty(halves + looks)
-    for k in range(halves):
-        ends[k] = share * 0.5 ** (halves - k)
-    ends[halves:] = share * np.arange(1, looks + 1)
-    shares = ends / max(last, 1)
-    shares[1:] -= shares[:-1].copy()
-    return np.round(ends).astype(np.int64), shares
+    looks = max(looks, -(-last // AT_ONCE))
+    return np.round(np.linspace(0.0, last, looks + 1)).astype(np.int64)
 
 
 @kernel

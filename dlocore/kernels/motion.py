@@ -52,7 +52,7 @@ def smooth_motion(
         weight: (nc,) [N/m] per unit length.
         least_jump: of the velocity, in a step, that counts as a jump [m].
         every: of how many states one is searched for folds.
-        looks: how many states are looked at for whether a disturbance may grow.
+        looks: how many states are looked at, at least, for whether a disturbance may grow.
         info: (SEEN,) as in `march_steps`, and the largest axial strain of the motion, the least and the largest |r'| at
             the curvature points, and the logarithm of what a disturbance grows by at most, about.
 
@@ -111,9 +111,9 @@ def smooth_motion(
         m, past, axial = history.memory, history.past, history.axial
         kept = m.reshape((1, *m.shape)), past.reshape((1, *past.shape)), axial.reshape((1, *axial.shape))
         behind = History(*kept, history.stick, history.slide, np.zeros((0, COLUMNS)), history.room)
-        (at, shares), lasts = looked_at(steps, looks), times[-1] - times[near]
+        at, lasts = looked_at(steps, looks), times[-1] - times[near]
         rates = fastest_growth(
-            axes, states[at], behind, tables, active, p, density, dragged, e, SLOWEST / lasts,
+            axes, states[at[1:]], behind, tables, active, p, density, dragged, e, SLOWEST / lasts,
         )  # fmt: skip
-        info[GROWTH] = (rates * shares).sum() * lasts
+        info[GROWTH] = rates.mean() * lasts
     return states, closed, reactions, history, control, off

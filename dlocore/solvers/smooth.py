@@ -33,7 +33,7 @@ def march_smooth(
     Args:
         knots_t: (n_t + 4,) [s] of the time spline.
         rho: spectral radius.
-        looks: how many states are looked at for whether a disturbance may grow.
+        looks: how many states are looked at, at least, for whether a disturbance may grow.
 
     Returns:
         What `march` and `fit` return, and None where they have to do it: where there is more to the motion, it takes

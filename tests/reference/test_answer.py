@@ -203,7 +203,7 @@ def pushed() -> Scene:
 def test_a_scene_that_does_not_determine_its_motion_is_no_success(pushed: Scene):
     found = predict(pushed)
     assert found.status == "stalled"
-    assert "But the scene does not determine its motion: a start bent by a millionth of the length" in found.message
+    assert "But the scene does not determine its motion: a cable bent by a millionth of the length" in found.message
     assert found.accuracy.error_parts["start"] > UNDETERMINED
     assert found.accuracy.error_estimate == pytest.approx(sum(found.accuracy.error_parts.values()))
 

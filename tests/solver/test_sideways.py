@@ -1,5 +1,6 @@
 """Planar motions that a disturbance out of their plane would grow in are solved in space, and others are not."""
 
+import math
 from dataclasses import replace
 from typing import Any, cast
 
@@ -26,11 +27,11 @@ from dlocore.buckling import UNSTABLE
 from dlocore.discretisation import room_for
 from dlocore.kernels.across import stiffness_across
 from dlocore.kernels.assembly import NO_RATES, History, assemble
-from dlocore.kernels.growth import AT_ONCE, looked_at
+from dlocore.kernels.growth import AT_ONCE, LOOKS, looked_at
 from dlocore.kernels.tension import COLUMNS
 from dlocore.plane import Plane
 from dlocore.problem import Problem, pose
-from dlocore.sideways import _looks, is_unstable, pose_as_shown
+from dlocore.sideways import is_unstable, pose_as_shown
 from dlocore.solvers.ladder import Level
 from dlocore.solvers.monitor import Monitor
 from dlocore.whole_march import sided
@@ -128,15 +129,12 @@ def test_a_cable_that_stands_falls_out_of_its_plane_however_slowly_its_foot_is_c
 
 
 @pytest.mark.parametrize("last", [0, 5, 440, 1000, 30_000])
-def test_the_first_states_of_long_motions_are_looked_at_closely(last: int) -> None:
-    for looks, (at, shares) in ((7, _looks(last)), (6, looked_at(last, 6))):
-        assert len(at) == len(shares) >= looks
-        assert at[-1] == last
-        assert np.all(np.diff(at) >= 0)
-        assert shares.sum() == pytest.approx(float(last > 0 or looks == 7))
-        early = at[at > 0].min(initial=last)
-        assert early <= max(2 * AT_ONCE, last / 6)
-        assert len(at) == looks or early >= AT_ONCE
+def test_a_motion_is_looked_at_six_times_and_however_long_it_is_every_so_many_steps(last: int) -> None:
+    at = looked_at(last, LOOKS)
+    assert (at[0], at[-1]) == (0, last)
+    assert len(at) == max(LOOKS, math.ceil(last / AT_ONCE)) + 1
+    assert np.ptp(np.diff(at)) <= 1
+    assert np.diff(at).max() <= AT_ONCE
 
 
 def test_its_equilibrium_hangs() -> None:
@@ -171,7 +169,8 @@ def test_a_stable_motion_stays_planar(scene: Scene) -> None:
 
 
 def test_an_elastica_whose_directions_are_held_leaves_its_plane_when_it_is_compressed_far() -> None:
-    prediction = predict(between(0.3, True, "tangent", WEIGHTLESS, 0.8))
+    # hardly damped, it snaps on its way, up to 36 mm elsewhere where a micrometre disturbs it before that
+    prediction = predict(between(0.3, True, "tangent", replace(WEIGHTLESS, drag=1.0), 0.8))
     assert prediction.status == "converged", prediction.message
     assert prediction.accuracy.dimensions == 3
     assert out_of_plane(prediction) > 0.05
