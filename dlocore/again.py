@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.determined import UNDETERMINED, UNSEEN, goes_astray, in_words, may_grow
+from dlocore.determined import DOUBTFUL, UNDETERMINED, UNSEEN, bend_in_words, goes_astray, in_words, may_grow
 from dlocore.given import given_status
 from dlocore.paths import Waypoints
 from dlocore.plane import Plane
@@ -23,7 +23,7 @@ from dlocore.solvers.ladder import Level, distance, hardness, run_level
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.whole_march import MISSED_COUNTS, march_status
 
-_NOT_OF_THE_GRID = ("neglected", "iteration")  # parts of an estimate that each solve has of its own
+_NOT_OF_THE_GRID = ("neglected", "iteration", "start")  # parts of an estimate that each solve has of its own
 _ROUNDING = 1e-14  # of the coordinates of a plane that is found from points
 NEAR = 0.05  # of the length: motions that lie closer have errors alike (benchmarks.again)
 
@@ -50,6 +50,8 @@ class Again:
         if self.errors is None:
             return ""
         away = f" On the grid of a motion {self.level.change * 1e3:.2g} mm away, whose error was estimated."
+        if "start" in self.errors:
+            away += f" But {bend_in_words(self.level.problem, self.errors['start'])}."
         return away + (f" {UNSEEN}" if self.unseen else "")
 
 
@@ -101,12 +103,14 @@ def march_again(problem: Problem, like: Prediction, monitor: Monitor) -> Again |
         return f"It calls for {', '.join(calls)}: {'; '.join(calls.values())}."
     if errors and like.accuracy.method == "march":
         errors[list(errors)[-1]] += max(0.0, MISSED_COUNTS * level.missed - sum(errors.values()))
-    target = problem.scene.quality.target_error
-    if target is not None and sum(errors.values()) > target:
-        return f"Its estimated error of {sum(errors.values()) * 1e3:.2g} mm is above the target."
     astray = _astray(level, monitor) if free_knots else 0.0
     if astray > UNDETERMINED * length:
         return f"On the grid of one like it {in_words(problem, astray)}."
+    if errors and astray > DOUBTFUL * length:
+        errors["start"] = astray
+    target = problem.scene.quality.target_error
+    if target is not None and sum(errors.values()) > target:
+        return f"Its estimated error of {sum(errors.values()) * 1e3:.2g} mm is above the target."
     return Again(level, judged, errors or None, unseen=np.isnan(astray))
 
 

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 DISTURBED = 1e-6  # of the length: bend of a start
 UNDETERMINED = 1e-2  # of the length: what moves by more when its start is bent so much is not determined
-DOUBTFUL = 1e-3  # of the length: what moves by more may go elsewhere when its start is bent the other way
+DOUBTFUL = 1e-3  # of the length: what moves by more is told, and may go elsewhere when its start is bent the other way
 UNSEEN = "A disturbance may grow in this motion; the time was up before it was seen how far it takes it."
 _GROWTH = math.log(20.0)  # of a disturbance, as looks at some states tell, from which on it is looked for how much
 _HARDLY = 1e-4  # of the length: a start that is no farther from a line is hardly bent
@@ -88,9 +88,14 @@ def farther(moved: Callable[[float], float], length: float) -> float:
 
 
 def in_words(problem: Problem, moved: float) -> str:
+    """Return in words that a scene does not determine its motion, which a bend moves by so much [m]."""
+    return f"the scene does not determine its motion: {bend_in_words(problem, moved)}"
+
+
+def bend_in_words(problem: Problem, moved: float) -> str:
     """Return in words that a cable which is hardly bent goes elsewhere by so much [m]."""
-    bend = f"a cable bent by a millionth of the length, {DISTURBED * problem.scene.cable.length * 1e6:.2g} um,"
-    return f"the scene does not determine its motion: {bend} goes elsewhere by up to {moved * 1e3:.2g} mm"
+    bend = f"{DISTURBED * problem.scene.cable.length * 1e6:.2g} um"
+    return f"a cable bent by a millionth of the length, {bend}, goes elsewhere by up to {moved * 1e3:.2g} mm"
 
 
 def _hardly_bent(start: StartCurve) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 
 from dlocore.budget import first_level, growth
 from dlocore.cost import Cost
-from dlocore.determined import UNDETERMINED, UNSEEN, goes_astray, in_words
+from dlocore.determined import DOUBTFUL, UNDETERMINED, UNSEEN, bend_in_words, goes_astray, in_words
 from dlocore.errors import SceneError
 from dlocore.prediction import Status
 from dlocore.problem import Problem
@@ -181,9 +181,9 @@ class _Climb:
                 if finer is None and status != "converged":
                     return Outcome(level, status, message, _parts(self.changes, level))
                 if finer is None:
-                    before, self.astray = self.astray, self._find_astray(level)
+                    before, self.astray = self._undetermined, self._find_astray(level)
                     # on a coarse grid disturbances may grow that do not on a fine one
-                    finer = self._next(level, size, None) if self.astray and not before else None
+                    finer = self._next(level, size, None) if self._undetermined and not before else None
                     if finer is None:
                         return self._agreeing(level)
             else:
@@ -359,24 +359,32 @@ class _Climb:
             return self.astray
         finally:
             self.monitor.phase("estimate")
-        return moved if moved > UNDETERMINED * self.problem.scene.cable.length else 0.0
+        return moved if moved > DOUBTFUL * self.problem.scene.cable.length else 0.0
+
+    @property
+    def _undetermined(self) -> bool:
+        """Whether its start may take a motion so far elsewhere that no grid tells of it what was asked for."""
+        lost = self.astray > UNDETERMINED * self.problem.scene.cable.length
+        return lost or (self.astray > 0.0 and self.estimate + self.astray > self.enough)
 
     def _agreeing(self, level: Level) -> Outcome:
         return self._answer(level, "converged", self._agreed(level))
 
     def _answer(self, level: Level, status: Status, message: str, advice: str = "") -> Outcome:
-        """Return an answer, which is no success where its start may take it `astray`."""
+        """Return an answer, which is no success where its start may take it astray."""
         message, parts = self._doubted(level, message)
-        if self.astray:
+        if self._undetermined:
             status, advice = "stalled", " Make the motion slower, damp it, or hold the cable in more places."
         return Outcome(level, status, message + advice, parts)
 
     def _doubted(self, level: Level, message: str) -> tuple[str, dict[str, float] | None]:
         """Return a message and the parts of the error [m], with what is known of where its start may take a motion."""
         parts = _parts(self.changes, level)
-        if self.astray:
-            return f"{message} But {in_words(self.problem, self.astray)}.", {**(parts or {}), "start": self.astray}
-        return message + (f" {UNSEEN}" if self.unseen else ""), parts
+        if not self.astray:
+            return message + (f" {UNSEEN}" if self.unseen else ""), parts
+        told = in_words if self._undetermined else bend_in_words
+        said = f"But {told(self.problem, self.astray)}."
+        return f"{message} {said}", {**(parts or {}), "start": self.astray}
 
     def _agreed(self, level: Level) -> str:
         return f"Two grids agree to {level.change * 1e3:.2g} mm; {self._left_over()}."

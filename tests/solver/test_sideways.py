@@ -24,6 +24,7 @@ from dlocore import (
     predict,
 )
 from dlocore.buckling import UNSTABLE
+from dlocore.determined import DOUBTFUL
 from dlocore.discretisation import room_for
 from dlocore.kernels.across import stiffness_across
 from dlocore.kernels.assembly import NO_RATES, History, assemble
@@ -174,6 +175,26 @@ def test_an_elastica_whose_directions_are_held_leaves_its_plane_when_it_is_compr
     assert prediction.status == "converged", prediction.message
     assert prediction.accuracy.dimensions == 3
     assert out_of_plane(prediction) > 0.05
+
+
+def test_what_a_micrometre_moves_by_little_is_part_of_the_error_and_more_than_the_target_no_success() -> None:
+    def snaps(closer: float, target: float) -> Scene:
+        scene = between(0.3, True, "tangent", replace(WEIGHTLESS, drag=0.7), closer)
+        return replace(scene, quality=Quality(target_error=target))
+
+    told = "a cable bent by a millionth of the length, 1 um, goes elsewhere by up to 1.3 mm"
+    found = predict(snaps(0.8, 2e-3))
+    assert found.status == "converged", found.message
+    assert f"But {told}." in found.message
+    assert DOUBTFUL < found.accuracy.error_parts["start"] < 2 * DOUBTFUL
+    assert found.accuracy.error_estimate == pytest.approx(sum(found.accuracy.error_parts.values()))
+    again = predict(snaps(0.8001, 2e-3), like=found)
+    assert "On the grid of a motion" in again.message
+    assert f"But {told}." in again.message
+    assert again.accuracy.error_parts["start"] == pytest.approx(found.accuracy.error_parts["start"], rel=0.1)
+    strict = predict(snaps(0.8, 1e-3))
+    assert strict.status == "stalled"
+    assert "does not determine its motion" in strict.message
 
 
 @pytest.mark.parametrize("hold", ["tangent", "clamp"])
