@@ -13,7 +13,8 @@ _SAFETY = 1.5  # times the distance to a finer march: what a slowly converging m
 _LEFT = 0.75  # times the distance to a coarser march: benchmarks.estimate
 _LEFT_KINKED = 1.0  # the same of a `kinked` march
 _ROOM = 0.8  # of n_u and n_t: a march on more is not coarser
-_TOO_LATE = " The time limit passed before its error was estimated."
+TOO_LATE = "The time limit passed before its error was estimated."
+UNKNOWN = "Its error is not known"
 
 
 def coarser(problem: Problem, size: Size) -> Size | None:
@@ -53,7 +54,7 @@ def by_finer(problem: Problem, level: Level, monitor: Monitor) -> tuple[float | 
     if other is None:
         return None, said
     if other.motion.stopped:
-        return None, " Its error is not known: the finer march to compare it with found no equilibrium."
+        return None, f" {UNKNOWN}: the finer march to compare it with found no equilibrium."
     return _SAFETY * distance(level, other, problem), ""
 
 
@@ -72,7 +73,7 @@ def _marched(problem: Problem, size: Size, level: Level, monitor: Monitor) -> tu
         monitor.check()
         other = run_level(problem, *size, monitor, booked=False, like=level.motion.grid, whole=True)
     except TimeIsUp:
-        return None, _TOO_LATE
+        return None, f" {TOO_LATE}"
     finally:
         monitor.phase("estimate")
     return other, ""

@@ -12,6 +12,7 @@ from benchmarks.hard.generator import Drawn
 from benchmarks.hard.laws import measure
 from benchmarks.hard.taut import words_if_too_short
 from dlocore import Prediction, Scene, SceneError, predict
+from dlocore.companion import TOO_LATE, UNKNOWN
 from dlocore.determined import DISTURBED, UNSEEN, bent
 from dlocore.discretisation import smallest_n_u
 from dlocore.driven import driven, words
@@ -268,7 +269,8 @@ def faults(record: dict[str, Any]) -> list[str]:
         if undetermined:
             return found
         if error > WRONG and record["apart"] < SURE * error:
-            told = estimate is not None and estimate > min(WRONG, 0.5 * error)
+            unknown = any(words in record["message"] for words in (TOO_LATE, UNKNOWN))
+            told = unknown if estimate is None else estimate > min(WRONG, 0.5 * error)
             found.append("wrong and told" if told else "lie")
         elif record.get("apart", 0.0) > WRONG:
             found.append("no reference and told" if tells(record) else "no reference and not told")

@@ -8,6 +8,7 @@ import pytest
 from benchmarks.hard.judge import by_a_march, faults, is_undetermined, left_its_grid
 from benchmarks.hard.shares import GROWTHS, Strata, drawn_again, has_failed, in_place_of, is_left, share, strata
 from benchmarks.random_scenes import counts, in_the_end, summary
+from dlocore.companion import TOO_LATE
 from dlocore.determined import DISTURBED
 
 SEED = 5
@@ -155,6 +156,8 @@ def test_what_never_may_happen_is_counted_by_kind():
         ({"disturbed": 0.3, "error": 0.5, "apart": 0.0}, ["undetermined and not told"]),
         ({"error": 0.5, "apart": 0.0}, ["lie"]),
         ({"error": 0.5, "apart": 0.0, "estimate": 0.3}, ["wrong and told"]),
+        ({"error": 0.5, "apart": 0.0, "estimate": None}, ["lie"]),
+        ({"error": 0.5, "apart": 0.0, "estimate": None, "message": f"Found. {TOO_LATE}"}, ["wrong and told"]),
         ({"error": 0.5, "apart": 0.4}, ["no reference and not told"]),
         ({"status": "stalled"}, ["not converged: stalled"]),
         ({"status": "stalled", "disturbed": 0.3}, ["undetermined and told: stalled"]),
