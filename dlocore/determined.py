@@ -23,6 +23,7 @@ DOUBTFUL = 1e-3  # of the length: what moves by more is told, and may go elsewhe
 UNSEEN = "A disturbance may grow in this motion; the time was up before it was seen how far it takes it."
 _GROWTH = math.log(20.0)  # of a disturbance, as looks at some states tell, from which on it is looked for how much
 _HARDLY = 1e-4  # of the length: a start that is no farther from a line is hardly bent
+_AT_ONCE = 64  # states whose past is looked up at once, which takes memory
 _COMPARED = 1025  # states of two motions, at most
 
 
@@ -111,7 +112,7 @@ def may_grow(problem: Problem, motion: March) -> bool:
     """Tell whether a disturbance may grow by much in a motion, as tangents of some states tell (eq. 18a)."""
     growth = motion.growth
     if growth is None:
-        growth = sum(float(rates @ np.diff(times)) for times, rates in _rates(problem, motion))
+        growth = sum(float(rates.mean() * (times[-1] - times[0])) for times, rates in _rates(problem, motion))
     return growth > _GROWTH
 
 
@@ -138,8 +139,12 @@ def _rates(problem: Problem, motion: March) -> Iterator[tuple[Floats, Floats]]:
     for window in motion.forces:
         lasts = float(window.times[-1] - window.times[0])
         at = looked_at(len(window.times) - 1, max(2, round(LOOKS * lasts / problem.horizon)))
-        times, states = window.times[at], window.states[at[1:]]
-        yield times, fastest_growth(
-            problem.axes, states, motion.behind(times[1:]), motion.grid.tables, *problem.laws,
-            problem.mass_density(), problem.drag_coefficient(), window.held.elimination, SLOWEST / problem.horizon,
-        )  # fmt: skip
+        rates = [
+            fastest_growth(
+                problem.axes, window.states[some], motion.behind(window.times[some]), motion.grid.tables,
+                *problem.laws, problem.mass_density(), problem.drag_coefficient(), window.held.elimination,
+                SLOWEST / problem.horizon,
+            )
+            for some in np.array_split(at[1:], -(-len(at) // _AT_ONCE))
+        ]  # fmt: skip
+        yield window.times[at], np.concatenate(rates)
