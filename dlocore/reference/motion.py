@@ -1,5 +1,6 @@
 """The motion of one rod, step by step: steps as long as their estimated error allows, windows between events."""
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -46,6 +47,7 @@ SHORTEST = 1e-9  # of the horizon: a step
 DOWN = 1e-3  # [s]: the first step downhill; what friction holds in the end depends on longer ones
 SETTLED = 1e-11  # of the length: a step downhill that ends the search for an equilibrium
 FARTHEST = 0.05  # of the length, in a step downhill: farther the rod might pass through what is in its way
+BENT = 8  # times a motion is bent, to see what becomes of that
 DOWNHILL = 2000  # steps to an equilibrium
 
 
@@ -160,10 +162,11 @@ class _Record:
         )
 
 
-def simulate(rod: Rod, tolerance: float, watch: Watch, bend: Floats | None = None) -> Motion:
+def simulate(rod: Rod, tolerance: float, watch: Watch, bend: Callable[[Floats], Floats] | None = None) -> Motion:
     """Simulate a rod from its start to the horizon, each step to an estimated error of `tolerance` [m].
 
-    By `bend` (n, 3) [m] nodes that no gripper holds are displaced as it begins.
+    By `bend` (n, 3) [m] of their positions (n, 3) [m], nodes that no gripper holds are displaced as it begins and, as a
+    damped motion forgets its start, at each BENT-th of its time.
 
     Raises:
         what `watch.check` raises, but for `TimeIsUp`.
@@ -176,9 +179,10 @@ def simulate(rod: Rod, tolerance: float, watch: Watch, bend: Floats | None = Non
     if problem.scene.shape.settle:
         with suppress(TimeIsUp):
             now, record.deepest = settled(rod, watch)
-    if bend is not None:
-        now = replace(now, x=now.x + bend)
-    for begin, end in pairwise(events_of(problem)):
+    bent = set() if bend is None else {k * problem.horizon / BENT for k in range(BENT)}
+    for begin, end in pairwise(sorted({*events_of(problem), *bent})):
+        if bend is not None and begin in bent:
+            now = replace(now, x=now.x + bend(now.x))
         middle = 0.5 * (begin + end)
         hold = [i for i, g in enumerate(grasps) if g.start <= middle and (g.release_time or np.inf) > middle]
         closed = {i: closed.get(i) or grip(rod, grasps[i], now) for i in hold}

@@ -32,7 +32,7 @@ FOURTH = 15.0  # what is left of a change by an extrapolation of the fourth orde
 DEEP = 0.02  # of the diameter: a motion that goes deeper into a surface is done again with stiffer contact
 STIFFER = (2.0, 30.0)  # at least and at most by these ratios
 STIFFEST = 1e5  # times the stiffness that bears the weight
-HELD = 0.1  # of the length: so near to what holds it a start is hardly bent
+HELD = 0.1  # of the length: so near to what holds it a rod is hardly bent
 TIMES = 129  # while a cable swings once, at which motions are compared, besides events
 
 
@@ -63,7 +63,7 @@ class Refined:
         problem: the posed scene, with the obstacles that the motion met.
         levels: the rods, by rising number of elements.
         ended: "agreed" within the target, "finest" rod, out of "time", or a "step" without solution.
-        astray: how far a start that is hardly another ends elsewhere [m], 0 where that does not matter or was not asked
+        astray: how far a rod that is hardly bent goes elsewhere [m], 0 where that does not matter or was not asked
             (`goes_astray`), NaN where the time was up before that was known.
     """
 
@@ -128,7 +128,7 @@ def refine(problem: Problem, target: float, watch: Watch, on_level: Callable[[Pr
 
 
 def goes_astray(refined: Refined, target: float, watch: Watch) -> float:
-    """Return how far a start that is bent by DISTURBED of the length ends elsewhere [m], see `Refined.astray`.
+    """Return how far a rod that is bent by DISTURBED of the length, now and then, goes elsewhere [m]: `Refined.astray`.
 
     Where rods agree the last but one is asked, and where it ends more than UNDETERMINED of the length elsewhere the
     last one, too.
@@ -146,31 +146,31 @@ def goes_astray(refined: Refined, target: float, watch: Watch) -> float:
 
 
 def _moved(level: Level, tolerance: float, watch: Watch, t: Floats, way: float) -> float:
-    """Return how far a bend of its start, times `way`, moves a rod at times t (m,) [s] [m]; 0 where no step tells.
+    """Return how far bends, times `way`, move a rod at times t (m,) [s] [m]; 0 where no step tells.
 
     Raises:
         TimeIsUp: the deadline passed.
     """
-    other = simulate(level.motion.rod, tolerance, watch, way * bend_of(level.motion.rod))
+    rod = level.motion.rod
+    other = simulate(rod, tolerance, watch, lambda x: way * bend_of(rod, x))
     if other.stopped == "time":
         raise TimeIsUp
     return 0.0 if other.stopped else _farthest(samples(other).positions(t), level.taken.positions(t))
 
 
-def bend_of(rod: Rod) -> Floats:
-    """Return displacements (n, 3) [m] across a rod, in some half waves of up to DISTURBED of its length.
+def bend_of(rod: Rod, x: Floats) -> Floats:
+    """Return displacements (n, 3) [m] across a rod at x (n, 3) [m], some half waves of up to DISTURBED of its length.
 
-    They vanish at what holds it at t = 0.
+    They vanish at whatever holds it at some time.
     """
     scene, u = rod.problem.scene, rod.u[:, None]
     length = scene.cable.length
     waves = np.sin(np.pi * u / length * [1.0, 2.0, 3.0]) @ np.random.default_rng(1).normal(size=(3, 3))
     for g in scene.grasps:
-        if g.start == 0.0:
-            waves *= 1.0 - np.exp(-(((u - g.u) / (HELD * length)) ** 2))
+        waves *= 1.0 - np.exp(-(((u - g.u) / (HELD * length)) ** 2))
     if rod.planar:
         waves[:, 2] = 0.0
-    along = np.gradient(rod.start.x, rod.u, axis=0)
+    along = np.gradient(x, rod.u, axis=0)
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
     across = waves - (waves * along).sum(axis=1, keepdims=True) * along
     return np.asarray(DISTURBED * length / np.linalg.norm(across, axis=1).max() * across)

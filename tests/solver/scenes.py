@@ -19,6 +19,7 @@ from dlocore import (
     SplineSurface,
     Straight,
     Table,
+    Waypoints,
     predict,
 )
 
@@ -150,3 +151,27 @@ def kinked(quality: Quality) -> Scene:
         horizon=0.8,
         quality=quality,
     )  # fmt: skip
+
+
+def arch_with_feet_close_for(dwell: float) -> Scene:
+    """Return an arch on a sloping table, which would fall sideways while its feet are close for a time `dwell` [s]."""
+    turn = np.linspace(-1.3, 1.3, 41)
+    points = np.column_stack([np.sin(turn), np.cos(turn), 0.0 * turn]) / 2.6
+    times = np.linspace(0.0, 86.0 + dwell, 962)
+
+    def smooth(x: Floats) -> Floats:
+        y = np.clip(x / 2.0, 0.0, 1.0)
+        return np.asarray(y**3 * (10.0 - 15.0 * y + 6.0 * y * y))
+
+    close = 0.3 * (smooth(times - 18.0) - smooth(times - 20.0 - dwell))[:, None]
+    left, right = (
+        Waypoints(times=times, positions=foot + way * close * [1.0, 0.0, 0.0])
+        for foot, way in ((points[0], 1.0), (points[-1], -1.0))
+    )
+    return Scene(
+        cable=Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=2.3e-3),
+        shape=Points(points=points, settle=True),
+        grasps=(Grasp(u=0.0, hold="tangent", path=left), Grasp(u=1.0, hold="tangent", path=right)),
+        environment=Environment(gravity=(0.0, -9.81, 0.0), drag=0.2, table=Table()),
+        quality=Quality(target_error=0.01),
+    )

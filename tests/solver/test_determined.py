@@ -19,7 +19,6 @@ from dlocore import (
     Scene,
     Straight,
     Table,
-    Waypoints,
     determined,
     predict,
     refinement,
@@ -34,7 +33,7 @@ from dlocore.solvers.march import March, march
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.statics import start_grid
 from dlocore.whole_march import march_level
-from tests.solver.scenes import WEIGHTLESS
+from tests.solver.scenes import WEIGHTLESS, arch_with_feet_close_for
 
 LENGTH = 1.0
 EI, MU = 0.02, 0.1  # [N m^2], [kg/m]
@@ -238,32 +237,8 @@ def test_what_falls_as_a_long_motion_begins_is_looked_at():
     assert "does not determine its motion" in found.message
 
 
-def arch(dwell: float) -> Scene:
-    """Return an arch on a sloping table, which would fall sideways while its feet are close for a time `dwell` [s]."""
-    turn = np.linspace(-1.3, 1.3, 41)
-    points = np.column_stack([np.sin(turn), np.cos(turn), 0.0 * turn]) / 2.6
-    times = np.linspace(0.0, 86.0 + dwell, 962)
-
-    def smooth(x: np.ndarray) -> np.ndarray:
-        y = np.clip(x / 2.0, 0.0, 1.0)
-        return np.asarray(y**3 * (10.0 - 15.0 * y + 6.0 * y * y))
-
-    close = 0.3 * (smooth(times - 18.0) - smooth(times - 20.0 - dwell))[:, None]
-    left, right = (
-        Waypoints(times=times, positions=foot + way * close * [1.0, 0.0, 0.0])
-        for foot, way in ((points[0], 1.0), (points[-1], -1.0))
-    )
-    return Scene(
-        cable=Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=2.3e-3),
-        shape=Points(points=points, settle=True),
-        grasps=(Grasp(u=0.0, hold="tangent", path=left), Grasp(u=1.0, hold="tangent", path=right)),
-        environment=Environment(gravity=(0.0, -9.81, 0.0), drag=0.2, table=Table()),
-        quality=Quality(target_error=0.01),
-    )
-
-
 def test_what_is_unstable_for_seconds_of_a_minute_and_has_forgotten_its_start_is_found():
-    found = predict(arch(10.0))
+    found = predict(arch_with_feet_close_for(10.0))
     assert found.status == "stalled"
     assert "does not determine its motion" in found.message
     assert found.accuracy.error_parts["start"] > 0.3
@@ -276,7 +251,7 @@ def test_what_is_unstable_for_seconds_of_a_minute_and_has_forgotten_its_start_is
     start = motion.grid.start + bent(problem, motion.grid, seed=1)
     other = march(problem, motion.grid.changed(start=start), motion.asked, Monitor(), rho=motion.rho)
     assert np.abs(other.states - motion.states).max() < 10 * DISTURBED
-    brief = predict(arch(0.5))  # too short to fall
+    brief = predict(arch_with_feet_close_for(0.5))  # too short to fall
     assert brief.status == "converged", brief.message
 
 
