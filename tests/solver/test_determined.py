@@ -23,7 +23,7 @@ from dlocore import (
     predict,
     refinement,
 )
-from dlocore.determined import DISTURBED, UNDETERMINED, UNSEEN, bent, goes_astray, may_grow
+from dlocore.determined import DISTURBED, DOUBTFUL, UNDETERMINED, UNSEEN, bent, goes_astray, may_grow
 from dlocore.events import closed_grasps
 from dlocore.grid import Grid
 from dlocore.holding import Starts, close_grasps, hold
@@ -253,6 +253,14 @@ def test_what_is_unstable_for_seconds_of_a_minute_and_has_forgotten_its_start_is
     assert np.abs(other.states - motion.states).max() < 10 * DISTURBED
     brief = predict(arch_with_feet_close_for(0.5))  # too short to fall
     assert brief.status == "converged", brief.message
+
+
+def test_scene_97_5133_counts_what_a_bend_moves_it_by():
+    """It was `converged` at 0.3 % of the length, where a bend of a millionth of the length moves it by 0.7 to 1.1 %."""
+    scene = draw(97, 5133).make()
+    found = predict(scene)
+    assert f"a cable bent by a millionth of the length, {scene.cable.length:.2g} um, goes elsewhere" in found.message
+    assert found.accuracy.error_parts["start"] > 3 * DOUBTFUL * scene.cable.length
 
 
 def test_on_a_given_grid_a_note_tells_that_a_scene_does_not_determine_its_motion():
