@@ -41,8 +41,8 @@ def goes_astray(problem: Problem, motion: March, monitor: Monitor, hard: bool) -
     """Return how far a motion goes elsewhere when its start is bent by DISTURBED of the length [m].
 
     Where a disturbance grows most later on, it is displaced by as much as that begins (`_onset`), too. It is marched
-    once more for that, and again with the opposite bend where that leaves it in doubt (`farther`): where
-    a disturbance may grow, or where tangents can't tell. They can't where the cable strikes something, where it touches
+    once more for that, and again with the opposite bend where that leaves it in doubt (`farther`): where a disturbance
+    may grow, or where tangents can't tell. They can't where the cable strikes something, where it touches
     or rubs and is `hard`, needed grids beyond the first few, and where it starts so nearly straight that it buckles
     between any two looks. Not where the start has a bow in a plane and another out of it (`buckling.py`), which is no
     larger, and of which the answer tells. Else, and where that march finds no equilibrium, it is 0.
@@ -53,10 +53,13 @@ def goes_astray(problem: Problem, motion: March, monitor: Monitor, hard: bool) -
     """
     bowed_twice = bool(problem.start.bow and problem.start.aside)
     untold = motion.split or (hard and problem.touches) or _hardly_bent(problem.start)
-    if bowed_twice or motion.stopped or not (untold or may_grow(problem, motion)):
+    if bowed_twice or motion.stopped:
+        return 0.0
+    grows = may_grow(problem, motion)
+    if not (untold or grows):
         return 0.0
     grid, bend = motion.grid, bent(problem, motion.grid, seed=1)
-    onset = _onset(problem, motion)
+    onset = _onset(problem, motion) if grows else 0.0
 
     def marched(way: float) -> March:
         knocks = {onset: way * bend} if onset > 0.0 else None
