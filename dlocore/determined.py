@@ -102,21 +102,30 @@ def bend_in_words(problem: Problem, moved: float) -> str:
     return f"a cable bent by a millionth of the length, {bend}, goes elsewhere by up to {moved * 1e3:.2g} mm"
 
 
-def _hardly_bent(start: StartCurve) -> bool:
-    """Tell whether a start is nearly straight, and not quite: too little decides on the side to which it buckles."""
+def bend_of(start: StartCurve) -> float:
+    """Return how far a start lies from the line between its ends, of its length; infinite where these meet."""
     ways = start.control_points - start.control_points[0]
     chord = ways[-1]
-    if start.bow or len(ways) <= DEGREE + 1 or not chord @ chord > 0.0:
+    return off_line(ways, chord) / float(start.knots[-1]) if chord @ chord > 0.0 else np.inf
+
+
+def _hardly_bent(start: StartCurve) -> bool:
+    """Tell whether a start is nearly straight, and not quite: too little decides on the side to which it buckles."""
+    if start.bow or len(start.control_points) <= DEGREE + 1:
         return False
-    return FLATNESS < off_line(ways, chord) / float(start.knots[-1]) < _HARDLY
+    return FLATNESS < bend_of(start) < _HARDLY
 
 
 def may_grow(problem: Problem, motion: March) -> bool:
     """Tell whether a disturbance may grow by much in a motion, as tangents of some states tell (eq. 18a)."""
-    growth = motion.growth
-    if growth is None:
-        growth = sum(float(rates.mean() * (times[-1] - times[0])) for times, rates in _rates(problem, motion))
-    return growth > _GROWTH
+    return growth_of(problem, motion) > _GROWTH
+
+
+def growth_of(problem: Problem, motion: March) -> float:
+    """Return the logarithm of what a disturbance grows by at most in a motion, about."""
+    if motion.growth is not None:
+        return motion.growth
+    return sum(float(rates.mean() * (times[-1] - times[0])) for times, rates in _rates(problem, motion))
 
 
 def _onset(problem: Problem, motion: March) -> float:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dlocore.bands import dense_of
 from dlocore.buckling import BOW, GROWTH, UNSTABLE
+from dlocore.determined import bend_of
 from dlocore.discretisation import grid_on, plane_curvature_of
 from dlocore.effects import laws
 from dlocore.events import closed_grasps
@@ -28,6 +29,8 @@ from dlocore.solvers.march import March
 Floats = NDArray[np.float64]
 
 _FLAT = 1e-6  # of the length: so near to a plane a motion is planar, but for rounding
+_STRAIGHT = 1e-2  # of the length: a start no farther from a line buckles, where it is pushed, within some steps
+_LOOKS_AT_STRAIGHT = 64  # states of its motion that are looked at, at least
 _NEUTRAL = 1e-8  # of the largest stiffness: what rounding leaves of none
 _COLUMN, _BELOW = np.array([(j, o) for j in range(4) for o in range(4 - j)]).T  # of a lower triangle (4, 4)
 WITH_TWIST = "with effects.twist on or auto"  # a way to have a motion leave its plane
@@ -44,7 +47,7 @@ def leaves_plane(problem: Problem, motion: March) -> bool:
         return False
     if problem.scene.shape.settle and is_unstable(problem, grid, grid.start, 0.0, grid.history.memory[:, 0]):
         return True
-    looks = looked_at(len(motion.times) - 1, LOOKS)
+    looks = looked_at(len(motion.times) - 1, _LOOKS_AT_STRAIGHT if bend_of(problem.start) < _STRAIGHT else LOOKS)
     density, drag = problem.scene.cable.linear_density, problem.drag_coefficient()
     slowest = GROWTH / problem.horizon  # [1/s]: rate of growth that matters
     slack = density * slowest**2 + drag * slowest

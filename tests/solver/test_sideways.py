@@ -129,6 +129,20 @@ def test_a_cable_that_stands_falls_out_of_its_plane_however_slowly_its_foot_is_c
     assert np.abs(found.surface.positions([1.0], [2.5, duration])[:, 0, 1]).max() > 0.1
 
 
+def test_scene_99_719_leaves_its_plane_on_coarse_grids_too() -> None:
+    """A rod that is straight to 63 um is pushed along itself: it buckles within six of 155 steps."""
+    scene = draw(99, 719).make()
+    u, t = np.linspace(0.0, scene.cable.length, 33), np.linspace(0.0, scene.horizon or 0.0, 17)
+    coarse, fine = (
+        predict(replace(scene, quality=Quality(target_error=share * scene.cable.length))) for share in (6.5e-3, 5e-4)
+    )
+    for found in (coarse, fine):
+        assert found.status == "converged", found.message
+        assert UNSTABLE in found.message
+    apart = coarse.surface.positions(u, t) - fine.surface.positions(u, t)
+    assert np.linalg.norm(apart, axis=-1).max() < 6.5e-3 * scene.cable.length
+
+
 @pytest.mark.parametrize("last", [0, 5, 440, 1000, 30_000])
 def test_a_motion_is_looked_at_six_times_and_however_long_it_is_every_so_many_steps(last: int) -> None:
     at = looked_at(last, LOOKS)
