@@ -118,14 +118,10 @@ def _hardly_bent(start: StartCurve) -> bool:
 
 def may_grow(problem: Problem, motion: March) -> bool:
     """Tell whether a disturbance may grow by much in a motion, as tangents of some states tell (eq. 18a)."""
-    return growth_of(problem, motion) > _GROWTH
-
-
-def growth_of(problem: Problem, motion: March) -> float:
-    """Return the logarithm of what a disturbance grows by at most in a motion, about."""
-    if motion.growth is not None:
-        return motion.growth
-    return sum(float(rates.mean() * (times[-1] - times[0])) for times, rates in _rates(problem, motion))
+    growth = motion.growth
+    if growth is None:
+        growth = sum(float(rates.mean() * (times[-1] - times[0])) for times, rates in _rates(problem, motion))
+    return growth > _GROWTH
 
 
 def _onset(problem: Problem, motion: March) -> float:
