@@ -69,11 +69,13 @@ def goes_astray(problem: Problem, motion: March, monitor: Monitor, hard: bool) -
         )
 
     plain = marched(0.0) if onset > 0.0 else motion  # in the same steps, of which some begin at the onset
+    if plain.stopped:
+        return 0.0
     at = np.unique(np.linspace(0, len(plain.states) - 1, _COMPARED).round().astype(int))
 
     def moved(way: float) -> float:
         other = marched(way)
-        if other.stopped or plain.stopped:
+        if other.stopped:
             return 0.0
         apart = (other.states[at] - plain.states[at])[..., : problem.plane.dimensions]
         return float(np.linalg.norm(apart, axis=-1).max())

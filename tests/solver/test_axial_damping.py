@@ -98,7 +98,7 @@ def test_motions_after_a_jump_or_a_release_of_an_undamped_cable_converge(seed, i
     # a micrometre takes 2:132 by 3 mm elsewhere on its way, no success for its target: its grids agree all the same
     parts = found.accuracy.error_parts
     assert sum(parts.values()) - parts.get("start", 0.0) <= (target or AUTO_ENOUGH * scene.cable.length)
-    assert found.status == "converged" or "start" in parts, found.message
+    assert found.status == "converged" or ((seed, index) == (2, 132) and "start" in parts), found.message
 
 
 def test_the_first_step_after_a_jump_of_velocity_is_not_led_astray_by_the_acceleration_of_that_instant():

@@ -54,10 +54,10 @@ def test_no_states_are_added_to_so_many_that_they_fill_memory(monkeypatch: pytes
 def over_a_bar() -> Scene:
     """Return the cable of the catalogue that is lowered over a bar, off to one side: its sections turn."""
     scene = catalogue()["lowered over a bar"]
-    (still, moved) = scene.grasps
-    assert isinstance(moved.path, Move)
-    aside = replace(moved.path, displacement=np.add(moved.path.displacement, [0.0, 0.05, 0.0]))
-    return replace(scene, grasps=(still, replace(moved, path=aside)))
+    first, last = scene.grasps
+    assert isinstance(last.path, Move)
+    aside = replace(last.path, displacement=np.add(last.path.displacement, [0.0, 0.05, 0.0]))
+    return replace(scene, grasps=(first, replace(last, path=aside)))
 
 
 @pytest.mark.parametrize("scene", [over_a_bar(), catalogue()["laid into a bin"]], ids=["over a bar", "into a bin"])
