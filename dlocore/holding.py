@@ -1,6 +1,7 @@
 """What grasps hold: their rows solved for pivot control points (docs/model.md eq. 11, 12), and the turn of clamps."""
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 from dlocore.grid import Grid
 from dlocore.kernels.banded import Elimination
 from dlocore.kernels.holding import ROW, hold_rows, place, spun
-from dlocore.paths import Still
+from dlocore.paths import STAYS
 from dlocore.plane import unit_across
 from dlocore.problem import Problem
 from dlocore.scene import Grasp
@@ -50,8 +51,6 @@ class Held:
 
 
 SMOOTH = (-1, 1)  # the row of no grasp
-_STILL = Still().line
-_NOWHERE = np.empty(0)
 Starts = dict[Grasp, Floats]  # point and unit tangent (2, 3) in the world where the path of a grasp begins
 
 
@@ -78,15 +77,17 @@ def hold(problem: Problem, grid: Grid, grasps: list[Grasp], t: Floats, starts: S
     """
     rows, table, sampled = constraint_rows(grasps, t, starts)
     turned = tuple(i for i, g in enumerate(grasps) if g.hold == "clamp") if problem.twist is not None else ()
-    places, angles = _NOWHERE, np.empty((len(t), len(turned)))
-    if problem.twist is not None and turned:
-        places = np.array([grasps[i].u for i in turned])
-        for r, i in enumerate(turned):
-            g = grasps[i]
-            angles[:, r] = grid.at(q, g.u)[3] + problem.twist.radius * spin_of(g, t, starts[g][1])
+    clamps, spins = np.empty((len(turned), 2), np.int64), list[Floats]()
+    for r, i in enumerate(turned):
+        g = grasps[i]
+        clamps[r] = rows.index((i, 1)), -1
+        if g.path.turn is None:
+            clamps[r, 1] = len(spins)
+            spins.append(spin_of(g, t, starts[g][1]))
     elimination, offsets, inverse, turned_inverse = hold_rows(
-        grid.knots, problem.nc, t, table, sampled, problem.plane.origin, problem.plane.axes, places, angles
-    )
+        grid.knots, problem.nc, t, table, sampled, problem.plane.origin, problem.plane.axes, clamps,
+        np.array(spins).reshape(-1, len(t)), q, 1.0 if problem.twist is None else problem.twist.radius,
+    )  # fmt: skip
     rows += (SMOOTH,) * (len(inverse) - len(rows))
     return Held(tuple(grasps), elimination, offsets, rows, inverse, turned, turned_inverse)
 
@@ -104,29 +105,27 @@ def constraint_rows(
         begun, directed = starts[g].tolist(), g.hold != "point"
         line, number = g.path.line, -1
         if line is None:
-            line, number = _STILL, len(sampled)
+            line, number = STAYS, len(sampled)
             sampled.append(g.path.at(t - g.start, starts[g][0]))
         rows.append((i, 0))
         table.append((g.u, 0, directed, number, g.start, *line, *begun[0]))
         if directed:
-            turns, number = g.path.rotation_at(t - g.start), -1
-            if turns is not None:
-                number = len(sampled)
-                sampled.append(turns @ starts[g][1])
+            turn, number = g.path.turn, -1
+            if turn is None:
+                turn, number = STAYS, len(sampled)
+                sampled.append(cast(Floats, g.path.rotation_at(t - g.start)) @ starts[g][1])
             rows.append((i, 1))
-            table.append((g.u, 1, directed, number, g.start, *_STILL, *begun[1]))
+            table.append((g.u, 1, directed, number, g.start, *turn, *begun[1]))
     return tuple(rows), np.array(table).reshape(-1, ROW), np.array(sampled).reshape(-1, len(t), 3)
 
 
 def spin_of(grasp: Grasp, t: Floats, direction: Floats) -> Floats:
-    """Return how much a gripper has turned about the cable since t[0], at the times t (k,) [s]; (k,) [rad].
+    """Return how much a gripper that turns has turned about the cable since t[0], at the times t (k,) [s]; (k,) [rad].
 
     It is measured against a frame that the smallest rotations carry from each of the tangents to the next, of which
     `direction` (3,) is that where the path begins, and counts full turns.
     """
-    turns = grasp.path.rotation_at(t - grasp.start)
-    if turns is None:
-        return np.zeros(len(t))
+    turns = cast(Floats, grasp.path.rotation_at(t - grasp.start))
     across = turns[0].T @ unit_across(turns[0] @ direction)  # a director, fixed in the gripper
     tangents = turns @ direction
     return np.asarray(spun(tangents, turns @ across, grasp.path.spin(t - grasp.start, tangents)))

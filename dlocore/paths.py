@@ -23,6 +23,7 @@ _PROFILES: dict[str, tuple[float, ...]] = {
     "cubic": (0.0, 3.0, -2.0, 0.0, 0.0),
 }
 MAX_WAYPOINTS = 100_000
+STAYS = (1.0, *_PROFILES["linear"], 0.0, 0.0, 0.0)  # a straight move, or a turn about one axis, that is none
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,7 +38,12 @@ class Still:
     @property
     def line(self) -> tuple[float, ...]:
         """Duration, profile and displacement of a straight move."""
-        return (1.0, *_PROFILES["linear"], 0.0, 0.0, 0.0)
+        return STAYS
+
+    @property
+    def turn(self) -> tuple[float, ...]:
+        """Duration, profile and rotation vector of a turn about one axis."""
+        return STAYS
 
     def at(self, t: Floats, start: Floats) -> Floats:
         """Positions at times `t` (k,) [s] of a grasp that began at `start` (3,) [m]; (k, 3) [m]."""
@@ -76,6 +82,13 @@ class Move:
     def line(self) -> tuple[float, ...]:
         """Duration [s], coefficients of x to x^5 of the profile, and displacement [m] of a straight move."""
         return (self.duration, *_PROFILES[self.profile], *cast(Floats, self.displacement).tolist())
+
+    @property
+    def turn(self) -> tuple[float, ...]:
+        """Duration [s], coefficients of x to x^5 of the profile, and rotation vector [rad] of a turn about one axis."""
+        if self.rotation is None:
+            return STAYS
+        return (self.duration, *_PROFILES[self.profile], *cast(Floats, self.rotation).tolist())
 
     def _share(self, t: Floats) -> Floats:
         """Return the share of the way that is done at times `t` (k,) [s]."""
@@ -167,6 +180,11 @@ class Waypoints:
     @property
     def line(self) -> None:
         """None: no straight move."""
+
+    @property
+    def turn(self) -> tuple[float, ...] | None:
+        """None where the grasp turns: about no one axis."""
+        return STAYS if self.orientations is None else None
 
     def _clip(self, t: Floats) -> Floats:
         times = cast(Floats, self.times)

@@ -14,7 +14,6 @@ from dlocore.shape import StartCurve
 Floats = NDArray[np.float64]
 
 FLATNESS = 1e-9  # of the length: a start and a motion this close to a plane are planar
-_BEGINNING = np.zeros(1)  # [s]
 _ALONG = np.array([1.0, 0.0, 0.0])  # of no vector at all
 _SEEN = 0.005, 0.02  # [m] and of the length: points seen this close to the table lie on it
 
@@ -229,7 +228,7 @@ def _normal_of(vectors: Floats) -> Floats:
 
 def _turns(path: Path, times: int) -> Floats | None:
     """Return the rotations (times, 3, 3) of a path at evenly spaced times, or None where it never turns."""
-    if path.rotation_at(_BEGINNING) is None:
+    if path.turn is not None and not any(path.turn[6:]):
         return None
     return path.rotation_at(np.linspace(0.0, path.duration, times))
 

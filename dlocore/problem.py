@@ -20,7 +20,6 @@ from dlocore.effects.drag import LinearDrag, QuadraticDrag
 from dlocore.effects.friction import Friction, slip_of
 from dlocore.effects.gravity import Gravity
 from dlocore.effects.inertia import Inertia
-from dlocore.effects.laws import keeps_curvature, keeps_history
 from dlocore.effects.plasticity import BendingMemory, StretchMemory, TwistMemory
 from dlocore.effects.selfcontact import SelfContact
 from dlocore.effects.stretch import Stretch, StretchDamping
@@ -189,12 +188,12 @@ class Problem:
     @cached_property
     def keeps_history(self) -> bool:
         """Whether a law reads what earlier steps left behind."""
-        return bool(keeps_history(self.laws[0]))
+        return bool(self.laws[0][list(laws.READ_HISTORY)].any())
 
     @cached_property
     def keeps_curvature(self) -> bool:
         """Whether a law reads the curvature or the frames of earlier steps."""
-        return bool(keeps_curvature(self.laws[0]))
+        return bool(self.laws[0][list(laws.READ_CURVATURE)].any())
 
     @cached_property
     def laws(self) -> tuple[NDArray[np.int64], Floats]:

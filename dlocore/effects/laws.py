@@ -23,6 +23,10 @@ from dlocore.kernels.compile import law
 COUNT = 14  # of compiled laws
 PARAMETERS = ROW  # room for parameters of one law, or for an obstacle
 
+# what reads the curvature or the frames of earlier steps, and what reads anything that earlier steps left behind
+READ_CURVATURE = (DAMPING, TWIST, BENDING_MEMORY)
+READ_HISTORY = (*READ_CURVATURE, STRETCH_MEMORY, STRETCH_DAMPING, FRICTION, CONTACT)
+
 _NO_VECTOR = (0.0, 0.0, 0.0)
 _NO_TANGENT = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -30,19 +34,19 @@ _NO_TANGENT = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 @law
 def keeps_curvature(active: Any) -> bool:
     """Tell whether a law reads the curvature or the frames of earlier steps."""
-    return bool(active[DAMPING] or active[TWIST] or active[BENDING_MEMORY])
+    acting = 0
+    for row in READ_CURVATURE:
+        acting += active[row]
+    return acting > 0
 
 
 @law
 def keeps_history(active: Any) -> bool:
     """Tell whether a law reads what earlier steps left behind."""
-    return bool(
-        keeps_curvature(active)
-        or active[STRETCH_MEMORY]
-        or active[STRETCH_DAMPING]
-        or active[FRICTION]
-        or active[CONTACT]
-    )
+    acting = 0
+    for row in READ_HISTORY:
+        acting += active[row]
+    return acting > 0
 
 
 @law

@@ -35,8 +35,9 @@ def place(knots: Any, control: Any, u: float, dimensions: int) -> Any:
 
 @brief
 def hold_rows(
-    knots: Any, nc: int, times: Any, rows: Any, sampled: Any, origin: Any, axes: Any, turned: Any, angles: Any
-) -> Any:
+    knots: Any, nc: int, times: Any, rows: Any, sampled: Any, origin: Any, axes: Any, clamps: Any, spins: Any, q: Any,
+    radius: float,
+) -> Any:  # fmt: skip
     """Solve what grasps hold for one control point each (docs/model.md eq. 11, 12).
 
     At a triple knot inside a spline may have a kink. The angle of the sections has one, where a gripper turns them or
@@ -48,17 +49,21 @@ def hold_rows(
         nc: number of coordinates of a control point.
         times: (k,) [s].
         rows: (r, ROW) what acts on every coordinate of the centreline: where [m], whether it is a direction, whether
-            its grasp holds the direction, the number of its path in `sampled` or -1, begin [s], the straight move
-            (`dlocore.paths.Move.line`: duration [s], profile (5) and displacement (3)) and value at the beginning (3)
-            in the world. `dlocore/holding.py` writes them.
-        sampled: (m, k, 3) points [m] or unit tangents over time of paths that are no straight moves, in the world.
+            its grasp holds the direction, the number of its path in `sampled` or -1, begin [s], the straight move of
+            a point or the turn about one axis of a direction (`dlocore.paths.Move.line` and `turn`: duration [s],
+            profile (5), and displacement [m] or rotation vector [rad] (3)) and value at the beginning (3) in the world.
+            `dlocore/holding.py` writes them.
+        sampled: (m, k, 3) points [m] or unit tangents over time of other paths, in the world.
         origin, axes: (3,) [m] and (dimensions, 3), of the coordinates of the solve.
-        turned: (m,) [m] where the angle of the section is held.
-        angles: (k, m) [m] the fourth coordinate there.
+        clamps: (c, 2) which of the rows holds the direction where the angle of the section is held, too, and the number
+            of its spin in `spins` or -1.
+        spins: (m, k) [rad] how much a gripper has turned about the cable since the first of the times, of other paths.
+        q: (n, nc) the state at the first of the times, whose angles the sections have there.
+        radius: of the fourth coordinate [m], which is an angle times that.
 
     Returns:
         The `Elimination`, the prescribed part (k, held) [m] of the held degrees of freedom, and the inverses (rows,
-        rows) and (m, m) of the rows' pivot blocks; rows are those given, then one for each triple knot.
+        rows) and (c, c) of the rows' pivot blocks; rows are those given, then one for each triple knot.
     """
     given, nd = len(rows), len(axes)
     kinks = _triple_knots(knots)
@@ -68,6 +73,9 @@ def hold_rows(
     for r in range(given):
         u[r], order[r], first[r] = rows[r, 0], int(rows[r, 1]), rows[r, 2]
     pivots, inverse, follow = _solved_for(knots, u, order, first)
+    turned = np.empty(len(clamps))
+    for r in range(len(clamps)):
+        turned[r] = rows[clamps[r, 0], 0]
     none = np.zeros(len(turned))
     turned_pivots, turned_inverse, turned_follow = _solved_for(knots, turned, np.zeros(len(turned), np.int64), none)
     offsets = np.zeros((len(times), count * nd + len(turned)))
@@ -75,22 +83,86 @@ def hold_rows(
     for s in range(given):
         row = rows[s]
         for k in range(len(times)):
-            x = min(max((times[k] - row[4]) / row[5], 0.0), 1.0)
-            done = x * (row[6] + x * (row[7] + x * (row[8] + x * (row[9] + x * row[10]))))
-            for i in range(3):
-                target[i] = sampled[int(row[3]), k, i] if row[3] >= 0.0 else row[14 + i] + done * row[11 + i]
-                if row[1] == 0.0:
+            if row[3] >= 0.0:
+                for i in range(3):
+                    target[i] = sampled[int(row[3]), k, i]
+            elif row[1] == 0.0:
+                done = _done(row, times[k])
+                for i in range(3):
+                    target[i] = row[14 + i] + done * row[11 + i]
+            else:
+                target[0], target[1], target[2] = _turned(row, _done(row, times[k]), (row[14], row[15], row[16]))
+            if row[1] == 0.0:
+                for i in range(3):
                     target[i] -= origin[i]
             for d in range(nd):
                 value = target[0] * axes[d, 0] + target[1] * axes[d, 1] + target[2] * axes[d, 2]
                 for r in range(count):
                     offsets[k, r * nd + d] += inverse[r, s] * value
+    table = np.empty((2, 4))
     for s in range(len(turned)):
+        span = find_span(knots, turned[s])
+        basis(knots, span, turned[s], 0, table)
+        begun = 0.0
+        for i in range(4):
+            begun += table[0, i] * q[span - 3 + i, nc - 1]
+        spin = spins[clamps[s, 1]] if clamps[s, 1] >= 0 else _spin_of(rows[clamps[s, 0]], times)
         for r in range(len(turned)):
             for k in range(len(times)):
-                offsets[k, count * nd + r] += turned_inverse[r, s] * angles[k, s]
+                offsets[k, count * nd + r] += turned_inverse[r, s] * (begun + radius * spin[k])
     e = elimination(len(knots) - 4, nc, nd, pivots, follow, turned_pivots, turned_follow)
     return e, offsets, inverse, turned_inverse
+
+
+@law
+def _done(row: Any, t: float) -> float:
+    """Return the share of its way that the path of a row, of those of `hold_rows`, has done at time t [s]."""
+    x = min(max((t - row[4]) / row[5], 0.0), 1.0)
+    return float(x * (row[6] + x * (row[7] + x * (row[8] + x * (row[9] + x * row[10])))))
+
+
+@law
+def _turned(row: Any, done: float, x: Vector) -> Vector:
+    """Return x turned by a share of the rotation of a row, of those of `hold_rows` (Rodrigues)."""
+    full = np.sqrt(row[11] * row[11] + row[12] * row[12] + row[13] * row[13])
+    if full == 0.0:
+        return x
+    n = (row[11] / full, row[12] / full, row[13] / full)
+    sine, half = np.sin(done * full), np.sin(0.5 * done * full)
+    y = _cross(n, x)
+    z = _cross(n, y)
+    versine = 2.0 * half * half
+    return (
+        x[0] + sine * y[0] + versine * z[0],
+        x[1] + sine * y[1] + versine * z[1],
+        x[2] + sine * y[2] + versine * z[2],
+    )
+
+
+@kernel
+def _spin_of(row: Any, times: Any) -> Any:
+    """Return by how much a gripper has turned about the cable at `times`, by its row of `hold_rows`; see `spun`.
+
+    It turns about one axis, to which the angle of the tangent stays.
+    """
+    tangent = (row[14], row[15], row[16])
+    about = row[11] * tangent[0] + row[12] * tangent[1] + row[13] * tangent[2]
+    least = min(abs(tangent[0]), abs(tangent[1]), abs(tangent[2]))
+    k = 0 if abs(tangent[0]) == least else 1 if abs(tangent[1]) == least else 2
+    across = _cross(tangent, (1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2)))
+    size = np.sqrt(across[0] * across[0] + across[1] * across[1] + across[2] * across[2])
+    director = (across[0] / size, across[1] / size, across[2] / size)
+    tangents, directors = np.empty((len(times), 3)), np.empty((len(times), 3))
+    expected = np.empty(max(len(times) - 1, 0))
+    before = 0.0
+    for k in range(len(times)):
+        done = _done(row, times[k])
+        tangents[k, 0], tangents[k, 1], tangents[k, 2] = _turned(row, done, tangent)
+        directors[k, 0], directors[k, 1], directors[k, 2] = _turned(row, done, director)
+        if k > 0:
+            expected[k - 1] = (done - before) * about
+        before = done
+    return spun(tangents, directors, expected)
 
 
 @brief
@@ -120,6 +192,12 @@ def spun(tangents: Any, directors: Any, expected: Any) -> Any:
 def _row(x: Any, k: int) -> Vector:
     """Return a row of x (k, 3)."""
     return x[k, 0], x[k, 1], x[k, 2]
+
+
+@law
+def _cross(a: Vector, b: Vector) -> Vector:
+    """Return a x b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @kernel

@@ -75,8 +75,10 @@ def smooth_motion(
     )
     if keeps_history(active):
         remember_start(axes, start, tables, active, p, history)
-    nowhere, unturned = np.empty(0), np.empty((len(times), 0))
-    e, offsets, _, _ = hold_rows(knots, nc, times, rows, sampled, origin, directions, nowhere, unturned)
+    no_clamps, no_spins = np.empty((0, 2), np.int64), np.empty((0, len(times)))
+    e, offsets, _, _ = hold_rows(
+        knots, nc, times, rows, sampled, origin, directions, no_clamps, no_spins, start, 1.0
+    )  # fmt: skip
     load = np.empty((1, n, nc))
     for i in range(n):
         for d in range(nc):

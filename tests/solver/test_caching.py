@@ -25,6 +25,25 @@ for kind in sys.argv[3:]:
     print(function(np.ones(2, kind)).dtype)
     print(sum(function.stats.cache_hits.values()), sum(function.stats.cache_misses.values()))
 """
+# What is compiled as a scene is solved whose code is all there.
+SOLVE = """
+from numba.core import event
+
+class Told(event.Listener):
+    def on_start(self, compiled):
+        print(compiled.data["dispatcher"].py_func.__qualname__)
+
+    def on_end(self, compiled):
+        pass
+
+event.register("numba:compile", Told())
+from dlocore import Cable, Environment, Grasp, Move, Quality, Scene, Straight, Table, predict
+clamps = Grasp(u=0.0, hold="clamp"), Grasp(u=1.0, hold="clamp", path=Move(displacement=(-0.1, 0.1, 0.0), duration=1.0))
+quality = Quality(n_u=9, n_t=9, method="march")
+for table in (None, Table()):
+    around = Environment(table=table)
+    predict(Scene(cable=Cable.preset("paper"), shape=Straight(), grasps=clamps, environment=around, quality=quality))
+"""
 
 
 def compiled(folder: Path, source: str, *kinds: str) -> "subprocess.Popen[str]":
@@ -43,6 +62,14 @@ def test_processes_that_compile_a_function_at_once_each_find_their_own_code(tmp_
     assert said.split() == ["True", *(word for k, kind in enumerate(kinds, 1) for word in (kind, str(k), "0"))]
     said, _ = compiled(tmp_path, "b", "float64").communicate(timeout=120)  # of another source nothing is kept
     assert said.split() == ["False", "float64", "0", "1"]
+
+
+def test_a_fresh_process_compiles_nothing_that_another_has_compiled() -> None:
+    for _ in range(2):
+        said = subprocess.run(
+            [sys.executable, "-c", SOLVE], cwd=ROOT, capture_output=True, text=True, check=True
+        ).stdout
+    assert said.split() == []
 
 
 def test_what_is_saved_at_once_is_not_mixed_up(tmp_path: Path) -> None:

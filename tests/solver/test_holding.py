@@ -92,6 +92,46 @@ def test_a_move_turns_about_its_rotation_vector():
         np.testing.assert_allclose(found, known, atol=20 * ROUNDING)
 
 
+TURNED = {
+    "still": Still(),
+    "moves": Move(displacement=WAY, duration=0.8),
+    "about no axis": Move(displacement=WAY, duration=0.8, rotation=(0.0, 0.0, 0.0)),
+    "about the cable": Move(displacement=WAY, duration=0.8, rotation=(0.7, 0.0, 0.0)),
+    "three times about the cable": Move(displacement=WAY, duration=1.0, rotation=(6.0 * np.pi, 0.0, 0.0)),
+    "about another axis": Move(displacement=WAY, duration=1.0, rotation=(5.0, -7.0, 4.0), profile="cubic"),
+    "waypoints": replace(
+        PATHS["waypoints"], orientations=[[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 0.0, 0.0], [0.0, 0.6, 0.8, 0.0]]
+    ),
+}
+
+
+@pytest.mark.parametrize("path", TURNED.values(), ids=TURNED.keys())
+@pytest.mark.parametrize("begin", [0.0, 0.1])
+def test_a_clamp_turns_the_section_as_its_gripper_turns_about_the_cable(path, begin):
+    clamps = Grasp(u=0.5, hold="clamp", path=path, grasp_time=begin), Grasp(u=0.9, hold="clamp")
+    problem, grid, _ = held_in(replace(scene(*clamps), effects={"twist": "on"}))
+    random = np.random.default_rng(4)
+    state, times = random.standard_normal(grid.start.shape), np.linspace(0.1, 1.4, 27)
+    starts: Starts = {}
+    close_grasps(problem, grid, list(clamps), starts, None)
+    held = hold(problem, grid, list(clamps), times, starts, state)
+    turns = [np.eye(3)] * len(times) if path.rotation_at(times) is None else path.rotation_at(times - begin)
+    tangent, director, spin = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), 0.0
+    for k, turn in enumerate(turns):
+        q = random.standard_normal(grid.start.shape)
+        place_rows(held.elimination, held.offsets[k : k + 1], q[None], 0)
+        if k > 0:  # carried from the last tangent to this one by the smallest rotation
+            before, now = turns[k - 1] @ tangent, turn @ tangent
+            across = np.cross(before, now)
+            sine = np.linalg.norm(across)
+            least = Rotation.from_rotvec(across / (sine or 1.0) * np.arctan2(sine, before @ now))
+            last = least.apply(turns[k - 1] @ director)
+            spin += np.arctan2(np.cross(last, turn @ director) @ now, last @ turn @ director)
+        wanted = grid.at(state, 0.5)[3] + problem.twist.radius * spin
+        assert abs(grid.at(q, 0.5)[3] - wanted) < 100 * ROUNDING
+        assert abs(grid.at(q, 0.9)[3] - grid.at(state, 0.9)[3]) < ROUNDING
+
+
 def test_in_the_plane_rows_hold_in_its_coordinates():
     path = Move(displacement=(-0.1, 0.2, 0.0), duration=1.0)
     problem, grid, held = held_in(scene(Grasp(u=0.3, hold="tangent"), Grasp(u=0.7, path=path), planar=True))
