@@ -96,9 +96,11 @@ def test_a_picture_of_the_scene_is_saved_larger_than_it_is_on_the_screen(service
 def test_a_click_on_the_cable_takes_hold_of_it_there(service, witness):
     page = open_scene(witness, service)
     page.get_by_role("button", name="Pause").click()
+    page.get_by_role("button", name="Play", exact=True).wait_for()  # no time of the playback comes after that
     time = page.locator("input[type=text]").first
     time.fill("0")
     time.press("Enter")
+    expect(time).to_have_value("0")
     grasp = field(page, "Grasp u [m]")
     expect(grasp).to_have_value("0.25")
     give_up = monotonic() + PATIENCE
