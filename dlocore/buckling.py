@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dlocore.effects.distance import distances
 from dlocore.events import closed_grasps
 from dlocore.paths import Move, Path, Still
-from dlocore.plane import FLATNESS, is_straight, leftwards, lies_on, natural_points, off_line
+from dlocore.plane import FLATNESS, is_straight, leftwards, lies_on, natural_points, off_line, turns_of
 from dlocore.scene import Grasp, Scene
 from dlocore.shape import StartCurve, fit_to_knots
 from dlocore.spline import greville
@@ -184,7 +184,7 @@ def _aside(path: Path, u: float, start: StartCurve, along: Floats, length: float
         from_start = path.at(np.linspace(0.0, path.duration, _TIMES), start(u)[0]) - start(u)[0]
         if off_line(from_start, along) > flat * length:
             return True
-    turns = path.rotation_at(np.linspace(0.0, path.duration, _TIMES))
+    turns = turns_of(path, _TIMES)
     return turns is not None and bool(np.abs(turns @ along - along).max() > flat)
 
 

@@ -111,7 +111,7 @@ def off_the_table(scene: Scene, start: StartCurve, met: tuple[int, ...]) -> str:
             return "a grasp lifts the cable off it"
         if isinstance(path, Waypoints) and np.ptp(cast(Floats, path.positions)[:, 2]) > 0:
             return "a grasp lifts the cable off it"
-        turns = _turns(path, 9)
+        turns = turns_of(path, 9)
         if turns is not None and np.abs(turns[:, 2, :2]).max() > 1e-9:
             return "a grasp turns the cable off its plane"
     for load in scene.loads:
@@ -198,7 +198,7 @@ def flat_plane(scene: Scene, start: StartCurve, *, still: bool = False) -> Plane
         return Plane(np.eye(3), origin, "start, motion and forces do not lie in one plane")
     flat_turns = True
     for grasp in () if still else scene.grasps:
-        turns = _turns(grasp.path, 33)
+        turns = turns_of(grasp.path, 33)
         if turns is not None and np.abs(turns @ normal - normal).max() > 1e-9:
             flat_turns = False
     if not flat_turns:
@@ -226,7 +226,7 @@ def _normal_of(vectors: Floats) -> Floats:
     return normal / math.sqrt(normal @ normal)
 
 
-def _turns(path: Path, times: int) -> Floats | None:
+def turns_of(path: Path, times: int) -> Floats | None:
     """Return the rotations (times, 3, 3) of a path at evenly spaced times, or None where it never turns."""
     if path.turn is not None and not any(path.turn[6:]):
         return None
