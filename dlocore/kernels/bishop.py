@@ -15,7 +15,7 @@ import numpy as np
 
 from dlocore.effects.base import Vector
 from dlocore.kernels.compile import law, leaf
-from dlocore.kernels.strain import transport, vector
+from dlocore.kernels.strain import cross, transport, vector
 
 LENGTH, H, TANGENT, BEND = 0, 1, 2, 5  # columns of `state`
 STATE = 8
@@ -27,14 +27,9 @@ def _dot(a: Vector, b: Vector) -> float:
 
 
 @law
-def _cross(a: Vector, b: Vector) -> Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@law
 def _half_area(a: Vector, b: Vector, c: Vector) -> tuple[float, float]:
     """Return a vector whose angle is half the area of a triangle on the unit sphere."""
-    return 1.0 + _dot(a, b) + _dot(b, c) + _dot(c, a), _dot(a, _cross(b, c))
+    return 1.0 + _dot(a, b) + _dot(b, c) + _dot(c, a), _dot(a, cross(b, c))
 
 
 @law
@@ -71,12 +66,12 @@ def carry(weights: Any, state: Any, past: Any, now: float, last: float, before: 
             last * past[n, 2] + before * past[n, 5],
         )
         bend = transport(t0, t, bend)
-        side = _cross(t, bend)
+        side = cross(t, bend)
         for d in range(3):
             out[n, d] = x * bend[d] + y * side[d]
         bend, kappa = vector(out, n, 0), vector(state, n, BEND)
         along += now * w * _dot(kappa, bend)
-        across += now * w * _dot(kappa, _cross(t, bend))
+        across += now * w * _dot(kappa, cross(t, bend))
         squares += w * (now * now * _dot(kappa, kappa) + _dot(bend, bend))
     if squares == 0.0:
         return
@@ -86,7 +81,7 @@ def carry(weights: Any, state: Any, past: Any, now: float, last: float, before: 
     along, across = along / size, across / size
     for n in range(len(weights)):
         bend = vector(out, n, 0)
-        side = _cross(vector(state, n, TANGENT), bend)
+        side = cross(vector(state, n, TANGENT), bend)
         for d in range(3):
             out[n, d] = along * bend[d] + across * side[d]
 
@@ -113,7 +108,7 @@ def rate_by_velocity(weights: Any, state: Any, turning: Any, rate: Any) -> None:
         if n > 0:
             binormal = _binormal(vector(state, n - 1, TANGENT), t)
             spin -= 0.5 * (_dot(binormal, vector(turning, n - 1, 0)) + _dot(binormal, vector(turning, n, 0)))
-        side = _cross(t, kappa)
+        side = cross(t, kappa)
         for d in range(3):
             rate[n, d] -= spin * side[d]
         across += weights[n] * _dot(side, vector(rate, n, 0))
@@ -122,7 +117,7 @@ def rate_by_velocity(weights: Any, state: Any, turning: Any, rate: Any) -> None:
         return
     spin = across / square
     for n in range(len(weights)):
-        side = _cross(vector(state, n, TANGENT), vector(state, n, BEND))
+        side = cross(vector(state, n, TANGENT), vector(state, n, BEND))
         for d in range(3):
             rate[n, d] -= spin * side[d]
 
@@ -131,7 +126,7 @@ def rate_by_velocity(weights: Any, state: Any, turning: Any, rate: Any) -> None:
 def _binormal(a: Vector, b: Vector) -> Vector:
     """Return 2 a x b/(1 + a . b), about t x kappa times the length between two points."""
     s = 2.0 / (1.0 + _dot(a, b))
-    axis = _cross(a, b)
+    axis = cross(a, b)
     return s * axis[0], s * axis[1], s * axis[2]
 
 
@@ -149,7 +144,7 @@ def torques(weights: Any, state: Any, eta: float, rate: Any, out: Any) -> None:
             for d in range(3):
                 out[n - 1, d] -= 0.5 * torque * binormal[d]
                 out[n, d] -= 0.5 * torque * binormal[d]
-        torque += weights[n] * eta * _dot(vector(rate, n, 0), _cross(t, vector(state, n, BEND)))
+        torque += weights[n] * eta * _dot(vector(rate, n, 0), cross(t, vector(state, n, BEND)))
     for n in range(len(weights)):
         t = vector(state, n, TANGENT)
         along = _dot(vector(out, n, 0), t)

@@ -8,7 +8,7 @@ from dlocore.effects.base import Vector
 from dlocore.kernels.banded import elimination
 from dlocore.kernels.basis import basis, find_span
 from dlocore.kernels.compile import brief, kernel, law
-from dlocore.kernels.strain import transport
+from dlocore.kernels.strain import cross, transport, vector
 
 ROW = 17  # numbers that describe a row
 _JUMP = 2  # in place of a derivative: what the slope jumps by
@@ -129,8 +129,8 @@ def _turned(row: Any, done: float, x: Vector) -> Vector:
         return x
     n = (row[11] / full, row[12] / full, row[13] / full)
     sine, half = np.sin(done * full), np.sin(0.5 * done * full)
-    y = _cross(n, x)
-    z = _cross(n, y)
+    y = cross(n, x)
+    z = cross(n, y)
     versine = 2.0 * half * half
     return (
         x[0] + sine * y[0] + versine * z[0],
@@ -149,7 +149,7 @@ def _spin_of(row: Any, times: Any) -> Any:
     about = row[11] * tangent[0] + row[12] * tangent[1] + row[13] * tangent[2]
     least = min(abs(tangent[0]), abs(tangent[1]), abs(tangent[2]))
     k = 0 if abs(tangent[0]) == least else 1 if abs(tangent[1]) == least else 2
-    across = _cross(tangent, (1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2)))
+    across = cross(tangent, (1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2)))
     size = np.sqrt(across[0] * across[0] + across[1] * across[1] + across[2] * across[2])
     director = (across[0] / size, across[1] / size, across[2] / size)
     tangents, directors = np.empty((len(times), 3)), np.empty((len(times), 3))
@@ -179,25 +179,13 @@ def spun(tangents: Any, directors: Any, expected: Any) -> Any:
     """
     out = np.zeros(len(tangents))
     for k in range(1, len(tangents)):
-        t = _row(tangents, k)
-        x, y = transport(_row(tangents, k - 1), t, _row(directors, k - 1)), _row(directors, k)
+        t = vector(tangents, k, 0)
+        x, y = transport(vector(tangents, k - 1, 0), t, vector(directors, k - 1, 0)), vector(directors, k, 0)
         turned = (x[1] * y[2] - x[2] * y[1]) * t[0] + (x[2] * y[0] - x[0] * y[2]) * t[1]
         turned += (x[0] * y[1] - x[1] * y[0]) * t[2]
         angle = np.arctan2(turned, x[0] * y[0] + x[1] * y[1] + x[2] * y[2])
         out[k] = out[k - 1] + angle + 2.0 * np.pi * np.round((expected[k - 1] - angle) / (2.0 * np.pi))
     return out
-
-
-@law
-def _row(x: Any, k: int) -> Vector:
-    """Return a row of x (k, 3)."""
-    return x[k, 0], x[k, 1], x[k, 2]
-
-
-@law
-def _cross(a: Vector, b: Vector) -> Vector:
-    """Return a x b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @kernel

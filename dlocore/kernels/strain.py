@@ -82,6 +82,12 @@ def space_curvature_rate(length: float, h: float, t: Vector, kappa: Vector, da: 
 
 
 @law
+def cross(a: Vector, b: Vector) -> Vector:
+    """Return a x b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@law
 def transport(t0: Vector, t1: Vector, x: Vector) -> Vector:
     """Return x turned by the smallest rotation that brings the unit vector t0 to t1 (parallel transport)."""
     cosine = t0[0] * t1[0] + t0[1] * t1[1] + t0[2] * t1[2]
