@@ -1,8 +1,8 @@
 """What takes the place of a given grid or of a least squares that fails on it, and what is said of that.
 
 A least squares that was asked for and does not converge is solved once more with more control points in time; where it
-does not converge on them either its march is the answer, as the last resort. A march that can't show the motion on its
-grid is left for finer ones.
+does not converge on them either its march is the answer, as the last resort. A grid on which a motion errs too much, or
+does not come to its end, is left for finer ones.
 """
 
 from collections.abc import Sequence
@@ -24,11 +24,19 @@ _MOST_WORK = 2e9
 def falls_short(found: Prediction) -> bool:
     """Tell whether something else is to be solved in place of an answer on a given grid.
 
-    The printed scheme stays as it is.
+    It is where that is no success, or errs by more than AUTO_ENOUGH of the length as it estimates. The printed scheme
+    stays as it is.
     """
     asked = found.scene.quality
     given = asked.n_u is not None and asked.method != "paper" and found.level is not None
-    return given and found.status not in ("converged", "time_limit")
+    return given and (found.status not in ("converged", "time_limit") or errs(found))
+
+
+def errs(found: Prediction) -> bool:
+    """Tell whether a success errs by more than AUTO_ENOUGH of the length, as it estimates: its grid is too coarse."""
+    error = found.accuracy.error_estimate
+    most = AUTO_ENOUGH * found.scene.cable.length + found.accuracy.neglected  # which finer grids leave as it is
+    return found.status == "converged" and error is not None and error > most
 
 
 def more_in_time(found: Prediction) -> Quality | None:
@@ -63,7 +71,7 @@ def left_before(scene: Scene, solved: Scene) -> str:
     asked, kept = scene.quality, solved.quality
     said = []
     if asked.method == "spacetime" != kept.method:
-        said.append("The least squares that was asked for did not converge before: this is a march.")
+        said.append("The least squares that was asked for was left before: this is a march.")
     if (asked.n_u, asked.n_t) != (kept.n_u, kept.n_t):
         said.append(f"The {asked.n_u} x {asked.n_t} control points that were asked for were left before.")
     return " ".join(said)
@@ -99,11 +107,14 @@ def with_finer(found: Prediction, finer: Prediction | SceneError, spent: float, 
         monitor: that of both solves.
     """
     quality, more = found.scene.quality, monitor.elapsed() - spent
+    estimate = found.accuracy.error_estimate or 0.0
     if isinstance(finer, Prediction) and finer.status == "converged":
         accuracy = finer.accuracy
         error = accuracy.error_estimate
         known = "an error that is not known" if error is None else f"an estimated error of {error * 1e3:.2g} mm"
         failed = "did not converge" if accuracy.method == "spacetime" else "could not show the motion"
+        if errs(found):
+            failed = f"err by an estimated {estimate * 1e3:.2g} mm"
         said = (
             f"{finer.said} The {quality.n_u} x {quality.n_t} control points that were asked for {failed}, which took "
             f"{spent * 1e3:.0f} ms to find: {found.said} This is the answer on {accuracy.n_u} x {accuracy.n_t}, with "
@@ -111,9 +122,11 @@ def with_finer(found: Prediction, finer: Prediction | SceneError, spent: float, 
         )
         return replace(finer, scene=found.scene, said=said)
     reason = str(finer) if isinstance(finer, SceneError) else finer.said
+    short = f", as it errs by an estimated {estimate * 1e3:.2g} mm, and do not converge" if errs(found) else ""
+    tried = f"Finer grids were tried for {more * 1e3:.0f} ms{short or ' and do not converge either'}: {reason}"
     return replace(
         found,
-        said=f"{found.said} Finer grids were tried for {more * 1e3:.0f} ms and do not converge either: {reason}",
+        said=f"{found.said} {tried}",
         iterations=tuple(monitor.iterations),
         accuracy=replace(found.accuracy, wall_time=monitor.elapsed(), phases=dict(monitor.phases)),
     )

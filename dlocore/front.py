@@ -12,7 +12,16 @@ from dlocore.companion import by_coarser, by_finer
 from dlocore.cost import Cost
 from dlocore.errors import SceneError
 from dlocore.events import smallest_n_t
-from dlocore.fallback import as_marched, by_march, falls_short, free_grids, left_before, more_in_time, with_finer
+from dlocore.fallback import (
+    as_marched,
+    by_march,
+    errs,
+    falls_short,
+    free_grids,
+    left_before,
+    more_in_time,
+    with_finer,
+)
 from dlocore.frames import material_of
 from dlocore.given import evenly_fitted, given_status, march_given
 from dlocore.prediction import Accuracy, GraspReaction, MaterialMotion, OnIteration, Prediction, Status
@@ -55,9 +64,9 @@ def predict(
         cancelled: asked between iterations; where it returns True the solve stops.
         cost: what solves cost on this machine (`dlocore.calibration.stored_cost`), by which a time budget begins with a
             grid that fits; without it with the coarsest.
-        keep_grid: answer on a given grid (n_u and n_t), and by a least squares that was asked for, also where it can't
-            show the motion, or does not converge, as who measures them wants. Else finer grids, or a march, are the
-            answer where they show it, which `message` tells.
+        keep_grid: as that of the scene's `quality`, whatever it is there. Without it finer grids, or a march, are the
+            answer where a given grid errs by more than 1 % of the length as it estimates, or a solve on it does not
+            converge, and they do better, which `message` tells.
 
     Returns:
         The prediction. Not converging is a status, not an exception.
@@ -67,6 +76,7 @@ def predict(
         Cancelled: `cancelled` returned True.
     """
     monitor = Monitor(on_iteration, deadline, cancelled)
+    keep_grid = keep_grid or scene.quality.keep_grid
     if like is None:
         return _shown(scene, monitor, cost, keep_grid)
     asked = scene if keep_grid else as_solved(scene, like)
@@ -74,7 +84,8 @@ def predict(
     again = march_again(problem, like, monitor)
     if isinstance(again, Again):
         found = replace(_solved(problem, monitor, cost, again), scene=scene)
-        if keep_grid or not falls_short(found):
+        # where finer grids were tried for the one like it in vain they are not tried again
+        if keep_grid or not falls_short(found) or (errs(found) and errs(like)):
             return found if asked is scene else replace(found, said=f"{found.said} {left_before(scene, asked)}")
         again = found.said
     fresh = _shown(scene, monitor, cost, keep_grid)
@@ -86,9 +97,9 @@ def _shown(scene: Scene, monitor: Monitor, cost: Cost | None, keep_grid: bool) -
     found = _solved(pose(scene), monitor, cost)
     if keep_grid or not falls_short(found):
         return found
-    if scene.quality.method == "spacetime":
+    if scene.quality.method == "spacetime" and found.status != "converged":
         found = _last_resort(found, monitor)
-        if found.status == "converged":
+        if not falls_short(found):
             return found
     spent = monitor.elapsed()
     return with_finer(found, _tried(scene, free_grids(scene), monitor), spent, monitor)

@@ -34,7 +34,7 @@ def predict_many(
         threads: solves at once; by default as many as there are processors for this process.
         deadline: time allowed for each scene [s], as in `predict`.
         cancelled: asked between iterations of every solve; where it returns True all stop.
-        keep_grid: answer on given grids also where they can't show the motion, as in `predict`.
+        keep_grid: answer with what given grids come to by themselves, however much that errs, as in `predict`.
 
     Returns:
         For each scene, in order, its prediction, or the error that says why it can't be solved as it was given.

@@ -290,15 +290,19 @@ class Quality:
 
     Args:
         n_u: control points along the cable, 5 to 129.
-        n_t: control points in time, 5 to 513. Where such a grid can't show the motion finer ones are solved, and where
-            these do, they are the answer, which says so; `keep_grid=True` of `predict` does without.
+        n_t: control points in time, 5 to 513. Where a solve on such a grid errs by more than 1 % of the length, as it
+            estimates, or does not come to its end, finer grids are solved, and where these reach that 1 % they are the
+            answer, which says so.
         delta: threshold of a least squares on the norm of its control-point update, paper eq. (25) [m], 1e-10 to 1e-2;
             without it 1e-5.
         method: "march", "spacetime", "paper", "reference" (docs/reference.md), or "auto": `march`, which is nearer to
             the motion on the same grid and takes less time; but `spacetime` where a grid is given with a `delta`, which
             a march has no use for, and the motion is smooth. Where "spacetime" does not converge, `march` is the last
-            resort, and the answer says so; `keep_grid=True` of `predict` does without.
-        estimate: with a given grid, estimate the error by a second march on another grid; False saves its time.
+            resort, and the answer says so.
+        estimate: with a given grid, estimate the error by a second march on another grid; False saves its time, and
+            with it what that calls for: however much a solve that converges errs, it is the answer.
+        keep_grid: answer with what a given grid, and a least squares that was asked for, come to by themselves,
+            however much that errs, and whether it converges or not, as who measures them wants.
     """
 
     n_u: int | None = None
@@ -308,6 +312,7 @@ class Quality:
     time_budget: float | None = None
     method: Method = "auto"
     estimate: bool = True
+    keep_grid: bool = False
 
     def __post_init__(self) -> None:
         for name, most in (("n_u", MAX_N_U), ("n_t", MAX_N_T)):
@@ -336,6 +341,8 @@ class Quality:
             raise SceneError(
                 given[1], getattr(self, given[1]), "only one of n_u with n_t, target_error and time_budget"
             )
+        if self.keep_grid and self.n_u is None:
+            raise SceneError("keep_grid", True, "n_u and n_t given with it")
         if self.method in ("spacetime", "paper") and self.n_u is None:
             raise SceneError("method", self.method, "n_u and n_t given with it")
         if self.method == "reference" and (self.n_u is not None or self.time_budget is not None):

@@ -26,9 +26,16 @@ class QualityForm(Form):
         self._n_t = gui.add_slider("Points in time n_t", min=5, max=129, step=1, initial_value=13)
         self._delta = gui.add_dropdown("Threshold δ", (NONE, *DELTAS))
         self._method = gui.add_dropdown("Method", METHODS)
+        self._keep = gui.add_checkbox(
+            "Keep this grid", False, hint="Also where it errs by more than 1 % of the length, or does not converge"
+        )
         self._bind(self._mode, self._asked)
-        for control in (self._error, self._budget, self._n_u, self._n_t, self._delta, self._method):
+        for control in (self._error, self._budget, *self._of_grid):
             self._bind(control, self._asked)
+
+    @property
+    def _of_grid(self) -> tuple[Any, ...]:
+        return self._n_u, self._n_t, self._delta, self._method, self._keep
 
     def _asked(self, draft: Draft) -> Draft:
         mode: Mode = self._mode.value
@@ -44,6 +51,8 @@ class QualityForm(Form):
                 wanted["delta"] = DELTAS.get(words) or float(words.removesuffix(" m"))
             if self._method.value != "auto":
                 wanted["method"] = self._method.value
+            if self._keep.value:
+                wanted["keep_grid"] = True
         return draft.put(QUALITY, wanted)
 
     def take(self, draft: Draft) -> None:
@@ -64,7 +73,7 @@ class QualityForm(Form):
         show_value(self._mode, mode)
         show_if(self._error, mode == "target error")
         show_if(self._budget, mode == "time budget")
-        for control in (self._n_u, self._n_t, self._delta, self._method):
+        for control in self._of_grid:
             show_if(control, mode == "grid")
 
     def _take_grid(self, given: dict[str, Any]) -> None:
@@ -78,3 +87,4 @@ class QualityForm(Form):
             self._delta.options = (NONE, *DELTAS, words)
         show_value(self._delta, words)
         show_value(self._method, given.get("method", "auto"))
+        show_value(self._keep, bool(given.get("keep_grid", False)))
