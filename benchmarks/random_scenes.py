@@ -206,7 +206,7 @@ def summary(records: list[dict[str, Any]]) -> str:
         _, low, high = share(Strata(count, len(part) - count, 0, 0, 0, 0))
         lines.append(f"converged, {name}: {_part(count, len(part))}, 95 % interval {low:.2%} to {high:.2%}")
     finer = sum(r["status"] == "converged" and left_its_grid(r) for r in given)
-    lines.append(f"of them on finer grids than the one given, as that could not show the motion: {finer}")
+    lines.append(f"of them on finer grids than the one given, as that erred too much or failed: {finer}")
     good = [r for r in determined if r["status"] == "converged" or by_a_march(r)]
     asked = sum(not by_a_march(r) for r in good)
     lines.append(f"converged, as asked: {_part(asked, len(determined))}")

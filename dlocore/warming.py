@@ -82,7 +82,8 @@ def _rough(table: Table | None, twist: Switch) -> None:
     """Motions of two, three or four coordinates that rub, lie beside something, and may yield."""
     beside = (Sphere(center=(0.5, 0.3, 0.0), radius=0.2),)
     environment = Environment(drag=0.1, drag_quadratic=0.1, table=table, obstacles=beside)
-    for quality in (Quality(), Quality(n_u=9, n_t=9), Quality(n_u=9, n_t=9, method="spacetime")):
+    given = Quality(n_u=9, n_t=9, keep_grid=True)
+    for quality in (Quality(), given, replace(given, method="spacetime")):
         plastic: Switch = "on" if quality.method == "auto" and twist != "off" else "off"
         scene = Scene(
             cable=CABLE,

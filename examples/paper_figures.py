@@ -23,7 +23,7 @@ def scene(grasp: float, method: str) -> dlo.Scene:
         shape=dlo.Straight(),
         grasps=[dlo.Grasp(u=grasp, path=dlo.Move(displacement=(0.0, 0.5, 0.0), duration=1.6))],
         environment=dlo.Environment(drag=0.05, table=dlo.Table()),
-        quality=dlo.Quality(n_u=9, n_t=13, delta=1e-5, method=method),
+        quality=dlo.Quality(n_u=9, n_t=13, delta=1e-5, method=method, keep_grid=True),
     )
 
 

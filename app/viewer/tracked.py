@@ -94,6 +94,7 @@ class Tracked:
                     "n_u": N_U,
                     "n_t": min(MOST_IN_TIME, 13 + round(POINTS_IN_SECOND * self._replay.horizon)),
                     "method": "march",
+                    "keep_grid": True,  # on which the cable was identified
                 },
             }
         )

@@ -86,7 +86,7 @@ def test_an_obstacle_out_of_reach_is_called_for_by_a_motion_that_comes_to_it():
         grasps=(Grasp(u=0.0),),
         environment=Environment(drag=0.3, obstacles=(bar,)),
         horizon=1.5,
-        quality=Quality(n_u=17, n_t=73),
+        quality=Quality(n_u=17, n_t=73, keep_grid=True),
     )
     assert not {e.name: e.active for e in plan(falls).effects}["obstacles"]
     found = predict(falls)

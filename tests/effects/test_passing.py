@@ -136,7 +136,7 @@ def test_coarse_steps_swing_through_no_bar_nor_past_it_unseen(z: float) -> None:
         grasps=(Grasp(u=0.0),),
         environment=Environment(drag=0.05, obstacles=(bar(0.0, z, 0.002),)),
         horizon=1.0,
-        quality=Quality(n_u=9, n_t=13, method="march"),
+        quality=Quality(n_u=9, n_t=13, method="march", keep_grid=True),
     )
     prediction = predict(scene)
     assert next(e.active for e in prediction.effects if e.name == "obstacles")

@@ -35,7 +35,7 @@ def test_a_bent_wire_that_is_turned_slowly_swings_as_a_rigid_body(angle, width, 
 
 @pytest.mark.parametrize(("angle", "width"), [(50, 0.005), (90, 0.01), (90, 0.06), (170, 0.02)])
 def test_the_error_of_a_swinging_bend_is_told(angle, width):
-    for quality in (Quality(), Quality(n_u=13, n_t=25, method="march")):
+    for quality in (Quality(), Quality(n_u=13, n_t=25, method="march", keep_grid=True)):
         found = predict(swinging(angle, width, quality))
         assert found.status == "converged"
         assert found.accuracy.error_estimate is not None

@@ -132,9 +132,9 @@ def swinging(quality: Quality) -> Scene:
     )
 
 
-def jerked(n_t: int) -> Scene:
+def jerked(n_t: int, way: float = 0.07, duration: float = 0.2) -> Scene:
     """Return the cable that swings, jerked at once to its speed: its least squares does not converge."""
-    path = Move(displacement=(0.3, 0.0, 0.0), duration=0.15, profile="linear")
+    path = Move(displacement=(way, 0.0, 0.0), duration=duration, profile="linear")
     scene = swinging(Quality(n_u=17, n_t=n_t, delta=1e-9))
     return replace(scene, grasps=(Grasp(u=0.0, path=path),))
 

@@ -435,6 +435,6 @@ def test_the_reference_buckles_to_the_same_side() -> None:
 
 @pytest.mark.parametrize("method", ["march", "spacetime"])
 def test_given_grids_start_with_the_bow_too(method: Any) -> None:
-    prediction = predict(pushed(quality=Quality(n_u=17, n_t=33, method=method)))
+    prediction = predict(pushed(quality=Quality(n_u=17, n_t=33, method=method, keep_grid=True)))
     assert at_end(prediction, 0.5)[1] > 0.2
     assert prediction.surface.positions([0.5], 0.0)[0, 0, 1] == pytest.approx(BOW, rel=0.05)

@@ -73,7 +73,7 @@ def test_a_least_squares_that_runs_out_of_time_leaves_the_march_that_it_started_
 
 def test_a_march_in_place_of_the_least_squares_is_held_to_its_time_spline():
     # 17 control points miss it by 8 % of the length
-    found = predict(jerked(17), keep_grid=True)
+    found = predict(jerked(17, way=0.3, duration=0.15), keep_grid=True)
     assert found.accuracy.method == "march"
     assert found.status == "max_iterations"
     assert "Raise n_t" in found.message

@@ -104,7 +104,7 @@ HANGING = Scene(
 @pytest.mark.parametrize("scene", [paper_scene(0.25), RUBBING, HANGING], ids=["sliding", "rubbing", "hanging"])
 @pytest.mark.parametrize(("n_u", "n_t"), [(9, 13), (13, 19), (21, 31)])
 def test_the_estimate_on_a_given_grid_is_honest(scene: Scene, n_u: int, n_t: int):
-    found = predict(replace(scene, quality=march(n_u, n_t, estimate=True)))
+    found = predict(replace(scene, quality=march(n_u, n_t, estimate=True)), keep_grid=True)
     truth = predict(replace(scene, quality=march(65, 193)))
     error = apart(found.surface, truth.surface).max()
     assert 1.0 < (found.accuracy.error_estimate or 0.0) / error < HIGH  # measured: 1.9 to 3.7
@@ -134,7 +134,7 @@ def test_a_grid_with_no_room_for_a_coarser_one_is_compared_with_a_finer_one():
 def test_a_coarser_march_that_folds_is_replaced_by_a_finer_one():
     # slack between two grippers: seven control points fold it within a span, nine do not
     def estimated(n_u: int, n_t: int) -> Prediction:
-        return predict(replace(random_scene(51), quality=march(n_u, n_t, estimate=True)))
+        return predict(replace(random_scene(51), quality=march(n_u, n_t, estimate=True)), keep_grid=True)
 
     level = estimated(9, 13).level
     assert level is not None

@@ -41,7 +41,7 @@ def test_a_cable_that_folds_on_a_given_grid_is_marched_on_points_between_which_i
     assert quality.n_t is not None
     size = Size(quality.n_u, quality.n_t, given_steps(quality.n_t))
     assert is_folded(march_level(pose(scene), size, Monitor()))
-    found = predict(scene)
+    found = predict(scene, keep_grid=True)
     assert found.status == "converged"
     assert "watched at more points" in found.message
     assert "watched at more points" in found.iterations[-1].note
@@ -54,7 +54,7 @@ def test_a_cable_that_folds_on_a_given_grid_is_marched_on_points_between_which_i
 
 def test_the_estimate_tells_how_far_a_coarse_grid_that_was_watched_is_off():
     scene = draw(2, 186).make()
-    found = predict(scene)
+    found = predict(scene, keep_grid=True)
     fine = predict(replace(scene, quality=march(96, 120)))
     assert fine.status == "converged"
     estimate = found.accuracy.error_estimate
@@ -112,7 +112,7 @@ def test_time_knots_go_where_a_spline_of_given_size_misses_its_march():
     assert np.all(np.diff(moved.knots_t) >= 0.0)
     for event in problem.events:
         assert np.sum(moved.knots_t == event.time) == event.multiplicity
-    found = predict(scene)
+    found = predict(scene, keep_grid=True)
     assert found.status == "converged"
     estimate = found.accuracy.error_estimate
     assert estimate is not None

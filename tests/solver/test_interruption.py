@@ -12,7 +12,7 @@ from tests.solver.scenes import cable, march, paper_scene
 METHODS = {
     "march": march(9, 13),
     "auto": Quality(),
-    "spacetime": Quality(n_u=9, n_t=13, method="spacetime"),
+    "spacetime": Quality(n_u=9, n_t=13, method="spacetime", keep_grid=True),
     "paper": Quality(n_u=9, n_t=13, method="paper"),
 }
 every_method = pytest.mark.parametrize("method", METHODS)
@@ -33,7 +33,7 @@ def test_a_cancelled_solve_stops_at_the_next_look(method):
 
 
 def test_a_running_solve_is_cancelled_within_an_iteration():
-    scene = paper_scene(0.25, 1e-4, quality=Quality(n_u=17, n_t=49, delta=1e-10))
+    scene = paper_scene(0.25, 1e-4, quality=Quality(n_u=17, n_t=49, delta=1e-10, keep_grid=True))
     seen: list[Iteration] = []
     whole = len(predict(scene).iterations)
     with pytest.raises(Cancelled):

@@ -161,7 +161,9 @@ def test_a_march_without_time_stays_at_its_start():
 
 
 def test_a_surface_of_few_states_is_that_of_all(monkeypatch: pytest.MonkeyPatch):
-    scene = dataclasses.replace(SCENES["twisted and yielding"], quality=Quality(n_u=11, n_t=17, method="march"))
+    scene = dataclasses.replace(
+        SCENES["twisted and yielding"], quality=Quality(n_u=11, n_t=17, method="march", keep_grid=True)
+    )
     full = predict(scene)
     assert full.level is not None
     monkeypatch.setattr(kept, "MOST_NUMBERS", full.level.motion.states.size / 3)

@@ -188,7 +188,7 @@ def pulled_taut(method: Literal["march", "spacetime"]) -> Scene:
         grasps=(Grasp(u=0.0), Grasp(u=1.0, path=Move(displacement=way, duration=1.0))),
         environment=Environment(drag=0.05, table=Table()),
         horizon=1.2,
-        quality=Quality(n_u=17, n_t=25, method=method),
+        quality=Quality(n_u=17, n_t=25, method=method, keep_grid=True),
     )
 
 

@@ -25,7 +25,7 @@ from dlocore import (
     predict_many,
 )
 
-COARSE = Quality(n_u=9, n_t=13, method="march")
+COARSE = Quality(n_u=9, n_t=13, method="march", keep_grid=True)
 
 
 def scene(u: float, quality: Quality = COARSE, displacement: tuple[float, float, float] = (0.0, 0.4, 0.0)) -> Scene:

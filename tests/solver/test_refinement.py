@@ -79,7 +79,7 @@ def test_no_coupling_of_held_points_is_lost_from_the_reduced_tangent(n_u: int):
 
 def test_an_error_that_two_grids_share_is_told():
     # both time splines pass through the middle of the trembling, and so agree
-    coarse = predict(swinging(march(13, 19, estimate=True)))
+    coarse = predict(swinging(march(13, 19, estimate=True, keep_grid=True)))
     fine = predict(swinging(Quality(target_error=3e-3)))
     assert fine.status == "converged"
     truth = refined(swinging(Quality()), 1e-3)
@@ -251,7 +251,7 @@ def test_a_surface_that_its_time_spline_stretches_is_told_of():
     scene = draw(28, 2367).make()
     free = replace(scene, quality=Quality(target_error=0.01 * scene.cable.length))
     for asked, advice in ((scene, "take more control points"), (free, "ask for a smaller target_error")):
-        found = predict(asked)
+        found = predict(asked, keep_grid=True)
         assert found.status == "converged"
         assert found.level.motion.largest_strain < 0.05
         assert "the surface stretches the cable by up to" in found.message

@@ -215,13 +215,13 @@ def test_what_a_micrometre_moves_by_little_is_part_of_the_error_and_more_than_th
 @pytest.mark.parametrize("closer", [0.3, 0.5, 0.7, 0.9])
 def test_what_it_says_of_a_state_is_what_a_disturbed_motion_does(hold: str, closer: float) -> None:
     scene = between(0.3, True, hold, replace(WEIGHTLESS, drag=1.0), closer)
-    planar = predict(replace(scene, horizon=4.0, quality=Quality(n_u=25, n_t=61, method="march")))
+    planar = predict(replace(scene, horizon=4.0, quality=Quality(n_u=25, n_t=61, method="march", keep_grid=True)))
     level = cast(Level, planar.level)
     grid = level.motion.grid
     says = is_unstable(level.problem, grid, level.motion.states[-1], 4.0, grid.history.memory[:, 0])
     u = np.linspace(0.0, np.pi, 41)
     bent = scene.shape.points + np.outer(1e-4 * (np.sin(u) ** 2 + np.sin(u) * np.sin(2.0 * u)), [0.0, 1.0, 0.0])  # type: ignore[union-attr]
-    quality = Quality(n_u=25, n_t=121, method="march")
+    quality = Quality(n_u=25, n_t=121, method="march", keep_grid=True)
     spatial = predict(replace(scene, shape=Points(points=bent), horizon=16.0, quality=quality))
     u, late = np.linspace(0.0, 1.0, 65), spatial.surface.positions(np.linspace(0.0, 1.0, 65), [4.0, 16.0])
     before, after = np.abs(late[..., 1]).max(axis=1)
@@ -230,7 +230,9 @@ def test_what_it_says_of_a_state_is_what_a_disturbed_motion_does(hold: str, clos
 
 def test_the_stiffness_is_the_tangent_of_the_forces_in_space() -> None:
     prediction = predict(
-        replace(between(1.0, False, "point", HEAVY, 0.3), quality=Quality(n_u=13, n_t=25, method="march"))
+        replace(
+            between(1.0, False, "point", HEAVY, 0.3), quality=Quality(n_u=13, n_t=25, method="march", keep_grid=True)
+        )
     )
     level = cast(Level, prediction.level)
     problem, grid, q = level.problem, level.motion.grid, level.motion.states[-1]
@@ -275,7 +277,7 @@ def _forces(problem: Problem, x: Floats, tables: Any) -> Floats:
 
 
 def test_a_given_grid_keeps_to_its_plane_and_says_so() -> None:
-    prediction = predict(replace(FALLS, quality=Quality(n_u=17, n_t=33, method="march")))
+    prediction = predict(replace(FALLS, quality=Quality(n_u=17, n_t=33, method="march", keep_grid=True)))
     assert prediction.accuracy.dimensions == 2
     assert "in its plane the motion is unstable" in prediction.message
 

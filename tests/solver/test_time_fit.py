@@ -85,7 +85,9 @@ def led(times: list[float], quality: Quality) -> Scene:
     )
 
 
-@pytest.mark.parametrize("quality", [Quality(), Quality(n_u=9, n_t=19, method="march")], ids=["chosen", "given"])
+@pytest.mark.parametrize(
+    "quality", [Quality(), Quality(n_u=9, n_t=19, method="march", keep_grid=True)], ids=["chosen", "given"]
+)
 def test_a_march_follows_a_path_of_few_waypoints_exactly_at_all_times(quality: Quality) -> None:
     scene = led([0.0, 0.35, 0.8, 1.1, 1.6], quality)
     prediction = predict(scene)
@@ -105,7 +107,7 @@ def test_a_march_follows_a_path_of_few_waypoints_exactly_at_all_times(quality: Q
     ],
 )
 def test_time_knots_stay_even_where_waypoints_would_crowd_them(times: list[float]) -> None:
-    least_squares = Quality(n_u=9, n_t=19, method="spacetime")
+    least_squares = Quality(n_u=9, n_t=19, method="spacetime", keep_grid=True)
     followed, even = (time_knots(pose(led(times, quality)), 19) for quality in (Quality(), least_squares))
     assert followed is not None
     np.testing.assert_array_equal(followed, even)

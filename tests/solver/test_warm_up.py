@@ -27,7 +27,8 @@ assert len(before) > 40, before
 for name, scene in catalogue().items():
     for method in ("march", "spacetime"):
         try:
-            answer = predict(replace(scene, quality=Quality(n_u=13, n_t=19, method=method)), deadline=2.0)
+            given = Quality(n_u=13, n_t=19, method=method, keep_grid=True)
+            answer = predict(replace(scene, quality=given), deadline=2.0)
             answer.message, answer.grasps, answer.effects, answer.material, answer.start_energy
             [(i.surface, i.energy) for i in answer.iterations]
             energies(answer.scene, answer.surface, [0.0, answer.surface.horizon])
