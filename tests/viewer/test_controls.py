@@ -70,6 +70,7 @@ GRIPPER = ("primitives", 0)
         ({"Threshold δ": "10⁻⁶ m"}, ("quality", "delta"), 1e-6),
         ({"Threshold δ": "none"}, ("quality",), {"n_u": 9, "n_t": 13}),
         ({"Method": "march"}, ("quality", "method"), "march"),
+        ({"Keep this grid": True}, ("quality",), {"n_u": 9, "n_t": 13, "delta": 1e-5, "keep_grid": True}),
         ({"Name": "my run"}, ("name",), "my run"),
         ({"Let it settle first": True}, ("shape", "settle"), True),
         ({"Add": "Box", "Centre [m]": [0.9, 0.3, 0.1]}, ("environment", "obstacles", 0, "center"), [0.9, 0.3, 0.1]),
