@@ -26,15 +26,8 @@ def hold_to(case: Case) -> None:
     prediction = predict(posed(case))
     asked = prediction.scene.quality.method
     assert asked in ("auto", prediction.accuracy.method)  # a march in place of a least squares is none
-    length = prediction.surface.length
-    estimate = prediction.accuracy.error_estimate
-    told = prediction.status != "converged" or (estimate is not None and estimate > 0.01 * length)
-    if case.end == "told":
-        assert told, prediction.message
-    else:
-        assert prediction.status == "converged", prediction.message
-    if not told or case.end == "converged":
-        keep_laws(prediction)
+    assert prediction.status == "converged", prediction.message
+    keep_laws(prediction)
     if case.error is not None:
         assert case.error(prediction) <= case.within
 

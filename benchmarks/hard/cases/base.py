@@ -11,7 +11,7 @@ from dlocore import Cable, Environment, Move, Prediction, Quality, Scene
 
 Floats = NDArray[np.float64]
 Group = Literal["geometry", "stiffness", "motion", "effects", "numbers"]
-End = Literal["converged", "told", "refused"]
+End = Literal["converged", "refused"]
 
 WEIGHTLESS = Environment(gravity=(0.0, 0.0, 0.0))
 TARGET = 0.005  # of the length: the target error of the cases
@@ -29,8 +29,7 @@ class Case:
         make: returns the scene, or raises SceneError where it has to be refused.
         error: distance of a prediction from the true answer, of the length; None where only the laws tell.
         within: that distance at most.
-        end: "converged", "told" where the scene does not determine the answer and the status or the estimate must
-            say so, or "refused".
+        end: "converged" or "refused".
     """
 
     name: str
