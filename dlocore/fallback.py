@@ -107,14 +107,13 @@ def with_finer(found: Prediction, finer: Prediction | SceneError, spent: float, 
         monitor: that of both solves.
     """
     quality, more = found.scene.quality, monitor.elapsed() - spent
-    estimate = found.accuracy.error_estimate or 0.0
+    off = f"by an estimated {(found.accuracy.error_estimate or 0.0) * 1e3:.2g} mm" if errs(found) else ""
     if isinstance(finer, Prediction) and finer.status == "converged":
         accuracy = finer.accuracy
         error = accuracy.error_estimate
         known = "an error that is not known" if error is None else f"an estimated error of {error * 1e3:.2g} mm"
         failed = "did not converge" if accuracy.method == "spacetime" else "could not show the motion"
-        if errs(found):
-            failed = f"err by an estimated {estimate * 1e3:.2g} mm"
+        failed = f"err {off}" if off else failed
         said = (
             f"{finer.said} The {quality.n_u} x {quality.n_t} control points that were asked for {failed}, which took "
             f"{spent * 1e3:.0f} ms to find: {found.said} This is the answer on {accuracy.n_u} x {accuracy.n_t}, with "
@@ -122,11 +121,10 @@ def with_finer(found: Prediction, finer: Prediction | SceneError, spent: float, 
         )
         return replace(finer, scene=found.scene, said=said)
     reason = str(finer) if isinstance(finer, SceneError) else finer.said
-    short = f", as it errs by an estimated {estimate * 1e3:.2g} mm, and do not converge" if errs(found) else ""
-    tried = f"Finer grids were tried for {more * 1e3:.0f} ms{short or ' and do not converge either'}: {reason}"
+    failed = f", as it errs {off}, and do not converge" if off else " and do not converge either"
     return replace(
         found,
-        said=f"{found.said} {tried}",
+        said=f"{found.said} Finer grids were tried for {more * 1e3:.0f} ms{failed}: {reason}",
         iterations=tuple(monitor.iterations),
         accuracy=replace(found.accuracy, wall_time=monitor.elapsed(), phases=dict(monitor.phases)),
     )

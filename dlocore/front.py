@@ -84,7 +84,7 @@ def predict(
     again = march_again(problem, like, monitor)
     if isinstance(again, Again):
         found = replace(_solved(problem, monitor, cost, again), scene=scene)
-        # where finer grids were tried for the one like it in vain they are not tried again
+        # where the one like it is on as coarse a grid finer ones were tried in vain, or not wanted
         if keep_grid or not falls_short(found) or (errs(found) and errs(like)):
             return found if asked is scene else replace(found, said=f"{found.said} {left_before(scene, asked)}")
         again = found.said
