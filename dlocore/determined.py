@@ -18,6 +18,7 @@ from dlocore.spline import DEGREE
 Floats = NDArray[np.float64]
 
 DISTURBED = 1e-6  # of the length: bend of a start
+TURNED = 1e-4  # rad: turn of its sections
 UNDETERMINED = 1e-2  # of the length: what moves by more when its start is bent so much is not determined
 DOUBTFUL = 1e-3  # of the length: what moves by more is told, and may go elsewhere when its start is bent the other way
 UNSEEN = "A disturbance may grow in this motion; the time was up before it was seen how far it takes it."
@@ -28,13 +29,19 @@ _COMPARED = 1025  # states of two motions, at most
 
 
 def bent(problem: Problem, grid: Grid, seed: int) -> Floats:
-    """Return how a start (n_u, nc) [m] is bent: by some half waves of about DISTURBED of the length."""
+    """Return how a start (n_u, nc) [m] is bent: by some half waves of about DISTURBED of the length.
+
+    With twist its sections are turned, too, by about TURNED, between its ends: what turns over on a table hardly feels
+    that it is bent.
+    """
     u = np.linspace(0.0, np.pi, grid.n_u)[:, None]
     dimensions = problem.plane.dimensions
     sizes = np.random.default_rng(seed).normal(size=(3, dimensions)) / 2
     waves = np.zeros((grid.n_u, problem.nc))
-    waves[:, :dimensions] = np.sin(u * [1.0, 2.0, 3.0]) @ sizes
-    return DISTURBED * problem.scene.cable.length * waves
+    waves[:, :dimensions] = DISTURBED * problem.scene.cable.length * np.sin(u * [1.0, 2.0, 3.0]) @ sizes
+    if problem.twist is not None:
+        waves[:, -1] = TURNED * problem.twist.radius * (np.sin(u) + 0.5 * np.sin(2.0 * u))[:, 0]
+    return waves
 
 
 def goes_astray(problem: Problem, motion: March, monitor: Monitor, hard: bool) -> float:
@@ -101,7 +108,8 @@ def in_words(problem: Problem, moved: float) -> str:
 def bend_in_words(problem: Problem, moved: float) -> str:
     """Return in words that a cable which is hardly bent goes elsewhere by so much [m]."""
     bend = f"{DISTURBED * problem.scene.cable.length * 1e6:.2g} um"
-    return f"a cable bent by a millionth of the length, {bend}, goes elsewhere by up to {moved * 1e3:.2g} mm"
+    turned = "" if problem.twist is None else f" and turned by {TURNED * 1e3:.2g} mrad,"
+    return f"a cable bent by a millionth of the length, {bend},{turned} goes elsewhere by up to {moved * 1e3:.2g} mm"
 
 
 def bend_of(start: StartCurve) -> float:

@@ -196,12 +196,17 @@ def _memory(problem: Problem, grid: Grid, history: History) -> Floats:
     else:
         curve = start_curve(Points(points=rest), problem.scene.cable.length)
     natural = problem.coordinates(fit_to_knots(curve, grid.knots))
+    own = natural
+    if curve is problem.start:
+        own = grid.start
+        if problem.contact is not None:  # what the start was pushed out of the table by is no part of the shape
+            given = replace(grid, start=natural, find_tables=lambda knots: grid.tables)
+            own = consistent_start(problem, given, touches=False)
     if nc == 2:
-        kappa = plane_curvature_of(grid.tables, natural if curve is not problem.start else grid.start)
+        kappa = plane_curvature_of(grid.tables, own)
         return np.concatenate([kappa, kappa], axis=1)
     # the bends of the natural curve in a frame without twist that starts like that of the sections
     frames = np.zeros_like(history.past)
-    own = natural if curve is not problem.start else grid.start
     start_frames(grid.knots, own, grid.tables, leftwards(curve(0.0, 1)[0]), frames)
     first, second = frames[:, DIRECTOR : DIRECTOR + 3], np.cross(frames[:, :3], frames[:, DIRECTOR : DIRECTOR + 3])
     bends = frames[:, 3:6]
@@ -248,10 +253,11 @@ def _planar_memory(problem: Problem, sections: Floats, director: Floats, tangent
     )
 
 
-def consistent_start(problem: Problem, grid: Grid) -> Floats:
+def consistent_start(problem: Problem, grid: Grid, *, touches: bool = True) -> Floats:
     """Return start control points (n_u, nc) of unit speed that pass exactly through the held points of the curve.
 
-    What the knots leave inside the table or an obstacle is pushed out. The angle of the sections plays no part.
+    What the knots leave inside the table or an obstacle is pushed out, unless it `touches` neither. The angle of the
+    sections plays no part.
     """
     line = problem.line
     history = _no_history(line, grid.tables)
@@ -261,7 +267,7 @@ def consistent_start(problem: Problem, grid: Grid) -> Floats:
     close_grasps(problem, grid, grasps, starts, None)
     held = hold(line, grid, grasps, np.zeros(1), starts, start)
     active, parameters = line.law_table()
-    kept = [laws.STRETCH, laws.CONTACT, laws.TABLE]
+    kept = [laws.STRETCH, *([laws.CONTACT, laws.TABLE] if touches else [])]
     active[[row for row in range(laws.COUNT) if row not in kept]] = 0
     strength = 1e-3 * parameters[0, 0] * (grid.n_u / problem.scene.cable.length) ** 2
     q = start.copy()

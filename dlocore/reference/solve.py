@@ -217,7 +217,7 @@ def _status(refined: Refined, target: float) -> tuple[Status, str]:
             f"Rods of up to {count} elements agree to {refined.estimate * 1e3:.2g} mm, target {target * 1e3:.2g} mm."
         )
         if refined.astray > 0.0:
-            return "stalled", f"{agreed} But {in_words(refined.problem, refined.astray)}."
+            return "stalled", f"{agreed} But {in_words(refined.problem.line, refined.astray)}."
         return "converged", agreed + (f" {UNSEEN}" if np.isnan(refined.astray) else "")
     if refined.ended == "time":
         return "time_limit", f"The time limit passed; {moved}. Allow more time or a larger target_error."

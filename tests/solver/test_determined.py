@@ -263,6 +263,19 @@ def test_scene_97_5133_counts_what_a_bend_moves_it_by():
     assert found.accuracy.error_parts["start"] > 3 * DOUBTFUL * scene.cable.length
 
 
+def test_scene_102_21_turns_over_sooner_or_later_as_its_sections_lie(monkeypatch: pytest.MonkeyPatch):
+    """Its sections turn all together: whether half waves of a bend reach that hangs on which ones they are."""
+    found = predict(draw(102, 21).make())
+    assert found.status == "stalled"
+    assert "a cable bent by a millionth of the length, 1 um, and turned by 0.1 mrad, goes elsewhere" in found.message
+    assert found.level is not None
+    problem, motion = found.level.problem, found.level.motion
+    assert found.accuracy.error_parts["start"] > 5.0 * UNDETERMINED * problem.scene.cable.length
+    monkeypatch.setattr(determined, "bent", lambda problem, grid, seed: bent(problem, grid, seed + 1))
+    other = goes_astray(problem, motion, Monitor(), hard=False)  # by other waves
+    assert other == pytest.approx(found.accuracy.error_parts["start"], rel=0.1)
+
+
 def test_on_a_given_grid_a_note_tells_that_a_scene_does_not_determine_its_motion():
     scene = draw(90, 42943).make()
     found = predict(scene)

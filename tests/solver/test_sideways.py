@@ -25,15 +25,15 @@ from dlocore import (
 )
 from dlocore.buckling import UNSTABLE
 from dlocore.determined import DOUBTFUL
-from dlocore.discretisation import room_for
+from dlocore.discretisation import make_grid, room_for
 from dlocore.kernels.across import stiffness_across
 from dlocore.kernels.assembly import NO_RATES, History, assemble
 from dlocore.kernels.growth import AT_ONCE, LOOKS, looked_at
 from dlocore.kernels.tension import COLUMNS
 from dlocore.plane import Plane
-from dlocore.problem import Problem, pose
+from dlocore.problem import Problem, pose, stiffer
 from dlocore.sideways import is_unstable, pose_as_shown
-from dlocore.solvers.ladder import Level
+from dlocore.solvers.ladder import Level, distance, run_level
 from dlocore.solvers.monitor import Monitor
 from dlocore.whole_march import sided
 
@@ -226,6 +226,30 @@ def test_what_it_says_of_a_state_is_what_a_disturbed_motion_does(hold: str, clos
     u, late = np.linspace(0.0, 1.0, 65), spatial.surface.positions(np.linspace(0.0, 1.0, 65), [4.0, 16.0])
     before, after = np.abs(late[..., 1]).max(axis=1)
     assert says == (after > max(3.0 * before, 1e-3) or before > 1e-2)
+
+
+@pytest.mark.parametrize("stiffness", [1.0, 100.0])
+def test_what_a_start_is_pushed_out_of_the_table_by_bends_no_stress_free_shape(stiffness: float) -> None:
+    # its point is held at the height of the table, beside which it is pushed out by micrometres: 0.2/m of bends
+    scene = draw(102, 21).make()
+    problem = stiffer(pose(scene, {"side": "it leaves the table"}), stiffness)
+    assert problem.contact is not None
+    assert problem.twist is not None
+    grid = make_grid(problem, 28)
+    assert np.abs(grid.start[:, 2]).max() > 1e-6
+    across = np.abs(grid.history.memory[:, [1, 4]]).max()
+    along = np.abs(grid.history.memory[:, [0, 3]]).max()
+    assert along == pytest.approx(0.4783, abs=1e-3)
+    assert across < 1e-9 * along
+
+
+def test_how_a_wire_turns_over_on_a_table_does_not_hang_on_the_stiffness_of_contact() -> None:
+    found = predict(draw(102, 21).make())
+    level = cast(Level, found.level)
+    softer, harder = (
+        run_level(stiffer(level.posed, ratio), *level.size, Monitor(), free_knots=True) for ratio in (1.0, 100.0)
+    )
+    assert distance(softer, harder, level.problem) < 1e-3  # it was 0.022
 
 
 def test_the_stiffness_is_the_tangent_of_the_forces_in_space() -> None:
