@@ -151,7 +151,6 @@ def beside(known: KnownMotion, problem: Problem, grid: Grid) -> tuple[Floats, Fl
         times[first : last + 1] = np.linspace(begin, end, last - first + 1)
         h = (end - begin) / (last - first)
         entry = _enter(problem, grid, starts, times, first, last, states[first], v, history)
-        velocity = entry.closed if first == 0 else velocity
         v, a, G = entry.v.copy(), entry.a.copy(), entry.G.copy()
         applied = applied_forces(problem, grid, times[first : last + 1])
         left = follow_steps(
@@ -161,6 +160,7 @@ def beside(known: KnownMotion, problem: Problem, grid: Grid) -> tuple[Floats, Fl
         )  # fmt: skip
         if not left <= _STRAYED * length:
             raise ValueError(f"the motion beside it can't be followed: a step was left with {left:.2g} m")
+        velocity = entry.velocity(states[0], states[1], h, times[1]) if first == 0 else velocity
     return states, times, velocity
 
 

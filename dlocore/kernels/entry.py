@@ -16,7 +16,7 @@ from dlocore.kernels.assembly import (
     remember,
     times_scalar_band,
 )
-from dlocore.kernels.banded import multiply_band, solve_free
+from dlocore.kernels.banded import multiply_band, place_held, solve_free
 from dlocore.kernels.compile import brief
 from dlocore.kernels.march import constrained_mass_solve
 from dlocore.kernels.selfcontact import press
@@ -74,6 +74,24 @@ def begin_stretch(
         return closed, np.zeros_like(v), G, jump
     held_acceleration = (near[2] - 2.0 * near[1] + near[0]) / (h * h)
     return closed, constrained_mass_solve(nc, density * unit, e, held_acceleration, -G), G, jump
+
+
+@brief
+def after_jump(e: Any, near: Any, short: float, q: Any, later: Any, h: float) -> Any:
+    """Return the velocity (n, nc) that a jump at the state q leaves: that to the state h [s] later, held as it is held.
+
+    As the grasps close only what they hold has their speed. The next moment a cable that hardly stretches has set out
+    with them, as far as it is pulled along itself: a time spline that began without would be late by that for a span.
+
+    Args:
+        q, later: (n, nc) [m] the states.
+        near: (3, held) [m] prescribed part of what is held at the jump, `short` and 2 `short` [s] later.
+    """
+    v = (later - q) / h
+    rate = np.empty((1, near.shape[1]))
+    rate[0] = (4.0 * near[1] - 3.0 * near[0] - near[2]) / (2.0 * short)
+    place_held(e, rate, 0, v.reshape(v.size))
+    return v
 
 
 @brief

@@ -17,7 +17,7 @@ from dlocore.kernels.assembly import (
 )
 from dlocore.kernels.basis import build_tables
 from dlocore.kernels.compile import kernel
-from dlocore.kernels.entry import begin_stretch, lasting, remember_start, to_ends_of_steps
+from dlocore.kernels.entry import after_jump, begin_stretch, lasting, remember_start, to_ends_of_steps
 from dlocore.kernels.growth import SLOWEST, fastest_growth, looked_at
 from dlocore.kernels.holding import hold_rows
 from dlocore.kernels.march import march_steps
@@ -38,8 +38,8 @@ def smooth_motion(
 ) -> Any:  # fmt: skip
     """March a smooth motion without twist from its start, and fit the time spline to it.
 
-    It is `build_tables`, `remember_start`, `hold_rows`, `begin_stretch`, `lasting`, `march_steps`, `to_ends_of_steps`
-    and `fitted` one after the other: see there for what is not said here.
+    It is `build_tables`, `remember_start`, `hold_rows`, `begin_stretch`, `lasting`, `march_steps`, `to_ends_of_steps`,
+    `after_jump` and `fitted` one after the other: see there for what is not said here.
 
     Args:
         axes: (0, 1) or (0, 1, 2).
@@ -57,7 +57,7 @@ def smooth_motion(
             the curvature points, and the logarithm of what a disturbance grows by at most, about.
 
     Returns:
-        The states (steps + 1, n, nc) [m], the velocity (n, nc) [m/s] as the grasps close, the forces (steps + 1, held)
+        The states (steps + 1, n, nc) [m], the velocity (n, nc) [m/s] just after t = 0, the forces (steps + 1, held)
         [N] that hold them, what lies behind the motion at its end, the control points (n_t, n, nc) [m] of the time
         spline and what it misses each state by (steps + 1,) [m].
     """
@@ -104,6 +104,8 @@ def smooth_motion(
         dragged, tables, active, p, history, load, e, offsets[near:], reactions, np.zeros((0, 0, 0)), info,
     )  # fmt: skip
     to_ends_of_steps(reactions, first, steps, rho / (1.0 + rho))
+    if h * jump > least_jump:
+        closed = after_jump(e, offsets[:near], times[1] - times[0], states[0], states[1], h)
     control, off = fitted(knots_t, times[near:], states, closed, nc)
     least, most = slopes(states, 1, tables.axial_first, tables.axial_b1)
     info[STRAIN] = max(0.0, most - 1.0, 1.0 - least)

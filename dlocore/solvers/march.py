@@ -247,7 +247,8 @@ class _Walk:
         self._mass = grid.tables.mass * problem.mass_density()
         self._tolerance = tolerance_of(problem, grid, problem.horizon / len(times))
         self._kept = Kept(grid.start, counts, _frames(problem), _columns(problem, grid))
-        self._v = self._velocity = grid.velocity.copy()
+        self._v = grid.velocity.copy()
+        self._beginning: tuple[Entry, float]  # of the motion, and its time step [s]
         self._info = np.zeros(5)
         self._info[FAILED_STEP] = -1
         self._starts: Starts = {}
@@ -327,7 +328,7 @@ class _Walk:
             states=states,
             steps=len(self._times) - 1,
             asked=asked,
-            velocity=self._velocity,
+            velocity=self._velocity(),
             history=self._history,
             log=kept.log,
             reached=reached,
@@ -340,6 +341,12 @@ class _Walk:
             deepest=float(self._info[DEEPEST]),
             find_forces=lambda: forces,
         )
+
+    def _velocity(self) -> Floats:
+        """Return the velocity (n_u, nc) [m/s] just after t = 0."""
+        entry, h = self._beginning
+        q, later = self._kept.states[:2]
+        return entry.velocity(q, later, h, float(self._times[self._kept.steps[1]]))
 
     def _enter(self, begin: float, end: float, first: int, last: int) -> _Stretch:
         """Close the grasps of a stretch; what friction holds leans on it from the beginning."""
@@ -354,7 +361,7 @@ class _Walk:
         )  # fmt: skip
         e, a = entry.held.elimination, entry.a
         if first == 0:
-            self._velocity = entry.closed
+            self._beginning = entry, h
             if problem.friction is not None and problem.table is not None:
                 lean_on_table(problem, grid, a, self._history)
             if problem.friction is not None and problem.friction.lying > 0:

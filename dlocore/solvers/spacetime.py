@@ -21,6 +21,7 @@ from dlocore.kernels.anderson import advance, room
 from dlocore.kernels.assembly import History, times_scalar_band
 from dlocore.kernels.banded import expand_rows, place_rows
 from dlocore.kernels.blocks import REACH, factor_rows
+from dlocore.kernels.entry import after_jump
 from dlocore.kernels.leastsquares import (
     POINTS,
     Equations,
@@ -36,6 +37,7 @@ from dlocore.report import WindowForces
 from dlocore.scene import Grasp
 from dlocore.solvers.march import March
 from dlocore.solvers.monitor import Monitor
+from dlocore.solvers.stretch import JUMPS
 
 Floats = NDArray[np.float64]
 
@@ -48,6 +50,7 @@ _PATIENCE = 20  # iterations after which the least update has to be below ...
 _FALLS = 0.9  # ... this share of what it was; else it won't fall below delta, which most do in 15 and few in 40
 _DAMPING = 1e-6  # of the diagonal of normal equations that lost their positive factors to rounding
 _LARGEST_STEP = 0.25  # of the length, in one control point: beyond it a step is shortened
+_SHORT = 1e-6  # [s] after an event: for the velocity of what is held
 LARGEST_STRAIN = 0.003  # of a cable of the bounded axial stiffness under the largest tension of the march
 RESOLVED = 15.0  # times mu L^2/h^2: the axial stiffness that a time spline of span h resolves
 
@@ -270,10 +273,8 @@ def solve(problem: Problem, motion: March, knots_t: Floats, delta: float, monito
         span = (window.end - window.begin) / (len(window.knots) - 7)
         stiffness = bounded_axial_stiffness(problem, tension, span)
         if i > 0:
-            near = hold(problem, grid, grasps, window.begin + 1e-6 * np.arange(3.0), starts, q)
-            rate = (4 * near.offsets[1] - 3 * near.offsets[0] - near.offsets[2]) / 2e-6
-            mass = times_scalar_band(grid.tables.mass, v)
-            v = constrained_mass_solve(problem.nc, grid.tables.mass, near.elimination, rate, mass)
+            near = hold(problem, grid, grasps, window.begin + _SHORT * np.arange(3.0), starts, q)
+            v = _closed(problem, motion, window, near, v)
         solver = WindowSolver(problem, grid, window, grasps, starts, q, v, motion, stiffness, monitor)
         control = guess[i]
         control[0] = q
@@ -292,6 +293,21 @@ def solve(problem: Problem, motion: March, knots_t: Floats, delta: float, monito
         q = control[-1]
         v = 3 * (control[-1] - control[-2]) / (window.knots[-2] - window.knots[-5])
     return Solved(join(parts, windows), True, worst, lambda: tuple(find() for find in forces))
+
+
+def _closed(problem: Problem, motion: March, window: Window, near: Held, v: Floats) -> Floats:
+    """Return what a velocity v (n_u, nc) [m/s] becomes as a window begins and its grasps close.
+
+    `near` is what is held then, _SHORT and 2 _SHORT later. Where the velocity jumps it is as the march goes on.
+    """
+    rate = (4 * near.offsets[1] - 3 * near.offsets[0] - near.offsets[2]) / (2 * _SHORT)
+    mass = motion.grid.tables.mass
+    closed = constrained_mass_solve(problem.nc, mass, near.elimination, rate, times_scalar_band(mass, v))
+    k = int(np.searchsorted(motion.times, window.begin - 1e-12))
+    step = motion.times[k + 1] - motion.times[k]
+    if step * np.abs(closed - v).max() <= JUMPS * problem.scene.cable.length:
+        return np.asarray(closed)
+    return np.asarray(after_jump(near.elimination, near.offsets, _SHORT, *motion.states[k : k + 2], step))
 
 
 def _window_fit(motion: March, window: Window) -> Floats:

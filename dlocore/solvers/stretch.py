@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from dlocore.grid import Grid
 from dlocore.holding import Held, Starts, close_grasps, hold
 from dlocore.kernels.assembly import NO_RATES, History
-from dlocore.kernels.entry import begin_stretch
+from dlocore.kernels.entry import after_jump, begin_stretch
 from dlocore.problem import Problem
 from dlocore.scene import Grasp
 
@@ -29,7 +29,8 @@ class Entry:
         v: the same, zero where inertia is left out.
         a: (n_u, nc) [m/s^2] consistent acceleration, and
         G: (n_u, nc) [N] forces f + C v - load.
-        jumps: whether the velocity jumps, so that the acceleration is that of the instant alone.
+        sudden: whether the velocity jumps.
+        jumps: the same, but False where inertia is left out: with it the acceleration is that of the instant alone.
     """
 
     held: Held
@@ -38,7 +39,18 @@ class Entry:
     v: Floats
     a: Floats
     G: Floats
+    sudden: bool
     jumps: bool
+
+    def velocity(self, q: Floats, later: Floats, h: float, after: float) -> Floats:
+        """Return the velocity (n_u, nc) [m/s] with which the motion goes on from q to a state `after` [s] later.
+
+        Both are (n_u, nc) [m]; h is the time step [s] with which the stretch was entered.
+        """
+        if not self.sudden:
+            return self.closed
+        e, near = self.held.elimination, self.held.offsets[:3]
+        return np.asarray(after_jump(e, near, h * NEAR[1], q, later, after))
 
 
 def enter(
@@ -70,5 +82,5 @@ def enter(
         problem.plane.dimensions,
     )  # fmt: skip
     started = closed.copy() if inertial else np.zeros_like(closed)
-    jumps = inertial and h * jump > JUMPS * problem.scene.cable.length
-    return Entry(held, held.offsets[3:], closed, started, a, G, jumps)
+    sudden = h * jump > JUMPS * problem.scene.cable.length
+    return Entry(held, held.offsets[3:], closed, started, a, G, sudden, sudden and inertial)

@@ -112,9 +112,9 @@ def test_not_converging_exits_with_3_and_still_writes(tmp_path: Path, capsys: py
 def test_a_least_squares_that_does_not_converge_is_answered_by_a_march(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = {"kind": "move", "displacement": [0.07, 0, 0], "duration": 0.2, "profile": "linear"}
+    path = {"kind": "move", "displacement": [0.07, 0, 0], "duration": 0.3, "profile": "linear"}
     scene = {
-        "cable": {"length": 0.6, "diameter": 0.005, "linear_density": 0.08, "bending_stiffness": 1.2e-4},
+        "cable": {"length": 0.6, "diameter": 0.005, "linear_density": 0.08, "bending_stiffness": 3e-5},
         "shape": {"kind": "straight", "direction": [0, 0, -1]},
         "primitives": [{"u": 0.0, "hold": "tangent", "path": path}],
         "environment": {"drag": 0.013},

@@ -132,7 +132,7 @@ def swinging(quality: Quality) -> Scene:
     )
 
 
-def jerked(n_t: int, way: float = 0.07, duration: float = 0.2) -> Scene:
+def jerked(n_t: int, way: float = 0.1, duration: float = 0.3) -> Scene:
     """Return the cable that swings, jerked at once to its speed: its least squares does not converge."""
     path = Move(displacement=(way, 0.0, 0.0), duration=duration, profile="linear")
     scene = swinging(Quality(n_u=17, n_t=n_t, delta=1e-9))
