@@ -25,7 +25,8 @@ from dlocore.statics import equilibrium
 
 U = np.linspace(0.0, 1.0, 12)[:, None]
 ARC = Points(points=U * [1.0, 0.0, 0.0] + 0.05 * np.sin(3.0 * U) * [0.0, 1.0, 0.0])
-GRASP = Grasp(u=0.3, hold="clamp", path=Move(displacement=(0.0, 0.01, 0.0), rotation=(0.0, 0.0, 0.1), duration=1.0))
+MOVE = Move(displacement=(0.0, 0.01, 0.0), rotation=(0.0, 0.0, 0.1), duration=1.0)
+GRASP = Grasp(u=0.3, hold="clamp", path=MOVE)
 # yields at a bend that is not reached, and has a memory, so that all that looks for that is compiled, too
 CABLE = Cable.preset("paper", bending_damping=1e-4, yield_strain=0.1, memory_rate=1.0)
 
@@ -79,7 +80,7 @@ def _smooth(table: Table | None) -> None:
 
 
 def _rough(table: Table | None, twist: Switch) -> None:
-    """Motions of two, three or four coordinates that rub, lie beside something, and may yield."""
+    """Motions of two, three or four coordinates that begin with a speed, rub, lie beside something, and may yield."""
     beside = (Sphere(center=(0.5, 0.3, 0.0), radius=0.2),)
     environment = Environment(drag=0.1, drag_quadratic=0.1, table=table, obstacles=beside)
     given = Quality(n_u=9, n_t=9, keep_grid=True)
@@ -88,7 +89,7 @@ def _rough(table: Table | None, twist: Switch) -> None:
         scene = Scene(
             cable=CABLE,
             shape=replace(ARC, settle=table is None),
-            grasps=(GRASP,),
+            grasps=(replace(GRASP, path=replace(MOVE, profile="linear")),),
             environment=environment,
             effects={"twist": twist, "plasticity": plastic},
             quality=quality,
