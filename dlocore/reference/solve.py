@@ -216,7 +216,7 @@ def _status(refined: Refined, target: float) -> tuple[Status, str]:
         agreed = (
             f"Rods of up to {count} elements agree to {refined.estimate * 1e3:.2g} mm, target {target * 1e3:.2g} mm."
         )
-        if refined.astray > 0.0:
+        if refined.astray > 0.0:  # by a bend alone: no sections of its rods are turned
             return "stalled", f"{agreed} But {in_words(refined.problem.line, refined.astray)}."
         return "converged", agreed + (f" {UNSEEN}" if np.isnan(refined.astray) else "")
     if refined.ended == "time":
