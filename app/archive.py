@@ -9,7 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.schemas import Motion, PredictionRequest, to_scene
-from dlocore import ControlPoints, Iteration, Material, MaterialMotion, Prediction, Scene, SplineSurface
+from dlocore import (
+    ControlPoints,
+    Iteration,
+    Material,
+    MaterialMotion,
+    Prediction,
+    Scene,
+    SplineSurface,
+    StretchMotion,
+)
 from dlocore.machine import machine_line
 
 Floats = NDArray[np.float64]
@@ -66,6 +75,7 @@ def pack(prediction: Prediction) -> bytes:
         arrays |= _named("start_", replace(shape, material=None))
         arrays |= _named("remembered_", shape.material)
     arrays |= _named("material_", prediction.material)
+    arrays |= _named("stretch_", prediction.stretch)
     surfaces = [prediction.surface, *(iteration.surface for iteration in prediction.iterations)]
     for k, surface in enumerate(surfaces):
         arrays[f"control_points_{k}"] = surface.control_points
@@ -92,8 +102,12 @@ def _surface(arrays: Any, k: int) -> SplineSurface:
 
 
 def _motion(arrays: Any) -> Motion:
-    material = _part("material_", arrays)
-    return Motion(_surface(arrays, 0), MaterialMotion(**material) if material else None)
+    material, stretch = _part("material_", arrays), _part("stretch_", arrays)
+    return Motion(
+        _surface(arrays, 0),
+        MaterialMotion(**material) if material else None,
+        StretchMotion(**stretch) if stretch else None,  # of a run stored before it was noted
+    )
 
 
 def unpack_motion(nets: bytes) -> Motion:

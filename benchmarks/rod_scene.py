@@ -89,7 +89,7 @@ def start_of(scene: Scene, grid: Floats) -> Start:
     elif np.ndim(shape.velocity) == 1:
         velocities = np.tile(np.asarray(shape.velocity), (len(grid), 1))
     elif isinstance(shape, ControlPoints):
-        velocities = design_matrix(knots, grid) @ np.asarray(shape.velocity)
+        velocities = design_matrix(knots, grid) @ np.asarray(shape.velocity)[:, :3]
     else:
         rows = np.asarray(shape.velocity)
         velocities = CubicSpline(np.linspace(0.0, length, len(rows)), rows)(grid)

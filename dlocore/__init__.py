@@ -6,7 +6,16 @@ from dlocore.cable import PRESETS, Cable
 from dlocore.errors import Cancelled, DloError, SceneError
 from dlocore.obstacles import Box, Capsule, Cylinder, Sphere
 from dlocore.paths import Move, Still, Waypoints
-from dlocore.prediction import Accuracy, EffectReport, GraspReaction, Iteration, MaterialMotion, Prediction, continued
+from dlocore.prediction import (
+    Accuracy,
+    EffectReport,
+    GraspReaction,
+    Iteration,
+    MaterialMotion,
+    Prediction,
+    StretchMotion,
+    continued,
+)
 from dlocore.recordings import Recording, load_recording, save_recording
 from dlocore.scene import ControlPoints, Environment, Grasp, Load, Material, Points, Quality, Scene, Straight, Table
 from dlocore.spline import SplineSurface
@@ -52,6 +61,7 @@ __all__ = [
     "SplineSurface",
     "Still",
     "Straight",
+    "StretchMotion",
     "Table",
     "Waypoints",
     "continued",

@@ -24,7 +24,7 @@ from dlocore.paths import Waypoints
 from dlocore.plane import leftwards
 from dlocore.problem import Problem
 from dlocore.scene import Material, Points
-from dlocore.shape import SplineCurve, fit_to_knots, start_curve, velocity_to_knots
+from dlocore.shape import SplineCurve, fit_to_knots, spin_to_knots, start_curve, velocity_to_knots
 
 Floats = NDArray[np.float64]
 
@@ -70,7 +70,8 @@ def grid_on(problem: Problem, knots: Floats) -> Grid:
     theta = None if curve.theta is None else fit_to_knots(curve.theta, knots)[:, 0]
     start = np.ascontiguousarray(problem.coordinates(fit_to_knots(curve, knots), theta))
     given = velocity_to_knots(curve, knots)
-    velocity = np.zeros(start.shape) if given is None else np.ascontiguousarray(problem.rates(given))
+    spin = None if problem.twist is None else spin_to_knots(curve, knots)
+    velocity = np.zeros(start.shape) if given is None else np.ascontiguousarray(problem.rates(given, spin))
     grid = Grid(knots, start, velocity, partial(_tables_of, problem), partial(_history_of, problem))
     waypoints = any(g.start == 0.0 and isinstance(g.path, Waypoints) for g in problem.scene.grasps)
     if waypoints or len(curve.control_points) > 4:
@@ -117,7 +118,7 @@ def _history_of(problem: Problem, grid: Grid) -> History:
         start_frames(grid.knots, grid.start, grid.tables, start_director(problem), history.past)
     history.memory[:] = _memory(problem, grid, history)
     if problem.start.bow:
-        history.axial[:, 0] = _axial_strain(grid.tables, grid.start[:, : problem.plane.dimensions])
+        history.axial[:, 0] = axial_strain(grid.tables, grid.start[:, : problem.plane.dimensions])
     if problem.start.material is not None:
         _write_stretch(grid, history, problem.start.material)
     if problem.keeps_history:
@@ -175,7 +176,7 @@ def plane_curvature_of(tables: Tables, q: Floats) -> Floats:
     return ((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / (a * a).sum(axis=1))[:, None]
 
 
-def _axial_strain(tables: Tables, r: Floats) -> Floats:
+def axial_strain(tables: Tables, r: Floats) -> Floats:
     """Return the axial strain (points,) of control points r (n_u, 2 or 3) at the axial points."""
     index = tables.axial_first[:, None] + np.arange(4)
     return np.asarray(np.linalg.norm(np.einsum("pi,pid->pd", tables.axial_b1, r[index]), axis=1) - 1.0)
@@ -254,7 +255,7 @@ def _planar_memory(problem: Problem, sections: Floats, director: Floats, tangent
 
 
 def consistent_start(problem: Problem, grid: Grid, *, touches: bool = True) -> Floats:
-    """Return start control points (n_u, nc) of unit speed that pass exactly through the held points of the curve.
+    """Return start control points (n_u, nc) that pass exactly through the held points of the curve, strained as it is.
 
     What the knots leave inside the table or an obstacle is pushed out, unless it `touches` neither. The angle of the
     sections plays no part.
@@ -269,6 +270,7 @@ def consistent_start(problem: Problem, grid: Grid, *, touches: bool = True) -> F
     active, parameters = line.law_table()
     kept = [laws.STRETCH, *([laws.CONTACT, laws.TABLE] if touches else [])]
     active[[row for row in range(laws.COUNT) if row not in kept]] = 0
+    history.axial[:, 0] = problem.start.strain_at(grid.tables.axial_u)
     strength = 1e-3 * parameters[0, 0] * (grid.n_u / problem.scene.cable.length) ** 2
     q = start.copy()
     relax(

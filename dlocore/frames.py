@@ -9,13 +9,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.discretisation import start_director
+from dlocore.discretisation import axial_strain, start_director
 from dlocore.grid import Grid
 from dlocore.kernels.angles import angles_with
 from dlocore.kernels.basis import spline_values
 from dlocore.kernels.timefit import fit_time
 from dlocore.kernels.twisted import twist_rates
-from dlocore.prediction import MaterialMotion
+from dlocore.prediction import MaterialMotion, StretchMotion
 from dlocore.problem import Problem
 from dlocore.spline import DEGREE, SplineSurface
 from dlocore.transport import transported
@@ -23,6 +23,7 @@ from dlocore.transport import transported
 Floats = NDArray[np.float64]
 
 MATERIAL_TIMES = 33  # at most, at which the memory of a motion is kept
+STRETCH_TIMES = 257  # the same of its stretch
 _INSIDE = 1e-3  # of a span of the time knots: how far from its ends a time is inside
 _SMOOTH = 0.03  # times the bends of an angle over a span count as its slopes do: little where these decide
 
@@ -145,6 +146,13 @@ def material_of(
         times=times[kept], director=directors, u=u, memory=sections,
         stretch=stretch, natural=np.array(natural),
     )  # fmt: skip
+
+
+def stretch_of(grid: Grid, times: Floats, states: Floats) -> StretchMotion:
+    """Return how far a cable is stretched in the states (k, n_u, nc) at the times (k,) [s] of a motion."""
+    kept = np.unique(np.linspace(0, len(times) - 1, STRETCH_TIMES).round().astype(int))
+    strain = np.array([axial_strain(grid.tables, q[:, :3]) for q in states[kept]])
+    return StretchMotion(times=times[kept], u=np.array(grid.tables.axial_u), strain=strain)
 
 
 def directors(problem: Problem, surface: SplineSurface, times: Floats) -> Floats:

@@ -22,7 +22,7 @@ from dlocore.fallback import (
     more_in_time,
     with_finer,
 )
-from dlocore.frames import material_of
+from dlocore.frames import material_of, stretch_of
 from dlocore.given import evenly_fitted, given_status, march_given
 from dlocore.prediction import Accuracy, GraspReaction, MaterialMotion, OnIteration, Prediction, Status
 from dlocore.problem import Problem, pose
@@ -294,6 +294,7 @@ def _answer(
         report_grasps=partial(_reactions, level, find_forces),
         report_effects=partial(effect_reports, problem, grid, partial(_material, problem, level)),
         report_material=partial(_material, problem, level),
+        report_stretch=partial(stretch_of, grid, level.motion.times, level.motion.states),
         iterations=tuple(monitor.iterations),
         accuracy=Accuracy(
             method=method,

@@ -123,7 +123,7 @@ def off_the_table(scene: Scene, start: StartCurve, met: tuple[int, ...]) -> str:
     natural = natural_points(scene)
     if natural is not None and not np.ptp(natural[:, 2]) <= table_tolerance(scene):
         return "the stress-free shape is not flat"
-    if start.theta is not None:
+    if start.twisted:
         return "the cable is twisted"
     if start.material is not None and np.abs(_remembered_bends(start)[:, 2]).max() > FLATNESS:
         return "the cable remembers bends that are not flat"
@@ -150,7 +150,7 @@ def find_plane(scene: Scene, start: StartCurve, on_table: bool, met: bool) -> Pl
         return Plane(np.eye(3), origin, "the cable does not stay on the table")
     if scene.effects.get("twist", "auto") == "on":
         return Plane(np.eye(3), origin, "twist is asked for")
-    if start.theta is not None and scene.effects.get("twist", "auto") != "off":
+    if start.twisted and scene.effects.get("twist", "auto") != "off":
         return Plane(np.eye(3), origin, "the start is twisted")
     if on_table:
         return Plane(np.eye(3)[:2], origin, "the cable lies on the table and moves in its plane")

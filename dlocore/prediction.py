@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.errors import number
-from dlocore.scene import ControlPoints, Material, Scene
-from dlocore.spline import SplineSurface
+from dlocore.scene import MAX_STRAIN, ControlPoints, Material, Scene
+from dlocore.spline import SplineSurface, greville
 
 if TYPE_CHECKING:
     from dlocore.solvers.ladder import Level
@@ -141,6 +141,27 @@ class MaterialMotion:
         )
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StretchMotion:
+    """How far the cable is stretched, over time: what its spline does not tell to the accuracy of a tension.
+
+    Attributes:
+        times: (m,) [s].
+        u: (k,) [m].
+        strain: axial strain (m, k).
+    """
+
+    times: Floats
+    u: Floats
+    strain: Floats
+
+    def at(self, t: float) -> Floats:
+        """Return the axial strain (k,) at time `t` [s], linear between the stored times."""
+        k = int(np.clip(np.searchsorted(self.times, t) - 1, 0, len(self.times) - 2))
+        s = float(np.clip((t - self.times[k]) / (self.times[k + 1] - self.times[k]), 0.0, 1.0))
+        return np.asarray((1 - s) * self.strain[k] + s * self.strain[k + 1])
+
+
 @dataclass(frozen=True, kw_only=True)
 class Accuracy:
     """What the answer is worth and what it cost.
@@ -209,6 +230,7 @@ class Prediction:
     report_grasps: Callable[[], tuple[GraspReaction, ...]] = field(repr=False)
     report_effects: Callable[[SplineSurface], tuple[EffectReport, ...]] = field(repr=False)
     report_material: Callable[[], MaterialMotion | None] = field(repr=False)
+    report_stretch: Callable[[], StretchMotion] = field(repr=False)
     find_objections: Callable[[], list[str]] = field(repr=False)
     find_start_energy: Callable[[], float] = field(repr=False)
     level: "Level | None" = field(default=None, repr=False)
@@ -239,28 +261,46 @@ class Prediction:
         """What the sections remember over time; None where they are elastic, naturally straight and untwisted."""
         return self.report_material()
 
+    @cached_property
+    def stretch(self) -> StretchMotion:
+        """How far the cable is stretched over time."""
+        return self.report_stretch()
+
     def shape_at(self, t: float | None = None) -> ControlPoints:
         """Return the cable at time `t` [s], its last by default, as the start of another motion.
 
-        Shape, velocity, twist and memory go on, so that primitives chain: grasp, move, release, grasp elsewhere.
+        Shape, velocity, stretch, twist, spin and memory go on, so that primitives chain: grasp, move, release, grasp
+        elsewhere.
 
         Raises:
             SceneError: `t` is outside the predicted time.
         """
-        return continued(self.surface, self.material, t)
+        return continued(self.surface, self.material, t, stretch=self.stretch)
 
 
-def continued(surface: SplineSurface, material: MaterialMotion | None, t: float | None = None) -> ControlPoints:
+def continued(
+    surface: SplineSurface,
+    material: MaterialMotion | None,
+    t: float | None = None,
+    *,
+    stretch: StretchMotion | None = None,
+) -> ControlPoints:
     """Return the cable of a predicted motion at time `t` [s], its last by default, as the start of another motion.
+
+    Without `stretch`, where it was not stored, the cable goes on with its own length.
 
     Raises:
         SceneError: `t` is outside the predicted time.
     """
     at = surface.horizon if t is None else number("t", t, at_least=0.0, at_most=surface.horizon, unit="s")
     control, velocity = (surface.states(at, order)[0] for order in (0, 1))
+    strain = None
+    if stretch is not None:
+        strain = np.interp(greville(surface.knots_u), stretch.u, stretch.at(at)).clip(-MAX_STRAIN, MAX_STRAIN)
     return ControlPoints(
         control_points=control,
         knots=surface.knots_u,
-        velocity=velocity[:, :3],
+        velocity=velocity,
         material=None if material is None else material.at(at),
+        strain=strain,
     )

@@ -40,6 +40,7 @@ DELTA = 1e-5  # [m]: threshold of a least squares
 MAX_OBSTACLES = 100
 AUTO_TARGET = 2e-3  # of the length: the error that quality "auto" aims at
 MAX_POINTS = 100_000
+MAX_STRAIN = 0.5  # axial, that a start may have
 MAX_PRESCRIBED_STRAIN = 0.005  # of the chord between two grasps: beyond it no cable of this kind can follow
 
 
@@ -51,7 +52,8 @@ class Straight:
         settle: relax to static equilibrium under the grasps' first poses before t = 0; on something rough to where
             friction holds it.
         velocity: initial velocity [m/s]: None (rest), (3,) for all points, or (n, 3) at points evenly spaced along
-            the cable (for `Points`: at the points themselves; for `ControlPoints`: control points of the velocity).
+            the cable (for `Points`: at the points themselves; for `ControlPoints`: control points of the velocity,
+            (n, 4) with the rate of theta [rad/s]; without it the sections do not spin about their tangent).
     """
 
     start: ArrayLike = (0.0, 0.0, 0.0)
@@ -126,7 +128,8 @@ class ControlPoints:
 
     The knots are clamped (four equal at each end) and run from 0 to the cable's length. The fourth column is theta,
     the angle of the sections against a frame without twist (docs/model.md eq. 19). `material` is what the sections
-    remember of an earlier motion.
+    remember of an earlier motion, `strain` (n,) the axial strain with which it goes on, at the means of each three
+    successive inner knots and linear between them; None: without any, whatever the control points' own length.
     """
 
     control_points: ArrayLike
@@ -134,6 +137,7 @@ class ControlPoints:
     settle: bool = False
     velocity: ArrayLike | None = None
     material: Material | None = None
+    strain: ArrayLike | None = None
 
     def __post_init__(self) -> None:
         columns = 3 if columns_of(self.control_points) == 3 else 4
@@ -150,7 +154,13 @@ class ControlPoints:
             if not (clamped and (np.diff(knots[3:-3]) >= 0).all()):
                 raise SceneError("knots", knots, "rising, four equal at each end, from 0 to the cable's length")
             object.__setattr__(self, "knots", knots)
-        object.__setattr__(self, "velocity", _velocity(self.velocity, len(points)))
+        columns = 4 if self.velocity is not None and columns_of(self.velocity) == 4 else 3
+        object.__setattr__(self, "velocity", _velocity(self.velocity, len(points), columns))
+        if self.strain is not None:
+            strain = array("strain", self.strain, shape=(len(points),))
+            if not np.abs(strain).max() <= MAX_STRAIN:
+                raise SceneError("strain", strain, f"-{MAX_STRAIN:g} to {MAX_STRAIN:g}")
+            object.__setattr__(self, "strain", strain)
 
 
 Shape = Straight | Points | ControlPoints
@@ -165,12 +175,12 @@ def _points(name: str, value: ArrayLike, *, at_least: int) -> Floats:
     return points
 
 
-def _velocity(value: ArrayLike | None, count: int | None) -> Floats | None:
+def _velocity(value: ArrayLike | None, count: int | None, columns: int = 3) -> Floats | None:
     if value is None:
         return None
     if columns_of(value) == 0:
         return array("velocity", value, shape=(3,), unit="m/s")
-    velocity = array("velocity", value, shape=(count, 3), unit="m/s")
+    velocity = array("velocity", value, shape=(count, columns), unit="m/s")
     if len(velocity) < 4:
         raise SceneError("velocity", f"{len(velocity)} rows", "one velocity, or at least 4")
     return velocity

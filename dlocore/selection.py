@@ -181,7 +181,7 @@ def _twist(scene: Scene, start: StartCurve, dimensions: int, bent: bool, plastic
         return _PLANAR
     if bent:
         return Choice(True, "the stress-free shape is bent, and its bends turn with the sections")
-    if start.theta is not None:
+    if start.twisted:
         return Choice(True, "the start is twisted")
     if plastic:
         return Choice(True, "bends that the sections remember turn with them")

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import cast
 
 import numpy as np
@@ -14,12 +15,14 @@ from dlocore.kernels.basis import GAUSS_4, gauss_points, spline_values
 from dlocore.kernels.holding import place
 from dlocore.kernels.projection import on_knots
 from dlocore.scene import ControlPoints, Material, Points, Shape, Straight
-from dlocore.spline import DEGREE, uniform_knots
+from dlocore.spline import DEGREE, greville, uniform_knots
 
 Floats = NDArray[np.float64]
 
 SPEED_RANGE = (0.5, 1.5)  # of |r'|: a coarse spline of a hairpin stays within, evenly spaced control points don't
 SAME_ANGLE = 1e-9  # [rad]
+SAME_SPIN = 1e-6  # [rad/s]
+_SPUN = 8  # places in each span at which the spin of the sections is found
 _PLACES = 129  # at which a curve is looked at for how it turns
 _ONE_SPAN = uniform_knots(4, 1.0)
 _THIRDS = np.linspace(0.0, 1.0, 4)[:, None]
@@ -53,6 +56,8 @@ class StartCurve(SplineCurve):
         length_given: length of the curve before it was made as long as the cable [m].
         theta: angle of the sections, a spline with control points (n, 1) [rad], or None where it is the same
             everywhere.
+        theta_rate: its rate, a spline with control points (n, 1) [rad/s], or None where the sections do not spin.
+        strain: axial strain (n,) at the means of each three successive inner knots, or None where there is none.
         material: what the sections remember, or None where the scene's `rest_shape` tells.
         bow: height of the bow without stress that a straight start was given to buckle by [m], see `buckling.py`.
         aside: that of the bow that a planar start was given out of its plane [m].
@@ -63,6 +68,8 @@ class StartCurve(SplineCurve):
     fit_max: float = 0.0
     length_given: float = 0.0
     theta: SplineCurve | None = None
+    theta_rate: SplineCurve | None = None
+    strain: Floats | None = None
     material: Material | None = None
     bow: float = 0.0
     aside: float = 0.0
@@ -72,6 +79,33 @@ class StartCurve(SplineCurve):
         """Heights of the lowest and the highest control point, between which the curve lies [m]."""
         z = self.control_points[:, 2].tolist()
         return min(z), max(z)
+
+    @property
+    def twisted(self) -> bool:
+        """Whether its sections are turned against each other, or turn."""
+        return self.theta is not None or self.theta_rate is not None
+
+    def strain_at(self, u: Floats) -> Floats:
+        """Return the axial strain (k,) at u (k,) [m]."""
+        if self.strain is None:
+            return np.zeros(len(u))
+        return np.interp(u, greville(self.knots), self.strain)
+
+    def spin_at(self, u: Floats) -> Floats:
+        """Return how fast the sections spin about their tangent (k,) [rad/s] at u (k,) [m], rising.
+
+        It is theta_t + f, where f is the spin of the frame without twist along the cable that theta is measured
+        against: f(0) = 0, f' = t . (t_t x r_uu) at unit speed (docs/model.md eq. 9).
+        """
+        if self.theta_rate is None:
+            return np.zeros(len(u))
+        spin = self.theta_rate(u)[:, 0]
+        if self.velocity is None:
+            return spin
+        first, second, rate = self(u, 1), self(u, 2), self.velocity(u, 1)
+        slope = np.einsum("kd,kd->k", first, np.cross(rate, second)) / np.linalg.norm(first, axis=1) ** 3
+        frame = np.concatenate([[0.0], np.cumsum(0.5 * (slope[1:] + slope[:-1]) * np.diff(u))])
+        return np.asarray(spin + frame)
 
     @cached_property
     def turning(self) -> float:
@@ -123,10 +157,13 @@ def _given(shape: ControlPoints, length: float) -> StartCurve:
             "a straight cable has its control points at the means of three successive knots"
         )
         raise SceneError("shape.control_points", f"|r'| from {slowest:.3g} to {fastest:.3g}", allowed)
-    velocity = None
+    velocity = theta_rate = None
     if shape.velocity is not None:
-        velocity = SplineCurve(knots=knots, control_points=np.array(np.broadcast_to(shape.velocity, control.shape)))
-    turned = np.ptp(angles) > SAME_ANGLE or (shape.material is not None and np.abs(angles).max() > SAME_ANGLE)
+        rates = cast(Floats, shape.velocity)
+        velocity = SplineCurve(knots=knots, control_points=np.array(np.broadcast_to(rates[..., :3], control.shape)))
+        if rates.shape[-1] == 4 and _turned(rates[:, 3:], SAME_SPIN, shape.material):
+            theta_rate = SplineCurve(knots=knots, control_points=rates[:, 3:].copy())
+    turned = _turned(angles, SAME_ANGLE, shape.material)
     theta = SplineCurve(knots=knots, control_points=angles) if turned else None
     return StartCurve(
         knots=knots,
@@ -134,8 +171,15 @@ def _given(shape: ControlPoints, length: float) -> StartCurve:
         velocity=velocity,
         length_given=given,
         theta=theta,
+        theta_rate=theta_rate,
+        strain=None if shape.strain is None else cast(Floats, shape.strain),
         material=shape.material,
     )
+
+
+def _turned(angles: Floats, same: float, material: Material | None) -> bool:
+    """Tell whether sections with these angles (n, 1), or rates, are turned against each other or what they remember."""
+    return bool(np.ptp(angles) > same or (material is not None and np.abs(angles).max() > same))
 
 
 def _speed(curve: SplineCurve) -> tuple[Floats, Floats]:
@@ -214,3 +258,14 @@ def fit_to_knots(curve: SplineCurve, knots: Floats) -> Floats:
 def velocity_to_knots(curve: StartCurve, knots: Floats) -> Floats | None:
     """Return the control points [m/s] of the initial velocity on `knots` [m], or None at rest."""
     return None if curve.velocity is None else fit_to_knots(curve.velocity, knots)
+
+
+def spin_to_knots(curve: StartCurve, knots: Floats) -> Floats | None:
+    """Return the control points (n_u,) [rad/s] of the sections' spin on `knots` [m], or None where they have none."""
+    if curve.theta_rate is None:
+        return None
+    from scipy.interpolate import make_lsq_spline
+
+    cuts = np.unique(np.concatenate([curve.knots, knots]))
+    u = np.unique(np.concatenate([np.linspace(a, b, _SPUN) for a, b in pairwise(cuts)]))
+    return np.asarray(make_lsq_spline(u, curve.spin_at(u), knots, k=DEGREE).c)

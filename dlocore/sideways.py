@@ -119,7 +119,7 @@ def solved_in_space(ways: list[str]) -> str:
 
 def _bends_in_plane(problem: Problem) -> bool:
     """Tell whether a cable that is bent without stress moves in a plane that it may leave, or turn over in."""
-    return _may_be_bent(problem) and problem.plane.dimensions == 2 and problem.start.theta is None
+    return _may_be_bent(problem) and problem.plane.dimensions == 2 and not problem.start.twisted
 
 
 def _may_be_bent(problem: Problem) -> bool:
@@ -218,7 +218,7 @@ def is_unstable(problem: Problem, grid: Grid, q: Floats, t: float, bends: Floats
 def is_looked_at(problem: Problem) -> bool:
     """Tell whether the stiffness across its plane is that of a cable that is straight without stress, and may leave."""
     start = problem.start
-    return not (problem.on_table or _may_be_bent(problem) or start.aside or start.theta is not None)
+    return not (problem.on_table or _may_be_bent(problem) or start.aside or start.twisted)
 
 
 def _in_plane(problem: Problem, states: Floats) -> Floats | None:

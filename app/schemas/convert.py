@@ -36,6 +36,7 @@ from dlocore import (
     SplineSurface,
     Still,
     Straight,
+    StretchMotion,
     Table,
     Waypoints,
     continued,
@@ -47,10 +48,14 @@ from dlocore.scene import Shape
 
 
 class Motion(NamedTuple):
-    """A predicted motion: its surface, and what the sections of the cable remember (None: nothing)."""
+    """A predicted motion: its surface, what the sections of the cable remember (None: nothing), and its stretch.
+
+    The stretch is None of one that was stored before it was noted.
+    """
 
     surface: SplineSurface
     material: MaterialMotion | None
+    stretch: StretchMotion | None
 
 
 # Finds the motion of a stored prediction by its id; None where there is no such prediction.
@@ -113,6 +118,7 @@ def shape_of(request: PredictionRequest, cable: Cable, stored: StoredMotion) -> 
             knots=model.knots,
             settle=model.settle,
             velocity=_velocity(model.velocity, "control_points"),
+            strain=model.strain,
         )
 
 
@@ -132,10 +138,8 @@ def _velocity(value: Any, kind: str) -> Any:
         raise SceneError("velocity.kind", value.kind, f'"{kind}" with this shape')
     if isinstance(value, PointVelocities):
         return value.points
-    for i, row in enumerate(value.control_points):
-        if len(row) == 4 and row[3] != 0.0:
-            raise SceneError(f"velocity.control_points[{i}][3]", row[3], "0", "The twist starts at rest")
-    return [row[:3] for row in value.control_points]
+    check_columns("velocity.control_points", value.control_points)
+    return value.control_points
 
 
 def _continued(model: PredictionShape, cable: Cable, stored: StoredMotion) -> ControlPoints:
@@ -149,7 +153,8 @@ def _continued(model: PredictionShape, cable: Cable, stored: StoredMotion) -> Co
     if model.t is not None and not model.t <= surface.horizon:
         raise SceneError("shape.t", model.t, f"0 to the end of that prediction, {surface.horizon:g} [s]")
     with within("shape"):
-        return replace(continued(surface, motion.material, model.t), settle=model.settle)
+        start = continued(surface, motion.material, model.t, stretch=motion.stretch)
+        return replace(start, settle=model.settle)
 
 
 def grasp_of(i: int, model: PrimitiveModel) -> Grasp:

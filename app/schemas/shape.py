@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Discriminator, Field, Tag
 
 from app.schemas.base import Flag, Model, Number, Point, Vector
+from dlocore.scene import MAX_STRAIN
 
 ControlPoint = Annotated[list[Number], Field(min_length=3, max_length=4)]
 Settle = Annotated[
@@ -26,7 +27,10 @@ class ControlVelocities(Model):
     kind: Literal["control_points"]
     control_points: list[ControlPoint] = Field(
         min_length=4,
-        description="[m/s, m/s, m/s]; a fourth number must be 0: the twist starts at rest.",
+        description=(
+            "[m/s, m/s, m/s] or [m/s, m/s, m/s, rad/s]; the fourth is the rate of theta. With three the "
+            "sections do not spin about their tangent."
+        ),
         examples=[[[0, 0.1, 0]] * 4],
     )
 
@@ -101,10 +105,18 @@ class ControlPointsShape(Model):
     )
     settle: Settle = False
     velocity: Velocity | None = Field(default=None, description="Initial velocity [m/s]; absent: at rest.")
+    strain: list[Annotated[Number, Field(ge=-MAX_STRAIN, le=MAX_STRAIN)]] | None = Field(
+        default=None,
+        description=(
+            "Axial strain, one number for each control point, at the mean of three successive inner knots; absent: the "
+            "cable has its own length, whatever that of the spline."
+        ),
+        examples=[[0.001, 0.001, 0.0, 0.0]],
+    )
 
 
 class PredictionShape(Model):
-    """Continue from a stored prediction, with its shape, velocity and twist, and what the cable remembers."""
+    """Continue from a stored prediction: with its shape, velocity, stretch and twist, and what the cable remembers."""
 
     kind: Literal["prediction"]
     id: str = Field(description="Id of a stored prediction.", examples=["0193b1f5a2c07f3e9d1c5b6a7e8f"])

@@ -315,7 +315,7 @@ def _with_start(rod: Rod) -> Rod:
             at = g.path.at(np.zeros(1), point[0]) if isinstance(g.path, Waypoints) else point
             fixed[rod.node(g.u)] = _flat(rod, rod.inside(at))[0]
     if not start.bow:  # whose length is without stress
-        x = _unstretched(x, np.diff(u), fixed)
+        x = _of_length(x, np.diff(u) * (1.0 + start.strain_at(0.5 * (u[1:] + u[:-1]))), fixed)
     tangents = unit(_flat(rod, start(u, 1) @ rod.axes.T))
     between = unit(np.diff(x, axis=0))
     material = start.material
@@ -352,12 +352,14 @@ def _with_start(rod: Rod) -> Rod:
     v = np.zeros_like(x)
     if start.velocity is not None:
         v = _flat(rod, start.velocity(u) @ rod.axes.T)
+    spin = np.zeros(len(u) - 1) if rod.planar else start.spin_at(halves)[1::2]
     snapshot = replace(
         rod.start,
         x=x,
         v=v,
         t=between,
         a=a,
+        spin=spin,
         kept=Memory(turn, np.repeat(remembered[:, None], 2, axis=1)),
         axial=axial,
     )
@@ -404,7 +406,7 @@ def _bends(rod: Rod, curve: SplineCurve, between: Floats | None = None) -> Float
     return out
 
 
-def _unstretched(x: Floats, h: Floats, fixed: dict[int, Floats]) -> Floats:
+def _of_length(x: Floats, h: Floats, fixed: dict[int, Floats]) -> Floats:
     """Return positions (n, 3) near x with edges of the lengths h (n - 1,) [m] and the `fixed` nodes in place.
 
     Newton's method on the lengths with the smallest displacement; held nodes too far apart leave a little strain.

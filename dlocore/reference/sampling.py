@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.plane import leftwards
-from dlocore.prediction import MaterialMotion
+from dlocore.prediction import MaterialMotion, StretchMotion
 from dlocore.reference import body as places
 from dlocore.reference.motion import Motion
 from dlocore.reference.rod import carried, unit
 
 Floats = NDArray[np.float64]
 
-KEPT = 33  # times at most at which the memory of a motion is kept
+KEPT = 33  # times at most at which memory and stretch of a motion are kept
 
 
 def between(times: Floats, x: Floats, v: Floats, t: Floats) -> Floats:
@@ -90,6 +90,20 @@ def samples(motion: Motion) -> Samples:
     return Samples(rod.u, motion.times, x, v, theta, directors @ rod.axes)
 
 
+def stretch_of(motion: Motion) -> StretchMotion:
+    """Return how far the rod is stretched over a motion."""
+    u = motion.rod.u
+    at = _kept(motion)
+    strain = [np.linalg.norm(np.diff(motion.states[k].x, axis=0), axis=1) / np.diff(u) - 1.0 for k in at]
+    return StretchMotion(times=motion.times[at], u=0.5 * (u[1:] + u[:-1]), strain=np.array(strain))
+
+
+def _kept(motion: Motion) -> NDArray[np.int64]:
+    """Return the times of a motion that are kept of it, each once."""
+    at = np.unique(np.linspace(0, len(motion.times) - 1, KEPT).round().astype(int))
+    return at[np.concatenate([[True], np.diff(motion.times[at]) > 0.0])]
+
+
 def material_of(motion: Motion, taken: Samples) -> MaterialMotion | None:
     """Return what the sections remember over a motion; None where they are elastic and straight."""
     rod = motion.rod
@@ -97,8 +111,7 @@ def material_of(motion: Motion, taken: Samples) -> MaterialMotion | None:
     yields = rod.law[places.MEMORY_RATE] > 0.0
     if not (yields or np.any(rod.natural) or np.any(rod.start.kept.memory)):
         return None
-    at = np.unique(np.linspace(0, len(motion.times) - 1, KEPT).round().astype(int))
-    at = at[np.concatenate([[True], np.diff(motion.times[at]) > 0.0])]
+    at = _kept(motion)
     inner = slice(1, -1)
     memory = np.array([motion.states[k].kept.memory[inner].mean(axis=1) for k in at])
     natural = rod.natural[inner]

@@ -16,7 +16,7 @@ from dlocore.reference.chain import chain, grip
 from dlocore.reference.energy import energies
 from dlocore.reference.fit import LEAST_TIMES, MOST_TIMES, Fit, fit
 from dlocore.reference.refine import Level, Refined, goes_astray, refine
-from dlocore.reference.sampling import between, material_of
+from dlocore.reference.sampling import between, material_of, stretch_of
 from dlocore.reference.strands import refuse_meeting
 from dlocore.scene import Scene
 from dlocore.solvers.monitor import Monitor
@@ -193,6 +193,7 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
         ),
         report_effects=lambda surface: _effects(refined, surface),
         report_material=lambda: material_of(motion, last.taken),
+        report_stretch=lambda: stretch_of(motion),
         find_objections=partial(side_notes, problem.start),
     )
 
