@@ -118,7 +118,8 @@ def _history_of(problem: Problem, grid: Grid) -> History:
         start_frames(grid.knots, grid.start, grid.tables, start_director(problem), history.past)
     history.memory[:] = _memory(problem, grid, history)
     if problem.start.bow:
-        history.axial[:, 0] = axial_strain(grid.tables, grid.start[:, : problem.plane.dimensions])
+        strain = axial_strain(grid.tables, grid.start[:, : problem.plane.dimensions])
+        history.axial[:, 0] = strain - problem.start.strain_at(grid.tables.axial_u)
     if problem.start.material is not None:
         _write_stretch(grid, history, problem.start.material)
     if problem.keeps_history:

@@ -57,7 +57,7 @@ class StartCurve(SplineCurve):
         theta: angle of the sections, a spline with control points (n, 1) [rad], or None where it is the same
             everywhere.
         theta_rate: its rate, a spline with control points (n, 1) [rad/s], or None where the sections do not spin.
-        strain: axial strain (n,) at the means of each three successive inner knots, or None where there is none.
+        strain: places u (k,) [m], rising, and the axial strain there (k,), or None where there is none.
         material: what the sections remember, or None where the scene's `rest_shape` tells.
         bow: height of the bow without stress that a straight start was given to buckle by [m], see `buckling.py`.
         aside: that of the bow that a planar start was given out of its plane [m].
@@ -69,7 +69,7 @@ class StartCurve(SplineCurve):
     length_given: float = 0.0
     theta: SplineCurve | None = None
     theta_rate: SplineCurve | None = None
-    strain: Floats | None = None
+    strain: tuple[Floats, Floats] | None = None
     material: Material | None = None
     bow: float = 0.0
     aside: float = 0.0
@@ -89,7 +89,7 @@ class StartCurve(SplineCurve):
         """Return the axial strain (k,) at u (k,) [m]."""
         if self.strain is None:
             return np.zeros(len(u))
-        return np.interp(u, greville(self.knots), self.strain)
+        return np.interp(u, *self.strain)
 
     def spin_at(self, u: Floats) -> Floats:
         """Return how fast the sections spin about their tangent (k,) [rad/s] at u (k,) [m], rising.
@@ -172,7 +172,7 @@ def _given(shape: ControlPoints, length: float) -> StartCurve:
         length_given=given,
         theta=theta,
         theta_rate=theta_rate,
-        strain=None if shape.strain is None else cast(Floats, shape.strain),
+        strain=None if shape.strain is None else (greville(knots), cast(Floats, shape.strain)),
         material=shape.material,
     )
 

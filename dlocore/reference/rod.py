@@ -314,8 +314,9 @@ def _with_start(rod: Rod) -> Rod:
             point = start(g.u)
             at = g.path.at(np.zeros(1), point[0]) if isinstance(g.path, Waypoints) else point
             fixed[rod.node(g.u)] = _flat(rod, rod.inside(at))[0]
+    strain = start.strain_at(0.5 * (u[1:] + u[:-1]))
     if not start.bow:  # whose length is without stress
-        x = _of_length(x, np.diff(u) * (1.0 + start.strain_at(0.5 * (u[1:] + u[:-1]))), fixed)
+        x = _of_length(x, np.diff(u) * (1.0 + strain), fixed)
     tangents = unit(_flat(rod, start(u, 1) @ rod.axes.T))
     between = unit(np.diff(x, axis=0))
     material = start.material
@@ -338,7 +339,7 @@ def _with_start(rod: Rod) -> Rod:
     axial = np.zeros(len(u) - 1)
     soft = rod.law[places.SOFTENED]
     if start.bow:
-        axial = (np.linalg.norm(np.diff(x, axis=0), axis=1) / np.diff(u) - 1.0) / soft
+        axial = (np.linalg.norm(np.diff(x, axis=0), axis=1) / np.diff(u) - 1.0 - strain) / soft
     if material is not None:
         place = cast(Floats, material.u)
         memory = _sections(rod, material.director, cast(Floats, material.memory), place, start(0.0, 1)[0])

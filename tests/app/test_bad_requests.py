@@ -152,9 +152,11 @@ CASES: list[tuple[dict[str, Any], str, Any, str]] = [
     (
         NET,
         "shape.velocity",
-        {"kind": "control_points", "control_points": [[0, 0, 0, 0]] * 3 + [[0, 0, 0, 0.1]]},
-        "shape.velocity.control_points[3][3]",
+        {"kind": "control_points", "control_points": [[0, 0, 0]] * 3 + [[0, 0, 0, 0.1]]},
+        "shape.velocity.control_points[3]",
     ),
+    (NET, "shape.strain", [0, 0, 0, 0.6], "shape.strain[3]"),
+    (NET, "shape.strain", [0, 0, 0], "shape.strain"),
     # the reference chooses its own rods and steps
     (PAPER, "quality", {"method": "reference", "n_u": 9, "n_t": 13}, "quality.n_u"),
 ]

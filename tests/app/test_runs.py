@@ -103,6 +103,7 @@ def test_what_the_cable_remembers_is_stored_and_goes_on(tmp_path: Path, predicti
     assert_same_fields(follow.shape.material, expected.material)
     np.testing.assert_array_equal(follow.shape.control_points, expected.control_points)
     np.testing.assert_array_equal(follow.shape.velocity, expected.velocity)
+    np.testing.assert_array_equal(follow.shape.strain, expected.strain)
 
 
 def test_a_run_that_went_on_knows_its_scene_without_the_one_before(tmp_path: Path, prediction: Prediction) -> None:
@@ -117,6 +118,7 @@ def test_a_run_that_went_on_knows_its_scene_without_the_one_before(tmp_path: Pat
     assert run.scene.shape.settle
     assert_same_fields(run.scene.shape.material, scene.shape.material)
     np.testing.assert_array_equal(run.scene.shape.control_points, scene.shape.control_points)
+    np.testing.assert_array_equal(run.scene.shape.strain, scene.shape.strain)
 
 
 def test_a_run_that_was_stored_without_its_memory_still_loads(tmp_path: Path, prediction: Prediction) -> None:

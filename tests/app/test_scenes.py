@@ -50,11 +50,15 @@ def test_a_velocity_may_have_any_form_of_the_contract(velocity: Any, expected: A
 
 def test_the_velocity_of_control_points_is_given_by_control_points() -> None:
     net = [[x, 0, 0, 0] for x in (0, 0.3, 0.7, 1)]
-    rates = [[0, 0.1 * k, 0, 0] for k in range(4)]
-    velocity = {"kind": "control_points", "control_points": rates}
-    shape = scene_of(paper_scene(shape={"kind": "control_points", "control_points": net, "velocity": velocity})).shape
-    assert isinstance(shape, ControlPoints)
-    np.testing.assert_array_equal(shape.velocity, [rate[:3] for rate in rates])
+    rates = [[0, 0.1 * k, 0, 0.2 * k] for k in range(4)]
+    for columns in (3, 4):
+        given = [rate[:columns] for rate in rates]
+        velocity = {"kind": "control_points", "control_points": given}
+        request = {"kind": "control_points", "control_points": net, "velocity": velocity, "strain": [0, 0.001, 0, 0]}
+        shape = scene_of(paper_scene(shape=request)).shape
+        assert isinstance(shape, ControlPoints)
+        np.testing.assert_array_equal(shape.velocity, given)
+        np.testing.assert_array_equal(shape.strain, [0, 0.001, 0, 0])
 
 
 def test_a_load_is_constant_or_over_time() -> None:

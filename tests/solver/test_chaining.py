@@ -1,0 +1,182 @@
+"""A motion that goes on from another's end is the rest of the motion that both are parts of.
+
+Hard about it: at its end a cable is stretched by its weight and by what swings, and its sections spin about their
+tangent; the surface alone tells neither. A cable that began with its own length was 2 mm of a metre elsewhere at once,
+and its grids agreed on that; a thick wire whose sections began without spin swung otherwise.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dlocore import (
+    Cable,
+    ControlPoints,
+    Environment,
+    Grasp,
+    Move,
+    Points,
+    Prediction,
+    Quality,
+    Scene,
+    SceneError,
+    Straight,
+    predict,
+)
+from dlocore.discretisation import axial_strain
+from dlocore.shape import start_curve
+from dlocore.spline import greville, spline_at
+
+TARGET = 5e-4  # [m]; both cables have a length of 1 m
+SOFT = Scene(
+    cable=Cable(length=1.0, diameter=0.01, linear_density=0.2, bending_stiffness=0.005, axial_stiffness=300.0),
+    shape=Straight(direction=(0.0, 0.0, -1.0)),
+    grasps=(Grasp(u=0.0, path=Move(displacement=(0.4, 0.0, 0.0), duration=0.8)),),
+    horizon=1.2,
+    environment=Environment(drag=0.05),
+    quality=Quality(target_error=TARGET),
+)
+
+
+def bent_wire() -> Scene:
+    """Return a thick wire, bent in space without stress, that a clamp turns."""
+    s = np.linspace(0.0, 1.0, 60)
+    arc = np.column_stack([np.sin(2.5 * s) / 2.5, (1.0 - np.cos(2.5 * s)) / 2.5, 0.3 * s**2])
+    arc /= np.linalg.norm(np.diff(arc, axis=0), axis=1).sum()
+    path = Move(displacement=(0.2, -0.1, 0.1), rotation=(1.5, 1.0, -0.8), duration=0.8)
+    return Scene(
+        cable=Cable(length=1.0, diameter=0.02, linear_density=0.3, bending_stiffness=0.05, rest_shape="initial"),
+        shape=Points(points=arc),
+        grasps=(Grasp(u=0.0, hold="clamp", path=path),),
+        horizon=1.2,
+        environment=Environment(drag=0.1),
+        quality=Quality(target_error=TARGET),
+    )
+
+
+@pytest.fixture(scope="module")
+def soft() -> Prediction:
+    return predict(SOFT)
+
+
+@pytest.fixture(scope="module")
+def wire() -> Prediction:
+    return predict(bent_wire())
+
+
+def rest(whole: Prediction, t: float, shape: ControlPoints | None = None, **changed: object) -> Prediction:
+    """Predict what is left of a motion after `t` [s], when its gripper stands."""
+    scene = whole.scene
+    grasps = tuple(Grasp(u=g.u, hold=g.hold) for g in scene.grasps)
+    start = whole.shape_at(t) if shape is None else shape
+    return predict(replace(scene, shape=start, grasps=grasps, horizon=scene.horizon - t, **changed))  # type: ignore[arg-type]
+
+
+def apart(whole: Prediction, t: float, part: Prediction) -> float:
+    """Return the largest distance of the rest of a motion after `t` [s] from what was predicted of it [m]."""
+    u, times = np.linspace(0.0, 1.0, 65), np.linspace(0.0, part.surface.horizon, 17)
+    return float(np.linalg.norm(whole.surface.positions(u, t + times) - part.surface.positions(u, times), axis=2).max())
+
+
+@pytest.mark.parametrize("t", [0.8, 1.0])
+def test_a_stretched_cable_goes_on_stretched(soft: Prediction, t: float) -> None:
+    part = rest(soft, t)
+    error = (soft.accuracy.error_estimate or 0.0) + (part.accuracy.error_estimate or 0.0)
+    assert part.status == "converged"
+    assert apart(soft, t, part) < error < TARGET
+    assert apart(soft, t, rest(soft, t, replace(soft.shape_at(t), strain=None))) > 4 * TARGET
+
+
+def test_the_reference_goes_on_the_same_way(soft: Prediction) -> None:
+    part = rest(soft, 1.0, quality=Quality(method="reference", target_error=TARGET))
+    assert part.status == "converged"
+    assert apart(soft, 1.0, part) < 0.2 * TARGET
+
+
+def test_a_motion_of_the_reference_goes_on_stretched() -> None:
+    first = predict(replace(SOFT, horizon=1.0, quality=Quality(method="reference", target_error=TARGET)))
+    whole = predict(SOFT)
+    assert apart(whole, 1.0, rest(whole, 1.0, first.shape_at())) < 0.3 * TARGET
+
+
+@pytest.mark.parametrize("t", [0.8, 0.95])
+def test_sections_that_spin_go_on_spinning(wire: Prediction, t: float) -> None:
+    part = rest(wire, t)
+    assert part.status == "converged"
+    assert apart(wire, t, part) < 0.5 * TARGET
+    shape = wire.shape_at(t)
+    assert shape.velocity is not None
+    still = replace(shape, velocity=np.asarray(shape.velocity)[:, :3])
+    assert apart(wire, t, rest(wire, t, still)) > TARGET
+
+
+@pytest.mark.parametrize("t", [0.3, 0.5, 0.9])
+def test_the_spin_of_the_sections_is_that_of_the_march(wire: Prediction, t: float) -> None:
+    """The march has the angle against frames without spin, the answer against one without twist along the cable."""
+    assert wire.level is not None
+    motion, twist = wire.level.motion, wire.level.problem.twist
+    assert twist is not None
+    k = int(np.argmin(np.abs(motion.times - t)))
+    rates = (motion.states[k + 1, :, 3] - motion.states[k - 1, :, 3]) / (motion.times[k + 1] - motion.times[k - 1])
+    u = np.linspace(0.0, 1.0, 301)
+    marched = spline_at(motion.grid.knots, rates[:, None] / twist.radius, u)[:, 0]
+    curve = start_curve(wire.shape_at(float(motion.times[k])), 1.0)
+    assert curve.theta_rate is not None
+    assert np.abs(curve.spin_at(u) - curve.theta_rate(u)[:, 0]).max() > 3.0  # [rad/s], of the frame
+    np.testing.assert_allclose(curve.spin_at(u), marched, atol=0.3)
+
+
+def test_the_strain_of_a_start_is_that_of_the_tension_that_its_weight_calls_for() -> None:
+    """A cable that hangs at rest has EA strain = mu g (L - u); two spans from an end it is known by a fifth only."""
+    down = Straight(direction=(0.0, 0.0, -1.0), settle=True)
+    still = replace(SOFT, grasps=(Grasp(u=0.0),), shape=down, horizon=0.2, quality=Quality(n_u=21, n_t=13))
+    shape = predict(still).shape_at()
+    assert shape.strain is not None
+    u, largest = greville(np.asarray(shape.knots)), 0.2 * 9.81 / 300.0
+    inner = (u > 0.12) & (u < 0.8)
+    np.testing.assert_allclose(np.asarray(shape.strain)[inner], largest * (1.0 - u[inner]), rtol=0.01)
+    assert np.trapezoid(shape.strain, u) == pytest.approx(0.5 * largest, rel=0.01)  # how much longer it is
+
+
+def test_a_least_squares_goes_on_with_the_stretch_of_the_true_cable() -> None:
+    """Its own cable is softer than the true one, by the docs' eq. 15a, and stretches a hundred times as much."""
+    stiff = replace(SOFT, cable=replace(SOFT.cable, axial_stiffness=3e4))
+    marched = predict(replace(stiff, horizon=1.0, quality=Quality(n_u=13, n_t=25, method="march")))
+    least = predict(replace(stiff, horizon=1.0, quality=Quality(n_u=13, n_t=25, method="spacetime")))
+    assert (marched.accuracy.method, least.accuracy.method) == ("march", "spacetime")
+    expected, found = np.asarray(marched.shape_at().strain), np.asarray(least.shape_at().strain)
+    np.testing.assert_allclose(found, expected, atol=0.2 * np.abs(expected).max())
+
+
+def test_a_straight_cable_that_is_given_a_bow_keeps_its_stretch() -> None:
+    """It is pulled taut, then pushed: its bow is without stress, what it was pulled by is not."""
+    taut = replace(SOFT, environment=Environment(gravity=(0.0, 0.0, 0.0), drag=0.5), horizon=0.6)
+    ends = [Grasp(u=1.0, path=Move(displacement=(0.0, 0.0, z), duration=0.4)) for z in (-0.004, 0.05)]
+    first, second = (replace(taut, grasps=(Grasp(u=0.0), end)) for end in ends)
+    pushed = predict(replace(second, shape=predict(first).shape_at()))
+    assert pushed.level is not None
+    problem, grid = pushed.level.problem, pushed.level.motion.grid
+    assert problem.start.bow > 0.0
+    given = problem.start.strain_at(grid.tables.axial_u)
+    np.testing.assert_allclose(given, 0.004, atol=5e-4)  # waves run along it
+    strain = axial_strain(grid.tables, grid.start[:, : problem.plane.dimensions])
+    np.testing.assert_allclose(strain - grid.history.axial[:, 0], given, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "allowed"),
+    [
+        ("strain", [0.0] * 5, "shape"),
+        ("strain", [0.0, 0.0, 0.0, 0.7], "-0.5 to 0.5"),
+        ("strain", [0.0, 0.0, 0.0, float("nan")], "finite"),
+        ("velocity", [[0.0, 0.0, 0.0, 0.0]] * 3, "shape"),
+        ("velocity", [[0.0] * 5] * 4, "shape"),
+    ],
+)
+def test_a_bad_strain_or_velocity_is_refused(field: str, value: list[float], allowed: str) -> None:
+    control = [[x, 0.0, 0.0] for x in (0.0, 1 / 3, 2 / 3, 1.0)]
+    with pytest.raises(SceneError) as error:
+        ControlPoints(control_points=control, **{field: value})  # type: ignore[arg-type]
+    assert field in str(error.value)
+    assert allowed in str(error.value)
