@@ -25,6 +25,7 @@ from dlocore.plane import leftwards
 from dlocore.problem import Problem
 from dlocore.scene import Material, Points
 from dlocore.shape import SplineCurve, fit_to_knots, spin_to_knots, start_curve, velocity_to_knots
+from dlocore.spline import spline_at
 
 Floats = NDArray[np.float64]
 
@@ -147,8 +148,9 @@ def corners(curve: SplineCurve, length: float) -> list[float]:
     turns to and fro adds nothing. A bend is where that is above half of its largest value about there: as wide as the
     bend, or as what is looked over. It has its middle, and a wider one two places, a third of it to either side.
     """
-    if (len(curve.control_points) - 3) * BEND < 2.0:
-        return []  # its spans are too long for it
+    spans = np.diff(curve.knots)
+    if 2.0 * spans[spans > 0.0].min() > BEND * length:
+        return []  # all its spans are too long for it
     u = np.linspace(0.0, length, _PLACES)
     first, second = curve(u, 1), curve(u, 2)
     speed = np.linalg.norm(first, axis=1)
@@ -190,20 +192,15 @@ def _memory(problem: Problem, grid: Grid, history: History) -> Floats:
     if nc == 3:
         return history.memory
     if material is not None:
-        return _remembered(problem, grid, material, problem.start(0.0, 1)[0])
+        remembered = _remembered(problem, grid, material, problem.start(0.0, 1)[0])
+        return _as_stressed(problem, grid, remembered)
     if problem.rests_straight:
         return history.memory
     if isinstance(rest, str):
         curve: SplineCurve = problem.start
     else:
         curve = start_curve(Points(points=rest), problem.scene.cable.length)
-    natural = problem.coordinates(fit_to_knots(curve, grid.knots))
-    own = natural
-    if curve is problem.start:
-        own = grid.start
-        if problem.contact is not None:  # what the start was pushed out of the table by is no part of the shape
-            given = replace(grid, start=natural, find_tables=lambda knots: grid.tables)
-            own = consistent_start(problem, given, touches=False)
+    own = _untouched(problem, grid) if curve is problem.start else problem.coordinates(fit_to_knots(curve, grid.knots))
     if nc == 2:
         kappa = plane_curvature_of(grid.tables, own)
         return np.concatenate([kappa, kappa], axis=1)
@@ -214,6 +211,50 @@ def _memory(problem: Problem, grid: Grid, history: History) -> Floats:
     bends = frames[:, 3:6]
     strain = np.column_stack([(bends * first).sum(1), (bends * second).sum(1), np.zeros(len(bends))])
     return np.concatenate([strain, strain], axis=1)
+
+
+def _untouched(problem: Problem, grid: Grid) -> Floats:
+    """Return the start (n_u, nc) on a grid but for what it was pushed out of the table or an obstacle by."""
+    if problem.contact is None:
+        return grid.start
+    given = problem.coordinates(fit_to_knots(problem.start, grid.knots))
+    own = consistent_start(problem, replace(grid, start=given, find_tables=lambda knots: grid.tables), touches=False)
+    return np.concatenate([own[:, : problem.line.nc], grid.start[:, problem.line.nc :]], axis=1)
+
+
+def _as_stressed(problem: Problem, grid: Grid, remembered: Floats) -> Floats:
+    """Return what the sections remember (points, 2 m) such that the start has the bending stress of the given one.
+
+    On few control points the start can't bend as sharply as the given one, and where that is free of stress, as at a
+    corner, it would spring. What its bends miss there is left out of the stress-free ones, too.
+    """
+    curve = problem.start
+    knots = np.array(curve.knots)  # of the one kind that the kernels are compiled for
+    theta = None if curve.theta is None else fit_to_knots(curve.theta, knots)[:, 0]
+    tables = _tables_of(problem, knots)
+    there = _section_bends(problem, knots, tables, problem.coordinates(curve.control_points, theta))
+    here = _section_bends(problem, grid.knots, grid.tables, _untouched(problem, grid))
+    out, half = remembered.copy(), remembered.shape[1] // 2
+    for d in range(here.shape[1]):
+        missed = here[:, d] - np.interp(grid.tables.curvature_u, tables.curvature_u, there[:, d])
+        out[:, d] += missed
+        out[:, half + d] += missed
+    return out
+
+
+def _section_bends(problem: Problem, knots: Floats, tables: Tables, q: Floats) -> Floats:
+    """Return the bends of control points q (n, nc) at the curvature points: one in the plane, two of the sections."""
+    if problem.nc == 2:
+        return plane_curvature_of(tables, q)
+    frames = np.zeros((len(tables.curvature_u), PAST))
+    start_frames(knots, np.ascontiguousarray(q), tables, start_director(problem), frames)
+    first, bends = frames[:, DIRECTOR : DIRECTOR + 3], frames[:, 3:6]
+    along, across = (bends * first).sum(1), (bends * np.cross(frames[:, :3], first)).sum(1)
+    assert problem.twist is not None, "without twist in space no bends are remembered"
+    theta = spline_at(knots, q[:, 3:], tables.curvature_u)[:, 0] / problem.twist.radius
+    return np.column_stack(
+        [np.cos(theta) * along + np.sin(theta) * across, np.cos(theta) * across - np.sin(theta) * along]
+    )
 
 
 def write_material(problem: Problem, grid: Grid, q: Floats, history: History, material: Material) -> None:
