@@ -330,11 +330,12 @@ def _start_energy(level: Level) -> float:
 
 def _material(problem: Problem, level: Level) -> MaterialMotion | None:
     motion = level.motion
-    if len(motion.log) == 0 and not np.any(motion.grid.history.memory):
+    if len(motion.log) == 0 and not np.any(motion.grid.history.memory) and not problem.rests_as_it_begins:
         return None
     kept, memory, axial = motion.logged, motion.memory, motion.axial_memory
     if len(motion.log) == 0:
-        memory = np.broadcast_to(motion.grid.history.memory[:, :1], (len(kept), len(motion.history.memory), 1))
+        of_bends = motion.grid.history.memory[:, : 1 if problem.nc == 2 else 3]
+        memory = np.broadcast_to(of_bends, (len(kept), *of_bends.shape))
     if len(motion.log) == 0 or axial.shape[1] == 0:
         axial = np.broadcast_to(motion.grid.history.axial[:, 0], (len(kept), len(motion.history.axial)))
     return material_of(problem, motion.grid, motion.times[kept], motion.states[kept], memory, axial)

@@ -258,7 +258,7 @@ class Prediction:
 
     @cached_property
     def material(self) -> MaterialMotion | None:
-        """What the sections remember over time; None where they are elastic, naturally straight and untwisted."""
+        """What the sections remember over time; None where they are elastic, and straight whatever the start."""
         return self.report_material()
 
     @cached_property

@@ -104,6 +104,12 @@ class Problem:
         rest = self.rest_shape
         return isinstance(rest, str) and rest == "straight"
 
+    @property
+    def rests_as_it_begins(self) -> bool:
+        """Whether the scene takes the start as the stress-free shape, which another start would not be."""
+        rest = self.scene.cable.rest_shape
+        return isinstance(rest, str) and rest == "initial"
+
     @cached_property
     def features(self) -> Features:
         """Where along the cable knots are needed, but for sharp bends of the start."""

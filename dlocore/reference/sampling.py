@@ -105,11 +105,12 @@ def _kept(motion: Motion) -> NDArray[np.int64]:
 
 
 def material_of(motion: Motion, taken: Samples) -> MaterialMotion | None:
-    """Return what the sections remember over a motion; None where they are elastic and straight."""
+    """Return what the sections remember over a motion; None where they are elastic and straight whatever the start."""
     rod = motion.rod
     soft = rod.law[places.SOFTENED]
     yields = rod.law[places.MEMORY_RATE] > 0.0
-    if not (yields or np.any(rod.natural) or np.any(rod.start.kept.memory)):
+    remembers = yields or np.any(rod.natural) or np.any(rod.start.kept.memory)
+    if not (remembers or rod.problem.rests_as_it_begins):
         return None
     at = _kept(motion)
     inner = slice(1, -1)

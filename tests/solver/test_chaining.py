@@ -24,7 +24,8 @@ from dlocore import (
     Straight,
     predict,
 )
-from dlocore.discretisation import axial_strain
+from dlocore.discretisation import axial_strain, corners
+from dlocore.scene import Method
 from dlocore.shape import start_curve
 from dlocore.spline import greville, spline_at
 
@@ -88,6 +89,19 @@ def test_a_stretched_cable_goes_on_stretched(soft: Prediction, t: float) -> None
     assert apart(soft, t, rest(soft, t, replace(soft.shape_at(t), strain=None))) > 4 * TARGET
 
 
+@pytest.mark.parametrize("method", ["auto", "reference"])
+def test_a_cable_that_began_straight_stays_straight_without_stress(method: Method) -> None:
+    """Its stress-free shape is the one that it began with, not the bent one that it goes on from."""
+    scene = replace(SOFT, cable=replace(SOFT.cable, bending_stiffness=0.05, rest_shape="initial"))
+    whole = predict(scene)
+    first = predict(replace(scene, horizon=0.8, quality=Quality(method=method, target_error=TARGET)))
+    part = rest(whole, 0.8, first.shape_at())
+    assert part.status == "converged"
+    assert apart(whole, 0.8, part) < TARGET
+    assert part.material is not None
+    assert not np.any(part.material.memory)
+
+
 def test_the_reference_goes_on_the_same_way(soft: Prediction) -> None:
     part = rest(soft, 1.0, quality=Quality(method="reference", target_error=TARGET))
     assert part.status == "converged"
@@ -147,6 +161,34 @@ def test_a_least_squares_goes_on_with_the_stretch_of_the_true_cable() -> None:
     assert (marched.accuracy.method, least.accuracy.method) == ("march", "spacetime")
     expected, found = np.asarray(marched.shape_at().strain), np.asarray(least.shape_at().strain)
     np.testing.assert_allclose(found, expected, atol=0.2 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("gravity", [0.0, -9.81])
+def test_a_corner_without_stress_goes_on_without_stress(gravity: float) -> None:
+    """On few control points the corner is rounder than it was: what remembers the sharp one would spring open.
+
+    It is in the plane without weight, and with weight across that with twist.
+    """
+    legs = np.concatenate([np.linspace([0.0, 0.0], [0.5, 0.0], 40), np.linspace([0.5, 0.01], [0.5, 0.5], 40)])
+    wire = replace(
+        bent_wire(),
+        cable=Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=0.02, rest_shape="initial"),
+        shape=Points(points=legs),
+        grasps=(Grasp(u=0.0, hold="clamp", path=Move(displacement=(0.1, 0.3, 0.0), duration=0.8)),),
+        environment=Environment(gravity=(0.0, 0.0, gravity), drag=0.1),
+    )
+    whole = predict(wire)
+    part = rest(whole, 0.8)
+    assert whole.status == part.status == "converged"
+    assert part.accuracy.n_u <= whole.accuracy.n_u
+    error = (whole.accuracy.error_estimate or 0.0) + (part.accuracy.error_estimate or 0.0)
+    assert apart(whole, 0.8, part) < 2.0 * error
+    assert part.level is not None
+    assert len(corners(part.level.problem.start, 1.0)) == 1
+    coarse = rest(whole, 0.8, quality=Quality(n_u=13, n_t=19))
+    assert coarse.start_energy == pytest.approx(
+        part.start_energy, rel=0.05
+    )  # 40 to 240 times it where the corner springs
 
 
 def test_a_straight_cable_that_is_given_a_bow_keeps_its_stretch() -> None:
