@@ -228,6 +228,8 @@ def _as_stressed(problem: Problem, grid: Grid, remembered: Floats) -> Floats:
     On few control points the start can't bend as sharply as the given one, and where that is free of stress, as at a
     corner, it would spring. What its bends miss there is left out of the stress-free ones, too.
     """
+    if not remembered.any():
+        return remembered  # straight, which any grid is
     curve = problem.start
     knots = np.array(curve.knots)  # of the one kind that the kernels are compiled for
     theta = None if curve.theta is None else fit_to_knots(curve.theta, knots)[:, 0]
