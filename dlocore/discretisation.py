@@ -38,6 +38,7 @@ _WIDE = 2.2  # times BEND: where a bend, rather than what is looked over, is as 
 _PLACES = 501  # along the start at which bends are looked for
 _REACH = round(BEND * (_PLACES - 1))  # of them, to either side
 _MOST_CORNERS = 4
+_THREE = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
 _APART = 0.25 * BEND  # of the length: what is nearer to a sharp bend shares its knot
 
 
@@ -192,7 +193,7 @@ def _memory(problem: Problem, grid: Grid, history: History) -> Floats:
     if nc == 3:
         return history.memory
     if material is not None:
-        remembered = _remembered(problem, grid, material, problem.start(0.0, 1)[0])
+        remembered = _remembered(problem, grid, material, problem.start(0.0, 1)[0], problem.start.knots)
         return _as_stressed(problem, grid, remembered)
     if problem.rests_straight:
         return history.memory
@@ -236,11 +237,10 @@ def _as_stressed(problem: Problem, grid: Grid, remembered: Floats) -> Floats:
     tables = _tables_of(problem, knots)
     there = _section_bends(problem, knots, tables, problem.coordinates(curve.control_points, theta))
     here = _section_bends(problem, grid.knots, grid.tables, _untouched(problem, grid))
-    out, half = remembered.copy(), remembered.shape[1] // 2
-    for d in range(here.shape[1]):
-        missed = here[:, d] - np.interp(grid.tables.curvature_u, tables.curvature_u, there[:, d])
-        out[:, d] += missed
-        out[:, half + d] += missed
+    missed = here - _between(grid.tables.curvature_u, tables.curvature_u, there, knots)
+    out, half, bends = remembered.copy(), remembered.shape[1] // 2, missed.shape[1]
+    out[:, :bends] += missed
+    out[:, half : half + bends] += missed
     return out
 
 
@@ -263,7 +263,7 @@ def write_material(problem: Problem, grid: Grid, q: Floats, history: History, ma
     """Write what the sections remember at the state q (n_u, nc) of a motion of this problem into a history."""
     if problem.nc != 3:
         tangent = problem.plane.world_vectors(grid.at(q, 0.0, 1)[: problem.plane.dimensions])
-        history.memory[:] = _remembered(problem, grid, material, tangent)
+        history.memory[:] = _remembered(problem, grid, material, tangent, grid.knots)
     _write_stretch(grid, history, material)
 
 
@@ -272,19 +272,31 @@ def _write_stretch(grid: Grid, history: History, material: Material) -> None:
         history.axial[:, 0] = np.interp(grid.tables.axial_u, cast(Floats, material.u), cast(Floats, material.stretch))
 
 
-def _remembered(problem: Problem, grid: Grid, material: Material, tangent: Floats) -> Floats:
+def _remembered(problem: Problem, grid: Grid, material: Material, tangent: Floats, knots: Floats) -> Floats:
     """Return the stress-free strain at the curvature points, and its natural value, (points, 2 m), of a material.
 
-    `tangent` (3,) is that at u = 0, where the material's director lies.
+    `tangent` (3,) is that at u = 0, where the material's director lies; `knots` are those of what it remembers.
     """
-    u = grid.tables.curvature_u
-    columns = [np.zeros(len(u))] * 6
-    for k, values in enumerate((material.memory, material.natural)):
-        if values is not None:
-            for d in range(3):
-                columns[3 * k + d] = np.interp(u, cast(Floats, material.u), cast(Floats, values)[:, d])
-    sections = np.column_stack(columns)
+    u, places = grid.tables.curvature_u, cast(Floats, material.u)
+    given = [material.memory, np.zeros((len(places), 3)) if material.natural is None else material.natural]
+    sections = _between(u, places, np.concatenate(cast(list[Floats], given), axis=1), knots)
     return sections if problem.nc == 4 else _planar_memory(problem, sections, cast(Floats, material.director), tangent)
+
+
+def _between(u: Floats, places: Floats, values: Floats, knots: Floats) -> Floats:
+    """Return values (k, m) at u (k,) of those at `places` (p, m), the curvature points of a spline with these knots.
+
+    In each span the curvature of a cubic is nearly linear, and has a kink at the knot: it is the parabola through the
+    three points of a span, and where the places are others, what is linear between them.
+    """
+    cuts = np.unique(knots)
+    span = np.clip(np.searchsorted(cuts, places) - 1, 0, len(cuts) - 2)
+    if not np.array_equal(span, np.repeat(np.arange(len(cuts) - 1), 3)):
+        return np.column_stack([np.interp(u, places, row) for row in values.T])
+    at = np.clip(np.searchsorted(cuts, u, side="right") - 1, 0, len(cuts) - 2)
+    x, y = places.reshape(-1, 3)[at], values.reshape(-1, 3, values.shape[1])[at]
+    shares = [(u - x[:, j]) * (u - x[:, k]) / ((x[:, i] - x[:, j]) * (x[:, i] - x[:, k])) for i, j, k in _THREE]
+    return np.einsum("ik,kid->kd", shares, y)
 
 
 def _planar_memory(problem: Problem, sections: Floats, director: Floats, tangent: Floats) -> Floats:
