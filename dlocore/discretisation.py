@@ -181,9 +181,10 @@ def plane_curvature_of(tables: Tables, q: Floats) -> Floats:
 
 
 def axial_strain(tables: Tables, r: Floats) -> Floats:
-    """Return the axial strain (points,) of control points r (n_u, 2 or 3) at the axial points."""
+    """Return the axial strain (..., points) of control points r (..., n_u, 2 or 3) at the axial points."""
     index = tables.axial_first[:, None] + np.arange(4)
-    return np.asarray(np.linalg.norm(np.einsum("pi,pid->pd", tables.axial_b1, r[index]), axis=1) - 1.0)
+    slopes = np.einsum("pi,...pid->...pd", tables.axial_b1, r[..., index, :])
+    return np.asarray(np.linalg.norm(slopes, axis=-1) - 1.0)
 
 
 def _memory(problem: Problem, grid: Grid, history: History) -> Floats:

@@ -151,7 +151,7 @@ def material_of(
 def stretch_of(grid: Grid, times: Floats, states: Floats) -> StretchMotion:
     """Return how far a cable is stretched in the states (k, n_u, nc) at the times (k,) [s] of a motion."""
     kept = np.unique(np.linspace(0, len(times) - 1, STRETCH_TIMES).round().astype(int))
-    strain = np.array([axial_strain(grid.tables, q[:, :3]) for q in states[kept]])
+    strain = axial_strain(grid.tables, states[kept][..., :3])
     return StretchMotion(times=times[kept], u=np.array(grid.tables.axial_u), strain=strain)
 
 
