@@ -133,6 +133,22 @@ def test_a_run_that_was_stored_without_its_memory_still_loads(tmp_path: Path, pr
     assert motion.material is None
 
 
+def test_a_run_that_was_stored_without_its_stretch_goes_on_without(tmp_path: Path, prediction: Prediction) -> None:
+    target, (id,) = fill(tmp_path, prediction, 1)
+    nets = tmp_path / "runs" / id / runs.NETS
+    with np.load(nets) as arrays:
+        kept = {name: arrays[name] for name in arrays.files if not name.startswith("stretch_")}
+        assert len(kept) == len(arrays.files) - 3
+    np.savez(nets, **kept)
+    motion = target.motion(id)
+    assert motion is not None
+    assert motion.stretch is None
+    request = paper_scene(shape={"kind": "prediction", "id": id, "t": 0.7})
+    shape = to_scene(PredictionRequest.model_validate(request), target.motion).shape
+    assert isinstance(shape, ControlPoints)
+    assert shape.strain is None
+
+
 def test_runs_are_listed_newest_first_in_pages(tmp_path: Path, prediction: Prediction) -> None:
     target, ids = fill(tmp_path, prediction, 5)
     assert listed(target) == ids[::-1]
