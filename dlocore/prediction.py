@@ -129,8 +129,7 @@ class MaterialMotion:
 
     def at(self, t: float) -> Material:
         """Return what the sections remember at time `t` [s], linear between the stored times."""
-        k = int(np.clip(np.searchsorted(self.times, t) - 1, 0, len(self.times) - 2))
-        s = float(np.clip((t - self.times[k]) / (self.times[k + 1] - self.times[k]), 0.0, 1.0))
+        k, s = _bracket(self.times, t)
         director = (1 - s) * self.director[k] + s * self.director[k + 1]
         return Material(
             director=director / np.linalg.norm(director),
@@ -157,9 +156,14 @@ class StretchMotion:
 
     def at(self, t: float) -> Floats:
         """Return the axial strain (k,) at time `t` [s], linear between the stored times."""
-        k = int(np.clip(np.searchsorted(self.times, t) - 1, 0, len(self.times) - 2))
-        s = float(np.clip((t - self.times[k]) / (self.times[k + 1] - self.times[k]), 0.0, 1.0))
+        k, s = _bracket(self.times, t)
         return np.asarray((1 - s) * self.strain[k] + s * self.strain[k + 1])
+
+
+def _bracket(times: Floats, t: float) -> tuple[int, float]:
+    """Return which of the times (m,) [s] is the last before `t`, and the share of the way from it to the next."""
+    k = int(np.clip(np.searchsorted(times, t) - 1, 0, len(times) - 2))
+    return k, float(np.clip((t - times[k]) / (times[k + 1] - times[k]), 0.0, 1.0))
 
 
 @dataclass(frozen=True, kw_only=True)

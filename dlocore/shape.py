@@ -56,7 +56,7 @@ class StartCurve(SplineCurve):
         length_given: length of the curve before it was made as long as the cable [m].
         theta: angle of the sections, a spline with control points (n, 1) [rad], or None where it is the same
             everywhere.
-        theta_rate: its rate, a spline with control points (n, 1) [rad/s], or None where the sections do not spin.
+        theta_rate: its rate, a spline with control points (n, 1) [rad/s], or None where no section spins.
         strain: places u (k,) [m], rising, and the axial strain there (k,), or None where there is none.
         material: what the sections remember, or None where the scene's `rest_shape` tells.
         bow: height of the bow without stress that a straight start was given to buckle by [m], see `buckling.py`.
@@ -82,8 +82,9 @@ class StartCurve(SplineCurve):
 
     @property
     def twisted(self) -> bool:
-        """Whether its sections are turned against each other, or turn."""
-        return self.theta is not None or self.theta_rate is not None
+        """Whether its sections are turned against each other or what they remember, or turn so."""
+        rate = self.theta_rate
+        return self.theta is not None or (rate is not None and _turned(rate.control_points, SAME_SPIN, self.material))
 
     def strain_at(self, u: Floats) -> Floats:
         """Return the axial strain (k,) at u (k,) [m]."""
@@ -161,7 +162,7 @@ def _given(shape: ControlPoints, length: float) -> StartCurve:
     if shape.velocity is not None:
         rates = cast(Floats, shape.velocity)
         velocity = SplineCurve(knots=knots, control_points=np.array(np.broadcast_to(rates[..., :3], control.shape)))
-        if rates.shape[-1] == 4 and _turned(rates[:, 3:], SAME_SPIN, shape.material):
+        if rates.shape[-1] == 4:
             theta_rate = SplineCurve(knots=knots, control_points=rates[:, 3:].copy())
     turned = _turned(angles, SAME_ANGLE, shape.material)
     theta = SplineCurve(knots=knots, control_points=angles) if turned else None
