@@ -38,6 +38,7 @@ _WIDE = 2.2  # times BEND: where a bend, rather than what is looked over, is as 
 _PLACES = 501  # along the start at which bends are looked for
 _REACH = round(BEND * (_PLACES - 1))  # of them, to either side
 _MOST_CORNERS = 4
+_ROUNDING = 1e-9  # of what is remembered: less has not yielded
 _THREE = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
 _APART = 0.25 * BEND  # of the length: what is nearer to a sharp bend shares its knot
 
@@ -195,7 +196,7 @@ def _memory(problem: Problem, grid: Grid, history: History) -> Floats:
         return history.memory
     if material is not None:
         remembered = _remembered(problem, grid, material, problem.start(0.0, 1)[0], problem.start.knots)
-        return _as_stressed(problem, grid, remembered)
+        return remembered if _has_yielded(material) else _as_stressed(problem, grid, remembered)
     if problem.rests_straight:
         return history.memory
     if isinstance(rest, str):
@@ -228,11 +229,12 @@ def _as_stressed(problem: Problem, grid: Grid, remembered: Floats) -> Floats:
     """Return what the sections remember (points, 2 m) such that the start has the bending stress of the given one.
 
     On few control points the start can't bend as sharply as the given one, and where that is free of stress, as at a
-    corner, it would spring. What its bends miss there is left out of the stress-free ones, too.
+    corner, it would spring. What its bends miss there is left out of the stress-free ones, too. What has yielded is its
+    sections' own, and stays; so does what is remembered on the same knots.
     """
-    if not remembered.any():
-        return remembered  # straight, which any grid is
     curve = problem.start
+    if not remembered.any() or np.array_equal(curve.knots, grid.knots):
+        return remembered
     knots = np.array(curve.knots)  # of the one kind that the kernels are compiled for
     theta = None if curve.theta is None else fit_to_knots(curve.theta, knots)[:, 0]
     tables = _tables_of(problem, knots)
@@ -279,9 +281,23 @@ def _remembered(problem: Problem, grid: Grid, material: Material, tangent: Float
     `tangent` (3,) is that at u = 0, where the material's director lies; `knots` are those of what it remembers.
     """
     u, places = grid.tables.curvature_u, cast(Floats, material.u)
-    given = [material.memory, np.zeros((len(places), 3)) if material.natural is None else material.natural]
-    sections = _between(u, places, np.concatenate(cast(list[Floats], given), axis=1), knots)
+    values = np.concatenate(_memories(material), axis=1)
+    if _has_yielded(material):
+        sections = np.column_stack([np.interp(u, places, row) for row in values.T])
+    else:
+        sections = _between(u, places, values, knots)
     return sections if problem.nc == 4 else _planar_memory(problem, sections, cast(Floats, material.director), tangent)
+
+
+def _memories(material: Material) -> tuple[Floats, Floats]:
+    """Return what a material remembers, and what that was before anything yielded, (k, 3) each."""
+    memory = cast(Floats, material.memory)
+    return memory, np.zeros_like(memory) if material.natural is None else cast(Floats, material.natural)
+
+
+def _has_yielded(material: Material) -> bool:
+    memory, natural = _memories(material)
+    return bool(np.abs(memory - natural).max() > _ROUNDING * np.abs(memory).max())
 
 
 def _between(u: Floats, places: Floats, values: Floats, knots: Floats) -> Floats:
