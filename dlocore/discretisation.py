@@ -208,11 +208,8 @@ def _memory(problem: Problem, grid: Grid, history: History) -> Floats:
         kappa = plane_curvature_of(grid.tables, own)
         return np.concatenate([kappa, kappa], axis=1)
     # the bends of the natural curve in a frame without twist that starts like that of the sections
-    frames = np.zeros_like(history.past)
-    start_frames(grid.knots, own, grid.tables, leftwards(curve(0.0, 1)[0]), frames)
-    first, second = frames[:, DIRECTOR : DIRECTOR + 3], np.cross(frames[:, :3], frames[:, DIRECTOR : DIRECTOR + 3])
-    bends = frames[:, 3:6]
-    strain = np.column_stack([(bends * first).sum(1), (bends * second).sum(1), np.zeros(len(bends))])
+    along, across = _bends(grid.knots, own, grid.tables, leftwards(curve(0.0, 1)[0]))
+    strain = np.column_stack([along, across, np.zeros(len(along))])
     return np.concatenate([strain, strain], axis=1)
 
 
@@ -251,15 +248,20 @@ def _section_bends(problem: Problem, knots: Floats, tables: Tables, q: Floats) -
     """Return the bends of control points q (n, nc) at the curvature points: one in the plane, two of the sections."""
     if problem.nc == 2:
         return plane_curvature_of(tables, q)
-    frames = np.zeros((len(tables.curvature_u), PAST))
-    start_frames(knots, np.ascontiguousarray(q), tables, start_director(problem), frames)
-    first, bends = frames[:, DIRECTOR : DIRECTOR + 3], frames[:, 3:6]
-    along, across = (bends * first).sum(1), (bends * np.cross(frames[:, :3], first)).sum(1)
+    along, across = _bends(knots, q, tables, start_director(problem))
     assert problem.twist is not None, "without twist in space no bends are remembered"
     theta = spline_at(knots, q[:, 3:], tables.curvature_u)[:, 0] / problem.twist.radius
     return np.column_stack(
         [np.cos(theta) * along + np.sin(theta) * across, np.cos(theta) * across - np.sin(theta) * along]
     )
+
+
+def _bends(knots: Floats, q: Floats, tables: Tables, director: Floats) -> tuple[Floats, Floats]:
+    """Return the two bends (points,) of control points q (n, >= 3) in the frame without twist from a director (3,)."""
+    frames = np.zeros((len(tables.curvature_u), PAST))
+    start_frames(knots, np.ascontiguousarray(q), tables, director, frames)
+    first, bends = frames[:, DIRECTOR : DIRECTOR + 3], frames[:, 3:6]
+    return (bends * first).sum(axis=1), (bends * np.cross(frames[:, :3], first)).sum(axis=1)
 
 
 def write_material(problem: Problem, grid: Grid, q: Floats, history: History, material: Material) -> None:
