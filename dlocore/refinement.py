@@ -109,6 +109,7 @@ class _Climb:
         unseen: whether no time was left to see how far it goes.
         evened: how often more control points were taken as the cable was strained between the points that watch it.
         pace: time that the last march took for each of its points and steps [s].
+        wanting: effects that a finer grid called for, and that no time was left to march with, in words.
     """
 
     problem: Problem
@@ -129,6 +130,7 @@ class _Climb:
     unseen: bool = False
     evened: int = 0
     pace: float = np.inf
+    wanting: str = ""
 
     def outcome(self) -> Outcome:
         """March until an answer is found, and return it."""
@@ -138,15 +140,16 @@ class _Climb:
             began = self.monitor.elapsed()
             try:
                 level = self._march(size)
-            except TimeIsUp:
+            except TimeIsUp as up:
                 self.monitor.phase("march")
+                self.wanting = str(up).replace("side", "a side to go to")
                 break
             except SceneError as error:
                 if error.field != RESTLESS:
                     raise
                 self.number += 1
                 shown = self.best or shown
-                if self.number >= len(LEVELS):
+                if self.number >= len(LEVELS) or (shown is not None and self.monitor.elapsed() > self.budget):
                     if shown is None:
                         raise
                     return self._restless(shown, error)
@@ -201,6 +204,7 @@ class _Climb:
         """March on the next grid; where its motion calls for another effect, forget the grids before."""
         before = self.best
         if before is not None:
+            self.monitor.end_within(self.budget)
             self.monitor.check()
         rho = self.rho
         if before is not None and size.steps == before.size.steps and before.motion.rho == STRONGLY_DAMPED:
@@ -211,7 +215,7 @@ class _Climb:
         if before is not None and level.posed is self.problem:
             level = replace(level, change=distance(before, level, self.problem))
             if not self._is_rough(level):  # so strands do not meet because of the grid
-                level = march_level(self.problem, size, self.monitor, rho, free_knots=True, known=level)
+                level = march_level(self.problem, size, self.monitor, rho, free_knots=True, known=level, whole=True)
         if level.posed is not self.problem:
             self._forget()  # another motion
         self.problem = level.posed  # a rough grid may have needed contact that is too stiff for a fine one
@@ -421,13 +425,20 @@ class _Climb:
         return Outcome(other, "converged", self._agreed(other), parts)
 
     def _within_budget(self, level: Level) -> Outcome:
-        """Return the best that the budget allows."""
+        """Return the best that the budget allows; it is a success where its error is known, and is what is enough."""
+        allowed = f"{self.budget * 1e3:.3g} ms"
         if not np.isfinite(level.change):
-            return Outcome(level, "time_limit", f"{self.budget * 1e3:.3g} ms allow one grid, unchecked.", None)
-        moved = f"the last refinement moved the surface by {level.change * 1e3:.2g} mm"
+            return Outcome(level, "time_limit", f"{allowed} allow one grid, unchecked.", None)
+        status, failure = march_status(self.problem, level)
+        moved = f"The best grid in {allowed}; the last refinement moved the surface by {level.change * 1e3:.2g} mm."
         self.astray = self._find_astray(level)
-        message, parts = self._doubted(level, f"The best grid in {self.budget * 1e3:.3g} ms; {moved}.")
-        return Outcome(level, march_status(self.problem, level)[0], message, parts)
+        message, parts = self._doubted(level, moved)
+        if status != "converged":
+            return Outcome(level, status, f"{message} {failure}", parts)
+        if parts is None or sum(parts.values()) > self.enough:
+            more = f"more than {AUTO_ENOUGH:.0%} of the length" if parts else "not known"
+            return Outcome(level, "time_limit", f"{message} Its estimated error is {more}: allow more time.", parts)
+        return Outcome(level, status, message, parts)
 
     def _unfinished(self, level: Level, best: Level) -> Outcome:
         """Return the best one, where a finer grid was not finished."""
@@ -445,6 +456,11 @@ class _Climb:
         """Return the best one, where no finer grid is to be tried or the time is up."""
         best = self.best
         assert best is not None
+        if self.wanting:
+            words = f"The time limit passed: a finer grid calls for {self.wanting}, which this answer leaves out."
+            return Outcome(best, "time_limit", f"{words} Allow more time.", None)
+        if self.monitor.elapsed() > self.budget:
+            return self._within_budget(best)
         status, message = march_status(self.problem, best)
         left = self._left_over()
         advice = "Allow a larger target_error, more time or a shorter motion."

@@ -296,7 +296,8 @@ class Quality:
     """What accuracy or grid is asked for, and by which method.
 
     Give `n_u` and `n_t` (a fixed grid), or `target_error` [m] at the worst point of the surface, or `time_budget` [s],
-    or nothing (0.2 % of the length is aimed at, an estimated error of 1 % is success).
+    or nothing (0.2 % of the length is aimed at, an estimated error of 1 % is success). With a time budget grids are
+    refined as long as it lasts, but the first is marched to its end; an estimated error of 1 % is success, too.
 
     Args:
         n_u: control points along the cable, 5 to 129.

@@ -23,7 +23,7 @@ from dlocore.solvers.ladder import (
     stretched,
 )
 from dlocore.solvers.march import RHO
-from dlocore.solvers.monitor import Monitor
+from dlocore.solvers.monitor import Monitor, TimeIsUp
 
 TORN = 0.2  # axial strain: no cable of this kind follows
 FOLDED = 0.4  # of |r'| between the points that watch over the length: less is a fold that no energy sees
@@ -61,19 +61,22 @@ def march_level(
 
     Raises:
         Cancelled: the caller asked to stop.
-        TimeIsUp: the deadline passed, where the march had to be `whole`.
+        TimeIsUp: the deadline passed, where the march had to be `whole`; it names the effects that were called for.
     """
-    called = dict(problem.called_for)
+    called, asked = dict(problem.called_for), problem.called_for
     while True:
         if free_knots:
             size = Size(max(size.n_u, smallest_n_u(problem)), max(size.n_t, smallest_n_t(problem)), size.steps)
         stiffness, credible, like = 1.0, CREDIBLE_STRAIN, None
         if before is not None and before.posed is problem:
             stiffness, credible, like = hardness(before), credible_after(before), before.motion.grid
-        level = known or run_level(
-            problem, *size, monitor, rho=rho, free_knots=free_knots, hardness=stiffness, credible=credible,
-            watch=watch, like=like, whole=whole,
-        )  # fmt: skip
+        try:
+            level = known or run_level(
+                problem, *size, monitor, rho=rho, free_knots=free_knots, hardness=stiffness, credible=credible,
+                watch=watch, like=like, whole=whole,
+            )  # fmt: skip
+        except TimeIsUp:
+            raise TimeIsUp(", ".join(name for name in called if name not in asked)) from None
         if known is not None:
             new, known = called_for_by_fine(level), None
         else:

@@ -140,7 +140,12 @@ class QualityModel(Model):
         default=None, ge=1e-6, le=10.0, description="Error at the worst point of the surface [m].", examples=[0.002]
     )
     time_budget: Number | None = Field(
-        default=None, ge=1e-4, le=3600.0, description="Time the solve may take [s].", examples=[0.02]
+        default=None,
+        ge=1e-4,
+        le=3600.0,
+        description="Time the solve may take [s]; a first grid that takes longer is still marched to its end. "
+        "`converged` then says that the estimated error is within 1 % of the length.",
+        examples=[0.02],
     )
     method: Literal["auto", "march", "spacetime", "paper", "reference"] = Field(
         default="auto",

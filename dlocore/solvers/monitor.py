@@ -8,7 +8,10 @@ from dlocore.prediction import Iteration, OnIteration
 
 
 class TimeIsUp(Exception):  # noqa: N818 - no error: the solver answers with what it has
-    """The deadline of a solve has passed; the solver answers with what it has."""
+    """The deadline of a solve has passed; the solver answers with what it has.
+
+    Its text names the effects that a motion was found to call for, and that there was no time to march with.
+    """
 
 
 class Monitor:
@@ -39,6 +42,12 @@ class Monitor:
     def within(self, time: float) -> "Monitor":
         """Return a monitor of a part of the solve, which has so much time from now on [s], and no more than all."""
         return Monitor(deadline=min(time, self.remaining()), cancelled=self._cancelled)
+
+    def end_within(self, time: float) -> None:
+        """Have the deadline no later than so long after the solve began [s]."""
+        end = self.began + time
+        if end < float("inf"):
+            self._end = end if self._end is None else min(end, self._end)
 
     def check(self) -> None:
         """Raise Cancelled where the caller asked to stop, TimeIsUp where the deadline has passed."""

@@ -353,8 +353,8 @@ def test_what_a_grid_says_is_not_forgotten_as_the_time_ends(marches: bool, monke
 
 @pytest.fixture
 def hurried(monkeypatch: pytest.MonkeyPatch) -> Scene:
-    """A scene with a time budget that two grids use up, however fast the machine is."""
-    monkeypatch.setattr(refinement._Climb, "_in_time", lambda climb, *_: climb.estimate == np.inf)
+    """A scene with a time budget that is used up once two grids agree to 1 %, however fast the machine is."""
+    monkeypatch.setattr(refinement._Climb, "_in_time", lambda climb, *_: climb.estimate > climb.enough)
     return dataclasses.replace(column(0.1, drag=1.0), quality=Quality(time_budget=600.0))
 
 
