@@ -191,8 +191,9 @@ class Sensitivities:
         names: the parameters.
         exact: by parameter: differentiated step by step; else by differences of whole marches.
         reason: why not, "" where all are.
-        steps: the change of each parameter, up and down, on which the derivative rests.
-        above, below: the motions with each parameter a little larger and smaller.
+        steps: half the change of each parameter on which the derivative rests.
+        above, below: the motions with each parameter a little larger and smaller; one of them is the motion itself
+            where the parameter ends there, as a drag of zero does, and the derivative is that to the other side.
     """
 
     names: tuple[str, ...]
@@ -216,6 +217,8 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     The motion is marched once more on the prediction's grid, with the effects that it found, and differentiated step by
     step: exact up to about 1e-6 of the largest derivative. Where steps can't be differentiated (contact, friction,
     strands that touch, steps that had to be split) whole marches are compared instead, and `exact` and `reason` say so.
+    A parameter that can't be less, or more, as a drag of zero or the place of a grasp at an end, is changed to the
+    other side only: the derivative then errs by about the relative change of it over a change of 1e-4.
 
     Args:
         prediction: of the scene.
@@ -224,7 +227,7 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
             stiffnesses that were derived from others stay.
 
     Raises:
-        SceneError: a path leads to no number.
+        SceneError: a path leads to no number, or to one that can be neither less nor more.
     """
     scene, accuracy = prediction.scene, prediction.accuracy
     found = {report.name: "" for report in prediction.effects if report.active}
@@ -242,34 +245,39 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     elif not reason:
         reason = "the start is an equilibrium that is found by iteration"
 
-    def moved(name: str, value: float) -> tuple[Problem, Grid]:
-        other = pose(_with(scene, name, value), problem.called_for)
-        return other, start_grid(other, accuracy.n_u, monitor)
+    def around(name: str, value: float, width: float) -> list[tuple[float, Problem, Grid]]:
+        """Return the scene with a larger and a smaller number, and by how much; as it is where no scene has that."""
+        found, refused = list[tuple[float, Problem, Grid]](), list[SceneError]()
+        for change in (width, -width):
+            try:
+                other = pose(_with(scene, name, value + change), problem.called_for)
+                found.append((change, other, start_grid(other, accuracy.n_u, monitor)))
+            except SceneError as error:
+                refused.append(error)
+                found.append((0.0, problem, grid))
+        if len(refused) == len(found):
+            raise SceneError("wrt", name, "a number that can be changed a little", str(refused[0]).rstrip("."))
+        return found
 
     above, below, exact, widths = [], [], [], []
     for name, value in zip(wrt, values, strict=True):
         size = abs(value) if value != 0.0 else 1.0
-        sides: list[SplineSurface] = []
+        surfaces: list[SplineSurface] = []
         followed = known is not None
-        width = STEP * size
+        sides = around(name, value, STEP * size) if followed else []
         try:
             if known is not None:
-                for sign in (1.0, -1.0):
-                    other, other_grid = moved(name, value + sign * width)
-                    sides.append(_surface(other, other_grid, *beside(known, other, other_grid), accuracy.n_t))
+                surfaces = [_surface(p, g, *beside(known, p, g), accuracy.n_t) for _, p, g in sides]
         except ValueError as error:
             followed, reason = False, str(error)
         if not followed:
-            width = COARSE_STEP * size
-            sides = []
-            for sign in (1.0, -1.0):
-                other, other_grid = moved(name, value + sign * width)
-                one = march(other, other_grid, steps, monitor)
-                sides.append(_surface(other, other_grid, one.states, one.times, one.velocity, accuracy.n_t))
-        above.append(sides[0])
-        below.append(sides[1])
+            sides = around(name, value, COARSE_STEP * size)
+            marched = [(p, g, march(p, g, steps, monitor)) for _, p, g in sides]
+            surfaces = [_surface(p, g, m.states, m.times, m.velocity, accuracy.n_t) for p, g, m in marched]
+        above.append(surfaces[0])
+        below.append(surfaces[1])
         exact.append(followed)
-        widths.append(width)
+        widths.append(0.5 * (sides[0][0] - sides[1][0]))
     return Sensitivities(
         names=tuple(wrt), exact=tuple(exact), reason=reason, steps=tuple(widths), above=tuple(above),
         below=tuple(below),

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dlocore import Cable, Environment, Grasp, Move, Quality, Scene, SceneError, Straight, predict
-from dlocore.sensitivity import STEP, sensitivities
+from dlocore import Cable, Environment, Grasp, Move, Quality, Scene, SceneError, Straight, predict, sensitivity
+from dlocore.sensitivity import STEP, _with, sensitivities
 from dlocore.solvers import march as marching
 
 U, T = np.linspace(0.05, 0.95, 7), np.linspace(0.2, 1.5, 6)
@@ -52,7 +52,7 @@ def test_the_gripper_moves_with_its_displacement(found: np.ndarray) -> None:
 
 def by_differences(scene: Scene, name: str) -> np.ndarray:
     """Return the derivative by differences of marches over 1e-3 of the value, right to about its square."""
-    from dlocore.sensitivity import _number, _with
+    from dlocore.sensitivity import _number
 
     value = _number(scene, name)
     width = 10 * STEP * value
@@ -102,3 +102,26 @@ def test_contact_is_differentiated_by_whole_marches_and_said_so() -> None:
 def test_a_path_that_leads_to_no_number_is_refused(path: str) -> None:
     with pytest.raises(SceneError, match="wrt"):
         sensitivities(predict(scene()), [path])
+
+
+@pytest.mark.parametrize("name", ["environment.drag", "grasps[0].u"])
+def test_a_number_at_its_bound_is_changed_to_the_other_side(name: str) -> None:
+    """As a drag of zero, or the grasp at an end: the derivative is that of the motion with a little more of it."""
+    bare = scene(
+        environment=Environment(gravity=(0, 0, 0)),
+        grasps=(Grasp(u=0.0, path=Move(displacement=(0.0, 0.4, 0.0), duration=1.5)),),
+    )
+    sensed = sensitivities(predict(bare), [name])
+    assert sensed.exact == (True,)
+    assert sensed.steps == (0.5 * STEP,)
+    start, more, most = (predict(_with(bare, name, k * 1e-3)).surface(U, T)[..., :3] for k in range(3))
+    expected = (4.0 * more - 3.0 * start - most) / 2e-3
+    assert np.abs(sensed(U, T)[0] - expected).max() < 2e-3 * np.abs(expected).max()
+
+
+def test_a_number_that_can_not_change_at_all_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sensitivity, "STEP", 10.0)
+    with pytest.raises(SceneError) as refused:
+        sensitivities(predict(scene()), ["grasps[0].u"])  # neither 3.3 m nor -2.7 m of a cable of one metre
+    assert (refused.value.field, refused.value.given) == ("wrt", "grasps[0].u")
+    assert "Allowed: 0 to the cable's length, 1 [m]. Allowed" in str(refused.value)
