@@ -1,8 +1,9 @@
-"""What time budgets give: `python -m benchmarks.budgets [--seed S] [--begin N] [--end N] [--budgets MS ...]`.
+"""What time budgets give: `python -m benchmarks.budgets [--seed S] [--begin N] [--end N] [--budgets MS ...]
+[--calibrated]`.
 
 Random hard scenes are predicted within time budgets, and compared with a prediction to 0.1 % of the length. Time is
-that of the processor, so that other programs on the machine do not count. The first grid is marched to its end, however
-long that takes; nothing is known here of what solves cost on this machine, so that this is always the coarsest.
+that of the processor, so that other programs on the machine do not count. The first grid is the coarsest, or with
+`--calibrated` what `dlo calibrate` has told of this machine chooses it.
 """
 
 import os
@@ -20,6 +21,8 @@ import numpy as np
 from benchmarks.hard.generator import draw
 from benchmarks.machine import machine_line
 from dlocore import Quality, SceneError, predict, warm_up
+from dlocore.calibration import stored_cost
+from dlocore.cost import Cost
 
 TARGET = 1e-3  # of the length: of what the answers are compared with
 DEADLINE = 15.0  # [s] for that
@@ -36,7 +39,7 @@ class Answer(NamedTuple):
     told: float | None
 
 
-def answers(seed: int, index: int, budgets: list[float]) -> list[Answer]:
+def answers(seed: int, index: int, budgets: list[float], cost: Cost | None) -> list[Answer]:
     """Return what each budget gives for a random scene; nothing where no fine prediction converges."""
     drawn = draw(seed, index)
     if not drawn.possible:
@@ -51,7 +54,7 @@ def answers(seed: int, index: int, budgets: list[float]) -> list[Answer]:
         expected, found = fine.surface.positions(u, t), []
         for budget in budgets:
             began = time.process_time()
-            answer = predict(replace(scene, quality=Quality(time_budget=budget)))
+            answer = predict(replace(scene, quality=Quality(time_budget=budget)), cost=cost)
             spent = time.process_time() - began
             error = np.linalg.norm(answer.surface.positions(u, t) - expected, axis=-1).max() / length
             told = answer.accuracy.error_estimate
@@ -82,12 +85,16 @@ def main() -> None:
     parser.add_argument("--begin", type=int, default=0, help="first index (default 0)")
     parser.add_argument("--end", type=int, default=300, help="index after the last (default 300)")
     parser.add_argument("--budgets", type=float, nargs="+", default=[5.0, 20.0, 100.0, 500.0], help="[ms]")
+    parser.add_argument("--calibrated", action="store_true", help="with what solves cost, as the service")
     options = parser.parse_args()
     warm_up()
+    cost = stored_cost() if options.calibrated else None
+    if options.calibrated and cost is None:
+        parser.error("--calibrated needs a calibration: dlo calibrate")
     budgets = [1e-3 * ms for ms in options.budgets]
     by_budget: dict[float, list[Answer]] = defaultdict(list)
     for index in range(options.begin, options.end):
-        for budget, answer in zip(budgets, answers(options.seed, index, budgets), strict=False):
+        for budget, answer in zip(budgets, answers(options.seed, index, budgets, cost), strict=False):
             by_budget[budget].append(answer)
             if answer.status == "converged" and answer.error > max(2.0 * (answer.told or 0.0), SMALL):
                 print(f"{index}: {answer.error:.1e} of the length off at {answer.told:.1e}, {1e3 * budget:g} ms")

@@ -14,6 +14,7 @@ from dlocore.shape import StartCurve
 Floats = NDArray[np.float64]
 
 FLATNESS = 1e-9  # of the length: a start and a motion this close to a plane are planar
+NEARLY = 1e-5  # relative: one this close to a plane is drawn out of it by less than a real cable is bent
 _ALONG = np.array([1.0, 0.0, 0.0])  # of no vector at all
 _SEEN = 0.005, 0.02  # [m] and of the length: points seen this close to the table lie on it
 
@@ -125,7 +126,7 @@ def off_the_table(scene: Scene, start: StartCurve, met: tuple[int, ...]) -> str:
         return "the stress-free shape is not flat"
     if start.twisted:
         return "the cable is twisted"
-    if start.material is not None and np.abs(_remembered_bends(start)[:, 2]).max() > FLATNESS:
+    if start.material is not None and np.abs(_remembered_bends(start, FLATNESS)[:, 2]).max() > FLATNESS:
         return "the cable remembers bends that are not flat"
     return ""
 
@@ -158,20 +159,32 @@ def find_plane(scene: Scene, start: StartCurve, on_table: bool, met: bool) -> Pl
 
 
 def rest_plane(scene: Scene, start: StartCurve) -> Plane:
-    """Return the plane of start, paths and forces, or of all but the paths where the start settles in it first."""
-    plane = flat_plane(scene, start)
-    return flat_plane(scene, start, still=True) if plane.dimensions == 3 and scene.shape.settle else plane
+    """Return the plane of start, paths and forces, or of all but the paths where the start settles in it first.
+
+    They may lie in it but for rounding elsewhere (NEARLY), as of coordinates that were measured or turned. That takes a
+    cable out of it by less than any real one is bent, and is no side to go to.
+    """
+    for flat in (FLATNESS, NEARLY):
+        for still in (False, True) if scene.shape.settle else (False,):
+            plane = flat_plane(scene, start, still=still, flat=flat)
+            if plane.dimensions == 2:
+                return plane
+    return plane
 
 
-def flat_plane(scene: Scene, start: StartCurve, *, still: bool = False) -> Plane:
+def flat_plane(scene: Scene, start: StartCurve, *, still: bool = False, flat: float = FLATNESS) -> Plane:
     """Return the plane of start, paths and forces, whatever the cable may touch; all of space where they have none.
 
-    Of grasps that stand `still` only where they begin counts.
+    Of grasps that stand `still` only where they begin counts. So `flat` they have to lie, relative to what is
+    largest; and where that is more than FLATNESS, to what moves a free cable by its length within the horizon.
     """
-    origin, length = np.array(start.control_points[0]), scene.cable.length
+    origin, length, mass = np.array(start.control_points[0]), scene.cable.length, scene.cable.linear_density
+    speed = length / cast(float, scene.horizon) if flat > FLATNESS else 0.0  # [m/s] within the horizon by its length
+    fall = speed**2 / length
     spread = [(start.control_points - origin) / length]
     if start.velocity is not None:
-        spread.append(start.velocity.control_points / max(1e-9, np.abs(start.velocity.control_points).max()))
+        v = start.velocity.control_points
+        spread.append(v / max(1e-9, float(np.abs(v).max()), speed))
     for grasp in scene.grasps:
         if isinstance(grasp.path, Move) and not still:
             spread.append(cast(Floats, grasp.path.displacement)[None] / length)
@@ -182,24 +195,24 @@ def flat_plane(scene: Scene, start: StartCurve, *, still: bool = False) -> Plane
             spread.append((positions[:1] - start(grasp.u)) / length)
     gravity = cast(Floats, scene.environment.gravity)
     if gravity.any() and scene.effects.get("gravity", "auto") != "off":
-        spread.append(gravity[None] / np.linalg.norm(gravity))
+        spread.append(gravity[None] / max(float(np.linalg.norm(gravity)), fall))
     for load in scene.loads:
         force = np.atleast_2d(cast(Floats, load.force))
-        spread.append(force / max(1e-300, np.abs(force).max()))
+        spread.append(force / max(1e-300, float(np.abs(force).max()), fall * mass * length))
     natural = natural_points(scene)
     if natural is not None:
         spread.append((natural - natural[0]) / length)
     if start.material is not None:
-        spread.append(_remembered_bends(start))
+        spread.append(_remembered_bends(start, flat))
     vectors = np.concatenate(spread)
-    normal = _normal_of(vectors)
+    normal = _normal_of(vectors, flat)
     off_plane = float(np.abs(vectors @ normal).max())
-    if not off_plane <= FLATNESS * max(1.0, np.abs(vectors).max()):
+    if not off_plane <= flat * max(1.0, np.abs(vectors).max()):
         return Plane(np.eye(3), origin, "start, motion and forces do not lie in one plane")
     flat_turns = True
     for grasp in () if still else scene.grasps:
         turns = turns_of(grasp.path, 33)
-        if turns is not None and np.abs(turns @ normal - normal).max() > 1e-9:
+        if turns is not None and np.abs(turns @ normal - normal).max() > flat:
             flat_turns = False
     if not flat_turns:
         return Plane(np.eye(3), origin, "a grasp turns the cable out of the plane of its motion")
@@ -208,10 +221,10 @@ def flat_plane(scene: Scene, start: StartCurve, *, still: bool = False) -> Plane
     return Plane(np.array([first, _cross(normal, first)]), origin, "start, motion and forces lie in one plane")
 
 
-def _normal_of(vectors: Floats) -> Floats:
+def _normal_of(vectors: Floats, flat: float) -> Floats:
     """Return a unit vector (3,) across the largest of some vectors (k, 3) and the one that lies farthest off its line.
 
-    Where they lie in one plane it is normal to that; where they lie in a line, across it.
+    Where they lie in one plane it is normal to that; where they lie in a line, but for a part `flat`, across it.
     """
     squares = np.einsum("ij,ij->i", vectors, vectors)
     k = int(squares.argmax())
@@ -220,7 +233,7 @@ def _normal_of(vectors: Floats) -> Floats:
     off = vectors - (vectors @ first)[:, None] * first
     squares = np.einsum("ij,ij->i", off, off)
     k = int(squares.argmax())
-    if not math.sqrt(squares[k]) > FLATNESS * size:
+    if not math.sqrt(squares[k]) > flat * size:
         return unit_across(first)
     normal = _cross(first, off[k])
     return normal / math.sqrt(normal @ normal)
@@ -233,15 +246,18 @@ def turns_of(path: Path, times: int) -> Floats | None:
     return path.rotation_at(np.linspace(0.0, path.duration, times))
 
 
-def _remembered_bends(start: StartCurve) -> Floats:
-    """Return vectors (k, 3) along which the sections' memory bends the cable; an off-plane one where it is twisted."""
+def _remembered_bends(start: StartCurve, flat: float) -> Floats:
+    """Return vectors (k, 3) along which the sections' memory bends the cable; an off-plane one where it is twisted.
+
+    What is smaller than a part `flat` of the largest is none.
+    """
     material = start.material
     assert material is not None
     memory = cast(Floats, material.memory)
     scale = float(np.abs(memory).max())
     if scale == 0.0:
         return np.zeros((1, 3))
-    if np.abs(memory[:, 2]).max() > FLATNESS * scale:
+    if np.abs(memory[:, 2]).max() > flat * scale:
         return np.eye(3)
     # a flat curve carries its frame flat: all its bends lie in its plane where those at u = 0 do
     tangent = start(0.0, 1)[0] / np.linalg.norm(start(0.0, 1)[0])
@@ -249,7 +265,7 @@ def _remembered_bends(start: StartCurve) -> Floats:
     second = np.cross(tangent, first)
     _, sizes, principal = np.linalg.svd(memory[:, :2] / scale, full_matrices=False)
     bends = np.array([d[0] * first + d[1] * second for d in principal])
-    return bends if sizes[1] > FLATNESS * sizes[0] else bends[:1]
+    return bends if sizes[1] > flat * sizes[0] else bends[:1]
 
 
 def leftwards(tangent: Floats) -> Floats:

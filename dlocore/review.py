@@ -117,7 +117,7 @@ def objections(level: Level) -> list[str]:
     found += _stretched(level)
     found += side_notes(problem.start)
     found += turn_notes(problem, level.motion.grid)
-    found += tip_notes(level.motion.grid)
+    found += tip_notes(level.motion.grid.tipped, problem.scene.cable.length)
     kept = [
         *([WITH_TWIST] if lacks_twist(problem) else []),
         *(["without a given grid"] if problem.scene.quality.n_u is not None else []),

@@ -17,7 +17,7 @@ from dlocore.effects import laws
 from dlocore.events import closed_grasps
 from dlocore.grid import Grid
 from dlocore.kernels.across import stiffness_across
-from dlocore.kernels.assembly import NO_RATES, assemble
+from dlocore.kernels.assembly import NO_RATES, History, assemble
 from dlocore.kernels.banded import factor
 from dlocore.kernels.basis import basis_rows
 from dlocore.kernels.growth import LOOKS, looked_at
@@ -28,7 +28,7 @@ from dlocore.solvers.march import March
 
 Floats = NDArray[np.float64]
 
-_FLAT = 1e-6  # of the length: so near to a plane a motion is planar, but for rounding
+_FLAT = 1e-2  # of the length: so near to a plane a motion is planar, but for what rounding grows to
 _STRAIGHT = 1e-2  # of the length: a start no farther from a line buckles, where it is pushed, within some steps
 _LOOKS_AT_STRAIGHT = 64  # states of its motion that are looked at, at least
 _NEUTRAL = 1e-8  # of the largest stiffness: what rounding leaves of none
@@ -43,44 +43,41 @@ def leaves_plane(problem: Problem, motion: March) -> bool:
     So it would where the start has settled to an equilibrium that is none of a cable that may leave the plane.
     """
     grid = motion.grid
-    if not (is_looked_at(problem) or _bends_in_plane(problem)):
+    if not (is_looked_at(problem) or _bends_in_plane(problem) or _turns_in_plane(problem)):
         return False
-    if problem.scene.shape.settle and is_unstable(problem, grid, grid.start, 0.0, grid.history.memory[:, 0]):
+    if problem.scene.shape.settle and is_unstable(problem, grid, grid.start, 0.0, grid.past()):
         return True
     looks = looked_at(len(motion.times) - 1, _LOOKS_AT_STRAIGHT if bend_of(problem.start) < _STRAIGHT else LOOKS)
     density, drag = problem.scene.cable.linear_density, problem.drag_coefficient()
     slowest = GROWTH / problem.horizon  # [1/s]: rate of growth that matters
     slack = density * slowest**2 + drag * slowest
     times, states = motion.times[looks], motion.states[looks]
-    leasts = _leasts(problem, grid, states, times.tolist(), _bends_of(problem, motion, times), slack)
+    leasts = _leasts(problem, grid, states, times.tolist(), motion.behind(times), slack)
     rates = sum((math.sqrt(drag**2 - 4.0 * density * min(least, 0.0)) - drag) / (2.0 * density) for least in leasts)
     # a straight cable that buckles may do so to any side: until it has, all grow alike
     both = math.log(1.0 / BOW) if problem.start.bow else 0.0
     return rates / len(looks) * problem.horizon > GROWTH + both
 
 
-def _bends_of(problem: Problem, motion: March, times: Floats) -> Floats:
-    """Return the bends [1/m] that a cable has without stress in a plane (k, points) at times (k,), none if straight."""
-    if not _bends_in_plane(problem):
-        return np.zeros((len(times), 0))
-    memory = motion.behind(times).memory[..., 0]
-    return np.broadcast_to(memory, (len(times), memory.shape[1]))
-
-
 def _leasts(
-    problem: Problem, grid: Grid, states: Floats, times: list[float], bends: Floats, slack: float | None = None
+    problem: Problem, grid: Grid, states: Floats, times: list[float], behind: History, slack: float | None = None
 ) -> Iterator[float]:
     """Yield the least stiffness [N/m^2] against leaving their plane of states (k, n, nc) below -slack.
 
-    `bends` (k, points) [1/m] are those that the cable has there without stress in a plane. By default the slack is what
-    rounding leaves of no stiffness.
+    What lies `behind` them is a `History` with arrays (1 or k, ...). By default the slack is what rounding leaves of no
+    stiffness.
     """
     if _bends_in_plane(problem):
         leasts = _leasts_of_lying if _is_weighed_down(problem) else _leasts_of_bent
-        yield from leasts(problem, grid, states, times, bends, slack)
+        bends = behind.memory[..., 0]
+        yield from leasts(problem, grid, states, times, np.broadcast_to(bends, (len(times), bends.shape[1])), slack)
         return
     flat = _in_plane(problem, states)
-    if flat is None:
+    if len(flat) == 0:
+        return
+    states, times = states[: len(flat)], times[: len(flat)]
+    if not is_looked_at(problem):
+        yield from _leasts_of_turning(problem, grid, states, times, behind, slack)
         return
     bands, unit = _bands(problem, grid, states, flat)
     for t, q, band in zip(times, flat, bands, strict=True):
@@ -122,6 +119,12 @@ def _bends_in_plane(problem: Problem) -> bool:
     return _may_be_bent(problem) and problem.plane.dimensions == 2 and not problem.start.twisted
 
 
+def _turns_in_plane(problem: Problem) -> bool:
+    """Tell whether a cable that is bent without stress is solved in space with twist, and may all the same lie flat."""
+    start = problem.start
+    return _may_be_bent(problem) and problem.nc == 4 and not (start.aside or start.twisted)
+
+
 def _may_be_bent(problem: Problem) -> bool:
     """Tell whether the cable may have bends without stress: by its shape, as it yields, or of an earlier motion."""
     rest = problem.scene.cable.rest_shape
@@ -140,35 +143,57 @@ def _leasts_of_bent(
     elastic = {**problem.scene.effects, "twist": "on", "plasticity": "off"}
     posed = pose(replace(problem.scene, effects=elastic), problem.called_for)
     space = grid_on(posed, grid.knots)
-    history, (active, parameters) = space.past(), posed.law_table()
+    history, normal = space.past(), np.cross(*problem.plane.axes)
     history.memory[:] = 0.0
-    n, nc = grid.n_u, posed.nc
-    normal = np.cross(*problem.plane.axes)
-    away = np.zeros((2, nc))
-    away[0, :3], away[1, 3] = normal, 1.0
-    unit: Floats = np.kron(dense_of(grid.tables.mass), np.eye(2)).astype(np.float64)
-    f, K = np.empty((n, nc)), np.empty((n * nc, 4 * nc))
     for t, flat, natural in zip(times, states, bends, strict=True):
-        q = np.zeros((n, nc))
+        q = np.zeros((grid.n_u, posed.nc))
         q[:, :3] = posed.plane.points(problem.plane.world(flat))
         # in a plane the sections turn as the tangent does
         across = np.cross(normal, space.at(q, 0.0, 1)[:3])
         start_frames(grid.knots, q, space.tables, across / np.linalg.norm(across), history.past)
         history.memory[:, 0] = natural
-        still = np.zeros_like(q)
-        assemble(
-            posed.axes, q, still, space.tables, active, parameters, history, NO_RATES, (1.0, 0.0, 1.0), f, K
-        )  # fmt: skip
-        stiff = np.einsum("xa,iajb,yb->ixjy", away, dense_of(K).reshape(n, nc, n, nc), away)
-        held = closed_grasps(problem.scene, t, t)
-        firm, allowed = _firm(stiff), _allowed(slack, stiff, unit)
-        stiff[:, 0, :, 0] += dense_of(_held_band(grid, held, firm))
-        stiff[:, 1, :, 1] += dense_of(_held_band(grid, [g for g in held if g.hold == "clamp"], firm, direction=False))
-        whole = stiff.reshape(2 * n, 2 * n)
-        try:
-            np.linalg.cholesky(whole + allowed * unit)
-        except np.linalg.LinAlgError:
-            yield _least(whole, unit)
+        yield from _turned(posed, space, q, t, normal, history, posed.law_table(), slack)
+
+
+def _leasts_of_turning(
+    problem: Problem, grid: Grid, states: Floats, times: list[float], behind: History, slack: float | None
+) -> Iterator[float]:
+    """Do what `_leasts_of_bent` does for a cable that is solved in space with twist: its frames tell how it is turned.
+
+    What yields does not do so by a small disturbance. A cable that rubs on what it is pressed to does not slip off it.
+    """
+    active, parameters = problem.law_table()
+    active[[laws.BENDING_MEMORY, laws.TWIST_MEMORY, laws.STRETCH_MEMORY, laws.SELF_CONTACT, laws.FRICTION]] = 0
+    if problem.friction is not None:
+        parameters = parameters[: laws.COUNT]
+    normal = np.cross(*problem.rest_plane.axes)
+    for k, (t, q) in enumerate(zip(times, states, strict=True)):
+        memory, past, axial = (x[min(k, len(x) - 1)] for x in (behind.memory, behind.past, behind.axial))
+        history = behind._replace(memory=memory, past=past, axial=axial)
+        yield from _turned(problem, grid, q, t, normal, history, (active, parameters), slack)
+
+
+def _turned(
+    problem: Problem, grid: Grid, q: Floats, t: float, normal: Floats, history: History,
+    law_table: tuple[NDArray[np.int64], Floats], slack: float | None,
+) -> Iterator[float]:  # fmt: skip
+    """Yield the least stiffness of a state (n, 4) against displacements along a normal (3,) and turns, if negative."""
+    n, nc = grid.n_u, problem.nc
+    away = np.zeros((2, nc))
+    away[0, :3], away[1, 3] = normal, 1.0
+    unit: Floats = np.kron(dense_of(grid.tables.mass), np.eye(2)).astype(np.float64)
+    f, K, still = np.empty((n, nc)), np.empty((n * nc, 4 * nc)), np.zeros((n, nc))
+    assemble(problem.axes, q, still, grid.tables, *law_table, history, NO_RATES, (1.0, 0.0, 1.0), f, K)
+    stiff = np.einsum("xa,iajb,yb->ixjy", away, dense_of(K).reshape(n, nc, n, nc), away)
+    held = closed_grasps(problem.scene, t, t)
+    firm, allowed = _firm(stiff), _allowed(slack, stiff, unit)
+    stiff[:, 0, :, 0] += dense_of(_held_band(grid, held, firm))
+    stiff[:, 1, :, 1] += dense_of(_held_band(grid, [g for g in held if g.hold == "clamp"], firm, direction=False))
+    whole = stiff.reshape(2 * n, 2 * n)
+    try:
+        np.linalg.cholesky(whole + allowed * unit)
+    except np.linalg.LinAlgError:
+        yield _least(whole, unit)
 
 
 def _is_weighed_down(problem: Problem) -> bool:
@@ -207,12 +232,14 @@ def _products(rows: Floats) -> Floats:
     return np.asarray(rows[:, _COLUMN] * rows[:, _COLUMN + _BELOW])
 
 
-def is_unstable(problem: Problem, grid: Grid, q: Floats, t: float, bends: Floats) -> bool:
-    """Tell whether control points q (n, nc) at rest at a time t [s] would leave their plane, as in `leaves_plane`.
+def is_unstable(problem: Problem, grid: Grid, q: Floats, t: float, history: History) -> bool:
+    """Tell whether control points q (n, nc) at rest at a time t [s] would leave their plane, as in `leaves_plane`."""
+    return any(True for _ in _leasts(problem, grid, q[None], [t], of_one_time(history)))
 
-    `bends` (points,) [1/m] are those that the cable has there without stress in a plane.
-    """
-    return any(True for _ in _leasts(problem, grid, q[None], [t], bends[None]))
+
+def of_one_time(history: History) -> History:
+    """Return a history with the arrays (1, ...) of one time."""
+    return history._replace(memory=history.memory[None], past=history.past[None], axial=history.axial[None])
 
 
 def is_looked_at(problem: Problem) -> bool:
@@ -221,23 +248,21 @@ def is_looked_at(problem: Problem) -> bool:
     return not (problem.on_table or _may_be_bent(problem) or start.aside or start.twisted)
 
 
-def _in_plane(problem: Problem, states: Floats) -> Floats | None:
-    """Return the coordinates (k, n, 2) of states (k, n, nc) in their plane, None where none is or they can't leave it.
+def _in_plane(problem: Problem, states: Floats) -> Floats:
+    """Return the coordinates (m, n, 2) in their plane of states (k, n, nc), until they leave it: m = 0 to k.
 
-    That is a cable on a table, and one with bends without stress, whose stiffness is another.
+    It is 0 where there is no plane, or they can't leave it, as on a table.
     """
-    if not is_looked_at(problem):
-        return None
+    if not (is_looked_at(problem) or _turns_in_plane(problem)):
+        return states[:0]
     if problem.plane.dimensions == 2:
         return states
-    scene = problem.scene
-    if not problem.touches and scene.effects.get("twist", "auto") != "on" and not scene.shape.settle:
-        return None  # in space for another reason than what it touches: it lies in no plane
     plane = problem.rest_plane
     if plane.dimensions == 3:
-        return None
+        return states[:0]
     r = problem.plane.world(states[..., :3])
-    return plane.points(r) if plane.distance(r) <= _FLAT * scene.cable.length else None
+    away = np.abs(r - plane.world(plane.points(r))).max(axis=(1, 2)) > _FLAT * problem.scene.cable.length
+    return plane.points(r[: int(np.argmax(away)) if away.any() else len(r)])
 
 
 def pose_as_shown(scene: Scene, called_for: Mapping[str, str], control_points: Floats) -> Problem:
@@ -250,6 +275,7 @@ def pose_as_shown(scene: Scene, called_for: Mapping[str, str], control_points: F
         shown = bool(control_points[..., 3].any())
     else:
         plane, off = problem.rest_plane, 0.1 * BOW**2 * scene.cable.length
+        off += 2.0 * plane.distance(problem.start.control_points) if plane.dimensions == 2 else 0.0
         shown = plane.dimensions == 2 and plane.distance(control_points[0, :, :3]) > off
     return pose(scene, {**called_for, "side": UNSTABLE}) if shown else problem
 

@@ -101,13 +101,13 @@ def equilibrium(
     sizes = [n_u] if n_u is not None else [max(n, least + 2 * i) for i, n in enumerate(LEVELS)]
     rest, notes = _refined(problem, sizes, at, target, monitor), list[str]()
     found = rest.settled
-    if rest.status == "converged" and is_unstable(problem, rest.grid, found.q, at, found.history.memory[:, 0]):
+    if rest.status == "converged" and is_unstable(problem, rest.grid, found.q, at, found.history):
         if lacks_twist(problem):
             notes.append(solved_in_space([WITH_TWIST]))
         else:
             problem = pose(scene, {"side": UNSTABLE}, at_rest=True)
             rest = _refined(problem, sizes, at, target, monitor)
-    notes += [*side_notes(problem.start), *tip_notes(rest.grid)]
+    notes += [*side_notes(problem.start), *tip_notes(rest.grid.tipped, scene.cable.length)]
     grid, q, history = rest.grid, rest.settled.q, rest.settled.history
     world = problem.world(free_of_frames(problem, grid, q[None], history.past[None])[0])
     held = reactions(problem, grid, (holding(problem, grid, rest.settled),))

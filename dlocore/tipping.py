@@ -33,9 +33,10 @@ _FALLS = 3  # from one such equilibrium to another, at most
 
 
 def tipped(problem: Problem, grid: Grid, monitor: Monitor, at: float = 0.0, starts: Starts | None = None) -> Grid:
-    """Return a grid that has settled in space, free of contact, tipped off where it would fall and settled on.
+    """Return a grid that has settled, free of contact, tipped off where it would fall and settled on.
 
-    One that lies in a plane, and of which `sideways.py` tells whether it leaves that, is left to it.
+    One that lies in a plane, and of which `sideways.py` tells whether it leaves that, is left to it. So is one that
+    friction holds.
 
     The tip is one of `BOW` of the length, in the shape of the fastest fall. Where it finds no rest after it, or falls
     again and again, the grid is returned as it is.
@@ -50,10 +51,8 @@ def tipped(problem: Problem, grid: Grid, monitor: Monitor, at: float = 0.0, star
     Raises:
         Cancelled: the caller asked to stop.
     """
-    if problem.plane.dimensions == 2 or problem.contact is not None or problem.self_contact is not None:
+    if not may_fall(problem):
         return grid
-    if problem.rest_plane.dimensions == 2 and is_looked_at(problem):
-        return grid  # `is_unstable` tells, and gives it a bow
     now = grid
     for _ in range(_FALLS):
         way = falls(problem, now, at, starts)
@@ -67,10 +66,22 @@ def tipped(problem: Problem, grid: Grid, monitor: Monitor, at: float = 0.0, star
     return grid if falls(problem, now, at, starts) is not None else now
 
 
-def tip_notes(grid: Grid) -> list[str]:
-    """Return what is to be known of a grid that was tipped, in words."""
-    tip = f"it is tipped by {BOW * float(grid.knots[-1]) * 1e3:.2g} mm, and another side may be as likely"
-    return [f"{TIPPED}: {tip}"] if grid.tipped else []
+def may_fall(problem: Problem) -> bool:
+    """Tell whether a start of a problem is tipped where it would fall."""
+    # one that is straight by nature and lies in a plane that it may leave is given a bow if `is_unstable` tells so
+    bowed = problem.plane.dimensions == 3 and problem.rest_plane.dimensions == 2 and is_looked_at(problem)
+    return not problem.touches and not bowed
+
+
+def to_a_side(u: Floats) -> Floats:
+    """Return displacements (n, 3) along a cable at u (n,), in parts of its length: a start falls to their side."""
+    return (1.0 + _LOPSIDED * u)[:, None] * _SIDE
+
+
+def tip_notes(tipped: bool, length: float) -> list[str]:
+    """Return what is to be known of a start that was tipped, in words; `length` [m] is that of the cable."""
+    tip = f"it is tipped by {BOW * length * 1e3:.2g} mm, and another side may be as likely"
+    return [f"{TIPPED}: {tip}"] if tipped else []
 
 
 def falls(problem: Problem, grid: Grid, at: float = 0.0, starts: Starts | None = None) -> Floats | None:
@@ -80,7 +91,7 @@ def falls(problem: Problem, grid: Grid, at: float = 0.0, starts: Starts | None =
     eigenvector of the least eigenvalue of its tangent, if that is negative: found by inverse iteration, held by springs
     just strong enough for it to stay.
     """
-    cable, nc, q = problem.scene.cable, problem.nc, grid.start
+    cable, nc, q, dimensions = problem.scene.cable, problem.nc, grid.start, problem.plane.dimensions
     grasps = closed_grasps(problem.scene, at, at)
     starts = {} if starts is None else starts
     close_grasps(problem, grid, grasps, starts, q)
@@ -103,7 +114,7 @@ def falls(problem: Problem, grid: Grid, at: float = 0.0, starts: Starts | None =
 
     u = greville(grid.knots) / cable.length
     way = np.zeros_like(q)
-    way[:, :3] = (1.0 + _LOPSIDED * u)[:, None] * _SIDE
+    way[:, :dimensions] = to_a_side(u)[:, :dimensions]
     springs = _SLACK * scale
     if pushed(springs, way) is not None:
         return None
@@ -118,5 +129,6 @@ def falls(problem: Problem, grid: Grid, at: float = 0.0, starts: Starts | None =
     for _ in range(_ITERATIONS):
         moved = pushed(springs, times_scalar_band(grid.tables.mass, way))
         assert moved is not None, "these springs hold it"
-        way = moved / max(float(np.abs(moved[:, :3]).max()), turn * float(np.abs(moved[:, 3:]).max(initial=0.0)))
+        size = float(np.abs(moved[:, :dimensions]).max())
+        way = moved / max(size, turn * float(np.abs(moved[:, dimensions:]).max(initial=0.0)))
     return way if float(np.sum(way * side)) >= 0.0 else -way

@@ -9,6 +9,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.buckling import BOW
 from dlocore.paths import Waypoints
 from dlocore.problem import Problem
 from dlocore.reference import body as places
@@ -18,6 +19,7 @@ from dlocore.reference.forces import goes_through
 from dlocore.reference.rod import Memory, Rod, Snapshot
 from dlocore.reference.step import DONE, take_step
 from dlocore.solvers.monitor import TimeIsUp
+from dlocore.tipping import may_fall, to_a_side
 
 Floats = NDArray[np.float64]
 
@@ -49,6 +51,7 @@ SETTLED = 1e-11  # of the length: a step downhill that ends the search for an eq
 FARTHEST = 0.05  # of the length, in a step downhill: farther the rod might pass through what is in its way
 BENT = 8  # times a motion is bent, to see what becomes of that
 DOWNHILL = 2000  # steps to an equilibrium
+FALLS = 0.01  # of the length: a rod that ends farther from where it was at rest once it is tipped did not rest there
 
 
 Stopped = Literal["", "step", "time"]
@@ -77,6 +80,7 @@ class Motion:
         stopped: why it ended early: "step" without a solution, "time" over; "" where it did not.
         steps: how many it took.
         rejected: how many were done again.
+        tipped: whether its start was tipped off an equilibrium that any disturbance leaves.
     """
 
     rod: Rod
@@ -89,6 +93,7 @@ class Motion:
     stopped: Stopped
     steps: int
     rejected: int
+    tipped: bool
 
 
 def events_of(problem: Problem) -> list[float]:
@@ -118,6 +123,7 @@ class _Record:
         self.beginnings: list[int] = []
         self.deepest = self.left = 0.0
         self.steps = self.rejected = 0
+        self.tipped = False
 
     def begin(self, link: Chain, state: State) -> None:
         """Note the state in which a window begins; what grippers give there is that of its first step."""
@@ -159,6 +165,7 @@ class _Record:
             stopped=stopped,
             steps=self.steps,
             rejected=self.rejected,
+            tipped=self.tipped,
         )
 
 
@@ -179,6 +186,8 @@ def simulate(rod: Rod, tolerance: float, watch: Watch, bend: Callable[[Floats], 
     if problem.scene.shape.settle:
         with suppress(TimeIsUp):
             now, record.deepest = settled(rod, watch)
+            fallen = _fallen(rod, now, watch) if may_fall(problem) else None
+            now, record.tipped = fallen or now, fallen is not None
     bent = set() if bend is None else {k * problem.horizon / BENT for k in range(BENT)}
     for begin, end in pairwise(sorted({*events_of(problem), *bent})):
         if bend is not None and begin in bent:
@@ -197,6 +206,17 @@ def simulate(rod: Rod, tolerance: float, watch: Watch, bend: Callable[[Floats], 
             return record.motion("step")
         now = link.snapshot(ended)
     return record.motion("")
+
+
+def _fallen(rod: Rod, rest: Snapshot, watch: Watch) -> Snapshot | None:
+    """Return where a rod at rest falls to, None where it stays: tipped by BOW of its length it comes back to there."""
+    length = rod.problem.scene.cable.length
+    way = BOW * length * to_a_side(rod.u / length)
+    way[[rod.node(g.u) for g in rod.problem.scene.grasps if g.start == 0.0]] = 0.0
+    if rod.planar:
+        way[:, 2] = 0.0
+    found, _ = settled(replace(rod, start=replace(rest, x=rest.x + way)), watch)
+    return found if np.abs(found.x - rest.x).max() > FALLS * length else None
 
 
 def _window(link: Chain, state: State, tolerance: float, watch: Watch, record: _Record) -> State | None:

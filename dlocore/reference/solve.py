@@ -21,6 +21,7 @@ from dlocore.reference.strands import refuse_meeting
 from dlocore.scene import Scene
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import SplineSurface
+from dlocore.tipping import tip_notes
 from dlocore.whole_march import sided
 
 Floats = NDArray[np.float64]
@@ -194,7 +195,7 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
         report_effects=lambda surface: _effects(refined, surface),
         report_material=lambda: material_of(motion, last.taken),
         report_stretch=lambda: stretch_of(motion),
-        find_objections=partial(side_notes, problem.start),
+        find_objections=lambda: [*side_notes(problem.start), *tip_notes(motion.tipped, problem.scene.cable.length)],
     )
 
 

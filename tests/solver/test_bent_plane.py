@@ -17,6 +17,7 @@ from dlocore import (
     Points,
     Quality,
     Scene,
+    Sphere,
     Still,
     Table,
     equilibrium,
@@ -25,7 +26,7 @@ from dlocore import (
 from dlocore.buckling import UNSTABLE
 from dlocore.discretisation import make_grid
 from dlocore.problem import pose
-from dlocore.sideways import _leasts, pose_as_shown
+from dlocore.sideways import _leasts, of_one_time, pose_as_shown
 
 WEIGHTLESS = Environment(gravity=(0.0, 0.0, 0.0), drag=0.2)
 EI, GJ, LENGTH = 0.01, 0.006, 1.0
@@ -59,7 +60,7 @@ def least(posed: Scene) -> float:
     """Return the least stiffness against leaving the plane of the given shape, 0 where there is none below zero."""
     problem = pose(posed)
     grid = make_grid(problem, 33)
-    found = _leasts(problem, grid, grid.start[None], [0.0], grid.history.memory[None, :, 0], 0.0)
+    found = _leasts(problem, grid, grid.start[None], [0.0], of_one_time(grid.history), 0.0)
     return min(found, default=0.0)
 
 
@@ -115,11 +116,54 @@ def test_an_arc_that_is_bent_back_is_solved_in_space():
     assert UNSTABLE in given.message
 
 
+# in space for other reasons than that they leave their plane: of the third coordinate nothing pulls them there
+IN_SPACE: dict[str, dict[str, Any]] = {
+    "with twist": {"effects": {"twist": "on"}},
+    "over an obstacle in the plane": {
+        "environment": replace(WEIGHTLESS, obstacles=(Sphere(center=(0.5, -2.0, 0.0), radius=0.1),)),
+        "effects": {"obstacles": "on"},
+    },
+    "a table across the plane": {"environment": replace(WEIGHTLESS, table=Table(height=-1.0))},
+    "turned by rounding": {"environment": replace(WEIGHTLESS, gravity=(0.0, 0.0, 1e-7))},
+}
+
+
+@pytest.mark.parametrize("changes", IN_SPACE.values(), ids=IN_SPACE)
+def test_an_arc_that_is_bent_back_leaves_its_plane_whatever_it_is_solved_in_space_for(changes):
+    # it had stayed in it, as all that is exactly flat does, at estimates that told nothing
+    posed = scene(arc(1.2), arc(1.2, turned=-1.0)[:, :2], *held("tangent"))
+    auto, found = predict(posed), predict(replace(posed, **changes))
+    assert UNSTABLE in found.message
+    u, t = np.linspace(0.0, LENGTH, 33), np.linspace(0.0, 1.0, 17)
+    apart = np.linalg.norm(auto.surface.positions(u, t) - found.surface.positions(u, t), axis=-1).max()
+    assert apart < 2.0 * (auto.accuracy.error_estimate + found.accuracy.error_estimate)
+
+
+@pytest.mark.parametrize("index", [118, 193, 197])
+def test_a_random_motion_leaves_its_plane_with_twist_switched_on_as_without(index):
+    auto = draw(111, index).make()  # 5 to 61 % of the length elsewhere where they had stayed in it
+    auto = replace(auto, quality=Quality(target_error=3e-3 * auto.cable.length))
+    with_twist = replace(auto, effects={**auto.effects, "twist": "on"})
+    answers = [predict(one) for one in (auto, with_twist)]
+    assert all(a.status == "converged" and UNSTABLE in a.message for a in answers)
+    u, t = np.linspace(0.0, auto.cable.length, 33), np.linspace(0.0, auto.horizon, 33)
+    apart = np.linalg.norm(np.subtract(*(a.surface.positions(u, t) for a in answers)), axis=-1).max()
+    assert apart < sum(a.accuracy.error_estimate for a in answers)
+
+
 @pytest.mark.parametrize("rest", ["initial", "straight"])
 def test_an_arc_that_stays_is_solved_in_its_plane(rest):
     shape = arc(1.2)
     found = predict(scene(shape, rest, *held("clamp")))
     assert found.accuracy.dimensions == 2
+    assert UNSTABLE not in found.message
+
+
+@pytest.mark.parametrize("rest", ["initial", "straight"])
+@pytest.mark.parametrize("changes", IN_SPACE.values(), ids=IN_SPACE)
+def test_an_arc_that_stays_has_no_bow_where_it_is_solved_in_space(changes, rest):
+    found = predict(scene(arc(1.2), rest, *held("clamp"), **changes))
+    assert found.accuracy.dimensions == 3
     assert UNSTABLE not in found.message
 
 
@@ -129,7 +173,7 @@ def test_what_tells_does_not_depend_on_how_far_the_cable_has_turned(turn):
     grid = make_grid(problem, 33)
     c, s = np.cos(turn), np.sin(turn)
     given, turned = (
-        min(_leasts(problem, grid, (grid.start @ q.T)[None], [0.0], grid.history.memory[None, :, 0], 0.0))
+        min(_leasts(problem, grid, (grid.start @ q.T)[None], [0.0], of_one_time(grid.history), 0.0))
         for q in (np.eye(2), np.array([[c, -s], [s, c]]))
     )
     assert turned == pytest.approx(given, rel=1e-3)

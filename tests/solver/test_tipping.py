@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dlocore import Cable, Environment, Grasp, Load, Move, Points, Scene, equilibrium, predict
+from benchmarks.hard.generator import draw
+from dlocore import Cable, Environment, Grasp, Load, Move, Points, Quality, Scene, Table, equilibrium, predict
 from dlocore.problem import pose
 from dlocore.solvers.monitor import Monitor
 from dlocore.statics import start_grid
@@ -92,3 +93,62 @@ def test_what_stays_is_left_alone(scene):
     problem, grid = settled(scene, 17)
     assert falls(problem, grid) is None
     assert not grid.tipped
+
+
+def loop(**changes: Any) -> Scene:
+    """Return a loop on a smooth table between two points that let it turn, where it is at rest, and unrolls."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 121)
+    x, y = turn / np.pi - 0.6 * np.sin(turn), 0.6 * (1.0 - np.cos(turn))
+    points = 0.12 * np.column_stack([x, y, 0.0 * turn])
+    length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    cable = Cable(length=length, diameter=0.005, linear_density=0.1, bending_stiffness=0.2)
+    values: dict[str, Any] = {
+        "grasps": (Grasp(u=0.0), Grasp(u=length)),
+        "horizon": 1.0,
+        "environment": Environment(drag=1.0, table=Table()),
+    }
+    return Scene(cable=cable, shape=Points(points=points, settle=True), **(values | changes))
+
+
+def turning(points: np.ndarray) -> float:
+    """Return by how much the direction of a curve (n, 3) in the x-y plane turns from its beginning to its end [rad]."""
+    along = np.diff(points, axis=0)
+    return float(np.ptp(np.unwrap(np.arctan2(along[:, 1], along[:, 0]))[[0, -1]]))
+
+
+@pytest.mark.parametrize("n_u", [14, 25, 40])
+def test_a_loop_on_a_smooth_table_unrolls_on_every_grid(n_u):
+    # symmetric, it had stayed on some grids, and on those that a load makes uneven it had not
+    scene = loop()
+    assert turning(scene.shape.points) > 6.0
+    for loads in ((), (Load(u=0.3 * scene.cable.length, force=(0.0, 0.0, 0.0)),)):
+        problem, grid = settled(replace(scene, loads=loads), n_u)
+        assert falls(problem, grid) is None
+        assert turning(problem.world(grid.start)[:, :3]) < 4.0
+
+
+def test_the_reference_unrolls_a_loop_to_the_same_side():
+    scene = loop()
+    answers = [predict(replace(scene, quality=Quality(target_error=2e-3, method=m))) for m in ("auto", "reference")]
+    assert [a.status for a in answers] == ["converged", "converged"]
+    u, t = np.linspace(0.0, scene.cable.length, 33), [0.0, 1.0]
+    assert turning(answers[1].surface.positions(u, 0.0)[0]) < 4.0
+    apart = np.subtract(*(a.surface.positions(u, t) for a in answers))
+    assert np.linalg.norm(apart, axis=-1).max() < sum(a.accuracy.error_estimate for a in answers)
+
+
+def test_friction_holds_what_would_fall():
+    rough = loop(environment=Environment(drag=1.0, table=Table(friction=2.0)))
+    held = predict(replace(rough, cable=replace(rough.cable, bending_stiffness=1e-4)))
+    assert held.status == "converged", held.message
+    assert TIPPED not in held.message
+    assert turning(held.surface.positions(np.linspace(0.0, held.scene.cable.length, 99), 0.0)[0]) > 5.0
+
+
+def test_the_reference_tells_where_it_was_tipped_and_leaves_a_start_that_stays():
+    wound = draw(22, 36).make()  # a loop that is symmetric to the last bit
+    quality = Quality(target_error=5e-3 * wound.cable.length, method="reference")
+    assert TIPPED in predict(replace(wound, quality=quality)).message
+    hanging = predict(replace(arch(-0.3), quality=Quality(target_error=2e-3, method="reference")))
+    assert hanging.status == "converged", hanging.message
+    assert TIPPED not in hanging.message
