@@ -26,7 +26,7 @@ from dlocore import Load, Prediction, Quality, Scene, SceneError, Sphere, predic
 TARGET = 3e-3  # of the length
 DEADLINES = 2.0, 4.0  # [s] as it is, and in other words
 FAR = 100.0  # times the length
-TURNED = 1e-7  # of gravity, or of 1 m/s^2 where that is more
+TURNED = 1e-7  # of gravity
 LITTLE = 1e-9  # [N s^2/m^3]
 SMALL = 1e-3  # of the length: what is less than this apart is not asked for how far it may be
 
@@ -45,9 +45,9 @@ def reworded(scene: Scene, found: Prediction, random: np.random.Generator) -> It
         yield "a release after the end", replace(scene, grasps=held, horizon=horizon)
     if len(scene.grasps) > 1:
         yield "another order of grasps", replace(scene, grasps=scene.grasps[::-1], horizon=horizon)
-    if around.table is None:
-        gravity = cast(NDArray[np.float64], around.gravity)
-        off = TURNED * max(1.0, float(np.linalg.norm(gravity))) * random.normal(size=3)
+    gravity = cast(NDArray[np.float64], around.gravity)
+    if around.table is None and gravity.any():  # without weight any little turns what nothing holds from turning
+        off = TURNED * float(np.linalg.norm(gravity)) * random.normal(size=3)
         yield "gravity turned a little", replace(scene, environment=replace(around, gravity=gravity + off))
     drag = replace(around, drag_quadratic=around.drag_quadratic + LITTLE)
     yield "next to no drag", replace(scene, environment=drag)
