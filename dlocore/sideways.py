@@ -31,7 +31,8 @@ Floats = NDArray[np.float64]
 _FLAT = 1e-2  # of the length: so near to a plane a motion is planar, but for what rounding grows to
 _STRAIGHT = 1e-2  # of the length: a start no farther from a line buckles, where it is pushed, within some steps
 _LOOKS_AT_STRAIGHT = 64  # states of its motion that are looked at, at least
-_NEUTRAL = 1e-8  # of the largest stiffness: what rounding leaves of none
+_NEUTRAL = 1e-4  # of what bends a cable and weighs on it: the stiffness that a start at rest may have of none
+_ROUNDING = 1e-13  # of the largest stiffness: what rounding leaves of none
 _COLUMN, _BELOW = np.array([(j, o) for j in range(4) for o in range(4 - j)]).T  # of a lower triangle (4, 4)
 WITH_TWIST = "with effects.twist on or auto"  # a way to have a motion leave its plane
 _FIRM = 1e6  # times the largest stiffness, with which what is held stays in the plane
@@ -60,12 +61,11 @@ def leaves_plane(problem: Problem, motion: March) -> bool:
 
 
 def _leasts(
-    problem: Problem, grid: Grid, states: Floats, times: list[float], behind: History, slack: float | None = None
+    problem: Problem, grid: Grid, states: Floats, times: list[float], behind: History, slack: float
 ) -> Iterator[float]:
     """Yield the least stiffness [N/m^2] against leaving their plane of states (k, n, nc) below -slack.
 
-    What lies `behind` them is a `History` with arrays (1 or k, ...). By default the slack is what rounding leaves of no
-    stiffness.
+    What lies `behind` them is a `History` with arrays (1 or k, ...).
     """
     if _bends_in_plane(problem):
         leasts = _leasts_of_lying if _is_weighed_down(problem) else _leasts_of_bent
@@ -89,9 +89,9 @@ def _leasts(
                 yield least
 
 
-def _allowed(slack: float | None, stiff: Floats, unit: Floats) -> float:
-    """Return the slack, by default what rounding leaves of no stiffness, of one and a unit matrix or bands of them."""
-    return _NEUTRAL * float(np.abs(stiff).max()) / float(unit.max()) if slack is None else slack
+def _allowed(slack: float, stiff: Floats, unit: Floats) -> float:
+    """Return the slack, or what rounding leaves of no stiffness, if that is more; of a matrix and a unit, or bands."""
+    return max(slack, _ROUNDING * float(np.abs(stiff).max()) / float(unit.max()))
 
 
 def _firm(stiff: Floats) -> float:
@@ -133,7 +133,7 @@ def _may_be_bent(problem: Problem) -> bool:
 
 
 def _leasts_of_bent(
-    problem: Problem, grid: Grid, states: Floats, times: list[float], bends: Floats, slack: float | None
+    problem: Problem, grid: Grid, states: Floats, times: list[float], bends: Floats, slack: float
 ) -> Iterator[float]:
     """Do what `_leasts` does for a cable that is bent without stress: its sections turn as it leaves the plane.
 
@@ -156,7 +156,7 @@ def _leasts_of_bent(
 
 
 def _leasts_of_turning(
-    problem: Problem, grid: Grid, states: Floats, times: list[float], behind: History, slack: float | None
+    problem: Problem, grid: Grid, states: Floats, times: list[float], behind: History, slack: float
 ) -> Iterator[float]:
     """Do what `_leasts_of_bent` does for a cable that is solved in space with twist: its frames tell how it is turned.
 
@@ -175,7 +175,7 @@ def _leasts_of_turning(
 
 def _turned(
     problem: Problem, grid: Grid, q: Floats, t: float, normal: Floats, history: History,
-    law_table: tuple[NDArray[np.int64], Floats], slack: float | None,
+    law_table: tuple[NDArray[np.int64], Floats], slack: float,
 ) -> Iterator[float]:  # fmt: skip
     """Yield the least stiffness of a state (n, 4) against displacements along a normal (3,) and turns, if negative."""
     n, nc = grid.n_u, problem.nc
@@ -202,7 +202,7 @@ def _is_weighed_down(problem: Problem) -> bool:
 
 
 def _leasts_of_lying(
-    problem: Problem, grid: Grid, states: Floats, times: list[float], bends: Floats, slack: float | None
+    problem: Problem, grid: Grid, states: Floats, times: list[float], bends: Floats, slack: float
 ) -> Iterator[float]:
     """Do what `_leasts` does for a cable that is bent without stress and lies on a table: its sections may turn over.
 
@@ -234,7 +234,15 @@ def _products(rows: Floats) -> Floats:
 
 def is_unstable(problem: Problem, grid: Grid, q: Floats, t: float, history: History) -> bool:
     """Tell whether control points q (n, nc) at rest at a time t [s] would leave their plane, as in `leaves_plane`."""
-    return any(True for _ in _leasts(problem, grid, q[None], [t], of_one_time(history)))
+    slack = _NEUTRAL * stiffness_of(problem)
+    return any(True for _ in _leasts(problem, grid, q[None], [t], of_one_time(history), slack))
+
+
+def stiffness_of(problem: Problem, pull: float = 0.0) -> float:
+    """Return about how stiff bending, weight and a pull [N] make a cable against what takes it elsewhere [N/m^2]."""
+    length = problem.scene.cable.length
+    bending = problem.bend.bending_stiffness if problem.bend else 0.0
+    return bending / length**4 + (float(np.linalg.norm(problem.weight())) + pull / length) / length
 
 
 def of_one_time(history: History) -> History:

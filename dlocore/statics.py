@@ -108,6 +108,8 @@ def equilibrium(
             problem = pose(scene, {"side": UNSTABLE}, at_rest=True)
             rest = _refined(problem, sizes, at, target, monitor)
     notes += [*side_notes(problem.start), *tip_notes(rest.grid.tipped, scene.cable.length)]
+    if problem.friction is not None:
+        notes.append("friction is left out, which holds a cable where it came to lie")
     grid, q, history = rest.grid, rest.settled.q, rest.settled.history
     world = problem.world(free_of_frames(problem, grid, q[None], history.past[None])[0])
     held = reactions(problem, grid, (holding(problem, grid, rest.settled),))

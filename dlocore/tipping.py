@@ -16,7 +16,7 @@ from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, times_
 from dlocore.kernels.banded import solve_free
 from dlocore.problem import Problem
 from dlocore.settling import settle
-from dlocore.sideways import is_looked_at
+from dlocore.sideways import is_looked_at, stiffness_of
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import greville
 
@@ -97,10 +97,7 @@ def falls(problem: Problem, grid: Grid, at: float = 0.0, starts: Starts | None =
     close_grasps(problem, grid, grasps, starts, q)
     elimination = hold(problem, grid, grasps, np.full(2, at), starts, q).elimination
     active, parameters = problem.law_table()
-    bending = problem.bend.bending_stiffness if problem.bend else 0.0
     pull = float(np.abs(applied_forces(problem, grid, np.array([at]))).max())  # of any control point [N]
-    load = float(np.linalg.norm(problem.weight())) + pull / cable.length
-    scale = bending / cable.length**4 + load / cable.length
 
     def pushed(springs: float, right: Floats) -> Floats | None:
         f, K = np.empty_like(q), np.empty((q.size, 4 * nc))
@@ -115,7 +112,7 @@ def falls(problem: Problem, grid: Grid, at: float = 0.0, starts: Starts | None =
     u = greville(grid.knots) / cable.length
     way = np.zeros_like(q)
     way[:, :dimensions] = to_a_side(u)[:, :dimensions]
-    springs = _SLACK * scale
+    springs = _SLACK * stiffness_of(problem, pull)
     if pushed(springs, way) is not None:
         return None
     for _ in range(_SPRINGS):
@@ -131,4 +128,5 @@ def falls(problem: Problem, grid: Grid, at: float = 0.0, starts: Starts | None =
         assert moved is not None, "these springs hold it"
         size = float(np.abs(moved[:, :dimensions]).max())
         way = moved / max(size, turn * float(np.abs(moved[:, dimensions:]).max(initial=0.0)))
-    return way if float(np.sum(way * side)) >= 0.0 else -way
+    farthest = np.sum(way**2, axis=1, keepdims=True)  # it falls where it goes farthest, however it waves elsewhere
+    return way if float(np.sum(farthest * way * side)) >= 0.0 else -way

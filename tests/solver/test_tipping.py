@@ -142,7 +142,23 @@ def test_friction_holds_what_would_fall():
     held = predict(replace(rough, cable=replace(rough.cable, bending_stiffness=1e-4)))
     assert held.status == "converged", held.message
     assert TIPPED not in held.message
-    assert turning(held.surface.positions(np.linspace(0.0, held.scene.cable.length, 99), 0.0)[0]) > 5.0
+    u = np.linspace(0.0, held.scene.cable.length, 99)
+    assert turning(held.surface.positions(u, 0.0)[0]) > 5.0
+    unrolled = equilibrium(held.scene)
+    assert turning(unrolled.positions(u)) < 4.0
+    assert "friction is left out" in unrolled.message
+
+
+@pytest.mark.parametrize("n_u", [14, 19, 28, 41])
+def test_what_stands_far_above_its_grasp_falls_to_one_side_on_every_grid(n_u):
+    # it falls in waves, and as a whole to either side of the mean (115:41): where it goes farthest counts
+    stands = draw(115, 41).make()
+    scene = replace(stands, shape=replace(stands.shape, settle=True))
+    problem, grid = settled(scene, n_u)
+    assert grid.tipped
+    top = problem.world(grid.start)[0, :3]
+    assert top[1] < -0.1
+    assert top[2] < -1.0
 
 
 def test_the_reference_tells_where_it_was_tipped_and_leaves_a_start_that_stays():
