@@ -275,13 +275,13 @@ def test_in_equilibrium_sections_have_turned_over(hold, gravity):
     assert UNSTABLE not in there.message
 
 
-@pytest.mark.parametrize("stiffness", [EI, 1.0])
+@pytest.mark.parametrize("stiffness", [EI, 4.0])
 def test_a_bent_rod_that_is_held_in_one_direction_hangs_from_it(stiffness):
     # it turns about that direction; stiff, it falls slowly for what keeps its length and the turn of its sections
     def standing(way: float) -> Scene:
         curve = arc(1.0)[:, [0, 2, 1]] * [1.0, 1.0, way]
         posed = scene(curve, "initial", Grasp(u=0.0, hold="tangent"), environment=Environment(drag=0.2))
-        cable = replace(posed.cable, bending_stiffness=stiffness, torsional_stiffness=0.7 * stiffness)
+        cable = replace(posed.cable, bending_stiffness=stiffness, torsional_stiffness=0.7 * stiffness, diameter=0.002)
         return replace(posed, cable=cable, shape=replace(posed.shape, settle=True))
 
     up, down = (equilibrium(standing(way)) for way in (1.0, -1.0))
