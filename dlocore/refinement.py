@@ -24,7 +24,7 @@ from dlocore.solvers.ladder import (
 )
 from dlocore.solvers.march import MOST_FRAMES, RHO, STRONGLY_DAMPED
 from dlocore.solvers.monitor import Monitor, TimeIsUp
-from dlocore.statics import RESTLESS
+from dlocore.statics import RESTLESS, settles_elsewhere
 from dlocore.whole_march import MISSED_COUNTS, Outcome, is_folded, is_uneven, march_level, march_status
 
 AUTO_ENOUGH = 1e-2  # of the length: the estimated error with which it is content where the finest grids reach no closer
@@ -357,6 +357,7 @@ class _Climb:
         monitor = self.monitor if self.budget == np.inf else self.monitor.within(self.budget - self.monitor.elapsed())
         try:
             moved = goes_astray(level.problem, level.motion, monitor, self.number >= len(LEVELS))
+            moved = max(moved, settles_elsewhere(level.problem, level.motion.grid, monitor))
             self.unseen = False
         except TimeIsUp:
             self.unseen = True

@@ -30,6 +30,7 @@ from dlocore.solvers.ladder import CREDIBLE_STRAIN, Level
 from dlocore.solvers.monitor import Monitor
 from dlocore.spin import bends_sharply, spin_forces
 from dlocore.spline import SplineSurface, design_matrix
+from dlocore.statics import settles_elsewhere
 from dlocore.tipping import tip_notes
 from dlocore.turning import turn_notes
 
@@ -157,7 +158,10 @@ def _undetermined(level: Level) -> list[str]:
     problem = level.problem
     if problem.scene.quality.n_u is None:
         return []
-    moved = goes_astray(problem, level.motion, Monitor(), hard=False)
+    moved = max(
+        goes_astray(problem, level.motion, Monitor(), hard=False),
+        settles_elsewhere(problem, level.motion.grid, Monitor()),
+    )
     return [f"on this grid {in_words(problem, moved)}"] if moved > UNDETERMINED * problem.scene.cable.length else []
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.buckling import UNSTABLE, side_notes
+from dlocore.determined import bent
 from dlocore.discretisation import make_grid, smallest_n_u
 from dlocore.errors import SceneError, number
 from dlocore.events import closed_grasps
@@ -32,6 +33,8 @@ LEVELS = (9, 13, 17, 25, 33, 49, 65, 97, 129, 193, 257, 385)
 _WOUND = np.pi  # [rad]: a start that turns by more along its length may have other equilibria beside the one downhill
 _COARSE = 12  # control points: on so few a start may settle to another of several equilibria than on more
 _ELSEWHERE = 0.02  # of the length: farther apart starts may lie in two equilibria
+_FAR = 0.05  # of the length: a start that settles no farther away has hardly passed by another equilibrium
+_TELLING = 13  # control points, of a start that is settled twice to see whether it tells to which side it goes
 _FINER = (1.5, 2.0)  # times the control points, with which a start that finds no rest may
 
 
@@ -194,6 +197,34 @@ def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None =
         allowed = "false, or a start that grasps hold in an equilibrium"
         raise SceneError(RESTLESS, True, allowed, "The start did not come to rest")
     return found
+
+
+def settles_elsewhere(problem: Problem, settled: Grid, monitor: Monitor) -> float:
+    """Return how far apart a start settles that is bent by DISTURBED of the length to one side and to the other [m].
+
+    It is 0 where it did not go far to where it is `settled`, where friction holds it, and where it finds no rest. An S
+    between two pins may go to either side of the line between them. A coarse grid tells.
+
+    Raises:
+        Cancelled: the caller asked to stop.
+        TimeIsUp: the deadline passed.
+    """
+    if not problem.scene.shape.settle or problem.friction is not None:
+        return 0.0
+    u = np.linspace(0.0, problem.scene.cable.length, 33)
+    dimensions = problem.plane.dimensions
+    way = design_matrix(settled.knots, u) @ settled.start[:, :dimensions] - problem.plane.points(problem.start(u))
+    if not np.linalg.norm(way, axis=1).max() > _FAR * problem.scene.cable.length:
+        return 0.0
+    monitor.check()
+    grid = make_grid(problem, max(_TELLING, smallest_n_u(problem)))
+    ends = []
+    for side in (1.0, -1.0):
+        found = _settled(problem, grid.changed(start=grid.start + side * bent(problem, grid, seed=1)), monitor, None)
+        if found is None:
+            return 0.0
+        ends.append(found.start[:, :dimensions])
+    return float(np.linalg.norm(ends[0] - ends[1], axis=1).max())
 
 
 def _settled(problem: Problem, grid: Grid, monitor: Monitor, like: Grid | None) -> Grid | None:

@@ -3,6 +3,7 @@
 import itertools
 import time
 import traceback
+from contextlib import suppress
 from dataclasses import asdict
 from typing import Any, Literal
 
@@ -23,7 +24,7 @@ from dlocore.progress import surface_at
 from dlocore.solvers.ladder import Size, given_steps, stretched
 from dlocore.solvers.march import march
 from dlocore.solvers.monitor import Monitor, TimeIsUp
-from dlocore.statics import start_grid
+from dlocore.statics import settles_elsewhere, start_grid
 from dlocore.whole_march import march_level
 
 WRONG = 0.01  # of the length: an error that an answer has to tell of
@@ -137,7 +138,7 @@ def disturbed(prediction: Prediction, scene: Scene, deadline: float) -> float | 
 
     More than WRONG: the scene does not determine its motion. Three marches on one grid, as fine as the finest that the
     prediction tried, as coarse steps damp what would grow. Their start is as it is, or bent by some half waves; only
-    where each finds its equilibria and keeps the cable's length.
+    where each finds its equilibria and keeps the cable's length. A start that settles is bent before it does, too.
     """
     problem = _posed(prediction, scene)
     n_u, steps = _finest(prediction, problem)
@@ -153,6 +154,9 @@ def disturbed(prediction: Prediction, scene: Scene, deadline: float) -> float | 
         at = np.searchsorted(motion.times, t).clip(0, len(motion.times) - 1)
         shapes.append(motion.states[at][:, :, : problem.plane.dimensions])
     away = max(float(np.linalg.norm(x - shapes[0], axis=-1).max()) for x in shapes[1:])
+    with suppress(TimeIsUp):
+        monitor = Monitor(None, deadline)
+        away = max(away, settles_elsewhere(problem, start_grid(problem, n_u, monitor), monitor))
     return away / scene.cable.length
 
 
