@@ -164,12 +164,12 @@ def rest_plane(scene: Scene, start: StartCurve) -> Plane:
     They may lie in it but for rounding elsewhere (NEARLY), as of coordinates that were measured or turned. That takes a
     cable out of it by less than any real one is bent, and is no side to go to.
     """
-    for flat in (FLATNESS, NEARLY):
-        for still in (False, True) if scene.shape.settle else (False,):
-            plane = flat_plane(scene, start, still=still, flat=flat)
-            if plane.dimensions == 2:
-                return plane
-    return plane
+    for still in (False, True) if scene.shape.settle else (False,):
+        nearly = flat_plane(scene, start, still=still, flat=NEARLY)
+        if nearly.dimensions == 2:
+            exactly = flat_plane(scene, start, still=still)
+            return exactly if exactly.dimensions == 2 else nearly
+    return nearly
 
 
 def flat_plane(scene: Scene, start: StartCurve, *, still: bool = False, flat: float = FLATNESS) -> Plane:

@@ -46,6 +46,8 @@ def leaves_plane(problem: Problem, motion: March) -> bool:
     grid = motion.grid
     if not (is_looked_at(problem) or _bends_in_plane(problem) or _turns_in_plane(problem)):
         return False
+    if problem.plane.dimensions == 3 and problem.rest_plane.dimensions == 3:
+        return False
     if problem.scene.shape.settle and is_unstable(problem, grid, grid.start, 0.0, grid.past()):
         return True
     looks = looked_at(len(motion.times) - 1, _LOOKS_AT_STRAIGHT if bend_of(problem.start) < _STRAIGHT else LOOKS)
