@@ -264,6 +264,12 @@ class Problem:
         length, diameter = self.scene.cable.length, self.scene.cable.diameter
         return max(min(diameter, max(0.5 * diameter, length / _SEGMENTS)), length / MOST_NODES)
 
+    def stiffness_aside(self, pull: float = 0.0) -> float:
+        """Return about how stiff bending, weight and a pull [N] make the cable against what takes it aside [N/m^2]."""
+        length = self.scene.cable.length
+        bending = self.bend.bending_stiffness if self.bend else 0.0
+        return bending / length**4 + (float(np.linalg.norm(self.weight())) + pull / length) / length
+
     def weight(self) -> Floats:
         """Return the weight per unit length in the solve's coordinates (nc,) [N/m]."""
         return np.zeros(self.nc) if self.gravity is None else self.rates(self.gravity.weight())

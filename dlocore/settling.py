@@ -120,9 +120,7 @@ def _relaxed(
     active, parameters = problem.law_table()
     axes, tables, elimination, offset = problem.axes, grid.tables, held.elimination, held.offsets[-1]
     length = problem.scene.cable.length
-    bending = problem.bend.bending_stiffness if problem.bend else 0.0
-    load = float(np.linalg.norm(problem.weight()))
-    springs = _SPRINGS * (bending / length**4 + load / length) + 1e-9
+    springs = _SPRINGS * problem.stiffness_aside() + 1e-9
     strength = searched = share * springs
     plain, near, weak, moved = problem.contact is None, False, False, 0.0
     untouched = history._replace(tension=grid.history.tension)

@@ -44,9 +44,7 @@ def leaves_plane(problem: Problem, motion: March) -> bool:
     So it would where the start has settled to an equilibrium that is none of a cable that may leave the plane.
     """
     grid = motion.grid
-    if not (is_looked_at(problem) or _bends_in_plane(problem) or _turns_in_plane(problem)):
-        return False
-    if problem.plane.dimensions == 3 and problem.rest_plane.dimensions == 3:
+    if not (_bends_in_plane(problem) or _may_lie_flat(problem)):
         return False
     if problem.scene.shape.settle and is_unstable(problem, grid, grid.start, 0.0, grid.past()):
         return True
@@ -119,6 +117,12 @@ def solved_in_space(ways: list[str]) -> str:
 def _bends_in_plane(problem: Problem) -> bool:
     """Tell whether a cable that is bent without stress moves in a plane that it may leave, or turn over in."""
     return _may_be_bent(problem) and problem.plane.dimensions == 2 and not problem.start.twisted
+
+
+def _may_lie_flat(problem: Problem) -> bool:
+    """Tell whether a cable that may leave its plane has one, also if it is solved in space."""
+    leaves = is_looked_at(problem) or _turns_in_plane(problem)
+    return leaves and (problem.plane.dimensions == 2 or problem.rest_plane.dimensions == 2)
 
 
 def _turns_in_plane(problem: Problem) -> bool:
@@ -236,15 +240,8 @@ def _products(rows: Floats) -> Floats:
 
 def is_unstable(problem: Problem, grid: Grid, q: Floats, t: float, history: History) -> bool:
     """Tell whether control points q (n, nc) at rest at a time t [s] would leave their plane, as in `leaves_plane`."""
-    slack = _NEUTRAL * stiffness_of(problem)
+    slack = _NEUTRAL * problem.stiffness_aside()
     return any(True for _ in _leasts(problem, grid, q[None], [t], of_one_time(history), slack))
-
-
-def stiffness_of(problem: Problem, pull: float = 0.0) -> float:
-    """Return about how stiff bending, weight and a pull [N] make a cable against what takes it elsewhere [N/m^2]."""
-    length = problem.scene.cable.length
-    bending = problem.bend.bending_stiffness if problem.bend else 0.0
-    return bending / length**4 + (float(np.linalg.norm(problem.weight())) + pull / length) / length
 
 
 def of_one_time(history: History) -> History:
@@ -263,16 +260,14 @@ def _in_plane(problem: Problem, states: Floats) -> Floats:
 
     It is 0 where there is no plane, or they can't leave it, as on a table.
     """
-    if not (is_looked_at(problem) or _turns_in_plane(problem)):
+    if not _may_lie_flat(problem):
         return states[:0]
     if problem.plane.dimensions == 2:
         return states
-    plane = problem.rest_plane
-    if plane.dimensions == 3:
-        return states[:0]
-    r = problem.plane.world(states[..., :3])
-    away = np.abs(r - plane.world(plane.points(r))).max(axis=(1, 2)) > _FLAT * problem.scene.cable.length
-    return plane.points(r[: int(np.argmax(away)) if away.any() else len(r)])
+    plane, r = problem.rest_plane, problem.plane.world(states[..., :3])
+    flat = plane.points(r)
+    away = np.abs(r - plane.world(flat)).max(axis=(1, 2)) > _FLAT * problem.scene.cable.length
+    return flat[: int(np.argmax(away)) if away.any() else len(flat)]
 
 
 def pose_as_shown(scene: Scene, called_for: Mapping[str, str], control_points: Floats) -> Problem:
@@ -284,8 +279,8 @@ def pose_as_shown(scene: Scene, called_for: Mapping[str, str], control_points: F
     if problem.on_table:
         shown = bool(control_points[..., 3].any())
     else:
-        plane, off = problem.rest_plane, 0.1 * BOW**2 * scene.cable.length
-        off += 2.0 * plane.distance(problem.start.control_points) if plane.dimensions == 2 else 0.0
+        plane = problem.rest_plane  # in space nothing is off it
+        off = 0.1 * BOW**2 * scene.cable.length + 2.0 * plane.distance(problem.start.control_points)
         shown = plane.dimensions == 2 and plane.distance(control_points[0, :, :3]) > off
     return pose(scene, {**called_for, "side": UNSTABLE}) if shown else problem
 

@@ -16,7 +16,7 @@ from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, times_
 from dlocore.kernels.banded import solve_free
 from dlocore.problem import Problem
 from dlocore.settling import settle
-from dlocore.sideways import is_looked_at, stiffness_of
+from dlocore.sideways import is_looked_at
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import greville
 
@@ -112,7 +112,7 @@ def falls(problem: Problem, grid: Grid, at: float = 0.0, starts: Starts | None =
     u = greville(grid.knots) / cable.length
     way = np.zeros_like(q)
     way[:, :dimensions] = to_a_side(u)[:, :dimensions]
-    springs = _SLACK * stiffness_of(problem, pull)
+    springs = _SLACK * problem.stiffness_aside(pull)
     if pushed(springs, way) is not None:
         return None
     for _ in range(_SPRINGS):

@@ -155,8 +155,7 @@ def disturbed(prediction: Prediction, scene: Scene, deadline: float) -> float | 
         shapes.append(motion.states[at][:, :, : problem.plane.dimensions])
     away = max(float(np.linalg.norm(x - shapes[0], axis=-1).max()) for x in shapes[1:])
     with suppress(TimeIsUp):
-        monitor = Monitor(None, deadline)
-        away = max(away, settles_elsewhere(problem, start_grid(problem, n_u, monitor), monitor))
+        away = max(away, settles_elsewhere(problem, grid, Monitor(None, deadline)))
     return away / scene.cable.length
 
 
