@@ -325,3 +325,42 @@ def test_an_answer_tells_of_strains_that_few_cables_bear():
 def test_quality_auto_takes_the_march_and_a_given_grid_the_least_squares():
     assert predict(paper_scene(0.0, quality=Quality())).accuracy.method == "march"
     assert predict(paper_scene(0.0)).accuracy.method == "spacetime"
+
+
+def test_what_is_on_one_side_of_a_clamp_moves_as_if_the_cable_ended_there():
+    way = Move(displacement=(0.05, 0.1, 0.15), rotation=(0.3, -0.4, 0.5), duration=0.8)
+    end = Move(displacement=(-0.1, 0.05, 0.1), duration=0.6)
+    points = arc(1.0, 1.2)
+    grasps = (Grasp(u=0.4, hold="clamp", path=way), Grasp(u=1.0, path=end))
+    whole = Scene(
+        cable=cable(bending_stiffness=5e-3),
+        shape=Points(points=points),
+        grasps=grasps,
+        environment=Environment(drag=0.1),
+    )
+    answer = refined(whole, 2e-3)
+    assert answer.accuracy.dimensions == 3
+    for begin, end_u in ((0.0, 0.4), (0.4, 1.0)):
+        kept = points[round(40 * begin) : round(40 * end_u) + 1]
+        held = tuple(replace(g, u=g.u - begin) for g in grasps if begin <= g.u <= end_u)
+        part = replace(
+            whole, cable=cable(length=end_u - begin, bending_stiffness=5e-3), shape=Points(points=kept), grasps=held
+        )
+        alone = refined(replace(part, horizon=0.8), 2e-3)
+        u, t = samples(alone.surface)
+        off = np.linalg.norm(alone.surface.positions(u, t) - answer.surface.positions(u + begin, t), axis=-1).max()
+        assert off <= alone.accuracy.error_estimate + answer.accuracy.error_estimate
+
+
+@pytest.mark.parametrize("hold", ["point", "tangent", "clamp"])
+def test_a_gripper_that_another_takes_over_from_on_its_way_makes_no_difference(hold):
+    def moved(share: float) -> Move:
+        return Move(displacement=share * np.array([0.1, 0.2, 0.1]), duration=share, profile="linear")
+
+    one = Grasp(u=0.3, hold=hold, path=moved(1.0))
+    two = (replace(one, path=moved(0.4), release_time=0.4), replace(one, path=moved(0.6), grasp_time=0.4))
+    given = Scene(cable=cable(), shape=Points(points=arc(1.0, 1.0)), grasps=(one,), environment=Environment(drag=0.1))
+    a, b = refined(given, 2e-3), refined(replace(given, grasps=two), 2e-3)
+    assert apart(a.surface, b.surface).max() <= a.accuracy.error_estimate + b.accuracy.error_estimate
+    forces = np.concatenate([g.reaction[g.reaction.any(axis=1)] for g in b.grasps])
+    assert np.abs(forces).max() <= 1.2 * np.abs(a.grasps[0].reaction).max()  # nothing is caught with a jolt

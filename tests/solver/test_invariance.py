@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dlocore import ControlPoints, Environment, Grasp, Load, Move, Points, Quality, Scene, predict
-from tests.solver.scenes import Floats, cable, march, paper_scene, samples
+from dlocore import ControlPoints, Environment, Grasp, Load, Move, Points, Quality, Scene, Waypoints, predict
+from dlocore.shape import start_curve
+from tests.solver.scenes import Floats, G, cable, converged, march, paper_scene, samples
 
 TURN = Rotation.from_rotvec([0.3, -0.7, 1.9]).as_matrix()
 MIRROR = np.diag([1.0, -1.0, 1.0])
@@ -126,6 +127,51 @@ def test_prediction_scales_with_the_units_of_length_time_and_mass(factor):
     np.testing.assert_allclose(
         other.surface.positions(u * a, t * np.sqrt(a)) / a, one.surface.positions(u, t), atol=1e-5
     )  # the Newton tolerance, on the tail that whips
+
+
+def carried(velocity: Floats, *, planar: bool) -> Scene:
+    """Return a cable without drag that two grippers begin to bring together, seen from a frame that drifts."""
+    turned, climb = np.linspace(0.0, 1.5, 41), 0.0 if planar else 0.2
+    radius = np.sqrt(1.0 / 1.5**2 - climb**2)
+    points = np.column_stack([radius * np.sin(turned), climb * turned, radius * (np.cos(turned) - 1.0)])
+    ways = [Move(displacement=way + velocity, duration=1.0, profile="linear") for way in ([0, 0, 0], [-0.1, 0, 0.2])]
+    return Scene(
+        cable=cable(bending_damping=1e-4),
+        shape=Points(points=points, velocity=velocity),
+        grasps=(Grasp(u=0.1, path=ways[0]), Grasp(u=0.9, hold="tangent", path=ways[1])),
+        quality=METHODS["auto"],
+    )
+
+
+@pytest.mark.parametrize("planar", [True, False], ids=["plane", "space"])
+def test_prediction_is_the_same_from_a_frame_that_drifts(planar):
+    drift = np.array([0.3, -0.4, 0.2])  # out of the plane of the motion, so that one of the two is solved in space
+    a, b = converged(carried(0.0 * drift, planar=planar)), converged(carried(drift, planar=planar))
+    assert (a.accuracy.dimensions, b.accuracy.dimensions) == (2 if planar else 3, 3)
+    u, t = samples(a.surface)
+    seen = b.surface.positions(u, t) - t[:, None, None] * drift
+    np.testing.assert_allclose(seen, a.surface.positions(u, t), atol=ROUNDING)
+    for g, h in zip(a.grasps, b.grasps, strict=True):
+        np.testing.assert_allclose(h.reaction, g.reaction, atol=1e-5 * np.abs(g.reaction).max())
+
+
+@pytest.mark.parametrize("rise", [(0.0, 0.0, G), (1.0, 2.0, 3.0)], ids=["weightless", "heavier and aslant"])
+@pytest.mark.parametrize("planar", [True, False], ids=["plane", "space"])
+def test_weight_is_what_a_frame_that_rises_faster_and_faster_feels(planar, rise):
+    given = carried(np.zeros(3), planar=planar)
+    start, t = start_curve(given.shape, 1.0), np.linspace(0.0, 1.0, 9)
+
+    def risen(rise: Floats) -> Scene:
+        ways = [g.path.at(t, start(g.u)[0]) + 0.5 * t[:, None] ** 2 * rise for g in given.grasps]
+        paths = [Waypoints(times=t, positions=way, start="moving") for way in ways]
+        grasps = tuple(replace(g, path=path) for g, path in zip(given.grasps, paths, strict=True))
+        return replace(given, grasps=grasps, environment=Environment(gravity=rise - [0.0, 0.0, G]))
+
+    a, b = converged(risen(np.zeros(3))), converged(risen(np.array(rise)))
+    u, times = samples(a.surface)
+    seen = b.surface.positions(u, times) - 0.5 * times[:, None, None] ** 2 * np.array(rise)
+    off = np.linalg.norm(seen - a.surface.positions(u, times), axis=-1).max()
+    assert off <= min(5e-4, a.accuracy.error_estimate + b.accuracy.error_estimate)
 
 
 @every_method
