@@ -1,9 +1,10 @@
 """Whether scenes that say the same have the same answer: `python -m benchmarks.reworded [--seed S] [--end N]`.
 
-Random hard scenes are predicted as they are, and with something added that changes nothing: an obstacle far away, a
-load of no force, a release after the end, grasps in another order, a gravity that is turned by 1e-7, next to no drag,
-effects switched on that were left out, the start as the control points of the answer. The answers are compared, in
-parts of the length, with the sum of both estimates.
+Random hard scenes are predicted as they are, and with something added that changes nothing: an obstacle far away, or
+beside the cable, a load of no force, a release after the end, a gripper that takes over from another on its way, grasps
+in another order, a gravity that is turned by 1e-7, next to no drag, effects switched on that were left out, the start
+as the control points of the answer; and as they are seen from a frame that drifts, or falls. The answers are compared,
+in parts of the length, with the sum of both estimates.
 """
 
 import os
@@ -14,25 +15,119 @@ import argparse
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.hard.generator import draw
 from benchmarks.machine import machine_line
-from dlocore import Load, Prediction, Quality, Scene, SceneError, Sphere, predict, warm_up
+from dlocore import (
+    Grasp,
+    Load,
+    Move,
+    Prediction,
+    Quality,
+    Scene,
+    SceneError,
+    Sphere,
+    Still,
+    Waypoints,
+    predict,
+    warm_up,
+)
+
+Floats = NDArray[np.float64]
 
 TARGET = 3e-3  # of the length
 DEADLINES = 2.0, 4.0  # [s] as it is, and in other words
 FAR = 100.0  # times the length
 TURNED = 1e-7  # of gravity
 LITTLE = 1e-9  # [N s^2/m^3]
+CLEAR = 0.02  # of the length, between the cable and an obstacle beside it
+MOMENTS = 121  # at which the path of a gripper is written down as it is seen from another frame
+FARTHEST = 100.0  # lengths that a frame falls
 SMALL = 1e-3  # of the length: what is less than this apart is not asked for how far it may be
 
 
-def reworded(scene: Scene, found: Prediction, random: np.random.Generator) -> Iterator[tuple[str, Scene]]:
-    """Yield scenes that say the same as one whose answer was `found`, and what was added."""
+class Frame(NamedTuple):
+    """A frame that moves by `velocity` t + `acceleration` t^2/2, (3,) [m/s] and (3,) [m/s^2]."""
+
+    velocity: Floats
+    acceleration: Floats
+
+    def at(self, t: Floats) -> Floats:
+        """Return where it is at times (k,) [s]; (k, 3) [m]."""
+        return t[:, None] * self.velocity + 0.5 * t[:, None] ** 2 * self.acceleration
+
+
+AT_REST = Frame(np.zeros(3), np.zeros(3))
+
+
+def reworded(scene: Scene, found: Prediction, random: np.random.Generator) -> Iterator[tuple[str, Scene, Frame]]:
+    """Yield scenes that say the same as one whose answer was `found`, what was added, and how their frame moves."""
+    for name, words in added(scene, found, random):
+        yield name, words, AT_REST
+    around, length, horizon = scene.environment, scene.cable.length, found.surface.horizon
+    unhindered = around.table is None and not around.obstacles and around.drag == around.drag_quadratic == 0.0
+    if not unhindered or scene.shape.settle:
+        return
+    gravity = cast(Floats, around.gravity)
+    falls = random.uniform(0.3, 1.0) * gravity + random.normal(size=3) * length / horizon**2
+    falls *= min(1.0, FARTHEST * length / (0.5 * horizon**2 * float(np.linalg.norm(falls))))
+    drift = random.normal(size=3) * length / horizon
+    frames = {"a frame that drifts": Frame(drift, np.zeros(3)), "a frame that falls": Frame(np.zeros(3), falls)}
+    for name, frame in frames.items():
+        seen = seen_from(frame, scene, found)
+        if seen is not None:
+            yield name, seen, frame
+
+
+def seen_from(frame: Frame, scene: Scene, found: Prediction) -> Scene | None:
+    """Return a scene as a frame sees it that moves the other way; None where a path jumps, turns or has waypoints."""
+    horizon, grasps = found.surface.horizon, list[Grasp]()
+    for g in scene.grasps:
+        path = g.path
+        turns = getattr(path, "rotation", None) is not None or isinstance(path, Waypoints)
+        if turns or g.start >= horizon or (isinstance(path, Move) and path.profile == "linear"):
+            return None
+        clock = np.linspace(0.0, horizon - g.start, MOMENTS)
+        way = path.at(clock, found.surface.positions(g.u, g.start)[0, 0]) + frame.at(clock + g.start)
+        grasps.append(replace(g, path=Waypoints(times=clock, positions=way, start="moving")))
+    shape = found.shape_at(0.0)
+    velocity = np.array(shape.velocity)
+    velocity[:, :3] += frame.velocity
+    around = replace(scene.environment, gravity=cast(Floats, scene.environment.gravity) + frame.acceleration)
+    shape = replace(shape, velocity=velocity)
+    return replace(scene, shape=shape, grasps=tuple(grasps), environment=around, horizon=horizon)
+
+
+def taken_over(grasp: Grasp, horizon: float) -> tuple[Grasp, Grasp] | None:
+    """Return a grasp as two, of which one takes over from the other on its way; None where no path tells the rest."""
+    path = grasp.path
+    at = 0.5 * (grasp.start + min(grasp.release_time or horizon, horizon))
+    if isinstance(path, Move) and path.profile == "linear" and path.rotation is None:
+        left = path.duration - (at - grasp.start)
+        if left <= 0.0:
+            return None
+        path = replace(path, displacement=left / path.duration * cast(Floats, path.displacement), duration=left)
+    elif not isinstance(path, Still):
+        return None
+    return replace(grasp, release_time=at), replace(grasp, path=path, grasp_time=at)
+
+
+def beside(found: Prediction, random: np.random.Generator) -> Sphere | None:
+    """Return a ball that the motion comes near to, but does not touch; None where there is no room for one."""
+    cable = found.scene.cable
+    u, t = np.linspace(0.0, cable.length, 101), np.linspace(0.0, found.surface.horizon, 65)
+    places = found.surface.positions(u, t).reshape(-1, 3)
+    middle = places[random.integers(len(places))] + 0.3 * cable.length * random.normal(size=3)
+    room = float(np.linalg.norm(places - middle, axis=1).min()) - 0.5 * cable.diameter - CLEAR * cable.length
+    return Sphere(center=middle, radius=room) if room > CLEAR * cable.length else None
+
+
+def added(scene: Scene, found: Prediction, random: np.random.Generator) -> Iterator[tuple[str, Scene]]:
+    """Yield scenes with something added that changes nothing, and what that is."""
     around, length, horizon = scene.environment, scene.cable.length, scene.horizon
     way = (0.0, 0.0, -FAR * length) if around.table is None else (FAR * length, 0.0, 0.0)
     far = Sphere(center=way, radius=0.1 * length)
@@ -45,7 +140,7 @@ def reworded(scene: Scene, found: Prediction, random: np.random.Generator) -> It
         yield "a release after the end", replace(scene, grasps=held, horizon=horizon)
     if len(scene.grasps) > 1:
         yield "another order of grasps", replace(scene, grasps=scene.grasps[::-1], horizon=horizon)
-    gravity = cast(NDArray[np.float64], around.gravity)
+    gravity = cast(Floats, around.gravity)
     if around.table is None and gravity.any():  # without weight any little turns what nothing holds from turning
         off = TURNED * float(np.linalg.norm(gravity)) * random.normal(size=3)
         yield "gravity turned a little", replace(scene, environment=replace(around, gravity=gravity + off))
@@ -56,6 +151,12 @@ def reworded(scene: Scene, found: Prediction, random: np.random.Generator) -> It
             yield f"{effect} switched on", replace(scene, effects={**scene.effects, effect: "on"})
     if not scene.shape.settle:
         yield "its start as control points", replace(scene, shape=found.shape_at(0.0), horizon=horizon)
+    over = taken_over(scene.grasps[0], found.surface.horizon) if scene.grasps else None
+    if over is not None:
+        yield "a gripper that takes over", replace(scene, grasps=(*over, *scene.grasps[1:]), horizon=horizon)
+    ball = beside(found, random)
+    if ball is not None and around.table is None:
+        yield "an obstacle beside it", replace(scene, environment=replace(around, obstacles=(*around.obstacles, ball)))
 
 
 def main() -> None:
@@ -79,7 +180,7 @@ def main() -> None:
             continue
         scenes += 1
         u, t = np.linspace(0.0, length, 65), np.linspace(0.0, found.surface.horizon, 65)
-        for name, words in reworded(scene, found, np.random.default_rng([options.seed, index])):
+        for name, words, frame in reworded(scene, found, np.random.default_rng([options.seed, index])):
             try:
                 answer = predict(words, deadline=DEADLINES[1])
             except SceneError as error:
@@ -89,7 +190,7 @@ def main() -> None:
             if answer.status != "converged":
                 other[f"{name}: {answer.status}"] += 1
                 continue
-            away = answer.surface.positions(u, t) - found.surface.positions(u, t)
+            away = answer.surface.positions(u, t) - frame.at(t)[:, None] - found.surface.positions(u, t)
             off = float(np.linalg.norm(away, axis=-1).max()) / length
             told = sum(p.accuracy.error_estimate or 0.0 for p in (found, answer)) / length
             (apart if off > max(2.0 * told, SMALL) else same)[name] += 1
