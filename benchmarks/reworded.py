@@ -155,7 +155,7 @@ def added(scene: Scene, found: Prediction, random: np.random.Generator) -> Itera
     if over is not None:
         yield "a gripper that takes over", replace(scene, grasps=(*over, *scene.grasps[1:]), horizon=horizon)
     ball = beside(found, random)
-    if ball is not None and around.table is None:
+    if ball is not None and around.table is None and not scene.shape.settle:
         yield "an obstacle beside it", replace(scene, environment=replace(around, obstacles=(*around.obstacles, ball)))
 
 
