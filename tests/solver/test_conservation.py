@@ -3,12 +3,24 @@
 import numpy as np
 import pytest
 
-from dlocore import ControlPoints, Environment, Grasp, Load, Move, Prediction, Scene, Straight, predict
+from dlocore import ControlPoints, Environment, Grasp, Load, Move, Points, Prediction, Scene, Straight, predict
 from dlocore.discretisation import make_grid
 from dlocore.problem import pose
 from dlocore.report import elastic_energy
 from dlocore.spline import design_matrix
-from tests.solver.scenes import WEIGHTLESS, Floats, G, along, cable, centre, march, momentum, paper_scene, without_table
+from tests.solver.scenes import (
+    WEIGHTLESS,
+    Floats,
+    G,
+    along,
+    arc,
+    cable,
+    centre,
+    march,
+    momentum,
+    paper_scene,
+    without_table,
+)
 
 MU = 0.05
 
@@ -170,6 +182,36 @@ def test_impulse_of_all_forces_is_the_change_of_momentum(hold):
         change = momentum(prediction.surface, MU, t[[k]])[0][0]
         # of up to 0.02 N s; second order of 325 steps, and the velocity of the time spline
         np.testing.assert_allclose(change, impulse, atol=3e-5)
+
+
+@pytest.mark.parametrize("hold", ["point", "tangent", "clamp"])
+def test_impulse_of_all_torques_is_the_change_of_angular_momentum(hold):
+    drag, gravity = 0.05, np.array([0.1, 0.0, -1.0])
+    turned = None if hold == "point" else (0.2, 0.3, -0.6)
+    way = Move(displacement=(0.0, 0.3, 0.1), rotation=turned, duration=0.8)
+    scene = Scene(
+        cable=cable(bending_damping=1e-4),
+        shape=Points(points=arc(1.0, 1.0)),
+        grasps=(Grasp(u=0.25, hold=hold, path=way), Grasp(u=1.0)),
+        loads=(Load(u=0.75, force=(0.0, 0.02, 0.05)),),
+        environment=Environment(gravity=gravity, drag=drag),
+        quality=march(25, 65),
+    )
+    prediction = predict(scene)
+    assert prediction.status == "converged"
+    surface, t = prediction.surface, prediction.grasps[0].times
+    u, w = along(surface)
+    r, v = surface(u, t)[..., :3], surface(u, t, dt=1)[..., :3]
+    torque = np.einsum("u,kud->kd", w, np.cross(r, MU * gravity - drag * v))
+    torque += np.cross(surface.positions(0.75, t)[:, 0], [0.0, 0.02, 0.05])
+    for g in prediction.grasps:
+        torque += np.cross(surface.positions(g.u, t)[:, 0], g.reaction) + g.moment
+    impulse = np.concatenate(
+        [np.zeros((1, 3)), np.cumsum(0.5 * (torque[1:] + torque[:-1]) * np.diff(t)[:, None], axis=0)]
+    )
+    change = momentum(surface, MU, t)[1]
+    off = (change - impulse)[len(t) // 8 :]  # from where the first waves, as the bent cable springs, are gone
+    np.testing.assert_allclose(off, np.tile(off[0], (len(off), 1)), atol=2e-4 * np.abs(change).max())  # second order
 
 
 def test_reactions_over_time_do_not_depend_on_the_step():
