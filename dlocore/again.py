@@ -19,9 +19,10 @@ from dlocore.prediction import Prediction
 from dlocore.problem import Problem
 from dlocore.review import called_for
 from dlocore.scene import Grasp, Scene
+from dlocore.solvers.changes import MISSED_COUNTS
 from dlocore.solvers.ladder import Level, distance, hardness, run_level
 from dlocore.solvers.monitor import Monitor, TimeIsUp
-from dlocore.whole_march import MISSED_COUNTS, march_status
+from dlocore.whole_march import march_status
 
 _NOT_OF_THE_GRID = ("neglected", "iteration", "start")  # parts of an estimate that each solve has of its own
 _ROUNDING = 1e-14  # of the coordinates of a plane that is found from points

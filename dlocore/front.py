@@ -31,11 +31,12 @@ from dlocore.refinement import climb
 from dlocore.report import WindowForces, effect_reports, elastic_energy, reactions
 from dlocore.review import neglected, objections
 from dlocore.scene import Method, Quality, Scene
+from dlocore.solvers.changes import MISSED_COUNTS
 from dlocore.solvers.ladder import Level
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.paper import BEYOND, solve_as_printed
 from dlocore.solvers.spacetime import solve
-from dlocore.whole_march import MISSED_COUNTS, TORN, Outcome, march_status, sided
+from dlocore.whole_march import TORN, Outcome, march_status, sided
 
 Floats = NDArray[np.float64]
 FindForces = Callable[[], tuple[WindowForces, ...]]

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from dlocore.budget import first_level, growth
+from dlocore.budget import Means, first_level
 from dlocore.cost import Cost
 from dlocore.determined import DOUBTFUL, UNDETERMINED, UNSEEN, bend_in_words, goes_astray, in_words
 from dlocore.errors import SceneError
@@ -12,7 +12,7 @@ from dlocore.prediction import Status
 from dlocore.problem import Problem
 from dlocore.progress import record_level
 from dlocore.scene import AUTO_TARGET, Quality
-from dlocore.solvers.changes import Change, weighed
+from dlocore.solvers.changes import DIRECTIONS, MISSED_COUNTS, Changes, weighed
 from dlocore.solvers.ladder import (
     ACCEPT,
     LEVELS,
@@ -22,38 +22,18 @@ from dlocore.solvers.ladder import (
     distance,
     stretched,
 )
-from dlocore.solvers.march import MOST_FRAMES, RHO, STRONGLY_DAMPED
+from dlocore.solvers.march import RHO, STRONGLY_DAMPED
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.statics import RESTLESS, settles_elsewhere
-from dlocore.whole_march import MISSED_COUNTS, Outcome, is_folded, is_uneven, march_level, march_status
+from dlocore.whole_march import Outcome, is_folded, is_uneven, march_level, march_status
 
 AUTO_ENOUGH = 1e-2  # of the length: the estimated error with which it is content where the finest grids reach no closer
 ROUGH = 0.05  # of the length: two grids that differ more are in no order yet: the next is marched with strong damping
-MOST_WORK = 3.2e7  # control points times steps of one march in the plane
-_COSTS = {
-    2: 1.0,
-    3: 2.0,
-    4: 2.9,
-}  # times the time, by coordinates: in space, and with twist, which takes 1.4 times that
-_FRAMES = 3  # a control point in time, at least, that are kept of a motion with twist: what its time spline needs
-PATIENT = 64.0  # times as much, of a march that will end before a deadline or within a time budget, ...
-MOST_STEPS = 1_000_000  # ... and has no more steps: what holds the cable is kept of all of them, see `Kept`
-_SLOWER = 1.3  # times as long as its work tells, a march may take
-CONTACT_COSTS = 2  # times as much work counts with contact, which takes more of the time of a step
-AUTO_SHARE = 1 / 32  # of it for who asked for no target, once the estimated error is AUTO_ENOUGH
-_MOST_POINTS = 800  # along the cable, ...
-_PATIENT_POINTS = 4  # ... or so many times as many, of a march that will end before a deadline
 _FINER = {"space": 1.5, "time": 2.0}
 _FINE_IN_TIME = 0.3  # of the target: a time spline that misses its march by less keeps its knots as the steps halve
 _AT_BEST = 0.2  # of an error, is left by one refinement: what is still too much after all of them is not begun
-_STALE = 4.0  # times what a refinement in one direction moved the surface by: once those in the other moved it by more,
-# and by more than the target, what the first has left is measured again
-_DEAR = 0.25  # of the time left: a march that takes more is not done only to tell what steps err by
 _EVENED = 3  # refinements in space, at most, of a grid that agrees with the one before on strain within a span
 _FAILURES = 2  # refinements in time of a march that found no equilibrium
-
-
-Changes = dict[str, Change]  # by direction, "space", "time" or "both": how far its last refinement moved the surface
 
 
 def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | None = None) -> Outcome:
@@ -74,14 +54,13 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
     is worth; the message says how far the grids agree.
     """
     length = problem.scene.cable.length
+    budget = quality.time_budget
     return _Climb(
         problem=problem,
-        monitor=monitor,
-        cost=cost,
+        means=Means(monitor, cost, budget or np.inf),
         target=quality.target_error or AUTO_TARGET * length,
         enough=quality.target_error or AUTO_ENOUGH * length,
-        budget=quality.time_budget or np.inf,
-        number=0 if quality.time_budget is None else first_level(problem, cost, quality.time_budget),
+        number=0 if budget is None else first_level(problem, cost, budget),
     ).outcome()
 
 
@@ -91,16 +70,13 @@ class _Climb:
 
     Attributes:
         problem: what is solved now; motions may call for more effects.
-        monitor: that of the solve.
-        cost: what solves cost on this machine, where it is known.
+        means: what it may spend.
         target: error that is aimed at [m].
         enough: estimated error that is success where no finer grid is left [m].
-        budget: time allowed [s], infinite where none was given.
         number: of the grids that refine space and time together, this one included.
         direction: in which the grid at hand is finer than the best one: "both", "space" or "time".
         best: the finest march so far that is to be believed.
         changes: how far refinements moved the surface.
-        since: by direction, how far others have moved it at most since the last in this one [m].
         estimate: error of the best one [m].
         rho: spectral radius of the next march.
         failures: marches in a row that found less than the best one, or no equilibrium as that.
@@ -108,29 +84,34 @@ class _Climb:
             that does not matter.
         unseen: whether no time was left to see how far it goes.
         evened: how often more control points were taken as the cable was strained between the points that watch it.
-        pace: time that the last march took for each of its points and steps [s].
         wanting: effects that a finer grid called for, and that no time was left to march with, in words.
     """
 
     problem: Problem
-    monitor: Monitor
-    cost: Cost | None
+    means: Means
     target: float
     enough: float
-    budget: float
     number: int
     direction: str = "both"
     best: Level | None = None
-    changes: Changes = field(default_factory=dict)
-    since: dict[str, float] = field(default_factory=dict)
+    changes: Changes = field(default_factory=Changes)
     estimate: float = np.inf
     rho: float = RHO
     failures: int = 0
     astray: float = 0.0
     unseen: bool = False
     evened: int = 0
-    pace: float = np.inf
     wanting: str = ""
+
+    @property
+    def monitor(self) -> Monitor:
+        """That of the solve."""
+        return self.means.monitor
+
+    @property
+    def _timed(self) -> bool:
+        """Whether a time budget was given."""
+        return self.means.budget < np.inf
 
     def outcome(self) -> Outcome:
         """March until an answer is found, and return it."""
@@ -142,14 +123,14 @@ class _Climb:
                 level = self._march(size)
             except TimeIsUp as up:
                 self.monitor.phase("march")
-                self.wanting = str(up).replace("side", "a side to go to")
+                self.wanting = ", ".join("a side to go to" if name == "side" else name for name in up.args)
                 break
             except SceneError as error:
                 if error.field != RESTLESS:
                     raise
                 self.number += 1
                 shown = self.best or shown
-                if self.number >= len(LEVELS) or (shown is not None and self.monitor.elapsed() > self.budget):
+                if self.number >= len(LEVELS) or (shown is not None and self.means.used_up):
                     if shown is None:
                         raise
                     return self._restless(shown, error)
@@ -159,7 +140,7 @@ class _Climb:
                 size = stretched(self.problem, self.number)
                 continue
             spent = self.monitor.elapsed() - began
-            self.pace = spent / self._work(size)
+            self.means.took(self.problem, size, spent)
             if self.best is not None:
                 more = self._after_failure(level, self.best, size)
                 if more is not None:
@@ -174,7 +155,7 @@ class _Climb:
             status, message = march_status(self.problem, level)
             if level.motion.stopped == "time" or self.failures > len(LEVELS):
                 return Outcome(level, status, message, None)
-            agrees = self.estimate <= ACCEPT * self.target and self.budget == np.inf
+            agrees = self.estimate <= ACCEPT * self.target and not self._timed
             uneven = agrees and is_uneven(level) and self.evened < _EVENED
             self.evened += uneven
             unfolds = self._affordable(_finer(size, "space", False)) if uneven or is_folded(level) else None
@@ -182,7 +163,7 @@ class _Climb:
             if agrees and unfolds is None:
                 finer = self._once_more(size)
                 if finer is None and status != "converged":
-                    return Outcome(level, status, message, _parts(self.changes, level))
+                    return Outcome(level, status, message, self.changes.parts(level))
                 if finer is None:
                     before, self.astray = self._undetermined, self._find_astray(level)
                     # on a coarse grid disturbances may grow that do not on a fine one
@@ -195,7 +176,7 @@ class _Climb:
                     return unfolded
                 self._look_back(level, size)
                 finer = self._next(level, size, unfolds)
-            if finer is not None and not self._in_time(size, finer, spent):
+            if finer is not None and not self.means.next_fits(self.problem, size, finer, spent):
                 return self._within_budget(level)
             size = finer
         return self._ended()
@@ -204,7 +185,7 @@ class _Climb:
         """March on the next grid; where its motion calls for another effect, forget the grids before."""
         before = self.best
         if before is not None:
-            self.monitor.end_within(self.budget)
+            self.monitor.end_within(self.means.budget)
             self.monitor.check()
         rho = self.rho
         if before is not None and size.steps == before.size.steps and before.motion.rho == STRONGLY_DAMPED:
@@ -223,7 +204,7 @@ class _Climb:
 
     def _forget(self) -> None:
         """Forget the grids before."""
-        self.best, self.changes, self.estimate, self.evened = None, {}, np.inf, 0
+        self.best, self.changes, self.estimate, self.evened = None, Changes(), np.inf, 0
         self.astray, self.unseen = 0.0, False
 
     def _is_rough(self, level: Level) -> bool:
@@ -234,18 +215,17 @@ class _Climb:
         if not _is_worse(level, best):
             return None
         self.failures += 1
-        if self.failures > _FAILURES or self.budget < np.inf:
+        if self.failures > _FAILURES or self._timed:
             return None
         return self._affordable(_finer(size, "space" if is_folded(best) else "time", True))
 
     def _weigh(self, level: Level, best: Level) -> None:
         """Note how far a level moved the surface, what error that points to, and how to damp the next march."""
         if best.motion.stopped:  # its surface stands still from there on: how far that is from another tells nothing
-            self.changes, self.estimate = {}, np.inf
+            self.changes, self.estimate = Changes(), np.inf
             return
-        self.changes[self.direction] = weighed(level, best, self.changes.get(self.direction), not self.changes)
-        self.since = {d: max(self.since.get(d, 0.0), level.change) for d in self.changes if d != self.direction}
-        self.estimate = max(_error(self.changes), MISSED_COUNTS * level.missed)
+        self.changes.note(self.direction, level, best)
+        self.estimate = self.changes.estimate(level)
         rough = self._is_rough(level)
         if self.number < len(LEVELS) or (rough and self.problem.self_contact is not None):
             self.rho = STRONGLY_DAMPED if rough else RHO  # later on two marches would differ by their damping
@@ -255,13 +235,11 @@ class _Climb:
 
         On coarse steps, which damp what they can't resolve, more control points may move the surface by far less.
         """
-        for direction in _FINER:
-            moved = self.since.get(direction, 0.0)
-            if direction in self.changes and moved > max(_STALE * self.changes[direction].moved, self.target):
-                finer = self._affordable(_finer(size, direction, False))
-                if finer is not None:
-                    self.direction = direction
-                    return finer
+        for direction in self.changes.stale(self.target):
+            finer = self._affordable(_finer(size, direction, False))
+            if finer is not None:
+                self.direction = direction
+                return finer
         return None
 
     def _look_back(self, level: Level, size: Size) -> None:
@@ -269,11 +247,10 @@ class _Climb:
 
         So it is where a motion calls for another effect on a fine grid: the grids before tell nothing of it.
         """
-        known = "both" in self.changes or "time" in self.changes
+        known = "both" in self.changes.last or "time" in self.changes.last
         if known or self.number < len(LEVELS) - 1 or level.motion.stopped or is_folded(level):
             return
-        finer, left = _finer(size, "time", False), min(self.monitor.remaining(), self.budget - self.monitor.elapsed())
-        if left == np.inf or self.pace * self._work(finer) <= _DEAR * left:
+        if not self.means.is_dear(self.problem, _finer(size, "time", False)):
             return
         half = size._replace(steps=size.steps // 2)
         try:
@@ -287,8 +264,8 @@ class _Climb:
             return
         moved = distance(coarse, level, self.problem)
         record_level(self.problem, replace(coarse, change=moved, note="tells what steps err by"), self.monitor)
-        self.changes["time"] = weighed(replace(level, change=moved), coarse, None, True)
-        self.estimate = max(_error(self.changes), MISSED_COUNTS * level.missed)
+        self.changes.last["time"] = weighed(replace(level, change=moved), coarse, None, True)
+        self.estimate = self.changes.estimate(level)
 
     def _next(self, level: Level, size: Size, unfolds: Size | None) -> Size | None:
         """Return the next size, None where no finer grid is worth its time; `unfolds` is for a motion that folds."""
@@ -298,18 +275,17 @@ class _Climb:
             return finer._replace(n_u=max(finer.n_u, size.n_u), steps=max(finer.steps, size.steps))
         if unfolds is not None:
             self.direction = "space"
-            if "both" in self.changes:
-                self.changes.setdefault(
-                    "time", self.changes["both"]
-                )  # of space, grids that agree on a fold tell nothing
+            if "both" in self.changes.last:  # of space, grids that agree on a fold tell nothing
+                self.changes.last.setdefault("time", self.changes.last["both"])
             return unfolds
         trembles = MISSED_COUNTS * level.missed > _FINE_IN_TIME * self.target
-        sizes = {direction: self._affordable(_finer(size, direction, trembles)) for direction in _FINER}
-        self.direction = "time" if MISSED_COUNTS * level.missed > _error(self.changes) else _worst(self.changes)
-        change = self.changes.get(self.direction)
+        sizes = {direction: self._affordable(_finer(size, direction, trembles)) for direction in DIRECTIONS}
+        misses = MISSED_COUNTS * level.missed > self.changes.error
+        self.direction = "time" if misses else self.changes.worst()
+        change = self.changes.last.get(self.direction)
         if sizes[self.direction] is None and (change is None or change.error < self.target):
             # may still bring the sum of both below it
-            self.direction = next(direction for direction in _FINER if direction != self.direction)
+            self.direction = next(direction for direction in DIRECTIONS if direction != self.direction)
         if self.direction == "time" and self.problem.self_contact is None:
             # on the same steps strongly damped marches err by far more; but strands that strike each other rebound less
             self.rho = RHO
@@ -318,24 +294,9 @@ class _Climb:
 
     def _affordable(self, size: Size) -> Size | None:
         """Return a size, or None where a march of it takes too long."""
-        work = self._work(size)
         success = self.best is None or not is_folded(self.best)
         content = self.enough > self.target and self.estimate <= self.enough and success
-        in_time = self._ends_in_time(size)
-        most = MOST_WORK * (AUTO_SHARE if content else PATIENT if in_time else 1.0)
-        fits = self.problem.twist is None or _FRAMES * size.n_t * size.n_u <= MOST_FRAMES
-        points = _MOST_POINTS * (_PATIENT_POINTS if in_time and not content else 1)
-        return size if fits and size.n_u <= points and work <= most else None
-
-    def _work(self, size: Size) -> float:
-        """Return the control points times steps of a march in the plane that takes as long as one of a size."""
-        touches = self.problem.contact is not None or self.problem.self_contact is not None
-        return size.n_u * size.steps * _COSTS[self.problem.nc] * (CONTACT_COSTS if touches else 1.0)
-
-    def _ends_in_time(self, size: Size) -> bool:
-        """Tell whether there is a deadline or a budget, and a march of a size will end before it."""
-        left = min(self.monitor.remaining(), self.budget - self.monitor.elapsed())
-        return left < np.inf and size.steps <= MOST_STEPS and _SLOWER * self.pace * self._work(size) < left
+        return self.means.affordable(self.problem, size, content)
 
     def _left(self, size: Size | None) -> int:
         """Return how many refinements in the direction are left, from a size on."""
@@ -345,16 +306,12 @@ class _Climb:
             size = self._affordable(_finer(size, self.direction, False))
         return count
 
-    def _in_time(self, size: Size, finer: Size, spent: float) -> bool:
-        """Tell whether the next grid is done within the budget, if one of `size` took a time `spent` [s]."""
-        return not growth(self.problem, self.cost, size, finer) * spent > self.budget - self.monitor.elapsed()
-
     def _find_astray(self, level: Level) -> float:
         """Return how far a start that is hardly another would go elsewhere [m], 0 where that does not matter.
 
         Where there is no time left to look, what the grid before says counts.
         """
-        monitor = self.monitor if self.budget == np.inf else self.monitor.within(self.budget - self.monitor.elapsed())
+        monitor = self.monitor.within(self.means.left) if self._timed else self.monitor
         try:
             moved = goes_astray(level.problem, level.motion, monitor, self.number >= len(LEVELS))
             moved = max(moved, settles_elsewhere(level.problem, level.motion.grid, monitor))
@@ -384,7 +341,7 @@ class _Climb:
 
     def _doubted(self, level: Level, message: str) -> tuple[str, dict[str, float] | None]:
         """Return a message and the parts of the error [m], with what is known of where its start may take a motion."""
-        parts = _parts(self.changes, level)
+        parts = self.changes.parts(level)
         if not self.astray:
             return message + (f" {UNSEEN}" if self.unseen else ""), parts
         told = in_words if self._undetermined else bend_in_words
@@ -405,7 +362,7 @@ class _Climb:
 
         A tip far shorter than a span, beyond a grasp, may fold straight back on any grid: nothing else moves by that.
         """
-        if not (is_folded(level) and self.estimate <= ACCEPT * self.target and self.budget == np.inf):
+        if not (is_folded(level) and self.estimate <= ACCEPT * self.target and not self._timed):
             return None
         try:
             other = march_level(
@@ -421,13 +378,13 @@ class _Climb:
             return None
         other = replace(other, change=level.change + away, note="watched at more points")
         record_level(self.problem, other, self.monitor)
-        parts = _parts(self.changes, other) or {}
+        parts = self.changes.parts(other) or {}
         parts[list(parts)[-1]] += away
         return Outcome(other, "converged", self._agreed(other), parts)
 
     def _within_budget(self, level: Level) -> Outcome:
         """Return the best that the budget allows; it is a success where its error is known, and is what is enough."""
-        allowed = f"{self.budget * 1e3:.3g} ms"
+        allowed = f"{self.means.budget * 1e3:.3g} ms"
         if not np.isfinite(level.change):
             return Outcome(level, "time_limit", f"{allowed} allow one grid, unchecked.", None)
         status, failure = march_status(self.problem, level)
@@ -446,7 +403,7 @@ class _Climb:
         if self.estimate <= self.enough:
             return self._ended()
         status, message = march_status(self.problem, level)
-        errors = _parts(self.changes, best) or ({"grid": best.change} if np.isfinite(best.change) else None)
+        errors = self.changes.parts(best) or ({"grid": best.change} if np.isfinite(best.change) else None)
         return Outcome(best, status, f"A finer grid was not finished: {message}", errors)
 
     def _restless(self, best: Level, error: SceneError) -> Outcome:
@@ -460,7 +417,7 @@ class _Climb:
         if self.wanting:
             words = f"The time limit passed: a finer grid calls for {self.wanting}, which this answer leaves out."
             return Outcome(best, "time_limit", f"{words} Allow more time.", None)
-        if self.monitor.elapsed() > self.budget:
+        if self.means.used_up:
             return self._within_budget(best)
         status, message = march_status(self.problem, best)
         left = self._left_over()
@@ -475,7 +432,7 @@ class _Climb:
         elif status == "converged":
             self.astray = self.astray or self._find_astray(best)
             return self._answer(best, "max_iterations", f"No finer grid was tried; {left}.", f" {advice}")
-        return Outcome(best, status, message, _parts(self.changes, best))
+        return Outcome(best, status, message, self.changes.parts(best))
 
 
 def _is_worse(level: Level, best: Level) -> bool:
@@ -492,29 +449,3 @@ def _finer(size: Size, direction: str, trembles: bool) -> Size:
     if direction == "space":
         return size._replace(n_u=round(ratio * size.n_u))
     return size._replace(n_t=round(ratio * size.n_t) if trembles else size.n_t, steps=round(ratio * size.steps))
-
-
-def _worst(changes: Changes) -> str:
-    """Return the direction to refine: time, then space, then that which erred more."""
-    unknown = [direction for direction in ("time", "space") if direction not in changes]
-    return unknown[0] if unknown else max(_FINER, key=lambda direction: changes[direction].error)
-
-
-def _error(changes: Changes) -> float:
-    """Return the error [m] that the changes point to: of the whole grid, or of both directions once both are known."""
-    if all(direction in changes for direction in _FINER):
-        return sum(changes[direction].error for direction in _FINER)
-    return changes["both"].error if "both" in changes else np.inf
-
-
-def _parts(changes: Changes, level: Level) -> dict[str, float] | None:
-    """Return the parts of the error [m] of a level, space and time as far as they are known apart, or None."""
-    if not np.isfinite(_error(changes)):
-        return None
-    known = list(_FINER) if all(direction in changes for direction in _FINER) else ["both"]
-    parts = {"grid" if direction == "both" else direction: changes[direction].error for direction in known}
-    unseen = MISSED_COUNTS * level.missed - sum(parts.values())
-    if unseen > 0.0:  # what the time spline misses of its march is told by no other grid
-        last = list(parts)[-1]
-        parts[last] += unseen
-    return parts

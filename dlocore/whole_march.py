@@ -28,7 +28,6 @@ from dlocore.solvers.monitor import Monitor, TimeIsUp
 TORN = 0.2  # axial strain: no cable of this kind follows
 FOLDED = 0.4  # of |r'| between the points that watch over the length: less is a fold that no energy sees
 _LOOKS = (1, 2, 3)  # grids on which a motion is looked at for whether it leaves its plane
-MISSED_COUNTS = 3.0  # what the time spline misses of its march, times this, is the least that the error may be
 
 
 class Outcome(NamedTuple):
@@ -76,7 +75,7 @@ def march_level(
                 watch=watch, like=like, whole=whole,
             )  # fmt: skip
         except TimeIsUp:
-            raise TimeIsUp(", ".join(name for name in called if name not in asked)) from None
+            raise TimeIsUp(*(name for name in called if name not in asked)) from None
         if known is not None:
             new, known = called_for_by_fine(level), None
         else:

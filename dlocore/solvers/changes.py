@@ -1,5 +1,6 @@
-"""What error the change from one grid to a finer one points to."""
+"""What error the changes from one grid to a finer one point to."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,10 @@ _MOST_FALL = 20.0  # times less than the refinement before, at most, is believed
 # ... where strong damping begins with it, whose errors are about those of half as many steps without: 6 in theory
 _MOST_FALL_DAMPED = 8.0
 _MORE = 1.1  # times as many steps: fewer are as many
+_STALE = 4.0  # times what a refinement in one direction moved the surface by: once those in the other moved it by more,
+# what the first has left is measured again
+MISSED_COUNTS = 3.0  # what the time spline misses of its march, times this, is the least that the error may be
+DIRECTIONS = "space", "time"
 
 
 class Change(NamedTuple):
@@ -67,3 +72,58 @@ def weighed(level: Level, before: Level, last: Change | None, first: bool = Fals
     fall = _MOST_FALL_DAMPED if damped and not was_damped else _MOST_FALL
     left = _MOST_LEFT if first else _LEFT_KINKED
     return Change(counts * level.change, moved_before, left if level.motion.kinked else _LEFT, fall)
+
+
+class Changes:
+    """How far refinements moved the surface, by direction: "space", "time", or "both" at once.
+
+    Attributes:
+        last: what the last refinement in each direction did.
+        since: by direction, how far others have moved the surface at most since then [m].
+    """
+
+    def __init__(self, last: Mapping[str, Change] | None = None) -> None:
+        self.last: dict[str, Change] = dict(last or {})
+        self.since: dict[str, float] = {}
+
+    def note(self, direction: str, level: Level, before: Level) -> None:
+        """Note that a refinement in a direction took one level to the next."""
+        self.last[direction] = weighed(level, before, self.last.get(direction), not self.last)
+        self.since = {d: max(self.since.get(d, 0.0), level.change) for d in self.last if d != direction}
+
+    @property
+    def error(self) -> float:
+        """The error [m] they point to: of the whole grid, or of both directions once both are known; else infinite."""
+        if self._apart:
+            return sum(self.last[direction].error for direction in DIRECTIONS)
+        return self.last["both"].error if "both" in self.last else np.inf
+
+    def estimate(self, level: Level) -> float:
+        """Return the error [m] of the last level; what its time spline misses is told by no other grid."""
+        return max(self.error, MISSED_COUNTS * level.missed)
+
+    def parts(self, level: Level) -> dict[str, float] | None:
+        """Return the parts of that error [m], space and time as far as they are known apart, or None."""
+        if not np.isfinite(self.error):
+            return None
+        known = DIRECTIONS if self._apart else ("both",)
+        parts = {"grid" if direction == "both" else direction: self.last[direction].error for direction in known}
+        parts[list(parts)[-1]] += max(0.0, MISSED_COUNTS * level.missed - sum(parts.values()))
+        return parts
+
+    def worst(self) -> str:
+        """Return the direction to refine: time, then space, then that which erred more."""
+        unknown = [direction for direction in ("time", "space") if direction not in self.last]
+        return unknown[0] if unknown else max(DIRECTIONS, key=lambda direction: self.last[direction].error)
+
+    def stale(self, target: float) -> list[str]:
+        """Return the directions whose last refinement tells little of the grid at hand.
+
+        The others have since moved the surface by several times as much, and by more than the target [m].
+        """
+        known = [direction for direction in DIRECTIONS if direction in self.last]
+        return [d for d in known if self.since.get(d, 0.0) > max(_STALE * self.last[d].moved, target)]
+
+    @property
+    def _apart(self) -> bool:
+        return all(direction in self.last for direction in DIRECTIONS)

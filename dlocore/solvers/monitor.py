@@ -10,7 +10,7 @@ from dlocore.prediction import Iteration, OnIteration
 class TimeIsUp(Exception):  # noqa: N818 - no error: the solver answers with what it has
     """The deadline of a solve has passed; the solver answers with what it has.
 
-    Its text names the effects that a motion was found to call for, and that there was no time to march with.
+    Its arguments name the effects that a motion was found to call for, and that there was no time to march with.
     """
 
 

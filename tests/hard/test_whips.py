@@ -5,9 +5,10 @@ from dataclasses import replace
 import pytest
 
 from benchmarks.hard.generator import draw
+from dlocore.budget import Means
 from dlocore.problem import Problem, pose
 from dlocore.refinement import ROUGH, _Climb, _is_worse
-from dlocore.solvers.changes import Change
+from dlocore.solvers.changes import Change, Changes
 from dlocore.solvers.ladder import CREDIBLE_STRAIN, LEVELS, Size, run_level
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED
 from dlocore.solvers.monitor import Monitor
@@ -42,8 +43,8 @@ def test_strong_damping_ends_with_the_first_refinement_in_time_alone(whip: Probl
     level = replace(run_level(whip, *size, Monitor(None, None), rho=STRONGLY_DAMPED), change=change)
     problem = pose(whip.scene, {**whip.called_for, "self_contact": "strands meet"}) if meets else whip
     climb = _Climb(
-        problem=problem, monitor=Monitor(None, None), cost=None, target=1e-3, enough=1e-3, budget=float("inf"),
-        number=len(LEVELS), rho=STRONGLY_DAMPED, changes={"both": Change(change, 2.0 * change, 0.9)},
+        problem=problem, means=Means(Monitor(None, None), None, float("inf")), target=1e-3, enough=1e-3,
+        number=len(LEVELS), rho=STRONGLY_DAMPED, changes=Changes({"both": Change(change, 2.0 * change, 0.9)}),
         best=level,
     )  # fmt: skip
     finer = climb._next(level, size, None)

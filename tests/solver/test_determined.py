@@ -23,6 +23,7 @@ from dlocore import (
     predict,
     refinement,
 )
+from dlocore.budget import Means
 from dlocore.determined import DISTURBED, DOUBTFUL, UNDETERMINED, UNSEEN, bent, goes_astray, may_grow
 from dlocore.events import closed_grasps
 from dlocore.grid import Grid
@@ -354,7 +355,12 @@ def test_what_a_grid_says_is_not_forgotten_as_the_time_ends(marches: bool, monke
 @pytest.fixture
 def hurried(monkeypatch: pytest.MonkeyPatch) -> Scene:
     """A scene with a time budget that is used up once two grids agree to 1 %, however fast the machine is."""
-    monkeypatch.setattr(refinement._Climb, "_in_time", lambda climb, *_: climb.estimate > climb.enough)
+
+    class Hurried(refinement._Climb):
+        def __post_init__(self) -> None:
+            self.means.__dict__["next_fits"] = lambda *_: self.estimate > self.enough
+
+    monkeypatch.setattr(refinement, "_Climb", Hurried)
     return dataclasses.replace(column(0.1, drag=1.0), quality=Quality(time_budget=600.0))
 
 
@@ -389,7 +395,7 @@ def test_a_finer_grid_may_still_look_where_a_coarse_one_had_no_time(monkeypatch:
         raise moved
 
     climb = refinement._Climb(
-        problem=pose(column(0.1)), monitor=Monitor(), cost=None, target=1.0, enough=1.0, budget=1.0, number=0
+        problem=pose(column(0.1)), means=Means(Monitor(), None, 1.0), target=1.0, enough=1.0, number=0
     )
     level = march_level(climb.problem, refinement.stretched(climb.problem, 0), climb.monitor)
     monkeypatch.setattr(refinement, "goes_astray", astray)

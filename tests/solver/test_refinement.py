@@ -20,6 +20,7 @@ from dlocore import (
     Scene,
     Sphere,
     Straight,
+    budget,
     equilibrium,
     predict,
     refinement,
@@ -98,15 +99,15 @@ def test_a_target_is_reached_by_more_steps_where_only_time_errs():
 def test_who_gives_a_deadline_gets_more_work_for_a_target_that_ends_before_it(monkeypatch: pytest.MonkeyPatch):
     scene = swinging(Quality(target_error=2e-4))
     free = predict(scene).accuracy
-    monkeypatch.setattr(refinement, "MOST_WORK", 0.5 * free.n_u * free.steps)
+    monkeypatch.setattr(budget, "MOST_WORK", 0.5 * free.n_u * free.steps)
     assert predict(scene).status == "max_iterations"
     found = predict(scene, deadline=60.0)
     assert found.status == "converged"
     assert (found.accuracy.n_u, found.accuracy.steps) == (free.n_u, free.steps)
     with monkeypatch.context() as patch:
-        patch.setattr(refinement, "_SLOWER", 1e9)  # the next march would not end before it: it is not begun
+        patch.setattr(budget, "_SLOWER", 1e9)  # the next march would not end before it: it is not begun
         assert predict(scene, deadline=60.0).status == "max_iterations"
-    monkeypatch.setattr(refinement, "MOST_STEPS", free.steps // 2)
+    monkeypatch.setattr(budget, "MOST_STEPS", free.steps // 2)
     assert predict(scene, deadline=60.0).status == "max_iterations"
 
 
@@ -114,7 +115,7 @@ def test_who_gives_a_deadline_gets_more_control_points_too(monkeypatch: pytest.M
     scene = swinging(Quality(target_error=1e-4))
     scene = replace(scene, cable=replace(scene.cable, bending_stiffness=1e-6))
     free = predict(scene).accuracy
-    monkeypatch.setattr(refinement, "_MOST_POINTS", free.n_u - 1)
+    monkeypatch.setattr(budget, "_MOST_POINTS", free.n_u - 1)
     assert predict(scene).status == "max_iterations"
     found = predict(scene, deadline=60.0)
     assert found.status == "converged"
@@ -127,7 +128,7 @@ def test_what_steps_err_by_is_learned_from_half_as_many_where_twice_as_many_are_
     scene = draw(34, 31518).make()
     effects = {**scene.effects, "twist": "off"}
     scene = replace(scene, quality=Quality(target_error=0.05 * scene.cable.length), effects=effects)
-    monkeypatch.setattr(refinement, "_DEAR", 0.0)  # as if the time were nearly up
+    monkeypatch.setattr(budget, "_DEAR", 0.0)  # as if the time were nearly up
     found = predict(scene, deadline=60.0)
     assert found.status == "converged"
     assert sum("tells what steps err by" in step.note for step in found.iterations) == 1

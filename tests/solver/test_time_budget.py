@@ -6,6 +6,7 @@ import pytest
 
 from benchmarks.hard.generator import draw
 from dlocore import Quality, predict, refinement, whole_march
+from dlocore.budget import Means
 from dlocore.problem import pose
 from dlocore.solvers.ladder import Level, run_level
 from dlocore.solvers.monitor import Monitor, TimeIsUp
@@ -53,7 +54,7 @@ def test_an_answer_tells_which_effects_it_had_no_time_for(monkeypatch: pytest.Mo
         calls.append(size)
         level = march_level(problem, size, monitor, *arguments, **options)
         if len(calls) == 2:
-            raise TimeIsUp("self_contact, side")
+            raise TimeIsUp("self_contact", "side")
         return level
 
     monkeypatch.setattr(refinement, "march_level", marched)
@@ -87,7 +88,7 @@ def test_within_a_time_budget_an_error_of_more_than_a_hundredth_is_no_success():
     found = predict(replace(loop, quality=Quality(time_budget=1e-4)))
     assert (found.status, found.accuracy.error_estimate) == ("time_limit", None)
     climb = refinement._Climb(
-        problem=pose(loop), monitor=Monitor(), cost=None, target=0.04, enough=0.18, budget=600.0, number=0
+        problem=pose(loop), means=Means(Monitor(), None, 600.0), target=0.04, enough=0.18, number=0
     )
     for number in (0, 1):
         size = refinement.stretched(climb.problem, number)
