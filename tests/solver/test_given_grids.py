@@ -119,14 +119,14 @@ def test_time_knots_go_where_a_spline_of_given_size_misses_its_march():
     assert estimate >= 3.0 * moved.missed  # what the spline misses is part of the error
 
 
-def test_a_march_without_equilibrium_on_a_given_grid_is_tried_in_more_steps():
+def test_a_march_that_fails_on_a_given_grid_is_tried_in_more_steps():
     scene = draw(23, 34).make()  # 165 steps for 33 control points in time, which are too few of those, too
     quality = replace(scene.quality, method="march", estimate=False)
     found = predict(replace(scene, quality=quality), keep_grid=True)
     assert found.accuracy.steps >= 4 * 165
     assert "watched" not in found.message
     assert "Every time step found its equilibrium" in found.message
-    assert "with 165 steps: A time step found no equilibrium" in found.message
+    assert "On the grid as it is, with 165 steps: " in found.message  # no equilibrium, or torn: processors differ
 
 
 def test_a_time_spline_has_states_in_every_span():
