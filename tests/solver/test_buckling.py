@@ -413,6 +413,18 @@ def test_a_start_that_is_twisted_more_than_it_bears_leaves_its_line() -> None:
     assert bow(replace(scene, cable=cord(torsional_stiffness=1e-3))) == 0.0
 
 
+def test_a_cable_that_another_gripper_takes_over_buckles_as_without() -> None:
+    # each had a bow of its own: the second to the other side, so that nothing was left of the two
+    given = pushed()
+    hands = (replace(given.grasps[0], release_time=0.8), Grasp(u=0.0, grasp_time=0.8), given.grasps[1])
+    one, two = predict(given), predict(replace(given, grasps=hands))
+    assert one.status == two.status == "converged", two.message
+    assert bow(replace(given, grasps=hands)) == bow(given) == pytest.approx(BOW)
+    u, t = np.linspace(0.0, 1.0, 33), np.linspace(0.0, 2.0, 33)
+    away = np.linalg.norm(one.surface.positions(u, t) - two.surface.positions(u, t), axis=-1).max()
+    assert away <= one.accuracy.error_estimate + two.accuracy.error_estimate
+
+
 def test_parts_side_by_side_bow_to_both_sides_by_turns() -> None:
     grasps = tuple(Grasp(u=u, path=way(0.2 * (0.5 - u), 0.0, 0.0)) for u in (0.0, 0.25, 0.5, 0.75, 1.0))
     scene = Scene(cable=cord(), shape=Straight(), grasps=grasps, environment=replace(LYING, drag=1.0), horizon=4.0)
