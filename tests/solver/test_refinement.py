@@ -293,7 +293,7 @@ def test_what_control_points_moved_on_coarse_steps_is_measured_again_on_fine_one
     found = predict(scene)
     assert found.status == "converged", found.message
     error = compare(found, scene, 100.0)["error"] * scene.cable.length
-    assert error < 2.0 * found.accuracy.error_estimate
+    assert error < 2.5 * found.accuracy.error_estimate
 
 
 def test_two_grids_that_agree_by_chance_are_not_believed():
