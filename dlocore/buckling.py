@@ -7,9 +7,9 @@ length.
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import NamedTuple, cast
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,12 +36,16 @@ _AGES = 1e6  # times the horizon: all the time that a disturbance needs
 _TIMES = 65  # at which each stretch of the motion is looked at
 
 
-class _Part(NamedTuple):
-    """A part of the cable, from `begin` to `end` [m], with a grasp at either end or None where it is free."""
+@dataclass(frozen=True)
+class _Part:
+    """A part of the cable, from `begin` to `end` [m], with a grasp at either end or None where it is free.
+
+    It is the same one, which grows and bows once, whoever holds its ends later on.
+    """
 
     begin: float
     end: float
-    grasps: tuple[Grasp | None, Grasp | None]
+    grasps: tuple[Grasp | None, Grasp | None] = field(compare=False)
 
 
 def with_side(scene: Scene, start: StartCurve, at_rest: bool) -> StartCurve:
@@ -67,10 +71,7 @@ def with_side(scene: Scene, start: StartCurve, at_rest: bool) -> StartCurve:
     pushed = [part for part, growth in _growths(scene, start, along, at_rest).items() if growth > GROWTH]
     if not pushed:
         return given
-    pieces: dict[tuple[float, float], _Part] = {}  # one bow each, whoever holds its ends later on
-    for piece in (piece for part in pushed for piece in _pieces(scene, part)):
-        pieces.setdefault((piece.begin, piece.end), piece)
-    bowed = list(pieces.values())
+    bowed = list(dict.fromkeys(piece for part in pushed for piece in _pieces(scene, part)))
     knots = _knots(bowed, scene.cable.length)
     u = greville(knots)
     # by turns, as beyond a grasp that lets the cable turn it bends on the other way
@@ -216,7 +217,6 @@ def _growths(scene: Scene, start: StartCurve, along: Floats, at_rest: bool) -> d
     for g in scene.grasps:
         times |= {t for t in (g.start, g.release_time or 0.0) if t < horizon}
     growths: dict[_Part, float] = {}
-    known: dict[tuple[float, float], _Part] = {}  # whoever holds its ends later on
     for a, b in pairwise(sorted(times)):
         held = closed_grasps(scene, a, b)
         t = np.linspace(a, b, _TIMES)
@@ -227,8 +227,7 @@ def _growths(scene: Scene, start: StartCurve, along: Floats, at_rest: bool) -> d
             drive = np.where(_buckles(scene, part, push, torque), torque * k**3 + push * k**2 - EI * k**4, 0.0)
             rate = (np.sqrt(c**2 + 4.0 * mu * np.maximum(drive, 0.0)) - c) / (2.0 * mu)
             growth = float(np.sum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t)))
-            first = known.setdefault((part.begin, part.end), part)
-            growths[first] = growths.get(first, 0.0) + patience * growth
+            growths[part] = growths.get(part, 0.0) + patience * growth
     return growths
 
 
