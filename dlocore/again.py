@@ -19,7 +19,7 @@ from dlocore.prediction import Prediction
 from dlocore.problem import Problem
 from dlocore.review import called_for
 from dlocore.scene import Grasp, Scene
-from dlocore.solvers.changes import MISSED_COUNTS
+from dlocore.solvers.changes import with_missed
 from dlocore.solvers.ladder import Level, distance, hardness, run_level
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.whole_march import march_status
@@ -103,7 +103,7 @@ def march_again(problem: Problem, like: Prediction, monitor: Monitor) -> Again |
     if calls:
         return f"It calls for {', '.join(calls)}: {'; '.join(calls.values())}."
     if errors and like.accuracy.method == "march":
-        errors[list(errors)[-1]] += max(0.0, MISSED_COUNTS * level.missed - sum(errors.values()))
+        errors = with_missed(errors, level)
     astray = _astray(level, monitor) if free_knots else 0.0
     if astray > UNDETERMINED * length:
         return f"On the grid of one like it {in_words(problem, astray)}."

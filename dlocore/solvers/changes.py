@@ -74,6 +74,13 @@ def weighed(level: Level, before: Level, last: Change | None, first: bool = Fals
     return Change(counts * level.change, moved_before, left if level.motion.kinked else _LEFT, fall)
 
 
+def with_missed(parts: Mapping[str, float], level: Level) -> dict[str, float]:
+    """Return parts of an error [m], the last one larger where the time spline misses more than their sum tells of."""
+    parts = dict(parts)
+    parts[list(parts)[-1]] += max(0.0, MISSED_COUNTS * level.missed - sum(parts.values()))
+    return parts
+
+
 class Changes:
     """How far refinements moved the surface, by direction: "space", "time", or "both" at once.
 
@@ -108,8 +115,7 @@ class Changes:
             return None
         known = DIRECTIONS if self._apart else ("both",)
         parts = {"grid" if direction == "both" else direction: self.last[direction].error for direction in known}
-        parts[list(parts)[-1]] += max(0.0, MISSED_COUNTS * level.missed - sum(parts.values()))
-        return parts
+        return with_missed(parts, level)
 
     def worst(self) -> str:
         """Return the direction to refine: time, then space, then that which erred more."""
