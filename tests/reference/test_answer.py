@@ -207,19 +207,21 @@ def test_contact_is_stiffened_until_the_table_is_hardly_entered():
     assert prediction.surface.positions(np.linspace(0, 1, 41), np.linspace(0, 0.15, 41))[..., 2].min() > -0.1 * 0.005
 
 
+def rod_pushed_along_itself(shortened: float) -> Scene:
+    """Return a nearly straight rod on a table: a micrometre decides to which side it buckles."""
+    return replace(pushed_along_itself(shortened), quality=Quality(method="reference", target_error=1e-2))
+
+
 @pytest.fixture(scope="module")
 def pushed() -> Scene:
-    """A nearly straight rod on a table that is pushed along itself: a micrometre decides to which side it buckles."""
-    scene = pushed_along_itself(1e-3)
-    return replace(scene, quality=Quality(method="reference", target_error=1e-2))
+    return rod_pushed_along_itself(1e-3)
 
 
 def first_of(status: str) -> Prediction:
     """Return the first answer with a status of such rods: whether two of them agree is a matter of the processor."""
     found = []
     for shortened in (1e-3, 2e-3):
-        scene = replace(pushed_along_itself(shortened), quality=Quality(method="reference", target_error=1e-2))
-        found.append(predict(scene))
+        found.append(predict(rod_pushed_along_itself(shortened)))
         if found[-1].status == status:
             return found[-1]
     raise AssertionError([answer.message for answer in found])

@@ -23,12 +23,17 @@ ROUNDING = 1e-8  # [m]: of 1e-16, amplified by stiff waves and by iterations; me
 every_method = pytest.mark.parametrize("method", METHODS)
 
 
+def bent(climb: float) -> Floats:
+    """Return points (41, 3) along an arc, or where it climbs a helix, of length 1."""
+    turned = np.linspace(0.0, 1.5, 41)
+    radius = np.sqrt(1.0 / 1.5**2 - climb**2)
+    return np.column_stack([radius * np.sin(turned), radius * (np.cos(turned) - 1.0), climb * turned])
+
+
 def scene(frame: Floats = np.eye(3), shift: Floats = np.zeros(3), *, planar: bool, method: str) -> Scene:  # noqa: B008
     """Return a scene of everything, seen in another frame: r -> frame r + shift."""
     out = 0.0 if planar else 1.0
-    turned, climb = np.linspace(0.0, 1.5, 41), 0.2 * out
-    radius = np.sqrt(1.0 / 1.5**2 - climb**2)  # of an arc, or in space a helix, of length 1
-    points = np.column_stack([radius * np.sin(turned), radius * (np.cos(turned) - 1.0), climb * turned])
+    points = bent(0.2 * out)
     rotation = np.linalg.det(frame) * frame @ [0.2 * out, 0.0, 0.7]  # an axial vector
     lift = Move(displacement=frame @ [0.05, 0.3, 0.1 * out], duration=0.8, rotation=rotation)
     swing = Move(displacement=frame @ [-0.1, 0.2, 0.0], duration=0.6)
@@ -131,9 +136,7 @@ def test_prediction_scales_with_the_units_of_length_time_and_mass(factor):
 
 def carried(velocity: Floats, *, planar: bool) -> Scene:
     """Return a cable without drag that two grippers begin to bring together, seen from a frame that drifts."""
-    turned, climb = np.linspace(0.0, 1.5, 41), 0.0 if planar else 0.2
-    radius = np.sqrt(1.0 / 1.5**2 - climb**2)
-    points = np.column_stack([radius * np.sin(turned), climb * turned, radius * (np.cos(turned) - 1.0)])
+    points = bent(0.0 if planar else 0.2)[:, [0, 2, 1]]
     ways = [Move(displacement=way + velocity, duration=1.0, profile="linear") for way in ([0, 0, 0], [-0.1, 0, 0.2])]
     return Scene(
         cable=cable(bending_damping=1e-4),

@@ -281,14 +281,17 @@ def test_contact_that_a_grid_had_to_make_stiffer_begins_so_on_the_next():
     assert hardness(again) == pytest.approx(needed)
 
 
-def test_what_control_points_moved_on_coarse_steps_is_measured_again_on_fine_ones():
-    # steps that damp what they can't resolve hid what more control points change: it was three times the estimate off
+def test_a_direction_is_stale_once_the_other_has_moved_the_surface_by_far_more():
     changes = Changes({"space": Change(2e-3, np.inf, 0.75), "time": Change(9e-3, np.inf, 0.45)})
     changes.since = {"space": 9e-3}
     assert changes.stale(target=5e-3) == ["space"]  # more than four times as much, and more than the target
     assert changes.stale(target=1e-2) == []
     changes.last["space"] = Change(2.5e-3, np.inf, 0.75)
     assert changes.stale(target=5e-3) == []
+
+
+def test_what_control_points_moved_on_coarse_steps_is_measured_again_on_fine_ones():
+    # steps that damp what they can't resolve hid what more control points change: it was three times the estimate off
     scene = draw(14, 180).make()
     found = predict(scene)
     assert found.status == "converged", found.message
