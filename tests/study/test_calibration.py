@@ -19,14 +19,15 @@ def measured() -> Calibration:
         return calibration.measure(repeats=1)
 
 
-def test_a_finer_grid_takes_longer_and_errs_less(measured: Calibration) -> None:
+def test_a_finer_grid_takes_more_steps_and_errs_less(measured: Calibration) -> None:
     for dimensions in (2, 3):
         marches = [p for p in measured.of_dimensions(dimensions) if p.method == "march"]
         assert [p.n_u for p in marches] == [9, 13, 17]
         assert all(p.converged for p in marches)
         # both paths of refinement: the error of these smooth motions falls at least with the second power of the grid
         assert marches[0].error > 2 * marches[-1].error > 0
-        assert 0 < marches[0].wall_time < 2 * marches[-1].wall_time  # a factor for the noise of one call
+        assert [p.steps for p in marches] == sorted({p.steps for p in marches})
+        assert all(p.wall_time > 0 for p in marches)
 
 
 def test_the_front_leaves_out_what_another_point_beats(measured: Calibration) -> None:
