@@ -7,7 +7,43 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numba
+from llvmlite import binding
+from numba.core.caching import CompileResultCacheImpl
 from numba.core.serialize import dumps
+
+FORMAT = 2  # of what is kept: counted up where it changes
+_NO_BITCODE = binding.parse_assembly("").as_bitcode()
+
+
+class UnreadBitcode(CompileResultCacheImpl):  # type: ignore[misc]  # numba has no types
+    """What is kept of a compiled function: its code, the names in it, and its bitcode.
+
+    The bitcode is for compiling callers, into which it is inlined. numba parses it for each function that it loads, and
+    looks up all names in it, which takes three quarters of the time; here only what is called by something that has
+    to be compiled is parsed.
+    """
+
+    def reduce(self, result: Any) -> Any:
+        """Return what is to be written of a compiled function."""
+        module = result.library._get_module_for_linking()
+        defined = {v.name for v in (*module.functions, *module.global_variables) if not v.is_declaration}
+        return defined, super().reduce(result)
+
+    def rebuild(self, target_context: Any, payload: Any) -> Any:
+        """Return the compiled function of which `reduce` returned a payload."""
+        defined, ((name, kind, (code, bitcode)), *rest) = payload
+        target_context.codegen()._engine._defined_symbols.update(defined)
+        result = super().rebuild(target_context, ((name, kind, (code, _NO_BITCODE)), *rest))
+        library = result.library
+        library._shared_module = None
+
+        def for_linking() -> Any:
+            if library._shared_module is None:
+                library._shared_module = binding.parse_bitcode(bitcode)
+            return library._shared_module
+
+        library._get_module_for_linking = for_linking
+        return result
 
 
 class OverloadFiles:
@@ -22,7 +58,7 @@ class OverloadFiles:
     def __init__(self, folder: str, name: str, source: str) -> None:
         """Keep what is compiled of `source`, a hash, in `folder`, in files whose names begin with `name`."""
         self._folder, self._name = Path(folder), name
-        self._stamp = f"{numba.__version__} {source}\n".encode()
+        self._stamp = f"{numba.__version__} {FORMAT} {source}\n".encode()
 
     def load(self, key: Any) -> Any:
         """Return what was saved for `key`, or None where that is nothing, or of another source."""
@@ -73,6 +109,7 @@ def kept(compiled: Any, source: str) -> Any:
     """Return `compiled`, a function of numba's with a cache, that keeps its code in `OverloadFiles` of `source`."""
     if hasattr(compiled, "_cache"):  # not where compilation is switched off for debugging
         cache = compiled._cache
+        cache._impl = UnreadBitcode(compiled.py_func)
         cache._cache_file = OverloadFiles(cache.cache_path, cache._impl.filename_base, source)
     return compiled
 

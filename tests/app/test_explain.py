@@ -26,7 +26,7 @@ def test_what_is_explained_is_what_is_then_done(client: TestClient) -> None:
     assert plan["reason"]
     active = {effect["name"] for effect in document["effects"] if effect["active"]}
     assert {effect["name"] for effect in plan["effects"] if effect["active"]} == active
-    assert 0 < plan["expected_time"] < 100 * done["wall_time"]
+    assert 0 < plan["expected_time"] < 60
 
 
 def test_everything_that_is_wrong_is_named_at_once(client: TestClient) -> None:

@@ -25,6 +25,24 @@ for kind in sys.argv[3:]:
     print(function(np.ones(2, kind)).dtype)
     print(sum(function.stats.cache_hits.values()), sum(function.stats.cache_misses.values()))
 """
+# A caller is compiled where what it calls is loaded.
+CALLER = """
+import sys
+import numba, numpy as np
+from dlocore.caching import kept
+sys.path.insert(0, sys.argv[1])
+from doubled import doubled as plain
+doubled = kept(numba.njit(cache=True)(plain), "a")
+
+@numba.njit
+def four_times(x):
+    return doubled(doubled(x))
+
+print(four_times(1.5))
+print(sum(doubled.stats.cache_hits.values()), sum(doubled.stats.cache_misses.values()))
+made = four_times.inspect_llvm(four_times.signatures[0]).splitlines()
+print(any("call" in line and "doubled" in line for line in made))
+"""
 # What is compiled as a scene is solved whose code is all there.
 SOLVE = """
 from numba.core import event
@@ -62,6 +80,15 @@ def test_processes_that_compile_a_function_at_once_each_find_their_own_code(tmp_
     assert said.split() == ["True", *(word for k, kind in enumerate(kinds, 1) for word in (kind, str(k), "0"))]
     said, _ = compiled(tmp_path, "b", "float64").communicate(timeout=120)  # of another source nothing is kept
     assert said.split() == ["False", "float64", "0", "1"]
+
+
+def test_what_is_loaded_is_inlined_into_what_calls_it(tmp_path: Path) -> None:
+    (tmp_path / "doubled.py").write_text("def doubled(x):\n    return x + x\n")
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    command = [sys.executable, "-c", CALLER, str(tmp_path)]
+    for hits, misses in ((0, 1), (1, 0)):
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        assert done.stdout.split() == ["6.0", str(hits), str(misses), "False"]
 
 
 def test_a_fresh_process_compiles_nothing_that_another_has_compiled() -> None:
