@@ -12,7 +12,7 @@ from benchmarks.random_reference import compare as compare_with_reference
 SEED = 2
 COUNT = 300
 BATCH = 30
-DEADLINE = 3.0  # [s]: an answer that is cut off, one in twenty, has a status too
+DEADLINE = 1.0  # [s]: an answer that is cut off, one in eight, has a status too
 PATIENCE = 15.0  # [s]: for scenes that have to converge
 
 

@@ -21,8 +21,8 @@ def _moved(distance: float, time: float, **changes: object) -> Scene:
 
 @case("motion", "all laws")
 def half_a_metre_in_50_ms() -> Scene:
-    """19 m/s and 1100 m/s^2 at the gripper: a wave runs along the cable for ten times as long as the move takes."""
-    return _moved(0.5, 0.05, horizon=0.4)
+    """19 m/s and 1100 m/s^2 at the gripper: a wave runs along the cable for twice as long as the move takes."""
+    return _moved(0.5, 0.05, horizon=0.15)
 
 
 def _from_pulled_along(p: Prediction) -> float:
