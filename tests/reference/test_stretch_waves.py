@@ -52,10 +52,10 @@ def test_reference_and_march_agree_on_a_soft_cable_that_is_jerked(yields):
         effects={"plasticity": "on"} if yields else {},
     )
     found = predict(replace(scene, quality=Quality(target_error=2e-3, method="march")))
-    truth = predict(replace(scene, quality=Quality(target_error=5e-4, method="reference")))
+    truth = predict(replace(scene, quality=Quality(target_error=1e-3, method="reference")))
     assert found.status == truth.status == "converged", (found.message, truth.message)
-    assert apart(found.surface, truth.surface).max() < 2.5e-3  # both targets
+    assert apart(found.surface, truth.surface).max() < 3e-3  # both targets
     # a tenth of that damping is another motion, by more than both may be wrong
     weak = replace(scene, cable=replace(scene.cable, axial_damping=0.2))
-    other = predict(replace(weak, quality=Quality(target_error=5e-4, method="reference")))
+    other = predict(replace(weak, quality=Quality(target_error=1e-3, method="reference")))
     assert apart(other.surface, truth.surface).max() > 5e-3

@@ -55,7 +55,7 @@ def test_a_cable_that_folds_on_a_given_grid_is_marched_on_points_between_which_i
 def test_the_estimate_tells_how_far_a_coarse_grid_that_was_watched_is_off():
     scene = draw(2, 186).make()
     found = predict(scene, keep_grid=True)
-    fine = predict(replace(scene, quality=march(96, 120)))
+    fine = predict(replace(scene, quality=march(64, 120)))
     assert fine.status == "converged"
     estimate = found.accuracy.error_estimate
     assert estimate is not None

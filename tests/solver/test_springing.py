@@ -29,7 +29,7 @@ def test_more_control_points_do_not_hold_a_rod_back_that_springs_straight(path):
 
 def test_a_rod_springs_straight_as_the_reference_says():
     found = predict(sprung(Quality(target_error=2e-3)))
-    known = predict(sprung(Quality(method="reference", target_error=2e-3)))
+    known = predict(sprung(Quality(method="reference", target_error=5e-3)))
     assert found.status == known.status == "converged"
     assert found.accuracy.error_estimate is not None
     assert known.accuracy.error_estimate is not None
