@@ -20,6 +20,7 @@ from dlocore.obstacles import Sphere
 from dlocore.paths import Move
 from dlocore.prediction import Prediction
 from dlocore.scene import Environment, Grasp, Points, Quality, Scene, Straight, Switch, Table
+from dlocore.sensitivity import sensitivities
 from dlocore.spline import uniform_knots
 from dlocore.statics import equilibrium
 
@@ -79,6 +80,19 @@ def _smooth(table: Table | None) -> None:
     predict(Scene(cable=Cable.preset("paper"), shape=ARC, grasps=(GRASP,), environment=around))
 
 
+def _differentiated(table: Table | None, twist: Switch) -> None:
+    """The derivatives of a smooth motion of two, three or four coordinates, which `identify` takes, too."""
+    scene = Scene(
+        cable=Cable.preset("paper"),
+        shape=ARC,
+        grasps=(GRASP,),
+        environment=Environment(drag=0.1, table=table),
+        effects={"twist": twist},
+        quality=Quality(n_u=9, n_t=9, keep_grid=True),
+    )
+    sensitivities(predict(scene), ["cable.bending_stiffness"])
+
+
 def _rough(table: Table | None, twist: Switch) -> None:
     """Motions of two, three or four coordinates that begin with a speed, rub, lie beside something, and may yield."""
     beside = (Sphere(center=(0.5, 0.3, 0.0), radius=0.2),)
@@ -126,10 +140,18 @@ PARTS = {
     "in a plane": lambda: _rough(Table(friction=0.1), "auto"),
     "in space": lambda: _rough(None, "off"),
     "with twist": lambda: _rough(None, "on"),
+    "derivatives in a plane": lambda: _differentiated(Table(), "auto"),
+    "derivatives in space": lambda: _differentiated(None, "off"),
+    "derivatives with twist": lambda: _differentiated(None, "on"),
     "others": _others,
 }
 # what one process compiles, the longest first
-SHARES = (("with twist",), ("smooth in space", "in space"), ("smooth in a plane", "in a plane"), ("others",))
+SHARES = (
+    ("with twist", "derivatives with twist"),
+    ("smooth in space", "in space", "derivatives in space"),
+    ("smooth in a plane", "in a plane", "derivatives in a plane"),
+    ("others",),
+)
 
 if __name__ == "__main__":
     for name in sys.argv[1:]:

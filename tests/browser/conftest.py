@@ -113,7 +113,7 @@ def _is_ready(address: str) -> bool:
 
 @pytest.fixture
 def witness(browser: Browser) -> Iterator[Witness]:
-    context = browser.new_context(viewport={"width": 900, "height": 600})
+    context = browser.new_context(viewport={"width": 720, "height": 480})
     page = context.new_page()
     page.set_default_timeout(60_000)
     yield Witness(page)

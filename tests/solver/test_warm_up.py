@@ -14,7 +14,7 @@ import sys
 from dataclasses import replace
 from numba.core.dispatcher import Dispatcher
 from benchmarks.catalogue import catalogue
-from dlocore import Quality, SceneError, energies, predict, warm_up
+from dlocore import Quality, SceneError, energies, predict, sensitivities, warm_up
 
 def compiled():
     modules = [m for name, m in list(sys.modules.items()) if name.startswith("dlocore")]
@@ -33,6 +33,8 @@ for name, scene in catalogue().items():
             [(i.surface, i.energy) for i in answer.iterations]
             energies(answer.scene, answer.surface, [0.0, answer.surface.horizon])
             predict(answer.scene, like=answer)
+            if method == "march":
+                sensitivities(answer, ["cable.bending_stiffness"])
         except SceneError as error:
             assert error.field.startswith("quality"), (name, error)  # so small a grid is refused for a few
     new = compiled() - before
@@ -40,7 +42,7 @@ for name, scene in catalogue().items():
 """
 
 
-def test_nothing_is_compiled_in_a_solve_after_warm_up():
+def test_nothing_is_compiled_in_a_solve_or_its_derivatives_after_warm_up():
     # in a process of its own: the tests before have compiled other things
     done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=540)
     assert done.returncode == 0, done.stderr
