@@ -17,6 +17,7 @@ from app.schemas.surroundings import QualityModel
 from app.settings import Settings
 from dlocore import Iteration, Prediction, Scene, SceneError
 from dlocore.scene import Method
+from dlocore.words import in_mm
 
 BAD_INPUT, NOT_CONVERGED = 2, 3
 
@@ -128,7 +129,7 @@ def warmup() -> int:
 def summary(prediction: Prediction) -> str:
     """Return status, method, error, time and active effects in a few lines."""
     accuracy = prediction.accuracy
-    error = "unknown" if accuracy.error_estimate is None else f"{1e3 * accuracy.error_estimate:.3g} mm"
+    error = "unknown" if accuracy.error_estimate is None else in_mm(accuracy.error_estimate, 3)
     active = ", ".join(effect.name for effect in prediction.effects if effect.active)
     return "\n".join(
         [

@@ -23,6 +23,7 @@ from dlocore.solvers.changes import with_missed
 from dlocore.solvers.ladder import Level, distance, hardness, run_level
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.whole_march import march_status
+from dlocore.words import in_mm
 
 _NOT_OF_THE_GRID = ("neglected", "iteration", "start")  # parts of an estimate that each solve has of its own
 _ROUNDING = 1e-14  # of the coordinates of a plane that is found from points
@@ -50,7 +51,7 @@ class Again:
         """What to say of the estimate, in words."""
         if self.errors is None:
             return ""
-        away = f" On the grid of a motion {self.level.change * 1e3:.2g} mm away, whose error was estimated."
+        away = f" On the grid of a motion {in_mm(self.level.change)} away, whose error was estimated."
         if "start" in self.errors:
             away += f" But {bend_in_words(self.level.problem, self.errors['start'])}."
         return away + (f" {UNSEEN}" if self.unseen else "")
@@ -98,7 +99,7 @@ def march_again(problem: Problem, like: Prediction, monitor: Monitor) -> Again |
     if status != "converged":
         return message
     if errors and not change <= NEAR * length:
-        return f"The motion is {change * 1e3:.2g} mm from the one whose error was estimated."
+        return f"The motion is {in_mm(change)} from the one whose error was estimated."
     calls = called_for(level)
     if calls:
         return f"It calls for {', '.join(calls)}: {'; '.join(calls.values())}."
@@ -111,7 +112,7 @@ def march_again(problem: Problem, like: Prediction, monitor: Monitor) -> Again |
         errors["start"] = astray
     target = problem.scene.quality.target_error
     if target is not None and sum(errors.values()) > target:
-        return f"Its estimated error of {sum(errors.values()) * 1e3:.2g} mm is above the target."
+        return f"Its estimated error of {in_mm(sum(errors.values()))} is above the target."
     return Again(level, judged, errors or None, unseen=np.isnan(astray))
 
 

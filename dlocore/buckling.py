@@ -22,6 +22,7 @@ from dlocore.scene import Grasp, Scene
 from dlocore.shape import StartCurve, fit_to_knots
 from dlocore.spline import greville
 from dlocore.straightening import straightened
+from dlocore.words import in_mm
 
 Floats = NDArray[np.float64]
 
@@ -132,11 +133,11 @@ def side_notes(start: StartCurve) -> list[str]:
     notes = []
     if start.bow:
         side = "left" if start.bow > 0.0 else "right"
-        bow = f"it starts with a bow of {abs(start.bow) * 1e3:.2g} mm to its {side}, and its mirror image is as likely"
+        bow = f"it starts with a bow of {in_mm(abs(start.bow))} to its {side}, and its mirror image is as likely"
         why = "the straight cable is pushed or twisted along itself and has no side to buckle to"
         notes.append(f"{why}: {bow}")
     if start.aside:
-        bow = f"it starts with a bow of {start.aside * 1e3:.2g} mm out of it, and its mirror image is as likely"
+        bow = f"it starts with a bow of {in_mm(start.aside)} out of it, and its mirror image is as likely"
         notes.append(f"{'the plane of its bow may not hold it' if start.bow else UNSTABLE}: {bow}")
     return notes
 

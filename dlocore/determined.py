@@ -14,6 +14,7 @@ from dlocore.shape import StartCurve
 from dlocore.solvers.march import March, march
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import DEGREE
+from dlocore.words import in_mm
 
 Floats = NDArray[np.float64]
 
@@ -109,7 +110,7 @@ def bend_in_words(problem: Problem, moved: float) -> str:
     """Return in words that a cable which is hardly bent goes elsewhere by so much [m]."""
     bend = f"{DISTURBED * problem.scene.cable.length * 1e6:.2g} um"
     turned = "" if problem.twist is None else f" and turned by {TURNED * 1e3:.2g} mrad,"
-    return f"a cable bent by a millionth of the length, {bend},{turned} goes elsewhere by up to {moved * 1e3:.2g} mm"
+    return f"a cable bent by a millionth of the length, {bend},{turned} goes elsewhere by up to {in_mm(moved)}"
 
 
 def bend_of(start: StartCurve) -> float:

@@ -14,6 +14,7 @@ from dlocore.refinement import AUTO_ENOUGH
 from dlocore.scene import MAX_N_T, Quality, Scene
 from dlocore.solvers.ladder import Level
 from dlocore.solvers.monitor import Monitor
+from dlocore.words import in_mm
 
 _MORE_IN_TIME = 2  # times the control points in time of a least squares
 # control points in time times the cube of the coordinates of those along the cable, of a least squares that is solved
@@ -107,11 +108,11 @@ def with_finer(found: Prediction, finer: Prediction | SceneError, spent: float, 
         monitor: that of both solves.
     """
     quality, more = found.scene.quality, monitor.elapsed() - spent
-    off = f"by an estimated {(found.accuracy.error_estimate or 0.0) * 1e3:.2g} mm" if errs(found) else ""
+    off = f"by an estimated {in_mm(found.accuracy.error_estimate or 0.0)}" if errs(found) else ""
     if isinstance(finer, Prediction) and finer.status == "converged":
         accuracy = finer.accuracy
         error = accuracy.error_estimate
-        known = "an error that is not known" if error is None else f"an estimated error of {error * 1e3:.2g} mm"
+        known = "an error that is not known" if error is None else f"an estimated error of {in_mm(error)}"
         failed = "did not converge" if accuracy.method == "spacetime" else "could not show the motion"
         failed = f"err {off}" if off else failed
         said = (

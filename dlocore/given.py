@@ -11,6 +11,7 @@ from dlocore.solvers.ladder import Level, Size, given_steps
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.timefit import evened, fit, largest
 from dlocore.whole_march import is_folded, march_level, march_status
+from dlocore.words import in_mm
 
 MISSED = 0.02  # of the length: a time spline that misses its march by more is no answer
 # what is tried where a march finds no equilibrium, folds or tears the cable: times as many steps, and whether more
@@ -65,6 +66,6 @@ def given_status(level: Level) -> tuple[Status, str]:
     """Return the status of a march on a given grid, and what it says, in words."""
     status, message = march_status(level.problem, level)
     if status == "converged" and level.missed > MISSED * level.problem.scene.cable.length:
-        spline = f"The time spline of {len(level.control)} control points misses them by {level.missed * 1e3:.2g} mm."
+        spline = f"The time spline of {len(level.control)} control points misses them by {in_mm(level.missed)}."
         return "max_iterations", f"{message} {spline} Raise n_t."
     return status, message

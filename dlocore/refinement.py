@@ -26,6 +26,7 @@ from dlocore.solvers.march import RHO, STRONGLY_DAMPED
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.statics import RESTLESS, settles_elsewhere
 from dlocore.whole_march import Outcome, is_folded, is_uneven, march_level, march_status
+from dlocore.words import in_mm
 
 AUTO_ENOUGH = 1e-2  # of the length: the estimated error with which it is content where the finest grids reach no closer
 ROUGH = 0.05  # of the length: two grids that differ more are in no order yet: the next is marched with strong damping
@@ -349,13 +350,13 @@ class _Climb:
         return f"{message} {said}", {**(parts or {}), "start": self.astray}
 
     def _agreed(self, level: Level) -> str:
-        return f"Two grids agree to {level.change * 1e3:.2g} mm; {self._left_over()}."
+        return f"Two grids agree to {in_mm(level.change)}; {self._left_over()}."
 
     def _left_over(self) -> str:
         """Return the estimated error and the target, in words."""
         finite = np.isfinite(self.estimate)
-        known = f"the estimated error is {self.estimate * 1e3:.3g} mm" if finite else "its error is not known"
-        return f"{known}, target {self.target * 1e3:.3g} mm"
+        known = f"the estimated error is {in_mm(self.estimate, 3)}" if finite else "its error is not known"
+        return f"{known}, target {in_mm(self.target, 3)}"
 
     def _unfolded(self, level: Level, size: Size) -> Outcome | None:
         """Return the answer of a march that watches over the length at more points, if a fold is all that is amiss.
@@ -388,7 +389,7 @@ class _Climb:
         if not np.isfinite(level.change):
             return Outcome(level, "time_limit", f"{allowed} allow one grid, unchecked.", None)
         status, failure = march_status(self.problem, level)
-        moved = f"The best grid in {allowed}; the last refinement moved the surface by {level.change * 1e3:.2g} mm."
+        moved = f"The best grid in {allowed}; the last refinement moved the surface by {in_mm(level.change)}."
         self.astray = self._find_astray(level)
         message, parts = self._doubted(level, moved)
         if status != "converged":

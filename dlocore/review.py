@@ -33,6 +33,7 @@ from dlocore.spline import SplineSurface, design_matrix
 from dlocore.statics import settles_elsewhere
 from dlocore.tipping import tip_notes
 from dlocore.turning import turn_notes
+from dlocore.words import in_mm
 
 Floats = NDArray[np.float64]
 
@@ -66,13 +67,13 @@ def called_for(level: Level, fine: bool = True) -> dict[str, str]:
             found["inertia"] = f"without it the cable has no equilibrium to go on to at {reached:.3g} s"
         elif moved > MATTERS * problem.scene.cable.length:
             most = min(moved, problem.scene.cable.length)  # where the cable is about to give way it tells no distance
-            found["inertia"] = f"without it a first solve is {most * 1e3:.2g} mm off"
+            found["inertia"] = f"without it a first solve is {in_mm(most)} off"
     if switch("twist", "auto") == "auto":
         moved = _spun(level)
         allowed = min(MATTERS * problem.scene.cable.length, problem.scene.quality.target_error or np.inf)
         if moved > _TURNS * allowed:
             found["twist"] = (
-                f"sections that turn at sharp bends resist, which moves the cable by {moved * 1e3:.2g} mm or more"
+                f"sections that turn at sharp bends resist, which moves the cable by {in_mm(moved)} or more"
             )
     if fine and not found:  # they are of the motion that has all the others
         found.update(called_for_by_fine(level))
@@ -128,7 +129,7 @@ def objections(level: Level) -> list[str]:
     found += _undetermined(level)
     elsewhere = goes_elsewhere(problem, level.motion)
     if elsewhere:
-        lopsided = f"a cable lopsided by {BOW * problem.scene.cable.length * 1e3:.2g} mm"
+        lopsided = f"a cable lopsided by {in_mm(BOW * problem.scene.cable.length)}"
         found.append(
             f"the motion is its own mirror image, and unstable so: {lopsided} goes {elsewhere:.2g} m elsewhere"
         )
@@ -149,7 +150,7 @@ def objections(level: Level) -> list[str]:
         if name in off:
             moved = _response(level, name)
             if moved > allowed:
-                found.append(f"{name} is off, though it would move the cable by about {moved * 1e3:.2g} mm")
+                found.append(f"{name} is off, though it would move the cable by about {in_mm(moved)}")
     return found
 
 
@@ -244,7 +245,7 @@ def _touches(level: Level) -> dict[str, str]:
         gap, nearer = min(gap, float(gaps.min())), min(nearer, float((gaps - between).min()))
     if nearer > CLOSE * problem.scene.cable.length:
         return {}
-    what = f"comes within {gap * 1e3:.2g} mm of" if gap > 0 else "passes through"
+    what = f"comes within {in_mm(gap)} of" if gap > 0 else "passes through"
     return {"obstacles": f"the motion {what} an obstacle"}
 
 
@@ -267,7 +268,7 @@ def _meets_itself(level: Level) -> dict[str, str]:
     apart = nearest_strands(motion.grid.knots, motion.states, dimensions, diameter, CLOSE_STRANDS * diameter)
     if not np.isfinite(apart):
         return {}
-    meet = f"come within {apart * 1e3:.2g} mm of each other" if apart > 0.05 * diameter else "cross"
+    meet = f"come within {in_mm(apart)} of each other" if apart > 0.05 * diameter else "cross"
     return {"self_contact": f"two strands {meet}"}
 
 

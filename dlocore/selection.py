@@ -12,6 +12,7 @@ from dlocore.effects.selfcontact import NEAR_START, nearest_strands
 from dlocore.paths import Move, Waypoints
 from dlocore.scene import EFFECTS, Grasp, Scene
 from dlocore.shape import StartCurve
+from dlocore.words import in_mm
 
 Floats = NDArray[np.float64]
 
@@ -137,7 +138,7 @@ def _self_contact(scene: Scene, start: StartCurve, lies_over: bool) -> Choice:
         apart = nearest_strands(start.knots, control[None], 3, diameter, NEAR_START * diameter)
     if not np.isfinite(apart):
         return Choice(False, "no two strands come near each other")
-    return Choice(True, f"two strands of the start are {apart * 1e3:.2g} mm apart")
+    return Choice(True, f"two strands of the start are {in_mm(apart)} apart")
 
 
 def reached(scene: Scene, start: StartCurve, called_for: Mapping[str, str]) -> tuple[int, ...]:

@@ -25,6 +25,7 @@ from dlocore.sideways import WITH_TWIST, is_unstable, lacks_twist, solved_in_spa
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import design_matrix
 from dlocore.tipping import tip_notes, tipped
+from dlocore.words import in_mm
 
 Floats = NDArray[np.float64]
 
@@ -161,7 +162,7 @@ def _refined(problem: Problem, sizes: list[int], at: float, target: float, monit
         if settled.rest == "time":
             break
         one = len(sizes) == 1
-        status, message = "converged", "Forces balance." if one else f"Two grids agree to {change * 1e3:.2g} mm."
+        status, message = "converged", "Forces balance." if one else f"Two grids agree to {in_mm(change)}."
         if change <= target:
             break
     assert found is not None, "every list of sizes has a first"
@@ -170,7 +171,7 @@ def _refined(problem: Problem, sizes: list[int], at: float, target: float, monit
         status = "stalled"
         message = "The relaxation did not come to rest. The scene may have no equilibrium, or many side by side."
     elif status == "converged" and len(sizes) > 1 and not change <= target:
-        status, message = "max_iterations", f"The finest grid still moved the shape by {change * 1e3:.2g} mm."
+        status, message = "max_iterations", f"The finest grid still moved the shape by {in_mm(change)}."
     return _Rest(grid, settled, status, message, change)
 
 

@@ -19,6 +19,7 @@ from dlocore.settling import settle
 from dlocore.sideways import is_looked_at
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import greville
+from dlocore.words import in_mm
 
 Floats = NDArray[np.float64]
 
@@ -80,7 +81,7 @@ def to_a_side(u: Floats) -> Floats:
 
 def tip_notes(tipped: bool, length: float) -> list[str]:
     """Return what is to be known of a start that was tipped, in words; `length` [m] is that of the cable."""
-    tip = f"it is tipped by {BOW * length * 1e3:.2g} mm, and another side may be as likely"
+    tip = f"it is tipped by {in_mm(BOW * length)}, and another side may be as likely"
     return [f"{TIPPED}: {tip}"] if tipped else []
 
 

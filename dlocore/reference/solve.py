@@ -23,6 +23,7 @@ from dlocore.solvers.monitor import Monitor
 from dlocore.spline import SplineSurface
 from dlocore.tipping import tip_notes
 from dlocore.whole_march import sided
+from dlocore.words import in_mm
 
 Floats = NDArray[np.float64]
 
@@ -209,15 +210,13 @@ def _status(refined: Refined, target: float) -> tuple[Status, str]:
     last = refined.levels[-1]
     motion = last.motion
     count = len(motion.rod.u) - 1
-    moved = f"the last refinement, to {count} elements, moved it by {last.change * 1e3:.2g} mm"
+    moved = f"the last refinement, to {count} elements, moved it by {in_mm(last.change)}"
     if len(refined.levels) == 1:
         moved = f"one rod of {count} elements, unchecked"
     if motion.stopped:
         moved = f"it stands still after {motion.times[-1]:.4g} s of {refined.problem.horizon:.4g} s"
     if refined.ended == "agreed":
-        agreed = (
-            f"Rods of up to {count} elements agree to {refined.estimate * 1e3:.2g} mm, target {target * 1e3:.2g} mm."
-        )
+        agreed = f"Rods of up to {count} elements agree to {in_mm(refined.estimate)}, target {in_mm(target)}."
         if refined.astray > 0.0:  # by a bend alone: no sections of its rods are turned
             return "stalled", f"{agreed} But {in_words(refined.problem.line, refined.astray)}."
         return "converged", agreed + (f" {UNSEEN}" if np.isnan(refined.astray) else "")
@@ -225,7 +224,7 @@ def _status(refined: Refined, target: float) -> tuple[Status, str]:
         return "time_limit", f"The time limit passed; {moved}. Allow more time or a larger target_error."
     if refined.ended == "step":
         return "stalled", f"A step found no solution; {moved}. Make the motion slower or smoother."
-    return "max_iterations", f"No finer rod; {moved}, target {target * 1e3:.2g} mm. Allow a larger target_error."
+    return "max_iterations", f"No finer rod; {moved}, target {in_mm(target)}. Allow a larger target_error."
 
 
 def _effects(refined: Refined, surface: SplineSurface) -> tuple[EffectReport, ...]:

@@ -1,0 +1,23 @@
+"""Lengths as messages write them."""
+
+import pytest
+
+from dlocore.words import in_mm
+
+
+@pytest.mark.parametrize(
+    ("length", "digits", "words"),
+    [
+        (0.58, 2, "580 mm"),
+        (0.0997, 2, "100 mm"),
+        (0.0993, 2, "99 mm"),
+        (12.3456, 3, "12346 mm"),
+        (5e-3, 3, "5 mm"),
+        (1.234e-3, 2, "1.2 mm"),
+        (3.7e-8, 2, "3.7e-05 mm"),
+        (0.0, 2, "0 mm"),
+        (float("inf"), 2, "inf mm"),
+    ],
+)
+def test_a_length_has_its_digits_and_no_exponent_where_it_is_long(length: float, digits: int, words: str) -> None:
+    assert in_mm(length, digits) == words
