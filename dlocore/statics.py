@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.buckling import UNSTABLE, side_notes
-from dlocore.determined import bent
+from dlocore.determined import UNDETERMINED, bend_in_words, bent
 from dlocore.discretisation import make_grid, smallest_n_u
 from dlocore.errors import SceneError, number
 from dlocore.events import closed_grasps
@@ -115,6 +115,16 @@ def equilibrium(
     if problem.friction is not None:
         notes.append("friction is left out, which holds a cable where it came to lie")
     grid, q, history = rest.grid, rest.settled.q, rest.settled.history
+    if rest.status == "converged":
+
+        def rest_of(start: Grid) -> Floats | None:
+            other = _rested(problem, start, at, monitor)[1]
+            return other.q if other.rest == "settled" else None
+
+        apart = _to_two_sides(problem, grid, q, rest_of)
+        if apart > UNDETERMINED * scene.cable.length:
+            bend = bend_in_words(problem, apart)
+            notes.append(f"which of several equilibria it comes to is not determined: {bend}")
     world = problem.world(free_of_frames(problem, grid, q[None], history.past[None])[0])
     held = reactions(problem, grid, (holding(problem, grid, rest.settled),))
     return Equilibrium(
@@ -145,13 +155,7 @@ def _refined(problem: Problem, sizes: list[int], at: float, target: float, monit
     change, status = np.inf, cast(Status, "time_limit")
     message = "The time limit passed. Allow more time or a smaller n_u."
     for n in sizes:
-        grid = make_grid(problem, n)
-        settled = settle(problem, grid, at, monitor)
-        if settled.rest == "settled":
-            stays = grid.changed(start=settled.q, history=settled.history)
-            stays = tipped(problem, stays, monitor, at, settled.starts)
-            settled = settled._replace(q=stays.start, history=stays.history)
-            grid = grid.changed(tipped=stays.tipped)
+        grid, settled = _rested(problem, make_grid(problem, n), at, monitor)
         if settled.rest == "time" and found is not None:
             break
         if found is not None:
@@ -173,6 +177,15 @@ def _refined(problem: Problem, sizes: list[int], at: float, target: float, monit
     elif status == "converged" and len(sizes) > 1 and not change <= target:
         status, message = "max_iterations", f"The finest grid still moved the shape by {in_mm(change)}."
     return _Rest(grid, settled, status, message, change)
+
+
+def _rested(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> tuple[Grid, Settled]:
+    """Return a grid, and the rest that its start comes to and stays in, under the grasps and loads of the time `at`."""
+    settled = settle(problem, grid, at, monitor)
+    if settled.rest != "settled":
+        return grid, settled
+    stays = tipped(problem, grid.changed(start=settled.q, history=settled.history), monitor, at, settled.starts)
+    return grid.changed(tipped=stays.tipped), settled._replace(q=stays.start, history=stays.history)
 
 
 def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None = None) -> Grid:
@@ -212,19 +225,32 @@ def settles_elsewhere(problem: Problem, settled: Grid, monitor: Monitor) -> floa
     """
     if not problem.scene.shape.settle or problem.friction is not None:
         return 0.0
+
+    def rest_of(start: Grid) -> Floats | None:
+        monitor.check()
+        found = _settled(problem, start, monitor, None)
+        return None if found is None else found.start
+
+    return _to_two_sides(problem, settled, settled.start, rest_of)
+
+
+def _to_two_sides(problem: Problem, grid: Grid, q: Floats, rest_of: Callable[[Grid], Floats | None]) -> float:
+    """Return how far apart the rests of a start are that is bent to either side, if it went far to `q` on `grid` [m].
+
+    `rest_of` returns the control points of a start's rest on a grid, None where it finds none.
+    """
     u = np.linspace(0.0, problem.scene.cable.length, 33)
     dimensions = problem.plane.dimensions
-    way = design_matrix(settled.knots, u) @ settled.start[:, :dimensions] - problem.plane.points(problem.start(u))
+    way = design_matrix(grid.knots, u) @ q[:, :dimensions] - problem.plane.points(problem.start(u))
     if not np.linalg.norm(way, axis=1).max() > _FAR * problem.scene.cable.length:
         return 0.0
-    monitor.check()
-    grid = make_grid(problem, max(_TELLING, smallest_n_u(problem)))
+    coarse = make_grid(problem, max(_TELLING, smallest_n_u(problem)))
     ends = []
     for side in (1.0, -1.0):
-        found = _settled(problem, grid.changed(start=grid.start + side * bent(problem, grid, seed=1)), monitor, None)
-        if found is None:
+        rest = rest_of(coarse.changed(start=coarse.start + side * bent(problem, coarse, seed=1)))
+        if rest is None:
             return 0.0
-        ends.append(found.start[:, :dimensions])
+        ends.append(rest[:, :dimensions])
     return float(np.linalg.norm(ends[0] - ends[1], axis=1).max())
 
 

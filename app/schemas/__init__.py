@@ -1,6 +1,7 @@
 """The JSON contract: what goes in, what comes out, and the way to and from the solver's data."""
 
 from app.schemas.convert import Motion, to_scene
+from app.schemas.describe import from_scene
 from app.schemas.request import EXAMPLES, PredictionRequest
 from app.schemas.response import PredictionList, PredictionResponse, from_prediction, problem_document
 
@@ -11,6 +12,7 @@ __all__ = [
     "PredictionRequest",
     "PredictionResponse",
     "from_prediction",
+    "from_scene",
     "problem_document",
     "to_scene",
 ]

@@ -276,6 +276,12 @@ def test_a_start_that_may_settle_to_either_side_is_no_success():
     assert "the scene does not determine its motion" in given.message
 
 
+@pytest.mark.parametrize("at", [0.0, 1.0])
+def test_an_equilibrium_that_is_one_of_two_tells_so(at: float):
+    assert "not determined" in equilibrium(snake(0.0), at=at).message
+    assert "not determined" not in equilibrium(snake(0.05), at=at).message
+
+
 @pytest.mark.parametrize("lean", [0.05, -0.05])
 def test_a_start_that_leans_settles_to_its_side(lean: float):
     found = predict(snake(lean))

@@ -1,0 +1,88 @@
+"""From the solver's scene to the request that describes it."""
+
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from dlocore import (
+    Box,
+    Capsule,
+    ControlPoints,
+    Cylinder,
+    Load,
+    Move,
+    Points,
+    Scene,
+    SceneError,
+    Sphere,
+    Still,
+    Straight,
+    Waypoints,
+)
+
+_KINDS: dict[type, str] = {
+    Straight: "straight",
+    Points: "points",
+    ControlPoints: "control_points",
+    Still: "still",
+    Move: "move",
+    Waypoints: "waypoints",
+    Sphere: "sphere",
+    Capsule: "capsule",
+    Cylinder: "cylinder",
+    Box: "box",
+}
+
+
+def from_scene(scene: Scene) -> dict[str, Any]:
+    """Return the request that describes a scene, ready for JSON: `to_scene` makes the same scene of it.
+
+    It is what `POST /v1/predictions` and `dlo predict` take, and what the 3D scene opens from a file.
+
+    Raises:
+        SceneError: a request can't say what a field says: `shape.material` (the service knows it of the stored
+            prediction that a shape of kind "prediction" names), or `quality.estimate` without an estimate.
+    """
+    if isinstance(scene.shape, ControlPoints) and scene.shape.material is not None:
+        allowed = 'None; a shape of kind "prediction" goes on from a stored one with its material'
+        raise SceneError("shape.material", "a material", allowed)
+    if not scene.quality.estimate:
+        raise SceneError("quality.estimate", False, "True: an answer of the service has an estimate")
+    return {
+        "cable": _plain(scene.cable),
+        "shape": _shape(scene.shape),
+        "primitives": [_plain(grasp) for grasp in scene.grasps],
+        "loads": [_load(load) for load in scene.loads],
+        "environment": _plain(scene.environment),
+        "horizon": scene.horizon,
+        "effects": dict(scene.effects),
+        "quality": {name: value for name, value in _plain(scene.quality).items() if name != "estimate"},
+    }
+
+
+def _plain(value: Any) -> Any:
+    """Return a part of a scene as numbers, words, lists and objects; what is None is left out of an object."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, tuple | list):
+        return [_plain(part) for part in value]
+    if not hasattr(value, "__dataclass_fields__"):
+        return value
+    named = {"kind": _KINDS[type(value)]} if type(value) in _KINDS else {}
+    given = {field.name: getattr(value, field.name) for field in fields(value)}
+    return {**named, **{name: _plain(part) for name, part in given.items() if part is not None}}
+
+
+def _shape(shape: Straight | Points | ControlPoints) -> dict[str, Any]:
+    """Return a shape; velocities that have an angle's rate are given as control points of it."""
+    described: dict[str, Any] = _plain(shape)
+    if np.ndim(described.get("velocity", 0.0)) == 2 and len(described["velocity"][0]) == 4:
+        described["velocity"] = {"kind": "control_points", "control_points": described["velocity"]}
+    return described
+
+
+def _load(load: Load) -> dict[str, Any]:
+    force = _plain(load.force)
+    over_time = {"times": _plain(load.times), "values": force}
+    return {"u": load.u, "force": force if load.times is None else over_time}
