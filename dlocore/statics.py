@@ -111,20 +111,15 @@ def equilibrium(
         else:
             problem = pose(scene, {"side": UNSTABLE}, at_rest=True)
             rest = _refined(problem, sizes, at, target, monitor)
-    notes += [*side_notes(problem.start), *tip_notes(rest.grid.tipped, scene.cable.length)]
+    sides = [*side_notes(problem.start), *tip_notes(rest.grid.tipped, scene.cable.length)]
+    notes += sides
     if problem.friction is not None:
         notes.append("friction is left out, which holds a cable where it came to lie")
     grid, q, history = rest.grid, rest.settled.q, rest.settled.history
-    if rest.status == "converged":
-
-        def rest_of(start: Grid) -> Floats | None:
-            other = _rested(problem, start, at, monitor)[1]
-            return other.q if other.rest == "settled" else None
-
-        apart = _to_two_sides(problem, grid, q, rest_of)
-        if apart > UNDETERMINED * scene.cable.length:
-            bend = bend_in_words(problem, apart)
-            notes.append(f"which of several equilibria it comes to is not determined: {bend}")
+    apart = _rests_apart(problem, rest, at, monitor) if rest.status == "converged" and not sides else 0.0
+    if apart > UNDETERMINED * scene.cable.length:
+        bend = bend_in_words(problem, apart)
+        notes.append(f"which of several equilibria it comes to is not determined: {bend}")
     world = problem.world(free_of_frames(problem, grid, q[None], history.past[None])[0])
     held = reactions(problem, grid, (holding(problem, grid, rest.settled),))
     return Equilibrium(
@@ -232,6 +227,16 @@ def settles_elsewhere(problem: Problem, settled: Grid, monitor: Monitor) -> floa
         return None if found is None else found.start
 
     return _to_two_sides(problem, settled, settled.start, rest_of)
+
+
+def _rests_apart(problem: Problem, rest: _Rest, at: float, monitor: Monitor) -> float:
+    """Return the same of an equilibrium under the grasps and loads of the time `at` [m]."""
+
+    def rest_of(start: Grid) -> Floats | None:
+        other = _rested(problem, start, at, monitor)[1]
+        return other.q if other.rest == "settled" else None
+
+    return _to_two_sides(problem, rest.grid, rest.settled.q, rest_of)
 
 
 def _to_two_sides(problem: Problem, grid: Grid, q: Floats, rest_of: Callable[[Grid], Floats | None]) -> float:

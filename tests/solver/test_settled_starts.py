@@ -278,8 +278,10 @@ def test_a_start_that_may_settle_to_either_side_is_no_success():
 
 @pytest.mark.parametrize("at", [0.0, 1.0])
 def test_an_equilibrium_that_is_one_of_two_tells_so(at: float):
-    assert "not determined" in equilibrium(snake(0.0), at=at).message
-    assert "not determined" not in equilibrium(snake(0.05), at=at).message
+    # where rounding leaves it between the two it is tipped, and says that
+    told = ("which of several equilibria it comes to is not determined", "another side may be as likely")
+    assert any(words in equilibrium(snake(0.0), at=at).message for words in told)
+    assert not any(words in equilibrium(snake(0.05), at=at).message for words in told)
 
 
 @pytest.mark.parametrize("lean", [0.05, -0.05])
