@@ -73,7 +73,10 @@ class Motion:
         rod: the rod.
         times: of the steps that were noted (k,) [s]; an event occurs twice, as a gripper may jump there.
         states: the rod at those times.
-        forces: of each grasp (grasps, k, 3) [N], zero while it is open.
+        given_times: of the forces and moments (m,) [s]: the middle between each two noted steps, and both ends of what
+            lies between two events.
+        forces: of each grasp (grasps, m, 3) [N], the mean between two noted steps, which is what momentum is gained by;
+            zero while it is open.
         moments: the same [N m].
         deepest: largest depth in a surface [m].
         left: largest update that Newton's iterations left [m].
@@ -86,6 +89,7 @@ class Motion:
     rod: Rod
     times: Floats
     states: tuple[Snapshot, ...]
+    given_times: Floats
     forces: Floats
     moments: Floats
     deepest: float
@@ -118,48 +122,48 @@ class _Record:
         self.rod = rod
         self.times: list[float] = []
         self.states: list[Snapshot] = []
-        self.forces: list[Floats] = []
-        self.moments: list[Floats] = []
-        self.beginnings: list[int] = []
+        self.given: list[tuple[float, Floats, Floats]] = []
         self.deepest = self.left = 0.0
         self.steps = self.rejected = 0
         self.tipped = False
 
     def begin(self, link: Chain, state: State) -> None:
-        """Note the state in which a window begins; what grippers give there is that of its first step."""
-        self.beginnings.append(len(self.times))
+        """Note the state in which a window begins."""
         self.times.append(link.begin)
         self.states.append(link.snapshot(state))
-        nothing = np.zeros((len(self.rod.problem.scene.grasps), 3))
-        self.forces.append(nothing)
-        self.moments.append(nothing)
 
-    def note(self, link: Chain, t: float, h: float, state: State, reaction: Floats, torque: Floats) -> None:
-        """Note the state at the end of a step h, and what the grippers give to the cable there."""
+    def note(self, link: Chain, t: float, state: State, impulse: Floats, twist: Floats) -> None:
+        """Note the state at t [s], and what grippers gave to the cable since the note before, by its integrals.
+
+        These are of the forces that hold the nodes (n, 4) [N s] and of the moments (n - 1, 3) [N m s].
+        """
         grasps = self.rod.problem.scene.grasps
+        begin = self.times[-1]
+        middle, half = 0.5 * (begin + t), 0.5 * (t - begin)
         force, moment = np.zeros((len(grasps), 3)), np.zeros((len(grasps), 3))
         for k, held in enumerate(link.grips):
             i = next(i for i, g in enumerate(grasps) if g is held.grasp)
             nodes = link.node_of == held.node
-            inertia = link.body.mass[nodes, 0].sum() * link.acceleration(held, t, h)
-            force[i] = (reaction[nodes, :3].sum(axis=0) + inertia) @ self.rod.axes
-            moment[i] = torque[link.edge_of == -1 - k].sum(axis=0) @ self.rod.axes
+            inertia = link.body.mass[nodes, 0].sum() * link.acceleration(held, middle, half)
+            force[i] = (impulse[nodes, :3].sum(axis=0) / (t - begin) + inertia) @ self.rod.axes
+            moment[i] = twist[link.edge_of == -1 - k].sum(axis=0) / (t - begin) @ self.rod.axes
+        first, last = begin == link.begin, t == link.end
+        at = (*([begin] if first else []), middle, *([t] if last else []))
+        self.given += [(time, force, moment) for time in at]
         self.times.append(t)
         self.states.append(link.snapshot(state))
-        self.forces.append(force)
-        self.moments.append(moment)
 
     def motion(self, stopped: Stopped) -> Motion:
         """Return what was noted."""
-        for i in self.beginnings:
-            if i + 1 < len(self.forces):
-                self.forces[i], self.moments[i] = self.forces[i + 1], self.moments[i + 1]
+        nothing = np.zeros((len(self.rod.problem.scene.grasps), 3))
+        times, forces, moments = zip(*self.given or [(self.times[0], nothing, nothing)], strict=True)
         return Motion(
             rod=self.rod,
             times=np.array(self.times),
             states=tuple(self.states),
-            forces=np.array(self.forces).transpose(1, 0, 2),
-            moments=np.array(self.moments).transpose(1, 0, 2),
+            given_times=np.array(times),
+            forces=np.array(forces).transpose(1, 0, 2),
+            moments=np.array(moments).transpose(1, 0, 2),
             deepest=self.deepest,
             left=self.left,
             stopped=stopped,
@@ -224,6 +228,7 @@ def _window(link: Chain, state: State, tolerance: float, watch: Watch, record: _
     t, end = link.begin, link.end
     h = FIRST * (end - t)
     period, told = link.rod.problem.horizon, np.zeros(3)
+    impulse, twist = np.zeros_like(state.q), np.zeros_like(state.t)
     while t < end:
         watch.check()
         h = end - t if end - t < (1.0 + LAST) * h else h
@@ -243,8 +248,11 @@ def _window(link: Chain, state: State, tolerance: float, watch: Watch, record: _
         record.deepest, record.left = max(record.deepest, told[2]), max(record.left, told[1])
         after.q[:, 3] = 0.0  # spin counts from the beginning of the step
         state = after
+        impulse += h * reaction
+        twist += h * torque
         if t == end or t - record.times[-1] >= link.rod.problem.horizon / NOTES:
-            record.note(link, t, h, state, reaction, torque)
+            record.note(link, t, state, impulse, twist)
+            impulse[:], twist[:] = 0.0, 0.0
         h *= min(GROW, SAFETY * (tolerance / max(told[0], 1e-300)) ** (1.0 / SDIRK4.order))
     return state
 

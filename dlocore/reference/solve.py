@@ -190,7 +190,7 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
         find_start_energy=partial(_elastic_energy, last, 0),
         start_fit=problem.start.fit_rms,
         report_grasps=lambda: tuple(
-            GraspReaction(g.u, motion.times, motion.forces[i], motion.moments[i])
+            GraspReaction(g.u, motion.given_times, motion.forces[i], motion.moments[i])
             for i, g in enumerate(problem.scene.grasps)
         ),
         report_effects=lambda surface: _effects(refined, surface),

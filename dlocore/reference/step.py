@@ -82,6 +82,44 @@ def _remains(body: Any, period: float, state: Any, end: Any, tangent_rate: Any, 
 
 
 @compiled
+def add_forces(
+    body: Any, state: Any, after: Any, load: Any, pull: Any, memory: Any, axial: Any, anchor: Any, implicit: float,
+    b: Any, lengths: Any, tangent_rate: Any, R: Any, torque: Any, K: Any, mode: int,
+) -> float:  # fmt: skip
+    """Write what is left of the forces on each node (n, 4) [N] to `R`, that on what is held being what holds it.
+
+    Args:
+        body: the rod.
+        state: in which the step begins.
+        after: the state of a stage; receives what it remembers.
+        load: on each node (n, 3) [N].
+        pull: velocity (n, 4) that the stage would have without a force of its own.
+        memory, axial, anchor: what is remembered without a rate of the stage.
+        implicit: the time that the stage counts [s].
+        b, lengths, tangent_rate: second directors and lengths of the edges, and the rates of held tangents.
+        R, torque: receive the forces and the moments of held directions (n - 1, 3) [N m].
+        K, mode: the band to which the tangent is added: 0 none, 1 all of it, 2 its definite part.
+
+    Returns:
+        the largest depth in a surface [m].
+    """
+    q, v = after.q, after.v
+    for k in range(len(q)):
+        for d in range(4):
+            R[k, d] = 0.0 if body.fixed[k, d] else body.mass[k, d] * (v[k, d] - pull[k, d]) / implicit
+            if d < 3:
+                R[k, d] -= body.weight[k, d] + load[k, d]
+    torque[:] = 0.0
+    add_edges(body, v, axial, implicit, after.t, lengths, after.axial, R, K, mode)
+    add_hinges(
+        body, v, state.turn, memory, implicit, after.t, after.a, b, lengths, tangent_rate, after.turn, after.memory,
+        torque, R, K, mode,
+    )  # fmt: skip
+    add_drag(body, v, implicit, R, K, mode)
+    return float(add_contact(body, q, v, anchor, implicit, after.anchor, R, K, mode))
+
+
+@compiled
 def take_step(
     body: Any, tableau: Any, h: float, period: float, state: Any, guide: Any, tolerance: float, after: Any,
     reaction: Any, torque: Any, told: Any,
@@ -97,8 +135,9 @@ def take_step(
         guide: what is prescribed at the stages.
         tolerance: of Newton's iteration [m].
         after: the state at the end.
-        reaction: forces that hold the nodes in place at the end (n, 4), without the inertia of what is held [N].
-        torque: the moments that held directions take there (n - 1, 3) [N m].
+        reaction: mean over the step of the forces that hold the nodes in place (n, 4), without the inertia of what is
+            held [N]: that at the end is of waves of stretch, which no step of a smooth motion resolves.
+        torque: mean of the moments that held directions take (n - 1, 3) [N m].
         told: receives the estimated error [m], the last update [m] and the largest depth in a surface [m].
     """
     n, dims, static = len(body.rest) + 1, body.dims, period == 0.0
@@ -110,7 +149,9 @@ def take_step(
     guess, pull = np.empty((n, 4)), np.empty((n, 4))
     memory, axial, anchor = np.empty((hinges, 3)), np.empty(edges), np.empty((points, 3))
     b, lengths, tangent_rate = np.zeros((edges, 3)), np.empty(edges), np.zeros((edges, 3))
-    R, K, dx = reaction, np.zeros((n * dims, width + 1)), np.empty(n * dims)
+    R, T = np.empty((n, 4)), np.empty((edges, 3))
+    K, dx = np.zeros((n * dims, width + 1)), np.empty(n * dims)
+    reaction[:], torque[:] = 0.0, 0.0
     q, v, gyration = after.q, after.v, body.law[GYRATION]
     factored = False
     deepest = 0.0
@@ -156,13 +197,6 @@ def take_step(
             refactor = static or not factored
             mode = 1
             while True:
-                for k in range(n):
-                    for d in range(4):
-                        inertia = (v[k, d] - pull[k, d]) / implicit
-                        R[k, d] = 0.0 if body.fixed[k, d] else body.mass[k, d] * inertia
-                        if d < 3:
-                            R[k, d] -= body.weight[k, d] + guide.load[i, k, d]
-                torque[:] = 0.0
                 if refactor:
                     K[:] = 0.0
                     for k in range(n):
@@ -170,15 +204,10 @@ def take_step(
                             free = not body.fixed[k, d]
                             K[k * dims + d, 0] = body.mass[k, d] / (implicit * implicit) if free else 1.0
                 use = mode if refactor else 0
-                add_edges(
-                    body, v, axial, implicit, after.t, lengths, after.axial, R, K, use,
+                deepest = add_forces(
+                    body, state, after, guide.load[i], pull, memory, axial, anchor, implicit, b, lengths, tangent_rate,
+                    R, T, K, use,
                 )  # fmt: skip
-                add_hinges(
-                    body, v, state.turn, memory, implicit, after.t, after.a, b, lengths, tangent_rate, after.turn,
-                    after.memory, torque, R, K, use,
-                )  # fmt: skip
-                add_drag(body, v, implicit, R, K, use)
-                deepest = add_contact(body, q, v, anchor, implicit, after.anchor, R, K, use)
                 if not refactor:
                     break
                 if factor(K):
@@ -219,6 +248,15 @@ def take_step(
         # what the last update changed: forces, memory and anchors of the very end of the stage
         if not frames(body, state, q, after.t, after.a, b, lengths):
             return FAILED
+        # those of the last update are not those of the state that it led to: the cable hardly stretches
+        add_forces(
+            body, state, after, guide.load[i], pull, memory, axial, anchor, implicit, b, lengths, tangent_rate, R, T,
+            K, 0,
+        )  # fmt: skip
+        # the weights with which the stages make up the step: momentum is gained by the mean of the forces
+        share = tableau.coefficients[stages - 1, i]
+        reaction += share * R
+        torque += share * T
         for k in range(n):
             for d in range(4):
                 V[i, k, d] = v[k, d]
