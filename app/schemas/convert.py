@@ -209,13 +209,13 @@ def environment_of(model: EnvironmentModel) -> Environment:
         )
 
 
-_OBSTACLES: dict[str, type[Obstacle]] = {"sphere": Sphere, "capsule": Capsule, "cylinder": Cylinder, "box": Box}
+OBSTACLES: dict[str, type[Obstacle]] = {"sphere": Sphere, "capsule": Capsule, "cylinder": Cylinder, "box": Box}
 
 
 def obstacle_of(i: int, model: ObstacleModel) -> Obstacle:
     """Return the obstacle `i` of the solver, or raise SceneError."""
     with within(f"environment.obstacles[{i}]"):
-        return _OBSTACLES[model.kind](**model.model_dump(exclude={"kind"}))
+        return OBSTACLES[model.kind](**model.model_dump(exclude={"kind"}))
 
 
 def quality_of(model: str | QualityModel) -> Quality:

@@ -1,25 +1,12 @@
 """From the solver's scene to the request that describes it."""
 
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
 
-from dlocore import (
-    Box,
-    Capsule,
-    ControlPoints,
-    Cylinder,
-    Load,
-    Move,
-    Points,
-    Scene,
-    SceneError,
-    Sphere,
-    Still,
-    Straight,
-    Waypoints,
-)
+from app.schemas.convert import OBSTACLES
+from dlocore import ControlPoints, Load, Move, Points, Scene, SceneError, Still, Straight, Waypoints
 
 _KINDS: dict[type, str] = {
     Straight: "straight",
@@ -28,10 +15,7 @@ _KINDS: dict[type, str] = {
     Still: "still",
     Move: "move",
     Waypoints: "waypoints",
-    Sphere: "sphere",
-    Capsule: "capsule",
-    Cylinder: "cylinder",
-    Box: "box",
+    **{obstacle: kind for kind, obstacle in OBSTACLES.items()},
 }
 
 
@@ -67,7 +51,7 @@ def _plain(value: Any) -> Any:
         return value.tolist()
     if isinstance(value, tuple | list):
         return [_plain(part) for part in value]
-    if not hasattr(value, "__dataclass_fields__"):
+    if not is_dataclass(value):
         return value
     named = {"kind": _KINDS[type(value)]} if type(value) in _KINDS else {}
     given = {field.name: getattr(value, field.name) for field in fields(value)}

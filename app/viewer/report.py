@@ -11,6 +11,7 @@ from app.viewer import plots
 from app.viewer.palette import ColourScale, css_ramp
 from dlocore import EffectReport, Prediction
 from dlocore.calibration import Measured, front_of
+from dlocore.words import in_mm
 
 _CARD = (
     "margin: 0 0.75rem 0.6rem; padding: 0.55rem 0.7rem; border-radius: 0.5rem; font-size: 0.8rem; line-height: 1.35;"
@@ -36,10 +37,7 @@ def milliseconds(seconds: float) -> str:
 
 def millimetres(metres: float | None) -> str:
     """Return an estimated error [m] in millimetres, or say that there is none."""
-    if metres is None:
-        return "not estimated"
-    mm = 1e3 * metres
-    return f"{mm:.2g} mm" if mm < 10 else f"{mm:.0f} mm"
+    return "not estimated" if metres is None else in_mm(metres)
 
 
 def status_card(prediction: Prediction, *, preview: bool) -> str:
