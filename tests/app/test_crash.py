@@ -28,7 +28,7 @@ from dlocore import predict
 from tests.app.conftest import ROOT, paper_scene
 
 rr = pytest.importorskip("rerun")
-RUNS = 100
+RUNS = 40
 WRITERS = 8
 CAP = 30  # runs that the store keeps, well below what is written before a kill
 KILLS = 4

@@ -11,7 +11,7 @@ from tests.app.live import serving
 CONFIG = Path(__file__).parent / "schemathesis.toml"
 # An answer with store=false carries an id and is no resource: reading it gives 404, which one check takes for a loss.
 CHECKS = ["--checks=all", "--exclude-checks=ensure_resource_availability"]
-OPTIONS = [*CHECKS, "--max-examples=20", "--seed=1", "--request-timeout=30", "--generation-database=none"]
+OPTIONS = [*CHECKS, "--max-examples=12", "--seed=1", "--request-timeout=30", "--generation-database=none"]
 
 
 @pytest.mark.slow

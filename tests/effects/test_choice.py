@@ -67,7 +67,8 @@ def test_the_catalogue_has_scenes_of_every_effect():
 def test_plasticity_is_switched_on_by_a_motion_that_yields_only():
     def bent(strain: float) -> Prediction:
         plastic = cable(yield_strain=strain, memory_rate=20.0)
-        return predict(Scene(cable=plastic, shape=Straight(), grasps=(Grasp(u=0.3, path=SIDE),)))
+        rough = Quality(target_error=0.01)
+        return predict(Scene(cable=plastic, shape=Straight(), grasps=(Grasp(u=0.3, path=SIDE),), quality=rough))
 
     active, reason = effect(bent(0.002), "plasticity")
     assert active

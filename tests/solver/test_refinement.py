@@ -340,7 +340,7 @@ def test_a_strongly_damped_grid_that_agrees_with_one_that_was_not_is_not_believe
     assert apart(found.surface, truth.surface).max() < 2.0 * found.accuracy.error_estimate
 
 
-@pytest.mark.parametrize("n_u", [20, 21, 22, 24])
+@pytest.mark.parametrize("n_u", [20, 24])
 def test_what_strikes_itself_so_fast_that_it_goes_through_meets_a_contact_that_stops_it(n_u: int):
     # a limp cable that a gripper flings at 30 m/s: contact as stiff as bears its weight and bending was passed through,
     # ten times as stiff no less, and what came of it jammed
