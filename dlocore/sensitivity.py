@@ -32,7 +32,7 @@ from dlocore.scene import Scene
 from dlocore.sideways import pose_as_shown
 from dlocore.solvers.march import March, march
 from dlocore.solvers.monitor import Monitor
-from dlocore.solvers.stretch import Entry, enter
+from dlocore.solvers.stretch import Entry, enter, with_what_lasts
 from dlocore.spline import SplineSurface
 from dlocore.statics import start_grid
 
@@ -103,8 +103,8 @@ def factored(problem: Problem, motion: March) -> KnownMotion:
     v, softened = grid.velocity.copy(), 0
     for begin, end, first, last in _stretches(problem, motion.times):
         h = (end - begin) / (last - first)
-        entry = _enter(problem, grid, starts, motion.times, first, last, states[first], v, history)
-        v, a = entry.v.copy(), entry.a.copy()
+        entry, a, _ = _enter(problem, grid, starts, motion.times, first, last, states[first], v, history)
+        v = entry.v.copy()
         free = states[0].size - len(entry.held.elimination.held)
         factors = np.empty((last - first, free, entry.held.elimination.width))
         part = np.ascontiguousarray(states[first : last + 1])
@@ -150,8 +150,8 @@ def beside(known: KnownMotion, problem: Problem, grid: Grid) -> tuple[Floats, Fl
         first, last = stretch.first, stretch.last
         times[first : last + 1] = np.linspace(begin, end, last - first + 1)
         h = (end - begin) / (last - first)
-        entry = _enter(problem, grid, starts, times, first, last, states[first], v, history)
-        v, a, G = entry.v.copy(), entry.a.copy(), entry.G.copy()
+        entry, a, G = _enter(problem, grid, starts, times, first, last, states[first], v, history)
+        v = entry.v.copy()
         applied = applied_forces(problem, grid, times[first : last + 1])
         left = follow_steps(
             problem.axes, stretch.jumps, h, known.motion.rho, _FOLLOWED * length,
@@ -173,14 +173,21 @@ def _stretches(problem: Problem, times: Floats) -> list[tuple[float, float, int,
 def _enter(
     problem: Problem, grid: Grid, starts: Starts, times: Floats, first: int, last: int, q: Floats, v: Floats,
     history: Any,
-) -> Entry:  # fmt: skip
-    """Close the grasps of the stretch from step `first` to `last` of `times` (steps + 1,) [s]; return how it begins."""
+) -> tuple[Entry, Floats, Floats]:  # fmt: skip
+    """Close the grasps of the stretch from step `first` to `last` of `times` (steps + 1,) [s].
+
+    Returns:
+        how it begins, and with which acceleration [m/s^2] and forces [N], each (n_u, nc), its steps do.
+    """
     own = times[first : last + 1]
     load = applied_forces(problem, grid, own[:1])[0]
     grasps = closed_grasps(problem.scene, float(own[0]), float(own[-1]))
     h = float(own[-1] - own[0]) / (last - first)
     before = float(times[first] - times[first - 1]) if first > 0 else 0.0
-    return enter(problem, grid, grasps, starts, own, h, before, np.ascontiguousarray(q), v, history, load)
+    q = np.ascontiguousarray(q)
+    entry = enter(problem, grid, grasps, starts, own, h, before, q, v, history, load)
+    a, G = with_what_lasts(problem, grid, entry, entry.a, h, q, history)
+    return entry, a.copy(), G.copy()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

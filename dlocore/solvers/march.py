@@ -15,7 +15,7 @@ from dlocore.events import closed_grasps, marks_of, step_counts, step_times
 from dlocore.grid import Grid
 from dlocore.holding import Starts, hold
 from dlocore.kernels.assembly import History, note, slopes, times_scalar_band
-from dlocore.kernels.entry import lasting, to_ends_of_steps
+from dlocore.kernels.entry import to_ends_of_steps
 from dlocore.kernels.march import (
     DEEPEST,
     DIVIDED_FROM,
@@ -32,7 +32,7 @@ from dlocore.scene import Grasp
 from dlocore.solvers.kept import Kept
 from dlocore.solvers.leaning import lean_on_anchors, lean_on_table
 from dlocore.solvers.monitor import Monitor, TimeIsUp
-from dlocore.solvers.stretch import Entry, enter
+from dlocore.solvers.stretch import Entry, enter, with_what_lasts
 
 Floats = NDArray[np.float64]
 
@@ -370,12 +370,7 @@ class _Walk:
                     a = np.zeros_like(entry.v)
         reactions = np.zeros((last - first + 1, len(e.held)))
         reactions[0] = (times_scalar_band(self._mass, a) + entry.G).reshape(-1)[e.held]
-        G = entry.G
-        if problem.inertia is not None:
-            tables, density = grid.tables, problem.mass_density()
-            a, G = lasting(
-                problem.axes, self._kept.now, a, G, tables.mass, density, h, tables, *self._laws, self._history, e
-            )
+        a, G = with_what_lasts(problem, grid, entry, a, h, self._kept.now, self._history)
         return _Stretch(h, first, last, grasps, entry, entry.v, a, G, reactions)
 
     def _steps(

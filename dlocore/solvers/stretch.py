@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from dlocore.grid import Grid
 from dlocore.holding import Held, Starts, close_grasps, hold
 from dlocore.kernels.assembly import NO_RATES, History
-from dlocore.kernels.entry import after_jump, begin_stretch
+from dlocore.kernels.entry import after_jump, begin_stretch, lasting
 from dlocore.problem import Problem
 from dlocore.scene import Grasp
 
@@ -84,3 +84,20 @@ def enter(
     started = closed.copy() if inertial else np.zeros_like(closed)
     sudden = h * jump > JUMPS * problem.scene.cable.length
     return Entry(held, held.offsets[3:], closed, started, a, G, sudden, sudden and inertial)
+
+
+def with_what_lasts(
+    problem: Problem, grid: Grid, entry: Entry, a: Floats, h: float, q: Floats, history: History
+) -> tuple[Floats, Floats]:
+    """Return acceleration and forces (n_u, nc) with which the steps of a stretch begin [m/s^2, N].
+
+    They are `a`, with which it is entered at the state q [m], and `entry.G`, without what does not last for a step `h`
+    [s], see `lasting`.
+    """
+    if problem.inertia is None:
+        return a, entry.G
+    found: tuple[Floats, Floats] = lasting(
+        problem.axes, q, a, entry.G, grid.tables.mass, problem.mass_density(), h, grid.tables, *problem.laws, history,
+        entry.held.elimination,
+    )  # fmt: skip
+    return found

@@ -5,9 +5,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from benchmarks.hard.generator import draw
 from dlocore import Cable, Environment, Grasp, Move, Quality, Scene, SceneError, Straight, predict, sensitivity
-from dlocore.sensitivity import STEP, _with, sensitivities
+from dlocore.problem import pose
+from dlocore.sensitivity import STEP, _with, beside, factored, sensitivities
 from dlocore.solvers import march as marching
+from dlocore.solvers.monitor import Monitor
+from dlocore.statics import start_grid
 
 U, T = np.linspace(0.05, 0.95, 7), np.linspace(0.2, 1.5, 6)
 
@@ -85,6 +89,19 @@ def test_derivatives_after_a_jump_are_those_of_marches_with_the_same_first_step(
     difference = by_differences(jerked, name)
     # a change of the damping by 1e-3 moves it by 1e-6 m, of which rounding and tolerances of 1e-10 m are 1e-4
     np.testing.assert_allclose(sensed(U, T)[0], difference, atol=1e-3 * np.abs(difference).max())
+
+
+@pytest.mark.parametrize("index", [45, 67, 259], ids=["twist", "a second grasp", "springs away"])
+def test_the_motion_beside_is_the_march_where_nothing_is_changed(index: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    # it began with an acceleration that does not last for a step, and was up to 0.04 % of the length beside the march
+    monkeypatch.setattr(marching, "TOLERANCE", 1e-13)
+    problem = pose(draw(128, index, small=True).make())
+    grid = start_grid(problem, 16, Monitor())
+    motion = marching.march(problem, grid, 70, Monitor())
+    states, times, velocity = beside(factored(problem, motion), problem, grid)
+    np.testing.assert_allclose(states, motion.states, atol=1e-7 * problem.scene.cable.length)
+    np.testing.assert_array_equal(times, motion.times)
+    np.testing.assert_allclose(velocity, motion.velocity, atol=1e-7 * problem.scene.cable.length)
 
 
 def test_contact_is_differentiated_by_whole_marches_and_said_so() -> None:
