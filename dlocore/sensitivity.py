@@ -326,12 +326,19 @@ def _number(scene: Scene, path: str) -> float:
     value: Any = scene
     for step in _steps_of(path):
         try:
-            value = value[step] if isinstance(step, int) else getattr(value, step)
+            value = value[step] if isinstance(step, int) else _field(value, step)
         except (AttributeError, IndexError, TypeError):
             raise SceneError("wrt", path, "the path of a number of the scene") from None
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         raise SceneError("wrt", path, "the path of a number of the scene")
     return float(value)
+
+
+def _field(part: Any, name: str) -> Any:
+    """Return what was given for a part of the scene by name; what follows from it can't be changed by itself."""
+    if not is_dataclass(part) or name not in {f.name for f in fields(part)}:
+        raise AttributeError(name)
+    return getattr(part, name)
 
 
 def _with(part: Any, path: str, value: float) -> Any:
@@ -342,9 +349,7 @@ def _with(part: Any, path: str, value: float) -> Any:
             return value
         step, *rest = steps
         if isinstance(step, str):
-            if not is_dataclass(part) or step not in {f.name for f in fields(part)}:
-                raise SceneError("wrt", path, "the path of a number of the scene")
-            return replace(part, **{step: changed(getattr(part, step), rest)})  # type: ignore[type-var]
+            return replace(part, **{step: changed(_field(part, step), rest)})
         if isinstance(part, np.ndarray):
             out = part.copy()
             out[step] = changed(part[step], rest)
