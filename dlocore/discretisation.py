@@ -48,6 +48,12 @@ def smallest_n_u(problem: Problem) -> int:
     return problem.features.least
 
 
+def too_few(problem: Problem, n_u: int) -> SceneError:
+    """Return the error of fewer control points than `smallest_n_u`."""
+    reason = f"{len(problem.features.u)} grasps and loads need a knot each"
+    return SceneError("quality.n_u", n_u, f"at least {smallest_n_u(problem)} in this scene", reason)
+
+
 def make_grid(problem: Problem, n_u: int) -> Grid:
     """Return the grid of `n_u` control points for a problem, with the start shape on it.
 
@@ -63,8 +69,7 @@ def make_grid(problem: Problem, n_u: int) -> Grid:
             features = find_features(scene, sharp, grading, apart, kinks) if sharp or kinks else problem.features
             if n_u >= features.least:
                 return grid_on(problem, graded_knots(n_u, length, *features[:4]))
-    reason = f"{len(problem.features.u)} grasps and loads need a knot each"
-    raise SceneError("quality.n_u", n_u, f"at least {smallest_n_u(problem)} in this scene", reason)
+    raise too_few(problem, n_u)
 
 
 def grid_on(problem: Problem, knots: Floats) -> Grid:

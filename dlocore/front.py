@@ -175,7 +175,7 @@ def _least_squares(
     assert quality.n_u is not None
     assert quality.n_t is not None
     if again is None:
-        _check_n_t(problem, quality.n_t)
+        check_n_t(problem, quality.n_t)
         level = march_given(problem, quality.n_u, quality.n_t, monitor)
     else:
         level = again.level
@@ -248,7 +248,8 @@ def _least_squares(
     return _answer(monitor, method, Outcome(level, status, message + doubt, errors), find_forces)
 
 
-def _check_n_t(problem: Problem, n_t: int) -> None:
+def check_n_t(problem: Problem, n_t: int) -> None:
+    """Raise SceneError where a grid has fewer control points in time than `smallest_n_t`."""
     least = smallest_n_t(problem)
     if n_t < least:
         reason = "Every jump in the grasps' motion needs knots in time"
@@ -260,7 +261,7 @@ def _given(problem: Problem, quality: Quality, monitor: Monitor, level: Level | 
     assert quality.n_u is not None
     assert quality.n_t is not None
     if level is None:
-        _check_n_t(problem, quality.n_t)
+        check_n_t(problem, quality.n_t)
         level = evenly_fitted(march_given(problem, quality.n_u, quality.n_t, monitor))
     problem = level.problem
     record_level(problem, level, monitor)

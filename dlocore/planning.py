@@ -3,10 +3,8 @@
 from dataclasses import dataclass
 
 from dlocore.companion import coarser, finer
-from dlocore.discretisation import smallest_n_u
-from dlocore.errors import SceneError
-from dlocore.events import smallest_n_t
-from dlocore.front import automatic_method
+from dlocore.discretisation import smallest_n_u, too_few
+from dlocore.front import automatic_method, check_n_t
 from dlocore.prediction import EffectReport
 from dlocore.problem import pose
 from dlocore.report import planned_effects
@@ -64,9 +62,9 @@ def plan(scene: Scene) -> Plan:
         marches = [stretched(problem, i) for i in range(_LEVEL + 1)]
     else:
         n_u, n_t, steps = quality.n_u, quality.n_t, given_steps(quality.n_t)
-        for name, given, least in (("n_u", n_u, smallest_n_u(problem)), ("n_t", n_t, smallest_n_t(problem))):
-            if given < least:
-                raise SceneError(f"quality.{name}", given, f"at least {least} in this scene")
+        if n_u < smallest_n_u(problem):
+            raise too_few(problem, n_u)
+        check_n_t(problem, n_t)
         marches = [Size(n_u, n_t, steps)]
         if quality.estimate:
             coarse = coarser(problem, marches[0]) if method == "march" else None
