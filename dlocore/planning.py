@@ -2,23 +2,30 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from dlocore.companion import coarser, finer
 from dlocore.discretisation import smallest_n_u, too_few
 from dlocore.front import automatic_method, check_n_t
 from dlocore.prediction import EffectReport
-from dlocore.problem import pose
+from dlocore.problem import Problem, pose
 from dlocore.report import planned_effects
 from dlocore.scene import Scene
 from dlocore.solvers.ladder import Size, given_steps, stretched
 
-# Medians measured on one 2-core cloud machine of 2026; they tell the order of the time it takes.
+# Medians measured on one 2-core cloud machine of 2026; they tell the order of the time it takes
+# (benchmarks/expected_times.py).
 _MARCH = {2: 9e-7, 3: 2.2e-6, 4: 3.1e-6}  # [s] per step and control point, by coordinates
 _ITERATION = 2.5e-4  # [s] of the least squares
 _UNKNOWNS = 1.6e-9  # [s] per iteration, time span and cubed number of free coordinates
 _SETUP = 5e-4  # [s]
 _REFERENCE = {2: 2e-5, 3: 4e-5}  # [s] of the reference per step and element, by dimensions
 _RODS = ((20, 150), (40, 250), (80, 450))  # elements and steps of the rods that most scenes need
-_LEVEL = 1  # of refinement that most scenes end at
+_LEVEL = 1  # of refinement that most scenes end at, ...
+_CLIMB = 4.0  # ... and times the time up to there that the median one takes
+# times the time, as steps take more iterations, are divided where something is struck, and have to be more
+_RUBS, _TOUCHES, _MEETS_ITSELF = 1.5, 5.0, 40.0
+_EVENTS = 1.5  # power of one more than the events of a motion
 _ITERATIONS = 8
 
 
@@ -33,7 +40,8 @@ class Plan:
         method: "march", "spacetime", "paper" or "reference".
         n_u, n_t, steps: the grid: as given, or the one at which most scenes meet their target; of the reference the
             nodes and the steps of its finest rod.
-        expected_time: about how long it would take here [s].
+        expected_time: the order of the time that it would take [s], as far as it is known before the motion: what is
+            struck, and what grows from it, decides.
     """
 
     dimensions: int
@@ -60,12 +68,13 @@ def plan(scene: Scene) -> Plan:
     if quality.n_u is None or quality.n_t is None:
         n_u, n_t, steps = stretched(problem, _LEVEL)
         marches = [stretched(problem, i) for i in range(_LEVEL + 1)]
+        factor = _CLIMB * _harder(problem)
     else:
         n_u, n_t, steps = quality.n_u, quality.n_t, given_steps(quality.n_t)
         if n_u < smallest_n_u(problem):
             raise too_few(problem, n_u)
         check_n_t(problem, n_t)
-        marches = [Size(n_u, n_t, steps)]
+        marches, factor = [Size(n_u, n_t, steps)], _harder(problem)
         if quality.estimate:
             coarse = coarser(problem, marches[0]) if method == "march" else None
             marches.append(coarse or finer(problem, marches[0]))
@@ -73,11 +82,12 @@ def plan(scene: Scene) -> Plan:
     if method == "reference":
         n_u, n_t, steps = _RODS[-1][0] + 1, _RODS[-1][1] + 1, _RODS[-1][1]
         marches = []
-    expected = _SETUP + sum(_MARCH[problem.nc] * size * count for size, _, count in marches)
+    expected = _SETUP + factor * sum(_MARCH[problem.nc] * size * count for size, _, count in marches)
     if method == "reference":
         expected += _REFERENCE[dimensions] * sum(elements * count for elements, count in _RODS)
     elif method != "march":
         expected += _ITERATIONS * (_ITERATION + _UNKNOWNS * n_t * (problem.nc * n_u) ** 3)
+    expected = min(expected, quality.time_budget or np.inf)
     return Plan(
         dimensions=dimensions,
         reason=problem.plane.reason,
@@ -88,3 +98,10 @@ def plan(scene: Scene) -> Plan:
         steps=steps,
         expected_time=expected,
     )
+
+
+def _harder(problem: Problem) -> float:
+    """Return how many times as long the steps of a motion take as those of a smooth one that touches nothing."""
+    rubs, touches = problem.friction is not None, problem.contact is not None
+    factor = _TOUCHES if touches else _RUBS if rubs else 1.0
+    return factor * (_MEETS_ITSELF if problem.self_contact is not None else 1.0) * (1 + len(problem.events)) ** _EVENTS

@@ -15,4 +15,4 @@ class PlanResponse(BaseModel):
     n_u: int = Field(description="Control points along the cable.", examples=[25])
     n_t: int = Field(description="Control points in time.", examples=[33])
     steps: int = Field(description="Time steps of the march.", examples=[160])
-    expected_time: float = Field(description="About how long a solve would take [s].", examples=[0.02])
+    expected_time: float = Field(description="The order of the time that a solve would take [s].", examples=[0.02])
