@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dlocore.discretisation import applied_forces
 from dlocore.errors import SceneError
-from dlocore.events import closed_grasps, marks_of, step_counts, time_knots
+from dlocore.events import closed_grasps, marks_of, step_counts
 from dlocore.grid import Grid
 from dlocore.holding import Starts
 from dlocore.kernels.sensitivity import factor_steps, follow_steps
@@ -30,9 +30,10 @@ from dlocore.problem import Problem, pose
 from dlocore.report import surface_of
 from dlocore.scene import Scene
 from dlocore.sideways import pose_as_shown
-from dlocore.solvers.march import March, march
+from dlocore.solvers.march import RHO, March, march
 from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.stretch import Entry, enter, with_what_lasts
+from dlocore.solvers.watched import watched
 from dlocore.spline import SplineSurface
 from dlocore.statics import start_grid
 
@@ -222,8 +223,9 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     """Return the derivatives of a predicted motion by parameters of its scene.
 
     The motion is marched once more on the prediction's grid, with the effects that it found, and differentiated step by
-    step: exact up to about 1e-6 of the largest derivative. Where steps can't be differentiated (contact, friction,
-    strands that touch, steps that had to be split) whole marches are compared instead, and `exact` and `reason` say so.
+    step: exact up to about 1e-6 of the largest derivative, for a time spline whose knots move with events alone. Where
+    steps can't be differentiated (contact, friction, strands that touch, steps that had to be split) whole marches are
+    compared instead, and `exact` and `reason` say so.
     A parameter that can't be less, or more, as a drag of zero or the place of a grasp at an end, is changed to the
     other side only: the derivative then errs by about the relative change of it over a change of 1e-4.
 
@@ -237,14 +239,21 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
         SceneError: a path leads to no number, or to one that can be neither less nor more.
     """
     scene, accuracy = prediction.scene, prediction.accuracy
-    found = {report.name: "" for report in prediction.effects if report.active}
-    called = {name: "the prediction found it" for name in found if name in ("plasticity", "self_contact", "obstacles")}
     values = [_number(scene, name) for name in wrt]
-    problem = pose_as_shown(scene, called, prediction.surface.control_points)
+    problem = _posed(prediction)
     monitor = Monitor(None, None, None)
     steps = _asked_for(problem, accuracy.steps)
-    grid = start_grid(problem, accuracy.n_u, monitor)
-    motion = march(problem, grid, steps, monitor)
+    own = None if prediction.level is None else prediction.level.motion
+    rho = RHO if own is None else own.rho
+    knots_t = prediction.surface.knots_t
+
+    def begun(problem: Problem) -> Grid:
+        """Return the prediction's grid with the start of a problem on it."""
+        grid = start_grid(problem, accuracy.n_u, monitor)
+        return watched(grid) if own is not None and own.grid.watched else grid
+
+    grid = begun(problem)
+    motion = march(problem, grid, steps, monitor, rho=rho)
     reason = objection(problem, motion)
     known = None
     if not reason and not scene.shape.settle:
@@ -258,7 +267,7 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
         for change in (width, -width):
             try:
                 other = pose(_with(scene, name, value + change), problem.called_for)
-                found.append((change, other, start_grid(other, accuracy.n_u, monitor)))
+                found.append((change, other, begun(other)))
             except SceneError as error:
                 refused.append(error)
                 found.append((0.0, problem, grid))
@@ -274,13 +283,15 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
         sides = around(name, value, STEP * size) if followed else []
         try:
             if known is not None:
-                surfaces = [_surface(p, g, *beside(known, p, g), accuracy.n_t) for _, p, g in sides]
+                surfaces = [_surface(p, g, *beside(known, p, g), _moved(knots_t, problem, p)) for _, p, g in sides]
         except ValueError as error:
             followed, reason = False, str(error)
         if not followed:
             sides = around(name, value, COARSE_STEP * size)
-            marched = [(p, g, march(p, g, steps, monitor)) for _, p, g in sides]
-            surfaces = [_surface(p, g, m.states, m.times, m.velocity, accuracy.n_t) for p, g, m in marched]
+            marched = [(p, g, march(p, g, steps, monitor, rho=rho)) for _, p, g in sides]
+            surfaces = [
+                _surface(p, g, m.states, m.times, m.velocity, _moved(knots_t, problem, p)) for p, g, m in marched
+            ]
         above.append(surfaces[0])
         below.append(surfaces[1])
         exact.append(followed)
@@ -291,16 +302,37 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     )  # fmt: skip
 
 
+def _posed(prediction: Prediction) -> Problem:
+    """Return the problem of a prediction, with the effects that it called for."""
+    if prediction.level is not None:
+        return pose(prediction.scene, prediction.level.posed.called_for)
+    active = {report.name for report in prediction.effects if report.active}
+    found = active & {"plasticity", "self_contact", "obstacles"}
+    called = dict.fromkeys(sorted(found), "the prediction found it")
+    return pose_as_shown(prediction.scene, called, prediction.surface.control_points)
+
+
 def _asked_for(problem: Problem, steps: int) -> int:
     """Return the number of steps that a march was asked for that took `steps`: stretches between events have more."""
     marks = marks_of(problem)
     return next((asked for asked in range(steps, 0, -1) if sum(step_counts(marks, asked)) <= steps), steps)
 
 
-def _surface(problem: Problem, grid: Grid, states: Floats, times: Floats, velocity: Floats, n_t: int) -> SplineSurface:
+def _moved(knots_t: Floats, problem: Problem, other: Problem) -> Floats:
+    """Return the time knots [s] of a motion of `problem` for that of another.
+
+    They move with the events; with the end alone where the other has an event more or less.
+    """
+    before, after = marks_of(problem), marks_of(other)
+    if len(before) != len(after):
+        before, after = before[:: len(before) - 1], after[:: len(after) - 1]
+    return np.interp(knots_t, before, after)
+
+
+def _surface(
+    problem: Problem, grid: Grid, states: Floats, times: Floats, velocity: Floats, knots_t: Floats
+) -> SplineSurface:
     """Return the bivariate spline of the centreline of marched states; theta is left out."""
-    knots_t = time_knots(problem, n_t)
-    assert knots_t is not None, "the prediction has one on as many control points"
     steps, n_u, nc = states.shape
     flat = fit_time(knots_t, times, states.reshape(steps, n_u * nc), velocity.reshape(-1))
     return surface_of(problem, grid.knots, knots_t, flat.reshape(len(knots_t) - 4, n_u, nc))

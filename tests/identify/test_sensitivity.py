@@ -104,6 +104,23 @@ def test_the_motion_beside_is_the_march_where_nothing_is_changed(index: int, mon
     np.testing.assert_allclose(velocity, motion.velocity, atol=1e-7 * problem.scene.cable.length)
 
 
+@pytest.mark.parametrize(
+    ("seed", "index"),
+    [(129, 112), (129, 119), (129, 28), (130, 224)],
+    ids=["watched at more points", "time knots moved", "and two events", "twist called for"],
+)
+def test_the_motion_between_both_is_the_predicted_one(seed: int, index: int) -> None:
+    # it was one on the grid as it would have been at first: up to 0.2 m beside, and derivatives as wrong
+    found = predict(draw(seed, index, small=True).make(), keep_grid=True)
+    assert found.status == "converged"
+    length = found.scene.cable.length
+    sensed = sensitivities(found, ["cable.linear_density"])
+    assert sensed.exact == (True,), sensed.reason
+    u, t = np.linspace(0.0, length, 9), np.linspace(0.0, found.surface.horizon, 9)
+    middle = 0.5 * (sensed.above[0].positions(u, t) + sensed.below[0].positions(u, t))
+    np.testing.assert_allclose(middle, found.surface.positions(u, t), atol=1e-5 * length)
+
+
 def test_contact_is_differentiated_by_whole_marches_and_said_so() -> None:
     from dlocore import Sphere
 
