@@ -26,7 +26,7 @@ from dlocore.holding import Starts
 from dlocore.kernels.sensitivity import factor_steps, follow_steps
 from dlocore.kernels.timefit import fit_time
 from dlocore.prediction import Prediction
-from dlocore.problem import Problem, pose
+from dlocore.problem import Problem, pose, stiffer
 from dlocore.report import surface_of
 from dlocore.scene import Scene
 from dlocore.sideways import pose_as_shown
@@ -240,7 +240,8 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     """
     scene, accuracy = prediction.scene, prediction.accuracy
     values = [_number(scene, name) for name in wrt]
-    problem = _posed(prediction)
+    hardness = _hardness(prediction)
+    problem = stiffer(_posed(prediction), hardness)
     monitor = Monitor(None, None, None)
     steps = _asked_for(problem, accuracy.steps)
     own = None if prediction.level is None else prediction.level.motion
@@ -266,7 +267,7 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
         found, refused = list[tuple[float, Problem, Grid]](), list[SceneError]()
         for change in (width, -width):
             try:
-                other = pose(_with(scene, name, value + change), problem.called_for)
+                other = stiffer(pose(_with(scene, name, value + change), problem.called_for), hardness)
                 found.append((change, other, begun(other)))
             except SceneError as error:
                 refused.append(error)
@@ -310,6 +311,14 @@ def _posed(prediction: Prediction) -> Problem:
     found = active & {"plasticity", "self_contact", "obstacles"}
     called = dict.fromkeys(sorted(found), "the prediction found it")
     return pose_as_shown(prediction.scene, called, prediction.surface.control_points)
+
+
+def _hardness(prediction: Prediction) -> float:
+    """Return how many times stiffer than posed contact had to be."""
+    if prediction.level is None:
+        return 1.0
+    posed, solved = (x.self_contact or x.contact for x in (prediction.level.posed, prediction.level.problem))
+    return 1.0 if posed is None or solved is None else solved.stiffness / posed.stiffness
 
 
 def _asked_for(problem: Problem, steps: int) -> int:

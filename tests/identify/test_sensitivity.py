@@ -132,6 +132,19 @@ def test_contact_is_differentiated_by_whole_marches_and_said_so() -> None:
     assert np.isfinite(sensed(U, T)).all()
 
 
+def test_contact_that_a_prediction_had_to_make_stiffer_is_as_stiff_beside_it() -> None:
+    # a strand that strikes a ball and goes through it on contact as posed: 11 % of the length beside the prediction
+    found = predict(draw(130, 63, small=True).make())
+    level = found.level
+    assert level is not None
+    assert level.problem.contact.stiffness > 100.0 * level.posed.contact.stiffness
+    sensed = sensitivities(found, ["environment.gravity[2]"])
+    length = found.scene.cable.length
+    u, t = np.linspace(0.0, length, 9), np.linspace(0.0, found.surface.horizon, 9)
+    middle = 0.5 * (sensed.above[0].positions(u, t) + sensed.below[0].positions(u, t))
+    np.testing.assert_allclose(middle, found.surface.positions(u, t), atol=5e-3 * length)
+
+
 @pytest.mark.parametrize(
     "path", ["cable.colour", "grasps[3].u", "grasps[0].start", "cable", "environment.gravity[7]", "__class__", "a b"]
 )
