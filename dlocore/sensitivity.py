@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dlocore.discretisation import applied_forces
 from dlocore.errors import SceneError
-from dlocore.events import closed_grasps, marks_of, step_counts
+from dlocore.events import closed_grasps, marks_of
 from dlocore.grid import Grid
 from dlocore.holding import Starts
 from dlocore.kernels.sensitivity import factor_steps, follow_steps
@@ -30,7 +30,7 @@ from dlocore.problem import Problem, pose, stiffer
 from dlocore.report import surface_of
 from dlocore.scene import Scene
 from dlocore.sideways import pose_as_shown
-from dlocore.solvers.march import RHO, March, march
+from dlocore.solvers.march import March, march
 from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.stretch import Entry, enter, with_what_lasts
 from dlocore.solvers.watched import watched
@@ -188,7 +188,7 @@ def _enter(
     q = np.ascontiguousarray(q)
     entry = enter(problem, grid, grasps, starts, own, h, before, q, v, history, load)
     a, G = with_what_lasts(problem, grid, entry, entry.a, h, q, history)
-    return entry, a.copy(), G.copy()
+    return entry, a, G
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -222,10 +222,10 @@ class Sensitivities:
 def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     """Return the derivatives of a predicted motion by parameters of its scene.
 
-    The motion is marched once more on the prediction's grid, with the effects that it found, and differentiated step by
-    step: exact up to about 1e-6 of the largest derivative, for a time spline whose knots move with events alone. Where
-    steps can't be differentiated (contact, friction, strands that touch, steps that had to be split) whole marches are
-    compared instead, and `exact` and `reason` say so.
+    The prediction's march, on its grid and with the effects that it found, is differentiated step by step: exact up to
+    about 1e-6 of the largest derivative, for a time spline whose knots move with events alone. Where steps can't be
+    differentiated (contact, friction, strands that touch, steps that had to be split) whole marches are compared
+    instead, and `exact` and `reason` say so.
     A parameter that can't be less, or more, as a drag of zero or the place of a grasp at an end, is changed to the
     other side only: the derivative then errs by about the relative change of it over a change of 1e-4.
 
@@ -240,21 +240,15 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     """
     scene, accuracy = prediction.scene, prediction.accuracy
     values = [_number(scene, name) for name in wrt]
-    hardness = _hardness(prediction)
-    problem = stiffer(_posed(prediction), hardness)
     monitor = Monitor(None, None, None)
-    steps = _asked_for(problem, accuracy.steps)
-    own = None if prediction.level is None else prediction.level.motion
-    rho = RHO if own is None else own.rho
-    knots_t = prediction.surface.knots_t
+    problem, motion = _solved(prediction, monitor)
+    hardness, knots_t = _hardness(prediction), prediction.surface.knots_t
 
     def begun(problem: Problem) -> Grid:
         """Return the prediction's grid with the start of a problem on it."""
         grid = start_grid(problem, accuracy.n_u, monitor)
-        return watched(grid) if own is not None and own.grid.watched else grid
+        return watched(grid) if motion.grid.watched else grid
 
-    grid = begun(problem)
-    motion = march(problem, grid, steps, monitor, rho=rho)
     reason = objection(problem, motion)
     known = None
     if not reason and not scene.shape.settle:
@@ -271,7 +265,7 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
                 found.append((change, other, begun(other)))
             except SceneError as error:
                 refused.append(error)
-                found.append((0.0, problem, grid))
+                found.append((0.0, problem, motion.grid))
         if len(refused) == len(found):
             raise SceneError("wrt", name, "a number that can be changed a little", str(refused[0]).rstrip("."))
         return found
@@ -289,7 +283,7 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
             followed, reason = False, str(error)
         if not followed:
             sides = around(name, value, COARSE_STEP * size)
-            marched = [(p, g, march(p, g, steps, monitor, rho=rho)) for _, p, g in sides]
+            marched = [(p, g, march(p, g, motion.asked, monitor, rho=motion.rho)) for _, p, g in sides]
             surfaces = [
                 _surface(p, g, m.states, m.times, m.velocity, _moved(knots_t, problem, p)) for p, g, m in marched
             ]
@@ -303,14 +297,17 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     )  # fmt: skip
 
 
-def _posed(prediction: Prediction) -> Problem:
-    """Return the problem of a prediction, with the effects that it called for."""
-    if prediction.level is not None:
-        return pose(prediction.scene, prediction.level.posed.called_for)
+def _solved(prediction: Prediction, monitor: Monitor) -> tuple[Problem, March]:
+    """Return the problem of a prediction as it was solved, and its march; of a reference, which has none, one anew."""
+    level = prediction.level
+    if level is not None:
+        return level.problem, level.motion
     active = {report.name for report in prediction.effects if report.active}
     found = active & {"plasticity", "self_contact", "obstacles"}
     called = dict.fromkeys(sorted(found), "the prediction found it")
-    return pose_as_shown(prediction.scene, called, prediction.surface.control_points)
+    problem = pose_as_shown(prediction.scene, called, prediction.surface.control_points)
+    accuracy = prediction.accuracy
+    return problem, march(problem, start_grid(problem, accuracy.n_u, monitor), accuracy.steps, monitor)
 
 
 def _hardness(prediction: Prediction) -> float:
@@ -319,12 +316,6 @@ def _hardness(prediction: Prediction) -> float:
         return 1.0
     posed, solved = (x.self_contact or x.contact for x in (prediction.level.posed, prediction.level.problem))
     return 1.0 if posed is None or solved is None else solved.stiffness / posed.stiffness
-
-
-def _asked_for(problem: Problem, steps: int) -> int:
-    """Return the number of steps that a march was asked for that took `steps`: stretches between events have more."""
-    marks = marks_of(problem)
-    return next((asked for asked in range(steps, 0, -1) if sum(step_counts(marks, asked)) <= steps), steps)
 
 
 def _moved(knots_t: Floats, problem: Problem, other: Problem) -> Floats:
