@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import get_args
 
 from app import commands, identify_commands, study_command
-from dlocore.scene import Method
+from dlocore.scene.scene import Method
 
 _DESCRIPTION = "Predict how a cable moves when grippers move it."
 _EPILOG = """examples:

@@ -16,7 +16,7 @@ from app.schemas import PredictionRequest, from_prediction, to_scene
 from app.schemas.surroundings import QualityModel
 from app.settings import Settings
 from dlocore import Iteration, Prediction, Scene, SceneError
-from dlocore.scene import Method
+from dlocore.scene.scene import Method
 from dlocore.words import in_mm
 
 BAD_INPUT, NOT_CONVERGED = 2, 3
@@ -95,6 +95,7 @@ def calibrate(*, repeats: int, json: str | None) -> int:
     from tqdm import tqdm
 
     from dlocore import calibration
+    from dlocore.study.calibrating import measure
 
     if repeats < 1:
         raise CommandError(f"--repeats: got {repeats}. Allowed: at least 1.")
@@ -106,7 +107,7 @@ def calibrate(*, repeats: int, json: str | None) -> int:
             bar.set_postfix_str(what)
             bar.update(done - bar.n)
 
-        found = calibration.measure(repeats=repeats, on_progress=show)
+        found = measure(repeats=repeats, on_progress=show)
     try:
         found.save(path)
     except OSError as error:

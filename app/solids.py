@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from dlocore.obstacles import Obstacle
+from dlocore.scene.obstacles import Obstacle
 
 Floats = NDArray[np.float64]
 

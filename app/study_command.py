@@ -10,7 +10,7 @@ from typing import Any, cast
 
 from app.commands import CommandError, read_scene
 from dlocore import Scene, SceneError
-from dlocore.scene import EFFECTS, Switch
+from dlocore.scene.scene import EFFECTS, Switch
 
 WORSE = 4  # exit code: the comparison found changes for the worse
 _GRID = re.compile(r"(\d+)[x×](\d+)")

@@ -13,8 +13,8 @@ import anyio.to_thread
 from app.problems import ProblemError
 from app.settings import Settings
 from dlocore import Cancelled, Iteration, Prediction, Scene, predict
+from dlocore.accuracy.cost import Cost
 from dlocore.calibration import stored_cost
-from dlocore.cost import Cost
 
 GRACE = 5.0  # s that a solve may take beyond its deadline, which it looks at between steps
 _MEMORY = 0.8  # weight of the past in the running mean of solve times

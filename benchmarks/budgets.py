@@ -21,8 +21,8 @@ import numpy as np
 from benchmarks.hard.generator import draw
 from benchmarks.machine import machine_line
 from dlocore import Quality, SceneError, predict, warm_up
+from dlocore.accuracy.cost import Cost
 from dlocore.calibration import stored_cost
-from dlocore.cost import Cost
 
 TARGET = 1e-3  # of the length: of what the answers are compared with
 DEADLINE = 15.0  # [s] for that

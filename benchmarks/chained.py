@@ -17,8 +17,8 @@ import numpy as np
 from benchmarks.hard.generator import draw
 from benchmarks.machine import machine_line
 from dlocore import ControlPoints, Grasp, Prediction, Quality, Scene, SceneError, Still, Waypoints, predict, warm_up
-from dlocore.paths import Path
-from dlocore.shape import start_curve
+from dlocore.scene.paths import Path
+from dlocore.shape.shape import start_curve
 
 TARGET = 3e-3  # of the length
 DEADLINE = 2.0  # [s] for each of the three

@@ -25,24 +25,13 @@ import numpy as np
 from benchmarks.hard.curves import arc, bend
 from benchmarks.machine import machine_line
 from benchmarks.paper_case import errors, paper_scene, reference
-from dlocore import (
-    Cable,
-    Environment,
-    Grasp,
-    Move,
-    Points,
-    Prediction,
-    Quality,
-    Scene,
-    Straight,
-    discretisation,
-    energies,
-    given,
-    predict,
-)
-from dlocore.features import find_features
+from dlocore import Cable, Environment, Grasp, Move, Points, Prediction, Quality, Scene, Straight, energies, predict
 from dlocore.kernels.basis import GAUSS_2, basis_rows, build_tables, graded_knots
-from dlocore.solvers import ladder, stretch
+from dlocore.levels import given
+from dlocore.levels import level as levels
+from dlocore.problem import discretisation
+from dlocore.problem.features import find_features
+from dlocore.solvers import stretch
 from dlocore.spline import uniform_knots
 
 GAUSS_1 = np.polynomial.legendre.leggauss(1)
@@ -56,7 +45,7 @@ SLOWLY = 20.0  # [s]
 SPRINGS = 0.4  # [s]
 TIMES = np.array([0.5, 1.0, 2.0, 5.0, 10.0])  # [s]
 FIRST_MARCH = patch.object(given, "_OTHERWISE", ())  # is the answer, also where it folds the cable
-GENERAL = patch.object(ladder, "march_smooth", lambda *_: None)  # the compiled march makes its own tables
+GENERAL = patch.object(levels, "march_smooth", lambda *_: None)  # the compiled march makes its own tables
 ALL_ACCELERATION = patch.object(stretch, "lasting", lambda axes, q, a, G, *_: (a, G))  # that a stretch begins with
 CASES = tuple(product((1e-2, 1e-3), (0.0, 0.25, 0.5, 0.8)))  # EI [N m^2], grasp [m]
 

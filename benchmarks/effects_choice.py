@@ -19,7 +19,7 @@ import numpy as np
 from benchmarks.catalogue import catalogue
 from benchmarks.machine import machine_line
 from dlocore import Prediction, Scene, SceneError, SplineSurface, predict, warm_up
-from dlocore.scene import EFFECTS
+from dlocore.scene.scene import EFFECTS
 
 WITHIN = 0.01  # of the length: two answers that are no farther apart count as the same
 DEADLINE = 60.0  # [s] for one solve

@@ -22,7 +22,7 @@ from benchmarks.hard.generator import draw
 from benchmarks.machine import machine_line
 from dlocore import Prediction, Quality, Scene, SceneError, predict, warm_up
 from dlocore.front import automatic_method
-from dlocore.problem import pose
+from dlocore.problem.problem import pose
 
 TRUE = 1e-3  # of the length
 DEADLINE = 20.0  # [s]

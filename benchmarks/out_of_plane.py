@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from benchmarks.machine import machine_line
 from benchmarks.pairs import Pair, drawn, indices, paired, scenes_parser, solved
-from dlocore.problem import pose
+from dlocore.problem.problem import pose
 
 DEADLINE = 15.0  # [s]
 PULL = 1e-4  # of the length over the square of the time: the acceleration across the plane

@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.hard.generator import draw
 from dlocore import Prediction, Quality, Scene, SceneError, predict
-from dlocore.events import moments
+from dlocore.problem.events import moments
 
 
 class Drawn(NamedTuple):

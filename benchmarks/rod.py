@@ -17,8 +17,8 @@ from scipy.interpolate import CubicSpline
 
 from benchmarks.rod_kernel import march_plane, march_space
 from benchmarks.rod_scene import Hold, Rod, Start, breakpoints, material_grid, start_of
-from dlocore.paths import Still
-from dlocore.scene import Load, Scene
+from dlocore.scene.paths import Still
+from dlocore.scene.scene import Load, Scene
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

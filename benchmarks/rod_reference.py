@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.rod import richardson
-from dlocore.cable import Cable
-from dlocore.paths import Move
-from dlocore.scene import Environment, Grasp, Scene, Straight
+from dlocore.scene.cable import Cable
+from dlocore.scene.paths import Move
+from dlocore.scene.scene import Environment, Grasp, Scene, Straight
 
 
 def scene_of(case: dict[str, Any]) -> Scene:

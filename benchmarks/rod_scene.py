@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from dlocore.scene import ControlPoints, Grasp, Points, Scene
+from dlocore.scene.scene import ControlPoints, Grasp, Points, Scene
 from dlocore.spline import design_matrix, uniform_knots
 
 Floats = NDArray[np.float64]

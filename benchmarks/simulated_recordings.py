@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from dlocore import Cable, Environment, Grasp, Points, Scene, Waypoints
-from dlocore.problem import pose
+from dlocore.problem.problem import pose
 from dlocore.recordings import Recording
 from dlocore.solvers.march import march
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import design_matrix
-from dlocore.statics import start_grid
+from dlocore.statics.statics import start_grid
 
 Floats = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from benchmarks.machine import machine_line
 from dlocore import Cable, Environment, Grasp, Move, Quality, Scene, Straight, Table, predict, warm_up
-from dlocore.scene import Hold
+from dlocore.scene.scene import Hold
 from dlocore.study.judge import finest_march, largest_error
 from dlocore.study.scenes import hanging
 

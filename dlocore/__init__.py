@@ -2,22 +2,25 @@
 
 from typing import TYPE_CHECKING, Any
 
-from dlocore.cable import PRESETS, Cable
+from dlocore.answer.parts import Accuracy, EffectReport, GraspReaction, Iteration, MaterialMotion, StretchMotion
 from dlocore.errors import Cancelled, DloError, SceneError
-from dlocore.obstacles import Box, Capsule, Cylinder, Sphere
-from dlocore.paths import Move, Still, Waypoints
-from dlocore.prediction import (
-    Accuracy,
-    EffectReport,
-    GraspReaction,
-    Iteration,
-    MaterialMotion,
-    Prediction,
-    StretchMotion,
-    continued,
-)
+from dlocore.prediction import Prediction, continued
 from dlocore.recordings import Recording, load_recording, save_recording
-from dlocore.scene import ControlPoints, Environment, Grasp, Load, Material, Points, Quality, Scene, Straight, Table
+from dlocore.scene.cable import PRESETS, Cable
+from dlocore.scene.obstacles import Box, Capsule, Cylinder, Sphere
+from dlocore.scene.paths import Move, Still, Waypoints
+from dlocore.scene.scene import (
+    ControlPoints,
+    Environment,
+    Grasp,
+    Load,
+    Material,
+    Points,
+    Quality,
+    Scene,
+    Straight,
+    Table,
+)
 from dlocore.spline import SplineSurface
 
 if TYPE_CHECKING:
@@ -26,7 +29,7 @@ if TYPE_CHECKING:
     from dlocore.many import predict_many
     from dlocore.planning import Plan, plan
     from dlocore.sensitivity import Sensitivities, sensitivities
-    from dlocore.statics import Equilibrium, equilibrium
+    from dlocore.statics.statics import Equilibrium, equilibrium
     from dlocore.warming import warm_up
 
 __all__ = [
@@ -80,7 +83,12 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import the solver on first use: its compiler takes longer to import than the rest of the package together."""
-    homes = {"predict": "front", "warm_up": "warming", "equilibrium": "statics", "Equilibrium": "statics"}
+    homes = {
+        "predict": "front",
+        "warm_up": "warming",
+        "equilibrium": "statics.statics",
+        "Equilibrium": "statics.statics",
+    }
     homes |= {"plan": "planning", "Plan": "planning", "energies": "balance", "effect_forces": "balance"}
     homes |= {"predict_many": "many"}
     homes |= {"sensitivities": "sensitivity", "Sensitivities": "sensitivity"}

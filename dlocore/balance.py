@@ -3,17 +3,17 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dlocore.discretisation import grid_on, write_material
+from dlocore.answer.frames import directors
+from dlocore.answer.parts import MaterialMotion
 from dlocore.effects import laws
-from dlocore.frames import directors
-from dlocore.grid import Grid
 from dlocore.kernels.assembly import NO_RATES, History, assemble, multiply_scalar_band, stored_energy
 from dlocore.kernels.twisted import start_frames
-from dlocore.prediction import MaterialMotion
-from dlocore.problem import Problem
-from dlocore.scene import Scene
-from dlocore.sideways import pose_as_shown
+from dlocore.problem.discretisation import grid_on, write_material
+from dlocore.problem.grid import Grid
+from dlocore.problem.problem import Problem
+from dlocore.scene.scene import Scene
 from dlocore.spline import SplineSurface
+from dlocore.stability.sideways import pose_as_shown
 
 Floats = NDArray[np.float64]
 

@@ -6,7 +6,6 @@ march refined until it stands still.
 
 import json
 import os
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.cost import Cost, Rates, pareto_front
+from dlocore.accuracy.cost import Cost, Rates, pareto_front
 from dlocore.machine import machine, user_data_dir
 
 FORMAT = 1
@@ -100,27 +99,6 @@ def default_path() -> Path:
     """Return where the calibration of this user lies: ``calibration.json`` in the data directory of the service."""
     given = os.environ.get("DLO_DATA_DIR")
     return (Path(given).expanduser() if given else user_data_dir()) / FILE
-
-
-def measure(
-    *,
-    repeats: int = 5,
-    on_progress: Callable[[int, int, str], None] = lambda done, total, what: None,
-    cancelled: Callable[[], bool] = lambda: False,
-) -> Calibration:
-    """Measure this machine; it takes some tens of seconds of one core.
-
-    Args:
-        repeats: timed calls of each solve, at most.
-        on_progress: called before each part with how many are done, how many there are, and what comes.
-        cancelled: asked before each part; where it returns True the measurement stops.
-
-    Raises:
-        Cancelled: `cancelled` returned True.
-    """
-    from dlocore.study import calibrating  # the solver, which it measures, is slow to import
-
-    return calibrating.measure(repeats=repeats, on_progress=on_progress, cancelled=cancelled)
 
 
 def load(path: Path | None = None) -> Calibration | None:

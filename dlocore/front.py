@@ -7,12 +7,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.again import Again, as_solved, march_again
-from dlocore.companion import by_coarser, by_finer
-from dlocore.cost import Cost
-from dlocore.errors import SceneError
-from dlocore.events import smallest_n_t
-from dlocore.fallback import (
+from dlocore.accuracy.again import Again, as_solved, march_again
+from dlocore.accuracy.changes import MISSED_COUNTS
+from dlocore.accuracy.companion import by_coarser, by_finer
+from dlocore.accuracy.cost import Cost
+from dlocore.accuracy.fallback import (
     as_marched,
     by_march,
     errs,
@@ -22,21 +21,23 @@ from dlocore.fallback import (
     more_in_time,
     with_finer,
 )
-from dlocore.frames import material_of, stretch_of
-from dlocore.given import evenly_fitted, given_status, march_given
-from dlocore.prediction import Accuracy, GraspReaction, MaterialMotion, OnIteration, Prediction, Status
-from dlocore.problem import Problem, pose
-from dlocore.progress import record, record_level, surface_at
-from dlocore.refinement import climb
-from dlocore.report import WindowForces, effect_reports, elastic_energy, reactions
-from dlocore.review import neglected, objections
-from dlocore.scene import Method, Quality, Scene
-from dlocore.solvers.changes import MISSED_COUNTS
-from dlocore.solvers.ladder import Level
+from dlocore.accuracy.refinement import climb
+from dlocore.answer.frames import material_of, stretch_of
+from dlocore.answer.parts import Accuracy, GraspReaction, MaterialMotion, OnIteration, Status
+from dlocore.answer.report import WindowForces, effect_reports, elastic_energy, reactions
+from dlocore.errors import SceneError
+from dlocore.levels.given import evenly_fitted, given_status, march_given
+from dlocore.levels.level import Level
+from dlocore.levels.progress import record, record_level, surface_at
+from dlocore.levels.review import neglected, objections
+from dlocore.levels.whole_march import TORN, Outcome, march_status, sided
+from dlocore.prediction import Prediction
+from dlocore.problem.problem import Problem, pose
+from dlocore.problem.time_grid import smallest_n_t
+from dlocore.scene.scene import Method, Quality, Scene
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.paper import BEYOND, solve_as_printed
 from dlocore.solvers.spacetime import solve
-from dlocore.whole_march import TORN, Outcome, march_status, sided
 
 Floats = NDArray[np.float64]
 FindForces = Callable[[], tuple[WindowForces, ...]]

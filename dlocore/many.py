@@ -9,7 +9,7 @@ from dlocore.errors import SceneError, number
 from dlocore.front import predict
 from dlocore.machine import usable_cores
 from dlocore.prediction import Prediction
-from dlocore.scene import Scene
+from dlocore.scene.scene import Scene
 
 _NEVER = 2**31 - 1  # looks at what is younger, after which what is old is looked at
 _MOST_AT_ONCE = 16  # scenes that a thread takes: to wake another for each takes longer than to solve a short one

@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dlocore.companion import coarser, finer
-from dlocore.discretisation import smallest_n_u, too_few
+from dlocore.accuracy.companion import coarser, finer
+from dlocore.answer.parts import EffectReport
+from dlocore.answer.report import planned_effects
 from dlocore.front import automatic_method, check_n_t
-from dlocore.prediction import EffectReport
-from dlocore.problem import Problem, pose
-from dlocore.report import planned_effects
-from dlocore.scene import Scene
-from dlocore.solvers.ladder import Size, given_steps, stretched
+from dlocore.levels.level import Size, given_steps, stretched
+from dlocore.problem.discretisation import smallest_n_u, too_few
+from dlocore.problem.problem import Problem, pose
+from dlocore.scene.scene import Scene
 
 # Medians measured on one 2-core cloud machine of 2026; they tell the order of the time it takes
 # (benchmarks/expected_times.py).

@@ -18,24 +18,25 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dlocore.discretisation import applied_forces
+from dlocore.answer.report import surface_of
 from dlocore.errors import SceneError
-from dlocore.events import closed_grasps, marks_of
-from dlocore.grid import Grid
-from dlocore.holding import Starts
 from dlocore.kernels.sensitivity import factor_steps, follow_steps
 from dlocore.kernels.timefit import fit_time
 from dlocore.prediction import Prediction
-from dlocore.problem import Problem, pose, stiffer
-from dlocore.report import surface_of
-from dlocore.scene import Scene
-from dlocore.sideways import pose_as_shown
+from dlocore.problem.discretisation import applied_forces
+from dlocore.problem.events import closed_grasps
+from dlocore.problem.grid import Grid
+from dlocore.problem.holding import Starts
+from dlocore.problem.problem import Problem, pose, stiffer
+from dlocore.problem.time_grid import marks_of
+from dlocore.scene.scene import Scene
 from dlocore.solvers.march import March, march
 from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.stretch import Entry, enter, with_what_lasts
 from dlocore.solvers.watched import watched
 from dlocore.spline import SplineSurface
-from dlocore.statics import start_grid
+from dlocore.stability.sideways import pose_as_shown
+from dlocore.statics.statics import start_grid
 
 Floats = NDArray[np.float64]
 

@@ -11,18 +11,18 @@ from pathlib import Path
 import numpy as np
 
 from dlocore.balance import energies
-from dlocore.cable import Cable
-from dlocore.caching import is_kept
-from dlocore.effects.selfcontact import nearest_strands
+from dlocore.compiling.caching import is_kept
 from dlocore.front import predict
 from dlocore.kernels.march import march_steps
-from dlocore.obstacles import Sphere
-from dlocore.paths import Move
 from dlocore.prediction import Prediction
-from dlocore.scene import Environment, Grasp, Points, Quality, Scene, Straight, Switch, Table
+from dlocore.problem.strands import nearest_strands
+from dlocore.scene.cable import Cable
+from dlocore.scene.obstacles import Sphere
+from dlocore.scene.paths import Move
+from dlocore.scene.scene import Environment, Grasp, Points, Quality, Scene, Straight, Switch, Table
 from dlocore.sensitivity import sensitivities
 from dlocore.spline import uniform_knots
-from dlocore.statics import equilibrium
+from dlocore.statics.statics import equilibrium
 
 U = np.linspace(0.0, 1.0, 12)[:, None]
 ARC = Points(points=U * [1.0, 0.0, 0.0] + 0.05 * np.sin(3.0 * U) * [0.0, 1.0, 0.0])

@@ -9,9 +9,9 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from dlocore.errors import SceneError
-from dlocore.fit import forget_fits
-from dlocore.scene import ControlPoints, Points, Straight
-from dlocore.shape import StartCurve, fit_to_knots, start_curve, velocity_to_knots
+from dlocore.scene.scene import ControlPoints, Points, Straight
+from dlocore.shape.fit import forget_fits
+from dlocore.shape.shape import StartCurve, fit_to_knots, start_curve, velocity_to_knots
 from dlocore.spline import design_matrix, uniform_knots
 
 Floats = NDArray[np.float64]

@@ -7,7 +7,7 @@ import numpy as np
 from app.recording.style import OBSTACLE, Floats, chunk
 from app.solids import pose
 from dlocore import Box, Capsule, Cylinder, Sphere
-from dlocore.obstacles import Obstacle
+from dlocore.scene.obstacles import Obstacle
 
 if TYPE_CHECKING:
     from rerun.chunk import Chunk

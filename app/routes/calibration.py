@@ -76,7 +76,9 @@ async def measure(request: Request, service: TheService) -> Response:
     running = service.measurements.under_way(KIND)
 
     def work(tell: Tell, cancelled: Any) -> bytes:
-        found = calibration.measure(on_progress=tell, cancelled=cancelled)
+        from dlocore.study import calibrating  # the solver, which it measures, is slow to import
+
+        found = calibrating.measure(on_progress=tell, cancelled=cancelled)
         found.save(service.settings.calibration_file)
         return orjson.dumps(document_of(found, 2))
 

@@ -24,7 +24,7 @@ from app.routes.body import JsonRoute, calling_when_gone
 from app.schemas import EXAMPLES, PredictionList, PredictionRequest
 from app.schemas.base import LIKE, RunId
 from app.service import Service, TheService
-from dlocore.prediction import Status
+from dlocore.answer.parts import Status
 
 router = APIRouter(prefix="/v1/predictions", tags=["predictions"], route_class=JsonRoute)
 _ISO = re.compile(r"\d{4}-\d\d-\d\d[Tt ]\d\d:\d\d(:\d\d([.,]\d+)?)?([Zz]|[+-]\d\d:?\d\d)", re.ASCII)

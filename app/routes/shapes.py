@@ -14,7 +14,7 @@ from app.routes.body import JsonRoute
 from app.schemas.convert import check_columns
 from app.schemas.fit import FIT_EXAMPLES, FitRequest, FitResponse
 from dlocore import SceneError
-from dlocore.cloud import fit_cloud
+from dlocore.shape.cloud import fit_cloud
 from dlocore.spline import DEGREE
 
 router = APIRouter(tags=["shapes"], route_class=JsonRoute)

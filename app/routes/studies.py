@@ -22,7 +22,7 @@ from app.service import Service, TheService
 from app.studies import StudyStore
 from dlocore import Scene
 from dlocore.errors import within
-from dlocore.scene import Switch
+from dlocore.scene.scene import Switch
 from dlocore.study.plan import Plan
 from dlocore.study.record import to_document
 from dlocore.study.running import run_study

@@ -42,9 +42,9 @@ from dlocore import (
     continued,
 )
 from dlocore.errors import within
-from dlocore.obstacles import Obstacle
-from dlocore.paths import Path
-from dlocore.scene import Shape
+from dlocore.scene.obstacles import Obstacle
+from dlocore.scene.paths import Path
+from dlocore.scene.scene import Shape
 
 
 class Motion(NamedTuple):

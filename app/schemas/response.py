@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from dlocore import Prediction
-from dlocore.prediction import Iteration, Status
+from dlocore.answer.parts import Iteration, Status
 from dlocore.spline import DEGREE
 
 Floats = NDArray[np.float64]

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Discriminator, Field, Tag
 
 from app.schemas.base import Flag, Model, Number, Point, Vector
-from dlocore.scene import MAX_STRAIN
+from dlocore.scene.scene import MAX_STRAIN
 
 ControlPoint = Annotated[list[Number], Field(min_length=3, max_length=4)]
 Settle = Annotated[

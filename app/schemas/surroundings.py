@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from app.schemas.base import BY_FORM, OBJECT, TEXT, Count, Flag, Model, Number, Vector
-from dlocore.scene import MAX_OBSTACLES
+from dlocore.scene.scene import MAX_OBSTACLES
 
 Switch = Literal["auto", "on", "off"]
 Length = Annotated[Number, Field(gt=0.0, le=1e4)]

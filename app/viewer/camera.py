@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.viewer.draft import Draft
-from dlocore.shape import StartCurve
+from dlocore.shape.shape import StartCurve
 
 Floats = NDArray[np.float64]
 FIELD_OF_VIEW = 0.7  # rad, vertical

@@ -8,7 +8,7 @@ from statistics import median
 import dlocore
 from dlocore import DloError, Prediction, Quality, Scene
 from dlocore.errors import Cancelled
-from dlocore.scene import Switch
+from dlocore.scene.scene import Switch
 
 REPEATS = 5  # of each march; the median counts
 LONGEST = 10.0  # s, of one march

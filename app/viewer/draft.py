@@ -18,7 +18,7 @@ from app.schemas.convert import StoredMotion, cable_of, shape_of
 from app.schemas.request import PAPER
 from dlocore import Cable, Scene, SceneError
 from dlocore.errors import within
-from dlocore.shape import StartCurve, start_curve
+from dlocore.shape.shape import StartCurve, start_curve
 
 Floats = NDArray[np.float64]
 Path = Sequence[str | int]

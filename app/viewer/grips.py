@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from app.viewer.draft import Draft
 from dlocore import SplineSurface
-from dlocore.paths import Profile
-from dlocore.scene import Hold
-from dlocore.shape import StartCurve
+from dlocore.scene.paths import Profile
+from dlocore.scene.scene import Hold
+from dlocore.shape.shape import StartCurve
 
 Floats = NDArray[np.float64]
 Motion = Literal["moves", "stays", "follows waypoints"]

@@ -7,7 +7,7 @@ from app.solids import pose
 from app.viewer import geometry
 from app.viewer.palette import OBSTACLE
 from dlocore import Box, Capsule, Cylinder, Sphere
-from dlocore.obstacles import Obstacle
+from dlocore.scene.obstacles import Obstacle
 
 SIDES, RINGS = 48, 12  # of round ones
 

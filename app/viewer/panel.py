@@ -19,7 +19,7 @@ from app.viewer.playback import Playback
 from app.viewer.shapes import with_settling
 from dlocore import Prediction, SplineSurface
 from dlocore.calibration import Measured
-from dlocore.shape import StartCurve
+from dlocore.shape.shape import StartCurve
 
 SPEEDS = {"¼×": 0.25, "½×": 0.5, "1×": 1.0, "2×": 2.0}
 SLIDER_STEPS = 160  # of the timeline

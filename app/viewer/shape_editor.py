@@ -9,7 +9,7 @@ from viser import ClientHandle
 
 from app.viewer import geometry, shapes
 from app.viewer.palette import BRAND, linear
-from dlocore.shape import StartCurve
+from dlocore.shape.shape import StartCurve
 
 Floats = NDArray[np.float64]
 BEAD = 0.016  # radius, of the cable's length

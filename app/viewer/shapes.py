@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.viewer.draft import Draft
-from dlocore.shape import StartCurve
+from dlocore.shape.shape import StartCurve
 
 Floats = NDArray[np.float64]
 HANDLES = 13  # points that can be dragged

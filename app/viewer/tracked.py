@@ -14,7 +14,7 @@ from dlocore import Environment, Prediction, SceneError, Waypoints
 from dlocore.identify import Candidate, Replay, Resolution
 from dlocore.identify.estimate import WINDOW, cable_of, cut
 from dlocore.recordings import Recording, load_recording
-from dlocore.scene import ControlPoints
+from dlocore.scene.scene import ControlPoints
 
 Floats = NDArray[np.float64]
 LARGEST = 20_000_000  # bytes

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from app.viewer.draft import Draft
 from app.viewer.shapes import scaled, with_points
 from dlocore import SceneError
-from dlocore.cloud import fit_cloud
 from dlocore.errors import points_array
-from dlocore.fit import MAX_LENGTH_MISMATCH
+from dlocore.shape.cloud import fit_cloud
+from dlocore.shape.fit import MAX_LENGTH_MISMATCH
 
 Floats = NDArray[np.float64]
 LARGEST = 10_000_000  # bytes

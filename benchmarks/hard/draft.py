@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore import Cable, Environment, Grasp, Load, Move, Quality, Scene
-from dlocore.scene import Shape, Switch
+from dlocore.scene.scene import Shape, Switch
 
 Floats = NDArray[np.float64]
 Rng = np.random.Generator

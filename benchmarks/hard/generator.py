@@ -18,9 +18,9 @@ from benchmarks.hard.surroundings import (
     draw_switches,
 )
 from dlocore import Move, Quality, Scene
-from dlocore.discretisation import smallest_n_u
-from dlocore.events import smallest_n_t
-from dlocore.problem import pose
+from dlocore.problem.discretisation import smallest_n_u
+from dlocore.problem.problem import pose
+from dlocore.problem.time_grid import smallest_n_t
 
 IMPOSSIBLE = 0.05  # share of scenes that no cable can follow
 

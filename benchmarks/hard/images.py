@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from dlocore import Box, Capsule, Cylinder, Move, Points, Scene, Sphere, SplineSurface, Straight, Waypoints
-from dlocore.obstacles import Obstacle
-from dlocore.paths import Path
-from dlocore.scene import Shape
+from dlocore.scene.obstacles import Obstacle
+from dlocore.scene.paths import Path
+from dlocore.scene.scene import Shape
 
 Floats = NDArray[np.float64]
 

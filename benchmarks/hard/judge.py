@@ -13,19 +13,19 @@ from benchmarks.hard.generator import Drawn
 from benchmarks.hard.laws import measure
 from benchmarks.hard.taut import words_if_too_short
 from dlocore import Prediction, Scene, SceneError, predict
-from dlocore.companion import TOO_LATE, UNKNOWN
-from dlocore.determined import DISTURBED, UNSEEN, bent
-from dlocore.discretisation import smallest_n_u
-from dlocore.driven import driven, words
-from dlocore.events import moments
-from dlocore.given import evenly_fitted, given_status
-from dlocore.problem import Problem, pose
-from dlocore.progress import surface_at
-from dlocore.solvers.ladder import Size, given_steps, stretched
+from dlocore.accuracy.companion import TOO_LATE, UNKNOWN
+from dlocore.levels.driven import driven, words
+from dlocore.levels.given import evenly_fitted, given_status
+from dlocore.levels.level import Size, given_steps, stretched
+from dlocore.levels.progress import surface_at
+from dlocore.levels.whole_march import march_level
+from dlocore.problem.discretisation import smallest_n_u
+from dlocore.problem.events import moments
+from dlocore.problem.problem import Problem, pose
 from dlocore.solvers.march import march
 from dlocore.solvers.monitor import Monitor, TimeIsUp
-from dlocore.statics import settles_elsewhere, start_grid
-from dlocore.whole_march import march_level
+from dlocore.stability.determined import DISTURBED, UNSEEN, bent
+from dlocore.statics.statics import settles_elsewhere, start_grid
 
 WRONG = 0.01  # of the length: an error that an answer has to tell of
 SURE = 0.3  # of a distance from the refined march: within it the refined marches agree where they can tell

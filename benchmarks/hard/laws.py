@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore import Grasp, Prediction, Scene, Waypoints, energies
-from dlocore.shape import start_curve
+from dlocore.shape.shape import start_curve
 
 Floats = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 from benchmarks.hard import curves
 from benchmarks.hard.draft import Draft, Floats, Rng, chance, in_room, pick, spread
 from dlocore import Grasp, Load, Points, Still, Straight, Waypoints
-from dlocore.scene import Hold
-from dlocore.shape import StartCurve, start_curve
+from dlocore.scene.scene import Hold
+from dlocore.shape.shape import StartCurve, start_curve
 
 SLACK = 0.97  # of the cable between two grasps: as far apart as they go, where they are not pulled taut
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmarks.hard.judge import WRONG, by_a_march, is_undetermined
-from dlocore.determined import DISTURBED
+from dlocore.stability.determined import DISTURBED
 
 GROWTHS = (WRONG / DISTURBED, 0.1 * WRONG / DISTURBED)  # of a change of the start: beyond it a motion is not determined
 _DRAWS = 200_000

@@ -23,7 +23,7 @@ from dlocore import (
     equilibrium,
     predict,
 )
-from dlocore.scene import Switch
+from dlocore.scene.scene import Switch
 
 Floats = NDArray[np.float64]
 BENDING = (1e-4, 1e-3, 1e-2)  # [N m^2]

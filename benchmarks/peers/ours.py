@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.peers.cases import Case, Floats
 from benchmarks.peers.search import TOLERANCES, Setting, Value
 from dlocore import Prediction, Quality, Scene, predict
-from dlocore.fit import forget_fits
+from dlocore.shape.fit import forget_fits
 
 N_U = (7, 9, 11, 13, 15, 17, 21, 25, 33, 41, 49)
 N_T = (9, 11, 13, 15, 17, 19, 21, 25, 29, 33, 41, 49, 65, 97)

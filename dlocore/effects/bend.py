@@ -6,8 +6,8 @@ kappa_0 is the paper's strain memory eps_0 at the point: the curvature of the st
 from dataclasses import dataclass
 from typing import ClassVar
 
+from dlocore.compiling.kernel import law
 from dlocore.effects.base import Effect, Site, Symmetric, Vector
-from dlocore.kernels.compile import law
 
 
 @dataclass(frozen=True)

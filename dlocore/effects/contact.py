@@ -12,8 +12,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from dlocore.compiling.kernel import law
 from dlocore.effects.base import Effect, Site
-from dlocore.kernels.compile import law
 
 DEEPEST = 0.02  # of the diameter
 PASSAGE = 0.005  # of the diameter: the depth w at which the stiffness is whole

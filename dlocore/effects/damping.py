@@ -8,8 +8,8 @@ it is that of sections that do not twist (`kernels/bishop.py`); in the plane, th
 from dataclasses import dataclass
 from typing import ClassVar
 
+from dlocore.compiling.kernel import law
 from dlocore.effects.base import Effect, Site, Symmetric, Vector
-from dlocore.kernels.compile import law
 
 
 @dataclass(frozen=True)

@@ -7,16 +7,16 @@ not follow; with D = 1 in those and 0 in the others,
     d = |q| - radius,   n = q / |q|,   H = (D - n n') / |q|.
 
 The layout of a row is here, beside the compiled code that reads it: numba freezes these numbers into its cache, which
-follows the source of this file but not that of `dlocore/obstacles.py`.
+follows the source of this file but not that of `dlocore/scene/obstacles.py`.
 """
 
 from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import kernel, law
 from dlocore.effects.base import Symmetric, Vector
 from dlocore.effects.kinds import CAPSULE, CYLINDER, SPHERE
-from dlocore.kernels.compile import kernel, law
 
 ROW = 17  # numbers in a row: kind, centre 3, axes of the body's frame 9, half sizes 3, friction
 

@@ -15,8 +15,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from dlocore.compiling.kernel import law
 from dlocore.effects.base import Effect, Site, Symmetric, Vector
-from dlocore.kernels.compile import law
 
 STICK = 0.02  # of the diameter: s_0 of steps of COARSE and longer ones
 COARSE = 0.05  # [s] for a cable of 1 m; with the root of the length, as the period of one that swings

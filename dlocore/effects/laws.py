@@ -1,11 +1,12 @@
 """The one list of compiled laws: which of them act at each site.
 
 `active[EFFECT]` switches a law, `p[EFFECT]` holds its parameters. A law that is not active costs one untaken branch.
-Rows of `p` from COUNT on are obstacles (`dlocore/obstacles.py`).
+Rows of `p` from COUNT on are obstacles (`dlocore/scene/obstacles.py`).
 """
 
 from typing import Any
 
+from dlocore.compiling.kernel import law
 from dlocore.effects.base import Symmetric, Vector
 from dlocore.effects.bend import bending_energy, bending_moment
 from dlocore.effects.damping import damping_moment
@@ -14,7 +15,6 @@ from dlocore.effects.drag import quadratic_drag
 from dlocore.effects.plasticity import yielded
 from dlocore.effects.stretch import tension
 from dlocore.effects.twist import torque
-from dlocore.kernels.compile import law
 
 (
     STRETCH, BEND, DAMPING, QUADRATIC_DRAG, TWIST, TWIST_DAMPING, BENDING_MEMORY, TWIST_MEMORY, STRETCH_MEMORY, CONTACT,

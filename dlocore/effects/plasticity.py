@@ -14,8 +14,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from dlocore.compiling.kernel import law
 from dlocore.effects.base import Effect, Site, Symmetric, Vector
-from dlocore.kernels.compile import law
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ strain lets them die out (docs/model.md eq. 7a).
 from dataclasses import dataclass
 from typing import ClassVar
 
+from dlocore.compiling.kernel import law
 from dlocore.effects.base import Effect, Site
-from dlocore.kernels.compile import law
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ length is that of the other coordinates.
 from dataclasses import dataclass
 from typing import ClassVar
 
+from dlocore.compiling.kernel import law
 from dlocore.effects.base import Effect, Site
-from dlocore.kernels.compile import law
 
 
 @dataclass(frozen=True)

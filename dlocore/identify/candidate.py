@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.cable import Cable
-from dlocore.problem import Problem
-from dlocore.scene import Environment
+from dlocore.problem.problem import Problem
+from dlocore.scene.cable import Cable
+from dlocore.scene.scene import Environment
 
 Floats = NDArray[np.float64]
 

@@ -1,136 +1,31 @@
-"""identify(recordings, ...): robust Gauss-Newton over whole windows, with intervals and what could not be seen."""
+"""identify(recordings, ...): the parameters of a cable from windows of recordings, first of short ones."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from time import perf_counter
-from typing import Literal, cast
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.cable import Cable
-from dlocore.errors import Cancelled, SceneError
+from dlocore.errors import SceneError
 from dlocore.identify.candidate import Candidate
+from dlocore.identify.identification import Identification, Progress
+from dlocore.identify.intervals import assess
 from dlocore.identify.parameters import DEFAULT, Parameter, parameters, prepared
-from dlocore.identify.replay import Played, Replay, Resolution, common_references
-from dlocore.identify.rest import Rest, Settled
+from dlocore.identify.replay import Resolution
+from dlocore.identify.search import Search
 from dlocore.recordings import Recording
-from dlocore.scene import Environment
+from dlocore.scene.cable import Cable
+from dlocore.scene.scene import Environment
 
 Floats = NDArray[np.float64]
 
 WINDOW = 5.0  # [s]: longer recordings are replayed in windows of about this length, each from its own start
-_FOLLOWED = 1e-5  # step of a coordinate in which a motion beside is followed
-_MARCHED = 2e-2  # where it is marched, whose tolerance would drown a smaller one
-_KNEE = 1.5  # robust deviations from which on a residual counts by its size, not its square
-_LEAST_DEVIATION = 2e-4  # [m] of the residuals, below which nothing is tracked
 _SHORT = 1.0  # [s] of the windows on which a search begins
 _MOST_SHORT = 8  # of them
 _COARSE = 13  # control points that they are replayed with at most
 _BEGINNING = 4  # iterations on them
-_MOST_CHANGE = 1.0  # of a coordinate in one iteration
-_PRIOR_LOG = 3.0  # standard deviation of the logarithms: a factor of 20 either way is no surprise
-_HOPED = 1e-2  # relative decrease that a search may end without, when no step is better
-_CONVERGED = 1e-3  # relative decrease of the cost
-
-Status = Literal["converged", "max_iterations"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Estimated:
-    """An identified parameter.
-
-    Attributes:
-        name, unit: of the parameter.
-        value: [unit]; where it is not identifiable what it was assumed to be.
-        low, high: 95 % interval [unit].
-        identifiable: the data tell it.
-        statement: in words.
-        rests_on: share of what is known of it by recording.
-    """
-
-    name: str
-    unit: str
-    value: float
-    low: float
-    high: float
-    identifiable: bool
-    statement: str
-    rests_on: dict[str, float]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Fit:
-    """How a recording's window is met.
-
-    Attributes:
-        name: of the recording.
-        begin: of the window in it [s].
-        times: of the compared frames in it (k,) [s].
-        measured, predicted: (k, m, 3) [m].
-        free: the markers that nothing holds.
-        stalled: the prediction stopped before the end.
-    """
-
-    name: str
-    begin: float
-    times: Floats
-    measured: Floats
-    predicted: Floats
-    free: NDArray[np.int64]
-    stalled: bool
-
-    @property
-    def distances(self) -> Floats:
-        """Distance of each free marker from its prediction (k, free) [m], NaN where it was lost."""
-        away = self.measured[:, self.free] - self.predicted[:, self.free]
-        return np.asarray(np.linalg.norm(away, axis=2))
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Identification:
-    """What recordings tell of a cable.
-
-    Attributes:
-        status: "converged" or "max_iterations".
-        message: in words, with what could not be identified.
-        candidate: everything that was found, to replay with.
-        parameters: as asked for, with intervals.
-        correlations: between the identified ones, (n, n), in the order of `parameters`; NaN for others.
-        fits: how each window is met.
-        deviation: robust standard deviation of a coordinate of the residuals [m].
-        iterations: of Gauss-Newton.
-        seconds: time it took.
-    """
-
-    status: Status
-    message: str
-    candidate: Candidate
-    parameters: tuple[Estimated, ...]
-    correlations: Floats
-    fits: tuple[Fit, ...]
-    deviation: float
-    iterations: int
-    seconds: float
-
-    @property
-    def cable(self) -> Cable:
-        """The cable, to be used in scenes."""
-        return self.candidate.cable
-
-    @property
-    def environment(self) -> Environment:
-        """The drag found."""
-        return self.candidate.environment
-
-
-@dataclass(frozen=True, kw_only=True)
-class Progress:
-    """One iteration: its number, the median distance of the free markers [m], and the values by name."""
-
-    iteration: int
-    distance: float
-    values: dict[str, float]
 
 
 def identify(
@@ -180,7 +75,7 @@ def identify(
         candidate = _begun(recordings, candidate, chosen, resolution, cancelled)
     search = Search(windows, chosen, resolution, cancelled)
     state = search.run(candidate, iterations, on_progress)
-    return search.result(state, perf_counter() - began)
+    return assess(search, state, perf_counter() - began)
 
 
 def _begun(
@@ -230,222 +125,3 @@ def cut(recordings: Sequence[Recording], window: float) -> list[Recording]:
             width = recording.duration / parts
             out.append(recording if parts == 1 else recording.part(i * width, (i + 1) * width))
     return out
-
-
-@dataclass(frozen=True, eq=False)
-class State:
-    """Where the search stands: candidate, replays of it, residuals."""
-
-    candidate: Candidate
-    played: list[Played | Settled]
-    residuals: list[Floats]
-    status: Status = "max_iterations"
-    iterations: int = 0
-    derivatives: list[Floats] | None = None
-
-
-class Search:
-    """Robust Gauss-Newton over the windows of some recordings."""
-
-    def __init__(
-        self,
-        windows: Sequence[Recording],
-        chosen: tuple[Parameter, ...],
-        resolution: Resolution,
-        cancelled: Callable[[], bool] | None = None,
-    ) -> None:
-        self.windows, self.chosen, self.resolution, self.cancelled = windows, chosen, resolution, cancelled
-        self.references = common_references(windows)
-        self.replays = [self._replay(w) for w in windows]
-
-    def _replay(self, window: Recording, shake: np.random.Generator | None = None) -> Replay | Rest:
-        if window.static:
-            return Rest(window, self.resolution, self.references, shake)
-        return Replay(window, self.resolution, self.references, shake)
-
-    def _check(self) -> None:
-        if self.cancelled is not None and self.cancelled():
-            raise Cancelled("The identification was cancelled")
-
-    def run(
-        self, candidate: Candidate, iterations: int, on_progress: Callable[[Progress], None] | None = None
-    ) -> State:
-        """Return the best candidate found from the given one, and its derivatives."""
-        state = self.play(candidate)
-        damping, status, done = 1e-3, cast(Status, "max_iterations"), 0
-        for done in range(1, iterations + 1):
-            r = np.concatenate(state.residuals)
-            deviation = robust_deviation(r)
-            state = replace(state, derivatives=self.derivatives(state))
-            J = np.concatenate(cast(list[Floats], state.derivatives))
-            x = self.coordinates(state.candidate)
-            H, g = self._normal(J, r, deviation, x)
-            before = self.cost(r, deviation, x)
-            free = self._free(x, g)
-            found: State | None = None
-            after, hoped = before, 0.0
-            for _ in range(6):
-                step = np.zeros(len(x))
-                matrix = H[np.ix_(free, free)]
-                step[free] = -np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), g[free])
-                hoped = hoped or -0.5 * float(g[free] @ step[free])
-                trial = self._bounded(x + np.clip(step, -_MOST_CHANGE, _MOST_CHANGE))
-                candidate = self.candidate(state.candidate, trial)
-                try:
-                    tried = self.play(candidate)
-                except SceneError:
-                    damping *= 10.0
-                    continue
-                after = self.cost(np.concatenate(tried.residuals), deviation, trial)
-                if after < before:
-                    found = tried
-                    break
-                damping = max(10.0 * damping, 1e-2)
-            if found is None:  # no better one is near; where much was hoped for, that is no minimum
-                status = "converged" if hoped < _HOPED * before else "max_iterations"
-                break
-            damping = max(0.2 * damping, 1e-7)
-            state = found
-            if on_progress is not None:
-                values = {p.name: p.get(state.candidate) for p in self.chosen}
-                on_progress(Progress(iteration=done, distance=self._distance(state), values=values))
-            if before - after < _CONVERGED * before:
-                status = "converged"
-                break
-        if state.derivatives is None:
-            state = replace(state, derivatives=self.derivatives(state))
-        return replace(state, status=status, iterations=done)
-
-    def play(self, candidate: Candidate) -> State:
-        """Return all windows replayed with a candidate."""
-        played: list[Played | Settled] = []
-        residuals = []
-        for replay in self.replays:
-            self._check()
-            one = replay.play(candidate)
-            played.append(one)
-            residuals.append(self._residuals(replay, one.predicted))
-        return State(candidate, played, residuals)
-
-    def _residuals(self, replay: Replay | Rest, predicted: Floats) -> Floats:
-        free = replay.recording.free
-        away = (predicted - replay.markers)[:, free]
-        return np.where(np.isfinite(away), away, 0.0).ravel()
-
-    def derivatives(self, state: State) -> list[Floats]:
-        """Return the derivatives (residuals, parameters) of the residuals of each window."""
-        x = self.coordinates(state.candidate)
-        out = []
-        for replay, played in zip(self.replays, state.played, strict=True):
-            J = np.zeros((len(self._residuals(replay, played.predicted)), len(x)))
-            known = self._followed(replay, played, state.candidate)
-            for j in range(len(x)):
-                self._check()
-                J[:, j] = self._column(replay, played, state.candidate, x, j, known)
-            lost = ~np.isfinite(replay.markers[:, replay.recording.free]).ravel()
-            J[lost] = 0.0
-            out.append(J)
-        return out
-
-    def _followed(self, replay: Replay | Rest, played: Played | Settled, candidate: Candidate) -> Floats | None:
-        """Return the prediction, followed to rounding; None where it can't be."""
-        if isinstance(replay, Rest) or isinstance(played, Settled) or not replay.differentiable(played):
-            return None
-        try:
-            return replay.play_beside(played, candidate)
-        except ValueError:
-            return None
-
-    def _column(
-        self,
-        replay: Replay | Rest,
-        played: Played | Settled,
-        candidate: Candidate,
-        x: Floats,
-        j: int,
-        known: Floats | None,
-    ) -> Floats:
-        free = replay.recording.free
-        if known is not None and isinstance(replay, Replay) and isinstance(played, Played):
-            moved = x.copy()
-            moved[j] += _FOLLOWED
-            if self.chosen[j].name.startswith("marker_offsets"):  # the start moves with it too, and forgets it soon
-                placed = (played.problem, played.grid, played.motion.times, played.motion.states)
-                change = replay.positions(self.candidate(candidate, moved), *placed) - played.predicted
-                return (change[:, free] / _FOLLOWED).ravel()
-            try:
-                change = replay.play_beside(played, self.candidate(candidate, moved)) - known
-                return (change[:, free] / _FOLLOWED).ravel()
-            except ValueError:
-                pass  # it strayed: marched instead
-        moved = x.copy()
-        moved[j] += _MARCHED
-        beside = self.candidate(candidate, moved)
-        if isinstance(replay, Replay) and isinstance(played, Played):
-            change = replay.play(beside, played).predicted - played.predicted
-        else:
-            change = replay.play(beside).predicted - played.predicted
-        return (change[:, free] / _MARCHED).ravel()
-
-    def coordinates(self, candidate: Candidate) -> Floats:
-        """Return the parameters of a candidate on the scales on which they are sought."""
-        return np.array([p.coordinate(p.get(candidate)) for p in self.chosen])
-
-    def candidate(self, base: Candidate, x: Floats) -> Candidate:
-        """Return the candidate of coordinates."""
-        for p, value in zip(self.chosen, x, strict=True):
-            base = p.put(base, p.value(float(value)))
-        return base
-
-    def _bounded(self, x: Floats) -> Floats:
-        least = [-np.inf if p.logarithmic else p.least / p.scale for p in self.chosen]
-        return np.maximum(x, least)
-
-    def _free(self, x: Floats, g: Floats) -> NDArray[np.int64]:
-        """Return the parameters that are not held at their bound."""
-        held = [not p.logarithmic and x[j] <= p.least / p.scale and g[j] > 0 for j, p in enumerate(self.chosen)]
-        return np.flatnonzero(~np.array(held))
-
-    def _normal(self, J: Floats, r: Floats, deviation: float, x: Floats) -> tuple[Floats, Floats]:
-        """Return the normal matrix and gradient of the cost."""
-        w = weights(r, deviation) / deviation**2
-        H = (J * w[:, None]).T @ J + np.diag(1.0 / self._prior() ** 2)
-        return H, J.T @ (w * r) + self._pull(x)
-
-    def _prior(self) -> Floats:
-        """Return the standard deviation of the prior of each coordinate; infinite where there is none."""
-        return np.array([_PRIOR_LOG if p.logarithmic and p.name != "length_ratio" else 1.0 if not np.isfinite(p.least)
-                         else p.scale if p.name == "length_ratio" else np.inf for p in self.chosen])  # fmt: skip
-
-    def _pull(self, x: Floats) -> Floats:
-        """Return the gradient of the prior: angles and bends are about zero; logarithms have none."""
-        centred = np.array([not p.logarithmic or p.name == "length_ratio" for p in self.chosen])
-        return np.where(centred, x / self._prior() ** 2, 0.0)
-
-    def cost(self, r: Floats, deviation: float, x: Floats) -> float:
-        """Return the robust cost of residuals and prior."""
-        knee = _KNEE * deviation
-        misfit = float((np.sqrt(1.0 + (r / knee) ** 2) - 1.0).sum()) * _KNEE**2
-        return misfit + 0.5 * float(x @ self._pull(x))
-
-    def _distance(self, state: State) -> float:
-        found = [np.linalg.norm(r.reshape(-1, 3), axis=1) for r in state.residuals]
-        every = np.concatenate(found)
-        return float(np.median(every[every > 0.0]))
-
-    def result(self, state: State, seconds: float) -> Identification:
-        """Return the identification: values with intervals, and what they rest on."""
-        from dlocore.identify.intervals import assess
-
-        return assess(self, state, seconds)
-
-
-def robust_deviation(r: Floats) -> float:
-    """Return the standard deviation of residuals (k,) [m] that outliers do not swell; zeros are lost markers."""
-    seen = r[r != 0.0]
-    return max(1.4826 * float(np.median(np.abs(seen))) if len(seen) else 0.0, _LEAST_DEVIATION)
-
-
-def weights(r: Floats, deviation: float) -> Floats:
-    """Return the weights of residuals: 1 for small ones, falling as 1/|r| for large ones."""
-    return np.asarray(1.0 / np.sqrt(1.0 + (r / (_KNEE * deviation)) ** 2))

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from dlocore.frames import unit
-from dlocore.scene import ControlPoints, Material
+from dlocore.answer.frames import unit
+from dlocore.answer.transport import transported
+from dlocore.scene.scene import ControlPoints, Material
 from dlocore.spline import design_matrix, greville
-from dlocore.transport import transported
 
 Floats = NDArray[np.float64]
 

@@ -1,19 +1,18 @@
 """How well identified parameters are known: intervals, correlations, and what the data do not tell."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from dlocore.identify.identification import Estimated, Fit, Identification
 from dlocore.identify.parameters import Parameter
 from dlocore.identify.replay import Played, Replay
 from dlocore.identify.rest import Rest
+from dlocore.identify.search import Search, State, robust_deviation, weights
 from dlocore.spline import DEGREE
-
-if TYPE_CHECKING:
-    from dlocore.identify.estimate import Estimated, Identification, Search, State
 
 Floats = NDArray[np.float64]
 
@@ -23,15 +22,13 @@ _UNSEEN = 0.5  # standard deviation of a logarithm, or share of the prior's, fro
 _SMALL = 0.1  # of the scale of a parameter without a prior
 
 
-def assess(search: "Search", state: "State", seconds: float) -> "Identification":
+def assess(search: Search, state: State, seconds: float) -> Identification:
     """Return the identification of a finished search.
 
     The variance of a value is the sum of three: of the residuals taken as independent, or as hanging together within
     blocks of half a second where that is more; of the noise of what was taken as known, the held markers and the start,
     replayed with other noise of the same size; and the square of what half the spans and half the step would change.
     """
-    from dlocore.identify.estimate import Fit, Identification, robust_deviation, weights
-
     chosen = search.chosen
     x = search.coordinates(state.candidate)
     r = np.concatenate(state.residuals)
@@ -40,7 +37,7 @@ def assess(search: "Search", state: "State", seconds: float) -> "Identification"
     J = np.concatenate(derivatives)
     w = weights(r, deviation)
     data = (J * w[:, None]).T @ J / deviation**2
-    prior = np.diag(1.0 / search._prior() ** 2)
+    prior = np.diag(1.0 / search.prior() ** 2)
     weak = np.diag(np.where(np.diag(prior) > 0, np.diag(prior), 1e-4))
     inverse = np.linalg.inv(data + weak)
     blocks = _blocks(search, state, w * r / deviation**2)
@@ -91,12 +88,10 @@ def assess(search: "Search", state: "State", seconds: float) -> "Identification"
 
 
 def _information(D: Floats, r: Floats, deviation: float) -> Floats:
-    from dlocore.identify.estimate import weights
-
     return np.asarray(((D * weights(r, deviation)[:, None]) * D).sum(axis=0))
 
 
-def _blocks(search: "Search", state: "State", pull: Floats) -> list[Floats]:
+def _blocks(search: Search, state: State, pull: Floats) -> list[Floats]:
     """Return the gradient of the misfit by blocks of time, or by shapes at rest."""
     out, at = [], 0
     for replay, D in zip(search.replays, cast(list[Floats], state.derivatives), strict=True):
@@ -108,7 +103,7 @@ def _blocks(search: "Search", state: "State", pull: Floats) -> list[Floats]:
     return out
 
 
-def _shaken(search: "Search", state: "State", scale: Floats) -> Floats:
+def _shaken(search: Search, state: State, scale: Floats) -> Floats:
     """Return the covariance of the gradient of the misfit that noise of the held markers and the start gives."""
     size = len(search.chosen)
     total = np.zeros((size, size))
@@ -122,22 +117,22 @@ def _shaken(search: "Search", state: "State", scale: Floats) -> Floats:
         free = replay.recording.free
         found = []
         for seed in range(_SHAKES):
-            search._check()
-            other = search._replay(replay.recording, np.random.default_rng([i, seed]))
+            search.check()
+            other = search.replay(replay.recording, np.random.default_rng([i, seed]))
             change = other.play(state.candidate).predicted - played.predicted
             found.append(D.T @ (factor * change[:, free].ravel()))
         total += np.array(found).T @ np.array(found) / _SHAKES
     return total
 
 
-def _refined(search: "Search", state: "State", scale: Floats) -> Floats:
+def _refined(search: Search, state: State, scale: Floats) -> Floats:
     """Return the gradient of the misfit that a net twice as fine and half the step give."""
     resolution = search.resolution
     finer = replace(resolution, n_u=2 * resolution.n_u - DEGREE, step=0.5 * resolution.step)
     total = np.zeros(len(search.chosen))
     at = 0
     for i, (replay, played) in enumerate(zip(search.replays, state.played, strict=True)):
-        search._check()
+        search.check()
         D = cast(list[Floats], state.derivatives)[i]
         factor = scale[at : at + len(D)]
         at += len(D)
@@ -150,10 +145,8 @@ def _refined(search: "Search", state: "State", scale: Floats) -> Floats:
 
 
 def _estimated(
-    p: Parameter, x: float, deviation: float, quantile: float, information: float, search: "Search", parts: Floats
-) -> "Estimated":
-    from dlocore.identify.estimate import Estimated
-
+    p: Parameter, x: float, deviation: float, quantile: float, information: float, search: Search, parts: Floats
+) -> Estimated:
     value = p.value(x)
     low, high = p.value(x - quantile * deviation), p.value(x + quantile * deviation)
     if not p.logarithmic:
@@ -184,7 +177,7 @@ def _estimated(
     )
 
 
-def _message(status: str, iterations: int, estimated: tuple["Estimated", ...], correlations: Floats) -> str:
+def _message(status: str, iterations: int, estimated: tuple[Estimated, ...], correlations: Floats) -> str:
     done = "Converged" if status == "converged" else "Stopped without converging"
     parts = [f"{done} in {iterations} iterations."]
     parts += [e.statement for e in estimated if not e.identifiable]

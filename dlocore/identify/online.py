@@ -7,14 +7,14 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dlocore.cable import Cable
 from dlocore.errors import SceneError, array
 from dlocore.identify.candidate import Candidate
-from dlocore.identify.estimate import robust_deviation, weights
 from dlocore.identify.parameters import DEFAULT, parameters, prepared
 from dlocore.identify.replay import Played, Replay, Resolution
+from dlocore.identify.search import robust_deviation, weights
 from dlocore.recordings import Recording
-from dlocore.scene import Environment
+from dlocore.scene.cable import Cable
+from dlocore.scene.scene import Environment
 
 Floats = NDArray[np.float64]
 

@@ -11,24 +11,24 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
+from dlocore.answer.frames import unit
 from dlocore.errors import SceneError
-from dlocore.frames import unit
-from dlocore.grid import Grid
 from dlocore.identify.beginning import rests, start_markers
 from dlocore.identify.candidate import Candidate, varied
 from dlocore.identify.frames import across, carried, tilted, turned_from, with_sections
 from dlocore.identify.span import Span
 from dlocore.identify.start import start_fit
 from dlocore.identify.tracks import held_paths
-from dlocore.paths import Waypoints
-from dlocore.problem import Problem, pose
+from dlocore.problem.grid import Grid
+from dlocore.problem.problem import Problem, pose
 from dlocore.recordings import Hold, Recording
-from dlocore.scene import ControlPoints, Grasp, Scene, Switch
+from dlocore.scene.paths import Waypoints
+from dlocore.scene.scene import ControlPoints, Grasp, Scene, Switch
 from dlocore.sensitivity import KnownMotion, beside, factored, objection
 from dlocore.solvers.march import STRONGLY_DAMPED, March, march
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import design_matrix
-from dlocore.statics import start_grid
+from dlocore.statics.statics import start_grid
 
 Floats = NDArray[np.float64]
 

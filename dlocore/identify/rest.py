@@ -6,18 +6,18 @@ from typing import Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.discretisation import make_grid
 from dlocore.errors import SceneError
 from dlocore.identify.candidate import Candidate
 from dlocore.identify.frames import across, tilted, turned_from, with_sections
 from dlocore.identify.replay import Resolution
 from dlocore.identify.span import Span
 from dlocore.identify.start import start_fit
-from dlocore.problem import pose
+from dlocore.problem.discretisation import make_grid
+from dlocore.problem.problem import pose
 from dlocore.recordings import Recording
-from dlocore.scene import ControlPoints, Grasp, Scene, Switch
-from dlocore.settling import settle
+from dlocore.scene.scene import ControlPoints, Grasp, Scene, Switch
 from dlocore.solvers.monitor import Monitor
+from dlocore.statics.settling import settle
 
 Floats = NDArray[np.float64]
 

@@ -6,14 +6,14 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.bands import dense_of
-from dlocore.cable import Cable
-from dlocore.discretisation import make_grid, room_for
 from dlocore.effects import laws
-from dlocore.grid import Grid
 from dlocore.kernels.assembly import NO_RATES, assemble, stored_energy
-from dlocore.problem import pose
-from dlocore.scene import Grasp, Scene, Straight
+from dlocore.problem.discretisation import make_grid, room_for
+from dlocore.problem.grid import Grid
+from dlocore.problem.problem import pose
+from dlocore.scene.cable import Cable
+from dlocore.scene.scene import Grasp, Scene, Straight
+from dlocore.solvers.bands import dense_of
 from dlocore.spline import design_matrix, greville
 
 Floats = NDArray[np.float64]

@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 
 from dlocore.errors import SceneError
 from dlocore.recordings import Recording
-from dlocore.smoothing import smooth
+from dlocore.shape.smoothing import smooth
 
 Floats = NDArray[np.float64]
 

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from dlocore.identify.candidate import Candidate
 from dlocore.identify.datasets import HangingWire, MovedCable
-from dlocore.identify.estimate import Identification, Progress, identify
+from dlocore.identify.estimate import identify
+from dlocore.identify.identification import Identification, Progress
 from dlocore.identify.replay import Replay, Resolution, common_references
 from dlocore.recordings import Recording
-from dlocore.scene import Environment
+from dlocore.scene.scene import Environment
 
 Floats = NDArray[np.float64]
 Model = Literal["scalars", "bends"]

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.kernels.compile import brief
+from dlocore.compiling.kernel import brief
 
 
 @brief

@@ -4,9 +4,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dlocore.compiling.kernel import kernel
 from dlocore.kernels.banded import expand_vector
 from dlocore.kernels.blocks import dot, solve_blocks
-from dlocore.kernels.compile import kernel
 
 _PARALLEL = 1e-8  # of a difference of steps: what is left of it beside the others that teaches nothing
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.kernels.compile import kernel, leaf
+from dlocore.compiling.kernel import kernel, leaf
 from dlocore.kernels.lanes import FIRSTS, LEVER, POINTS, SECONDS, SHARE, SLOPE, SPANS, WEIGHT, added, at, over
 
 

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dlocore.compiling.kernel import kernel, leaf, part
 from dlocore.effects.laws import (
     BEND,
     CONTACT,
@@ -26,7 +27,6 @@ from dlocore.effects.laws import (
 from dlocore.kernels import contact, plane, space, twisted
 from dlocore.kernels.banded import clear
 from dlocore.kernels.basis import row_of
-from dlocore.kernels.compile import kernel, leaf, part
 from dlocore.kernels.strain import space_curvature, squared_slope
 from dlocore.kernels.twisted_rows import PAST
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dlocore.kernels.compile import brief, kernel, law, leaf, part
+from dlocore.compiling.kernel import brief, kernel, law, leaf, part
 
 
 @law

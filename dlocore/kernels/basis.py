@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dlocore.kernels.compile import brief, kernel, law, leaf
+from dlocore.compiling.kernel import brief, kernel, law, leaf
 from dlocore.kernels.lanes import side_by_side
 from dlocore.kernels.pairs import pair_products
 

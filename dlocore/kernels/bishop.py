@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import law, leaf
 from dlocore.effects.base import Vector
-from dlocore.kernels.compile import law, leaf
 from dlocore.kernels.strain import cross, transport, vector
 
 LENGTH, H, TANGENT, BEND = 0, 1, 2, 5  # columns of `state`

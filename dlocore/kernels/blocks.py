@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.kernels.compile import kernel, law, leaf
+from dlocore.compiling.kernel import kernel, law, leaf
 
 REACH = 4  # blocks that the row of one is coupled with, itself among them
 _PANEL = 8  # rows that are subtracted from those below them in one go

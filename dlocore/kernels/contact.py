@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import law, leaf, part
 from dlocore.effects.base import Symmetric, Vector
 from dlocore.effects.contact import normal_force
 from dlocore.effects.distance import signed_distance
@@ -16,7 +17,6 @@ from dlocore.effects.friction import friction
 from dlocore.effects.kinds import BOX, CYLINDER
 from dlocore.effects.laws import CONTACT, COUNT, FRICTION, TABLE
 from dlocore.kernels.basis import row_of
-from dlocore.kernels.compile import law, leaf, part
 from dlocore.kernels.strands import dot
 
 _UP = (0.0, 0.0, 1.0)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import brief
 from dlocore.effects.laws import SELF_CONTACT, keeps_history
 from dlocore.kernels.assembly import (
     NO_RATES,
@@ -17,7 +18,6 @@ from dlocore.kernels.assembly import (
     times_scalar_band,
 )
 from dlocore.kernels.banded import multiply_band, place_held, solve_free
-from dlocore.kernels.compile import brief
 from dlocore.kernels.march import constrained_mass_solve
 from dlocore.kernels.selfcontact import press
 

@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import brief, kernel
 from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, history_at
 from dlocore.kernels.banded import factor, reduce_matrix
-from dlocore.kernels.compile import brief, kernel
 
 LOOKS = 6  # states of a motion, at least
 AT_ONCE = 64  # steps from one state that is looked at to the next, at most: what is unstable for less is not looked for

@@ -4,10 +4,10 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import brief, kernel, law
 from dlocore.effects.base import Vector
 from dlocore.kernels.banded import elimination
 from dlocore.kernels.basis import basis, find_span
-from dlocore.kernels.compile import brief, kernel, law
 from dlocore.kernels.strain import cross, transport, vector
 
 ROW = 17  # numbers that describe a row
@@ -50,9 +50,9 @@ def hold_rows(
         times: (k,) [s].
         rows: (r, ROW) what acts on every coordinate of the centreline: where [m], whether it is a direction, whether
             its grasp holds the direction, the number of its path in `sampled` or -1, begin [s], the straight move of
-            a point or the turn about one axis of a direction (`dlocore.paths.Move.line` and `turn`: duration [s],
+            a point or the turn about one axis of a direction (`dlocore.scene.paths.Move.line` and `turn`: duration [s],
             profile (5), and displacement [m] or rotation vector [rad] (3)) and value at the beginning (3) in the world.
-            `dlocore/holding.py` writes them.
+            `dlocore/problem/holding.py` writes them.
         sampled: (m, k, 3) points [m] or unit tangents over time of other paths, in the world.
         origin, axes: (3,) [m] and (dimensions, 3), of the coordinates of the solve.
         clamps: (c, 2) which of the rows holds the direction where the angle of the section is held, too, and the number

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.kernels.compile import kernel, part
+from dlocore.compiling.kernel import kernel, part
 
 _REACH = 3  # control points to either side that a control point shares a span with
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import kernel, law
 from dlocore.effects.base import Vector
-from dlocore.kernels.compile import kernel, law
 
 SPANS, POINTS = 16, 3
 LANES = SPANS * POINTS

@@ -4,11 +4,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dlocore.compiling.kernel import brief, kernel, leaf
 from dlocore.effects.laws import has_viscosity
 from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, history_at, multiply_scalar_band
 from dlocore.kernels.banded import reduce_matrix, reduce_vector, solve_rows
 from dlocore.kernels.basis import GAUSS_2, basis_rows, row_of
-from dlocore.kernels.compile import brief, kernel, leaf
 from dlocore.kernels.narrow import ROOM, factor_step, solve_step
 from dlocore.kernels.strain import squared_slope
 

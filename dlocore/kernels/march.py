@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import brief, kernel
 from dlocore.effects.laws import CONTACT, DAMPING, SELF_CONTACT, has_jumps, has_kinks, keeps_history
 from dlocore.kernels.assembly import (
     add_scalar_band,
@@ -21,7 +22,6 @@ from dlocore.kernels.banded import (
     reduce_vector,
     solve_free,
 )
-from dlocore.kernels.compile import brief, kernel
 from dlocore.kernels.contact import passes, strikes
 from dlocore.kernels.inertia import both_sides, effective, follow, padded, residual
 from dlocore.kernels.mixing import mixed, room

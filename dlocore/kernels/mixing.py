@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dlocore.kernels.compile import kernel
+from dlocore.compiling.kernel import kernel
 
 DEPTH = 40  # differences that are kept
 _PARALLEL = 1e-10  # of a difference: what is left of it beside the others that is only rounding

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import kernel
 from dlocore.effects.laws import keeps_curvature, keeps_history
 from dlocore.kernels.assembly import (
     MEMORY_IN_PLANE,
@@ -16,7 +17,6 @@ from dlocore.kernels.assembly import (
     times_scalar_band,
 )
 from dlocore.kernels.basis import build_tables
-from dlocore.kernels.compile import kernel
 from dlocore.kernels.entry import after_jump, begin_stretch, lasting, remember_start, to_ends_of_steps
 from dlocore.kernels.growth import SLOWEST, fastest_growth, looked_at
 from dlocore.kernels.holding import hold_rows

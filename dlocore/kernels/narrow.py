@@ -7,8 +7,8 @@ vector by ROOM zeros, which takes the place of a look whether a column ends earl
 
 from typing import Any
 
+from dlocore.compiling.kernel import law
 from dlocore.kernels.banded import factor, solve
-from dlocore.kernels.compile import law
 
 ROOM = 16  # rows beyond the last
 WIDTH = 8  # of the band that is written out: two coordinates of four control points

@@ -1,6 +1,6 @@
 """The coefficients of a time step, shared by all that steps through a motion."""
 
-from dlocore.kernels.compile import law
+from dlocore.compiling.kernel import law
 
 
 @law

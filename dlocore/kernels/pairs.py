@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.kernels.compile import kernel, part
+from dlocore.compiling.kernel import kernel, part
 
 # of control point i, then of j: B the first and C the second derivative of its basis function
 BB, BC, CB, CC = range(4)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import law, leaf, part
 from dlocore.effects.laws import (
     BENDING_MEMORY,
     DAMPING,
@@ -20,7 +21,6 @@ from dlocore.effects.laws import (
     curvature_stress,
 )
 from dlocore.kernels.basis import row_of
-from dlocore.kernels.compile import law, leaf, part
 from dlocore.kernels.strain import plane_curvature, plane_hessian
 from dlocore.kernels.tension import AT_HAND, MODULUS, assumed
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.kernels.compile import kernel, leaf
+from dlocore.compiling.kernel import kernel, leaf
 
 ORDERS = 5  # differences at most: of states that are known to a tolerance, higher ones are noise
 

@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import brief, kernel
 from dlocore.kernels.banded import factor, solve_rows
 from dlocore.kernels.basis import basis_rows, gauss_points
-from dlocore.kernels.compile import brief, kernel
 
 
 @brief

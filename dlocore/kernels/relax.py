@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import kernel
 from dlocore.kernels.assembly import (
     NO_RATES,
     add_scalar_band,
@@ -19,7 +20,6 @@ from dlocore.kernels.assembly import (
     stored_energy,
 )
 from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_matrix, reduce_vector, solve
-from dlocore.kernels.compile import kernel
 from dlocore.kernels.tension import point_on
 from dlocore.kernels.twisted import remember as carry
 

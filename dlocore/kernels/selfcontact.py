@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import kernel, law, leaf
 from dlocore.effects.base import Vector
 from dlocore.effects.contact import normal_force
 from dlocore.effects.laws import SELF_CONTACT
-from dlocore.kernels.compile import kernel, law, leaf
 from dlocore.kernels.strands import between, between_nodes, closest, dot, near_pairs
 
 _DRAWN = 0.05  # eps

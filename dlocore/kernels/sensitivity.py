@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import kernel
 from dlocore.effects.laws import DAMPING, keeps_history
 from dlocore.kernels.assembly import assemble, remember
 from dlocore.kernels.banded import expand_vector, factor, place_held, reduce_matrix, reduce_vector, solve
-from dlocore.kernels.compile import kernel
 from dlocore.kernels.inertia import both_sides, effective, padded, residual
 from dlocore.kernels.mixing import mixed, room
 from dlocore.kernels.newmark import coefficients

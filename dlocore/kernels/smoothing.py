@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import brief
 from dlocore.kernels.banded import factor, solve
-from dlocore.kernels.compile import brief
 
 LEAST_NOISE = 1e-6  # of the size of the data: below it rounding, not the data, would choose the smoothness
 TINY = 1e-300  # so that data that are all zero have a logarithm

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import law, leaf, part
 from dlocore.effects.base import Symmetric, Vector
 from dlocore.effects.laws import (
     DAMPING,
@@ -19,7 +20,6 @@ from dlocore.effects.laws import (
 )
 from dlocore.kernels.basis import row_of
 from dlocore.kernels.bishop import BEND, LENGTH, STATE, TANGENT, H, carry, rate_by_steps, rate_by_velocity, torques
-from dlocore.kernels.compile import law, leaf, part
 from dlocore.kernels.pairs import BB, BC, CB, CC, PAIRS, SUMS, add_point, add_span
 from dlocore.kernels.strain import space_curvature, space_curvature_rate, space_moment, vector
 from dlocore.kernels.tension import AT_HAND, MODULUS, assumed

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import law
 from dlocore.effects.base import Vector
-from dlocore.kernels.compile import law
 
 
 @law

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import kernel, law, leaf
 from dlocore.effects.base import Vector
-from dlocore.kernels.compile import kernel, law, leaf
 
 _SLACK = 0.9  # of a distance that is skipped along the cable: a strained cable is longer
 _TOO_NEAR = 0.5  # of the diameter: no step brings strands from farther away nearer than this

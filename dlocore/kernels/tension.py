@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import part
 from dlocore.kernels.basis import row_of
-from dlocore.kernels.compile import part
 
 # columns of `History.tension`: what the tangent takes, NaN where that at hand; that of the strain at the last assembly,
 # and its derivative by the strain [N]; that of the last step

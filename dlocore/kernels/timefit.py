@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import brief, kernel, leaf
 from dlocore.kernels.banded import factor, solve_rows
 from dlocore.kernels.basis import basis_rows, row_of
-from dlocore.kernels.compile import brief, kernel, leaf
 
 
 @kernel

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import kernel, law, leaf, part
 from dlocore.effects.laws import (
     BENDING_MEMORY,
     DAMPING,
@@ -32,7 +33,6 @@ from dlocore.effects.laws import (
     twist_stress,
 )
 from dlocore.kernels.basis import basis, find_span, row_of
-from dlocore.kernels.compile import kernel, law, leaf, part
 from dlocore.kernels.lanes import (
     FIRSTS,
     LANES,

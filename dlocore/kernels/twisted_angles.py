@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from dlocore.compiling.kernel import part
 from dlocore.kernels.basis import GAUSS_3
-from dlocore.kernels.compile import part
 from dlocore.kernels.lanes import POINTS, TRIPLE
 from dlocore.kernels.twisted_rows import FRAME, LAST, OFFSET
 

@@ -1,7 +1,7 @@
 """What the assembly with twist measures of a group of knot spans: places in its array W, and in what is remembered."""
 
+from dlocore.compiling.kernel import law
 from dlocore.effects.base import Vector
-from dlocore.kernels.compile import law
 from dlocore.kernels.lanes import LANES, POINTS, SPANS
 
 TANGENT, BEND, DIRECTOR, FRAME, LAST, BEFORE, OFFSET = 0, 3, 6, 9, 10, 13, 16  # columns of `past`

@@ -2,8 +2,8 @@
 
 from typing import Any
 
+from dlocore.compiling.kernel import law, leaf, part
 from dlocore.effects.base import Vector
-from dlocore.kernels.compile import law, leaf, part
 from dlocore.kernels.lanes import (
     FIRSTS,
     LANES,

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from dlocore.reference.body import CLAMP, DIRECTION, GYRATION, REAL, Body, Guide, State
 from dlocore.reference.rod import Memory, Rod, Snapshot, carried, unit
-from dlocore.scene import Grasp
+from dlocore.scene.scene import Grasp
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numba
 
-from dlocore.caching import kept
+from dlocore.compiling.caching import kept
 
 _FILES = ("compile", "body", "banded", "hinge", "surface", "forces", "energy", "step")  # what is compiled, or read so
 _SOURCE = hashlib.sha256(b"".join(Path(__file__).with_name(f"{name}.py").read_bytes() for name in _FILES)).hexdigest()

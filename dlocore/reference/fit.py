@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.problem import Problem
+from dlocore.problem.problem import Problem
 from dlocore.reference.motion import events_of
 from dlocore.spline import DEGREE, SplineSurface, design_matrix
 

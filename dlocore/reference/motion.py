@@ -9,17 +9,17 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.buckling import BOW
-from dlocore.paths import Waypoints
-from dlocore.problem import Problem
+from dlocore.problem.buckling import BOW
+from dlocore.problem.problem import Problem
 from dlocore.reference import body as places
 from dlocore.reference.body import State, Tableau
 from dlocore.reference.chain import Chain, Grip, chain, grip
 from dlocore.reference.forces import goes_through
 from dlocore.reference.rod import Memory, Rod, Snapshot
 from dlocore.reference.step import DONE, take_step
+from dlocore.scene.paths import Waypoints
 from dlocore.solvers.monitor import TimeIsUp
-from dlocore.tipping import may_fall, to_a_side
+from dlocore.statics.tipping import may_fall, to_a_side
 
 Floats = NDArray[np.float64]
 

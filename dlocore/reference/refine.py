@@ -8,14 +8,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.determined import DISTURBED, UNDETERMINED, farther
-from dlocore.events import moments
-from dlocore.problem import Problem, pose
+from dlocore.problem.events import moments
+from dlocore.problem.problem import Problem, pose
 from dlocore.reference.motion import Motion, Watch, events_of, simulate
 from dlocore.reference.rod import Rod, build, nodes_of, solid
 from dlocore.reference.sampling import Samples, samples
 from dlocore.reference.surface import gap
 from dlocore.solvers.monitor import TimeIsUp
+from dlocore.stability.determined import DISTURBED, UNDETERMINED, farther
 
 Floats = NDArray[np.float64]
 

@@ -7,14 +7,14 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.obstacles import Box, Capsule, Cylinder, Obstacle, Sphere
-from dlocore.paths import Waypoints
-from dlocore.plane import leftwards
-from dlocore.problem import Problem
+from dlocore.problem.plane import leftwards
+from dlocore.problem.problem import Problem
 from dlocore.reference import body as places
 from dlocore.reference.surface import BOX, CYLINDER, FRICTION, PLANE, ROUNDING, ROW
-from dlocore.scene import Points
-from dlocore.shape import SplineCurve, start_curve
+from dlocore.scene.obstacles import Box, Capsule, Cylinder, Obstacle, Sphere
+from dlocore.scene.paths import Waypoints
+from dlocore.scene.scene import Points
+from dlocore.shape.shape import SplineCurve, start_curve
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.plane import leftwards
-from dlocore.prediction import MaterialMotion, StretchMotion
+from dlocore.answer.parts import MaterialMotion, StretchMotion
+from dlocore.problem.plane import leftwards
 from dlocore.reference import body as places
 from dlocore.reference.motion import Motion
 from dlocore.reference.rod import carried, unit

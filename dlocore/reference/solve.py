@@ -6,23 +6,24 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dlocore.buckling import side_notes
-from dlocore.determined import in_words
+from dlocore.answer.parts import Accuracy, EffectReport, GraspReaction, Iteration, Status
 from dlocore.errors import SceneError
-from dlocore.events import closed_grasps
-from dlocore.prediction import Accuracy, EffectReport, GraspReaction, Iteration, Prediction, Status
-from dlocore.problem import Problem, pose
+from dlocore.levels.whole_march import sided
+from dlocore.prediction import Prediction
+from dlocore.problem.buckling import side_notes
+from dlocore.problem.events import closed_grasps
+from dlocore.problem.problem import Problem, pose
 from dlocore.reference.chain import chain, grip
 from dlocore.reference.energy import energies
 from dlocore.reference.fit import LEAST_TIMES, MOST_TIMES, Fit, fit
 from dlocore.reference.refine import Level, Refined, goes_astray, refine
 from dlocore.reference.sampling import between, material_of, stretch_of
 from dlocore.reference.strands import refuse_meeting
-from dlocore.scene import Scene
+from dlocore.scene.scene import Scene
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import SplineSurface
-from dlocore.tipping import tip_notes
-from dlocore.whole_march import sided
+from dlocore.stability.determined import in_words
+from dlocore.statics.tipping import tip_notes
 from dlocore.words import in_mm
 
 Floats = NDArray[np.float64]

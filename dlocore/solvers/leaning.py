@@ -4,11 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.effects.friction import SLIP_SPEED
-from dlocore.grid import Grid
 from dlocore.kernels.assembly import History
 from dlocore.kernels.banded import Elimination
 from dlocore.kernels.march import constrained_mass_solve
-from dlocore.problem import Problem
+from dlocore.problem.grid import Grid
+from dlocore.problem.problem import Problem
 
 Floats = NDArray[np.float64]
 

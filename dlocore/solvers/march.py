@@ -10,10 +10,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.discretisation import applied_forces
-from dlocore.events import closed_grasps, marks_of, step_counts, step_times
-from dlocore.grid import Grid
-from dlocore.holding import Starts, hold
+from dlocore.answer.report import WindowForces
 from dlocore.kernels.assembly import History, note, slopes, times_scalar_band
 from dlocore.kernels.entry import to_ends_of_steps
 from dlocore.kernels.march import (
@@ -26,9 +23,13 @@ from dlocore.kernels.march import (
 )
 from dlocore.kernels.tension import COLUMNS
 from dlocore.kernels.twisted_rows import PAST
-from dlocore.problem import Problem, firmer
-from dlocore.report import WindowForces
-from dlocore.scene import Grasp
+from dlocore.problem.discretisation import applied_forces
+from dlocore.problem.events import closed_grasps
+from dlocore.problem.grid import Grid
+from dlocore.problem.holding import Starts, hold
+from dlocore.problem.problem import Problem, firmer
+from dlocore.problem.time_grid import marks_of, step_counts, step_times
+from dlocore.scene.scene import Grasp
 from dlocore.solvers.kept import Kept
 from dlocore.solvers.leaning import lean_on_anchors, lean_on_table
 from dlocore.solvers.monitor import Monitor, TimeIsUp

@@ -3,8 +3,8 @@
 import time
 from collections.abc import Callable
 
+from dlocore.answer.parts import Iteration, OnIteration
 from dlocore.errors import Cancelled
-from dlocore.prediction import Iteration, OnIteration
 
 
 class TimeIsUp(Exception):  # noqa: N818 - no error: the solver answers with what it has

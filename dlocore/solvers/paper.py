@@ -9,15 +9,15 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.bands import dense_of
-from dlocore.discretisation import applied_forces
 from dlocore.errors import SceneError
-from dlocore.events import closed_grasps
-from dlocore.holding import Starts, close_grasps
 from dlocore.kernels.assembly import NO_RATES, History, assemble, history_at, multiply_scalar_band
 from dlocore.kernels.basis import basis_rows
 from dlocore.kernels.leastsquares import band_to_dense, states_at
-from dlocore.problem import Problem
+from dlocore.problem.discretisation import applied_forces
+from dlocore.problem.events import closed_grasps
+from dlocore.problem.holding import Starts, close_grasps
+from dlocore.problem.problem import Problem
+from dlocore.solvers.bands import dense_of
 from dlocore.solvers.march import March
 from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.spacetime import WindowSolver, windows_of

@@ -5,16 +5,17 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.events import closed_grasps, marks_of
-from dlocore.features import free_ends
-from dlocore.grid import Grid
-from dlocore.holding import Starts, close_grasps, constraint_rows, hold
+from dlocore.answer.report import WindowForces
 from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4
 from dlocore.kernels.march import FAILED_STEP, LEFT
 from dlocore.kernels.motion import GROWTH, LEAST_SLOPE, MOST_SLOPE, SEEN, STRAIN, smooth_motion
-from dlocore.problem import Problem
-from dlocore.report import WindowForces
-from dlocore.scene import Grasp
+from dlocore.problem.events import closed_grasps
+from dlocore.problem.features import free_ends
+from dlocore.problem.grid import Grid
+from dlocore.problem.holding import Starts, close_grasps, constraint_rows, hold
+from dlocore.problem.problem import Problem
+from dlocore.problem.time_grid import marks_of
+from dlocore.scene.scene import Grasp
 from dlocore.solvers.march import March, chunk_of, every_of, tolerance_of
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.stretch import JUMPS, NEAR

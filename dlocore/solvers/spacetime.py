@@ -12,11 +12,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.discretisation import applied_forces
+from dlocore.answer.report import WindowForces
 from dlocore.effects import laws
-from dlocore.events import closed_grasps
-from dlocore.grid import Grid
-from dlocore.holding import Held, Starts, close_grasps, hold
 from dlocore.kernels.anderson import advance, room
 from dlocore.kernels.assembly import History, times_scalar_band
 from dlocore.kernels.banded import expand_rows, place_rows
@@ -32,9 +29,12 @@ from dlocore.kernels.leastsquares import (
 )
 from dlocore.kernels.march import constrained_mass_solve
 from dlocore.kernels.timefit import fit_time
-from dlocore.problem import Problem
-from dlocore.report import WindowForces
-from dlocore.scene import Grasp
+from dlocore.problem.discretisation import applied_forces
+from dlocore.problem.events import closed_grasps
+from dlocore.problem.grid import Grid
+from dlocore.problem.holding import Held, Starts, close_grasps, hold
+from dlocore.problem.problem import Problem
+from dlocore.scene.scene import Grasp
 from dlocore.solvers.march import March
 from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.stretch import JUMPS

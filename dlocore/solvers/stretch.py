@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.grid import Grid
-from dlocore.holding import Held, Starts, close_grasps, hold
 from dlocore.kernels.assembly import NO_RATES, History
 from dlocore.kernels.entry import after_jump, begin_stretch, lasting
-from dlocore.problem import Problem
-from dlocore.scene import Grasp
+from dlocore.problem.grid import Grid
+from dlocore.problem.holding import Held, Starts, close_grasps, hold
+from dlocore.problem.problem import Problem
+from dlocore.scene.scene import Grasp
 
 Floats = NDArray[np.float64]
 

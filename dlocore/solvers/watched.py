@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from dlocore.grid import Grid
 from dlocore.kernels.basis import GAUSS_3, Tables, basis_rows
+from dlocore.problem.grid import Grid
 
 _SHARE = 0.3  # of the axial stiffness, at the points added: a fifth still leaves folds, more locks the bending more
 

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from dlocore.cost import pareto_front
+from dlocore.accuracy.cost import pareto_front
 from dlocore.study.record import Run, Study
 from dlocore.study.style import COLOURS, MARKS, new_figure, write_decimals
 

@@ -8,13 +8,13 @@ from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
+from dlocore.accuracy.cost import Cost, Sample, fitted_rates
 from dlocore.calibration import Calibration, Measured, source_mark
-from dlocore.cost import Cost, Sample, fitted_rates
 from dlocore.errors import Cancelled
 from dlocore.front import predict
 from dlocore.machine import machine
 from dlocore.prediction import Prediction
-from dlocore.scene import Method, Quality, Scene
+from dlocore.scene.scene import Method, Quality, Scene
 from dlocore.study.judge import Truth, finest_march, largest_error
 from dlocore.study.scenes import accuracy_scenes, effect_scenes, hanging, paper_case
 from dlocore.study.timing import Times, timed
@@ -92,8 +92,22 @@ class _Course:
         )
 
 
-def measure(*, repeats: int, on_progress: OnProgress, cancelled: Callable[[], bool]) -> Calibration:
-    """Measure this machine; see `dlocore.calibration.measure`."""
+def measure(
+    *,
+    repeats: int = 5,
+    on_progress: OnProgress = lambda done, total, what: None,
+    cancelled: Callable[[], bool] = lambda: False,
+) -> Calibration:
+    """Measure this machine; it takes some tens of seconds of one core.
+
+    Args:
+        repeats: timed calls of each solve, at most.
+        on_progress: called before each part with how many are done, how many there are, and what comes.
+        cancelled: asked before each part; where it returns True the measurement stops.
+
+    Raises:
+        Cancelled: `cancelled` returned True.
+    """
     began = time.perf_counter()
     scenes, effects = accuracy_scenes(), effect_scenes()
     grids = sum(len(g) for g in GRIDS.values())

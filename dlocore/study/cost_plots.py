@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import NullFormatter
 
-from dlocore.cost import exponent
+from dlocore.accuracy.cost import exponent
 from dlocore.study.record import Run, Scaled, Study
 from dlocore.study.style import COLOURS, MARKS, new_figure, write_decimals
 

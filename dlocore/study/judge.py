@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.answer.parts import Status
 from dlocore.front import predict
-from dlocore.prediction import Prediction, Status
-from dlocore.scene import Quality, Scene
+from dlocore.prediction import Prediction
+from dlocore.scene.scene import Quality, Scene
 from dlocore.study.timing import clock
 
 Floats = NDArray[np.float64]

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 from dlocore.errors import SceneError, choice
-from dlocore.scene import EFFECTS, Method, Quality, Scene, Switch
+from dlocore.scene.scene import EFFECTS, Method, Quality, Scene, Switch
 from dlocore.study.record import PARTS, Part
 from dlocore.study.scenes import accuracy_scenes
 

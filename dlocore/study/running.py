@@ -11,7 +11,7 @@ from dlocore.errors import Cancelled, SceneError
 from dlocore.front import predict
 from dlocore.machine import machine
 from dlocore.prediction import Prediction
-from dlocore.scene import Scene
+from dlocore.scene.scene import Scene
 from dlocore.study.judge import Truth, finest_march, positions_of, step_by_step
 from dlocore.study.plan import Case, Plan
 from dlocore.study.record import EffectCost, Run, Scaled, Step, Study

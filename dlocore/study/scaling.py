@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dlocore.obstacles import Cylinder
-from dlocore.paths import Move, Waypoints
-from dlocore.scene import Environment, Grasp, Method, Points, Quality, Scene, Straight, Switch, Table
+from dlocore.scene.obstacles import Cylinder
+from dlocore.scene.paths import Move, Waypoints
+from dlocore.scene.scene import Environment, Grasp, Method, Points, Quality, Scene, Straight, Switch, Table
 from dlocore.study.scenes import hanging, paper_case, plain_cord
 
 N_U = (9, 13, 17, 25, 33, 49, 65, 97, 129)

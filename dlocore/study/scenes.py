@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from dlocore.cable import Cable
-from dlocore.obstacles import Cylinder
-from dlocore.paths import Move
-from dlocore.scene import Environment, Grasp, Hold, Points, Scene, Straight, Table
+from dlocore.scene.cable import Cable
+from dlocore.scene.obstacles import Cylinder
+from dlocore.scene.paths import Move
+from dlocore.scene.scene import Environment, Grasp, Hold, Points, Scene, Straight, Table
 
 GRASPS = (0.0, 0.25, 0.5, 0.8)  # [m] of the paper's case
 

@@ -6,7 +6,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from dlocore.fit import forget_fits
+from dlocore.shape.fit import forget_fits
 
 Answer = TypeVar("Answer")
 

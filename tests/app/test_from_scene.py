@@ -11,7 +11,7 @@ from fastapi.testclient import TestClient
 from app.schemas import PredictionRequest, from_scene, to_scene
 from benchmarks.hard.generator import draw
 from dlocore import Grasp, Move, Quality, Scene, SceneError, Straight, continued, predict
-from dlocore.scene import EFFECTS
+from dlocore.scene.scene import EFFECTS
 from tests.solver.scenes import cable
 
 SEED, COUNT = 127, 300

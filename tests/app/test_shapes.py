@@ -10,8 +10,8 @@ from scipy.spatial import cKDTree
 
 from app.schemas.fit import FitResponse
 from dlocore import SceneError
-from dlocore.cloud import fit_cloud
-from dlocore.ordering import order_points, without_spikes
+from dlocore.shape.cloud import fit_cloud
+from dlocore.shape.ordering import order_points, without_spikes
 from tests.app.conftest import paper_scene
 from tests.app.test_bad_requests import the_problem
 

@@ -23,7 +23,7 @@ from dlocore import (
     plan,
     predict,
 )
-from dlocore.scene import EFFECTS
+from dlocore.scene.scene import EFFECTS
 from tests.solver.scenes import apart, cable
 
 ALL_ON = dict.fromkeys(EFFECTS, "on")

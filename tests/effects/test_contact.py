@@ -25,7 +25,7 @@ from dlocore import (
     Table,
     predict,
 )
-from dlocore.obstacles import Obstacle
+from dlocore.scene.obstacles import Obstacle
 from tests.solver.scenes import WEIGHTLESS, Floats, G, apart, cable, converged, march
 
 D = 0.005  # [m] of the paper's cable

@@ -9,12 +9,12 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.rod import simulate
 from dlocore import Cable, ControlPoints, Environment, Grasp, Quality, Scene, Waypoints, predict
-from dlocore.discretisation import room_for
 from dlocore.effects import laws
 from dlocore.effects.damping import Damping
 from dlocore.kernels.assembly import NO_RATES, History, assemble
 from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, build_tables
 from dlocore.kernels.entry import remember_start
+from dlocore.problem.discretisation import room_for
 from dlocore.sensitivity import sensitivities
 from dlocore.spline import design_matrix, uniform_knots
 

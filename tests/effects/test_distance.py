@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from dlocore import Box, Capsule, Cylinder, SceneError, Sphere
 from dlocore.effects.distance import ROW, distances, signed_distance
-from dlocore.obstacles import Obstacle
+from dlocore.scene.obstacles import Obstacle
 
 Floats = NDArray[np.float64]
 NAN, INF = float("nan"), float("inf")

@@ -7,7 +7,6 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from dlocore.discretisation import room_for
 from dlocore.effects import laws
 from dlocore.effects.bend import Bend
 from dlocore.effects.damping import Damping
@@ -16,6 +15,7 @@ from dlocore.effects.stretch import Stretch, StretchDamping
 from dlocore.kernels.assembly import NO_RATES, History, assemble, stored_energy
 from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, Tables, build_tables, graded_knots
 from dlocore.kernels.entry import remember_start
+from dlocore.problem.discretisation import room_for
 from dlocore.spline import design_matrix
 
 Floats = NDArray[np.float64]

@@ -25,16 +25,16 @@ from dlocore import (
     equilibrium,
     predict,
 )
-from dlocore.discretisation import make_grid
 from dlocore.kernels.assembly import contact_energy
 from dlocore.kernels.contact import passes
-from dlocore.obstacles import Obstacle
-from dlocore.plane import rest_plane
-from dlocore.problem import Problem, pose
-from dlocore.sideways import is_unstable, slipping_across
+from dlocore.problem.discretisation import make_grid
+from dlocore.problem.plane import rest_plane
+from dlocore.problem.problem import Problem, pose
+from dlocore.scene.obstacles import Obstacle
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import design_matrix
-from dlocore.statics import start_grid
+from dlocore.stability.sideways import is_unstable, slipping_across
+from dlocore.statics.statics import start_grid
 from tests.effects.test_contact import saddle
 from tests.solver.scenes import Floats
 

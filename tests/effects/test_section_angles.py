@@ -3,10 +3,10 @@
 import numpy as np
 
 from dlocore import Cable, Environment, Grasp, Points, Scene
-from dlocore.discretisation import make_grid
-from dlocore.frames import _SMOOTH, angles_of
+from dlocore.answer.frames import _SMOOTH, angles_of
 from dlocore.kernels.basis import Tables
-from dlocore.problem import pose
+from dlocore.problem.discretisation import make_grid
+from dlocore.problem.problem import pose
 from tests.solver.scenes import Floats, arc
 
 

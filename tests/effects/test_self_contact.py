@@ -11,17 +11,18 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.hard.generator import draw
 from dlocore import Cable, Environment, Grasp, Move, Points, Prediction, Quality, Scene, Straight, Table, predict
-from dlocore.discretisation import make_grid
 from dlocore.effects import laws
-from dlocore.effects.selfcontact import APART, nearest_strands
-from dlocore.events import closed_grasps
-from dlocore.grid import Grid
-from dlocore.holding import Starts, close_grasps, hold
+from dlocore.effects.selfcontact import APART
 from dlocore.kernels.banded import Elimination, elimination, factor, reduce_matrix, solve
 from dlocore.kernels.selfcontact import factor_wide, press, solve_wide, widen
 from dlocore.kernels.strands import clear_way, meeting_pairs, near_pairs
-from dlocore.problem import Problem, pose
-from dlocore.solvers.ladder import distance, run_level
+from dlocore.levels.level import distance, run_level
+from dlocore.problem.discretisation import make_grid
+from dlocore.problem.events import closed_grasps
+from dlocore.problem.grid import Grid
+from dlocore.problem.holding import Starts, close_grasps, hold
+from dlocore.problem.problem import Problem, pose
+from dlocore.problem.strands import nearest_strands
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import design_matrix, uniform_knots
 

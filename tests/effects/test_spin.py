@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, predict
-from dlocore.discretisation import make_grid
-from dlocore.problem import pose
-from dlocore.spin import SHARP, bends_sharply, spin_forces
+from dlocore.levels.spin import SHARP, bends_sharply, spin_forces
+from dlocore.problem.discretisation import make_grid
+from dlocore.problem.problem import pose
 
 LENGTH, RADIUS = 0.3, 0.3 / np.pi
 ANGLES = np.linspace(0.0, np.pi, 61)

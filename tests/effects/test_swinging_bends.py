@@ -8,8 +8,8 @@ import pytest
 from benchmarks.choices import from_rigid, swinging
 from benchmarks.hard.curves import bend
 from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, predict
-from dlocore.discretisation import make_grid
-from dlocore.problem import pose
+from dlocore.problem.discretisation import make_grid
+from dlocore.problem.problem import pose
 from dlocore.spline import design_matrix
 from tests.solver.scenes import Floats, march, samples
 

@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from dlocore import SplineSurface
-from dlocore.discretisation import room_for
 from dlocore.effects import laws
 from dlocore.effects.bend import Bend
 from dlocore.effects.stretch import Stretch
@@ -16,6 +15,7 @@ from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, Tables, build_table
 from dlocore.kernels.entry import remember_start
 from dlocore.kernels.twisted import start_frames
 from dlocore.kernels.twisted_rows import LAST, PAST
+from dlocore.problem.discretisation import room_for
 
 Floats = NDArray[np.float64]
 N_U, LENGTH = 9, 1.0

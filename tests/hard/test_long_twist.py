@@ -5,10 +5,10 @@ import pytest
 
 from benchmarks.hard.curves import arc
 from dlocore import Cable, Grasp, Move, Points, Quality, Scene, predict
-from dlocore.problem import pose
+from dlocore.problem.problem import pose
 from dlocore.solvers import march as marching
 from dlocore.solvers.monitor import Monitor
-from dlocore.statics import start_grid
+from dlocore.statics.statics import start_grid
 
 # yields where it is bent and turned, so that there is memory as well as frames
 SCENE = Scene(

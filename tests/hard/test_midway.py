@@ -6,12 +6,12 @@ import pytest
 from benchmarks.hard import curves
 from benchmarks.hard.judge import WRONG, disturbed, disturbed_midway, is_undetermined
 from dlocore import Cable, Environment, Grasp, Move, Points, Prediction, Quality, Scene, predict
-from dlocore.determined import DISTURBED
-from dlocore.problem import pose
-from dlocore.shape import start_curve
+from dlocore.problem.problem import pose
+from dlocore.shape.shape import start_curve
 from dlocore.solvers.march import march
 from dlocore.solvers.monitor import Monitor
-from dlocore.statics import start_grid
+from dlocore.stability.determined import DISTURBED
+from dlocore.statics.statics import start_grid
 
 
 def pushed_through(drag: float) -> Scene:

@@ -8,8 +8,8 @@ import pytest
 from benchmarks.hard.judge import by_a_march, faults, is_undetermined, left_its_grid
 from benchmarks.hard.shares import GROWTHS, Strata, drawn_again, has_failed, in_place_of, is_left, share, strata
 from benchmarks.random_scenes import counts, in_the_end, summary
-from dlocore.companion import TOO_LATE
-from dlocore.determined import DISTURBED
+from dlocore.accuracy.companion import TOO_LATE
+from dlocore.stability.determined import DISTURBED
 
 SEED = 5
 

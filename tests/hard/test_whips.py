@@ -5,11 +5,11 @@ from dataclasses import replace
 import pytest
 
 from benchmarks.hard.generator import draw
-from dlocore.budget import Means
-from dlocore.problem import Problem, pose
-from dlocore.refinement import ROUGH, _Climb, _is_worse
-from dlocore.solvers.changes import Change, Changes
-from dlocore.solvers.ladder import CREDIBLE_STRAIN, LEVELS, Size, run_level
+from dlocore.accuracy.budget import Means
+from dlocore.accuracy.changes import Change, Changes
+from dlocore.accuracy.refinement import ROUGH, _Climb, _is_worse
+from dlocore.levels.level import CREDIBLE_STRAIN, LEVELS, Size, run_level
+from dlocore.problem.problem import Problem, pose
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED
 from dlocore.solvers.monitor import Monitor
 

@@ -7,11 +7,11 @@ import pytest
 
 from benchmarks.hard.generator import draw
 from dlocore import Cable, Environment, Grasp, Move, Quality, Scene, SceneError, Straight, predict, sensitivity
-from dlocore.problem import pose
+from dlocore.problem.problem import pose
 from dlocore.sensitivity import STEP, _with, beside, factored, sensitivities
 from dlocore.solvers import march as marching
 from dlocore.solvers.monitor import Monitor
-from dlocore.statics import start_grid
+from dlocore.statics.statics import start_grid
 
 U, T = np.linspace(0.05, 0.95, 7), np.linspace(0.2, 1.5, 6)
 

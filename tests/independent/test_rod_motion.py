@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.rod import converged, richardson, simulate
 from benchmarks.rod_kernel import turning_angle
-from dlocore.cable import Cable
-from dlocore.paths import Move
-from dlocore.scene import ControlPoints, Environment, Grasp, Load, Scene, Straight
+from dlocore.scene.cable import Cable
+from dlocore.scene.paths import Move
+from dlocore.scene.scene import ControlPoints, Environment, Grasp, Load, Scene, Straight
 
 WEIGHTLESS = Environment(gravity=(0.0, 0.0, 0.0))
 EI, MU = 1e-3, 0.05

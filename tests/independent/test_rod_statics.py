@@ -6,8 +6,8 @@ from scipy.interpolate import make_interp_spline
 from scipy.optimize import brentq
 
 from benchmarks.rod import equilibrium, simulate
-from dlocore.cable import Cable
-from dlocore.scene import ControlPoints, Environment, Grasp, Load, Points, Scene, Straight, Table
+from dlocore.scene.cable import Cable
+from dlocore.scene.scene import ControlPoints, Environment, Grasp, Load, Points, Scene, Straight, Table
 
 WEIGHTLESS = Environment(gravity=(0.0, 0.0, 0.0))
 CABLE = Cable(length=1.0, diameter=0.01, linear_density=0.05, bending_stiffness=1e-3, axial_stiffness=100.0)

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore import Cable, Environment, Scene
-from dlocore.problem import pose
+from dlocore.problem.problem import pose
 from dlocore.reference.motion import Motion, settled, simulate
 from dlocore.reference.rod import Rod, build, nodes_of
 

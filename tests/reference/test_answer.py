@@ -23,15 +23,15 @@ from dlocore import (
     Table,
     predict,
 )
-from dlocore.determined import DISTURBED, UNDETERMINED
 from dlocore.errors import Cancelled
-from dlocore.problem import pose
+from dlocore.problem.problem import pose
 from dlocore.reference import refine
 from dlocore.reference.motion import Motion, Watch
 from dlocore.reference.refine import left
 from dlocore.reference.rod import Rod, build
 from dlocore.reference.solve import UNSEEN, converged
 from dlocore.solvers.monitor import Monitor
+from dlocore.stability.determined import DISTURBED, UNDETERMINED
 from tests.reference.rods import cable
 from tests.solver.scenes import arch_with_feet_close_for
 from tests.solver.test_again import pushed as pushed_along_itself

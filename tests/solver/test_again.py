@@ -20,9 +20,9 @@ from dlocore import (
     predict,
     predict_many,
 )
-from dlocore import again as again_module
-from dlocore.determined import UNDETERMINED, UNSEEN
+from dlocore.accuracy import again as again_module
 from dlocore.solvers.monitor import TimeIsUp
+from dlocore.stability.determined import UNDETERMINED, UNSEEN
 from tests.solver.scenes import WEIGHTLESS, apart, cable, march, paper_scene, samples
 from tests.solver.test_determined import column
 from tests.solver.test_two_grippers import hanging

@@ -8,11 +8,11 @@ from scipy.interpolate import make_interp_spline
 
 from benchmarks.hard.generator import draw
 from dlocore import ControlPoints, Environment, Grasp, Move, Quality, Scene, Straight, predict
-from dlocore.problem import pose
-from dlocore.refinement import AUTO_ENOUGH
+from dlocore.accuracy.refinement import AUTO_ENOUGH
+from dlocore.problem.problem import pose
 from dlocore.solvers.march import march as take_steps
 from dlocore.solvers.monitor import Monitor
-from dlocore.statics import start_grid
+from dlocore.statics.statics import start_grid
 from tests.solver.scenes import WEIGHTLESS, Floats, apart, cable, march
 
 EA, MU = 10.0, 0.05

@@ -27,7 +27,7 @@ from dlocore import (
     equilibrium,
     predict,
 )
-from dlocore.problem import Problem, pose
+from dlocore.problem.problem import Problem, pose
 from tests.solver.scenes import arc, cable
 
 NAN, INF = float("nan"), float("inf")

@@ -23,10 +23,10 @@ from dlocore import (
     equilibrium,
     predict,
 )
-from dlocore.buckling import UNSTABLE
-from dlocore.discretisation import make_grid
-from dlocore.problem import pose
-from dlocore.sideways import _leasts, of_one_time, pose_as_shown
+from dlocore.problem.buckling import UNSTABLE
+from dlocore.problem.discretisation import make_grid
+from dlocore.problem.problem import pose
+from dlocore.stability.sideways import _leasts, of_one_time, pose_as_shown
 
 WEIGHTLESS = Environment(gravity=(0.0, 0.0, 0.0), drag=0.2)
 EI, GJ, LENGTH = 0.01, 0.006, 1.0

@@ -27,9 +27,9 @@ from dlocore import (
     equilibrium,
     predict,
 )
-from dlocore.buckling import BOW
-from dlocore.problem import pose
-from dlocore.shape import start_curve
+from dlocore.problem.buckling import BOW
+from dlocore.problem.problem import pose
+from dlocore.shape.shape import start_curve
 from dlocore.spline import greville, uniform_knots
 
 WEIGHTLESS = Environment(gravity=(0.0, 0.0, 0.0), drag=0.3)

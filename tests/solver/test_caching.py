@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from dlocore.caching import OverloadFiles
+from dlocore.compiling.caching import OverloadFiles
 
 ROOT = Path(__file__).parents[2]
 # One function, compiled for a signature of each process, as two processes do that begin at once.
 PROGRAM = """
 import sys
 import numba, numpy as np
-from dlocore.caching import is_kept, kept
+from dlocore.compiling.caching import is_kept, kept
 sys.path.insert(0, sys.argv[1])
 from doubled import doubled
 function = kept(numba.njit(cache=True)(doubled), sys.argv[2])
@@ -29,7 +29,7 @@ for kind in sys.argv[3:]:
 CALLER = """
 import sys
 import numba, numpy as np
-from dlocore.caching import kept
+from dlocore.compiling.caching import kept
 sys.path.insert(0, sys.argv[1])
 from doubled import doubled as plain
 doubled = kept(numba.njit(cache=True)(plain), "a")

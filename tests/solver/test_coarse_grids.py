@@ -8,8 +8,8 @@ import pytest
 
 from benchmarks.hard.generator import draw
 from dlocore import Grasp, Iteration, Move, Prediction, Quality, Scene, SceneError, predict
-from dlocore.fallback import falls_short
-from dlocore.refinement import AUTO_ENOUGH
+from dlocore.accuracy.fallback import falls_short
+from dlocore.accuracy.refinement import AUTO_ENOUGH
 from tests.solver.scenes import paper_scene
 
 GRID = Quality(n_u=9, n_t=13, method="march")

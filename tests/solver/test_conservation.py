@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from dlocore import ControlPoints, Environment, Grasp, Load, Move, Points, Prediction, Scene, Straight, predict
-from dlocore.discretisation import make_grid
-from dlocore.problem import pose
-from dlocore.report import elastic_energy
+from dlocore.answer.report import elastic_energy
+from dlocore.problem.discretisation import make_grid
+from dlocore.problem.problem import pose
 from dlocore.spline import design_matrix
 from tests.solver.scenes import (
     WEIGHTLESS,

@@ -8,12 +8,12 @@ import pytest
 from benchmarks.catalogue import catalogue
 from dlocore import Quality, Scene, predict
 from dlocore.kernels.newmark import coefficients
-from dlocore.problem import Problem, pose
-from dlocore.solvers.ladder import run_level
+from dlocore.levels.level import run_level
+from dlocore.problem.problem import Problem, pose
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED, march
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import design_matrix
-from dlocore.statics import start_grid
+from dlocore.statics.statics import start_grid
 from tests.solver.scenes import Floats, apart, paper_scene, refined, rms
 
 

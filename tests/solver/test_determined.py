@@ -8,32 +8,20 @@ import numpy as np
 import pytest
 
 from benchmarks.hard.generator import draw
-from dlocore import (
-    Cable,
-    Cancelled,
-    Environment,
-    Grasp,
-    Move,
-    Points,
-    Quality,
-    Scene,
-    Straight,
-    Table,
-    determined,
-    predict,
-    refinement,
-)
-from dlocore.budget import Means
-from dlocore.determined import DISTURBED, DOUBTFUL, UNDETERMINED, UNSEEN, bent, goes_astray, may_grow
-from dlocore.events import closed_grasps
-from dlocore.grid import Grid
-from dlocore.holding import Starts, close_grasps, hold
+from dlocore import Cable, Cancelled, Environment, Grasp, Move, Points, Quality, Scene, Straight, Table, predict
+from dlocore.accuracy import refinement
+from dlocore.accuracy.budget import Means
 from dlocore.kernels.growth import fastest_growth
-from dlocore.problem import pose
+from dlocore.levels.whole_march import march_level
+from dlocore.problem.events import closed_grasps
+from dlocore.problem.grid import Grid
+from dlocore.problem.holding import Starts, close_grasps, hold
+from dlocore.problem.problem import pose
 from dlocore.solvers.march import March, march
 from dlocore.solvers.monitor import Monitor, TimeIsUp
-from dlocore.statics import start_grid
-from dlocore.whole_march import march_level
+from dlocore.stability import determined
+from dlocore.stability.determined import DISTURBED, DOUBTFUL, UNDETERMINED, UNSEEN, bent, goes_astray, may_grow
+from dlocore.statics.statics import start_grid
 from tests.solver.scenes import WEIGHTLESS, arch_with_feet_close_for
 
 LENGTH = 1.0

@@ -8,10 +8,10 @@ import pytest
 
 from benchmarks.robot_scenes import random_scene
 from dlocore import Cable, Environment, Grasp, Move, Prediction, Quality, Scene, Straight, Table, predict
-from dlocore.companion import coarser, finer
-from dlocore.problem import pose
-from dlocore.solvers.changes import Change, weighed
-from dlocore.solvers.ladder import LEVELS, Level, Size, distance, given_steps, run_level
+from dlocore.accuracy.changes import Change, weighed
+from dlocore.accuracy.companion import coarser, finer
+from dlocore.levels.level import LEVELS, Level, Size, distance, given_steps, run_level
+from dlocore.problem.problem import pose
 from dlocore.solvers.march import STRONGLY_DAMPED
 from dlocore.solvers.monitor import Monitor
 from tests.solver.scenes import apart, march, paper_scene

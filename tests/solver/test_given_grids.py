@@ -22,14 +22,14 @@ from dlocore import (
     Table,
     predict,
 )
-from dlocore.discretisation import make_grid
-from dlocore.events import time_knots
-from dlocore.given import MISSED, evenly_fitted, given_status
-from dlocore.problem import pose
-from dlocore.solvers.ladder import Size, given_steps
+from dlocore.levels.given import MISSED, evenly_fitted, given_status
+from dlocore.levels.level import Size, given_steps
+from dlocore.levels.whole_march import FOLDED, is_folded, march_level
+from dlocore.problem.discretisation import make_grid
+from dlocore.problem.problem import pose
+from dlocore.problem.time_grid import time_knots
 from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.watched import watched
-from dlocore.whole_march import FOLDED, is_folded, march_level
 from tests.solver.scenes import apart, march, paper_scene
 
 

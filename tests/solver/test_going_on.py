@@ -24,9 +24,9 @@ from dlocore import (
     Straight,
     predict,
 )
-from dlocore.discretisation import axial_strain, corners
-from dlocore.scene import Method
-from dlocore.shape import start_curve
+from dlocore.problem.discretisation import axial_strain, corners
+from dlocore.scene.scene import Method
+from dlocore.shape.shape import start_curve
 from dlocore.spline import greville, spline_at
 
 TARGET = 5e-4  # [m]; both cables have a length of 1 m

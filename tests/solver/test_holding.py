@@ -7,14 +7,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dlocore import Cable, ControlPoints, Environment, Grasp, Move, Scene, Straight, Waypoints
-from dlocore.discretisation import make_grid
-from dlocore.grid import Grid
-from dlocore.holding import SMOOTH, Held, Starts, close_grasps, hold
 from dlocore.kernels.banded import holding, multiply_band, place_rows, solve_free
 from dlocore.kernels.entry import to_ends_of_steps
-from dlocore.paths import Path, Still
-from dlocore.problem import Problem, pose
-from dlocore.scene import Hold
+from dlocore.problem.discretisation import make_grid
+from dlocore.problem.grid import Grid
+from dlocore.problem.holding import SMOOTH, Held, Starts, close_grasps, hold
+from dlocore.problem.problem import Problem, pose
+from dlocore.scene.paths import Path, Still
+from dlocore.scene.scene import Hold
 
 CABLE = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-3)
 TIMES = np.array([0.0, 0.1, 0.35, 0.8, 1.5])  # before, in and after the paths, which take 0.5 s to 1 s

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dlocore import ControlPoints, Environment, Grasp, Load, Move, Points, Quality, Scene, Waypoints, predict
-from dlocore.shape import start_curve
+from dlocore.shape.shape import start_curve
 from tests.solver.scenes import Floats, G, cable, converged, march, paper_scene, samples
 
 TURN = Rotation.from_rotvec([0.3, -0.7, 1.9]).as_matrix()

@@ -5,18 +5,19 @@ import dataclasses
 import numpy as np
 import pytest
 
-from dlocore import Cable, Environment, Grasp, Load, Move, Points, Quality, Scene, Sphere, Table, predict, review
-from dlocore.events import marks_of, step_counts
+from dlocore import Cable, Environment, Grasp, Load, Move, Points, Quality, Scene, Sphere, Table, predict
 from dlocore.kernels.predictor import differences_of
-from dlocore.problem import pose
+from dlocore.levels import review
+from dlocore.levels.level import Size
+from dlocore.levels.whole_march import march_level
+from dlocore.problem.problem import pose
+from dlocore.problem.time_grid import marks_of, step_counts
 from dlocore.sensitivity import objection
 from dlocore.solvers import kept
-from dlocore.solvers.ladder import Size
 from dlocore.solvers.march import March, march
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import design_matrix
-from dlocore.statics import start_grid
-from dlocore.whole_march import march_level
+from dlocore.statics.statics import start_grid
 
 BENT = tuple((float(x), 0.0, float(0.02 + 0.15 * np.sin(np.pi * x))) for x in np.linspace(0.0, 0.95, 9))
 CABLE = Cable(length=1.0, diameter=0.008, linear_density=0.05, bending_stiffness=5e-3)

@@ -9,7 +9,7 @@ import pytest
 from benchmarks.hard.generator import draw
 from benchmarks.hard.judge import by_a_march, run
 from dlocore import Cable, Grasp, Iteration, Move, Prediction, Quality, Scene, Straight, predict
-from dlocore.refinement import AUTO_ENOUGH
+from dlocore.accuracy.refinement import AUTO_ENOUGH
 from dlocore.study.plan import Plan
 from dlocore.study.running import run_study
 from tests.solver.scenes import jerked

@@ -7,19 +7,20 @@ import pytest
 from numpy.typing import NDArray
 
 from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, Table, predict
-from dlocore.events import closed_grasps, time_knots
-from dlocore.holding import Starts, close_grasps
 from dlocore.kernels.anderson import advance, room
 from dlocore.kernels.assembly import NO_RATES, assemble, history_at
 from dlocore.kernels.banded import elimination
 from dlocore.kernels.blocks import REACH, factor_rows, solve_blocks
 from dlocore.kernels.leastsquares import band_to_dense, holding_forces, states_at
-from dlocore.problem import pose
+from dlocore.problem.events import closed_grasps
+from dlocore.problem.holding import Starts, close_grasps
+from dlocore.problem.problem import pose
+from dlocore.problem.time_grid import time_knots
 from dlocore.solvers.march import march
 from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.spacetime import WindowSolver, behind_softer, windows_of
 from dlocore.solvers.timefit import fit
-from dlocore.statics import start_grid
+from dlocore.statics.statics import start_grid
 from tests.solver.scenes import arc
 
 Floats = NDArray[np.float64]

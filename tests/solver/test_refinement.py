@@ -10,35 +10,22 @@ import pytest
 from benchmarks.hard.curves import arc, hairpin
 from benchmarks.hard.generator import draw
 from benchmarks.hard.judge import compare
-from dlocore import (
-    Cable,
-    Environment,
-    Grasp,
-    Move,
-    Points,
-    Quality,
-    Scene,
-    Sphere,
-    Straight,
-    budget,
-    equilibrium,
-    predict,
-    refinement,
-)
-from dlocore.discretisation import make_grid
-from dlocore.holding import Starts, close_grasps, hold
+from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, Sphere, Straight, equilibrium, predict
+from dlocore.accuracy import budget, refinement
+from dlocore.accuracy.changes import Change, Changes
+from dlocore.accuracy.refinement import AUTO_ENOUGH
 from dlocore.kernels.banded import reduce_matrix
-from dlocore.problem import Problem, pose
-from dlocore.progress import surface_at
-from dlocore.refinement import AUTO_ENOUGH
-from dlocore.review import objections
-from dlocore.solvers import ladder
-from dlocore.solvers.changes import Change, Changes
-from dlocore.solvers.ladder import Level, Size, hardness, run_level
+from dlocore.levels import level as levels
+from dlocore.levels.level import Level, Size, hardness, run_level
+from dlocore.levels.progress import surface_at
+from dlocore.levels.review import objections
+from dlocore.levels.whole_march import is_folded, is_uneven, march_level
+from dlocore.problem.discretisation import make_grid
+from dlocore.problem.holding import Starts, close_grasps, hold
+from dlocore.problem.problem import Problem, pose
 from dlocore.solvers.march import STRONGLY_DAMPED, March
 from dlocore.solvers.march import march as take_steps
 from dlocore.solvers.monitor import Monitor
-from dlocore.whole_march import is_folded, is_uneven, march_level
 from tests.solver.scenes import apart, march, paper_scene, refined, swinging
 
 
@@ -363,7 +350,7 @@ def test_a_march_that_gains_energy_from_its_waves_is_given_up_on_its_way(monkeyp
         marches.append(take_steps(*args, **options))
         return marches[-1]
 
-    monkeypatch.setattr(ladder, "march", noted)
+    monkeypatch.setattr(levels, "march", noted)
     level = run_level(problem, 315, 60, 5120, Monitor(None, None, None))
     assert [motion.stopped for motion in marches] == ["strain", ""]
     assert marches[0].reached < 0.1 * marches[1].reached

@@ -5,14 +5,14 @@ import pytest
 from scipy.interpolate import make_interp_spline
 
 from dlocore import Cable, Environment, Grasp, Move, Scene, Straight
-from dlocore.events import moments
 from dlocore.kernels.timefit import sampled
-from dlocore.problem import pose
-from dlocore.progress import surface_at
-from dlocore.solvers.ladder import distance, stretched
+from dlocore.levels.level import distance, stretched
+from dlocore.levels.progress import surface_at
+from dlocore.levels.whole_march import march_level
+from dlocore.problem.events import moments
+from dlocore.problem.problem import pose
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import SplineSurface, uniform_knots
-from dlocore.whole_march import march_level
 
 
 @pytest.mark.parametrize("nc", [2, 3, 4])

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from dlocore import Cable, Environment, Grasp, Move, Quality, Scene, Straight, Table, predict, sensitivities
-from dlocore.discretisation import make_grid
-from dlocore.problem import pose
+from dlocore.problem.discretisation import make_grid
+from dlocore.problem.problem import pose
 from dlocore.solvers.march import march
 from dlocore.solvers.monitor import Monitor
 

@@ -10,33 +10,22 @@ from benchmarks.catalogue import catalogue
 from benchmarks.hard.generator import draw
 from benchmarks.random_reference import PATIENT
 from benchmarks.random_reference import compare as compare_with_reference
-from dlocore import (
-    Cable,
-    Environment,
-    Grasp,
-    Move,
-    Points,
-    Quality,
-    Scene,
-    SceneError,
-    equilibrium,
-    predict,
-    refinement,
-    statics,
-)
-from dlocore.discretisation import applied_forces, make_grid
-from dlocore.grid import Grid
-from dlocore.holding import Starts, close_grasps, hold
+from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, SceneError, equilibrium, predict
+from dlocore.accuracy import refinement
 from dlocore.kernels.relax import descend, relax
 from dlocore.kernels.tension import COLUMNS
-from dlocore.problem import Problem, pose
-from dlocore.regrid import begin_on, starts_folded
-from dlocore.settling import settle
-from dlocore.solvers.ladder import Level, Size
+from dlocore.levels.level import Level, Size
+from dlocore.levels.whole_march import march_level
+from dlocore.problem.discretisation import applied_forces, make_grid
+from dlocore.problem.grid import Grid
+from dlocore.problem.holding import Starts, close_grasps, hold
+from dlocore.problem.problem import Problem, pose
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import design_matrix
-from dlocore.statics import settles_elsewhere, start_grid
-from dlocore.whole_march import march_level
+from dlocore.statics import statics
+from dlocore.statics.regrid import begin_on, starts_folded
+from dlocore.statics.settling import settle
+from dlocore.statics.statics import settles_elsewhere, start_grid
 from tests.solver.scenes import WEIGHTLESS, Floats, arc, cable
 from tests.solver.test_handling import spanned_between_two
 from tests.solver.test_two_grippers import hanging

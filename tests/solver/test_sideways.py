@@ -23,19 +23,19 @@ from dlocore import (
     equilibrium,
     predict,
 )
-from dlocore.buckling import UNSTABLE
-from dlocore.determined import DOUBTFUL
-from dlocore.discretisation import make_grid, room_for
 from dlocore.kernels.across import stiffness_across
 from dlocore.kernels.assembly import NO_RATES, History, assemble
 from dlocore.kernels.growth import AT_ONCE, LOOKS, looked_at
 from dlocore.kernels.tension import COLUMNS
-from dlocore.plane import Plane
-from dlocore.problem import Problem, pose, stiffer
-from dlocore.sideways import is_unstable, pose_as_shown
-from dlocore.solvers.ladder import Level, distance, run_level
+from dlocore.levels.level import Level, distance, run_level
+from dlocore.levels.whole_march import sided
+from dlocore.problem.buckling import UNSTABLE
+from dlocore.problem.discretisation import make_grid, room_for
+from dlocore.problem.plane import Plane
+from dlocore.problem.problem import Problem, pose, stiffer
 from dlocore.solvers.monitor import Monitor
-from dlocore.whole_march import sided
+from dlocore.stability.determined import DOUBTFUL
+from dlocore.stability.sideways import is_unstable, pose_as_shown
 
 Floats = NDArray[np.float64]
 

@@ -19,10 +19,10 @@ from dlocore import (
     Table,
     Waypoints,
 )
-from dlocore.discretisation import make_grid
-from dlocore.events import time_knots
-from dlocore.problem import Problem, pose
-from dlocore.solvers.ladder import run_level
+from dlocore.levels.level import run_level
+from dlocore.problem.discretisation import make_grid
+from dlocore.problem.problem import Problem, pose
+from dlocore.problem.time_grid import time_knots
 from dlocore.solvers.march import CHUNK, RHO, March, chunk_of, march
 from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.smooth import march_smooth

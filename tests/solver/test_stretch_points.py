@@ -7,9 +7,9 @@ import pytest
 
 from benchmarks.rod import converged
 from dlocore import Environment, Grasp, Move, Scene, Straight, predict
-from dlocore.discretisation import make_grid
-from dlocore.grid import Grid
-from dlocore.problem import pose
+from dlocore.problem.discretisation import make_grid
+from dlocore.problem.grid import Grid
+from dlocore.problem.problem import pose
 from tests.solver.scenes import Floats, cable, march, rms, samples
 
 AROUND = Environment(gravity=(0.0, 0.0, 0.0), drag=0.05)

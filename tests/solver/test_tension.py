@@ -7,10 +7,10 @@ import pytest
 from numpy.typing import NDArray
 
 from dlocore import Cable, Environment, Grasp, Move, Scene, Straight
-from dlocore.discretisation import make_grid
 from dlocore.kernels.assembly import NO_RATES, History, assemble
 from dlocore.kernels.tension import ASSUMED, AT_HAND, COLUMNS, LAST, MODULUS, assume_last, keep, point_on
-from dlocore.problem import Problem, pose
+from dlocore.problem.discretisation import make_grid
+from dlocore.problem.problem import Problem, pose
 from dlocore.solvers.march import march
 from dlocore.solvers.monitor import Monitor
 

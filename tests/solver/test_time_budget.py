@@ -5,12 +5,14 @@ from dataclasses import replace
 import pytest
 
 from benchmarks.hard.generator import draw
-from dlocore import Quality, predict, refinement, whole_march
-from dlocore.budget import Means
-from dlocore.problem import pose
-from dlocore.solvers.ladder import Level, run_level
+from dlocore import Quality, predict
+from dlocore.accuracy import refinement
+from dlocore.accuracy.budget import Means
+from dlocore.levels import whole_march
+from dlocore.levels.level import Level, run_level
+from dlocore.levels.whole_march import march_level
+from dlocore.problem.problem import pose
 from dlocore.solvers.monitor import Monitor, TimeIsUp
-from dlocore.whole_march import march_level
 from tests.solver.scenes import paper_scene
 
 

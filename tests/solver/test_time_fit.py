@@ -7,9 +7,9 @@ import pytest
 
 from benchmarks.catalogue import catalogue
 from dlocore import Cable, Environment, Grasp, Move, Quality, Scene, Straight, Table, Waypoints, predict
-from dlocore.discretisation import make_grid
-from dlocore.events import time_knots
-from dlocore.problem import pose
+from dlocore.problem.discretisation import make_grid
+from dlocore.problem.problem import pose
+from dlocore.problem.time_grid import time_knots
 from dlocore.solvers import timefit
 from dlocore.solvers.march import March, march
 from dlocore.solvers.monitor import Monitor

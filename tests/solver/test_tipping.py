@@ -8,10 +8,10 @@ import pytest
 
 from benchmarks.hard.generator import draw
 from dlocore import Cable, Environment, Grasp, Load, Move, Points, Quality, Scene, Table, equilibrium, predict
-from dlocore.problem import pose
+from dlocore.problem.problem import pose
 from dlocore.solvers.monitor import Monitor
-from dlocore.statics import start_grid
-from dlocore.tipping import TIPPED, falls
+from dlocore.statics.statics import start_grid
+from dlocore.statics.tipping import TIPPED, falls
 
 SPAN = np.linspace(0.0, 0.6, 33)
 X = (SPAN - 0.3) / 0.3

@@ -16,9 +16,9 @@ from dlocore import (
     Scene,
     predict,
 )
-from dlocore.discretisation import corners
-from dlocore.features import find_features
-from dlocore.shape import start_curve
+from dlocore.problem.discretisation import corners
+from dlocore.problem.features import find_features
+from dlocore.shape.shape import start_curve
 from tests.solver.scenes import apart, cable, kinked, march
 
 

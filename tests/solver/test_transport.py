@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dlocore.transport import transported
+from dlocore.answer.transport import transported
 
 
 def turned(away: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dlocore import Cable, Environment, Grasp, Points, Scene, predict
-from dlocore.problem import pose
-from dlocore.turning import turns_freely
+from dlocore.problem.problem import pose
+from dlocore.statics.turning import turns_freely
 
 WEIGHTLESS = Environment(gravity=(0.0, 0.0, 0.0))
 S = np.linspace(0.0, 1.0, 41)

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from benchmarks.rod import converged
 from benchmarks.rod import equilibrium as rod_equilibrium
 from dlocore import ControlPoints, Environment, Grasp, Move, Points, Quality, Scene, equilibrium, predict
-from dlocore.discretisation import make_grid
-from dlocore.problem import pose
+from dlocore.problem.discretisation import make_grid
+from dlocore.problem.problem import pose
 from tests.solver.scenes import Floats, arc, cable, march, paper_scene, refined, samples, without_table
 
 LIFT = Move(displacement=(-0.2, 0.2, 0.1), duration=1.0)

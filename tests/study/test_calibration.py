@@ -16,7 +16,7 @@ def measured() -> Calibration:
     """A calibration on few grids: of whole ones the grids are all that differs."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(calibrating, "GRIDS", {"march": ((9, 13), (13, 19), (17, 25)), "spacetime": ((9, 13), (13, 19))})
-        return calibration.measure(repeats=1)
+        return calibrating.measure(repeats=1)
 
 
 def test_a_finer_grid_takes_more_steps_and_errs_less(measured: Calibration) -> None:
@@ -78,7 +78,7 @@ def test_the_default_place_is_the_data_directory_of_the_service(
 def test_a_calibration_tells_how_far_it_is_and_stops_when_asked() -> None:
     news: list[tuple[int, int]] = []
     with pytest.raises(Cancelled):
-        calibration.measure(
+        calibrating.measure(
             repeats=1,
             on_progress=lambda done, total, what: news.append((done, total)),
             cancelled=lambda: len(news) >= 3,

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from dlocore import Quality, Scene, predict
-from dlocore.budget import GROWTH, first_level, growth, march_time
-from dlocore.cost import Cost, Rates, Sample, exponent, fitted_rates, pareto_front
-from dlocore.problem import pose
-from dlocore.solvers.ladder import LEVELS, given_steps, stretched
+from dlocore.accuracy.budget import GROWTH, first_level, growth, march_time
+from dlocore.accuracy.cost import Cost, Rates, Sample, exponent, fitted_rates, pareto_front
+from dlocore.levels.level import LEVELS, given_steps, stretched
+from dlocore.problem.problem import pose
 from dlocore.study.scenes import hanging, paper_case
 
 PLANE = Rates(

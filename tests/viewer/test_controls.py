@@ -7,7 +7,7 @@ import pytest
 from protocol_client import NOTHING_STORED, SceneClient, connected
 
 from app.schemas import PredictionRequest, to_scene
-from dlocore.scene import EFFECTS
+from dlocore.scene.scene import EFFECTS
 
 
 def at(document, path):

@@ -10,7 +10,7 @@ from app.viewer import report
 from app.viewer.draft import Draft
 from app.viewer.forms.base import Form, OnEdit, show_value
 from dlocore import EffectReport
-from dlocore.scene import EFFECTS, Switch
+from dlocore.scene.scene import EFFECTS, Switch
 
 SWITCHES: tuple[Switch, ...] = get_args(Switch)
 NEEDED = ("stretch",)  # can't be switched off: without it a cable has no length

@@ -10,7 +10,7 @@ from app.viewer import grips
 from app.viewer.draft import Draft
 from app.viewer.forms.base import Form, OnEdit, show_if, show_value
 from dlocore import SplineSurface
-from dlocore.shape import StartCurve
+from dlocore.shape.shape import StartCurve
 
 NONE = "no gripper"
 HOLDS = {"its place": "point", "place and direction": "tangent", "place, direction and twist": "clamp"}

@@ -1,0 +1,79 @@
+"""The march on another grid that the error on a given one is estimated with."""
+
+from dlocore.levels.level import Level, Size, distance, run_level
+from dlocore.levels.whole_march import march_status
+from dlocore.problem.discretisation import smallest_n_u
+from dlocore.problem.problem import Problem
+from dlocore.problem.time_grid import smallest_n_t
+from dlocore.solvers.monitor import Monitor, TimeIsUp
+
+FINER = 1.5  # times n_u, n_t and the steps
+COARSER, FEWER = 0.75, 0.5  # times n_u and n_t, and the steps
+_SAFETY = 1.5  # times the distance to a finer march: what a slowly converging motion may be off beyond it
+_LEFT = 0.75  # times the distance to a coarser march: benchmarks.estimate
+_LEFT_KINKED = 1.0  # the same of a `kinked` march
+_ROOM = 0.8  # of n_u and n_t: a march on more is not coarser
+TOO_LATE = "The time limit passed before its error was estimated."
+UNKNOWN = "Its error is not known"
+
+
+def coarser(problem: Problem, size: Size) -> Size | None:
+    """Return the size of the march that the error of one on a given grid is estimated with, None where it is finer."""
+    other = _resized(problem, size, COARSER, FEWER)
+    return other if other.n_u <= _ROOM * size.n_u and other.n_t <= _ROOM * size.n_t else None
+
+
+def finer(problem: Problem, size: Size) -> Size:
+    """Return the size of a grid half as fine again."""
+    return _resized(problem, size, FINER, FINER)
+
+
+def by_coarser(problem: Problem, level: Level, monitor: Monitor) -> tuple[float | None, str]:
+    """Return the estimated error of a march on a given grid [m], or None and why there is none, in words.
+
+    It is a share of the distance to a march on a coarser grid, which takes less than half of its time. Where the grid
+    has no room for one, or it fails, a finer one takes its place.
+    """
+    size = coarser(problem, level.size)
+    if size is not None:
+        other, said = _marched(problem, size, level, monitor)
+        if other is None:
+            return None, said
+        if march_status(problem, other)[0] == "converged":
+            left = _LEFT_KINKED if level.motion.kinked else _LEFT
+            return left * distance(level, other, problem), ""
+    return by_finer(problem, level, monitor)
+
+
+def by_finer(problem: Problem, level: Level, monitor: Monitor) -> tuple[float | None, str]:
+    """Return the estimated error of a solution on a given grid [m], or None and why there is none, in words.
+
+    It is the distance to a march on a grid half as fine again, with a margin.
+    """
+    other, said = _marched(problem, finer(problem, level.size), level, monitor)
+    if other is None:
+        return None, said
+    if other.motion.stopped:
+        return None, f" {UNKNOWN}: the finer march to compare it with found no equilibrium."
+    return _SAFETY * distance(level, other, problem), ""
+
+
+def _resized(problem: Problem, size: Size, points: float, steps: float) -> Size:
+    """Return so many times the control points, but as many as the problem needs, and so many times the steps."""
+    n_u = max(smallest_n_u(problem), round(points * size.n_u))
+    n_t = max(smallest_n_t(problem), round(points * size.n_t))
+    return Size(n_u, n_t, round(steps * size.steps))
+
+
+def _marched(problem: Problem, size: Size, level: Level, monitor: Monitor) -> tuple[Level | None, str]:
+    """March on another grid than a level; None, and why, where that is of no use or the time is up."""
+    if level.motion.stopped:
+        return None, ""
+    try:
+        monitor.check()
+        other = run_level(problem, *size, monitor, booked=False, like=level.motion.grid, whole=True)
+    except TimeIsUp:
+        return None, f" {TOO_LATE}"
+    finally:
+        monitor.phase("estimate")
+    return other, ""

@@ -1,0 +1,452 @@
+"""Marches refined until two of them agree: the whole grid first, then the direction that still errs."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from dlocore.accuracy.budget import Means, first_level
+from dlocore.accuracy.changes import DIRECTIONS, MISSED_COUNTS, Changes, weighed
+from dlocore.accuracy.cost import Cost
+from dlocore.answer.parts import Status
+from dlocore.errors import SceneError
+from dlocore.levels.level import (
+    ACCEPT,
+    LEVELS,
+    Level,
+    Size,
+    credible_after,
+    distance,
+    stretched,
+)
+from dlocore.levels.progress import record_level
+from dlocore.levels.whole_march import Outcome, is_folded, is_uneven, march_level, march_status
+from dlocore.problem.problem import Problem
+from dlocore.scene.scene import AUTO_TARGET, Quality
+from dlocore.solvers.march import RHO, STRONGLY_DAMPED
+from dlocore.solvers.monitor import Monitor, TimeIsUp
+from dlocore.stability.determined import DOUBTFUL, UNDETERMINED, UNSEEN, bend_in_words, goes_astray, in_words
+from dlocore.statics.statics import RESTLESS, settles_elsewhere
+from dlocore.words import in_mm
+
+AUTO_ENOUGH = 1e-2  # of the length: the estimated error with which it is content where the finest grids reach no closer
+ROUGH = 0.05  # of the length: two grids that differ more are in no order yet: the next is marched with strong damping
+_FINER = {"space": 1.5, "time": 2.0}
+_FINE_IN_TIME = 0.3  # of the target: a time spline that misses its march by less keeps its knots as the steps halve
+_AT_BEST = 0.2  # of an error, is left by one refinement: what is still too much after all of them is not begun
+_EVENED = 3  # refinements in space, at most, of a grid that agrees with the one before on strain within a span
+_FAILURES = 2  # refinements in time of a march that found no equilibrium
+
+
+def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | None = None) -> Outcome:
+    """March on finer and finer grids until two agree within the target, or the time budget is used.
+
+    The first few refine space and time together, which is what most motions need. What is left errs mostly in one of
+    them: a cable that is let go vibrates faster than it is curved, a loop that tightens is curved more than it is fast.
+    So from there on each grid is finer in one direction, that whose last refinement moved the surface most, and the
+    error is the sum of both. A cable that folds between its control points gets more of them, whatever grids agree on.
+    The error is at least what the time spline misses of its march: a cable that trembles faster than
+    two grids can show looks alike on both. A motion that its scene does not determine is none to agree on: where two
+    grids say so in turn that is the answer. A march that finds no equilibrium is tried with more steps before it is
+    given up. Within a time budget the first grid is the one that what solves cost on this machine allows. Who gives a
+    time, as a budget or a deadline, is given more grids within it than who doesn't, who would wait for minutes.
+
+    A target that was asked for has to be met. Quality "auto" aims at AUTO_TARGET with a share of that work, and where
+    it reaches no closer with it, an estimate of AUTO_ENOUGH is success, for which it does all of the work that a target
+    is worth; the message says how far the grids agree.
+    """
+    length = problem.scene.cable.length
+    budget = quality.time_budget
+    return _Climb(
+        problem=problem,
+        means=Means(monitor, cost, budget or np.inf),
+        target=quality.target_error or AUTO_TARGET * length,
+        enough=quality.target_error or AUTO_ENOUGH * length,
+        number=0 if budget is None else first_level(problem, cost, budget),
+    ).outcome()
+
+
+@dataclass(kw_only=True)
+class _Climb:
+    """One climb, and how far it has come.
+
+    Attributes:
+        problem: what is solved now; motions may call for more effects.
+        means: what it may spend.
+        target: error that is aimed at [m].
+        enough: estimated error that is success where no finer grid is left [m].
+        number: of the grids that refine space and time together, this one included.
+        direction: in which the grid at hand is finer than the best one: "both", "space" or "time".
+        best: the finest march so far that is to be believed.
+        changes: how far refinements moved the surface.
+        estimate: error of the best one [m].
+        rho: spectral radius of the next march.
+        failures: marches in a row that found less than the best one, or no equilibrium as that.
+        astray: how far a start that is hardly another goes elsewhere, as the last grid that agreed has it [m], 0 where
+            that does not matter.
+        unseen: whether no time was left to see how far it goes.
+        evened: how often more control points were taken as the cable was strained between the points that watch it.
+        wanting: effects that a finer grid called for, and that no time was left to march with, in words.
+    """
+
+    problem: Problem
+    means: Means
+    target: float
+    enough: float
+    number: int
+    direction: str = "both"
+    best: Level | None = None
+    changes: Changes = field(default_factory=Changes)
+    estimate: float = np.inf
+    rho: float = RHO
+    failures: int = 0
+    astray: float = 0.0
+    unseen: bool = False
+    evened: int = 0
+    wanting: str = ""
+
+    @property
+    def monitor(self) -> Monitor:
+        """That of the solve."""
+        return self.means.monitor
+
+    @property
+    def _timed(self) -> bool:
+        """Whether a time budget was given."""
+        return self.means.budget < np.inf
+
+    def outcome(self) -> Outcome:
+        """March until an answer is found, and return it."""
+        size: Size | None = stretched(self.problem, self.number)
+        shown: Level | None = None  # the best one on grids whose start rests, where on finer ones it does not
+        while size is not None:
+            began = self.monitor.elapsed()
+            try:
+                level = self._march(size)
+            except TimeIsUp as up:
+                self.monitor.phase("march")
+                self.wanting = ", ".join("a side to go to" if name == "side" else name for name in up.args)
+                break
+            except SceneError as error:
+                if error.field != RESTLESS:
+                    raise
+                self.number += 1
+                shown = self.best or shown
+                if self.number >= len(LEVELS) or (shown is not None and self.means.used_up):
+                    if shown is None:
+                        raise
+                    return self._restless(shown, error)
+                # a start that finds no rest on few control points may do so on more; one that did on fewer still was at
+                # rest as they can't bend the way that it would go
+                self._forget()
+                size = stretched(self.problem, self.number)
+                continue
+            spent = self.monitor.elapsed() - began
+            self.means.took(self.problem, size, spent)
+            if self.best is not None:
+                more = self._after_failure(level, self.best, size)
+                if more is not None:
+                    record_level(self.problem, level, self.monitor)
+                    size = more
+                    continue
+                if level.motion.stopped and not self.best.motion.stopped:
+                    return self._unfinished(level, self.best)
+                self._weigh(level, self.best)
+            record_level(self.problem, level, self.monitor)
+            self.best, self.failures = level, self.failures + 1 if level.motion.stopped else 0
+            status, message = march_status(self.problem, level)
+            if level.motion.stopped == "time" or self.failures > len(LEVELS):
+                return Outcome(level, status, message, None)
+            agrees = self.estimate <= ACCEPT * self.target and not self._timed
+            uneven = agrees and is_uneven(level) and self.evened < _EVENED
+            self.evened += uneven
+            unfolds = self._affordable(_finer(size, "space", False)) if uneven or is_folded(level) else None
+            finer: Size | None
+            if agrees and unfolds is None:
+                finer = self._once_more(size)
+                if finer is None and status != "converged":
+                    return Outcome(level, status, message, self.changes.parts(level))
+                if finer is None:
+                    before, self.astray = self._undetermined, self._find_astray(level)
+                    # on a coarse grid disturbances may grow that do not on a fine one
+                    finer = self._next(level, size, None) if self._undetermined and not before else None
+                    if finer is None:
+                        return self._agreeing(level)
+            else:
+                unfolded = self._unfolded(level, size)
+                if unfolded is not None:
+                    return unfolded
+                self._look_back(level, size)
+                finer = self._next(level, size, unfolds)
+            if finer is not None and not self.means.next_fits(self.problem, size, finer, spent):
+                return self._within_budget(level)
+            size = finer
+        return self._ended()
+
+    def _march(self, size: Size) -> Level:
+        """March on the next grid; where its motion calls for another effect, forget the grids before."""
+        before = self.best
+        if before is not None:
+            self.monitor.end_within(self.means.budget)
+            self.monitor.check()
+        rho = self.rho
+        if before is not None and size.steps == before.size.steps and before.motion.rho == STRONGLY_DAMPED:
+            rho = STRONGLY_DAMPED  # without, the same steps went astray
+        level = march_level(
+            self.problem, size, self.monitor, rho, free_knots=True, rough=True, before=before, whole=before is not None
+        )
+        if before is not None and level.posed is self.problem:
+            level = replace(level, change=distance(before, level, self.problem))
+            if not self._is_rough(level):  # so strands do not meet because of the grid
+                level = march_level(self.problem, size, self.monitor, rho, free_knots=True, known=level, whole=True)
+        if level.posed is not self.problem:
+            self._forget()  # another motion
+        self.problem = level.posed  # a rough grid may have needed contact that is too stiff for a fine one
+        return level
+
+    def _forget(self) -> None:
+        """Forget the grids before."""
+        self.best, self.changes, self.estimate, self.evened = None, Changes(), np.inf, 0
+        self.astray, self.unseen = 0.0, False
+
+    def _is_rough(self, level: Level) -> bool:
+        return not level.change <= ROUGH * self.problem.scene.cable.length
+
+    def _after_failure(self, level: Level, best: Level, size: Size) -> Size | None:
+        """Return the size to try where a finer grid failed, None where it did not, or was tried often enough."""
+        if not _is_worse(level, best):
+            return None
+        self.failures += 1
+        if self.failures > _FAILURES or self._timed:
+            return None
+        return self._affordable(_finer(size, "space" if is_folded(best) else "time", True))
+
+    def _weigh(self, level: Level, best: Level) -> None:
+        """Note how far a level moved the surface, what error that points to, and how to damp the next march."""
+        if best.motion.stopped:  # its surface stands still from there on: how far that is from another tells nothing
+            self.changes, self.estimate = Changes(), np.inf
+            return
+        self.changes.note(self.direction, level, best)
+        self.estimate = self.changes.estimate(level)
+        rough = self._is_rough(level)
+        if self.number < len(LEVELS) or (rough and self.problem.self_contact is not None):
+            self.rho = STRONGLY_DAMPED if rough else RHO  # later on two marches would differ by their damping
+
+    def _once_more(self, size: Size) -> Size | None:
+        """Return the next size in a direction whose last refinement tells little of the grid at hand, or None.
+
+        On coarse steps, which damp what they can't resolve, more control points may move the surface by far less.
+        """
+        for direction in self.changes.stale(self.target):
+            finer = self._affordable(_finer(size, direction, False))
+            if finer is not None:
+                self.direction = direction
+                return finer
+        return None
+
+    def _look_back(self, level: Level, size: Size) -> None:
+        """Where nothing is known of what steps err by, and twice as many are dear, learn it from half as many.
+
+        So it is where a motion calls for another effect on a fine grid: the grids before tell nothing of it.
+        """
+        known = "both" in self.changes.last or "time" in self.changes.last
+        if known or self.number < len(LEVELS) - 1 or level.motion.stopped or is_folded(level):
+            return
+        if not self.means.is_dear(self.problem, _finer(size, "time", False)):
+            return
+        half = size._replace(steps=size.steps // 2)
+        try:
+            coarse = march_level(
+                self.problem, half, self.monitor, level.motion.rho, free_knots=True, rough=True, before=level,
+                whole=True,
+            )  # fmt: skip
+        except TimeIsUp:
+            return
+        if coarse.posed is not self.problem or march_status(self.problem, coarse)[0] != "converged":
+            return
+        moved = distance(coarse, level, self.problem)
+        record_level(self.problem, replace(coarse, change=moved, note="tells what steps err by"), self.monitor)
+        self.changes.last["time"] = weighed(replace(level, change=moved), coarse, None, True)
+        self.estimate = self.changes.estimate(level)
+
+    def _next(self, level: Level, size: Size, unfolds: Size | None) -> Size | None:
+        """Return the next size, None where no finer grid is worth its time; `unfolds` is for a motion that folds."""
+        self.number += 1
+        if self.number < len(LEVELS):
+            finer = stretched(self.problem, self.number)  # more may have been needed
+            return finer._replace(n_u=max(finer.n_u, size.n_u), steps=max(finer.steps, size.steps))
+        if unfolds is not None:
+            self.direction = "space"
+            if "both" in self.changes.last:  # of space, grids that agree on a fold tell nothing
+                self.changes.last.setdefault("time", self.changes.last["both"])
+            return unfolds
+        trembles = MISSED_COUNTS * level.missed > _FINE_IN_TIME * self.target
+        sizes = {direction: self._affordable(_finer(size, direction, trembles)) for direction in DIRECTIONS}
+        misses = MISSED_COUNTS * level.missed > self.changes.error
+        self.direction = "time" if misses else self.changes.worst()
+        change = self.changes.last.get(self.direction)
+        if sizes[self.direction] is None and (change is None or change.error < self.target):
+            # may still bring the sum of both below it
+            self.direction = next(direction for direction in DIRECTIONS if direction != self.direction)
+        if self.direction == "time" and self.problem.self_contact is None:
+            # on the same steps strongly damped marches err by far more; but strands that strike each other rebound less
+            self.rho = RHO
+        hope = _AT_BEST ** self._left(sizes[self.direction])
+        return None if change is not None and hope * change.moved > self.enough else sizes[self.direction]
+
+    def _affordable(self, size: Size) -> Size | None:
+        """Return a size, or None where a march of it takes too long."""
+        success = self.best is None or not is_folded(self.best)
+        content = self.enough > self.target and self.estimate <= self.enough and success
+        return self.means.affordable(self.problem, size, content)
+
+    def _left(self, size: Size | None) -> int:
+        """Return how many refinements in the direction are left, from a size on."""
+        count = 0
+        while size is not None:
+            count += 1
+            size = self._affordable(_finer(size, self.direction, False))
+        return count
+
+    def _find_astray(self, level: Level) -> float:
+        """Return how far a start that is hardly another would go elsewhere [m], 0 where that does not matter.
+
+        Where there is no time left to look, what the grid before says counts.
+        """
+        monitor = self.monitor.within(self.means.left) if self._timed else self.monitor
+        try:
+            moved = goes_astray(level.problem, level.motion, monitor, self.number >= len(LEVELS))
+            moved = max(moved, settles_elsewhere(level.problem, level.motion.grid, monitor))
+            self.unseen = False
+        except TimeIsUp:
+            self.unseen = True
+            return self.astray
+        finally:
+            self.monitor.phase("estimate")
+        return moved if moved > DOUBTFUL * self.problem.scene.cable.length else 0.0
+
+    @property
+    def _undetermined(self) -> bool:
+        """Whether its start may take a motion so far elsewhere that no grid tells of it what was asked for."""
+        lost = self.astray > UNDETERMINED * self.problem.scene.cable.length
+        return lost or (self.astray > 0.0 and self.estimate + self.astray > self.enough)
+
+    def _agreeing(self, level: Level) -> Outcome:
+        return self._answer(level, "converged", self._agreed(level))
+
+    def _answer(self, level: Level, status: Status, message: str, advice: str = "") -> Outcome:
+        """Return an answer, which is no success where its start may take it astray."""
+        message, parts = self._doubted(level, message)
+        if self._undetermined:
+            status, advice = "stalled", " Make the motion slower, damp it, or hold the cable in more places."
+        return Outcome(level, status, message + advice, parts)
+
+    def _doubted(self, level: Level, message: str) -> tuple[str, dict[str, float] | None]:
+        """Return a message and the parts of the error [m], with what is known of where its start may take a motion."""
+        parts = self.changes.parts(level)
+        if not self.astray:
+            return message + (f" {UNSEEN}" if self.unseen else ""), parts
+        told = in_words if self._undetermined else bend_in_words
+        said = f"But {told(self.problem, self.astray)}."
+        return f"{message} {said}", {**(parts or {}), "start": self.astray}
+
+    def _agreed(self, level: Level) -> str:
+        return f"Two grids agree to {in_mm(level.change)}; {self._left_over()}."
+
+    def _left_over(self) -> str:
+        """Return the estimated error and the target, in words."""
+        finite = np.isfinite(self.estimate)
+        known = f"the estimated error is {in_mm(self.estimate, 3)}" if finite else "its error is not known"
+        return f"{known}, target {in_mm(self.target, 3)}"
+
+    def _unfolded(self, level: Level, size: Size) -> Outcome | None:
+        """Return the answer of a march that watches over the length at more points, if a fold is all that is amiss.
+
+        A tip far shorter than a span, beyond a grasp, may fold straight back on any grid: nothing else moves by that.
+        """
+        if not (is_folded(level) and self.estimate <= ACCEPT * self.target and not self._timed):
+            return None
+        try:
+            other = march_level(
+                self.problem, size, self.monitor, self.rho, free_knots=True, rough=True, before=level, watch=True,
+                whole=True,
+            )  # fmt: skip
+        except TimeIsUp:
+            return None
+        away = distance(level, other, self.problem)
+        if other.posed is not self.problem or march_status(self.problem, other)[0] != "converged":
+            return None
+        if not self.estimate + away <= self.target:
+            return None
+        other = replace(other, change=level.change + away, note="watched at more points")
+        record_level(self.problem, other, self.monitor)
+        parts = self.changes.parts(other) or {}
+        parts[list(parts)[-1]] += away
+        return Outcome(other, "converged", self._agreed(other), parts)
+
+    def _within_budget(self, level: Level) -> Outcome:
+        """Return the best that the budget allows; it is a success where its error is known, and is what is enough."""
+        allowed = f"{self.means.budget * 1e3:.3g} ms"
+        if not np.isfinite(level.change):
+            return Outcome(level, "time_limit", f"{allowed} allow one grid, unchecked.", None)
+        status, failure = march_status(self.problem, level)
+        moved = f"The best grid in {allowed}; the last refinement moved the surface by {in_mm(level.change)}."
+        self.astray = self._find_astray(level)
+        message, parts = self._doubted(level, moved)
+        if status != "converged":
+            return Outcome(level, status, f"{message} {failure}", parts)
+        if parts is None or sum(parts.values()) > self.enough:
+            more = f"more than {AUTO_ENOUGH:.0%} of the length" if parts else "not known"
+            return Outcome(level, "time_limit", f"{message} Its estimated error is {more}: allow more time.", parts)
+        return Outcome(level, status, message, parts)
+
+    def _unfinished(self, level: Level, best: Level) -> Outcome:
+        """Return the best one, where a finer grid was not finished."""
+        if self.estimate <= self.enough:
+            return self._ended()
+        status, message = march_status(self.problem, level)
+        errors = self.changes.parts(best) or ({"grid": best.change} if np.isfinite(best.change) else None)
+        return Outcome(best, status, f"A finer grid was not finished: {message}", errors)
+
+    def _restless(self, best: Level, error: SceneError) -> Outcome:
+        """Return the best one, where the start on finer grids finds no rest, so that its error is not known."""
+        return Outcome(best, "stalled", f"On finer grids the start did not come to rest: {error}", None)
+
+    def _ended(self) -> Outcome:
+        """Return the best one, where no finer grid is to be tried or the time is up."""
+        best = self.best
+        assert best is not None
+        if self.wanting:
+            words = f"The time limit passed: a finer grid calls for {self.wanting}, which this answer leaves out."
+            return Outcome(best, "time_limit", f"{words} Allow more time.", None)
+        if self.means.used_up:
+            return self._within_budget(best)
+        status, message = march_status(self.problem, best)
+        left = self._left_over()
+        advice = "Allow a larger target_error, more time or a shorter motion."
+        if status == "converged" and self.estimate <= self.enough:
+            self.astray = self.astray or self._find_astray(best)
+            outcome = self._agreeing(best)
+            finest = " No finer grid was tried." if self.estimate > self.target else ""
+            return outcome._replace(message=outcome.message + finest)
+        elif status == "converged" and self.monitor.remaining() <= 0:
+            status, message = "time_limit", f"The time limit passed; {left}. {advice}"
+        elif status == "converged":
+            self.astray = self.astray or self._find_astray(best)
+            return self._answer(best, "max_iterations", f"No finer grid was tried; {left}.", f" {advice}")
+        return Outcome(best, status, message, self.changes.parts(best))
+
+
+def _is_worse(level: Level, best: Level) -> bool:
+    """Tell whether a finer grid failed, or strained the cable beyond belief, and the one before by far less."""
+    torn = level.motion.largest_strain > credible_after(best)
+    failed = bool(level.motion.stopped) and not best.motion.stopped
+    stalled = march_status(level.problem, level)[0] != "converged" == march_status(best.problem, best)[0]
+    return torn or failed or stalled
+
+
+def _finer(size: Size, direction: str, trembles: bool) -> Size:
+    """Return the next size in a direction; more time knots go with more steps only where the motion `trembles`."""
+    ratio = _FINER[direction]
+    if direction == "space":
+        return size._replace(n_u=round(ratio * size.n_u))
+    return size._replace(n_t=round(ratio * size.n_t) if trembles else size.n_t, steps=round(ratio * size.steps))

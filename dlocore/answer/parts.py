@@ -1,0 +1,199 @@
+"""The parts of an answer, and of what a solve reports while it runs."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.scene.scene import Material
+from dlocore.spline import SplineSurface
+
+Floats = NDArray[np.float64]
+Status = Literal["converged", "max_iterations", "stalled", "time_limit"]
+
+
+def with_notes(said: str, notes: list[str]) -> str:
+    """Return what was said of an answer and the notes on it, each in words, as one message."""
+    return " ".join([said, *[f"Note: {note}." for note in notes]])
+
+
+@dataclass(frozen=True)
+class EffectReport:
+    """Whether an effect was simulated, why, and how large it was.
+
+    Attributes:
+        name: as in the scene's `effects`.
+        active: whether it was simulated.
+        reason: why, in words.
+        magnitude: its size on the predicted motion, in `unit`; None where that means nothing.
+        unit: of the magnitude, e.g. "N".
+    """
+
+    name: str
+    active: bool
+    reason: str
+    magnitude: float | None = None
+    unit: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Iteration:
+    """One iteration of a solve: of `spacetime` or `paper`, or one refinement level of `march`.
+
+    Attributes:
+        number: from 0.
+        update: norm of the change of the control points, the paper's eq. (25) [m]; for a refinement level the largest
+            change of the surface [m], infinite at the first.
+        residual: root of the weighted mean square of the equations' residual over the whole motion, as a displacement
+            [m] (docs/model.md eq. 16); for `paper` a force [N]; for a level of `march` the largest error left
+            by Newton's iterations [m].
+        wall_time: since the solve began [s].
+        damping: Levenberg-Marquardt damping of the step, 0 for a plain one.
+        step_length: fraction of the full step that was taken.
+        n_u: control points along the cable at this iteration.
+        n_t: control points in time.
+        find_surface: finds the iterate itself, which `surface` keeps.
+        find_energy: finds the elastic energy at the end of the motion [J], which `energy` keeps.
+        note: what happened, in words, e.g. "Gauss-Newton tangent"; empty for a plain iteration.
+    """
+
+    number: int
+    update: float
+    residual: float
+    wall_time: float
+    damping: float
+    step_length: float
+    n_u: int
+    n_t: int
+    find_surface: Callable[[], SplineSurface] = field(repr=False)
+    find_energy: Callable[[], float] = field(repr=False)
+    note: str = ""
+
+    @cached_property
+    def surface(self) -> SplineSurface:
+        """The iterate itself."""
+        return self.find_surface()
+
+    @cached_property
+    def energy(self) -> float:
+        """Elastic energy at the end of the motion [J]."""
+        return self.find_energy()
+
+
+OnIteration = Callable[[Iteration], None]
+
+
+@dataclass(frozen=True, eq=False)
+class GraspReaction:
+    """Force and moment that a gripper gives to the cable.
+
+    Attributes:
+        u: material coordinate of the grasp [m].
+        times: (k,) [s], those of the prediction's reactions.
+        reaction: (k, 3) [N]; zero while the gripper is open.
+        moment: (k, 3) [N m]; zero for a grasp that holds only the position.
+    """
+
+    u: float
+    times: Floats
+    reaction: Floats
+    moment: Floats
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MaterialMotion:
+    """What the sections of the cable remember, over time; see `dlocore.Material`.
+
+    Attributes:
+        times: (m,) [s].
+        director: (m, 3), at u = 0.
+        u: (k,) [m].
+        memory: (m, k, 3) [1/m, 1/m, rad/m].
+        stretch: (m, k).
+        natural: (k, 3) [1/m, 1/m, rad/m].
+    """
+
+    times: Floats
+    director: Floats
+    u: Floats
+    memory: Floats
+    stretch: Floats
+    natural: Floats
+
+    def at(self, t: float) -> Material:
+        """Return what the sections remember at time `t` [s], linear between the stored times."""
+        k, s = _bracket(self.times, t)
+        director = (1 - s) * self.director[k] + s * self.director[k + 1]
+        return Material(
+            director=director / np.linalg.norm(director),
+            u=self.u,
+            memory=(1 - s) * self.memory[k] + s * self.memory[k + 1],
+            stretch=(1 - s) * self.stretch[k] + s * self.stretch[k + 1],
+            natural=self.natural,
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StretchMotion:
+    """How far the cable is stretched, over time: what its spline does not tell to the accuracy of a tension.
+
+    Attributes:
+        times: (m,) [s].
+        u: (k,) [m].
+        strain: axial strain (m, k).
+    """
+
+    times: Floats
+    u: Floats
+    strain: Floats
+
+    def at(self, t: float) -> Floats:
+        """Return the axial strain (k,) at time `t` [s], linear between the stored times."""
+        k, s = _bracket(self.times, t)
+        return np.asarray((1 - s) * self.strain[k] + s * self.strain[k + 1])
+
+
+def _bracket(times: Floats, t: float) -> tuple[int, float]:
+    """Return which of the times (m,) [s] is the last before `t`, and the share of the way from it to the next."""
+    k = int(np.clip(np.searchsorted(times, t) - 1, 0, len(times) - 2))
+    return k, float(np.clip((t - times[k]) / (times[k + 1] - times[k]), 0.0, 1.0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Accuracy:
+    """What the answer is worth and what it cost.
+
+    Attributes:
+        method: the method that gave the answer.
+        error_estimate: estimated error of the position at the worst point of the surface [m]; None where nothing was
+            computed that tells.
+        error_parts: what it adds up from [m]: "grid", of the discretisation, or "space" and "time" where they are known
+            apart; "iteration", what the last iteration left; "neglected", effects that "auto" left out; "start",
+            where the scene does not determine its motion, how far a start that is hardly another ends elsewhere. Empty
+            where there is no estimate.
+        neglected: the part of it that effects left out by "auto" may have, about [m].
+        wall_time: time of the whole solve [s].
+        n_u, n_t: size of the net of control points.
+        delta: threshold on the update [m].
+        steps: time steps of the march.
+        dimensions: 2 where the motion is planar, else 3.
+        dimensions_reason: why, in words.
+        phases: time by phase [s]: "setup", "march", "fit", "spacetime", "estimate", "report"; "march" has the fit of a
+            smooth motion without twist, which is one compiled call with it.
+    """
+
+    method: str
+    error_estimate: float | None
+    neglected: float
+    wall_time: float
+    n_u: int
+    n_t: int
+    delta: float
+    steps: int
+    dimensions: int
+    dimensions_reason: str
+    phases: dict[str, float] = field(default_factory=dict)
+    error_parts: dict[str, float] = field(default_factory=dict)

@@ -1,0 +1,139 @@
+"""What a solve tells about itself: world coordinates, reactions, effects and energies."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.answer.parts import EffectReport, GraspReaction, MaterialMotion
+from dlocore.effects.distance import distances
+from dlocore.kernels.assembly import History, stored_energy
+from dlocore.problem.grid import Grid
+from dlocore.problem.holding import SMOOTH, Held
+from dlocore.problem.problem import Problem
+from dlocore.scene.scene import Grasp
+from dlocore.spline import SplineSurface
+
+Floats = NDArray[np.float64]
+
+
+def surface_of(problem: Problem, knots_u: Floats, knots_t: Floats, control: Floats) -> SplineSurface:
+    """Return the surface in the world frame of control points (n_t, n_u, nc) in the solve's coordinates."""
+    return SplineSurface(problem.world(control), knots_u, knots_t)
+
+
+def elastic_energy(problem: Problem, grid: Grid, q: Floats, history: History) -> float:
+    """Return the elastic energy stored in control points q (n_u, nc) [J] with `history` behind them."""
+    return float(stored_energy(problem.axes, q, grid.tables, *problem.laws, history))
+
+
+@dataclass(frozen=True, eq=False)
+class WindowForces:
+    """What holds the cable over a stretch of time.
+
+    Attributes:
+        held: the held degrees of freedom.
+        times: (k,) [s].
+        forces: residual of the equations at the held degrees of freedom (k, held) [N].
+        states: control points (k, n_u, nc) [m] at those times.
+    """
+
+    held: Held
+    times: Floats
+    forces: Floats
+    states: Floats
+
+
+def reactions(problem: Problem, grid: Grid, windows: tuple[WindowForces, ...]) -> tuple[GraspReaction, ...]:
+    """Return force [N] and moment [N m] of every grasp over time.
+
+    The force is the multiplier of the constraint b(u_g) q = p, the moment d x (multiplier of b'(u_g) q = d).
+    """
+    dimensions = problem.plane.dimensions
+    t = np.concatenate([w.times for w in windows])
+    force = {g: np.zeros((len(t), 3)) for g in problem.scene.grasps}
+    moment = {g: np.zeros((len(t), 3)) for g in problem.scene.grasps}
+    at = 0
+    for window in windows:
+        part = slice(at, at + len(window.times))
+        at = part.stop
+        multipliers = problem.plane.world_vectors(window.held.multipliers(window.forces, dimensions))
+        for row, (i, derivative) in enumerate(window.held.rows):
+            if (i, derivative) == SMOOTH:
+                continue
+            g = window.held.grasps[i]
+            if derivative == 0:
+                force[g][part] = multipliers[:, row]
+            else:
+                moment[g][part] = np.cross(_tangents(problem, grid, window, g), multipliers[:, row])
+        if window.held.turned:
+            assert problem.twist is not None
+            torques = problem.twist.radius * window.held.torques(window.forces, dimensions)
+            for r, i in enumerate(window.held.turned):
+                g = window.held.grasps[i]
+                moment[g][part] += torques[:, r, None] * _tangents(problem, grid, window, g)
+    return tuple(GraspReaction(g.u, t, force[g], moment[g]) for g in problem.scene.grasps)
+
+
+def _tangents(problem: Problem, grid: Grid, window: WindowForces, grasp: Grasp) -> Floats:
+    """Return the tangents (k, 3) of a held direction, which has unit length."""
+    slope = grid.at(window.states, grasp.u, 1)[..., : problem.plane.dimensions]
+    return problem.plane.world_vectors(slope)
+
+
+def planned_effects(problem: Problem) -> tuple[EffectReport, ...]:
+    """Return for each effect whether the scene calls for it, and why; magnitudes are known only after solving."""
+    return tuple(EffectReport(name, choice.active, choice.reason) for name, choice in problem.choices.items())
+
+
+def effect_reports(
+    problem: Problem, grid: Grid, material: Callable[[], MaterialMotion | None], surface: SplineSurface
+) -> tuple[EffectReport, ...]:
+    """Return for each effect whether it was simulated, why, and its size on the predicted motion.
+
+    The axial strain is that at the axial points: between them reduced integration leaves it free to oscillate.
+    """
+    cable, environment = problem.scene.cable, problem.scene.environment
+    u = np.linspace(0.0, cable.length, 33)
+    t = np.linspace(0.0, surface.horizon, 33)
+    speed = np.linalg.norm(surface(u, t, dt=1)[..., :3], axis=-1)
+    acceleration = np.linalg.norm(surface(u, t, dt=2)[..., :3], axis=-1)
+    curvature = surface.curvature(u, t)
+    controls = surface.states(t)
+    states = problem.coordinates(controls[..., :3], controls[..., 3])
+    tau = surface.twist_rate(u, t)
+    mu, EI = cable.linear_density, cast(float, cable.bending_stiffness)
+    drag = environment.drag * speed + environment.drag_quadratic * speed**2
+    weight = float(mu * cable.length * np.linalg.norm(cast(Floats, environment.gravity)))
+    sizes: dict[str, tuple[float, str]] = {
+        "inertia": (float(mu * np.trapezoid(acceleration, u, axis=1).max()), "N"),
+        "drag": (float(np.trapezoid(drag, u, axis=1).max()), "N"),
+        "damping": (float(cable.bending_damping * np.abs(np.gradient(curvature, t, axis=0)).max()), "N m"),
+        "gravity": (weight, "N"),
+        "stretch": (grid.largest_strain(states), "axial strain"),
+        "bend": (float(EI * curvature.max()), "N m"),
+        "table": (weight, "N"),
+        "twist": (float(cast(float, cable.torsional_stiffness) * np.abs(tau).max()), "N m"),
+    }
+    if problem.twist is None:
+        del sizes["twist"]
+    if not problem.on_table:
+        del sizes["table"]
+    if problem.friction is not None and environment.table is not None:
+        sizes["friction"] = (environment.table.friction * weight, "N")
+    if problem.obstacles:
+        near = surface.positions(np.linspace(0.0, cable.length, 129), np.linspace(0.0, surface.horizon, 65))
+        rows = np.array([obstacle.row() for obstacle in problem.obstacles])
+        gap = distances(rows, np.ascontiguousarray(near.reshape(-1, 3))).min() - 0.5 * cable.diameter
+        sizes["obstacles"] = (float(gap), "m, the smallest gap")
+    if problem.choices["plasticity"].active:
+        kept = material()
+        if kept is not None:
+            change = np.linalg.norm(kept.memory[-1] - kept.natural, axis=1).max()
+            sizes["plasticity"] = (float(change), "1/m, the bend that is kept")
+    return tuple(
+        replace(report, magnitude=sizes[report.name][0], unit=sizes[report.name][1]) if report.name in sizes else report
+        for report in planned_effects(problem)
+    )

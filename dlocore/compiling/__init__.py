@@ -1,0 +1,1 @@
+"""Compiled functions, and what is kept of them on disk."""

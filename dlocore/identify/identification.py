@@ -1,0 +1,112 @@
+"""What is identified: values with intervals, what they rest on, and how the search goes."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.identify.candidate import Candidate
+from dlocore.scene.cable import Cable
+from dlocore.scene.scene import Environment
+
+Floats = NDArray[np.float64]
+
+Status = Literal["converged", "max_iterations"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimated:
+    """An identified parameter.
+
+    Attributes:
+        name, unit: of the parameter.
+        value: [unit]; where it is not identifiable what it was assumed to be.
+        low, high: 95 % interval [unit].
+        identifiable: the data tell it.
+        statement: in words.
+        rests_on: share of what is known of it by recording.
+    """
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    identifiable: bool
+    statement: str
+    rests_on: dict[str, float]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fit:
+    """How a recording's window is met.
+
+    Attributes:
+        name: of the recording.
+        begin: of the window in it [s].
+        times: of the compared frames in it (k,) [s].
+        measured, predicted: (k, m, 3) [m].
+        free: the markers that nothing holds.
+        stalled: the prediction stopped before the end.
+    """
+
+    name: str
+    begin: float
+    times: Floats
+    measured: Floats
+    predicted: Floats
+    free: NDArray[np.int64]
+    stalled: bool
+
+    @property
+    def distances(self) -> Floats:
+        """Distance of each free marker from its prediction (k, free) [m], NaN where it was lost."""
+        away = self.measured[:, self.free] - self.predicted[:, self.free]
+        return np.asarray(np.linalg.norm(away, axis=2))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Identification:
+    """What recordings tell of a cable.
+
+    Attributes:
+        status: "converged" or "max_iterations".
+        message: in words, with what could not be identified.
+        candidate: everything that was found, to replay with.
+        parameters: as asked for, with intervals.
+        correlations: between the identified ones, (n, n), in the order of `parameters`; NaN for others.
+        fits: how each window is met.
+        deviation: robust standard deviation of a coordinate of the residuals [m].
+        iterations: of Gauss-Newton.
+        seconds: time it took.
+    """
+
+    status: Status
+    message: str
+    candidate: Candidate
+    parameters: tuple[Estimated, ...]
+    correlations: Floats
+    fits: tuple[Fit, ...]
+    deviation: float
+    iterations: int
+    seconds: float
+
+    @property
+    def cable(self) -> Cable:
+        """The cable, to be used in scenes."""
+        return self.candidate.cable
+
+    @property
+    def environment(self) -> Environment:
+        """The drag found."""
+        return self.candidate.environment
+
+
+@dataclass(frozen=True, kw_only=True)
+class Progress:
+    """One iteration: its number, the median distance of the free markers [m], and the values by name."""
+
+    iteration: int
+    distance: float
+    values: dict[str, float]

@@ -1,0 +1,122 @@
+"""What no cable can follow and only its motion tells: grippers that drive what they hold into something.
+
+Grasps that hold from the beginning are looked at before anything is solved (`problem/checks.py`). One that closes
+later has its path begin where the cable is by then, and whether two strands meet is not known beforehand.
+"""
+
+from collections.abc import Iterator
+from itertools import combinations
+from typing import NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.effects.distance import distances
+from dlocore.effects.selfcontact import APART
+from dlocore.levels.level import TOO_DEEP
+from dlocore.problem.problem import Problem
+from dlocore.scene.scene import Grasp, Scene
+from dlocore.solvers.march import March
+from dlocore.spline import design_matrix
+
+Floats = NDArray[np.float64]
+
+_LOOKS = 129  # times at which a path is looked at, while it is held
+
+
+class Driven(NamedTuple):
+    """How deep a grasp drives what it holds into something.
+
+    Attributes:
+        grasp: its index.
+        into: what, as a part of a sentence.
+        time: when it is deepest [s].
+        depth: [m].
+    """
+
+    grasp: int
+    into: str
+    time: float
+    depth: float
+
+
+def driven(problem: Problem, motion: March) -> Driven | None:
+    """Return where a gripper drives the point that it holds into something by more than TOO_DEEP, deepest, or None.
+
+    That is an obstacle, the table, or another held point of the cable, which is within a diameter. Paths are looked at
+    to their end, from where the motion has the point as the gripper closes: the motion itself may have ended before.
+    """
+    scene = problem.scene
+    late = any(g.start > 0.0 for g in scene.grasps) and problem.contact is not None
+    if not late and (problem.self_contact is None or len(scene.grasps) < 2):
+        return None
+    begins = [_begin(problem, motion, grasp) for grasp in scene.grasps]
+    found = [*_into_surroundings(problem, begins), *_into_each_other(problem, begins)]
+    deepest = max(found, key=lambda one: one.depth, default=None)
+    too_deep = TOO_DEEP * scene.cable.diameter
+    return deepest if deepest is not None and deepest.depth > too_deep else None
+
+
+def words(problem: Problem, found: Driven) -> str:
+    """Return in words where a gripper drives what it holds."""
+    share = found.depth / problem.scene.cable.diameter
+    point = f"primitives[{found.grasp}] drives the point that it holds {share:.0%} of the cable's diameter"
+    where = f"{point} into {found.into} at {found.time:.3g} s, which no cable follows."
+    return f"{where} Its path begins where the cable is as it closes: end it elsewhere, or close it at another time."
+
+
+def _begin(problem: Problem, motion: March, grasp: Grasp) -> Floats | None:
+    """Return where the path of a grasp begins (3,) [m], None where the motion has not come so far."""
+    if grasp.start == 0.0:
+        return problem.start.place(grasp.u)[0]
+    k = int(np.searchsorted(motion.times, grasp.start * (1 - 1e-12)))
+    if k >= len(motion.times) or (motion.stopped and k > motion.reached):
+        return None
+    dimensions = problem.plane.dimensions
+    at = design_matrix(motion.grid.knots, [grasp.u])[0] @ motion.states[k][:, :dimensions]
+    return problem.plane.world(at)
+
+
+def _held(scene: Scene, grasps: list[Grasp]) -> Floats:
+    """Return times at which all of some grasps hold [s], none where they never do."""
+    begin = max(g.start for g in grasps)
+    end = min(cast(float, scene.horizon), *(g.release_time or np.inf for g in grasps))
+    if not begin < end:
+        return np.empty(0)
+    ends = [g.start + g.path.duration for g in grasps]
+    return np.union1d(np.linspace(begin, end, _LOOKS), np.clip(ends, begin, end))
+
+
+def _into_surroundings(problem: Problem, begins: list[Floats | None]) -> Iterator[Driven]:
+    """Return how deep each grasp that closes late goes into each obstacle, and into the table."""
+    scene, radius = problem.scene, 0.5 * problem.scene.cable.diameter
+    names = [f"obstacles[{scene.environment.obstacles.index(o)}]" for o in problem.obstacles]
+    rows = np.array([o.row() for o in problem.obstacles])
+    table = scene.environment.table if problem.table is not None else None
+    for k, (grasp, begin) in enumerate(zip(scene.grasps, begins, strict=True)):
+        t = _held(scene, [grasp])
+        if grasp.start == 0.0 or begin is None or not len(t):
+            continue
+        path = np.ascontiguousarray(grasp.path.at(t - grasp.start, begin))
+        depths = list(radius - distances(rows, path).T) if names else []
+        depths += [] if table is None else [table.height - path[:, 2]]
+        for name, depth in zip([*names, "the table"], depths, strict=False):
+            deepest = int(np.argmax(depth))
+            yield Driven(k, name, float(t[deepest]), float(depth[deepest]))
+
+
+def _into_each_other(problem: Problem, begins: list[Floats | None]) -> Iterator[Driven]:
+    """Return how far each two held points that begin apart come within a diameter, where strands may not cross."""
+    scene, diameter = problem.scene, problem.scene.cable.diameter
+    if problem.self_contact is None:
+        return
+    for j, k in combinations(range(len(scene.grasps)), 2):
+        a, b = scene.grasps[j], scene.grasps[k]
+        first, second, t = begins[j], begins[k], _held(scene, [a, b])
+        if first is None or second is None or not len(t) or abs(a.u - b.u) < APART * diameter:
+            continue
+        apart = np.linalg.norm(a.path.at(t - a.start, first) - b.path.at(t - b.start, second), axis=1)
+        if apart[0] >= diameter:
+            nearest = int(np.argmin(apart))
+            into = f"the one that primitives[{j}] holds"
+            yield Driven(k, into, float(t[nearest]), float(diameter - apart[nearest]))

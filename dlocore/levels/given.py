@@ -1,0 +1,71 @@
+"""A march on a grid that was asked for: once more, in another way, where it fails on it as it is."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from dlocore.answer.parts import Status
+from dlocore.levels.level import Level, Size, given_steps
+from dlocore.levels.progress import record_level
+from dlocore.levels.whole_march import is_folded, march_level, march_status
+from dlocore.problem.problem import Problem
+from dlocore.solvers.monitor import Monitor, TimeIsUp
+from dlocore.solvers.timefit import evened, fit, largest
+from dlocore.words import in_mm
+
+MISSED = 0.02  # of the length: a time spline that misses its march by more is no answer
+# what is tried where a march finds no equilibrium, folds or tears the cable: times as many steps, and whether more
+# points watch over the length
+_OTHERWISE = ((4, False), (1, True), (4, True), (16, False))
+
+
+def march_given(problem: Problem, n_u: int, n_t: int, monitor: Monitor) -> Level:
+    """March on a given grid; where that fails, with more steps or on points between which the cable can't fold.
+
+    The first march that is a success is the answer, and says what was done; where none is, it is the first of all.
+    """
+    size = Size(n_u, n_t, given_steps(n_t))
+    first = level = march_level(problem, size, monitor)
+    if march_status(level.problem, level)[0] in ("converged", "time_limit"):
+        return level
+    shown = first
+    for more, watch in _OTHERWISE:
+        record_level(level.problem, level, monitor)
+        try:
+            level = march_level(problem, size._replace(steps=more * size.steps), monitor, watch=watch, whole=True)
+        except TimeIsUp:
+            monitor.phase("march")
+            break
+        note = f"{level.size.steps} steps" + (", watched at more points" if watch else "")
+        level = replace(level, note=note, mended=_said(first, size.steps, watch))
+        status = given_status(evenly_fitted(level))[0]
+        if status == "converged" or (status == "max_iterations" and not is_folded(first)):
+            return level
+        if status == "max_iterations":  # but for the time spline it is a success
+            shown = level
+    return shown
+
+
+def _said(first: Level, steps: int, watch: bool) -> str:
+    failed = march_status(first.problem, first)[1].split(". ")[0]
+    stiffer = " Here its length is watched at more points, which makes it stiffer on few control points."
+    return f" On the grid as it is, with {steps} steps: {failed}." + (stiffer if watch else "")
+
+
+def evenly_fitted(level: Level) -> Level:
+    """Return a level of a given grid; where its time spline misses the march by more than MISSED, with knots moved."""
+    motion, problem = level.motion, level.problem
+    if motion.stopped or not level.missed > MISSED * problem.scene.cable.length:
+        return level
+    knots_t = evened(motion, level.knots_t, np.array([event.time for event in problem.events]))
+    control, off = fit(motion, knots_t)
+    return replace(level, knots_t=knots_t, control=control, missed=largest(off))
+
+
+def given_status(level: Level) -> tuple[Status, str]:
+    """Return the status of a march on a given grid, and what it says, in words."""
+    status, message = march_status(level.problem, level)
+    if status == "converged" and level.missed > MISSED * level.problem.scene.cable.length:
+        spline = f"The time spline of {len(level.control)} control points misses them by {in_mm(level.missed)}."
+        return "max_iterations", f"{message} {spline} Raise n_t."
+    return status, message

@@ -1,0 +1,259 @@
+"""One march on one grid, again where it failed or strained the cable, and its time spline."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.effects.contact import DEEPEST
+from dlocore.kernels.growth import LOOKS
+from dlocore.kernels.timefit import farthest, sampled
+from dlocore.problem.discretisation import smallest_n_u
+from dlocore.problem.events import moments, swings
+from dlocore.problem.grid import Grid
+from dlocore.problem.problem import Problem, stiffer, stiffer_for
+from dlocore.problem.time_grid import smallest_n_t, time_knots
+from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, march
+from dlocore.solvers.monitor import Monitor
+from dlocore.solvers.smooth import march_smooth
+from dlocore.solvers.timefit import fit, largest, missed, refined
+from dlocore.solvers.watched import watched
+from dlocore.statics.statics import start_grid
+
+Floats = NDArray[np.float64]
+
+# (n_u, n_t, steps) of a motion of about two seconds of one metre, before it is refined in one direction only
+# Each has twice the steps and 1.45 times the control points of the one before: of an error of second order in time, and
+# of one of fourth order along the cable, that leaves much the same share of what it moved the surface by.
+LEVELS = (
+    (9, 13, 40),
+    (13, 19, 80),
+    (19, 28, 160),
+    (28, 41, 320),
+    (41, 60, 640),
+)
+CREDIBLE_STRAIN = 0.02  # axial: a march that stretches the cable more is tried again with strong damping
+TEARS = 1.5  # times the strain of another march: what strains a cable so much more does it for want of steps
+_STIFFER = 5  # times that contact is made stiffer on one grid
+_MISSED = 0.01  # of the diameter: what the time spline may miss of a motion with contact
+_SAMPLES = 33  # along the cable, and in time while it swings once, at which surfaces are compared
+TOO_DEEP = 0.25  # of the diameter, in the table, an obstacle or itself: no cable is pressed in so far
+_YIELDING = 0.8  # of the depth, at most, is left by a stiffer contact where it is one of stiffness
+ACCEPT = 0.75  # of the target: an answer with a smaller estimated error is believed
+
+
+class Size(NamedTuple):
+    """Size of a grid: control points along the cable and in time, and steps of the march."""
+
+    n_u: int
+    n_t: int
+    steps: int
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """A march on one grid and its spline.
+
+    Attributes:
+        size: of the grid, as it was asked for.
+        posed: what was to be solved.
+        problem: what was solved: contact may have been made stiffer.
+        motion: the march.
+        knots_t: (n_t + 4,) [s].
+        control: (n_t, n_u, nc) [m].
+        missed: what the time spline misses of the march [m], but for moments such as a start that springs away.
+        change: largest distance to the level before [m], infinite at the first.
+        note: what was found on it, in words.
+        mended: what was done differently from other marches on a given grid as it failed on that one, in words.
+    """
+
+    size: Size
+    posed: Problem
+    problem: Problem
+    motion: March
+    knots_t: Floats
+    control: Floats
+    missed: float
+    change: float
+    note: str = ""
+    mended: str = ""
+
+    @cached_property
+    def samples(self) -> Floats:
+        """The surface at evenly spaced times and 33 places along the cable (moments, 33, nc) [m]."""
+        times = moments(self.problem.scene, _SAMPLES)
+        return np.asarray(sampled(self.knots_t, self.motion.grid.knots, self.control, times, _SAMPLES))
+
+
+def stretched(problem: Problem, level: int) -> Size:
+    """Return the size of a level for the horizon and the features of a problem."""
+    n_u, n_t, steps = LEVELS[level]
+    factor = swings(problem.scene)
+    n_u = max(n_u, smallest_n_u(problem) + 2 * level) + problem.kinks
+    n_t = max(round(n_t * factor), smallest_n_t(problem) + 4 * (level + 1))
+    return Size(n_u, n_t, max(round(steps * factor), 3 * n_t))
+
+
+def given_steps(n_t: int) -> int:
+    """Return the number of time steps that goes with a given number of control points in time."""
+    return max(48, 5 * n_t)
+
+
+def run_level(
+    problem: Problem,
+    n_u: int,
+    n_t: int,
+    steps: int,
+    monitor: Monitor,
+    *,
+    rho: float = RHO,
+    booked: bool = True,
+    free_knots: bool = False,
+    hardness: float = 1.0,
+    credible: float = CREDIBLE_STRAIN,
+    watch: bool = False,
+    grid: Grid | None = None,
+    like: Grid | None = None,
+    knots_t: Floats | None = None,
+    whole: bool = False,
+) -> Level:
+    """March on one grid and fit the time spline.
+
+    A march that found no equilibrium, or stretched the cable beyond belief, is done again with strong numerical
+    damping, or without where it had it, and kept where it comes farther or strains the cable by far less.
+
+    Args:
+        rho: spectral radius of the march.
+        booked: whether to book the time by phase.
+        free_knots: whether to add time knots where the cable strikes something; the grid is free to be refined, and it
+            is of interest whether a disturbance may grow.
+        hardness: times that contact is stiffer to begin with, as it had to be made on a grid before.
+        credible: axial strain up to which a march is believed.
+        watch: watch over the stretch at more points, between which the cable can't fold.
+        grid: with the start on it, where it is known.
+        like: another of the same problem, from whose start that of this one is settled.
+        knots_t: time knots to begin with, where they are known.
+        whole: whether a march that the deadline ends is of no use.
+
+    Raises:
+        Cancelled: the caller asked to stop.
+        TimeIsUp: the deadline passed, where it had to be `whole`.
+    """
+    posed = problem
+    if hardness > 1.0:
+        problem = stiffer(problem, hardness)
+    if grid is None:
+        grid = start_grid(problem, n_u, monitor, like)
+        grid = watched(grid) if watch else grid
+    if knots_t is None:
+        knots_t = time_knots(problem, n_t)
+    assert knots_t is not None, "the caller asks for enough control points"
+    if booked:
+        monitor.phase("setup")
+    looks = LOOKS if free_knots else 0
+    plain = None if grid.watched else march_smooth(problem, grid, steps, knots_t, monitor, rho, looks)
+    damped: March | None = None
+    if plain is None:
+        problem, motion, damped = _march(problem, grid, steps, monitor, rho, whole, credible)
+    else:
+        motion = plain[0]
+    if hardness > 1.0 and motion.stopped == "step":  # too stiff for this grid
+        problem = posed
+        motion = march(problem, grid, steps, monitor, rho=rho, whole=whole)
+    allowed, tried = DEEPEST * problem.scene.cable.diameter, problem
+    for _ in range(_STIFFER):
+        if motion.stopped == "time" or motion.deepest <= allowed:
+            break
+        if motion.stopped and problem.self_contact is None:
+            break  # a soft contact may be why strands got through each other, and the march ended
+        harder = stiffer_for(tried, motion.deepest)
+        again = march(harder, grid, steps, monitor, rho=rho, whole=whole)
+        if (again.reached, -again.deepest) < (motion.reached, -_YIELDING * motion.deepest):
+            if problem.self_contact is None or tried is not problem or again.reached < motion.reached:
+                break  # what is this deep was not pushed in
+            tried = harder  # strands that strike each other harder by chance are tried once more
+        else:
+            problem, motion, tried = harder, again, harder
+    doubtful = motion.stopped == "step" or motion.largest_strain > credible
+    if doubtful and motion is not damped and (rho > STRONGLY_DAMPED or motion.stopped == "step"):
+        other_rho = RHO if rho == STRONGLY_DAMPED else STRONGLY_DAMPED
+        again = damped or march(problem, grid, steps, monitor, rho=other_rho, whole=whole)
+        less = TEARS * again.largest_strain < motion.largest_strain
+        if again.reached > motion.reached or (again.reached == motion.reached and less):
+            motion = again
+    if booked:
+        monitor.phase("march")
+    smooth = motion
+    if free_knots and (problem.contact is not None or motion.deepest > 0.0):
+        knots_t, smooth = refined(motion, knots_t, _MISSED * problem.scene.cable.diameter)
+    if plain is not None and motion is plain[0]:
+        _, control, off = plain
+    else:
+        control, off = fit(smooth, knots_t)
+    if smooth is not motion:
+        off = missed(motion, knots_t, control)
+    if booked:
+        monitor.phase("fit")
+    return Level(Size(n_u, n_t, steps), posed, problem, motion, knots_t, control, largest(off), np.inf)
+
+
+def _fastest(motion: March) -> float:
+    """Return the largest speed of a control point in a motion, as far as it came [m/s]."""
+    states = motion.states[: motion.reached + 1, :, : min(3, motion.states.shape[2])]
+    moved = np.linalg.norm(np.diff(states, axis=0), axis=2).max(axis=1)
+    return float((moved / np.diff(motion.times[: motion.reached + 1])).max(initial=0.0))
+
+
+def _march(
+    problem: Problem, grid: Grid, steps: int, monitor: Monitor, rho: float, whole: bool, credible: float
+) -> tuple[Problem, March, March | None]:
+    """March; return what was solved, its march, and one with strong damping where it is known.
+
+    What goes astray is given up there and then, if something else does not. Waves that gain energy strain the cable
+    beyond belief, and most of their steps find equilibrium only in smaller ones: what comes to its end so, with strong
+    damping to follow, takes forty times as long. What is struck so fast that it goes through what it strikes, or
+    through itself, jams or goes another way: contact is made stiffer, and where that is not enough, so stiff at once
+    that it stops what is as fast as anything was until then.
+    """
+    damped: March | None = None
+    shallow = TOO_DEEP * problem.scene.cable.diameter
+    believed = np.inf if rho == STRONGLY_DAMPED or problem.touches else credible
+    motion = march(problem, grid, steps, monitor, rho=rho, whole=whole, credible=believed, shallow=shallow)
+    if motion.stopped == "strain":
+        damped = march(problem, grid, steps, monitor, rho=STRONGLY_DAMPED, whole=whole)
+        less = TEARS * damped.largest_strain < motion.largest_strain
+        if damped.stopped == "time" or (less and not damped.stopped):
+            return problem, damped, damped
+    elif motion.stopped == "depth":
+        for speed in (0.0, _fastest(motion)):
+            harder = stiffer_for(problem, motion.deepest, speed)
+            again = march(harder, grid, steps, monitor, rho=rho, whole=whole, shallow=shallow)
+            if again.stopped in ("", "time"):
+                return harder, again, None
+    else:
+        return problem, motion, None
+    return problem, march(problem, grid, steps, monitor, rho=rho, whole=whole), damped
+
+
+def hardness(level: Level) -> float:
+    """Return how many times stiffer than posed contact may have to be on the grid after a level: 1 or more.
+
+    What the level needed, but no more than leaves half the depth that is allowed.
+    """
+    posed, solved = (p.self_contact or p.contact for p in (level.posed, level.problem))
+    if posed is None or solved is None:
+        return 1.0
+    allowed = DEEPEST * level.problem.scene.cable.diameter
+    return max(1.0, solved.stiffness / posed.stiffness * min(1.0, 2.0 * level.motion.deepest / allowed))
+
+
+def credible_after(level: Level) -> float:
+    """Return the axial strain up to which a march on the grid after a level is believed."""
+    return max(CREDIBLE_STRAIN, TEARS * level.motion.largest_strain)
+
+
+def distance(a: Level, b: Level, problem: Problem) -> float:
+    """Return the largest distance between the surfaces of two levels [m]."""
+    return float(farthest(a.samples, b.samples, problem.plane.dimensions))

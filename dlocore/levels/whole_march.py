@@ -1,0 +1,142 @@
+"""One march that has all the effects its motion calls for, and what is to be said of it."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+from dlocore.answer.parts import Status
+from dlocore.levels.driven import driven, words
+from dlocore.levels.level import (
+    CREDIBLE_STRAIN,
+    TOO_DEEP,
+    Level,
+    Size,
+    credible_after,
+    hardness,
+    run_level,
+    stretched,
+)
+from dlocore.levels.progress import record_level
+from dlocore.levels.review import FAR_MORE, STRAINED, called_for, called_for_by_fine
+from dlocore.problem.discretisation import smallest_n_u
+from dlocore.problem.problem import Problem, pose
+from dlocore.problem.time_grid import smallest_n_t
+from dlocore.solvers.march import RHO
+from dlocore.solvers.monitor import Monitor, TimeIsUp
+from dlocore.stability.sideways import may_leave_plane
+
+TORN = 0.2  # axial strain: no cable of this kind follows
+FOLDED = 0.4  # of |r'| between the points that watch over the length: less is a fold that no energy sees
+_LOOKS = (1, 2, 3)  # grids on which a motion is looked at for whether it leaves its plane
+
+
+class Outcome(NamedTuple):
+    """A level of refinement, what to say of it, and the parts of its estimated error [m], or None."""
+
+    level: Level
+    status: Status
+    message: str
+    errors: Mapping[str, float] | None
+
+
+def march_level(
+    problem: Problem,
+    size: Size,
+    monitor: Monitor,
+    rho: float = RHO,
+    free_knots: bool = False,
+    rough: bool = False,
+    known: Level | None = None,
+    before: Level | None = None,
+    watch: bool = False,
+    whole: bool = False,
+) -> Level:
+    """March on one grid; where the motion calls for effects that were left out, again with them.
+
+    On a `rough` grid, which another follows, strands may meet, and a motion leave its plane, because of the grid:
+    whether they do is left open. A march of this grid that is `known` is done again only for that. Contact begins as
+    stiff as the level `before` had to make it, strains are believed that are not far above its own, and a start that is
+    to settle does so from its start. With `watch` the cable can't fold within a span, see `run_level`.
+
+    Raises:
+        Cancelled: the caller asked to stop.
+        TimeIsUp: the deadline passed, where the march had to be `whole`; it names the effects that were called for.
+    """
+    called, asked = dict(problem.called_for), problem.called_for
+    while True:
+        if free_knots:
+            size = Size(max(size.n_u, smallest_n_u(problem)), max(size.n_t, smallest_n_t(problem)), size.steps)
+        stiffness, credible, like = 1.0, CREDIBLE_STRAIN, None
+        if before is not None and before.posed is problem:
+            stiffness, credible, like = hardness(before), credible_after(before), before.motion.grid
+        try:
+            level = known or run_level(
+                problem, *size, monitor, rho=rho, free_knots=free_knots, hardness=stiffness, credible=credible,
+                watch=watch, like=like, whole=whole,
+            )  # fmt: skip
+        except TimeIsUp:
+            raise TimeIsUp(*(name for name in called if name not in asked)) from None
+        if known is not None:
+            new, known = called_for_by_fine(level), None
+        else:
+            new = {} if level.motion.stopped == "time" else called_for(level, fine=not rough)
+        if not new:
+            return level
+        record_level(problem, replace(level, note=f"calls for {', '.join(new)}"), monitor)
+        called |= new
+        problem = pose(problem.scene, called)
+
+
+def sided(problem: Problem, monitor: Monitor) -> Problem:
+    """Return the problem, with a side to go to where a march says that its motion leaves its plane."""
+    if not may_leave_plane(problem):
+        return problem
+    for number in _LOOKS:
+        called = march_level(problem, stretched(problem, number), monitor).posed.called_for
+        if "side" in called:
+            return pose(problem.scene, {"side": called["side"]})
+    return problem
+
+
+def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
+    """Return the status of a march, and what it says, in words."""
+    motion = level.motion
+    if not motion.stopped and motion.largest_strain > TORN:
+        strain = f"The motion strains the cable along itself by {motion.largest_strain:.0%}, which no cable follows."
+        advice = "Bring the grasps no farther apart than the cable between them, or make the motion slower."
+        return "stalled", f"{strain} {advice}"
+    if is_folded(level):
+        least, most = motion.slopes
+        seen = f"|r'| is {least:.2g} to {most:.2g} within a span"
+        return "stalled", f"The cable is folded finer than its control points can show: {seen}. Take more of them."
+    inside = None if motion.stopped == "time" else driven(problem, motion)
+    if inside is not None:
+        return "stalled", words(problem, inside)
+    deep = motion.deepest / problem.scene.cable.diameter
+    if not motion.stopped and deep > TOO_DEEP:
+        pushed = f"The cable is pressed {deep:.0%} of its diameter into the table, an obstacle or itself."
+        return "stalled", f"{pushed} Take finer grids, or a motion that does not jam it."
+    if not motion.stopped:
+        split = f", {motion.split} of them in smaller steps" if motion.split else ""
+        return "converged", f"Every time step found its equilibrium{split}.{level.mended}"
+    reached = motion.times[motion.reached]
+    rest = f"The surface stands still after {reached:.4g} s of {problem.horizon:.4g} s."
+    if motion.stopped == "time":
+        return "time_limit", f"The time limit passed. {rest} Allow more time or a coarser grid."
+    return (
+        "stalled",
+        f"A time step found no equilibrium. {rest} Allow more control points, or a slower or smoother motion.",
+    )
+
+
+def is_uneven(level: Level) -> bool:
+    """Tell whether a whole motion strains the cable within a span, and far more than where that is watched."""
+    least, most = level.motion.slopes
+    strain = max(1.0 - least, most - 1.0)
+    return not level.motion.stopped and strain > max(STRAINED, FAR_MORE * level.motion.largest_strain)
+
+
+def is_folded(level: Level) -> bool:
+    """Tell whether a whole motion folds the cable within a span: grids may agree on that, and it is none of a cable."""
+    least, most = level.motion.slopes
+    return not level.motion.stopped and not (least >= FOLDED and most <= 2.0 - FOLDED)

@@ -1,0 +1,349 @@
+"""Sides for those that have none: straight cables that are pushed along themselves, motions that may leave their plane.
+
+Straight, a cable is in equilibrium however hard it is pushed, but no real cable stays so. Where a disturbance would
+grow by much, it gets the imperfection that columns are designed with, a bow without stress of a thousandth of its
+length.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.effects.distance import distances
+from dlocore.problem.events import closed_grasps
+from dlocore.problem.plane import FLATNESS, is_straight, leftwards, lies_on, natural_points, off_line, turns_of
+from dlocore.problem.straightening import straightened
+from dlocore.scene.paths import Move, Path, Still
+from dlocore.scene.scene import Grasp, Scene
+from dlocore.shape.shape import StartCurve, fit_to_knots
+from dlocore.spline import greville
+from dlocore.words import in_mm
+
+Floats = NDArray[np.float64]
+
+BOW = 1e-3  # height, of the length of the part that buckles
+UNSTABLE = "in its plane the motion is unstable, as a disturbance out of it grows"
+GROWTH = math.log(10.0)  # of a disturbance, from which on it matters that there is one
+# What of a force that is spread along a part, free at one end, counts as if it pushed there: of a column under its own
+# weight, mu g L^3/EI = 7.84 against P L^2/EI = pi^2/4 (Greenhill, 1881)
+_SPREAD = 0.315
+_SPANS = 24  # of the knots of a bowed start, in each part
+_AGES = 1e6  # times the horizon: all the time that a disturbance needs
+_TIMES = 65  # at which each stretch of the motion is looked at
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A part of the cable, from `begin` to `end` [m], with a grasp at either end or None where it is free.
+
+    It is the same one, which grows and bows once, whoever holds its ends later on.
+    """
+
+    begin: float
+    end: float
+    grasps: tuple[Grasp | None, Grasp | None] = field(compare=False)
+
+
+def with_side(scene: Scene, start: StartCurve, at_rest: bool) -> StartCurve:
+    """Return the start, bowed to the left, or by turns, where it is straight and the motion pushes it along itself.
+
+    The left is that of its direction, horizontally; that of a vertical one is the x axis. A start that settles is
+    straight, too, where it comes to rest on a line, and where it is nearly so: what it deviates from a line then, by a
+    bow at most, it does without stress. The bow is on the side on which such a start was given.
+
+    Args:
+        scene: the scene.
+        start: start curve.
+        at_rest: a disturbance has all the time that it needs to grow, as where only the equilibrium is asked for.
+    """
+    given = start
+    # settled, a cable is straight that deviates from a line by less than a bow: its direction is no surer than that
+    settles = scene.shape.settle and not is_straight(given)
+    flat = BOW if settles else FLATNESS
+    start = (_straightened(scene, given, flat) if settles else None) or given
+    along = _line(scene, start, flat)
+    if along is None:
+        return given
+    pushed = [part for part, growth in _growths(scene, start, along, at_rest).items() if growth > GROWTH]
+    if not pushed:
+        return given
+    bowed = list(dict.fromkeys(piece for part in pushed for piece in _pieces(scene, part)))
+    knots = _knots(bowed, scene.cable.length)
+    u = greville(knots)
+    # by turns, as beyond a grasp that lets the cable turn it bends on the other way
+    aside = np.sum([(-1) ** k * _bow(part, u) for k, part in enumerate(bowed)], axis=0)
+    left = leftwards(along)
+    if float(np.mean((given.control_points - given.control_points[0]) @ left)) < -FLATNESS * scene.cable.length:
+        aside *= -1.0
+    control = fit_to_knots(start, knots) + np.outer(aside, left)
+    return replace(start, knots=knots, control_points=control, bow=float(aside[np.abs(aside).argmax()]))
+
+
+def _straightened(scene: Scene, start: StartCurve, flat: float) -> StartCurve | None:
+    """Return the straight line on which a start that settles comes to rest, or None where it does not; see `_line`."""
+    straight = straightened(scene, start, _gravity(scene, start))
+    along = None if straight is None else _line(scene, straight, flat)
+    if straight is None or along is None:
+        return None
+    held = tuple(replace(g, path=Still()) for g in scene.grasps if g.start == 0.0)
+    at_rest, times = replace(scene, grasps=held), np.array([0.0, cast(float, scene.horizon)])
+    for part in _parts(sorted(held, key=lambda g: g.u), scene.cable.length):
+        push, torque = _loaded(at_rest, straight, along, part, times)
+        if _buckles(scene, part, push, torque)[0]:
+            return None
+    return straight
+
+
+def out_of_plane(scene: Scene, start: StartCurve, normal: Floats) -> StartCurve:
+    """Return a planar start, bowed along the unit normal (3,) of its plane."""
+    length = scene.cable.length
+    parts = list(_parts(sorted(scene.grasps, key=lambda g: g.u), length))
+    knots = _joined(start.knots, _knots(parts, length))
+    u = greville(knots)
+    # one that buckles has a side already: what is left to tell is whether it leaves the plane that this gave it
+    aside = np.sum([_bow(part, u) for part in parts], axis=0) * (BOW if start.bow else 1.0)
+    control = fit_to_knots(start, knots) + np.outer(aside, normal)
+    return replace(start, knots=knots, control_points=control, aside=float(aside.max()))
+
+
+def _joined(a: Floats, b: Floats) -> Floats:
+    """Return clamped knots that contain those of two others, each as often as the one that has it more often."""
+    places = np.unique(np.round(np.concatenate([a, b]) / a[-1], 9)) * a[-1]
+    near = 1e-9 * a[-1]
+    counts = [max(int((np.abs(knots - x) <= near).sum()) for knots in (a, b)) for x in places]
+    return np.repeat(places, counts)
+
+
+def _knots(parts: list[_Part], length: float) -> Floats:
+    """Return clamped knots, triple where a part begins or ends inside: what a grasp holds there stays on the line."""
+    marks = sorted({0.0, length, *(x for part in parts for x in (part.begin, part.end))})
+    knots = [np.zeros(4)]
+    for a, b in pairwise(marks):
+        knots += [np.linspace(a, b, _SPANS + 1)[1:-1], np.full(3, b)]
+    return np.append(np.concatenate(knots), length)
+
+
+def side_notes(start: StartCurve) -> list[str]:
+    """Return what is to be known of a start that was bowed, in words."""
+    notes = []
+    if start.bow:
+        side = "left" if start.bow > 0.0 else "right"
+        bow = f"it starts with a bow of {in_mm(abs(start.bow))} to its {side}, and its mirror image is as likely"
+        why = "the straight cable is pushed or twisted along itself and has no side to buckle to"
+        notes.append(f"{why}: {bow}")
+    if start.aside:
+        bow = f"it starts with a bow of {in_mm(start.aside)} out of it, and its mirror image is as likely"
+        notes.append(f"{'the plane of its bow may not hold it' if start.bow else UNSTABLE}: {bow}")
+    return notes
+
+
+def _bow(part: _Part, u: Floats) -> Floats:
+    """Return how far the bow of a part lies aside at u (k,) [m]: level where a grasp may hold its direction."""
+    length = part.end - part.begin
+    x = np.clip((u - part.begin) / length, 0.0, 1.0)
+    if None not in part.grasps or part.grasps == (None, None):
+        shape = 0.5 * (1.0 - np.cos(2.0 * np.pi * x))
+    else:
+        shape = 1.0 - np.cos(0.5 * np.pi * (x if part.grasps[1] is None else 1.0 - x))
+    return np.asarray(BOW * length * shape)
+
+
+def _line(scene: Scene, start: StartCurve, flat: float) -> Floats | None:
+    """Return the direction (3,) of a start from which nothing leads away by more than a part `flat`, or None."""
+    chord = start.control_points[-1] - start.control_points[0]
+    size = math.sqrt(chord @ chord)
+    if not size > 0.5 * scene.cable.length:
+        return None
+    along = chord / size
+    if any(_aside(g.path, g.u, start, along, scene.cable.length, flat) for g in scene.grasps):
+        return None
+    forces = [_gravity(scene, start)[None], *(np.atleast_2d(cast(Floats, load.force)) for load in scene.loads)]
+    if start.velocity is not None:
+        forces.append(start.velocity.control_points)
+    if any(off_line(vectors, along) > flat * float(np.abs(vectors).max()) for vectors in forces):
+        return None
+    natural, material = natural_points(scene), start.material
+    if natural is not None and off_line(natural - natural[0], natural[-1] - natural[0]) > FLATNESS * scene.cable.length:
+        return None
+    if material is not None and bool(cast(Floats, material.memory)[:, :2].any()):
+        return None
+    straight = off_line(start.control_points - start.control_points[0], along) <= flat * size
+    return np.asarray(along) if straight else None
+
+
+def _aside(path: Path, u: float, start: StartCurve, along: Floats, length: float, flat: float) -> bool:
+    """Tell whether a path of a grasp at u [m] leads or turns the cable off its line by more than a part `flat`."""
+    if isinstance(path, Still):
+        return False
+    if isinstance(path, Move):
+        x, y, z = cast(Floats, path.displacement).tolist()
+        a, b, c = along.tolist()
+        if abs(y * c - z * b) + abs(z * a - x * c) + abs(x * b - y * a) > flat * length:
+            return True
+    else:
+        from_start = path.at(np.linspace(0.0, path.duration, _TIMES), start(u)[0]) - start(u)[0]
+        if off_line(from_start, along) > flat * length:
+            return True
+    turns = turns_of(path, _TIMES)
+    return turns is not None and bool(np.abs(turns @ along - along).max() > flat)
+
+
+def _gravity(scene: Scene, start: StartCurve) -> Floats:
+    """Return the gravity (3,) [m/s^2] that a table under the cable leaves."""
+    table = scene.environment.table
+    g = cast(Floats, scene.environment.gravity)
+    if scene.effects.get("gravity", "auto") == "off":
+        return np.zeros(3)
+    if table is not None and scene.effects.get("table", "auto") != "off" and lies_on(table, scene, start):
+        return np.array([g[0], g[1], 0.0])
+    return g
+
+
+def _growths(scene: Scene, start: StartCurve, along: Floats, at_rest: bool) -> dict[_Part, float]:
+    """Return for the parts of a straight cable the natural logarithm by which a disturbance of them grows, about.
+
+    A wave of wave number k grows at the rate s with mu s^2 + c s = M k^3 + P k^2 - EI k^4 under a push P and a torque
+    M: that of the fastest is summed over the time in which the part is unstable,
+    P + M^2/(4 EI) > pi^2 EI/l^2 (Greenhill, 1883).
+    """
+    cable, horizon = scene.cable, cast(float, scene.horizon)
+    patience = _AGES if at_rest else 1.0
+    mu, c, EI = cable.linear_density, scene.environment.drag, cast(float, cable.bending_stiffness)
+    times = {0.0, horizon}
+    for g in scene.grasps:
+        times |= {t for t in (g.start, g.release_time or 0.0) if t < horizon}
+    growths: dict[_Part, float] = {}
+    for a, b in pairwise(sorted(times)):
+        held = closed_grasps(scene, a, b)
+        t = np.linspace(a, b, _TIMES)
+        for part in _parts(sorted(held, key=lambda g: g.u), cable.length):
+            push, torque = _loaded(scene, start, along, part, t)
+            k = (3.0 * torque + np.sqrt(9.0 * torque**2 + 32.0 * EI * push)) / (8.0 * EI)
+            k = np.maximum(k, _least_wave_number(part))
+            drive = np.where(_buckles(scene, part, push, torque), torque * k**3 + push * k**2 - EI * k**4, 0.0)
+            rate = (np.sqrt(c**2 + 4.0 * mu * np.maximum(drive, 0.0)) - c) / (2.0 * mu)
+            growth = float(np.sum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t)))
+            growths[part] = growths.get(part, 0.0) + patience * growth
+    return growths
+
+
+def _buckles(scene: Scene, part: _Part, push: Floats, torque: Floats) -> NDArray[np.bool_]:
+    """Tell whether a push (k,) [N] and a torque (k,) [N m] bend a straight part."""
+    EI = cast(float, scene.cable.bending_stiffness)
+    return push + torque**2 / (4.0 * EI) > EI * _least_wave_number(part) ** 2
+
+
+def _least_wave_number(part: _Part) -> float:
+    """Return the wave number of the longest bend of a part [1/m]."""
+    length = part.end - part.begin
+    return math.pi / (length if None not in part.grasps else 2.0 * length)
+
+
+def _parts(held: list[Grasp], length: float) -> Iterator[_Part]:
+    return _between([(0.0, None), *((g.u, g) for g in held), (length, None)], length)
+
+
+def _pieces(scene: Scene, part: _Part) -> Iterator[_Part]:
+    """Return the pieces of a part between the grasps of t = 0, which close where the start was given, not on a bow."""
+    length = scene.cable.length
+    inside = [g for g in scene.grasps if g.start == 0.0 and part.begin < g.u < part.end]
+    held = [(g.u, g) for g in sorted(inside, key=lambda g: g.u)]
+    return _between([(part.begin, part.grasps[0]), *held, (part.end, part.grasps[1])], length)
+
+
+def _between(ends: Sequence[tuple[float, Grasp | None]], length: float) -> Iterator[_Part]:
+    for (begin, first), (end, second) in pairwise(ends):
+        if end - begin > FLATNESS * length:
+            yield _Part(begin, end, (first, second))
+
+
+def _loaded(scene: Scene, start: StartCurve, along: Floats, part: _Part, t: Floats) -> tuple[Floats, Floats]:
+    """Return the largest push (k,) [N] along a part at times t (k,) [s], 0 where it is pulled, and the torque [N m].
+
+    A cable that keeps its length moves as what holds it does; between two grasps that come closer, or a grasp and what
+    a free end meets, it is compressed.
+    """
+    cable = scene.cable
+    first, second = part.grasps
+    length = part.end - part.begin
+    loads = [(load.u, load.at(t) @ along) for load in scene.loads if part.begin <= load.u <= part.end]
+    weight = cable.linear_density * float(_gravity(scene, start) @ along)
+    holder = first or second
+    if holder is None:
+        needed = np.zeros(len(t)) + sum(force for _, force in loads) / length
+        way = _free_way(start, along, (weight + needed) / cable.linear_density, t)
+    else:
+        way = _way(holder, start, along, t)
+        v = np.gradient(way, t)
+        needed = cable.linear_density * np.gradient(v, t) + scene.environment.drag * v - weight
+    if first is not None and second is not None:
+        apart = _way(second, start, along, t) - _way(first, start, along, t)
+        met = np.array([max(first.start, second.start)])
+        closer = float((_way(second, start, along, met) - _way(first, start, along, met))[0]) - apart
+        if scene.shape.settle and met == 0.0:
+            closer += length - _way_along(start, part)
+        elastic = cast(float, cable.axial_stiffness) * closer / length
+        push = elastic + 0.5 * np.abs(needed) * length + np.sum([np.abs(force) for _, force in loads], axis=0)
+        turned = np.abs(_spin(second, along, t) - _spin(first, along, t) + _twist(start, part))
+        both = first.hold == second.hold == "clamp" and scene.effects.get("twist", "auto") != "off"
+        torque = cast(float, cable.torsional_stiffness) * turned / length if both else np.zeros(len(t))
+        return np.maximum(push, 0.0), torque
+    # what lies beyond a place is pushed from there: from the free end on, tension by tension
+    from_end = second is None
+    most = cast(float, cable.axial_stiffness) * _depth(scene, start, along, part, way) / length
+    for u in [u for u, _ in loads] + [part.begin if from_end else part.end]:
+        rest = (part.end - u) if from_end else (u - part.begin)
+        for there in (True, False):  # just before and just after a load
+            beyond = [f for v, f in loads if (v > u if from_end else v < u) or (there and v == u)]
+            push = _SPREAD * needed * rest - np.sum(beyond, axis=0)
+            most = np.maximum(most, push if from_end else -push)
+    return most, np.zeros(len(t))
+
+
+def _way(grasp: Grasp, start: StartCurve, along: Floats, t: Floats) -> Floats:
+    """Return how far a grasp has gone along a direction at times t (k,) [s]; (k,) [m]."""
+    return (grasp.path.at(t - grasp.start, start(grasp.u)[0]) - start(grasp.u)[0]) @ along
+
+
+def _way_along(start: StartCurve, part: _Part) -> float:
+    """Return the length of the start between the ends of a part [m]."""
+    return float(np.linalg.norm(np.diff(start(np.linspace(part.begin, part.end, _TIMES)), axis=0), axis=1).sum())
+
+
+def _free_way(start: StartCurve, along: Floats, acceleration: Floats, t: Floats) -> Floats:
+    """Return how far a cable that nothing holds has gone along its direction at times t (k,) [s]; (k,) [m]."""
+    velocity = 0.0 if start.velocity is None else float(start.velocity.control_points.mean(axis=0) @ along)
+    return velocity * t + 0.5 * acceleration * t**2
+
+
+def _depth(scene: Scene, start: StartCurve, along: Floats, part: _Part, way: Floats) -> Floats:
+    """Return how deep the free ends of a part would be in the table or an obstacle after a way (k,) [m]; (k,) [m]."""
+    environment, radius = scene.environment, 0.5 * scene.cable.diameter
+    on = {name for name in ("table", "obstacles") if scene.effects.get(name, "auto") != "off"}
+    deepest = np.zeros(len(way))
+    for u, grasp in zip((part.begin, part.end), part.grasps, strict=True):
+        if grasp is not None:
+            continue
+        end = start(u)[0] + np.outer(way, along)
+        if environment.table is not None and "table" in on:
+            deepest = np.maximum(deepest, environment.table.height - end[:, 2])
+        if environment.obstacles and "obstacles" in on:
+            rows = np.array([obstacle.row() for obstacle in environment.obstacles])
+            deepest = np.maximum(deepest, radius - distances(rows, end).min(axis=0))
+    return deepest
+
+
+def _twist(start: StartCurve, part: _Part) -> float:
+    """Return the angle by which the sections at the end of a part are turned against those at its begin [rad]."""
+    return 0.0 if start.theta is None else float(np.diff(start.theta([part.begin, part.end])[:, 0])[0])
+
+
+def _spin(grasp: Grasp, along: Floats, t: Floats) -> Floats:
+    """Return the angle by which a grasp has turned about a direction since t[0] at times t (k,) [s]; (k,) [rad]."""
+    spins = grasp.path.spin(t - grasp.start, np.tile(along, (len(t), 1)))
+    return np.concatenate([[0.0], np.cumsum(spins)])

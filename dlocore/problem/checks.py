@@ -1,0 +1,133 @@
+"""What no cable can follow, found before anything is solved: grasps too far apart, a start inside table or obstacle."""
+
+import math
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.effects.distance import distances
+from dlocore.errors import SceneError
+from dlocore.problem.plane import table_tolerance
+from dlocore.problem.strands import nearest_strands
+from dlocore.scene.paths import Move, Path, Still, Waypoints
+from dlocore.scene.scene import MAX_PRESCRIBED_STRAIN, Scene
+from dlocore.shape.shape import StartCurve
+
+Floats = NDArray[np.float64]
+
+GRASP_TOLERANCE = 0.010  # [m]: of the first waypoint from the cable
+
+CROSSING = 0.05  # of the diameter: strands of a start that are nearer pass through each other
+
+
+def check_waypoints(scene: Scene, start: StartCurve) -> None:
+    """Refuse waypoints that begin away from the grasped point."""
+    for i, grasp in enumerate(scene.grasps):
+        if isinstance(grasp.path, Waypoints) and grasp.start == 0.0:
+            first = cast(Floats, grasp.path.positions)[0]
+            off = float(np.linalg.norm(first - start(grasp.u)[0]))
+            if not off <= GRASP_TOLERANCE:
+                reason = f"The cable is {off:.3g} m from it at u = {grasp.u:g} m"
+                allowed = f"a point within {GRASP_TOLERANCE:g} m of the grasped point"
+                raise SceneError(f"primitives[{i}].path.positions[0]", first, allowed, reason)
+
+
+def check_reach(scene: Scene, start: StartCurve) -> None:
+    """Refuse two grasps that are at some time farther apart than the cable between them."""
+    if len(scene.grasps) < 2:
+        return
+    t = np.linspace(0.0, cast(float, scene.horizon), 257)
+    begin = [start(g.u)[0] for g in scene.grasps]
+    for j, b in enumerate(scene.grasps):
+        for i, a in enumerate(scene.grasps[:j]):
+            between = abs(b.u - a.u)
+            if _farthest(a.path, begin[i], b.path, begin[j]) <= between:
+                continue
+            together = (t >= max(a.start, b.start)) & (t <= min(a.release_time or np.inf, b.release_time or np.inf))
+            late = max(a.start, b.start) > 0 and not all(isinstance(g.path, Waypoints) for g in (a, b) if g.start > 0)
+            if late or not together.any():
+                continue  # a later grasp begins where the cable is then, which only the solve can tell
+            paths = b.path.at(t - b.start, begin[j]) - a.path.at(t - a.start, begin[i])
+            apart = np.where(together, np.linalg.norm(paths, axis=1), 0.0)
+            k = int(np.argmax(apart))
+            if not apart[k] <= between * (1.0 + MAX_PRESCRIBED_STRAIN) + 1e-6:
+                raise SceneError(
+                    f"primitives[{j}].path",
+                    f"{apart[k]:.4g} m from primitives[{i}] at {t[k]:.3g} s",
+                    f"at most {between:.4g} m",
+                    "No cable can follow: the two grasps are farther apart than the cable between them",
+                )
+
+
+def _farthest(a: Path, from_a: Floats, b: Path, from_b: Floats) -> float:
+    """Return a distance [m] that two paths from given points never exceed: that of ends, where both are straight."""
+    if isinstance(a, Waypoints) or isinstance(b, Waypoints):
+        return np.inf
+    ends = [
+        [begin] if isinstance(path, Still) else [begin, begin + cast(Floats, path.displacement)]
+        for path, begin in ((a, from_a), (b, from_b))
+    ]
+    return max(math.dist(p, q) for p in ends[0] for q in ends[1])
+
+
+def check_above(scene: Scene, start: StartCurve) -> None:
+    """Refuse a start, a grasp or an obstacle that is inside the table."""
+    table = scene.environment.table
+    assert table is not None
+    lowest = start.heights[0]
+    if not lowest >= table.height - table_tolerance(scene):
+        lowest = float(start(np.linspace(0.0, scene.cable.length, 101))[:, 2].min())
+    if not lowest >= table.height - table_tolerance(scene):
+        reason = f"The start is {table.height - lowest:.3g} m below a cable that lies on the table"
+        raise SceneError("environment.table.height", table.height, f"at most {lowest:.6g} [m] with this start", reason)
+    for i, grasp in enumerate(scene.grasps):
+        late = grasp.start > 0.0 and not isinstance(grasp.path, Waypoints)  # from where the cable is by then
+        if late or isinstance(grasp.path, Still):
+            continue
+        if isinstance(grasp.path, Move) and cast(Floats, grasp.path.displacement)[2] >= 0:
+            continue
+        path = grasp.path.at(np.linspace(0.0, grasp.path.duration, 65), start(grasp.u)[0])
+        below = table.height - float(path[:, 2].min())
+        if not below <= table_tolerance(scene):
+            reason = f"It takes the cable {below:.3g} m into the table"
+            raise SceneError(
+                f"primitives[{i}].path", f"{below:.3g} m below", f"a path above {table.height:g} m", reason
+            )
+
+
+def check_apart(scene: Scene, start: StartCurve) -> None:
+    """Refuse a start in which a strand lies inside another: contact could not tell to which side it belongs.
+
+    The ends of a ring may lie in one place.
+    """
+    diameter, control = scene.cable.diameter, np.ascontiguousarray(start.control_points)
+    if len(control) <= 4 or np.linalg.norm(control[-1] - control[0]) < diameter:
+        return
+    apart = nearest_strands(start.knots, control[None], 3, diameter, diameter)
+    if not apart >= CROSSING * diameter:
+        allowed = f"strands at least {CROSSING * diameter:.2g} m apart, or effects.self_contact off"
+        raise SceneError("shape", f"two strands {apart:.2g} m apart", allowed, "The start passes through itself")
+
+
+def check_outside(scene: Scene, start: StartCurve, met: tuple[int, ...]) -> None:
+    """Refuse a start or a grasp's path inside an obstacle."""
+    if not met:
+        return
+    rows = np.array([scene.environment.obstacles[i].row() for i in met])
+    radius = 0.5 * scene.cable.diameter
+
+    def depth(points: Floats) -> tuple[float, int]:
+        gaps = distances(rows, np.ascontiguousarray(points)).min(axis=0) - radius
+        return -float(gaps.min()), met[int(gaps.argmin())]
+
+    inside, i = depth(start(np.linspace(0.0, scene.cable.length, 101)))
+    allowed = "the cable outside all obstacles, or effects.obstacles off"
+    if inside > table_tolerance(scene):
+        reason = f"The cable starts up to {inside:.3g} m inside it"
+        raise SceneError(f"environment.obstacles[{i}]", f"{inside:.3g} m inside", allowed, reason)
+    for k, grasp in enumerate(scene.grasps):
+        inside, i = depth(grasp.path.at(np.linspace(0.0, grasp.path.duration, 65), start(grasp.u)[0]))
+        if grasp.start == 0.0 and inside > table_tolerance(scene):
+            reason = f"It takes the cable {inside:.3g} m into obstacles[{i}]"
+            raise SceneError(f"primitives[{k}].path", f"{inside:.3g} m inside", allowed, reason)

@@ -1,0 +1,74 @@
+"""When a motion is not smooth, how long it is, and what holds the cable meanwhile."""
+
+import math
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.scene.paths import Move, Waypoints
+from dlocore.scene.scene import Grasp, Scene
+
+Floats = NDArray[np.float64]
+
+
+_LONGEST = 64.0  # times that a cable swings, for as many of which grids and comparisons grow
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """A time at which the motion is not smooth, and how much of it jumps.
+
+    Attributes:
+        time: [s].
+        multiplicity: of the time knot there: 1 smooth, 2 acceleration jumps, 3 velocity jumps.
+    """
+
+    time: float
+    multiplicity: int
+
+
+def swings(scene: Scene) -> float:
+    """Return how many times as long a motion is as a cable of that length needs to swing, about; 1 to _LONGEST."""
+    natural = 2.0 * math.sqrt(scene.cable.length)  # [s], for a length in metres
+    return min(max(cast(float, scene.horizon) / natural, 1.0), _LONGEST)
+
+
+def moments(scene: Scene, in_a_swing: int) -> int:
+    """Return at how many evenly spaced times motions are compared: so many, and as many again for each swing more."""
+    return round((in_a_swing - 1) * swings(scene)) + 1
+
+
+def find_events(scene: Scene) -> tuple[Event, ...]:
+    """Return the events inside the horizon of a scene, by time."""
+    found: dict[float, int] = {}
+    latest = cast(float, scene.horizon) * (1 - 1e-9)
+
+    def add(time: float, multiplicity: int) -> None:
+        if 0.0 < time < latest:
+            found[time] = max(found.get(time, 0), multiplicity)
+
+    for g in scene.grasps:
+        add(g.start, 3)
+        if g.release_time is not None:
+            add(g.release_time, 3)
+        released = np.inf if g.release_time is None else g.release_time
+        end = g.start + g.path.duration
+        if g.path.duration and end < released:
+            add(end, _smoothness(g, g.path.duration))
+        if isinstance(g.path, Waypoints):
+            add(g.start + float(np.asarray(g.path.times)[0]), 2)
+    return tuple(Event(t, found[t]) for t in sorted(found))
+
+
+def _smoothness(grasp: Grasp, end: float) -> int:
+    if isinstance(grasp.path, Move):
+        return {"minimum_jerk": 1, "cubic": 2, "linear": 3}[grasp.path.profile]
+    return 3
+
+
+def closed_grasps(scene: Scene, begin: float, end: float) -> list[Grasp]:
+    """Return the grasps that hold all through the times `begin` to `end` [s]."""
+    middle = 0.5 * (begin + end)
+    return [g for g in scene.grasps if g.start <= middle and (g.release_time is None or g.release_time > middle)]

@@ -1,0 +1,91 @@
+"""A space discretisation: knots, basis tables, the start on them and what lies behind it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.kernels.assembly import History, slopes
+from dlocore.kernels.basis import Tables, basis_rows
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Space discretisation of a problem.
+
+    Attributes:
+        knots: (n_u + 4,) [m].
+        start: control points at t = 0 (n_u, nc) [m].
+        velocity: their given velocities, before grasps close (n_u, nc) [m/s].
+        find_tables: finds `tables` of the knots, and
+        find_history: `history` of the grid, as they are first read.
+        watched: the tables have more points than the knots ask for, see `solvers/watched.py`.
+        tipped: the start had settled where it would fall, see `statics/tipping.py`.
+    """
+
+    knots: Floats
+    start: Floats
+    velocity: Floats
+    find_tables: Callable[[Floats], Tables] = field(repr=False)
+    find_history: Callable[[Self], History] = field(repr=False)
+    watched: bool = False
+    tipped: bool = False
+
+    @cached_property
+    def tables(self) -> Tables:
+        """Basis functions at the quadrature points."""
+        return self.find_tables(self.knots)
+
+    @cached_property
+    def history(self) -> History:
+        """What the start has behind it: stress-free strain, frames. Kernels write to it: pass `past()`."""
+        return self.find_history(self)
+
+    def changed(
+        self,
+        *,
+        start: Floats | None = None,
+        tables: Tables | None = None,
+        history: History | None = None,
+        tipped: bool = False,
+    ) -> "Grid":
+        """Return the grid with another start, other tables, or something else behind it; the rest as it is."""
+        kept_tables, kept_history = tables or self.tables, history or self.history
+        return Grid(
+            self.knots,
+            self.start if start is None else start,
+            self.velocity,
+            lambda knots: kept_tables,
+            lambda grid: kept_history,
+            self.watched or tables is not None,
+            self.tipped or tipped,
+        )
+
+    def past(self) -> History:
+        """Return a copy of the history, to be carried on."""
+        return History(*(x.copy() for x in self.history))
+
+    @property
+    def n_u(self) -> int:
+        """Number of control points."""
+        return len(self.knots) - 4
+
+    def rows(self, u: float, derivative: int = 0) -> tuple[int, Floats]:
+        """Return the first control point and the four basis functions, or derivatives, at `u` [m]."""
+        first, table = basis_rows(self.knots, np.array([u]), derivative)
+        return int(first[0]), table[0, derivative]
+
+    def at(self, q: Floats, u: float, derivative: int = 0) -> Floats:
+        """Return the value or derivative at `u` [m] of control points q (..., n_u, nc)."""
+        first, b = self.rows(u, derivative)
+        return b @ q[..., first : first + 4, :]
+
+    def largest_strain(self, states: Floats) -> float:
+        """Return the largest |axial strain| at the axial points over the states (k, n_u, nc)."""
+        least, most = slopes(states, 1, self.tables.axial_first, self.tables.axial_b1)
+        return float(max(0.0, most - 1.0, 1.0 - least))

@@ -1,0 +1,203 @@
+"""Which effects a scene calls for, and the reason for each: from the scene, and from what a result has shown."""
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.effects.distance import distances
+from dlocore.effects.selfcontact import NEAR_START
+from dlocore.problem.strands import nearest_strands
+from dlocore.scene.paths import Move, Waypoints
+from dlocore.scene.scene import EFFECTS, Grasp, Scene
+from dlocore.shape.shape import StartCurve
+from dlocore.words import in_mm
+
+Floats = NDArray[np.float64]
+
+SLOW = 30.0  # times the first natural period: so slow a motion goes through equilibria
+NEAR = 0.1  # of the length: an obstacle nearer than this to the cable and its way may be touched
+
+
+class Choice(NamedTuple):
+    """Whether an effect is simulated, and why in words."""
+
+    active: bool
+    reason: str
+
+
+_MOVES = Choice(True, "the cable has mass and moves")
+_DRAGS, _NO_DRAG = Choice(True, "the environment has drag"), Choice(False, "no drag is given")
+_DAMPS = Choice(True, "the cable has internal damping")
+_NO_DAMPING = Choice(False, "no internal damping is given")
+_CARRIED = Choice(False, "the table carries the weight")
+_STRETCHES = Choice(True, "it keeps the cable's length")
+_BENDS = Choice(True, "the cable has bending stiffness")
+_PLANAR = Choice(False, "the motion is planar")
+_YIELDS_NOT = Choice(False, "the motion stays below the strain at which the cable yields")
+_ELASTIC = Choice(False, "the cable is elastic: no yield strain is given")
+_LIES = Choice(True, "the cable lies on it: it carries the weight, the motion is planar")
+_NO_TABLE = Choice(False, "there is none")
+_RUBS = Choice(True, "the cable slides on a rough surface")
+_SMOOTH = Choice(False, "no surface here has friction")
+_LIES_OVER = Choice(False, "on a table one strand can lie over another")
+
+
+def choose(
+    scene: Scene,
+    start: StartCurve,
+    dimensions: int,
+    on_table: bool,
+    lies_over: bool,
+    leaves: str,
+    met: tuple[int, ...],
+    bent: bool,
+    called_for: Mapping[str, str],
+) -> dict[str, Choice]:
+    """Choose the effects of a scene.
+
+    Args:
+        scene: the scene.
+        start: start curve.
+        dimensions: 2 where the motion is planar, else 3.
+        on_table: the cable lies on the table and moves in its plane.
+        lies_over: it lies there, though it may leave the plane.
+        leaves: why it does not, in words.
+        met: the obstacles that are simulated.
+        bent: its stress-free shape is bent or twisted.
+        called_for: effects that a result has called for, and the reason for each.
+    """
+    cable, environment = scene.cable, scene.environment
+    table = environment.table is not None
+    down = tuple(cast(Floats, environment.gravity).tolist())
+    heavy = down != (0.0, 0.0, 0.0)
+    drags = environment.drag > 0 or environment.drag_quadratic > 0
+    damps = cable.bending_damping > 0 or cable.torsional_damping > 0
+    plastic = (cable.yield_strain, cable.yield_twist, cable.yield_stretch) != (None, None, None)
+    rough = (
+        environment.table is not None and environment.table.friction > 0 and scene.effects.get("table", "auto") != "off"
+    ) or any(environment.obstacles[i].friction > 0 for i in met)
+    count = len(environment.obstacles)
+    near = f"{len(met)} of {count} are in the cable's reach" if met else "none is near" if count else "there are none"
+    found = {
+        "inertia": _inertia(scene, start, on_table),
+        "drag": _DRAGS if drags else _NO_DRAG,
+        "damping": _DAMPS if damps else _NO_DAMPING,
+        "gravity": Choice(heavy and not on_table, "the cable has weight" if heavy else "there is no gravity"),
+        "stretch": _STRETCHES,
+        "bend": _BENDS,
+        "table": _NO_TABLE if not table else _LIES if on_table else Choice(True, leaves),
+        "plasticity": _YIELDS_NOT if plastic else _ELASTIC,
+        "friction": _RUBS if rough else _SMOOTH,
+        "obstacles": Choice(bool(met), near),
+        "self_contact": _self_contact(scene, start, lies_over),
+    }
+    if on_table and heavy:
+        found["gravity"] = _CARRIED if down[:2] == (0.0, 0.0) else Choice(True, "the table slopes")
+    for name, reason in called_for.items():
+        found[name] = Choice(True, reason)
+    optional = ("inertia", "self_contact", "plasticity") if plastic else ("inertia", "self_contact")
+    for name, switch in scene.effects.items():
+        if name != "twist" and switch == "off":
+            found[name] = Choice(False, "switched off in the scene")
+        elif name in optional and switch == "on" and not found[name].active:
+            found[name] = Choice(True, "switched on in the scene")
+    if "twist" not in called_for:
+        found["twist"] = _twist(scene, start, dimensions, bent, found["plasticity"].active, found["damping"].active)
+    return {name: found[name] for name in EFFECTS}
+
+
+def _inertia(scene: Scene, start: StartCurve, on_table: bool) -> Choice:
+    """Choose inertia unless the motion is so slow that the cable goes through equilibria."""
+    cable, environment = scene.cable, scene.environment
+    moves = [g.path for g in scene.grasps if isinstance(g.path, Move)]
+    smooth = len(moves) > 0 and "linear" not in [m.profile for m in moves]
+    lasting = all([not isinstance(g.path, Waypoints) and g.start == 0.0 and not g.release_time for g in scene.grasps])
+    rubs = environment.drag > 0 or (environment.table is not None and environment.table.friction > 0)
+    heavy = not on_table and bool(cast(Floats, environment.gravity).any())
+    held = rubs or heavy or len(scene.grasps) > 1
+    if smooth and lasting and held and start.velocity is None and not scene.loads:
+        stiffness = cast(float, cable.bending_stiffness) * (1.875 / cable.length) ** 4
+        gravity = float(np.linalg.norm(cast(Floats, environment.gravity))) if heavy else 0.0
+        period = 2.0 * math.pi / math.sqrt(stiffness / cable.linear_density + gravity / cable.length)
+        shortest = min(m.duration for m in moves)
+        if shortest > SLOW * period:
+            reason = f"the motion is slow: {shortest:.3g} s against a first natural period of {period:.2g} s"
+            return Choice(False, reason)
+    return _MOVES
+
+
+def _self_contact(scene: Scene, start: StartCurve, lies_over: bool) -> Choice:
+    """Choose contact of the cable with itself where two strands of the start are near each other."""
+    if lies_over:
+        return _LIES_OVER
+    diameter, control = scene.cable.diameter, np.ascontiguousarray(start.control_points)
+    apart = np.inf
+    if len(control) > 4 and scene.effects.get("self_contact", "auto") == "auto":
+        apart = nearest_strands(start.knots, control[None], 3, diameter, NEAR_START * diameter)
+    if not np.isfinite(apart):
+        return Choice(False, "no two strands come near each other")
+    return Choice(True, f"two strands of the start are {in_mm(apart)} apart")
+
+
+def reached(scene: Scene, start: StartCurve, called_for: Mapping[str, str]) -> tuple[int, ...]:
+    """Return the obstacles that the cable may touch: those near its start, or carried off with its grasps.
+
+    Every point of the cable follows its grasps about as far as they go; what a result shows to come near is called
+    for by it. A start that settles has come from where it was given: it may have touched all that the cable reaches
+    from the grasps that hold it.
+    """
+    obstacles = scene.environment.obstacles
+    switch = scene.effects.get("obstacles", "auto")
+    if not obstacles or switch == "off":
+        return ()
+    if switch == "on" or "obstacles" in called_for:
+        return tuple(range(len(obstacles)))
+    u = np.linspace(0.0, scene.cable.length, 41)
+    points = start(u)
+    shifts = [np.zeros((1, 3))]
+    for grasp in scene.grasps:
+        t = np.linspace(0.0, grasp.path.duration, 17)
+        shifts.append(grasp.path.at(t, start(grasp.u)[0]) - start(grasp.u)[0])
+    moved = (points[:, None] + np.concatenate(shifts)[None]).reshape(-1, 3)
+    rows = np.array([o.row() for o in obstacles])
+    radius = 0.5 * scene.cable.diameter
+    near = distances(rows, np.ascontiguousarray(moved)).min(axis=0) - radius < NEAR * scene.cable.length
+    holding = [g.u for g in scene.grasps if g.start == 0.0]
+    if scene.shape.settle and holding:
+        away = distances(rows, start(np.array(holding))) - radius  # of each obstacle from each grasp
+        along = np.abs(u[:, None] - np.array(holding))
+        near |= (along[:, :, None] >= away).all(axis=1).any(axis=0)
+    return tuple(int(i) for i in np.flatnonzero(near))
+
+
+def _twist(scene: Scene, start: StartCurve, dimensions: int, bent: bool, plastic: bool, damped: bool) -> Choice:
+    switch = scene.effects.get("twist", "auto")
+    if switch == "off":
+        return Choice(False, "switched off in the scene")
+    if switch == "on":
+        return Choice(True, "switched on in the scene")
+    if dimensions == 2:
+        return _PLANAR
+    if bent:
+        return Choice(True, "the stress-free shape is bent, and its bends turn with the sections")
+    if start.twisted:
+        return Choice(True, "the start is twisted")
+    if plastic:
+        return Choice(True, "bends that the sections remember turn with them")
+    if damped:
+        return Choice(True, "internal damping acts on bends as the sections see them, which twist lets turn")
+    if _held_together([g for g in scene.grasps if g.hold == "clamp"]):
+        return Choice(True, "two grasps hold the orientation of the sections")
+    return Choice(False, "nothing holds an orientation at two places")
+
+
+def _held_together(grasps: list[Grasp]) -> bool:
+    """Tell whether two of the grasps hold at the same time."""
+    for i, a in enumerate(grasps):
+        for b in grasps[:i]:
+            if max(a.start, b.start) < min(a.release_time or np.inf, b.release_time or np.inf):
+                return True
+    return False

@@ -1,0 +1,76 @@
+"""The time of a problem in parts: the knots that its events ask for, and the steps between them."""
+
+from itertools import pairwise
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.kernels.basis import graded_knots
+from dlocore.problem.problem import Problem
+from dlocore.scene.paths import Waypoints
+
+Floats = NDArray[np.float64]
+
+
+def time_knots(problem: Problem, n_t: int) -> Floats | None:
+    """Return the time knots (n_t + 4,) [s] with a knot at every event, or None where n_t is too small for them.
+
+    Where the answer is a march waypoints have knots too if these are at most half of what is left, and nowhere closer
+    than even ones: a path through waypoints is then a spline on these knots. The least squares prefer even ones.
+    """
+    found = {event.time: event.multiplicity for event in problem.events}
+    quality = problem.scene.quality
+    if quality.n_u is None or quality.method == "march":
+        found |= dict.fromkeys(_waypoints(problem, n_t), 1)
+    times = sorted(found)
+    multiplicity = np.array([found[time] for time in times], dtype=np.int64)
+    even, wide = np.zeros(len(times)), np.ones(len(times))
+    knots = graded_knots(n_t, problem.horizon, np.array(times), multiplicity, even, wide)
+    return knots if len(knots) else None
+
+
+def _waypoints(problem: Problem, n_t: int) -> list[float]:
+    """Return the times [s] of the waypoints inside the horizon, or none where they are too many or too close."""
+    horizon, led = problem.horizon, []
+    for g in problem.scene.grasps:
+        if isinstance(g.path, Waypoints):
+            times = g.start + cast(Floats, g.path.times)[1:-1]
+            led.append(times[times < min(g.release_time or horizon, horizon)])
+    if not led:
+        return []
+    found = np.setdiff1d(np.concatenate(led), marks_of(problem))
+    if 2 * len(found) > n_t - 4 - sum(e.multiplicity for e in problem.events):
+        return []
+    marks = np.sort(np.concatenate([marks_of(problem), found]))
+    close = np.diff(marks) < horizon / n_t
+    crowded = close & (np.isin(marks[1:], found) | np.isin(marks[:-1], found))
+    return [] if crowded.any() else found.tolist()
+
+
+def smallest_n_t(problem: Problem) -> int:
+    """Return the least number of control points in time that has a knot at every event."""
+    return max(5, 4 + sum(e.multiplicity for e in problem.events))
+
+
+def marks_of(problem: Problem) -> list[float]:
+    """Return the times [s] between which the motion is smooth: its beginning, its events and its end."""
+    return [0.0, *[e.time for e in problem.events], problem.horizon]
+
+
+def step_counts(marks: list[float], steps: int) -> list[int]:
+    """Return the time steps of each stretch between the marks, about `steps` in all, more where marks lie close."""
+    if len(marks) == 2:
+        return [steps]
+    return [max(8, steps // (2 * len(marks)), round(steps * (b - a) / marks[-1])) for a, b in pairwise(marks)]
+
+
+def step_times(marks: list[float], counts: list[int]) -> Floats:
+    """Return the times (steps + 1,) [s] of a march with so many steps between each two marks."""
+    times = np.zeros(sum(counts) + 1)
+    first = 0
+    for (a, b), count in zip(pairwise(marks), counts, strict=True):
+        times[first : first + count] = a + (b - a) / count * np.arange(count)
+        first += count
+        times[first] = b
+    return times

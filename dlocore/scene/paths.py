@@ -1,0 +1,217 @@
+"""Grasp paths: where a gripper goes, and how it turns, over time.
+
+A path's clock starts when its grasp does (`Grasp.grasp_time`, t = 0 by default). Before its first instant and after
+its last a path stands still.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Literal, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dlocore.errors import SceneError, array, choice, number
+
+Floats = NDArray[np.float64]
+Profile = Literal["minimum_jerk", "linear", "cubic"]
+
+# coefficients of x to x^5 of the position s(x) on 0 <= x <= 1
+_PROFILES: dict[str, tuple[float, ...]] = {
+    "minimum_jerk": (0.0, 0.0, 10.0, -15.0, 6.0),
+    "linear": (1.0, 0.0, 0.0, 0.0, 0.0),
+    "cubic": (0.0, 3.0, -2.0, 0.0, 0.0),
+}
+MAX_WAYPOINTS = 100_000
+STAYS = (1.0, *_PROFILES["linear"], 0.0, 0.0, 0.0)  # a straight move, or a turn about one axis, that is none
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Still:
+    """Stay where the cable was grasped."""
+
+    @property
+    def duration(self) -> float:
+        """Time until the path ends [s]."""
+        return 0.0
+
+    @property
+    def line(self) -> tuple[float, ...]:
+        """Duration, profile and displacement of a straight move."""
+        return STAYS
+
+    @property
+    def turn(self) -> tuple[float, ...]:
+        """Duration, profile and rotation vector of a turn about one axis."""
+        return STAYS
+
+    def at(self, t: Floats, start: Floats) -> Floats:
+        """Positions at times `t` (k,) [s] of a grasp that began at `start` (3,) [m]; (k, 3) [m]."""
+        return np.broadcast_to(start, (len(t), 3))
+
+    def rotation_at(self, t: Floats) -> Floats | None:
+        """Rotations since the grasp began at times `t`; (k, 3, 3), or None where it never turns."""
+        return None
+
+    def spin(self, t: Floats, tangents: Floats) -> Floats:
+        """Turn about the `tangents` (k, 3) between each two of the times `t` (k,) [s]; (k - 1,) [rad]."""
+        return np.zeros(len(t) - 1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Move:
+    """Move by `displacement` (3,) [m] and turn by the rotation vector `rotation` (3,) [rad] in `duration` [s].
+
+    `profile` is "minimum_jerk" (zero velocity and acceleration at both ends), "cubic" (zero velocity) or "linear"
+    (constant velocity: it starts and stops with a jump).
+    """
+
+    displacement: ArrayLike
+    duration: float
+    rotation: ArrayLike | None = None
+    profile: Profile = "minimum_jerk"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "displacement", array("displacement", self.displacement, shape=(3,), unit="m"))
+        object.__setattr__(self, "duration", number("duration", self.duration, above=1e-4, at_most=1e4, unit="s"))
+        if self.rotation is not None:
+            object.__setattr__(self, "rotation", array("rotation", self.rotation, shape=(3,), unit="rad"))
+        choice("profile", self.profile, tuple(_PROFILES))
+
+    @property
+    def line(self) -> tuple[float, ...]:
+        """Duration [s], coefficients of x to x^5 of the profile, and displacement [m] of a straight move."""
+        return (self.duration, *_PROFILES[self.profile], *cast(Floats, self.displacement).tolist())
+
+    @property
+    def turn(self) -> tuple[float, ...]:
+        """Duration [s], coefficients of x to x^5 of the profile, and rotation vector [rad] of a turn about one axis."""
+        if self.rotation is None:
+            return STAYS
+        return (self.duration, *_PROFILES[self.profile], *cast(Floats, self.rotation).tolist())
+
+    def _share(self, t: Floats) -> Floats:
+        """Return the share of the way that is done at times `t` (k,) [s]."""
+        x = np.clip(t / self.duration, 0.0, 1.0)
+        a, b, c, d, e = _PROFILES[self.profile]
+        return np.asarray(x * (a + x * (b + x * (c + x * (d + x * e)))))
+
+    def at(self, t: Floats, start: Floats) -> Floats:
+        """Positions at times `t` (k,) [s] of a grasp that began at `start` (3,) [m]; (k, 3) [m]."""
+        s = self._share(t)
+        return start + s[:, None] * cast(Floats, self.displacement)
+
+    def rotation_at(self, t: Floats) -> Floats | None:
+        """Rotations since the grasp began at times `t`; (k, 3, 3), or None where it never turns."""
+        if self.rotation is None:
+            return None
+        rotation = cast(Floats, self.rotation)
+        full = math.sqrt(rotation @ rotation)
+        x, y, z = (rotation / (full or 1.0)).tolist()
+        across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        angle = (full * self._share(t))[:, None, None]
+        return np.eye(3) + np.sin(angle) * across + 2.0 * np.sin(0.5 * angle) ** 2 * (across @ across)  # Rodrigues
+
+    def spin(self, t: Floats, tangents: Floats) -> Floats:
+        """Turn about the `tangents` (k, 3) between each two of the times `t` (k,) [s]; (k - 1,) [rad].
+
+        The angle of the tangent to the rotation vector stays, so this is exact.
+        """
+        if self.rotation is None:
+            return np.zeros(len(t) - 1)
+        s = self._share(t)
+        return np.diff(s) * float(tangents[0] @ cast(Floats, self.rotation))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Waypoints:
+    """Pass through `positions` (n, 3) [m] at `times` (n,) [s] along a C2 cubic spline.
+
+    It starts at rest; with `start` "moving" at the velocity that the first waypoints tell, as a recorded path does.
+    `orientations` (n, 4), unit quaternions (w, x, y, z), turn the grasp by their rotation since the first. The first
+    position must be that of the cable at the grasped point, within `dlocore.problem.checks.GRASP_TOLERANCE`; the start
+    shape is then brought to it.
+    """
+
+    times: ArrayLike
+    positions: ArrayLike
+    orientations: ArrayLike | None = None
+    start: Literal["rest", "moving"] = "rest"
+
+    def __post_init__(self) -> None:
+        choice("start", self.start, ("rest", "moving"))
+        times = array("times", self.times, shape=(None,), unit="s")
+        if not 2 <= len(times) <= MAX_WAYPOINTS:
+            raise SceneError("times", f"{len(times)} times", f"2 to {MAX_WAYPOINTS} times")
+        if not (np.diff(times) > 1e-6).all():
+            k = int(np.argmin(np.diff(times)))
+            raise SceneError(f"times[{k + 1}]", times[k + 1], "times that rise by more than 1e-6 s")
+        if times[0] < 0.0:
+            raise SceneError("times[0]", times[0], "at least 0 [s]")
+        number("times[-1]", float(times[-1]), above=1e-4, at_most=1e4, unit="s")
+        positions = array("positions", self.positions, shape=(None, 3), unit="m")
+        if len(positions) != len(times):
+            raise SceneError("positions", f"{len(positions)} positions", f"as many as times ({len(times)})")
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "positions", positions)
+        from scipy.interpolate import CubicSpline  # slow to import, as the rotations below
+
+        boundary = "not-a-knot" if self.start == "moving" else ((1, np.zeros(3)), (2, np.zeros(3)))
+        object.__setattr__(self, "_spline", CubicSpline(times, positions, bc_type=boundary))  # type: ignore[arg-type]
+        if self.orientations is not None:
+            quaternions = array("orientations", self.orientations, shape=(None, 4))
+            if len(quaternions) != len(times):
+                raise SceneError("orientations", f"{len(quaternions)} rows", f"as many as times ({len(times)})")
+            norms = np.linalg.norm(quaternions, axis=1)
+            if not (np.abs(norms - 1.0) < 1e-3).all():
+                k = int(np.argmax(np.abs(norms - 1.0)))
+                raise SceneError(f"orientations[{k}]", quaternions[k], "unit quaternions (w, x, y, z)")
+            object.__setattr__(self, "orientations", quaternions)
+            from scipy.spatial.transform import Rotation, Slerp
+
+            turns = Rotation.from_quat(quaternions[:, [1, 2, 3, 0]])
+            object.__setattr__(self, "_slerp", Slerp(times, turns * turns[0].inv()))
+
+    @property
+    def duration(self) -> float:
+        """Time until the path ends [s]."""
+        return float(cast(Floats, self.times)[-1])
+
+    @property
+    def line(self) -> None:
+        """None: no straight move."""
+
+    @property
+    def turn(self) -> tuple[float, ...] | None:
+        """None where the grasp turns: about no one axis."""
+        return STAYS if self.orientations is None else None
+
+    def _clip(self, t: Floats) -> Floats:
+        times = cast(Floats, self.times)
+        return np.clip(t, times[0], times[-1])
+
+    def at(self, t: Floats, start: Floats) -> Floats:
+        """Positions at times `t` (k,) [s]; (k, 3) [m]. `start` is not used: waypoints are absolute."""
+        return self._spline(self._clip(t))  # type: ignore[attr-defined]
+
+    def rotation_at(self, t: Floats) -> Floats | None:
+        """Rotations since the grasp began at times `t`; (k, 3, 3), or None where it never turns."""
+        return None if self.orientations is None else self._slerp(self._clip(t)).as_matrix()  # type: ignore[attr-defined]
+
+    def spin(self, t: Floats, tangents: Floats) -> Floats:
+        """Turn about the `tangents` (k, 3) between each two of the times `t` (k,) [s]; (k - 1,) [rad].
+
+        Between two waypoints the gripper turns the shorter way; a full turn needs three of them or more.
+        """
+        if self.orientations is None:
+            return np.zeros(len(t) - 1)
+        fine = np.unique(np.concatenate([t, cast(Floats, self.times)]))
+        turns = self._slerp(self._clip(fine))  # type: ignore[attr-defined]
+        steps = (turns[1:] * turns[:-1].inv()).as_rotvec()
+        at = np.clip(np.searchsorted(t, fine[:-1], side="right") - 1, 0, len(t) - 2)
+        inside = (fine[:-1] >= t[0]) & (fine[1:] <= t[-1])
+        along = (steps * tangents[at]).sum(axis=1)
+        return np.asarray(np.bincount(at[inside], along[inside], minlength=len(t) - 1), dtype=np.float64)
+
+
+Path = Still | Move | Waypoints

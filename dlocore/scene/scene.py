@@ -1,0 +1,446 @@
+"""The scene: a cable, its start, what grasps and loads it, its surroundings, and the asked quality.
+
+Frozen data in SI units, world frame right-handed with z up. Everything is validated once, here.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dlocore.errors import SceneError, array, choice, columns_of, number, points_array
+from dlocore.scene.cable import Cable
+from dlocore.scene.obstacles import Obstacle
+from dlocore.scene.paths import Move, Path, Still, Waypoints
+
+Floats = NDArray[np.float64]
+Hold = Literal["point", "tangent", "clamp"]
+Method = Literal["auto", "march", "spacetime", "paper", "reference"]
+Switch = Literal["auto", "on", "off"]
+
+EFFECTS = (
+    "inertia",
+    "drag",
+    "damping",
+    "gravity",
+    "stretch",
+    "bend",
+    "twist",
+    "plasticity",
+    "table",
+    "friction",
+    "obstacles",
+    "self_contact",
+)
+MAX_GRASPS = 32
+MAX_N_U, MAX_N_T = 129, 513  # of a given grid: memory and time
+DELTA = 1e-5  # [m]: threshold of a least squares
+MAX_OBSTACLES = 100
+AUTO_TARGET = 2e-3  # of the length: the error that quality "auto" aims at
+MAX_POINTS = 100_000
+MAX_STRAIN = 0.5  # axial, that a start may have
+MAX_PRESCRIBED_STRAIN = 0.005  # of the chord between two grasps: beyond it no cable of this kind can follow
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Straight:
+    """A straight cable from `start` (3,) [m] along `direction` (3,), which need not have unit length.
+
+    Args (of every start shape):
+        settle: relax to static equilibrium under the grasps' first poses before t = 0; on something rough to where
+            friction holds it.
+        velocity: initial velocity [m/s]: None (rest), (3,) for all points, or (n, 3) at points evenly spaced along
+            the cable (for `Points`: at the points themselves; for `ControlPoints`: control points of the velocity,
+            (n, 4) with the rate of theta [rad/s]; without it the sections do not spin about their tangent).
+    """
+
+    start: ArrayLike = (0.0, 0.0, 0.0)
+    direction: ArrayLike = (1.0, 0.0, 0.0)
+    settle: bool = False
+    velocity: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "start", array("start", self.start, shape=(3,), unit="m"))
+        direction = array("direction", self.direction, shape=(3,))
+        if not np.linalg.norm(direction) > 1e-12:
+            raise SceneError("direction", direction, "a vector that is not zero")
+        object.__setattr__(self, "direction", direction)
+        object.__setattr__(self, "velocity", _velocity(self.velocity, None))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Points:
+    """Points `points` (n, 2 or 3) [m] in order along the whole cable, as a vision system delivers them.
+
+    Uneven spacing, noise and repeated points are welcome; 2D points lie at z = 0. 4 to 100,000 points.
+    """
+
+    points: ArrayLike
+    settle: bool = False
+    velocity: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        points = _points("points", self.points, at_least=4)
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "velocity", _velocity(self.velocity, len(points)))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Material:
+    """What the sections of a cable remember: how they are turned, and the strain that has become theirs.
+
+    Args:
+        director: unit vector (3,) across the cable at u = 0, fixed in its section where theta is zero.
+        u: material coordinates (k,) [m], rising.
+        memory: stress-free strain there (k, 3): two curvatures in the sections' frame and the twist rate
+            [1/m, 1/m, rad/m] (the paper's eps_0, eq. 9).
+        stretch: stress-free axial strain there (k,); None: zero.
+        natural: what `memory` was before anything yielded (k, 3): hardening pulls back to it; None: zero.
+    """
+
+    director: ArrayLike
+    u: ArrayLike
+    memory: ArrayLike
+    stretch: ArrayLike | None = None
+    natural: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        director = array("material.director", self.director, shape=(3,))
+        if not abs(float(np.linalg.norm(director)) - 1.0) < 1e-6:
+            raise SceneError("material.director", director, "a unit vector")
+        u = array("material.u", self.u, shape=(None,), unit="m")
+        if not (len(u) >= 2 and (np.diff(u) > 0).all()):
+            raise SceneError("material.u", u, "at least two rising coordinates [m]")
+        object.__setattr__(self, "director", director)
+        object.__setattr__(self, "u", u)
+        object.__setattr__(self, "memory", array("material.memory", self.memory, shape=(len(u), 3), unit="1/m"))
+        if self.stretch is not None:
+            object.__setattr__(self, "stretch", array("material.stretch", self.stretch, shape=(len(u),)))
+        if self.natural is not None:
+            object.__setattr__(self, "natural", array("material.natural", self.natural, shape=(len(u), 3), unit="1/m"))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ControlPoints:
+    """A cubic spline by its control points (n, 3 or 4) [m, m, m, rad], on `knots` (n + 4,) [m] or uniform ones.
+
+    The knots are clamped (four equal at each end) and run from 0 to the cable's length. The fourth column is theta,
+    the angle of the sections against a frame without twist (docs/model.md eq. 19). `material` is what the sections
+    remember of an earlier motion, `strain` (n,) the axial strain with which it goes on, at the means of each three
+    successive inner knots and linear between them; None: without any, whatever the control points' own length.
+    """
+
+    control_points: ArrayLike
+    knots: ArrayLike | None = None
+    settle: bool = False
+    velocity: ArrayLike | None = None
+    material: Material | None = None
+    strain: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        columns = 3 if columns_of(self.control_points) == 3 else 4
+        points = array("control_points", self.control_points, shape=(None, columns), unit="m")
+        if not 4 <= len(points) <= 2000:
+            raise SceneError("control_points", f"{len(points)} control points", "4 to 2000")
+        if columns == 3:
+            points = np.column_stack([points, np.zeros(len(points))])
+            points.setflags(write=False)
+        object.__setattr__(self, "control_points", points)
+        if self.knots is not None:
+            knots = array("knots", self.knots, shape=(len(points) + 4,), unit="m")
+            clamped = np.ptp(knots[:4]) == 0 and np.ptp(knots[-4:]) == 0 and knots[0] == 0
+            if not (clamped and (np.diff(knots[3:-3]) >= 0).all()):
+                raise SceneError("knots", knots, "rising, four equal at each end, from 0 to the cable's length")
+            object.__setattr__(self, "knots", knots)
+        columns = 4 if self.velocity is not None and columns_of(self.velocity) == 4 else 3
+        object.__setattr__(self, "velocity", _velocity(self.velocity, len(points), columns))
+        if self.strain is not None:
+            strain = array("strain", self.strain, shape=(len(points),))
+            if not np.abs(strain).max() <= MAX_STRAIN:
+                raise SceneError("strain", strain, f"-{MAX_STRAIN:g} to {MAX_STRAIN:g}")
+            object.__setattr__(self, "strain", strain)
+
+
+Shape = Straight | Points | ControlPoints
+
+
+def _points(name: str, value: ArrayLike, *, at_least: int) -> Floats:
+    points = points_array(name, value)
+    if not at_least <= len(points) <= MAX_POINTS:
+        raise SceneError(name, f"{len(points)} points", f"{at_least} to {MAX_POINTS} points")
+    if not np.ptp(points, axis=0).max() > 1e-9:
+        raise SceneError(name, points, "points that are not all the same")
+    return points
+
+
+def _velocity(value: ArrayLike | None, count: int | None, columns: int = 3) -> Floats | None:
+    if value is None:
+        return None
+    if columns_of(value) == 0:
+        return array("velocity", value, shape=(3,), unit="m/s")
+    velocity = array("velocity", value, shape=(count, columns), unit="m/s")
+    if len(velocity) < 4:
+        raise SceneError("velocity", f"{len(velocity)} rows", "one velocity, or at least 4")
+    return velocity
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Grasp:
+    """A gripper that holds the cable at material coordinate `u` [m] and moves it along `path`.
+
+    Args:
+        u: material coordinate [m], 0 to the cable's length.
+        hold: "point" holds the position, "tangent" position and direction, "clamp" the twist of the section too.
+        path: `Still`, `Move` or `Waypoints`; its clock starts at `grasp_time`.
+        grasp_time: when the gripper closes [s]; None: it holds from the start.
+        release_time: when it opens [s]; None: never.
+    """
+
+    u: float
+    path: Path = field(default_factory=Still)
+    hold: Hold = "point"
+    grasp_time: float | None = None
+    release_time: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "u", number("u", self.u, at_least=0.0, at_most=1000.0, unit="m"))
+        choice("hold", self.hold, ("point", "tangent", "clamp"))
+        if not isinstance(self.path, Still | Move | Waypoints):
+            raise SceneError("path", self.path, "Still, Move or Waypoints")
+        if self.hold == "point":
+            turns = any(getattr(self.path, name, None) is not None for name in ("rotation", "orientations"))
+            if turns:
+                name = "path.rotation" if isinstance(self.path, Move) else "path.orientations"
+                raise SceneError(name, "a rotation", 'none with hold "point", or hold "tangent"')
+        for name in ("grasp_time", "release_time"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, number(name, getattr(self, name), at_least=0.0, at_most=1e4, unit="s"))
+        if self.release_time is not None and not self.release_time > self.start:
+            raise SceneError("release_time", self.release_time, f"after the grasp at {self.start:g} s")
+
+    @property
+    def start(self) -> float:
+        """Time at which the grasp begins [s]."""
+        return self.grasp_time or 0.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Load:
+    """A known force at material coordinate `u` [m]: `force` (3,) [N], or (k, 3) at `times` (k,) [s], linear between."""
+
+    u: float
+    force: ArrayLike
+    times: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "u", number("u", self.u, at_least=0.0, at_most=1000.0, unit="m"))
+        if self.times is None:
+            object.__setattr__(self, "force", array("force", self.force, shape=(3,), unit="N"))
+            return
+        times = array("times", self.times, shape=(None,), unit="s")
+        if not (len(times) >= 1 and (np.diff(times) > 0).all()):
+            raise SceneError("times", times, "rising times")
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "force", array("force", self.force, shape=(len(times), 3), unit="N"))
+
+    def at(self, t: Floats) -> Floats:
+        """Forces at times `t` (k,) [s]; (k, 3) [N]."""
+        force = cast(Floats, self.force)
+        if self.times is None:
+            return np.broadcast_to(force, (len(t), 3))
+        return np.column_stack([np.interp(t, cast(Floats, self.times), force[:, d]) for d in range(3)])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """A horizontal table; `height` [m] is that of the centreline of a cable lying on it, `friction` Coulomb's mu."""
+
+    height: float = 0.0
+    friction: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "height", number("height", self.height, at_least=-1e4, at_most=1e4, unit="m"))
+        object.__setattr__(self, "friction", number("friction", self.friction, at_least=0.0, at_most=10.0))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Environment:
+    """Gravity (3,) [m/s^2], drag per unit length: linear [N s/m^2] and quadratic [N s^2/m^3], a table, obstacles."""
+
+    gravity: ArrayLike = (0.0, 0.0, -9.81)
+    drag: float = 0.0
+    drag_quadratic: float = 0.0
+    table: Table | None = None
+    obstacles: tuple[Obstacle, ...] = ()
+
+    def __post_init__(self) -> None:
+        gravity = array("gravity", self.gravity, shape=(3,), unit="m/s^2")
+        if not np.linalg.norm(gravity) <= 1000.0:
+            raise SceneError("gravity", gravity, "at most 1000 [m/s^2]")
+        object.__setattr__(self, "gravity", gravity)
+        object.__setattr__(self, "drag", number("drag", self.drag, at_least=0.0, at_most=1e6, unit="N s/m^2"))
+        quadratic = number("drag_quadratic", self.drag_quadratic, at_least=0.0, at_most=1e6, unit="N s^2/m^3")
+        object.__setattr__(self, "drag_quadratic", quadratic)
+        object.__setattr__(self, "obstacles", tuple(self.obstacles))
+        if len(self.obstacles) > MAX_OBSTACLES:
+            raise SceneError("obstacles", f"{len(self.obstacles)} obstacles", f"at most {MAX_OBSTACLES}")
+        for i, obstacle in enumerate(self.obstacles):
+            if not isinstance(obstacle, Obstacle):
+                raise SceneError(f"obstacles[{i}]", obstacle, "Sphere, Capsule, Cylinder or Box")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quality:
+    """What accuracy or grid is asked for, and by which method.
+
+    Give `n_u` and `n_t` (a fixed grid), or `target_error` [m] at the worst point of the surface, or `time_budget` [s],
+    or nothing (0.2 % of the length is aimed at, an estimated error of 1 % is success). With a time budget grids are
+    refined as long as it lasts, but the first is marched to its end; an estimated error of 1 % is success, too.
+
+    Args:
+        n_u: control points along the cable, 5 to 129.
+        n_t: control points in time, 5 to 513. Where a solve on such a grid errs by more than 1 % of the length, as it
+            estimates, or does not come to its end, finer grids are solved, and where these reach that 1 % they are the
+            answer, which says so.
+        delta: threshold of a least squares on the norm of its control-point update, paper eq. (25) [m], 1e-10 to 1e-2;
+            without it 1e-5.
+        method: "march", "spacetime", "paper", "reference" (docs/reference.md), or "auto": `march`, which is nearer to
+            the motion on the same grid and takes less time; but `spacetime` where a grid is given with a `delta`, which
+            a march has no use for, and the motion is smooth. Where "spacetime" does not converge, `march` is the last
+            resort, and the answer says so.
+        estimate: with a given grid, estimate the error by a second march on another grid; False saves its time, and
+            with it what that calls for: however much a solve that converges errs, it is the answer.
+        keep_grid: answer with what a given grid, and a least squares that was asked for, come to by themselves,
+            however much that errs, and whether it converges or not, as who measures them wants.
+    """
+
+    n_u: int | None = None
+    n_t: int | None = None
+    delta: float | None = None
+    target_error: float | None = None
+    time_budget: float | None = None
+    method: Method = "auto"
+    estimate: bool = True
+    keep_grid: bool = False
+
+    def __post_init__(self) -> None:
+        for name, most in (("n_u", MAX_N_U), ("n_t", MAX_N_T)):
+            value = getattr(self, name)
+            if value is None:
+                continue
+            if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 5 <= value <= most:
+                raise SceneError(name, value, f"an integer, 5 to {most}")
+            object.__setattr__(self, name, int(value))
+        if self.delta is not None:
+            object.__setattr__(self, "delta", number("delta", self.delta, at_least=1e-10, at_most=1e-2, unit="m"))
+        choice("method", self.method, ("auto", "march", "spacetime", "paper", "reference"))
+        if (self.n_u is None) != (self.n_t is None):
+            missing = "n_u" if self.n_u is None else "n_t"
+            raise SceneError(missing, None, "both n_u and n_t, or neither", "One of the two is missing")
+        if self.target_error is not None:
+            object.__setattr__(
+                self, "target_error", number("target_error", self.target_error, at_least=1e-6, at_most=10.0, unit="m")
+            )
+        if self.time_budget is not None:
+            object.__setattr__(
+                self, "time_budget", number("time_budget", self.time_budget, at_least=1e-4, at_most=3600.0, unit="s")
+            )
+        given = [n for n in ("n_u", "target_error", "time_budget") if getattr(self, n) is not None]
+        if len(given) > 1:
+            raise SceneError(
+                given[1], getattr(self, given[1]), "only one of n_u with n_t, target_error and time_budget"
+            )
+        if self.keep_grid and self.n_u is None:
+            raise SceneError("keep_grid", True, "n_u and n_t given with it")
+        if self.method in ("spacetime", "paper") and self.n_u is None:
+            raise SceneError("method", self.method, "n_u and n_t given with it")
+        if self.method == "reference" and (self.n_u is not None or self.time_budget is not None):
+            name = "n_u" if self.n_u is not None else "time_budget"
+            raise SceneError(name, getattr(self, name), 'target_error or nothing with method "reference"')
+
+    @property
+    def threshold(self) -> float:
+        """The threshold of a least squares on its update [m]: `delta`, or where none is given that of the paper."""
+        return DELTA if self.delta is None else self.delta
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Scene:
+    """Everything `predict` needs.
+
+    Args:
+        cable: the cable.
+        shape: where it is at t = 0.
+        grasps: what holds and moves it (the contract's `primitives`).
+        loads: known forces.
+        environment: gravity, drag, table.
+        horizon: predicted time [s]; None: until the last path ends.
+        effects: "on", "off" or "auto" by effect name; "auto" for those not named.
+        quality: asked accuracy or grid.
+
+    Raises:
+        SceneError: a part contradicts another, e.g. a grasp off the cable, or grasps too far apart.
+    """
+
+    cable: Cable
+    shape: Shape
+    grasps: tuple[Grasp, ...] = ()
+    loads: tuple[Load, ...] = ()
+    environment: Environment = field(default_factory=Environment)
+    horizon: float | None = None
+    effects: Mapping[str, Switch] = field(default_factory=dict)
+    quality: Quality = field(default_factory=Quality)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "grasps", tuple(self.grasps))
+        object.__setattr__(self, "loads", tuple(self.loads))
+        length = self.cable.length
+        if len(self.grasps) > MAX_GRASPS:
+            raise SceneError("primitives", f"{len(self.grasps)} primitives", f"at most {MAX_GRASPS}")
+        places = [(f"primitives[{i}].u", g.u) for i, g in enumerate(self.grasps)]
+        places += [(f"loads[{i}].u", load.u) for i, load in enumerate(self.loads)]
+        for name, u in places:
+            if not u <= length:
+                raise SceneError(name, u, f"0 to the cable's length, {length:g} [m]")
+        self._check_horizon()
+        self._check_effects()
+        self._check_overlap()
+        if isinstance(self.shape, ControlPoints) and self.shape.knots is not None:
+            last = float(cast(Floats, self.shape.knots)[-1])
+            if not abs(last - length) <= 1e-9 * length:
+                raise SceneError("shape.knots[-1]", last, f"the cable's length, {length:g} [m]")
+
+    def _check_horizon(self) -> None:
+        if self.horizon is not None:
+            object.__setattr__(self, "horizon", number("horizon", self.horizon, above=1e-4, at_most=1e4, unit="s"))
+            return
+        ends = [g.start + g.path.duration for g in self.grasps]
+        ends += [g.release_time for g in self.grasps if g.release_time is not None]
+        ends += [float(cast(Floats, load.times)[-1]) for load in self.loads if load.times is not None]
+        longest = max(ends, default=0.0)
+        if not longest > 1e-4:
+            raise SceneError("horizon", None, "a time [s], since no path has a duration", "It is missing")
+        object.__setattr__(self, "horizon", longest)
+
+    def _check_effects(self) -> None:
+        for name, value in self.effects.items():
+            choice("effects", name, EFFECTS)
+            choice(f"effects.{name}", value, ("auto", "on", "off"))
+            if name == "stretch" and value == "off":
+                reason = "Without axial stiffness a cable has no length"
+                raise SceneError("effects.stretch", "off", '"on" or "auto"', reason)
+
+    def _check_overlap(self) -> None:
+        for j, b in enumerate(self.grasps):
+            for i, a in enumerate(self.grasps[:j]):
+                a_end = np.inf if a.release_time is None else a.release_time
+                b_end = np.inf if b.release_time is None else b.release_time
+                if a.start < b_end and b.start < a_end and abs(a.u - b.u) < MIN_GRASP_DISTANCE * self.cable.length:
+                    nearest = MIN_GRASP_DISTANCE * self.cable.length
+                    reason = f"primitives[{i}] holds it at {a.u:g} m at the same time"
+                    raise SceneError(f"primitives[{j}].u", b.u, f"at least {nearest:g} m from it", reason)
+
+
+MIN_GRASP_DISTANCE = 1e-4  # of the length, between two grasps that hold at the same time

@@ -1,0 +1,1 @@
+"""Curves: how a cable lies at the start, fitted to points, ordered or as a mere cloud."""

@@ -1,0 +1,127 @@
+"""Fit a cable's curve to what a vision system sees: points in order or not, 2D or 3D, noisy, with outliers."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import BSpline
+from scipy.spatial import cKDTree
+
+from dlocore.errors import SceneError, points_array
+from dlocore.scene.scene import Points
+from dlocore.shape.fit import MAX_SPANS, NOISE, fit_points
+from dlocore.shape.ordering import DEVIATIONS, Indices, Order, order_points, without_spikes
+from dlocore.shape.shape import StartCurve, start_curve
+from dlocore.shape.smoothing import smooth
+from dlocore.spline import DEGREE
+
+Floats = NDArray[np.float64]
+
+LEAST = 4  # points
+MOST = 20_000  # points of a cloud: its order takes 0.3 s
+GROUPS = 250  # of a cloud: about as many points as a cable has places to bend
+REFITS = 3  # each without the outliers of the one before
+
+
+@dataclass(frozen=True, eq=False)
+class CloudFit:
+    """A curve through the points of a cable.
+
+    Attributes:
+        curve: cubic spline in arclength with its fit errors [m].
+        measured_length: length of the curve before it was made as long as the cable [m].
+        order: indices of the points along the cable (m,).
+        outliers: indices of the points that are not of it, rising.
+    """
+
+    curve: StartCurve
+    measured_length: float
+    order: Indices
+    outliers: Indices
+
+
+def fit_cloud(
+    points: ArrayLike,
+    *,
+    ordered: bool = True,
+    length: float | None = None,
+    start: Floats | None = None,
+    remove_outliers: bool = True,
+) -> CloudFit:
+    """Fit a unit-speed cubic spline to the points of a cable.
+
+    Args:
+        points: (n, 2 or 3) [m].
+        ordered: whether they are in order along the cable.
+        length: of the cable [m]; absent: as it is measured.
+        start: near the cable's end at u = 0 [m], for unordered points.
+        remove_outliers: whether to leave out points that are not of the cable.
+
+    Raises:
+        SceneError: the points are too few, of no single curve, or of one that differs in length from the cable.
+    """
+    p = points_array("points", points)
+    count = len(p)
+    if ordered:
+        found = without_spikes(p) if remove_outliers else Order(np.arange(count), np.arange(0))
+    else:
+        if count > MOST:
+            raise SceneError("points", f"{count} points", f"at most {MOST}, unless they are in order")
+        found = order_points(p, start)
+    kept = found.order
+    for _ in range(REFITS):
+        if len(kept) < LEAST:
+            raise SceneError("points", f"{len(kept)} points along the cable", f"at least {LEAST}")
+        seen = p[kept] if ordered else _averaged(p[kept])
+        try:
+            measured = _measured(seen)
+            curve = start_curve(Points(points=seen), measured if length is None else length)
+        except SceneError as error:
+            if length is None:
+                allowed = "points along one smooth curve, in their order if need be; or the cable's length beside them"
+                raise SceneError("points", f"{len(kept)} points", allowed, "They show no single curve") from None
+            raise SceneError(error.field.removeprefix("shape."), error.given, error.allowed, error.reason) from None
+        off = _off(curve, p[kept])
+        bad = off > max(DEVIATIONS * float(np.median(off)) / 0.6745, NOISE)
+        if not remove_outliers or not bad.any():
+            break
+        kept = kept[~bad]
+    off = _off(curve, p[kept])
+    curve = replace(curve, fit_rms=float(np.sqrt((off**2).mean())), fit_max=float(off.max()))
+    return CloudFit(curve, measured, kept, np.setdiff1d(np.arange(count), kept))
+
+
+def _averaged(p: Floats) -> Floats:
+    """Average points ordered by their place along the cable over groups, where noise hides their order in a group."""
+    if len(p) <= GROUPS:
+        return p
+    first = np.linspace(0, len(p), GROUPS + 1).astype(np.intp)
+    mean = np.add.reduceat(p, first[:-1]) / np.diff(first)[:, None]
+    mean[[0, -1]] = p[[0, -1]]
+    return mean
+
+
+def _measured(p: Floats) -> float:
+    """Return the length of the curve that ordered points show [m].
+
+    The chords between noisy points are too long; a smooth curve over them tells about how much, and a fit in its
+    arclength the rest.
+    """
+    middle = p - p.mean(axis=0)
+    s = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(p, axis=0) ** 2).sum(axis=1)))])
+    if not s[-1] > 0:
+        raise SceneError("points", "points all in one place", "points along a curve")
+    spans = int(np.clip(len(p), 8, MAX_SPANS))
+    rough = smooth(s, middle, np.ones(len(p)), float(s[-1]), spans, np.inf, np.ones(spans))
+    return fit_points(middle, _length(rough, float(s[-1]))).length_given
+
+
+def _length(spline: BSpline, end: float) -> float:
+    grid = np.linspace(0.0, end, 16 * (len(spline.c) - DEGREE) + 1)
+    return float(np.sqrt((np.diff(spline(grid), axis=0) ** 2).sum(axis=1)).sum())
+
+
+def _off(curve: StartCurve, p: Floats) -> Floats:
+    """Return the distances of points from a curve (n,) [m]."""
+    grid = curve(np.linspace(0.0, curve.knots[-1], 2000))
+    return np.asarray(cKDTree(grid).query(p)[0])

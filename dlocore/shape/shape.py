@@ -1,0 +1,273 @@
+"""Initial shapes: the curve a cable lies along at t = 0, and its control points on given knots."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dlocore.errors import SceneError
+from dlocore.kernels.basis import GAUSS_4, gauss_points, spline_values
+from dlocore.kernels.holding import place
+from dlocore.kernels.projection import on_knots
+from dlocore.scene.scene import ControlPoints, Material, Points, Shape, Straight
+from dlocore.spline import DEGREE, greville, uniform_knots
+
+Floats = NDArray[np.float64]
+
+SPEED_RANGE = (0.5, 1.5)  # of |r'|: a coarse spline of a hairpin stays within, evenly spaced control points don't
+SAME_ANGLE = 1e-9  # [rad]
+SAME_SPIN = 1e-6  # [rad/s]
+_SPUN = 8  # places in each span at which the spin of the sections is found
+_PLACES = 129  # at which a curve is looked at for how it turns
+_ONE_SPAN = uniform_knots(4, 1.0)
+_THIRDS = np.linspace(0.0, 1.0, 4)[:, None]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SplineCurve:
+    """A cubic spline over the material coordinate: control points (n, 3 or 1) on knots (n + 4,) [m]."""
+
+    knots: Floats
+    control_points: Floats
+
+    def __call__(self, u: ArrayLike, derivative: int = 0) -> Floats:
+        """Return the value or a derivative, of order up to 3, at `u` (k,) [m]; (k, 3)."""
+        at = np.atleast_1d(np.asarray(u, dtype=np.float64))
+        return np.asarray(spline_values(_plain(self.knots), _plain(self.control_points), _plain(at), derivative))
+
+    def place(self, u: float) -> Floats:
+        """Return the point [m] and the unit tangent (2, 3) at `u` [m]."""
+        return np.asarray(place(_plain(self.knots), _plain(self.control_points), u, 3))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StartCurve(SplineCurve):
+    """The shape of a cable at t = 0, r(u) over 0 <= u <= L.
+
+    Attributes:
+        velocity: v(u) [m/s], or None at rest.
+        fit_rms: root mean square distance of the given points from the curve [m]; 0 where it is given exactly.
+        fit_max: the largest of these distances [m].
+        length_given: length of the curve before it was made as long as the cable [m].
+        theta: angle of the sections, a spline with control points (n, 1) [rad], or None where it is the same
+            everywhere.
+        theta_rate: its rate, a spline with control points (n, 1) [rad/s], or None where no section spins.
+        strain: places u (k,) [m], rising, and the axial strain there (k,), or None where there is none.
+        material: what the sections remember, or None where the scene's `rest_shape` tells.
+        bow: height of the bow without stress that a straight start was given to buckle by [m], see
+            `problem/buckling.py`.
+        aside: that of the bow that a planar start was given out of its plane [m].
+    """
+
+    velocity: SplineCurve | None = None
+    fit_rms: float = 0.0
+    fit_max: float = 0.0
+    length_given: float = 0.0
+    theta: SplineCurve | None = None
+    theta_rate: SplineCurve | None = None
+    strain: tuple[Floats, Floats] | None = None
+    material: Material | None = None
+    bow: float = 0.0
+    aside: float = 0.0
+
+    @cached_property
+    def heights(self) -> tuple[float, float]:
+        """Heights of the lowest and the highest control point, between which the curve lies [m]."""
+        z = self.control_points[:, 2].tolist()
+        return min(z), max(z)
+
+    @property
+    def twisted(self) -> bool:
+        """Whether its sections are turned against each other or what they remember, or turn so."""
+        rate = self.theta_rate
+        return self.theta is not None or (rate is not None and _turned(rate.control_points, SAME_SPIN, self.material))
+
+    def strain_at(self, u: Floats) -> Floats:
+        """Return the axial strain (k,) at u (k,) [m]."""
+        if self.strain is None:
+            return np.zeros(len(u))
+        return np.interp(u, *self.strain)
+
+    def spin_at(self, u: Floats) -> Floats:
+        """Return how fast the sections spin about their tangent (k,) [rad/s] at u (k,) [m], rising.
+
+        It is theta_t + f, where f is the spin of the frame without twist along the cable that theta is measured
+        against: f(0) = 0, f' = t . (t_t x r_uu) at unit speed (docs/model.md eq. 9).
+        """
+        if self.theta_rate is None:
+            return np.zeros(len(u))
+        spin = self.theta_rate(u)[:, 0]
+        if self.velocity is None:
+            return spin
+        first, second, rate = self(u, 1), self(u, 2), self.velocity(u, 1)
+        slope = np.einsum("kd,kd->k", first, np.cross(rate, second)) / np.linalg.norm(first, axis=1) ** 3
+        frame = np.concatenate([[0.0], np.cumsum(0.5 * (slope[1:] + slope[:-1]) * np.diff(u))])
+        return np.asarray(spin + frame)
+
+    @cached_property
+    def turning(self) -> float:
+        """Angle by which the tangent turns along the curve, to whichever side [rad]."""
+        tangents = self(np.linspace(0.0, self.knots[-1], _PLACES), 1)
+        tangents /= np.linalg.norm(tangents, axis=1)[:, None]
+        chords = np.linalg.norm(np.diff(tangents, axis=0), axis=1)
+        return float(np.sum(2.0 * np.arcsin(np.minimum(0.5 * chords, 1.0))))
+
+
+def _plain(x: Floats) -> Floats:
+    """Return x, or a copy of it, as an array of the one kind that the kernels are compiled for."""
+    return x if x.flags.c_contiguous and x.flags.writeable else np.array(x, order="C")
+
+
+def start_curve(shape: Shape, length: float) -> StartCurve:
+    """Return the curve that a cable of `length` [m] lies along at t = 0.
+
+    Raises:
+        SceneError: the points are of a curve more than 10 % longer or shorter than the cable.
+    """
+    if isinstance(shape, Straight):
+        return _straight(shape, length)
+    if isinstance(shape, ControlPoints):
+        return _given(shape, length)
+    return _fitted(shape, length)
+
+
+def _straight(shape: Straight, length: float) -> StartCurve:
+    start, direction = cast(Floats, shape.start), cast(Floats, shape.direction)
+    control = start + length * _THIRDS * (direction / math.sqrt(direction @ direction))
+    velocity = _velocity(shape.velocity, length, lambda rows: np.linspace(0.0, length, rows), exact=True)
+    return StartCurve(knots=length * _ONE_SPAN, control_points=control, velocity=velocity, length_given=length)
+
+
+def _given(shape: ControlPoints, length: float) -> StartCurve:
+    from dlocore.shape.fit import check_length  # slow to import, as those below, and a straight cable needs none
+
+    rows = cast(Floats, shape.control_points)
+    control, angles = rows[:, :3].copy(), rows[:, 3:].copy()
+    knots = uniform_knots(len(control), length) if shape.knots is None else cast(Floats, shape.knots)
+    speed, width = _speed(SplineCurve(knots=knots, control_points=control))
+    given = float((speed * width).sum())
+    check_length("shape.control_points", "control points of the whole cable", given, length)
+    slowest, fastest = float(speed.min()), float(speed.max())
+    if not (slowest >= SPEED_RANGE[0] and fastest <= SPEED_RANGE[1]):
+        allowed = (
+            f"|r'| from {SPEED_RANGE[0]:g} to {SPEED_RANGE[1]:g} everywhere, as u is the cable's own arclength: "
+            "a straight cable has its control points at the means of three successive knots"
+        )
+        raise SceneError("shape.control_points", f"|r'| from {slowest:.3g} to {fastest:.3g}", allowed)
+    velocity = theta_rate = None
+    if shape.velocity is not None:
+        rates = cast(Floats, shape.velocity)
+        velocity = SplineCurve(knots=knots, control_points=np.array(np.broadcast_to(rates[..., :3], control.shape)))
+        if rates.shape[-1] == 4:
+            theta_rate = SplineCurve(knots=knots, control_points=rates[:, 3:].copy())
+    turned = _turned(angles, SAME_ANGLE, shape.material)
+    theta = SplineCurve(knots=knots, control_points=angles) if turned else None
+    return StartCurve(
+        knots=knots,
+        control_points=control,
+        velocity=velocity,
+        length_given=given,
+        theta=theta,
+        theta_rate=theta_rate,
+        strain=None if shape.strain is None else (greville(knots), cast(Floats, shape.strain)),
+        material=shape.material,
+    )
+
+
+def _turned(angles: Floats, same: float, material: Material | None) -> bool:
+    """Tell whether sections with these angles (n, 1), or rates, are turned against each other or what they remember."""
+    return bool(np.ptp(angles) > same or (material is not None and np.abs(angles).max() > same))
+
+
+def _speed(curve: SplineCurve) -> tuple[Floats, Floats]:
+    """Return |r'| at the Gauss points of each knot span (k,), and their quadrature weights (k,) [m]."""
+    u, width = gauss_points(_plain(curve.knots), *GAUSS_4)
+    return np.sqrt((curve(u, 1) ** 2).sum(axis=1)), width
+
+
+def _fitted(shape: Points, length: float) -> StartCurve:
+    """Fit the points; what the noise at the ends leaves of the mismatch in length is scaled away about the middle.
+
+    Scaling keeps the curve's shape and its unit speed. Where the points themselves are to scale and miss the ends
+    instead, it costs 10 to 16 mm rms for 5 % of a 1 m cable, as much as continuing the curve beyond its ends would
+    where the points are off scale; but the points are said to cover the whole cable.
+    """
+    from dlocore.shape.fit import fit_points
+
+    points = cast(Floats, shape.points)
+    middle = points.mean(axis=0)
+    fit = fit_points(points - middle, length)
+    scale = length / float(fit.curve.t[-1])
+    centre = fit.curve(np.linspace(0.0, fit.curve.t[-1], 65)).mean(axis=0)
+    knots, at = fit.curve.t * scale, np.minimum(fit.at * scale, length)
+    knots[-DEGREE - 1 :] = length
+    control = middle + centre + scale * (fit.curve.c - centre)
+    distance = _distance(SplineCurve(knots=knots, control_points=control), at, points)
+    return StartCurve(
+        knots=knots,
+        control_points=control,
+        velocity=_velocity(shape.velocity, length, lambda rows: at, exact=False),
+        fit_rms=float(np.sqrt((distance**2).mean())),
+        fit_max=float(distance.max()),
+        length_given=fit.length_given,
+    )
+
+
+def _distance(curve: SplineCurve, at: Floats, points: Floats) -> Floats:
+    """Return the distances (n,) [m] of points from a unit-speed curve, from parameters near their feet."""
+    foot = at + ((points - curve(at)) * curve(at, 1)).sum(axis=1)
+    return np.sqrt(((points - curve(np.clip(foot, 0.0, curve.knots[-1]))) ** 2).sum(axis=1))
+
+
+def _velocity(
+    given: ArrayLike | None, length: float, at: Callable[[int], Floats], *, exact: bool
+) -> SplineCurve | None:
+    """Return the velocity field of one velocity (3,) or of one at each of the points at `at(rows)` [m]."""
+    if given is None:
+        return None
+    velocity = cast(Floats, given)
+    if velocity.ndim == 1:
+        return SplineCurve(knots=uniform_knots(4, length), control_points=np.tile(velocity, (4, 1)))
+    from scipy.interpolate import make_interp_spline
+
+    from dlocore.shape.fit import MAX_SPANS
+    from dlocore.shape.smoothing import smooth
+
+    u, mean = at(len(velocity)), velocity.mean(axis=0)
+    if exact:
+        spline = make_interp_spline(u, velocity - mean, k=DEGREE)
+    else:
+        spans = int(np.clip(len(u), 8, MAX_SPANS))
+        spline = smooth(u, velocity - mean, np.ones(len(u)), length, spans, np.inf, np.ones(spans))
+    return SplineCurve(knots=spline.t, control_points=mean + spline.c)
+
+
+def fit_to_knots(curve: SplineCurve, knots: Floats) -> Floats:
+    """Return the control points (len(knots) - 4, 3) [m] of `curve` on clamped cubic `knots` [m], by least squares.
+
+    Exact for a straight cable, for the curve's own knots and for knots that contain them. Elsewhere the projection
+    keeps the shape and not the unit speed: on 9 control points and uniform knots a 1 m cable along one sine wave is
+    strained by 4 % in the middle of a span, on 13 by 0.9 %, on 25 by 0.07 %.
+    """
+    return np.asarray(on_knots(_plain(curve.knots), _plain(curve.control_points), _plain(knots), *GAUSS_4))
+
+
+def velocity_to_knots(curve: StartCurve, knots: Floats) -> Floats | None:
+    """Return the control points [m/s] of the initial velocity on `knots` [m], or None at rest."""
+    return None if curve.velocity is None else fit_to_knots(curve.velocity, knots)
+
+
+def spin_to_knots(curve: StartCurve, knots: Floats) -> Floats | None:
+    """Return the control points (n_u,) [rad/s] of the sections' spin on `knots` [m], or None where they have none."""
+    if curve.theta_rate is None:
+        return None
+    from scipy.interpolate import make_lsq_spline
+
+    cuts = np.unique(np.concatenate([curve.knots, knots]))
+    u = np.unique(np.concatenate([np.linspace(a, b, _SPUN) for a, b in pairwise(cuts)]))
+    return np.asarray(make_lsq_spline(u, curve.spin_at(u), knots, k=DEGREE).c)

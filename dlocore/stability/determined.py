@@ -1,0 +1,169 @@
+"""Whether a scene determines its motion: a start that is known to a millionth of the length may end anywhere."""
+
+import math
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.kernels.growth import LOOKS, SLOWEST, fastest_growth, looked_at
+from dlocore.problem.grid import Grid
+from dlocore.problem.plane import FLATNESS, off_line
+from dlocore.problem.problem import Problem
+from dlocore.shape.shape import StartCurve
+from dlocore.solvers.march import March, march
+from dlocore.solvers.monitor import Monitor
+from dlocore.spline import DEGREE
+from dlocore.words import in_mm
+
+Floats = NDArray[np.float64]
+
+DISTURBED = 1e-6  # of the length: bend of a start
+TURNED = 1e-4  # rad: turn of its sections
+UNDETERMINED = 1e-2  # of the length: what moves by more when its start is bent so much is not determined
+DOUBTFUL = 1e-3  # of the length: what moves by more is told, and may go elsewhere when its start is bent the other way
+UNSEEN = "A disturbance may grow in this motion; the time was up before it was seen how far it takes it."
+_GROWTH = math.log(20.0)  # of a disturbance, as looks at some states tell, from which on it is looked for how much
+_HARDLY = 1e-4  # of the length: a start that is no farther from a line is hardly bent
+_AT_ONCE = 64  # states whose past is looked up at once, which takes memory
+_COMPARED = 1025  # states of two motions, at most
+
+
+def bent(problem: Problem, grid: Grid, seed: int) -> Floats:
+    """Return how a start (n_u, nc) [m] is bent: by some half waves of about DISTURBED of the length.
+
+    With twist its sections are turned, too, by about TURNED, between its ends: what turns over on a table hardly feels
+    that it is bent.
+    """
+    u = np.linspace(0.0, np.pi, grid.n_u)[:, None]
+    dimensions = problem.plane.dimensions
+    sizes = np.random.default_rng(seed).normal(size=(3, dimensions)) / 2
+    waves = np.zeros((grid.n_u, problem.nc))
+    waves[:, :dimensions] = DISTURBED * problem.scene.cable.length * np.sin(u * [1.0, 2.0, 3.0]) @ sizes
+    if problem.twist is not None:
+        waves[:, -1] = TURNED * problem.twist.radius * (np.sin(u) + 0.5 * np.sin(2.0 * u))[:, 0]
+    return waves
+
+
+def goes_astray(problem: Problem, motion: March, monitor: Monitor, hard: bool) -> float:
+    """Return how far a motion goes elsewhere when its start is bent by DISTURBED of the length [m].
+
+    Where a disturbance grows most later on, it is displaced by as much as that begins (`_onset`), too. It is marched
+    once more for that, and again with the opposite bend where that leaves it in doubt (`farther`): where a disturbance
+    may grow, or where tangents can't tell. They can't where the cable strikes something, where it touches
+    or rubs and is `hard`, needed grids beyond the first few, and where it starts so nearly straight that it buckles
+    between any two looks. Not where the start has a bow in a plane and another out of it (`problem/buckling.py`), which
+    is no larger, and of which the answer tells. Else, and where that march finds no equilibrium, it is 0.
+
+    Raises:
+        Cancelled: the caller asked to stop.
+        TimeIsUp: the deadline passed.
+    """
+    bowed_twice = bool(problem.start.bow and problem.start.aside)
+    untold = motion.split or (hard and problem.touches) or _hardly_bent(problem.start)
+    if bowed_twice or motion.stopped:
+        return 0.0
+    grows = may_grow(problem, motion)
+    if not (untold or grows):
+        return 0.0
+    grid, bend = motion.grid, bent(problem, motion.grid, seed=1)
+    onset = _onset(problem, motion) if grows else 0.0
+
+    def marched(way: float) -> March:
+        knocks = {onset: way * bend} if onset > 0.0 else None
+        start = grid.start + way * bend
+        return march(
+            problem, grid.changed(start=start), motion.asked, monitor, rho=motion.rho, whole=True, knocks=knocks
+        )
+
+    plain = marched(0.0) if onset > 0.0 else motion  # in the same steps, of which some begin at the onset
+    if plain.stopped:
+        return 0.0
+    at = np.unique(np.linspace(0, len(plain.states) - 1, _COMPARED).round().astype(int))
+
+    def moved(way: float) -> float:
+        other = marched(way)
+        if other.stopped:
+            return 0.0
+        apart = (other.states[at] - plain.states[at])[..., : problem.plane.dimensions]
+        return float(np.linalg.norm(apart, axis=-1).max())
+
+    return farther(moved, problem.scene.cable.length)
+
+
+def farther(moved: Callable[[float], float], length: float) -> float:
+    """Return by how much a bend of a start, moved(1.0), or its opposite, moved(-1.0), moves a motion [m].
+
+    The opposite is asked where the first leaves it in doubt: what grows by more than DOUBTFUL may have gone to the same
+    of two sides, only sooner or later.
+    """
+    first = moved(1.0)
+    return max(first, moved(-1.0)) if DOUBTFUL * length < first <= UNDETERMINED * length else first
+
+
+def in_words(problem: Problem, moved: float) -> str:
+    """Return in words that a scene does not determine its motion, which a bend moves by so much [m]."""
+    return f"the scene does not determine its motion: {bend_in_words(problem, moved)}"
+
+
+def bend_in_words(problem: Problem, moved: float) -> str:
+    """Return in words that a cable which is hardly bent goes elsewhere by so much [m]."""
+    bend = f"{DISTURBED * problem.scene.cable.length * 1e6:.2g} um"
+    turned = "" if problem.twist is None else f" and turned by {TURNED * 1e3:.2g} mrad,"
+    return f"a cable bent by a millionth of the length, {bend},{turned} goes elsewhere by up to {in_mm(moved)}"
+
+
+def bend_of(start: StartCurve) -> float:
+    """Return how far a start lies from the line between its ends, of its length; infinite where these meet."""
+    ways = start.control_points - start.control_points[0]
+    chord = ways[-1]
+    return off_line(ways, chord) / float(start.knots[-1]) if chord @ chord > 0.0 else np.inf
+
+
+def _hardly_bent(start: StartCurve) -> bool:
+    """Tell whether a start is nearly straight, and not quite: too little decides on the side to which it buckles."""
+    if start.bow or len(start.control_points) <= DEGREE + 1:
+        return False
+    return FLATNESS < bend_of(start) < _HARDLY
+
+
+def may_grow(problem: Problem, motion: March) -> bool:
+    """Tell whether a disturbance may grow by much in a motion, as tangents of some states tell (eq. 18a)."""
+    growth = motion.growth
+    if growth is None:
+        growth = sum(float(rates.mean() * (times[-1] - times[0])) for times, rates in _rates(problem, motion))
+    return growth > _GROWTH
+
+
+def _onset(problem: Problem, motion: March) -> float:
+    """Return when the stretch of a motion begins in which a disturbance grows most [s]; 0 where it grows in none.
+
+    A motion that is damped has forgotten by then what disturbed its start.
+    """
+    onset = most = grown = begin = 0.0
+    for times, rates in _rates(problem, motion):
+        for k, rate in enumerate(rates):
+            begin = begin if grown > 0.0 else times[k]
+            grown = grown + rate * (times[k + 1] - times[k]) if rate > 0.0 else 0.0
+            if grown > most:
+                onset, most = begin, grown
+    return float(onset)
+
+
+def _rates(problem: Problem, motion: March) -> Iterator[tuple[Floats, Floats]]:
+    """Yield times (k + 1,) [s] in each stretch of a motion, and how fast a disturbance grows at most between them.
+
+    The rates (k,) [1/s] are those of the states at the later ones.
+    """
+    for window in motion.forces:
+        lasts = float(window.times[-1] - window.times[0])
+        at = looked_at(len(window.times) - 1, max(2, round(LOOKS * lasts / problem.horizon)))
+        rates = [
+            fastest_growth(
+                problem.axes, window.states[some], motion.behind(window.times[some]), motion.grid.tables,
+                *problem.laws, problem.mass_density(), problem.drag_coefficient(), window.held.elimination,
+                SLOWEST / problem.horizon,
+            )
+            for some in np.array_split(at[1:], -(-len(at) // _AT_ONCE))
+        ]  # fmt: skip
+        yield window.times[at], np.concatenate(rates)

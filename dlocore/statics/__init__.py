@@ -1,0 +1,1 @@
+"""Equilibria: where a cable that is held comes to rest."""

@@ -1,0 +1,236 @@
+"""Bring a held cable to rest: relaxations held back by springs, ever weaker ones."""
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.answer.report import WindowForces
+from dlocore.kernels.assembly import NO_RATES, History, assemble
+from dlocore.kernels.contact import passes
+from dlocore.kernels.entry import remember_start
+from dlocore.kernels.relax import descend, relax
+from dlocore.kernels.tension import COLUMNS
+from dlocore.problem.discretisation import applied_forces
+from dlocore.problem.events import closed_grasps
+from dlocore.problem.grid import Grid
+from dlocore.problem.holding import Held, Starts, close_grasps, hold
+from dlocore.problem.problem import Problem
+from dlocore.scene.scene import Grasp
+from dlocore.solvers.monitor import Monitor, TimeIsUp
+from dlocore.spline import greville
+
+Floats = NDArray[np.float64]
+Rest = Literal["settled", "restless", "time"]  # at rest; no rest found; the time was up
+
+TOLERANCE = 1e-10  # of the length, on the last Newton update
+RESTING = 1e-8  # of the length, as near to the equilibrium as a march solves its steps
+UNDRIVEN = 1e-6  # of what weighs on the cable and bends it: a force that drives nothing
+ROUNDS = 400  # of relaxations, each held back by where it started
+PATH_STEPS = 24  # that bring the grasps to their poses at a later time
+PATH_ROUNDS = 4  # of relaxations at each of them but the last
+_ROUNDING = 1e-15  # of the axial stiffness: what it makes of a force
+_SPRINGS = 10.0  # times what weighs on the cable and bends it, per length: the springs of the first relaxation
+_CLOSE = 0.05  # of the first update of a relaxation, on the last: the next one follows it
+_WEAK = 2e-3  # of the first springs: those that hold back nothing, and whose relaxations end at TOLERANCE
+_NEARBY = 1e-5  # of them: the springs that a start found on another grid begins with; it needs none as strong as they
+_STRONGEST = 1e6  # times them: the springs that Newton's method alone is tried with
+_STRONGER = 4.0  # times, where it fails
+_COMES_TO_REST = 0.5  # of the relaxation before: a cable that moves less by so much is on its way to rest
+_ITERATIONS = 60  # of a relaxation with a line search
+_ROUGH = 1e-5  # of the length: the tolerance of the first of those, which others follow
+
+
+class Settled(NamedTuple):
+    """Where a cable came to rest, or not.
+
+    Attributes:
+        q: control points (n_u, nc) [m].
+        rest: how they rest.
+        held: what is held of them.
+        history: what lies behind them.
+        at: the grasps are at their poses of this time [s].
+        starts: where the paths of the grasps begin.
+    """
+
+    q: Floats
+    rest: Rest
+    held: Held
+    history: History
+    at: float
+    starts: Starts
+
+
+def settle(
+    problem: Problem, grid: Grid, at: float, monitor: Monitor, begin: tuple[Floats, History] | None = None,
+    starts: Starts | None = None,
+) -> Settled:  # fmt: skip
+    """Bring the cable to rest with the grasps at their poses of time `at` [s].
+
+    Relaxations held back by a spring towards where they started: the first strongly, later ones less, so that a cable
+    without a stable tangent (buckling, free rotation) walks downhill instead of jumping. Each is Newton's method alone,
+    with stronger springs where it fails; where it fails with any, and where something is touched, which makes kinks, it
+    is one with a line search.
+
+    Args:
+        begin: control points and history at t = 0 that are near the equilibrium; the start of the grid without.
+        starts: where the paths of the grasps begin, of a cable that has been brought to their poses already; without,
+            it is brought there along the paths.
+
+    Raises:
+        Cancelled: the caller asked to stop.
+    """
+    q, history = (grid.start.copy(), grid.past()) if begin is None else begin
+    if len(history.tension) == 0:
+        history = history._replace(tension=np.zeros((len(grid.tables.axial_w), COLUMNS)))
+    carried = at > 0.0 and starts is None
+    starts = {} if starts is None else starts
+    before_t = 0.0 if carried else at
+    times = np.linspace(0.0, at, PATH_STEPS + 1)[1:] if carried else np.array([at])
+    for t in times:
+        grasps = closed_grasps(problem.scene, t, t)
+        close_grasps(problem, grid, grasps, starts, q)
+        held = hold(problem, grid, grasps, np.array([before_t, t]), starts, q if t > 0.0 else grid.start)
+        if carried:
+            _carry(problem, grid, grasps, starts, t, q)
+        before_t = t
+        applied = applied_forces(problem, grid, np.array([t]))[0]
+        rounds = ROUNDS if t == times[-1] else PATH_ROUNDS
+        rest = _relaxed(problem, grid, q, history, held, applied, rounds, 1.0 if begin is None else _NEARBY, monitor)
+        if rest == "time":
+            break
+    return Settled(q, rest, held, history._replace(tension=grid.history.tension), before_t, starts)
+
+
+def holding(problem: Problem, grid: Grid, settled: Settled) -> WindowForces:
+    """Return what holds a cable that has settled."""
+    q, at = settled.q, np.array([settled.at])
+    forces = _unbalanced(problem, grid, settled.history, q, applied_forces(problem, grid, at)[0])
+    return WindowForces(settled.held, at, forces.reshape(1, -1)[:, settled.held.elimination.held], q[None])
+
+
+def _relaxed(
+    problem: Problem, grid: Grid, q: Floats, history: History, held: Held, applied: Floats, rounds: int, share: float,
+    monitor: Monitor,
+) -> Rest:  # fmt: skip
+    """Relax the control points q (n_u, nc) and their history in place, in so many rounds, and tell how they rest.
+
+    `share` is that of the first springs to begin with.
+    """
+    active, parameters = problem.law_table()
+    axes, tables, elimination, offset = problem.axes, grid.tables, held.elimination, held.offsets[-1]
+    length = problem.scene.cable.length
+    springs = _SPRINGS * problem.stiffness_aside() + 1e-9
+    strength = searched = share * springs
+    plain, near, weak, moved = problem.contact is None, False, False, 0.0
+    untouched = history._replace(tension=grid.history.tension)
+    while rounds > 0:
+        try:
+            monitor.check()
+        except TimeIsUp:
+            return "time"
+        before = q.copy()
+        if plain:
+            weak = weak or strength <= _WEAK * springs
+            update, used = descend(
+                axes, q, strength, applied, tables, active, parameters, history, elimination, offset,
+                0.0 if weak else _CLOSE, TOLERANCE * length, RESTING * length,
+            )  # fmt: skip
+            if not np.isfinite(update):
+                if near:  # and no weaker springs hold it: at rest, if it is not pushed
+                    return "settled"
+                strength *= _STRONGER
+                if share < 1.0 and strength > springs:
+                    return "restless"
+                plain = strength <= _STRONGEST * springs
+                continue
+            scale = max(1.0, strength / springs)
+            strength *= 0.04 if used <= 2 else 0.2 if used <= 4 else 0.5
+        else:
+            tolerance = TOLERANCE if searched < springs else _ROUGH
+            update, used = relax(
+                axes, q, before, searched, applied, tables, active, parameters, untouched, elimination, offset,
+                tolerance * length, _ITERATIONS,
+            )  # fmt: skip
+            if passes(problem.nc, before, q, tables, parameters):
+                q[:] = before
+                searched *= _STRONGER
+                rounds -= 1
+                continue
+            found = update <= max(tolerance, RESTING) * length
+            searched *= 0.2 if used <= 12 else 0.5 if found else 1.0
+            scale, strength = 1.0, springs
+            history.tension[:] = 0.0
+        rounds -= 1
+        if problem.twist is not None:
+            remember_start(axes, q, tables, active, parameters, history)
+        last, moved = moved, float(np.abs(q - before).max())
+        near = scale * moved <= RESTING * length
+        if near and update <= RESTING * length:  # rounding may keep a stiff cable from TOLERANCE
+            return "settled"
+        stays = moved > _COMES_TO_REST * last  # a turn that dies out ends where nothing drives it
+        if not near and stays and (weak or not plain) and _only_turns(problem, grid, history, before, q, applied):
+            return "settled"
+        plain = problem.contact is None
+    return "restless"
+
+
+def _only_turns(problem: Problem, grid: Grid, history: History, before: Floats, q: Floats, applied: Floats) -> bool:
+    """Tell whether a relaxation turned the cable as a whole, from `before` to q (n_u, nc), and no force drives that.
+
+    A cable that hangs from a point, or between two, may turn about itself: it is in equilibrium at any angle. Turned as
+    a whole it stores what it did before, if it is straight by nature: what a coarse grid makes of that is no force.
+    """
+    length, dimensions = problem.scene.cable.length, problem.plane.dimensions
+    if not _moved_rigidly(before[:, :dimensions], q[:, :dimensions], RESTING * length):
+        return False
+    step = q - before
+    straight = problem.contact is None and not np.any(history.memory)
+    driving = applied if straight else _unbalanced(problem, grid, history, q, applied)
+    work = abs(float(np.sum(driving * step)))
+    bending = problem.bend.bending_stiffness if problem.bend else 0.0
+    scale = bending / length**2 + length * float(np.linalg.norm(problem.weight()))
+    force = UNDRIVEN * scale + _ROUNDING * problem.stretch.axial_stiffness
+    return work <= force * float(np.abs(step).max())
+
+
+def _moved_rigidly(before: Floats, after: Floats, tolerance: float) -> bool:
+    """Tell whether points (n, 2 or 3) lie within a tolerance [m] of a rigid motion of where they were before."""
+    a, b = before - before[0], after - after[0]
+    apart = np.sqrt((a * a).sum(axis=1)) - np.sqrt((b * b).sum(axis=1))
+    if np.abs(apart).max() > 2.0 * before.shape[1] ** 0.5 * tolerance:  # a distance that no such motion leaves
+        return False
+    x, y = before - before.mean(axis=0), after - after.mean(axis=0)
+    left, _, right = np.linalg.svd(x.T @ y)
+    return bool(np.abs(x @ (left @ right) - y).max() <= tolerance)
+
+
+def _carry(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, t: float, q: Floats) -> None:
+    """Shift the control points q (n_u, nc) with the grasps, evenly in between, where they move to at time `t` [s].
+
+    A grasp that moves alone by more than a span folds the cable there, and a fold finer than the quadrature stays.
+    """
+    if not grasps:
+        return
+    order = sorted(grasps, key=lambda g: g.u)
+    dimensions = problem.plane.dimensions
+    shift = np.array(
+        [
+            problem.plane.points(g.path.at(np.array([t - g.start]), starts[g][0])[0]) - grid.at(q, g.u)[:dimensions]
+            for g in order
+        ]
+    )
+    middle = greville(grid.knots)  # of the control points
+    for d in range(dimensions):
+        q[:, d] += np.interp(middle, [g.u for g in order], shift[:, d])
+
+
+def _unbalanced(problem: Problem, grid: Grid, history: History, q: Floats, applied: Floats) -> Floats:
+    """Return the forces (n_u, nc) [N] on the control points q that nothing balances but what holds them."""
+    active, parameters = problem.laws
+    f, nothing = np.empty_like(q), np.empty((1, 1))
+    assemble(
+        problem.axes, q, np.zeros_like(q), grid.tables, active, parameters, history, NO_RATES, (0.0, 0.0, 0.0), f,
+        nothing,
+    )  # fmt: skip
+    return np.asarray(f - applied)

@@ -1,0 +1,308 @@
+"""Static equilibrium alone: the paper's remark after eq. (20), the equations without M and N."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dlocore.answer.frames import free_of_frames
+from dlocore.answer.parts import Status, with_notes
+from dlocore.answer.report import elastic_energy, reactions
+from dlocore.errors import SceneError, number
+from dlocore.problem.buckling import UNSTABLE, side_notes
+from dlocore.problem.discretisation import make_grid, smallest_n_u
+from dlocore.problem.events import closed_grasps
+from dlocore.problem.grid import Grid
+from dlocore.problem.problem import Problem, pose
+from dlocore.scene.scene import Scene
+from dlocore.solvers.monitor import Monitor
+from dlocore.spline import design_matrix
+from dlocore.stability.determined import UNDETERMINED, bend_in_words, bent
+from dlocore.stability.sideways import WITH_TWIST, is_unstable, lacks_twist, solved_in_space
+from dlocore.statics.regrid import begin_on, starts_folded
+from dlocore.statics.resting import slide_to_rest
+from dlocore.statics.settling import Settled, holding, settle
+from dlocore.statics.tipping import tip_notes, tipped
+from dlocore.words import in_mm
+
+Floats = NDArray[np.float64]
+
+RESTLESS = "shape.settle"  # the field of the error of a start that finds no rest
+LEVELS = (9, 13, 17, 25, 33, 49, 65, 97, 129, 193, 257, 385)
+_WOUND = np.pi  # [rad]: a start that turns by more along its length may have other equilibria beside the one downhill
+_COARSE = 12  # control points: on so few a start may settle to another of several equilibria than on more
+_ELSEWHERE = 0.02  # of the length: farther apart starts may lie in two equilibria
+_FAR = 0.05  # of the length: a start that settles no farther away has hardly passed by another equilibrium
+_TELLING = 13  # control points, of a start that is settled twice to see whether it tells to which side it goes
+_FINER = (1.5, 2.0)  # times the control points, with which a start that finds no rest may
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Equilibrium:
+    """A static equilibrium.
+
+    Attributes:
+        status: "converged", or why not.
+        message: the status in words.
+        control_points: (n_u, 4) [m, m, m, rad].
+        knots_u: (n_u + 4,) [m].
+        reactions: force of each grasp, in the scene's order (grasps, 3) [N]; zero where it is open.
+        moments: moment of each grasp (grasps, 3) [N m].
+        energy: elastic energy [J].
+        error_estimate: largest distance to the grid before [m]; None where n_u was given.
+    """
+
+    status: Status
+    message: str
+    control_points: Floats
+    knots_u: Floats
+    reactions: Floats
+    moments: Floats
+    energy: float
+    error_estimate: float | None
+
+    def positions(self, u: ArrayLike) -> Floats:
+        """Return r at the material coordinates u (k,) [m]; (k, 3) [m]."""
+        return design_matrix(self.knots_u, np.atleast_1d(u)) @ self.control_points[:, :3]
+
+
+def equilibrium(
+    scene: Scene,
+    *,
+    at: float = 0.0,
+    n_u: int | None = None,
+    deadline: float | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> Equilibrium:
+    """Find the static equilibrium of a scene's cable with its grasps at their poses of time `at`.
+
+    The cable is brought there from its start shape along the grasps' paths, so that of several equilibria the one is
+    found that it would slowly reach. Without a given `n_u` grids are refined until two agree to a tenth of a per mille
+    of the length, or to the scene's `target_error`.
+
+    Args:
+        scene: its horizon, inertia, drag, damping and friction play no part.
+        at: time of the grasps' poses and of the loads [s].
+        n_u: number of control points; None: chosen.
+        deadline: time allowed [s].
+        cancelled: asked between relaxations; where it returns True the solve stops.
+
+    Raises:
+        SceneError: bad input, or nothing holds the cable against its weight.
+        Cancelled: `cancelled` returned True.
+    """
+    at = number("at", at, at_least=0.0, at_most=1e4, unit="s")
+    problem = pose(scene, at_rest=True)
+    if not closed_grasps(scene, at, at) and (np.any(problem.weight() != 0) or scene.loads):
+        raise SceneError(
+            "primitives", "no grasp", "a grasp that holds the cable", "Nothing holds it against its forces"
+        )
+    monitor = Monitor(None, deadline, cancelled)
+    target = scene.quality.target_error or 1e-4 * scene.cable.length
+    least = smallest_n_u(problem)
+    sizes = [n_u] if n_u is not None else [max(n, least + 2 * i) for i, n in enumerate(LEVELS)]
+    rest, notes = _refined(problem, sizes, at, target, monitor), list[str]()
+    found = rest.settled
+    if rest.status == "converged" and is_unstable(problem, rest.grid, found.q, at, found.history):
+        if lacks_twist(problem):
+            notes.append(solved_in_space([WITH_TWIST]))
+        else:
+            problem = pose(scene, {"side": UNSTABLE}, at_rest=True)
+            rest = _refined(problem, sizes, at, target, monitor)
+    sides = [*side_notes(problem.start), *tip_notes(rest.grid.tipped, scene.cable.length)]
+    notes += sides
+    if problem.friction is not None:
+        notes.append("friction is left out, which holds a cable where it came to lie")
+    grid, q, history = rest.grid, rest.settled.q, rest.settled.history
+    apart = _rests_apart(problem, rest, at, monitor) if rest.status == "converged" and not sides else 0.0
+    if apart > UNDETERMINED * scene.cable.length:
+        bend = bend_in_words(problem, apart)
+        notes.append(f"which of several equilibria it comes to is not determined: {bend}")
+    world = problem.world(free_of_frames(problem, grid, q[None], history.past[None])[0])
+    held = reactions(problem, grid, (holding(problem, grid, rest.settled),))
+    return Equilibrium(
+        status=rest.status,
+        message=with_notes(rest.message, notes),
+        control_points=world,
+        knots_u=grid.knots,
+        reactions=np.array([g.reaction[-1] for g in held]).reshape(-1, 3),
+        moments=np.array([g.moment[-1] for g in held]).reshape(-1, 3),
+        energy=elastic_energy(problem, grid, q, history),
+        error_estimate=None if n_u is not None or not np.isfinite(rest.change) else rest.change,
+    )
+
+
+class _Rest(NamedTuple):
+    """What `settle` found on the last of some grids, what to say of it, and how far it is from the one before [m]."""
+
+    grid: Grid
+    settled: Settled
+    status: Status
+    message: str
+    change: float
+
+
+def _refined(problem: Problem, sizes: list[int], at: float, target: float, monitor: Monitor) -> _Rest:
+    """Settle on finer and finer grids until two agree to the target [m]."""
+    found: tuple[Grid, Settled] | None = None
+    change, status = np.inf, cast(Status, "time_limit")
+    message = "The time limit passed. Allow more time or a smaller n_u."
+    for n in sizes:
+        grid, settled = _rested(problem, make_grid(problem, n), at, monitor)
+        if settled.rest == "time" and found is not None:
+            break
+        if found is not None:
+            u = np.linspace(0.0, problem.scene.cable.length, 65)
+            before = design_matrix(found[0].knots, u) @ found[1].q[:, :3]
+            change = float(np.linalg.norm(design_matrix(grid.knots, u) @ settled.q[:, :3] - before, axis=1).max())
+        found = grid, settled
+        if settled.rest == "time":
+            break
+        one = len(sizes) == 1
+        status, message = "converged", "Forces balance." if one else f"Two grids agree to {in_mm(change)}."
+        if change <= target:
+            break
+    assert found is not None, "every list of sizes has a first"
+    grid, settled = found
+    if settled.rest == "restless":
+        status = "stalled"
+        message = "The relaxation did not come to rest. The scene may have no equilibrium, or many side by side."
+    elif status == "converged" and len(sizes) > 1 and not change <= target:
+        status, message = "max_iterations", f"The finest grid still moved the shape by {in_mm(change)}."
+    return _Rest(grid, settled, status, message, change)
+
+
+def _rested(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> tuple[Grid, Settled]:
+    """Return a grid, and the rest that its start comes to and stays in, under the grasps and loads of the time `at`."""
+    settled = settle(problem, grid, at, monitor)
+    if settled.rest != "settled":
+        return grid, settled
+    stays = tipped(problem, grid.changed(start=settled.q, history=settled.history), monitor, at, settled.starts)
+    return grid.changed(tipped=stays.tipped), settled._replace(q=stays.start, history=stays.history)
+
+
+def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None = None) -> Grid:
+    """Return the grid of a motion's start: settled to equilibrium where the scene asks for it.
+
+    Where a grid `like` it, of the same problem, has settled, the start is settled from there: of several equilibria it
+    is the same one, and near. Where none has, and this one finds no rest from the given start, or folds within a span,
+    it is settled from that of a finer grid.
+
+    Raises:
+        SceneError: the start was to settle and found no equilibrium.
+    """
+    grid = make_grid(problem, n_u)
+    if not problem.scene.shape.settle:
+        return grid
+    found = _settled(problem, grid, monitor, like)
+    for finer in _FINER if like is None or starts_folded(like) else ():
+        if _is_wanting(problem, found):
+            other = _settled(problem, make_grid(problem, round(finer * n_u)), monitor, None)
+            again = None if other is None else _settled(problem, grid, monitor, other)
+            found = again or found
+    if found is None:
+        allowed = "false, or a start that grasps hold in an equilibrium"
+        raise SceneError(RESTLESS, True, allowed, "The start did not come to rest")
+    return found
+
+
+def settles_elsewhere(problem: Problem, settled: Grid, monitor: Monitor) -> float:
+    """Return how far apart a start settles that is bent by DISTURBED of the length to one side and to the other [m].
+
+    It is 0 where it did not go far to where it is `settled`, where friction holds it, and where it finds no rest. An S
+    between two pins may go to either side of the line between them. A coarse grid tells.
+
+    Raises:
+        Cancelled: the caller asked to stop.
+        TimeIsUp: the deadline passed.
+    """
+    if not problem.scene.shape.settle or problem.friction is not None:
+        return 0.0
+
+    def rest_of(start: Grid) -> Floats | None:
+        monitor.check()
+        found = _settled(problem, start, monitor, None)
+        return None if found is None else found.start
+
+    return _to_two_sides(problem, settled, settled.start, rest_of)
+
+
+def _rests_apart(problem: Problem, rest: _Rest, at: float, monitor: Monitor) -> float:
+    """Return the same of an equilibrium under the grasps and loads of the time `at` [m]."""
+
+    def rest_of(start: Grid) -> Floats | None:
+        other = _rested(problem, start, at, monitor)[1]
+        return other.q if other.rest == "settled" else None
+
+    return _to_two_sides(problem, rest.grid, rest.settled.q, rest_of)
+
+
+def _to_two_sides(problem: Problem, grid: Grid, q: Floats, rest_of: Callable[[Grid], Floats | None]) -> float:
+    """Return how far apart the rests of a start are that is bent to either side, if it went far to `q` on `grid` [m].
+
+    `rest_of` returns the control points of a start's rest on a grid, None where it finds none.
+    """
+    u = np.linspace(0.0, problem.scene.cable.length, 33)
+    dimensions = problem.plane.dimensions
+    way = design_matrix(grid.knots, u) @ q[:, :dimensions] - problem.plane.points(problem.start(u))
+    if not np.linalg.norm(way, axis=1).max() > _FAR * problem.scene.cable.length:
+        return 0.0
+    coarse = make_grid(problem, max(_TELLING, smallest_n_u(problem)))
+    ends = []
+    for side in (1.0, -1.0):
+        rest = rest_of(coarse.changed(start=coarse.start + side * bent(problem, coarse, seed=1)))
+        if rest is None:
+            return 0.0
+        ends.append(rest[:, :dimensions])
+    return float(np.linalg.norm(ends[0] - ends[1], axis=1).max())
+
+
+def _settled(problem: Problem, grid: Grid, monitor: Monitor, like: Grid | None) -> Grid | None:
+    """Return a grid with its start settled where it stays, or None where it finds no rest; see `_at_rest`."""
+    found = _at_rest(problem, grid, monitor, like)
+    return None if found is None else tipped(problem, found, monitor)
+
+
+def _at_rest(problem: Problem, grid: Grid, monitor: Monitor, like: Grid | None) -> Grid | None:
+    """Return a grid with its start settled, first from that of a grid like it, or None where it finds no rest.
+
+    What friction holds depends on the way, and of several equilibria that a wound start may have, or one with obstacles
+    below it, relaxations may jump to another: such starts slide downhill from the given one, on every grid. One that
+    folds within a span as it slides, which no energy sees, relaxes all the same where nothing is in its way. Where the
+    grid like it is coarse and its start went far, this one settles from the given start too, and that counts if it is
+    another equilibrium.
+    """
+    slid: Grid | None = None
+    if problem.friction is not None or problem.obstacles or problem.start.turning > _WOUND:
+        q, rest, history = slide_to_rest(problem, grid, monitor)
+        if rest != "restless":
+            slid = grid.changed(start=q, history=history)
+        if problem.friction is not None or not _is_wanting(problem, slid):
+            return slid
+    begin = None if like is None else begin_on(problem, grid, like)
+    found = settle(problem, grid, 0.0, monitor, begin)
+    if like is not None and begin is not None:
+        lost = found.rest == "restless"
+        if lost or (like.n_u <= _COARSE and _is_elsewhere(problem, grid.start, found.q)):
+            afresh = settle(problem, grid, 0.0, monitor)
+            if lost or (afresh.rest != "restless" and _is_elsewhere(problem, found.q, afresh.q)):
+                found = afresh
+    if found.rest == "restless":
+        return slid
+    return grid.changed(start=found.q, history=found.history, tipped=like is not None and like.tipped)
+
+
+def _is_elsewhere(problem: Problem, one: Floats, other: Floats) -> bool:
+    """Tell whether control points (n_u, nc) of two starts on one grid may lie in two equilibria."""
+    apart = (one - other)[:, : problem.plane.dimensions]
+    return float(np.abs(apart).max()) > _ELSEWHERE * problem.scene.cable.length
+
+
+def _is_wanting(problem: Problem, start: Grid | None) -> bool:
+    """Tell whether a start found no rest, or a fold within a span that a relaxation may unfold.
+
+    Over an obstacle it may not: it would take the cable through it.
+    """
+    return start is None or (problem.friction is None and not problem.obstacles and starts_folded(start))
