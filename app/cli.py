@@ -5,7 +5,9 @@ import sys
 from collections.abc import Sequence
 from typing import get_args
 
-from app import commands, identify_commands, study_command
+from app.commands import commands
+from app.commands import identify as identify_commands
+from app.commands import study as study_command
 from dlocore.scene.scene import Method
 
 _DESCRIPTION = "Predict how a cable moves when grippers move it."

@@ -8,9 +8,10 @@ from fastapi import FastAPI
 from fastapi.middleware.cors import CORSMiddleware
 from fastapi_offline import FastAPIOffline
 
-from app import openapi, problems, viewer
-from app.access import Access
-from app.middleware import AccessLog, BodyLimit, PageHeaders
+from app import viewer
+from app.http import openapi, problems
+from app.http.access import Access
+from app.http.middleware import AccessLog, BodyLimit, PageHeaders
 from app.routes import (
     batch,
     cables,
@@ -26,7 +27,7 @@ from app.routes import (
     shapes,
     studies,
 )
-from app.service import Service
+from app.service.service import Service
 from app.settings import Settings
 
 _ABOUT = """Predict how a cable moves when grippers move it: post a scene, get the whole motion as one bivariate spline.

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from app.gallery import Example, examples
+from app.pages.gallery import Example, examples
 from app.schemas import to_scene
 from app.viewer.palette import OBSTACLE, STEEL, colour
 from dlocore import Cylinder, Grasp, Prediction, predict

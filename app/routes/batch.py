@@ -5,13 +5,13 @@ from typing import Annotated
 from fastapi import APIRouter, Body, Request
 from fastapi.responses import Response
 
-from app.batch import check_size, predict_all
-from app.formats import LINES, negotiated
+from app.http.formats import LINES, negotiated
+from app.http.streamed import Emit, Streamed
 from app.routes import described
 from app.routes.body import JsonRoute
 from app.schemas.batch import BATCH_EXAMPLES, BatchRequest
-from app.service import TheService
-from app.streamed import Emit, Streamed
+from app.service.batch import check_size, predict_all
+from app.service.service import TheService
 
 router = APIRouter(tags=["predictions"], route_class=JsonRoute)
 _LINE = {"itemSchema": {"$ref": "#/components/schemas/BatchLine"}}

@@ -11,7 +11,7 @@ from fastapi import Request, Response
 from fastapi.routing import APIRoute
 from pydantic import BaseModel
 
-from app.problems import ProblemError
+from app.http.problems import ProblemError
 
 
 class JsonRequest(Request):

@@ -12,15 +12,15 @@ import orjson
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
 
-from app import events
-from app.formats import EVENTS, JSON, negotiated
-from app.measurements import Tell
-from app.problems import ProblemError
+from app.http.formats import EVENTS, JSON, negotiated
+from app.http.problems import ProblemError
 from app.routes import described
 from app.routes.body import JsonRoute
-from app.runs import new_id
 from app.schemas.calibration import CalibrationResponse
-from app.service import TheService
+from app.service import events
+from app.service.measurements import Tell
+from app.service.service import TheService
+from app.store.runs import new_id
 from dlocore import calibration
 from dlocore.calibration import Calibration
 

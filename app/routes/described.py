@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from app.formats import EVENTS, JSON, MSGPACK, NPZ
+from app.http.formats import EVENTS, JSON, MSGPACK, NPZ
 from app.schemas import problem_document
 
 Responses = dict[int | str, dict[str, Any]]

@@ -5,9 +5,9 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 from pydantic import BaseModel, Field
 
-from app.formats import JSON
-from app.gallery import Example, examples
-from app.problems import ProblemError
+from app.http.formats import JSON
+from app.http.problems import ProblemError
+from app.pages.gallery import Example, examples
 from app.routes import described
 from app.schemas import PredictionRequest, problem_document
 

@@ -4,10 +4,10 @@ import anyio.to_thread
 from fastapi import APIRouter, Request
 from fastapi.responses import RedirectResponse, Response
 
-from app.formats import JSON, NPZ, as_npz
+from app.http.formats import JSON, NPZ, as_npz
 from app.routes import described
 from app.routes.predictions import part
-from app.service import TheService
+from app.service.service import TheService
 
 _ANY = "application/octet-stream"
 router = APIRouter(prefix="/v1/predictions/{id}", tags=["predictions"])

@@ -5,10 +5,10 @@ from typing import Literal
 from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, Field
 
-from app import metrics
 from app.routes import described
 from app.schemas import problem_document
-from app.service import TheService
+from app.service import metrics
+from app.service.service import TheService
 
 router = APIRouter(tags=["service"])
 

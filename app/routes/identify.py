@@ -14,14 +14,14 @@ import orjson
 from fastapi import APIRouter, Body, Request
 from fastapi.responses import Response
 
-from app.formats import EVENTS, JSON, negotiated
-from app.identification import document_of_identification
-from app.problems import ProblemError, document_of, problem_of
+from app.http.formats import EVENTS, JSON, negotiated
+from app.http.problems import ProblemError, document_of, problem_of
+from app.http.streamed import Emit, Streamed
+from app.reports.identification import document_of_identification
 from app.routes import described
 from app.routes.body import JsonRoute, calling_when_gone
 from app.schemas.identify import IdentifyRequest, IdentifyResponse
-from app.service import Service
-from app.streamed import Emit, Streamed
+from app.service.service import Service
 from dlocore import Cancelled
 from dlocore.errors import SceneError, within
 from dlocore.recordings import Recording, recording_of

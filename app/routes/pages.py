@@ -8,7 +8,7 @@ from starlette.responses import Response
 from starlette.routing import Match, Mount
 from starlette.types import Scope
 
-from app.assets import static_dir
+from app.pages.assets import static_dir
 
 POLICY = "; ".join(
     [

@@ -14,16 +14,16 @@ from fastapi.responses import Response
 from pydantic import AwareDatetime, BeforeValidator
 from pydantic_core import PydanticCustomError
 
-from app import events
-from app.formats import EVENTS, FORMS, JSON, negotiated, prediction_response
-from app.jobs import Job
-from app.preferences import preferences
-from app.problems import ProblemError
+from app.http.formats import EVENTS, FORMS, JSON, negotiated, prediction_response
+from app.http.preferences import preferences
+from app.http.problems import ProblemError
 from app.routes import described
 from app.routes.body import JsonRoute, calling_when_gone
 from app.schemas import EXAMPLES, PredictionList, PredictionRequest
 from app.schemas.base import LIKE, RunId
-from app.service import Service, TheService
+from app.service import events
+from app.service.jobs import Job
+from app.service.service import Service, TheService
 from dlocore.answer.parts import Status
 
 router = APIRouter(prefix="/v1/predictions", tags=["predictions"], route_class=JsonRoute)

@@ -5,9 +5,9 @@ from fastapi import APIRouter
 from fastapi.responses import FileResponse, RedirectResponse, Response
 from starlette.exceptions import HTTPException
 
+from app.pages.rerun_files import FILES, viewer_files
 from app.recording import layout
-from app.rerun_files import FILES, viewer_files
-from app.service import TheService
+from app.service.service import TheService
 
 router = APIRouter(prefix="/rerun", include_in_schema=False)
 

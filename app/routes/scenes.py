@@ -7,15 +7,15 @@ import orjson
 from fastapi import APIRouter, Body, Request
 from fastapi.responses import Response
 
-from app.fields import BadField
-from app.formats import JSON, negotiated
-from app.problems import bad_scene
+from app.http.fields import BadField
+from app.http.formats import JSON, negotiated
+from app.http.problems import bad_scene
 from app.routes import described
 from app.routes.body import JsonRoute
 from app.schemas import EXAMPLES, PredictionRequest, to_scene
 from app.schemas.check import scene_errors
 from app.schemas.plan import PlanResponse
-from app.service import Service, TheService
+from app.service.service import Service, TheService
 from dlocore import plan
 
 router = APIRouter(tags=["scenes"], route_class=JsonRoute)

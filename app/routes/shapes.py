@@ -8,7 +8,7 @@ import orjson
 from fastapi import APIRouter, Body, Request
 from fastapi.responses import Response
 
-from app.formats import JSON, negotiated
+from app.http.formats import JSON, negotiated
 from app.routes import described
 from app.routes.body import JsonRoute
 from app.schemas.convert import check_columns

@@ -9,17 +9,17 @@ import orjson
 from fastapi import APIRouter, Body, Request
 from fastapi.responses import Response
 
-from app import events
-from app.formats import EVENTS, JSON, negotiated
-from app.measurements import Tell
-from app.problems import ProblemError
+from app.http.formats import EVENTS, JSON, negotiated
+from app.http.problems import ProblemError
 from app.routes import described
 from app.routes.body import JsonRoute
-from app.runs import new_id
 from app.schemas import to_scene
 from app.schemas.study import STUDY_EXAMPLES, StudyList, StudyRequest, StudyResponse
-from app.service import Service, TheService
-from app.studies import StudyStore
+from app.service import events
+from app.service.measurements import Tell
+from app.service.service import Service, TheService
+from app.store.runs import new_id
+from app.store.studies import StudyStore
 from dlocore import Scene
 from dlocore.errors import within
 from dlocore.scene.scene import Switch

@@ -5,7 +5,7 @@ from collections.abc import AsyncIterator
 
 from fastapi import FastAPI
 
-from app.service import Service
+from app.service.service import Service
 from app.viewer.gateway import add_gateway
 from app.viewer.host import SceneHost, hosting
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from app.fields import bad_fields
+from app.http.fields import bad_fields
 from app.schemas import PredictionRequest, to_scene
 from app.schemas.convert import StoredMotion, cable_of, shape_of
 from app.schemas.request import PAPER

@@ -12,7 +12,7 @@ import viser
 from fastapi import FastAPI
 from viser import ClientHandle, _messages
 
-from app.service import Service
+from app.service.service import Service
 from app.viewer.gateway import ADDRESS_HEADER, EXAMPLE_HEADER, KEY_HEADER, Upstream
 from app.viewer.kept import KeptCables
 from app.viewer.quiet import quiet_console

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from app.problems import ProblemError
+from app.http.problems import ProblemError
 from app.schemas.cable import CableModel
 
 LONGEST_NAME = 60

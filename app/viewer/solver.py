@@ -5,7 +5,7 @@ import threading
 from collections.abc import Callable
 
 import dlocore
-from app.service import Service
+from app.service.service import Service
 from app.viewer.draft import Draft
 from dlocore import Prediction, Scene, calibration
 from dlocore.calibration import Measured

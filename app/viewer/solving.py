@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
 
-from app.problems import ProblemError
+from app.http.problems import ProblemError
 from app.viewer.costs import measure_costs
 from app.viewer.draft import Draft
 from dlocore import Cancelled, DloError, Prediction, Quality, Scene, SceneError

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi
 
-from app.problems import ProblemError
+from app.http.problems import ProblemError
 from app.viewer import report
 from app.viewer import tracking_report as say
 from app.viewer.draft import Draft

@@ -21,9 +21,9 @@ import numpy as np
 import pytest
 
 from app.archive import pack
-from app.runs import SUMMARY, RunStore
 from app.schemas import PredictionRequest, to_scene
 from app.settings import Settings
+from app.store.runs import SUMMARY, RunStore
 from dlocore import predict
 from tests.app.conftest import ROOT, paper_scene
 
@@ -38,7 +38,7 @@ MOST_KILLS = 60  # until one comes while a run is being written
 WRITER = """
 import json, os, sys, threading
 from pathlib import Path
-from app.runs import RunStore
+from app.store.runs import RunStore
 from app.schemas import PredictionRequest, to_scene
 from app.settings import Settings
 from dlocore import predict

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from app import jobs
 from app.main import create_app
-from app.service import Service
+from app.service import jobs
+from app.service.service import Service
 from app.settings import Settings
 from tests.app.conftest import SLOW, paper_scene, start
 from tests.app.live import Live, serving

@@ -5,8 +5,8 @@ from typing import Any
 
 from fastapi.testclient import TestClient
 
-from app.recent import Recent
-from app.service import Service
+from app.service.service import Service
+from app.store.recent import Recent
 from dlocore import Prediction, predict
 from tests.app.conftest import paper_scene
 from tests.app.test_bad_requests import the_problem

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from app.formats import EVENTS, JSON, MSGPACK, NPZ, negotiated
-from app.preferences import preferences
-from app.problems import ProblemError
+from app.http.formats import EVENTS, JSON, MSGPACK, NPZ, negotiated
+from app.http.preferences import preferences
+from app.http.problems import ProblemError
 from tests.app.conftest import paper_scene
 from tests.app.test_bad_requests import the_problem
 

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from app.gallery import examples
+from app.pages.gallery import examples
 from tests.app.conftest import ROOT
 
 JSON = {"Content-Type": "application/json"}

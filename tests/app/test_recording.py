@@ -13,7 +13,7 @@ pytest.importorskip("rerun")
 import rerun as rr
 
 from app.archive import Run
-from app.service import Service
+from app.service.service import Service
 from dlocore import effect_forces, energies
 from dlocore.machine import machine_line
 from tests.app.conftest import paper_scene, put

@@ -14,9 +14,9 @@ from fastapi.testclient import TestClient
 from app.archive import Run
 from app.cli import main
 from app.recording import write_recording
-from app.runs import RunStore
 from app.schemas import PredictionRequest, from_prediction, to_scene
 from app.settings import Settings
+from app.store.runs import RunStore
 from dlocore import Prediction, energies, predict
 from tests.app.conftest import paper_scene
 from tests.app.test_recording import rows

@@ -10,11 +10,11 @@ import orjson
 import pytest
 from fastapi.testclient import TestClient
 
-from app import runs
 from app.main import create_app
-from app.runs import RunStore
 from app.schemas import PredictionRequest, to_scene
 from app.settings import Settings
+from app.store import runs
+from app.store.runs import RunStore
 from dlocore import ControlPoints, MaterialMotion, Prediction, predict
 from tests.app.conftest import paper_scene, start
 

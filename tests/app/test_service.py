@@ -18,11 +18,11 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from app.http.problems import ProblemError
 from app.main import create_app
-from app.problems import ProblemError
 from app.schemas import PredictionRequest, to_scene
+from app.service.worker import Worker
 from app.settings import Settings
-from app.worker import Worker
 from tests.app.conftest import ROOT, SLOW, paper_scene, start
 from tests.app.test_bad_requests import the_problem
 

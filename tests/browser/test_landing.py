@@ -8,7 +8,7 @@ import httpx
 import pytest
 from playwright.sync_api import Page, Route, expect
 
-from app.gallery import examples
+from app.pages.gallery import examples
 
 pytestmark = pytest.mark.browser
 DESKTOP, PHONE, NARROW = (1400, 900), (390, 844), (320, 640)

@@ -2,8 +2,8 @@
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector, generate_latest
 
-from app.runs import RunStore
-from app.worker import Worker
+from app.service.worker import Worker
+from app.store.runs import RunStore
 from dlocore import Prediction
 
 MEDIA_TYPE = "text/plain; version=0.0.4; charset=utf-8"

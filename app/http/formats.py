@@ -8,7 +8,7 @@ import orjson
 from fastapi import Response
 
 from app.archive import surface_npz
-from app.problems import ProblemError
+from app.http.problems import ProblemError
 from dlocore import MaterialMotion
 
 JSON = "application/json"

@@ -9,13 +9,13 @@ import anyio.to_thread
 import orjson
 from pydantic import ValidationError
 
-from app.fields import bad_fields
+from app.http.fields import bad_fields
+from app.http.problems import ProblemError, bad_scene, document_of, problem_of
+from app.http.streamed import Emit
 from app.logs import RUN
-from app.problems import ProblemError, bad_scene, document_of, problem_of
-from app.runs import new_id
 from app.schemas import PredictionRequest, to_scene
-from app.service import Service
-from app.streamed import Emit
+from app.service.service import Service
+from app.store.runs import new_id
 from dlocore import Iteration, Scene
 
 _log = logging.getLogger("dlo")

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
-from app.commands import CommandError, read_scene
+from app.commands.commands import CommandError, read_scene
 from dlocore import Scene, SceneError
 from dlocore.scene.scene import EFFECTS, Switch
 

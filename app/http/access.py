@@ -13,7 +13,7 @@ from starlette.datastructures import Headers
 from starlette.responses import RedirectResponse
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from app.problems import ProblemError, problem_response
+from app.http.problems import ProblemError, problem_response
 
 OPEN = frozenset({"/health", "/ready"})
 COOKIE = "dlo-session"

@@ -12,7 +12,7 @@ from fastapi.responses import Response
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
-from app.fields import BadField, bad_fields
+from app.http.fields import BadField, bad_fields
 from app.schemas.request import PredictionRequest
 from dlocore import SceneError
 

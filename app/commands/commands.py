@@ -11,7 +11,7 @@ from typing import Any
 import orjson
 from pydantic import ValidationError
 
-from app.fields import BadField, bad_fields
+from app.http.fields import BadField, bad_fields
 from app.schemas import PredictionRequest, from_prediction, to_scene
 from app.schemas.surroundings import QualityModel
 from app.settings import Settings
@@ -195,7 +195,7 @@ def read_scene(file: str) -> Scene:
 
 
 def _stored(id: str) -> Any:
-    from app.runs import RunStore
+    from app.store.runs import RunStore
 
     return RunStore(_settings()).motion(id)
 

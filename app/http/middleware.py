@@ -7,7 +7,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.problems import ProblemError, problem_response
+from app.http.problems import ProblemError, problem_response
 
 POLICY = "; ".join(
     [

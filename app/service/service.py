@@ -14,17 +14,17 @@ import orjson
 from anyio.abc import TaskGroup
 from fastapi import Depends, Request
 
-from app.jobs import Job, Jobs
+from app.http.problems import ProblemError, problem_of
 from app.logs import RUN
-from app.measurements import Measurement, Measurements, Work
-from app.metrics import Metrics
-from app.problems import ProblemError, problem_of
-from app.recent import Recent
-from app.runs import RunStore
 from app.schemas import PredictionRequest, from_prediction, to_scene
 from app.schemas.response import iteration_document
+from app.service.jobs import Job, Jobs
+from app.service.measurements import Measurement, Measurements, Work
+from app.service.metrics import Metrics
+from app.service.worker import Worker
 from app.settings import Settings
-from app.worker import Worker
+from app.store.recent import Recent
+from app.store.runs import RunStore
 from dlocore import Iteration, MaterialMotion, Prediction, Scene, SceneError, warm_up
 
 _log = logging.getLogger("dlo")

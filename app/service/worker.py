@@ -10,7 +10,7 @@ from threading import Event
 import anyio
 import anyio.to_thread
 
-from app.problems import ProblemError
+from app.http.problems import ProblemError
 from app.settings import Settings
 from dlocore import Cancelled, Iteration, Prediction, Scene, predict
 from dlocore.accuracy.cost import Cost

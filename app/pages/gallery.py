@@ -5,7 +5,7 @@ from functools import cache
 
 import orjson
 
-from app.assets import static_dir
+from app.pages.assets import static_dir
 from app.schemas import PredictionRequest
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import orjson
 
-from app.commands import BAD_INPUT, NOT_CONVERGED, CommandError, write_output
+from app.commands.commands import BAD_INPUT, NOT_CONVERGED, CommandError, write_output
 from dlocore import SceneError
 from dlocore.recordings import Recording, load_recording
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def identify(recordings: list[str], *, names: list[str], output: str, report: str | None, n_u: int) -> int:
     """Identify a cable from recordings, write it as JSON, and a report where one is asked for."""
-    from app.identification import document_of_identification, report_of
+    from app.reports.identification import document_of_identification, report_of
     from dlocore.identify import Resolution
     from dlocore.identify import identify as find
 
@@ -52,7 +52,7 @@ def _show(progress: "Progress") -> None:
 
 def validate(datasets: list[str], *, fit: int, models: list[str], json: str | None, plots: str | None) -> int:
     """Run the published protocols on data sets and print the table."""
-    from app.validation_plots import plots_of
+    from app.reports.validation_plots import plots_of
     from dlocore.identify.datasets import PUBLISHED, PUBLISHED_BY, load_datasets
     from dlocore.identify.validation import each_repeat, validate_cable, validate_wire
     from dlocore.machine import machine_line

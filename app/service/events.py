@@ -6,11 +6,11 @@ import anyio.to_thread
 import orjson
 from fastapi import Header, Response
 
-from app.formats import EVENTS
-from app.jobs import Job
-from app.problems import ProblemError, document_of
-from app.service import Service
-from app.streamed import Emit, Streamed
+from app.http.formats import EVENTS
+from app.http.problems import ProblemError, document_of
+from app.http.streamed import Emit, Streamed
+from app.service.jobs import Job
+from app.service.service import Service
 
 LastEventId = Annotated[
     str | None, Header(description="Number of the last event seen, to go on after it.", examples=["3"])

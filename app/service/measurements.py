@@ -13,8 +13,8 @@ from typing import Any, ClassVar
 
 import anyio
 
-from app.jobs import MAX_FINISHED, Job
-from app.problems import ProblemError, document_of, problem_of
+from app.http.problems import ProblemError, document_of, problem_of
+from app.service.jobs import MAX_FINISHED, Job
 from dlocore import Cancelled
 
 _log = logging.getLogger("dlo")

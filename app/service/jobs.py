@@ -7,9 +7,9 @@ from typing import Any, ClassVar, Literal
 
 import anyio
 
-from app.problems import ProblemError, document_of
-from app.runs import new_id
+from app.http.problems import ProblemError, document_of
 from app.schemas.response import job_links, now
+from app.store.runs import new_id
 from dlocore import MaterialMotion
 
 State = Literal["queued", "running", "done", "failed", "cancelled"]

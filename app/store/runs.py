@@ -15,11 +15,11 @@ from typing import Any
 import orjson
 
 from app.archive import Run, pack, unpack, unpack_motion
-from app.leftovers import claim
 from app.recording import write_recording
 from app.schemas import Motion
 from app.schemas.response import from_prediction
 from app.settings import Settings
+from app.store.leftovers import claim
 from dlocore import Prediction
 
 _ID = re.compile(r"[0-9a-f]{28}")

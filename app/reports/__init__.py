@@ -1,0 +1,1 @@
+"""What an identification and a validation say, as pages and plots."""

@@ -1,0 +1,1 @@
+"""What is kept: runs and studies on disk, the last predictions in memory."""
