@@ -14,7 +14,7 @@ from dlocore.identify.identification import Identification, Progress
 from dlocore.identify.intervals import assess
 from dlocore.identify.parameters import DEFAULT, Parameter, parameters, prepared
 from dlocore.identify.replay import Resolution
-from dlocore.identify.search import Search
+from dlocore.identify.search import Search, robust_deviation
 from dlocore.recordings import Recording
 from dlocore.scene.cable import Cable
 from dlocore.scene.scene import Environment
@@ -22,9 +22,10 @@ from dlocore.scene.scene import Environment
 Floats = NDArray[np.float64]
 
 WINDOW = 5.0  # [s]: longer recordings are replayed in windows of about this length, each from its own start
-_SHORT = 1.0  # [s] of the windows on which a search begins
+_BEGINS = 0.5, 1.5  # [s] of the windows on which a search begins, of a cable of 1 m; it swings once in 2 s
 _MOST_SHORT = 8  # of them
 _COARSE = 13  # control points that they are replayed with at most
+_STIFFNESSES = 0.1, 0.3, 3.0, 10.0  # times the given one, that are tried first
 _BEGINNING = 4  # iterations on them
 
 
@@ -89,15 +90,41 @@ def _begun(
 
     Numbers of the cable alone are sought here: the others need none but a fair guess of these.
     """
-    moving = [r for r in recordings if not r.static]
     scalars = tuple(p for p in chosen if p.name in DEFAULT)
-    short = [w for w in cut(moving, _SHORT) if np.isfinite(cast(Floats, w.markers)[..., 0]).any(axis=0).all()]
-    if not scalars or len(short) <= len(moving):
-        return candidate
-    picked = np.unique(np.linspace(0, len(short) - 1, _MOST_SHORT).round().astype(int))
     coarse = replace(resolution, n_u=min(resolution.n_u, _COARSE))
-    search = Search([short[i] for i in picked], scalars, coarse, cancelled)
-    return search.run(candidate, _BEGINNING, None).candidate
+    moving = [r for r in recordings if not r.static]
+    for seconds in _BEGINS if scalars else ():
+        try:
+            short = [w for r in moving for w in cut([r], seconds * np.sqrt(cast(float, r.length)))]
+            short = [w for w in short if np.isfinite(cast(Floats, w.markers)[..., 0]).any(axis=0).all()]
+            if len(short) > len(moving):
+                picked = np.unique(np.linspace(0, len(short) - 1, _MOST_SHORT).round().astype(int))
+                search = Search([short[i] for i in picked], scalars, coarse, cancelled)
+                candidate = search.run(_stiff(search, candidate), _BEGINNING, None).candidate
+        except SceneError:  # so short ones may have too few samples, or begin where they tell of no start
+            continue
+    return candidate
+
+
+def _stiff(search: Search, candidate: Candidate) -> Candidate:
+    """Return the candidate with the one of several bending stiffnesses that meets the markers best.
+
+    Far from the true one a stiff cable's misfit hardly changes with it, so that no slope leads there.
+    """
+    scalar = next((p for p in search.chosen if p.name == "bending_stiffness"), None)
+    if scalar is None:
+        return candidate
+    given = np.concatenate(search.play(candidate).residuals)
+    best, least = candidate, search.misfit(given, robust_deviation(given))
+    for factor in _STIFFNESSES:
+        other = scalar.put(candidate, factor * scalar.get(candidate))
+        try:
+            misfit = search.misfit(np.concatenate(search.play(other).residuals), robust_deviation(given))
+        except SceneError:
+            continue
+        if misfit < least:
+            best, least = other, misfit
+    return best
 
 
 def cable_of(recordings: Sequence[Recording]) -> Cable:

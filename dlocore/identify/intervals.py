@@ -12,13 +12,17 @@ from dlocore.identify.parameters import Parameter
 from dlocore.identify.replay import Played, Replay
 from dlocore.identify.rest import Rest
 from dlocore.identify.search import Search, State, robust_deviation, weights
+from dlocore.identify.tracks import noise_of_free
 from dlocore.spline import DEGREE
+from dlocore.words import in_mm
 
 Floats = NDArray[np.float64]
 
 _BLOCK = 0.5  # [s] in which residuals hang together
 _SHAKES = 12  # replays with other noise of the held markers and the start
 _UNSEEN = 0.5  # standard deviation of a logarithm, or share of the prior's, from which on a parameter is not identified
+_UNEXPLAINED = 3.0  # times what noise explains: a model that misses markers by more lacks something
+_ASTRAY = 0.01  # of the length, by which noise may move a prediction for intervals to hold
 _SMALL = 0.1  # of the scale of a parameter without a prior
 
 
@@ -44,7 +48,8 @@ def assess(search: Search, state: State, seconds: float) -> Identification:
     spread = sum((np.outer(g, g) for g in blocks), np.zeros_like(data))
     spread *= len(blocks) / max(len(blocks) - len(x), 1)
     clustered = inverse @ spread @ inverse
-    shaken = inverse @ _shaken(search, state, w / deviation**2) @ inverse
+    noise, spread_by_noise = _shaken(search, state, w / deviation**2)
+    shaken = inverse @ noise @ inverse
     plain = np.diag(inverse)
     refined = inverse @ _refined(search, state, w / deviation**2)
     variance = np.maximum(plain, np.diag(clustered)) + np.diag(shaken) + refined**2
@@ -73,7 +78,7 @@ def assess(search: Search, state: State, seconds: float) -> Identification:
         )
         for replay, played in zip(search.replays, state.played, strict=True)
     )
-    message = _message(state.status, state.iterations, estimated, correlations)
+    message = " ".join([_message(state, estimated, correlations), *_doubts(search, deviation, spread_by_noise)])
     return Identification(
         status=state.status,
         message=message,
@@ -103,11 +108,15 @@ def _blocks(search: Search, state: State, pull: Floats) -> list[Floats]:
     return out
 
 
-def _shaken(search: Search, state: State, scale: Floats) -> Floats:
-    """Return the covariance of the gradient of the misfit that noise of the held markers and the start gives."""
+def _shaken(search: Search, state: State, scale: Floats) -> tuple[Floats, float]:
+    """Return what noise of the held markers and the start does.
+
+    That is the covariance of the gradient of the misfit, and the robust deviation of a coordinate of the free markers
+    [m]; infinite for shapes at rest, of which it is not known.
+    """
     size = len(search.chosen)
     total = np.zeros((size, size))
-    at = 0
+    at, moved = 0, list[Floats]()
     for i, (replay, played) in enumerate(zip(search.replays, state.played, strict=True)):
         D = cast(list[Floats], state.derivatives)[i]
         factor = scale[at : at + len(D)]
@@ -121,8 +130,9 @@ def _shaken(search: Search, state: State, scale: Floats) -> Floats:
             other = search.replay(replay.recording, np.random.default_rng([i, seed]))
             change = other.play(state.candidate).predicted - played.predicted
             found.append(D.T @ (factor * change[:, free].ravel()))
+            moved.append(change[:, free].ravel())
         total += np.array(found).T @ np.array(found) / _SHAKES
-    return total
+    return total, robust_deviation(np.concatenate(moved)) if moved else np.inf
 
 
 def _refined(search: Search, state: State, scale: Floats) -> Floats:
@@ -177,9 +187,33 @@ def _estimated(
     )
 
 
-def _message(status: str, iterations: int, estimated: tuple[Estimated, ...], correlations: Floats) -> str:
-    done = "Converged" if status == "converged" else "Stopped without converging"
-    parts = [f"{done} in {iterations} iterations."]
+def _doubts(search: Search, deviation: float, by_noise: float) -> list[str]:
+    """Return in words why intervals may not hold.
+
+    Args:
+        search: that has ended.
+        deviation: robust deviation of the residuals [m].
+        by_noise: by which noise of the held markers and the start moves the prediction [m]; infinite where not known.
+    """
+    length = max(cast(float, window.length) for window in search.windows)
+    if np.isfinite(by_noise) and by_noise > _ASTRAY * length:
+        return [
+            f"Noise of the held markers and the start alone moves the prediction by {in_mm(by_noise)}:",
+            "intervals don't hold for a motion so wild. Record a slower one, or replay shorter windows.",
+        ]
+    explained = float(np.hypot(by_noise, max(noise_of_free(window) for window in search.windows)))
+    if not deviation > _UNEXPLAINED * explained:
+        return []
+    return [
+        f"The markers are missed by {in_mm(deviation)}, {deviation / explained:.2g} times what noise explains:",
+        "the model lacks something, or another cable meets them better. Intervals tell of noise alone.",
+    ]
+
+
+def _message(state: State, estimated: tuple[Estimated, ...], correlations: Floats) -> str:
+    """Return in words how the search ended, and what it does not tell."""
+    done = "Converged" if state.status == "converged" else "Stopped without converging"
+    parts = [f"{done} in {state.iterations} iterations."]
     parts += [e.statement for e in estimated if not e.identifiable]
     n = len(estimated)
     tied = [(i, j) for i in range(n) for j in range(i) if abs(correlations[i, j]) > 0.95]

@@ -196,12 +196,11 @@ class Replay:
             grasps.append(Grasp(u=at, hold=kind, path=way))
         environment = replace(candidate.environment, gravity=recording.gravity)
         fit = start_fit(length, self.resolution.n_u, tuple(held))
-        weight = candidate.cable.linear_density * np.asarray(environment.gravity)
         on = span.inside(self.seen)
         seen = self.seen[on]
         markers = self.start_markers[on] - self._beside_start(candidate, seen, self.start_markers[on])
         q = fit.shape(
-            cast(float, candidate.cable.bending_stiffness), weight, u[seen], markers, np.array(positions), self._guess
+            candidate.cable, cast(Floats, environment.gravity), u[seen], markers, np.array(positions), self._guess
         )
         self._guess = q
         v = None if self.at_rest else fit.velocity(q, u[seen], self.start_speeds[on], np.array(rates))
@@ -219,8 +218,17 @@ class Replay:
         )
 
     def posed(self, candidate: Candidate) -> tuple[Problem, Grid]:
-        """Return the equations of the recorded motion for a candidate, and its grid."""
-        problem = pose(self.scene(candidate))
+        """Return the equations of the recorded motion for a candidate, and its grid.
+
+        Raises:
+            SceneError: no cable with these numbers can begin as the first frames tell.
+        """
+        try:
+            problem = pose(self.scene(candidate))
+        except SceneError as error:
+            given = f"the first frames of {self.recording.name!r}"
+            allowed = "markers that tell how the cable lies, a first guess nearer to it, or more control points"
+            raise SceneError("markers", given, allowed, f"No such cable can begin so ({error})") from None
         return problem, start_grid(problem, self.resolution.n_u, Monitor(None, None, None))
 
     def play(self, candidate: Candidate, like: Played | None = None) -> Played:

@@ -112,8 +112,8 @@ class Rest:
         seen = np.flatnonzero(np.isfinite(self.given[frame, :, 0]))
         seen = seen[span.inside(seen)]
         fit = start_fit(length, self.resolution.n_u, tuple(held))
-        weight = cable.linear_density * np.asarray(environment.gravity)
-        q = fit.shape(cast(float, cable.bending_stiffness), weight, u[seen], self.given[frame, seen], np.array(targets))
+        gravity = cast(Floats, environment.gravity)
+        q = fit.shape(cable, gravity, u[seen], self.given[frame, seen], np.array(targets))
         shape = ControlPoints(control_points=q, knots=fit.grid.knots)
         if candidate.twist:
             shape = with_sections(shape, candidate.rest_curvature, candidate.turn, frames)

@@ -70,6 +70,7 @@ class Search:
         """Return the best candidate found from the given one, and its derivatives."""
         state = self.play(candidate)
         damping, status, done = 1e-3, cast(Status, "max_iterations"), 0
+        even = np.array([not p.logarithmic for p in self.chosen])
         for done in range(1, iterations + 1):
             r = np.concatenate(state.residuals)
             deviation = robust_deviation(r)
@@ -86,7 +87,8 @@ class Search:
                 matrix = H[np.ix_(free, free)]
                 step[free] = -np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), g[free])
                 hoped = hoped or -0.5 * float(g[free] @ step[free])
-                trial = self._bounded(x + np.clip(step, -_MOST_CHANGE, _MOST_CHANGE))
+                most = _MOST_CHANGE * np.maximum(1.0, np.abs(x) * even)
+                trial = self._bounded(x + np.clip(step, -most, most))
                 candidate = self.candidate(state.candidate, trial)
                 try:
                     tried = self.play(candidate)
@@ -221,9 +223,12 @@ class Search:
 
     def cost(self, r: Floats, deviation: float, x: Floats) -> float:
         """Return the robust cost of residuals and prior."""
-        knee = _KNEE * deviation
-        misfit = float((np.sqrt(1.0 + (r / knee) ** 2) - 1.0).sum()) * _KNEE**2
-        return misfit + 0.5 * float(x @ self._pull(x))
+        return self.misfit(r, deviation) + 0.5 * float(x @ self._pull(x))
+
+    @staticmethod
+    def misfit(r: Floats, deviation: float) -> float:
+        """Return the robust cost of residuals."""
+        return float((np.sqrt(1.0 + (r / (_KNEE * deviation)) ** 2) - 1.0).sum()) * _KNEE**2
 
     def _distance(self, state: State) -> float:
         found = [np.linalg.norm(r.reshape(-1, 3), axis=1) for r in state.residuals]

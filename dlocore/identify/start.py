@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +20,14 @@ from dlocore.spline import design_matrix, greville
 Floats = NDArray[np.float64]
 
 _AXES = (0, 1, 2)
-_AXIAL = 50.0  # [N]: of the relaxation, enough to keep the length within the markers' noise
-_SPRING = 50.0  # [N/m]: of a marker; a cable of 1e-3 N m^2 gives way by 1 mm per 2 mm of noise over 0.1 m
-_EVEN = 1e-5  # [m^4] of the smoothing of the velocity, against markers 0.1 m apart
-_KEPT_LENGTH = 10.0  # weight of the stretch rate beside a marker's velocity
-_TOLERANCE = 1e-8  # [m]
+# What follows is relative, so that a cable of another size and density starts alike. Of the relaxation:
+_AXIAL = 100.0  # stiffness in weights of the cable: it keeps the length within the markers' noise
+_SPRING = 100.0  # of a marker, in weights of a length; a metre of 50 g and 1e-3 N m^2 gives way by half over 0.1 m
+# and of the velocity:
+_EVEN = 1e-5  # of L^3: its smoothing, against markers a tenth of the length apart
+_KEPT_LENGTH = 10.0  # lengths: weight of the stretch rate beside a marker's velocity
+_TOLERANCE = 1e-8  # of the length
+_ON_EARTH = 9.81  # [m/s^2], also where nothing weighs
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,13 +76,13 @@ class StartFit:
         return HeldRows.of(self.grid.knots, self.held)
 
     def shape(
-        self, bending: float, weight: Floats, u: Floats, markers: Floats, targets: Floats, guess: Floats | None = None
+        self, cable: Cable, gravity: Floats, u: Floats, markers: Floats, targets: Floats, guess: Floats | None = None
     ) -> Floats:
         """Return control points (n, 3) [m].
 
         Args:
-            bending: EI [N m^2].
-            weight: per length (3,) [N/m].
+            cable: with its EI and density.
+            gravity: (3,) [m/s^2].
             u: markers' coordinates (m,) [m].
             markers: (m, 3) [m], all seen.
             targets: positions [m] and unit directions (held, 3).
@@ -90,12 +94,14 @@ class StartFit:
         active = np.zeros(laws.COUNT, np.int64)
         active[[laws.STRETCH, laws.BEND]] = 1
         p = np.zeros((laws.COUNT, laws.PARAMETERS))
-        p[laws.STRETCH, 0], p[laws.BEND, 0] = _AXIAL, bending
+        density, bending = cable.linear_density, cast(float, cable.bending_stiffness)
+        length, stiffness = float(knots[-1]), _SPRING * _ON_EARTH * density
+        p[laws.STRETCH, 0], p[laws.BEND, 0] = _AXIAL * _ON_EARTH * density * length, bending
         # a motion in a plane, too, starts from a shape that is found in space
         history = self.grid.past()._replace(room=np.zeros(room_for(len(_AXES), len(tables.curvature_w))))
         B = design_matrix(knots, u)
-        load = np.asarray(tables.weight)[:, None] * weight
-        springs = _SPRING * np.kron(rows.free.T @ (B.T @ B) @ rows.free, np.eye(3))
+        load = np.asarray(tables.weight)[:, None] * (density * gravity)
+        springs = stiffness * np.kron(rows.free.T @ (B.T @ B) @ rows.free, np.eye(3))
         Z = np.kron(rows.free, np.eye(3))
         if guess is None:
             middle = greville(knots)
@@ -106,23 +112,23 @@ class StartFit:
         def energy(q: Floats) -> float:
             away = B @ q - markers
             stored = float(stored_energy(_AXES, q, tables, active, p, history))
-            return stored - float((load * q).sum()) + 0.5 * _SPRING * float((away * away).sum())
+            return stored - float((load * q).sum()) + 0.5 * stiffness * float((away * away).sum())
 
         K, f, still = np.empty((3 * n, 12)), np.empty((n, 3)), np.zeros((n, 3))
-        before = energy(q)
+        before, rounding = energy(q), 1e-15 * stiffness * length**2
         for _ in range(60):
             scales = (1.0, 0.0, 0.0)  # the positive part: from a guess along noisy markers the full one need not be
             assemble(_AXES, q, still, tables, active, p, history, NO_RATES, scales, f, K)
-            force = (Z.T @ (f - load + _SPRING * B.T @ (B @ q - markers)).ravel()).astype(float)
+            force = (Z.T @ (f - load + stiffness * B.T @ (B @ q - markers)).ravel()).astype(float)
             step = -np.linalg.solve(Z.T @ dense_of(K) @ Z + springs, force)
-            slope, length = float(force @ step), 1.0
+            slope, share = float(force @ step), 1.0
             change = (Z @ step).reshape(n, 3)
             after = energy(q + change)
-            while not after <= before + 1e-4 * length * slope + 1e-15 and length > 1e-4:
-                length *= 0.5
-                after = energy(q + length * change)
-            q, before = q + length * change, after
-            if np.abs(change).max() < _TOLERANCE:
+            while not after <= before + 1e-4 * share * slope + rounding and share > 1e-4:
+                share *= 0.5
+                after = energy(q + share * change)
+            q, before = q + share * change, after
+            if np.abs(change).max() < _TOLERANCE * length:
                 break
         return np.ascontiguousarray(q)
 
@@ -135,15 +141,15 @@ class StartFit:
             speeds: their velocities (m, 3) [m/s].
             targets: velocities of what is held (held, 3).
         """
-        tables, n = self.grid.tables, len(q)
+        tables, n, length = self.grid.tables, len(q), float(self.grid.knots[-1])
         rows = self.rows
         B = design_matrix(self.grid.knots, u)
         first = _matrix(tables.axial_first, tables.axial_b1, n)
         tangent = first @ q
         tangent /= np.linalg.norm(tangent, axis=1)[:, None]
         second = _matrix(tables.curvature_first, tables.curvature_b2, n)
-        second *= np.sqrt(_EVEN * np.asarray(tables.curvature_w))[:, None]
-        stretch = (_KEPT_LENGTH * first[:, :, None] * tangent[:, None, :]).reshape(len(first), -1)
+        second *= np.sqrt(_EVEN * length**3 * np.asarray(tables.curvature_w))[:, None]
+        stretch = (_KEPT_LENGTH * length * first[:, :, None] * tangent[:, None, :]).reshape(len(first), -1)
         J = np.vstack([np.kron(B, np.eye(3)), stretch, np.kron(second, np.eye(3))])
         known = rows.offset @ targets
         y = np.concatenate([speeds.ravel(), np.zeros(len(J) - speeds.size)]) - J @ known.ravel()

@@ -41,6 +41,21 @@ def held_paths(recording: Recording, shake: np.random.Generator | None) -> dict[
     return out
 
 
+def noise_of(x: Floats) -> float:
+    """Return the standard deviation of the noise of samples x (k, 3) [m] in a row, or more; infinite of three.
+
+    Third differences tell it, to which a path that is well sampled adds little.
+    """
+    return 1.4826 * float(np.median(np.abs(np.diff(x, n=3, axis=0)))) / np.sqrt(20.0) if len(x) > 3 else np.inf
+
+
+def noise_of_free(recording: Recording) -> float:
+    """Return the standard deviation of the noise of the markers that nothing holds [m], the median over them."""
+    markers = cast(Floats, recording.markers)[:, recording.free]
+    found = [noise_of(x[np.isfinite(x[:, 0])]) for x in markers.swapaxes(0, 1)]
+    return float(np.median(found)) if found else np.inf
+
+
 def _without_outliers(t: Floats, x: Floats) -> tuple[Floats, Floats]:
     """Return the samples without those that leave the cubic through their four neighbours, the worst ones first."""
     for _ in range(_PASSES):
@@ -83,8 +98,7 @@ def _smoothed(t: Floats, x: Floats, times: Floats) -> CubicSpline:
     """
     keep = np.ones(len(t), dtype=bool)
     middle = x.mean(axis=0)
-    # third differences, to which a path that is well sampled adds little, bound the noise: else it could be all noise
-    most = _MOST * 1.4826 * float(np.median(np.abs(np.diff(x, n=3, axis=0)))) / np.sqrt(20.0) if len(t) > 3 else np.inf
+    most = _MOST * noise_of(x)  # else the path could be all noise
     for _ in range(_PASSES):
         if keep.sum() < _LEAST:
             raise SceneError("markers", f"{keep.sum()} samples of a held marker", "at least 8 that are no outliers")

@@ -7,7 +7,18 @@ import numpy as np
 import pytest
 
 from benchmarks.simulated_recordings import CABLE, DRAG, Tracking, simulated, true_cable
-from dlocore import Cancelled, Environment, SceneError
+from dlocore import (
+    Cable,
+    Cancelled,
+    Environment,
+    Grasp,
+    Points,
+    Quality,
+    Scene,
+    SceneError,
+    Waypoints,
+    predict,
+)
 from dlocore.identify import Candidate, Replay, Resolution, identify
 from dlocore.identify.datasets import load_datasets
 from dlocore.recordings import Recording
@@ -122,3 +133,77 @@ def test_the_outer_marker_of_a_clamp_stays_on_its_gripper() -> None:
     away = predicted - np.asarray(recording.markers)[FINE.start_frames :]
     # however the cable leaves the clamp; a path of 100 Hz is smoothed by far less
     assert np.abs(away[:, [0, 1, -2, -1]]).max() < 2e-4
+
+
+def swung(length: float, density: float, relative: float, *, noise: float, begin: float = 0.0) -> Recording:
+    """Return a recording of a cable that hangs from a gripper which swings, from a time on, in units of its own.
+
+    `relative` is EI / (density g L^3), the drag is a quarter of the density a period.
+    """
+    period = np.sqrt(length)
+    cable = Cable(
+        length=length,
+        diameter=0.005 * length,
+        linear_density=density,
+        bending_stiffness=relative * density * 9.81 * length**3,
+        axial_stiffness=500.0 * density * 9.81 * length,
+    )
+    t = np.linspace(0.0, 4.0 * period, 161)
+    ramp = 1.0 - np.exp(-((t / (0.4 * period)) ** 3))
+    way = 0.12 * length * ramp[:, None] * np.sin(t[:, None] / period * [2.6, 3.3, 1.7])
+    u = np.linspace(0.0, 1.0, 41)
+    shape = length * np.column_stack([0.15 * np.sin(2.0 * u), 0.0 * u, -u])
+    shape *= length / np.linalg.norm(np.diff(shape, axis=0), axis=1).sum()
+    scene = Scene(
+        cable=cable,
+        shape=Points(points=shape, settle=True),
+        grasps=[Grasp(u=0.0, path=Waypoints(times=t, positions=shape[0] + way))],
+        environment=Environment(drag=0.25 * density / period),
+        horizon=4.0 * period,
+        quality=Quality(target_error=1e-3 * length),
+        effects={"twist": "off", "inertia": "on"},
+    )
+    times = np.arange(begin, 4.0, 1.0 / 60.0) * period
+    x = predict(scene).surface.positions(np.linspace(0.0, length, 9), times)
+    x = x + noise * length * np.random.default_rng(1).standard_normal(x.shape)
+    return Recording(times=times, markers=x, held=(0,), u=np.linspace(0.0, length, 9), length=length,
+                     diameter=cable.diameter, linear_density=density)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("length", "density", "relative"), [(0.25, 0.01, 0.1), (1.0, 0.05, 1e-2), (2.2, 0.3, 0.14), (4.0, 0.3, 0.1)]
+)
+def test_a_cable_of_any_size_and_density_is_found_alike(length: float, density: float, relative: float) -> None:
+    true = relative * density * 9.81 * length**3
+    guess = Cable(
+        length=length, diameter=0.005 * length, linear_density=density, bending_stiffness=5.0 * true,
+        axial_stiffness=500.0 * density * 9.81 * length, bending_damping=1e-3 * true,
+    )  # fmt: skip
+    drag = 0.25 * density / np.sqrt(length)
+    # it begins amid the motion, so that its start has to be found from the markers
+    recording = swung(length, density, relative, noise=5e-4, begin=1.0)
+    found = identify([recording], guess, Environment(drag=0.3 * drag), names=("bending_stiffness", "drag"))
+    assert found.status == "converged"
+    stiffness, air = found.parameters
+    assert stiffness.value == pytest.approx(true, rel=0.05)
+    assert air.value == pytest.approx(drag, rel=0.05)
+    assert "missed" not in found.message
+
+
+def test_a_model_that_misses_the_markers_says_so() -> None:
+    recording = swung(1.0, 0.05, 1e-2, noise=5e-4)
+    wrong = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=5e-2, axial_stiffness=250.0)
+    found = identify([recording], wrong, Environment(drag=0.0125), names=("drag",))  # EI, which is wrong, is not sought
+    assert "The markers are missed by" in found.message
+    assert "times what noise explains" in found.message
+
+
+def test_a_start_that_no_cable_has_is_told_of_the_recording() -> None:
+    recording = swung(1.0, 0.05, 1e-2, noise=5e-4)
+    markers = np.array(recording.markers)
+    markers[:, 1:] = markers[:, :1] + 3.0 * (markers[:, 1:] - markers[:, :1])  # in feet, say
+    guess = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=5e-3)
+    with pytest.raises(SceneError, match=r"^markers: got the first frames of"):
+        Replay(replace(recording, markers=markers), Resolution()).play(
+            Candidate(cable=guess, environment=Environment())
+        )
