@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 _AXES = (0, 1, 2)
 # What follows is relative, so that a cable of another size and density starts alike. Of the relaxation:
-_AXIAL = 100.0  # stiffness in weights of the cable: it keeps the length within the markers' noise
+_AXIAL = 100.0, 1e3  # stiffness in weights of the cable, and in EI/L^2: it keeps the length within the markers' noise
 _SPRING = 100.0  # of a marker, in weights of a length; a metre of 50 g and 1e-3 N m^2 gives way by half over 0.1 m
 # and of the velocity:
 _EVEN = 1e-5  # of L^3: its smoothing, against markers a tenth of the length apart
@@ -96,7 +96,8 @@ class StartFit:
         p = np.zeros((laws.COUNT, laws.PARAMETERS))
         density, bending = cable.linear_density, cast(float, cable.bending_stiffness)
         length, stiffness = float(knots[-1]), _SPRING * _ON_EARTH * density
-        p[laws.STRETCH, 0], p[laws.BEND, 0] = _AXIAL * _ON_EARTH * density * length, bending
+        p[laws.STRETCH, 0] = max(_AXIAL[0] * _ON_EARTH * density * length, _AXIAL[1] * bending / length**2)
+        p[laws.BEND, 0] = bending
         # a motion in a plane, too, starts from a shape that is found in space
         history = self.grid.past()._replace(room=np.zeros(room_for(len(_AXES), len(tables.curvature_w))))
         B = design_matrix(knots, u)
