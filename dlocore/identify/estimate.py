@@ -117,10 +117,10 @@ def _stiff(search: Search, candidate: Candidate) -> Candidate:
     given = np.concatenate(search.play(candidate).residuals)
     best, least = candidate, search.misfit(given, robust_deviation(given))
     for factor in _STIFFNESSES:
-        other = scalar.put(candidate, factor * scalar.get(candidate))
         try:
+            other = scalar.put(candidate, factor * scalar.get(candidate))
             misfit = search.misfit(np.concatenate(search.play(other).residuals), robust_deviation(given))
-        except SceneError:
+        except SceneError:  # no such cable, or none that begins so
             continue
         if misfit < least:
             best, least = other, misfit

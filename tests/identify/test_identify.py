@@ -135,10 +135,12 @@ def test_the_outer_marker_of_a_clamp_stays_on_its_gripper() -> None:
     assert np.abs(away[:, [0, 1, -2, -1]]).max() < 2e-4
 
 
-def swung(length: float, density: float, relative: float, *, noise: float, begin: float = 0.0) -> Recording:
+def swung(
+    length: float, density: float, relative: float, *, noise: float, begin: float = 0.0, far: float = 0.12
+) -> Recording:
     """Return a recording of a cable that hangs from a gripper which swings, from a time on, in units of its own.
 
-    `relative` is EI / (density g L^3), the drag is a quarter of the density a period.
+    `relative` is EI / (density g L^3), the drag a quarter of the density a period; it swings `far` lengths.
     """
     period = np.sqrt(length)
     cable = Cable(
@@ -150,7 +152,7 @@ def swung(length: float, density: float, relative: float, *, noise: float, begin
     )
     t = np.linspace(0.0, 4.0 * period, 161)
     ramp = 1.0 - np.exp(-((t / (0.4 * period)) ** 3))
-    way = 0.12 * length * ramp[:, None] * np.sin(t[:, None] / period * [2.6, 3.3, 1.7])
+    way = far * length * ramp[:, None] * np.sin(t[:, None] / period * [2.6, 3.3, 1.7])
     u = np.linspace(0.0, 1.0, 41)
     shape = length * np.column_stack([0.15 * np.sin(2.0 * u), 0.0 * u, -u])
     shape *= length / np.linalg.norm(np.diff(shape, axis=0), axis=1).sum()
@@ -207,3 +209,13 @@ def test_a_start_that_no_cable_has_is_told_of_the_recording() -> None:
         Replay(replace(recording, markers=markers), Resolution()).play(
             Candidate(cable=guess, environment=Environment())
         )
+
+
+def test_a_motion_that_noise_alone_leads_astray_is_told_of() -> None:
+    recording = swung(1.0, 0.05, 1e-4, noise=4e-3, far=0.6)  # a limp cable that whips
+    guess = Cable(
+        length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=5e-5, axial_stiffness=250.0
+    )  # fmt: skip
+    found = identify([recording], guess, Environment(drag=0.0125), names=("drag",))
+    assert "Noise of the held markers and the start alone moves the prediction by" in found.message
+    assert "times what noise explains" not in found.message
