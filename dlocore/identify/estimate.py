@@ -115,11 +115,12 @@ def _stiff(search: Search, candidate: Candidate) -> Candidate:
     if scalar is None:
         return candidate
     given = np.concatenate(search.play(candidate).residuals)
-    best, least = candidate, search.misfit(given, robust_deviation(given))
+    deviation = robust_deviation(given)
+    best, least = candidate, search.misfit(given, deviation)
     for factor in _STIFFNESSES:
         try:
             other = scalar.put(candidate, factor * scalar.get(candidate))
-            misfit = search.misfit(np.concatenate(search.play(other).residuals), robust_deviation(given))
+            misfit = search.misfit(np.concatenate(search.play(other).residuals), deviation)
         except SceneError:  # no such cable, or none that begins so
             continue
         if misfit < least:
