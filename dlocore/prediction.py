@@ -39,8 +39,9 @@ class Prediction:
         surface: the bivariate spline q(u, t).
         grasps: reaction of each grasp, in the scene's order.
         effects: what was simulated and why.
-        message: what is said, and what effects that the scene switches off would have done.
-        start_energy: elastic energy stored in the start shape [J]. These four are functions of the rest, evaluated
+        notes: what is to be known beside the status, such as what effects that the scene switches off would have done.
+        message: what is said, and the notes.
+        start_energy: elastic energy stored in the start shape [J]. These five are functions of the rest, evaluated
             when they are first read.
         iterations: how the solve went.
         accuracy: method, estimated error, time.
@@ -66,9 +67,14 @@ class Prediction:
     judged: "Prediction | None" = field(default=None, repr=False)
 
     @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """What is to be known beside the status: strains, instabilities, what effects that are off would have done."""
+        return tuple(self.find_objections())
+
+    @cached_property
     def message(self) -> str:
-        """The status in words, what to do about it, and what effects that the scene switches off would have done."""
-        return with_notes(self.said, self.find_objections())
+        """The status in words, what to do about it, and the notes."""
+        return with_notes(self.said, self.notes)
 
     @cached_property
     def grasps(self) -> tuple[GraspReaction, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 from app.viewer import plots
 from app.viewer.palette import ColourScale, css_ramp
 from dlocore import EffectReport, Prediction
+from dlocore.accuracy.fallback import errs
 from dlocore.calibration import Measured, front_of
 from dlocore.words import in_mm
 
@@ -41,9 +42,19 @@ def millimetres(metres: float | None) -> str:
 
 
 def status_card(prediction: Prediction, *, preview: bool) -> str:
-    """Return the state of the last solve: status, time and error large, the rest small."""
+    """Return the state of the last solve: status, time and error large, the rest small.
+
+    What is to be known of an answer is said here, where nobody overlooks it: all of the message where it is no success
+    or errs by much, else the notes on it.
+    """
     accuracy = prediction.accuracy
-    ground = _GOOD if preview or prediction.status == "converged" else _DOUBT
+    if preview:
+        told: tuple[str, ...] = ()
+    elif prediction.status != "converged" or errs(prediction):
+        told = (prediction.message,)
+    else:
+        told = tuple(f"Note: {note}." for note in prediction.notes)
+    ground = _DOUBT if told else _GOOD
     state = "Preview" if preview else _WORDS[prediction.status]
     numbers = [
         (state, "status"),
@@ -62,7 +73,7 @@ def status_card(prediction: Prediction, *, preview: bool) -> str:
     }
     if not preview and len(parts) > 1:
         detail += "; error by " + ", ".join(f"{name} {millimetres(size)}" for name, size in parts.items())
-    advice = "" if preview or prediction.status == "converged" else f"<div>{escape(prediction.message)}</div>"
+    advice = "".join(f'<div style="margin-top: 0.3rem;">{escape(text)}</div>' for text in told)
     return (
         f'<div style="{_CARD} background: {ground};" data-status="{escape(prediction.status)}">'
         f'<div style="display: flex; justify-content: space-between; gap: 0.6rem;">{cells}</div>{advice}'

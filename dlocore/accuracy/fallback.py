@@ -7,6 +7,7 @@ does not come to its end, is left for finer ones.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import cast
 
 from dlocore.accuracy.refinement import AUTO_ENOUGH
 from dlocore.errors import SceneError
@@ -20,6 +21,7 @@ _MORE_IN_TIME = 2  # times the control points in time of a least squares
 # control points in time times the cube of the coordinates of those along the cable, of a least squares that is solved
 # once more: some twenty seconds
 _MOST_WORK = 2e9
+_NEARER = 0.5  # times the estimated error of a given grid: finer ones that err by less are the answer, converged or not
 
 
 def falls_short(found: Prediction) -> bool:
@@ -99,7 +101,7 @@ def _end(found: Prediction | SceneError) -> str:
 
 
 def with_finer(found: Prediction, finer: Prediction | SceneError, spent: float, monitor: Monitor) -> Prediction:
-    """Return the answer of finer grids where it is a success, else that of the given one, and say what was done.
+    """Return the answer of finer grids where it is a success, or far nearer, else the given one's; say what was done.
 
     Args:
         found: on the given grid.
@@ -109,7 +111,7 @@ def with_finer(found: Prediction, finer: Prediction | SceneError, spent: float, 
     """
     quality, more = found.scene.quality, monitor.elapsed() - spent
     off = f"by an estimated {in_mm(found.accuracy.error_estimate or 0.0)}" if errs(found) else ""
-    if isinstance(finer, Prediction) and finer.status == "converged":
+    if isinstance(finer, Prediction) and (finer.status == "converged" or _is_nearer(finer, found)):
         accuracy = finer.accuracy
         error = accuracy.error_estimate
         known = "an error that is not known" if error is None else f"an estimated error of {in_mm(error)}"
@@ -129,3 +131,13 @@ def with_finer(found: Prediction, finer: Prediction | SceneError, spent: float, 
         iterations=tuple(monitor.iterations),
         accuracy=replace(found.accuracy, wall_time=monitor.elapsed(), phases=dict(monitor.phases)),
     )
+
+
+def _is_nearer(finer: Prediction, found: Prediction) -> bool:
+    """Tell whether finer grids, though they don't converge, err by so much less than a given one that they are better.
+
+    Where that stalled it says what is wrong with the scene.
+    """
+    error, given = finer.accuracy.error_estimate, found.accuracy.error_estimate
+    known = error is not None and given is not None and found.status != "stalled"
+    return known and cast(float, error) < _NEARER * cast(float, given)

@@ -1,6 +1,6 @@
 """The parts of an answer, and of what a solve reports while it runs."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 Status = Literal["converged", "max_iterations", "stalled", "time_limit"]
 
 
-def with_notes(said: str, notes: list[str]) -> str:
+def with_notes(said: str, notes: Sequence[str]) -> str:
     """Return what was said of an answer and the notes on it, each in words, as one message."""
     return " ".join([said, *[f"Note: {note}." for note in notes]])
 

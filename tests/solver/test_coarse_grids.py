@@ -7,7 +7,19 @@ import numpy as np
 import pytest
 
 from benchmarks.hard.generator import draw
-from dlocore import Grasp, Iteration, Move, Prediction, Quality, Scene, SceneError, predict
+from dlocore import (
+    Cable,
+    Environment,
+    Grasp,
+    Iteration,
+    Move,
+    Prediction,
+    Quality,
+    Scene,
+    SceneError,
+    Straight,
+    predict,
+)
 from dlocore.accuracy.fallback import falls_short
 from dlocore.accuracy.refinement import AUTO_ENOUGH
 from tests.solver.scenes import paper_scene
@@ -144,3 +156,31 @@ def test_a_deadline_leaves_the_given_grid(own: Prediction):
     np.testing.assert_array_equal(found.surface.control_points, own.surface.control_points)
     assert found.accuracy.error_estimate == own.accuracy.error_estimate
     assert "and do not converge: The time limit passed" in found.message
+
+
+def test_finer_grids_that_run_out_of_time_are_the_answer_where_they_are_far_nearer():
+    # a limp cable that swings from a clamp, undamped
+    swinging = Scene(
+        cable=Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=3e-4),
+        shape=Straight(settle=True),
+        grasps=(Grasp(u=0.93, hold="clamp", path=Move(displacement=(-0.874, -0.071, 0.0), duration=2.0)),),
+        environment=Environment(gravity=(0.0, 0.0, -9.81)),
+        effects={"self_contact": "off"},
+        horizon=8.0,
+        quality=GRID,
+    )
+    own = predict(swinging, keep_grid=True)
+    seen: list[Iteration] = []
+
+    def late(step: Iteration) -> None:
+        seen.append(step)
+        if step.n_u == 28:  # finer ones would meet their target
+            time.sleep(6.0)
+
+    found = predict(swinging, deadline=6.0, on_iteration=late)
+    assert (own.status, size(own)) == ("max_iterations", (9, 13))
+    assert found.status == "time_limit"
+    assert own.accuracy.error_estimate > 2.0 * found.accuracy.error_estimate > 2.0 * AUTO_ENOUGH
+    assert size(found) == (seen[-1].n_u, seen[-1].n_t)
+    assert "The 9 x 13 control points that were asked for could not show the motion" in found.message
+    assert found.message.startswith("The time limit passed; the estimated error is")

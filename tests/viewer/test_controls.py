@@ -211,3 +211,20 @@ def test_the_target_can_be_dragged_in_height_and_turned(service):
         assert path["displacement"] == pytest.approx([0.05, 0.3, 0.1], abs=1e-6)
         assert path["rotation"] == pytest.approx([0.0, 0.0, np.pi / 6], abs=1e-6)
         client.wait_for(lambda: client.final_shape[:, 2].max() > 0.09)
+
+
+def test_the_card_tells_what_is_to_be_known_of_a_converged_answer(service):
+    with connected(service) as client:
+        client.refined()
+        assert "Note:" not in client.card
+        client.set("inertia", "off")
+        client.wait_for(lambda: "Note: inertia is off, though" in client.card)
+        assert 'data-status="converged"' in client.card
+        client.set("inertia", "auto")
+        client.wait_for(lambda: "Preview" not in client.card and "Note:" not in client.card)
+        # on the grid that was asked for it errs by a few centimetres, which is all that is said where that is kept
+        client.set("EI [10⁻³ N m²]", 0.1)
+        client.set("Keep this grid", True)
+        client.set("Grasp u [m]", 0.8)
+        client.wait_for(lambda: "The update fell below delta" in client.card)
+        assert 'data-status="converged"' in client.card
