@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 from dlocore.answer.parts import Status
 from dlocore.levels.driven import driven, words
@@ -104,6 +104,9 @@ def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
     if not motion.stopped and motion.largest_strain > TORN:
         strain = f"The motion strains the cable along itself by {motion.largest_strain:.0%}, which no cable follows."
         advice = "Bring the grasps no farther apart than the cable between them, or make the motion slower."
+        if len(problem.scene.grasps) < 2:  # what it carries and is slowed by pulls it
+            stiffness = cast(float, problem.scene.cable.axial_stiffness)
+            advice = f"Its axial stiffness is {stiffness:.3g} N: give it more, or less mass, weight, drag or speed."
         return "stalled", f"{strain} {advice}"
     if is_folded(level):
         least, most = motion.slopes
