@@ -149,8 +149,9 @@ def objections(level: Level) -> list[str]:
     for name in _forces(problem) if off else ():
         if name in off:
             moved = _response(level, name)
-            if moved > allowed:
-                found.append(f"{name} is off, though it would move the cable by about {in_mm(moved)}")
+            if moved > allowed:  # beyond its length the linear response tells no distance
+                far = "its length or more" if moved > problem.scene.cable.length else f"about {in_mm(moved)}"
+                found.append(f"{name} is off, though it would move the cable by {far}")
     return found
 
 

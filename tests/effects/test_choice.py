@@ -181,6 +181,11 @@ def test_what_is_off_and_does_not_matter_is_not_mentioned():
     assert "off" not in predict(still).message
 
 
+def test_what_would_move_the_cable_beyond_its_length_is_told_without_a_distance():
+    free = Scene(cable=cable(), shape=Straight(), horizon=2.0, effects={"gravity": "off"})  # it would fall 20 m
+    assert "gravity is off, though it would move the cable by its length or more" in predict(free).notes
+
+
 def test_a_slow_motion_that_has_no_equilibrium_to_go_on_to_is_solved_with_inertia():
     # held at two points it stands on its head at first, and is to turn over: it was stalled at 0 s
     scene = replace(draw(12, 41).make(), quality=Quality(n_u=9, n_t=109, method="march", estimate=False))
