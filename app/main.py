@@ -2,7 +2,6 @@
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from importlib.metadata import PackageNotFoundError, version
 
 from fastapi import FastAPI
 from fastapi.middleware.cors import CORSMiddleware
@@ -29,6 +28,7 @@ from app.routes import (
 )
 from app.service.service import Service
 from app.settings import Settings
+from dlocore.machine import program_version
 
 _ABOUT = """Predict how a cable moves when grippers move it: post a scene, get the whole motion as one bivariate spline.
 
@@ -51,7 +51,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         async with viewer.running(app, service), service.running():
             yield
 
-    app = FastAPIOffline(title="dlo", version=_version(), description=_ABOUT, lifespan=lifespan, redoc_url=None)
+    app = FastAPIOffline(title="dlo", version=program_version(), description=_ABOUT, lifespan=lifespan, redoc_url=None)
     app.state.settings = settings
     problems.install(app)
     openapi.install(app)
@@ -86,13 +86,6 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     viewer.add_routes(app)
     pages.add_pages(app)
     return app
-
-
-def _version() -> str:
-    try:
-        return version("dlo")
-    except PackageNotFoundError:  # run from a checkout
-        return "0"
 
 
 app = create_app()

@@ -15,7 +15,9 @@ class Settings(BaseSettings):
 
     model_config = SettingsConfigDict(env_prefix="DLO_", frozen=True, extra="ignore")
 
-    host: str = Field(default="127.0.0.1", description="Address to listen on; loopback unless you say otherwise.")
+    host: str = Field(
+        default="127.0.0.1", min_length=1, description="Address to listen on; loopback unless you say otherwise."
+    )
     port: int = Field(default=8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one.")
     data_dir: Path = Field(default_factory=user_data_dir, description="Directory of the stored runs.")
     max_body_bytes: int = Field(default=10_000_000, ge=1_000, description="Largest request body [bytes].")

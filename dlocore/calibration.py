@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from dlocore.accuracy.cost import Cost, Rates, pareto_front
+from dlocore.files import write_whole
 from dlocore.machine import machine, user_data_dir
 
 FORMAT = 1
@@ -84,9 +85,7 @@ class Calibration:
         """Write it whole or not at all, to the user's data directory by default, and return where."""
         path = path or default_path()
         path.parent.mkdir(parents=True, exist_ok=True)
-        unfinished = path.with_name(f".{path.name}-{os.getpid()}")
-        unfinished.write_text(json.dumps(to_document(self), indent=1))
-        unfinished.replace(path)
+        write_whole(path, json.dumps(to_document(self), indent=1).encode())
         return path
 
 

@@ -38,6 +38,7 @@ from dlocore.scene.scene import Method, Quality, Scene
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.paper import BEYOND, solve_as_printed
 from dlocore.solvers.spacetime import solve
+from dlocore.words import counted, in_ms
 
 Floats = NDArray[np.float64]
 FindForces = Callable[[], tuple[WindowForces, ...]]
@@ -205,20 +206,21 @@ def _least_squares(
         message = "The time limit passed; this is the last iterate. Allow more time or a coarser grid."
         if method == "spacetime":  # iterates that don't come near may be anything
             level = evenly_fitted(level)
+            done = counted(len(monitor.iterations) - before, "iteration")
             message = (
-                f"The time limit passed after {len(monitor.iterations) - before} iterations of the least squares. "
+                f"The time limit passed after {done} of the least squares. "
                 "Allow more time or a coarser grid. The surface is that of the march it started from."
             )
         else:
             level = replace(level, control=last[0])
         return _answer(monitor, method, Outcome(level, "time_limit", message, None))
     monitor.phase(method)
-    count, left = len(monitor.iterations) - before, update
+    iterations, left = counted(len(monitor.iterations) - before, "iteration"), update
     status: Status = "converged" if converged else "max_iterations"
-    message = f"The update fell below delta = {quality.threshold:g} m in {count} iterations."
+    message = f"The update fell below delta = {quality.threshold:g} m in {iterations}."
     if not converged:
         message = (
-            f"The update fell to {update:.2g} m in {count} iterations, not below delta = {quality.threshold:g} m. "
+            f"The update fell to {update:.2g} m in {iterations}, not below delta = {quality.threshold:g} m. "
             "Raise n_u and n_t, allow a larger delta, or take method march."
         )
     if problem.self_contact is not None:
@@ -230,7 +232,7 @@ def _least_squares(
             method, status, found = "march", *given_status(level)
             spent = monitor.phases["spacetime"]
             message = (
-                f"{found} The least squares did not converge in {count} iterations, which took {spent * 1e3:.3g} ms: "
+                f"{found} The least squares did not converge in {iterations}, which took {in_ms(spent)}: "
                 "the surface is that of the march it started from."
             )
         else:

@@ -3,7 +3,7 @@
 import os
 import platform
 from functools import cache
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 _PACKAGES = ("numpy", "scipy", "numba")
@@ -13,6 +13,14 @@ _BARE = ("processor", "system")  # they name themselves
 def usable_cores() -> int:
     """Return how many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def program_version() -> str:
+    """Return the version of this program that is installed, "0" where it runs from a checkout."""
+    try:
+        return version("dlo")
+    except PackageNotFoundError:
+        return "0"
 
 
 def user_data_dir() -> Path:

@@ -3,6 +3,19 @@
 
 def in_mm(length: float, digits: int = 2) -> str:
     """Return a length [m] as millimetres to so many digits, or to whole ones: 580 mm, not 5.8e+02 mm."""
-    mm = 1e3 * length
-    short = f"{mm:.{digits}g}"
-    return f"{mm:.0f} mm" if "e+" in short else f"{short} mm"
+    return f"{_short(1e3 * length, digits)} mm"
+
+
+def in_ms(time: float, digits: int = 3) -> str:
+    """Return a time [s] as milliseconds to so many digits, or to whole ones: 2000 ms, not 2e+03 ms."""
+    return f"{_short(1e3 * time, digits)} ms"
+
+
+def counted(count: int, what: str) -> str:
+    """Return how many there are of what is called so in the singular: 1 iteration, 2 iterations."""
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
+def _short(value: float, digits: int) -> str:
+    short = f"{value:.{digits}g}"
+    return f"{value:.0f}" if "e+" in short else short

@@ -9,7 +9,7 @@ ROOT = Path(__file__).parents[1]
 # folders, and the files beside them, from the ground up
 LAYERS = {
     "dlocore": [
-        "errors", "words", "machine", "compiling", "effects", "kernels", "spline", "scene", "shape", "problem",
+        "errors", "words", "machine", "files", "compiling", "effects", "kernels", "spline", "scene", "shape", "problem",
         "answer", "solvers", "stability", "statics", "levels", "prediction", "accuracy", "reference", "front", "many",
         "planning", "balance", "sensitivity", "warming", "calibration", "study", "recordings", "identify",
     ],

@@ -3,6 +3,9 @@
 import ipaddress
 import json as stdlib_json
 import math
+import os
+import re
+import socket
 import sys
 import time
 from pathlib import Path
@@ -10,24 +13,18 @@ from typing import Any
 
 import orjson
 from pydantic import ValidationError
+from pydantic_settings import SettingsError
 
+from app.commands.errors import FAILED, NOT_CONVERGED, CommandError
+from app.commands.files import check_outputs, for_people, read_input, shows_progress, write_output
 from app.http.fields import BadField, bad_fields
 from app.schemas import PredictionRequest, from_prediction, to_scene
 from app.schemas.surroundings import QualityModel
 from app.settings import Settings
 from dlocore import Iteration, Prediction, Scene, SceneError
+from dlocore.files import whole
 from dlocore.scene.scene import Method
-from dlocore.words import in_mm
-
-BAD_INPUT, NOT_CONVERGED = 2, 3
-
-
-class CommandError(Exception):
-    """A command that can't go on; the message is for the person who ran it."""
-
-    def __init__(self, message: str, exit_code: int = BAD_INPUT) -> None:
-        super().__init__(message)
-        self.exit_code = exit_code
+from dlocore.words import in_mm, in_ms
 
 
 def serve(host: str | None, port: int | None) -> int:
@@ -40,25 +37,46 @@ def serve(host: str | None, port: int | None) -> int:
     from app import logs
     from app.main import create_app
 
+    _check_data_dir(settings.data_dir)
+    listening = _listening(settings.host, settings.port)
     # one process: the 3D scene and the queue of solves live in it; viser compresses nothing, so neither do we
     config = uvicorn.Config(
         create_app(settings),
-        host=settings.host,
-        port=settings.port,
         log_config=logs.configuration(settings.log_format),
         access_log=False,
         ws_per_message_deflate=False,
         timeout_graceful_shutdown=math.ceil(settings.shutdown_grace),
     )
-    socket = config.bind_socket()
     where = f"[{settings.host}]" if ":" in settings.host else settings.host
-    address = f"http://{where}:{socket.getsockname()[1]}"
+    address = f"http://{where}:{listening.getsockname()[1]}"
     print(f"page      {address}/\n3D scene  {address}/scene/\nAPI docs  {address}/docs", flush=True)
     if settings.token is None and not _is_loopback(settings.host):
         print("warning   anyone who reaches this address can use it; DLO_TOKEN asks for a token", file=sys.stderr)
     print(f"runs      {settings.data_dir / 'runs'}", flush=True)
-    uvicorn.Server(config).run(sockets=[socket])
+    uvicorn.Server(config).run(sockets=[listening])
     return 0
+
+
+def _check_data_dir(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CommandError(f"DLO_DATA_DIR: can't make {folder}: {error.strerror}", FAILED) from None
+    if not os.access(folder, os.W_OK):
+        raise CommandError(f"DLO_DATA_DIR: can't write to {folder}", FAILED)
+
+
+def _listening(host: str, port: int) -> socket.socket:
+    """Return a socket that listens there."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        return socket.create_server((host, port), family=family)
+    except OSError as error:
+        reason = str(error.strerror).partition(" (")[0]  # which names the address once more
+        raise CommandError(
+            f"can't listen on port {port} of {host}: {reason}. --port 0 takes one that is free.",
+            FAILED,
+        ) from None
 
 
 def _is_loopback(host: str) -> bool:
@@ -70,7 +88,8 @@ def _is_loopback(host: str) -> bool:
 
 def predict(scene: str, *, npz: str | None, json: str | None, rrd: str | None, method: Method | None = None) -> int:
     """Predict one scene, write what is asked for, and say how it went on stderr."""
-    raw = _read(scene)
+    _check_predict(scene, npz=npz, json=json, rrd=rrd)
+    raw = read_input(scene)
     request = _request(raw)
     if method is not None:
         request = _by(request, method)
@@ -90,17 +109,33 @@ def predict(scene: str, *, npz: str | None, json: str | None, rrd: str | None, m
     return 0 if prediction.status == "converged" else NOT_CONVERGED
 
 
+def _check_predict(scene: str, *, npz: str | None, json: str | None, rrd: str | None) -> None:
+    if rrd == "-":
+        raise CommandError("--rrd: got -. Allowed: the name of a file, which has its layout beside it.")
+    layout = str(_layout_of(rrd)) if rrd is not None and Path(rrd).name else None
+    check_outputs({"--output": npz, "--json": json, "--rrd": rrd, "the layout of --rrd": layout}, [scene])
+
+
+def _layout_of(rrd: str) -> Path:
+    """Return the file of a recording's layout."""
+    return Path(rrd).with_suffix(".rbl")
+
+
 def calibrate(*, repeats: int, json: str | None) -> int:
     """Measure this machine, keep the result, and print it."""
     from tqdm import tqdm
 
     from dlocore import calibration
     from dlocore.study.calibrating import measure
+    from dlocore.study.plan import MAX_REPEATS
 
-    if repeats < 1:
-        raise CommandError(f"--repeats: got {repeats}. Allowed: at least 1.")
-    path = _settings().calibration_file if json is None else Path(json)
-    with tqdm(desc="calibrating", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
+    if not 1 <= repeats <= MAX_REPEATS:
+        raise CommandError(f"--repeats: got {repeats}. Allowed: 1 to {MAX_REPEATS}.")
+    check_outputs({"--json": json})
+    kept = _settings().calibration_file if json is None else None
+    if kept is not None:
+        _check_data_dir(kept.parent)
+    with tqdm(desc="calibrating", file=sys.stderr, disable=not shows_progress(), leave=False) as bar:
 
         def show(done: int, total: int, what: str) -> None:
             bar.total = total
@@ -108,12 +143,12 @@ def calibrate(*, repeats: int, json: str | None) -> int:
             bar.update(done - bar.n)
 
         found = measure(repeats=repeats, on_progress=show)
-    try:
-        found.save(path)
-    except OSError as error:
-        raise CommandError(f"can't write {path}: {error.strerror}", exit_code=1) from None
-    print(calibration.table(found))
-    print(f"kept in {path}", file=sys.stderr)
+    if json is not None:
+        write_output(json, stdlib_json.dumps(calibration.to_document(found), indent=1).encode())
+    else:
+        found.save(kept)
+    print(calibration.table(found), file=for_people(json))
+    print(f"kept in {json or kept}", file=sys.stderr)
     return 0
 
 
@@ -138,7 +173,7 @@ def summary(prediction: Prediction) -> str:
             f"method   {accuracy.method}, {accuracy.n_u} x {accuracy.n_t} control points",
             f"motion   {accuracy.dimensions}D: {accuracy.dimensions_reason}",
             f"error    {error} (estimated, worst point)",
-            f"time     {1e3 * accuracy.wall_time:.3g} ms",
+            f"time     {in_ms(accuracy.wall_time)}",
             f"effects  {active}",
         ]
     )
@@ -149,22 +184,24 @@ def _settings(**given: Any) -> Settings:
         return Settings(**given)
     except ValidationError as error:
         first = error.errors()[0]
-        name = "_".join(str(part) for part in first["loc"])
-        raise CommandError(f"setting {name} (DLO_{name.upper()}): {first['msg']}") from None
+        name = str(first["loc"][0])
+        shown = "a secret" if name == "token" else repr(first["input"])
+        origin = f"--{name}" if name in given else f"DLO_{name.upper()}"
+        raise CommandError(f"{origin}: got {shown}. {first['msg']}: {_described(name)}") from None
+    except SettingsError as error:  # no JSON where there has to be
+        name = re.findall(r'"(\w+)"', str(error))[0]
+        shown = repr(os.environ.get(f"DLO_{name.upper()}"))
+        raise CommandError(f"DLO_{name.upper()}: got {shown}. Allowed: {_described(name)}") from None
 
 
-def _read(scene: str) -> bytes:
-    if scene == "-":
-        return sys.stdin.buffer.read()
-    try:
-        return Path(scene).read_bytes()
-    except OSError as error:
-        raise CommandError(f"can't read {scene}: {error.strerror}") from None
+def _described(setting: str) -> str:
+    return Settings.model_fields[setting].description or ""
 
 
 def _request(raw: bytes) -> PredictionRequest:
     try:
-        body = stdlib_json.loads(raw)  # takes NaN too, which the schema then refuses by name
+        # takes NaN too, which the schema then refuses by name
+        body = stdlib_json.loads(raw, object_pairs_hook=_with_each_name_once)
     except (ValueError, RecursionError) as error:
         raise CommandError(f"the scene is not JSON: {error}") from None
     try:
@@ -176,9 +213,21 @@ def _request(raw: bytes) -> PredictionRequest:
 def _by(request: PredictionRequest, method: Method) -> PredictionRequest:
     """Return the request solved by another method; the reference has no grid and no time budget of its own."""
     given = {} if isinstance(request.quality, str) else request.quality.model_dump(exclude_unset=True)
+    if method in ("spacetime", "paper") and given.get("n_u") is None:
+        wanted = 'a scene whose quality names the grid, as {"n_u": 9, "n_t": 13, "delta": 1e-5}'
+        raise CommandError(f"--method: got {method}. Allowed: march or reference, or {wanted}.")
     if method == "reference":
         given = {name: value for name, value in given.items() if name == "target_error"}
     return request.model_copy(update={"quality": QualityModel(**{**given, "method": method})})
+
+
+def _with_each_name_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise CommandError(f"the scene: got {twice!r} twice in one object. Allowed: each name once.")
+    return found
 
 
 def _words(fields: list[BadField]) -> str:
@@ -187,11 +236,13 @@ def _words(fields: list[BadField]) -> str:
 
 
 def read_scene(file: str) -> Scene:
-    """Return the scene of a JSON file, "-" for standard input."""
+    """Return the scene of a JSON file, "-" for standard input; what is wrong with it is said with its name."""
     try:
-        return to_scene(_request(_read(file)), _stored)
+        return to_scene(_request(read_input(file)), _stored)
     except SceneError as error:
-        raise CommandError(_words([BadField.from_scene_error(error)])) from None
+        raise CommandError(f"{file}: {_words([BadField.from_scene_error(error)])}") from None
+    except CommandError as error:
+        raise CommandError(f"{file}: {error}", error.exit_code) from None
 
 
 def _stored(id: str) -> Any:
@@ -207,7 +258,7 @@ def _solve(request: PredictionRequest) -> Prediction:
     from dlocore import warm_up
     from dlocore.calibration import stored_cost
 
-    with tqdm(desc="solving", unit=" iterations", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
+    with tqdm(desc="solving", unit=" iterations", file=sys.stderr, disable=not shows_progress(), leave=False) as bar:
 
         def show(iteration: Iteration) -> None:
             bar.set_postfix(update=f"{iteration.update:.2g} m", residual=f"{iteration.residual:.2g}")
@@ -229,19 +280,8 @@ def _record(rrd: str, *, request_json: dict[str, Any], document: dict[str, Any],
     path = Path(rrd)
     run = Run.of(request_json, {**document, "id": path.stem}, prediction)
     try:
-        write_recording(run, path)
+        with whole(path) as unfinished:
+            write_recording(run, unfinished)
     except (OSError, RuntimeError) as error:
-        raise CommandError(f"can't write {rrd}: {error}", exit_code=1) from None
-    write_output(str(path.with_suffix(".rbl")), layout())
-
-
-def write_output(path: str, content: bytes) -> None:
-    """Write a file, "-" for standard output."""
-    if path == "-":
-        sys.stdout.buffer.write(content)
-        sys.stdout.buffer.flush()
-        return
-    try:
-        Path(path).write_bytes(content)
-    except OSError as error:
-        raise CommandError(f"can't write {path}: {error.strerror}", exit_code=1) from None
+        raise CommandError(f"can't write {rrd}: {error}", FAILED) from None
+    write_output(str(_layout_of(rrd)), layout())

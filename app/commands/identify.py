@@ -1,13 +1,15 @@
 """What ``dlo identify`` and ``dlo validate`` do."""
 
 import sys
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
 import orjson
 
-from app.commands.commands import BAD_INPUT, NOT_CONVERGED, CommandError, write_output
+from app.commands.errors import NOT_CONVERGED, CommandError
+from app.commands.files import check_outputs, for_people, write_output
 from dlocore import SceneError
 from dlocore.recordings import Recording, load_recording
 
@@ -22,11 +24,12 @@ def identify(recordings: list[str], *, names: list[str], output: str, report: st
     from dlocore.identify import Resolution
     from dlocore.identify import identify as find
 
+    check_outputs({"--output": output, "--report": report}, recordings)
     try:
         loaded = [_load(path) for path in recordings]
         found = find(loaded, names=tuple(names), resolution=Resolution(n_u=n_u), on_progress=_show)
     except SceneError as error:
-        raise CommandError(str(error), BAD_INPUT) from None
+        raise CommandError(str(error)) from None
     document = document_of_identification(found)
     write_output(output, orjson.dumps(document, option=orjson.OPT_INDENT_2 | orjson.OPT_SERIALIZE_NUMPY))
     if report is not None:
@@ -54,15 +57,20 @@ def validate(datasets: list[str], *, fit: int, models: list[str], json: str | No
     """Run the published protocols on data sets and print the table."""
     from app.reports.validation_plots import plots_of
     from dlocore.identify.datasets import PUBLISHED, PUBLISHED_BY, load_datasets
-    from dlocore.identify.validation import each_repeat, validate_cable, validate_wire
+    from dlocore.identify.validation import Model, each_repeat, validate_cable, validate_wire
     from dlocore.machine import machine_line
 
+    check_outputs({"--json": json}, folders={"--plots": plots})
+    allowed = get_args(Model)
+    if not set(models) <= set(allowed) or len(set(models)) < len(models):
+        raise CommandError(f"--models: got {','.join(models)!r}. Allowed: {' or '.join(allowed)}, or both, by a comma.")
+    table = partial(print, file=for_people(json), flush=True)
     try:
         cables, wires = load_datasets([Path(d) for d in datasets], fit)
-        print(machine_line())
+        table(machine_line())
         out: list[dict[str, Any]] = []
         if cables:
-            print(
+            table(
                 f"\nState from frames 0 and 1, all later frames open loop; L1 is the mean |dx| over frames, all "
                 f"markers and coordinates [m].\npublished: {PUBLISHED_BY}\n\n"
                 f"{'cable':<8}{'model':<9}{'mean':>8}{'median':>8}{'worst':>8}{'publ.':>8}{'mm/free':>9}"
@@ -71,30 +79,27 @@ def validate(datasets: list[str], *, fit: int, models: list[str], json: str | No
         for cable in cables:
             start = None
             for model in models:
-                result = validate_cable(cable, "bends" if model == "bends" else "scalars", start)
+                result = validate_cable(cable, cast(Model, model), start)
                 start = result.found.candidate
-                print(_row(result, PUBLISHED.get(cable.name)), flush=True)
+                table(_row(result, PUBLISHED.get(cable.name)))
                 out.append(_document(result))
         if wires:
-            print(f"\n{'wire':<8}{'fitted':<50}{'rms mm':>8}{'worst':>8}   EI [N m^2] and interval (published)")
+            table(f"\n{'wire':<8}{'fitted':<50}{'rms mm':>8}{'worst':>8}   EI [N m^2] and interval (published)")
         for wire in wires:
             for names in (("bending_stiffness", "clamp_angles"), ("bending_stiffness", "clamp_angles", *_BENT)):
                 settled = validate_wire(wire, names)
                 published = wire.published_bending_stiffness
-                print(_wire_row(settled, published), flush=True)
+                table(_wire_row(settled, published))
                 out.append({"wire": wire.name, "fitted": list(names), "rms": settled.rms.tolist()})
             alone = each_repeat(wire)
-            print(f"{wire.name:<8}each repeat alone: {', '.join(f'{1e3 * x:.1f}' for x in alone)} mm", flush=True)
+            table(f"{wire.name:<8}each repeat alone: {', '.join(f'{1e3 * x:.1f}' for x in alone)} mm")
             out.append({"wire": wire.name, "fitted": ["each repeat alone"], "rms": alone.tolist()})
     except SceneError as error:
-        raise CommandError(str(error), BAD_INPUT) from None
+        raise CommandError(str(error)) from None
     if json is not None:
         write_output(json, orjson.dumps(out, option=orjson.OPT_INDENT_2 | orjson.OPT_SERIALIZE_NUMPY))
     if plots is not None:
-        try:
-            Path(plots).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise CommandError(f"can't write {plots}: {error.strerror}", exit_code=1) from None
+        Path(plots).mkdir(parents=True, exist_ok=True)
         for name, drawn in plots_of(out, PUBLISHED).items():
             write_output(str(Path(plots) / name), drawn.encode())
     return 0

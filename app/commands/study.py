@@ -8,7 +8,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
-from app.commands.commands import CommandError, read_scene
+from app.commands.commands import read_scene
+from app.commands.errors import FAILED, CommandError
+from app.commands.files import check_outputs, for_people, shows_progress, write_output
 from dlocore import Scene, SceneError
 from dlocore.scene.scene import EFFECTS, Switch
 
@@ -26,6 +28,8 @@ def study(options: argparse.Namespace) -> int:
     from dlocore.study.plan import Plan
     from dlocore.study.running import run_study
 
+    read = [*options.scenes, *([] if options.compare is None else [options.compare])]
+    check_outputs({"--output": options.output}, read, {"--plots": options.plots})
     before = None if options.compare is None else _earlier(options.compare)
     if options.plots is not None:
         _check_matplotlib()
@@ -33,7 +37,7 @@ def study(options: argparse.Namespace) -> int:
         plan = Plan(**_asked(options))
     except SceneError as error:
         raise CommandError(str(error)) from None
-    with tqdm(desc="measuring", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
+    with tqdm(desc="measuring", file=sys.stderr, disable=not shows_progress(), leave=False) as bar:
 
         def show(done: int, total: int, what: str) -> None:
             bar.total = total
@@ -41,21 +45,21 @@ def study(options: argparse.Namespace) -> int:
             bar.update(done - bar.n)
 
         measured = run_study(plan, on_progress=show)
-    print(_table(measured))
-    try:
-        if options.output is not None:
-            record.save(measured, Path(options.output))
-        if options.plots is not None:
-            from dlocore.study.drawing import draw_all
+    table = for_people(options.output)
+    print(_table(measured), file=table)
+    if options.output is not None:
+        write_output(options.output, record.as_json(measured))
+    if options.plots is not None:
+        from dlocore.study.drawing import draw_all
 
-            for file in draw_all(measured, Path(options.plots)):
-                print(f"drew {file}", file=sys.stderr)
-    except OSError as error:
-        raise CommandError(f"can't write {error.filename}: {error.strerror}", exit_code=1) from None
+        for file in draw_all(measured, Path(options.plots)):
+            print(f"drew {file}", file=sys.stderr)
     if before is None:
         return 0
     comparison = compare(measured, before)
-    print(f"\ncompared with {options.compare}, measured at {before.measured_at}\n{words(comparison)}")
+    print(f"\ncompared with {options.compare}, measured at {before.measured_at}\n{words(comparison)}", file=table)
+    if comparison.compared == 0:
+        raise CommandError(f"--compare: {options.compare} has no run in common with this study")
     return WORSE if comparison.worse else 0
 
 
@@ -74,7 +78,7 @@ def _check_matplotlib() -> None:
     try:
         import matplotlib  # noqa: F401
     except ImportError:
-        raise CommandError("--plots needs matplotlib: pip install 'dlo[plots]'", exit_code=1) from None
+        raise CommandError("--plots needs matplotlib: pip install 'dlo[plots]'", FAILED) from None
 
 
 def _asked(options: argparse.Namespace) -> dict[str, Any]:

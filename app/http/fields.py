@@ -1,5 +1,6 @@
 """What is wrong with which field of a request: pydantic's findings in the words of the contract."""
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -106,8 +107,20 @@ def _text(steps: list[Any]) -> str:
 def _shown(value: Any, kind: str) -> str:
     if kind in ("too_short", "too_long") and isinstance(value, list):
         return f"{len(value)} items"
-    text = value if isinstance(value, str) else repr(value)
+    text = _as_json(value)
     return text if len(text) <= 120 else text[:117] + "..."
+
+
+def _as_json(value: Any) -> str:
+    """Return a value as JSON has it; a text bare, but for one that reads like another value, or like none."""
+    text = json.dumps(value, default=repr, ensure_ascii=False)
+    if not isinstance(value, str) or not value.strip():
+        return text
+    try:
+        json.loads(value)
+    except (ValueError, RecursionError):
+        return value
+    return text
 
 
 _FORMS = {

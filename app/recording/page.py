@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from app.archive import Run
 from app.recording.motion import arrow_scale
 from app.recording.style import chunk
-from dlocore.words import in_mm
+from dlocore.words import in_mm, in_ms
 
 if TYPE_CHECKING:
     from rerun.chunk import Chunk
@@ -37,7 +37,7 @@ def report(run: Run) -> str:
             "## Solve",
             f"- method: {accuracy['method']}, {len(run.iterations)} iterations or levels",
             f"- estimated error: {'unknown' if error is None else in_mm(error, 3)}",
-            f"- solve time: {1e3 * accuracy['wall_time']:.3g} ms",
+            f"- solve time: {in_ms(accuracy['wall_time'])}",
             f"- start shape: {document['start']['elastic_energy']:.3g} J elastic energy, "
             f"{in_mm(document['start']['fit_error'], 3)} rms from the given points",
             f"- machine: {run.machine}",

@@ -5,6 +5,8 @@ import threading
 from pathlib import Path
 from typing import Any
 
+from dlocore.files import write_whole
+
 _ID = re.compile(r"[0-9a-f]{28}")
 MAX_STUDIES = 100  # the oldest go first
 
@@ -20,9 +22,7 @@ class StudyStore:
         """Store the document of a study."""
         with self._lock:
             self._root.mkdir(parents=True, exist_ok=True)
-            unfinished = self._root / f".{id}"
-            unfinished.write_bytes(document)
-            unfinished.replace(self._file(id))
+            write_whole(self._file(id), document)
             for file in sorted(self._files(), reverse=True)[MAX_STUDIES:]:
                 file.unlink(missing_ok=True)
 

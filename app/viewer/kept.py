@@ -9,6 +9,7 @@ from typing import Any
 
 from app.http.problems import ProblemError
 from app.schemas.cable import CableModel
+from dlocore.files import write_whole
 
 LONGEST_NAME = 60
 MOST = 200
@@ -57,9 +58,7 @@ class KeptCables:
             values = {key: value for key, value in cable.items() if key != "length" and value is not None}
             kept[name] = {"cable": values, "environment": dict(environment)}
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            written = self._path.with_suffix(".part")
-            written.write_text(json.dumps(kept, indent=1))
-            written.replace(self._path)
+            write_whole(self._path, json.dumps(kept, indent=1).encode())
 
 
 def _is_cable(values: Any) -> bool:

@@ -12,7 +12,7 @@ from app.viewer.palette import ColourScale, css_ramp
 from dlocore import EffectReport, Prediction
 from dlocore.accuracy.fallback import errs
 from dlocore.calibration import Measured, front_of
-from dlocore.words import in_mm
+from dlocore.words import counted, in_mm
 
 _CARD = (
     "margin: 0 0.75rem 0.6rem; padding: 0.55rem 0.7rem; border-radius: 0.5rem; font-size: 0.8rem; line-height: 1.35;"
@@ -66,7 +66,7 @@ def status_card(prediction: Prediction, *, preview: bool) -> str:
         f'<div style="opacity: 0.65; font-size: 0.7rem;">{escape(name)}</div></div>'
         for value, name in numbers
     )
-    steps = f"{len(prediction.iterations)} iterations" if len(prediction.iterations) != 1 else "1 iteration"
+    steps = counted(len(prediction.iterations), "iteration")
     detail = f"{accuracy.method}, {accuracy.n_u} × {accuracy.n_t} control points, {steps}, {accuracy.dimensions}D"
     parts = {
         name: size for name, size in accuracy.error_parts.items() if size > 0.01 * (accuracy.error_estimate or 0.0)

@@ -26,7 +26,7 @@ from dlocore.solvers.march import RHO, STRONGLY_DAMPED
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.stability.determined import DOUBTFUL, UNDETERMINED, UNSEEN, bend_in_words, goes_astray, in_words
 from dlocore.statics.statics import RESTLESS, settles_elsewhere
-from dlocore.words import in_mm
+from dlocore.words import in_mm, in_ms
 
 AUTO_ENOUGH = 1e-2  # of the length: the estimated error with which it is content where the finest grids reach no closer
 ROUGH = 0.05  # of the length: two grids that differ more are in no order yet: the next is marched with strong damping
@@ -385,7 +385,7 @@ class _Climb:
 
     def _within_budget(self, level: Level) -> Outcome:
         """Return the best that the budget allows; it is a success where its error is known, and is what is enough."""
-        allowed = f"{self.means.budget * 1e3:.3g} ms"
+        allowed = in_ms(self.means.budget)
         if not np.isfinite(level.change):
             return Outcome(level, "time_limit", f"{allowed} allow one grid, unchecked.", None)
         status, failure = march_status(self.problem, level)

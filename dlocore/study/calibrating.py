@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from dlocore.accuracy.cost import Cost, Sample, fitted_rates
 from dlocore.calibration import Calibration, Measured, source_mark
 from dlocore.errors import Cancelled
 from dlocore.front import predict
-from dlocore.machine import machine
+from dlocore.machine import machine, program_version
 from dlocore.prediction import Prediction
 from dlocore.scene.scene import Method, Quality, Scene
 from dlocore.study.judge import Truth, finest_march, largest_error
@@ -129,7 +128,7 @@ def measure(
     on_progress(course.total, course.total, "done")
     return Calibration(
         machine=machine(),
-        version=_version(),
+        version=program_version(),
         source=source_mark(),
         measured_at=datetime.now(UTC).isoformat(timespec="seconds").replace("+00:00", "Z"),
         duration=time.perf_counter() - began,
@@ -198,10 +197,3 @@ def _deviation(cost: Cost, samples: list[Sample]) -> dict[str, float]:
         model = cost.time(method, s.n_u, s.n_t, s.steps, coordinates=s.coordinates, estimate=False)
         factors[method].append(max(model / s.wall_time, s.wall_time / model))
     return {method: float(np.median(found)) for method, found in factors.items()}
-
-
-def _version() -> str:
-    try:
-        return version("dlo")
-    except PackageNotFoundError:  # run from a checkout
-        return "0"

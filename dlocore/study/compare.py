@@ -35,12 +35,14 @@ class Comparison:
     Attributes:
         changes: beyond noise, the worse ones first.
         compared: runs that both have.
+        missing: runs that only the earlier one has, in words.
         same_machine: whether times could be compared.
         same_judge: whether errors could be.
     """
 
     changes: tuple[Change, ...]
     compared: int
+    missing: tuple[str, ...]
     same_machine: bool
     same_judge: bool
 
@@ -69,7 +71,14 @@ def compare(now: Study, before: Study) -> Comparison:
         if judges and run.status == old.status:
             changes += _error(run, old)
     changes.sort(key=lambda change: not change.worse)
-    return Comparison(changes=tuple(changes), compared=len(pairs), same_machine=machines, same_judge=judges)
+    measured = {run.key for run in now.runs}
+    return Comparison(
+        changes=tuple(changes),
+        compared=len(pairs),
+        missing=tuple(_name(run) for run in before.runs if run.key not in measured),
+        same_machine=machines,
+        same_judge=judges,
+    )
 
 
 def _status(run: Run, old: Run) -> list[Change]:
@@ -105,6 +114,7 @@ def _name(run: Run) -> str:
 def words(comparison: Comparison) -> str:
     """Return a comparison as text."""
     lines = [f"{comparison.compared} runs compared; {len(comparison.worse)} changes for the worse"]
+    lines += [f"not measured now: {run}" for run in comparison.missing]
     if not comparison.same_machine:
         lines.append("another machine: times are not compared")
     if not comparison.same_judge:

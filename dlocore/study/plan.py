@@ -66,6 +66,13 @@ class Plan:
         for name in ("scenes", "grids", "methods", "deltas", "effects", "parts"):
             if not getattr(self, name):
                 raise SceneError(name, "none", "at least one")
+        for name in ("grids", "methods", "deltas", "parts"):
+            given = getattr(self, name)
+            twice = next((x for x in given if given.count(x) > 1), None)
+            if twice is not None:
+                raise SceneError(name, twice, "each once")
+        if len(self.deltas) > 1 and set(self.methods) == {"march"}:
+            raise SceneError("deltas", self.deltas, "one: a march has no threshold, and is measured once")
         for n_u, n_t in self.grids:
             Quality(n_u=n_u, n_t=n_t)
         for delta in self.deltas:

@@ -2,11 +2,13 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Any, Literal
+from types import NoneType
+from typing import Any, Literal, TypeVar
 
 from dlocore.errors import DloError
+from dlocore.files import write_whole
 
 FORMAT = 1
 Part = Literal["runs", "scaling", "effects"]
@@ -149,21 +151,53 @@ def from_document(document: Any) -> Study:
         parts = {name: value for name, value in document.items() if name not in ("format", "id")}
         parts["runs"] = tuple(_run(run) for run in parts["runs"])
         parts["refused"] = tuple(parts["refused"])
-        parts["scaling"] = tuple(Scaled(**row) for row in parts["scaling"])
-        parts["effects"] = tuple(EffectCost(**row) for row in parts["effects"])
-        return Study(**parts)
-    except (KeyError, TypeError, AttributeError) as error:
+        parts["scaling"] = tuple(_plain(Scaled, row) for row in parts["scaling"])
+        parts["effects"] = tuple(_plain(EffectCost, row) for row in parts["effects"])
+        parts["machine"] = dict(parts["machine"])
+        return _plain(Study, parts)
+    except StudyError:
+        raise
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise StudyError(f"This is no study: {error}.") from None
 
 
 def _run(values: dict[str, Any]) -> Run:
-    steps = tuple(Step(**step) for step in values["iterations"])
-    return Run(**{**values, "iterations": steps, "active": tuple(values["active"])})
+    steps = tuple(_plain(Step, step) for step in values["iterations"])
+    run = _plain(Run, {**values, "iterations": steps, "active": tuple(values["active"])})
+    if not run.wall_time > 0.0:
+        raise StudyError(f"wall_time: got {run.wall_time!r}. Allowed: a time above zero [s].")
+    return run
+
+
+_KINDS: Mapping[Any, tuple[str, tuple[type, ...]]] = {
+    str: ("a text", (str,)),
+    int: ("a whole number", (int,)),
+    float: ("a number", (int, float)),
+    float | None: ("a number or null", (int, float, NoneType)),
+}
+_Row = TypeVar("_Row", Step, Run, Scaled, EffectCost, Study)
+
+
+def _plain(kind: type[_Row], values: Mapping[str, Any]) -> _Row:
+    """Return a row of a study, whose texts and numbers are some."""
+    row = kind(**values)
+    for part in fields(kind):
+        if part.type not in _KINDS:
+            continue
+        value, (words, allowed) = getattr(row, part.name), _KINDS[part.type]
+        if not isinstance(value, allowed) or isinstance(value, bool):
+            raise StudyError(f"{part.name}: got {value!r}. Allowed: {words}.")
+    return row
+
+
+def as_json(study: Study) -> bytes:
+    """Return a study as JSON."""
+    return json.dumps(to_document(study), indent=1).encode()
 
 
 def save(study: Study, path: Path) -> None:
-    """Write a study as JSON."""
-    path.write_text(json.dumps(to_document(study), indent=1))
+    """Write a study as JSON, whole or not at all."""
+    write_whole(path, as_json(study))
 
 
 def load(path: Path) -> Study:
@@ -175,5 +209,5 @@ def load(path: Path) -> Study:
     """
     try:
         return from_document(json.loads(path.read_text()))
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise StudyError(f"This is no JSON: {error}.") from None

@@ -2,6 +2,10 @@
 
 import io
 import json
+import os
+import socket
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +13,11 @@ import numpy as np
 import pytest
 
 from app.cli import main
+from app.commands.files import write_output
+from dlocore.files import whole
 from tests.app.conftest import paper_scene, put
+
+ROOT = Path(__file__).parents[2]
 
 
 class _Stdin:
@@ -135,10 +143,144 @@ def test_a_least_squares_that_does_not_converge_is_answered_by_a_march(
     assert len(answer["iterations"]) > 40
 
 
-def test_an_output_that_cannot_be_written_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+COMMANDS = {
+    "predict": ("-o", "--json", "--rrd"),
+    "study": ("-o", "--plots"),
+    "identify": ("-o", "--report"),
+    "validate": ("--json", "--plots"),
+    "calibrate": ("--json",),
+}
+
+
+@pytest.mark.parametrize(("command", "option"), [(c, option) for c, options in COMMANDS.items() for option in options])
+@pytest.mark.parametrize("bad", ["a file/out", ""])
+def test_an_output_that_cannot_be_written_says_so_before_any_work_is_done(
+    command: str, option: str, bad: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "a file").touch()
+    given = [] if command == "calibrate" else [str(tmp_path / "not there")]
+    assert main([command, *given, option, str(tmp_path / bad) if bad else ""]) == 1  # 2 once the input is looked for
+    message = capsys.readouterr().err
+    assert ("can't write" if bad else "an output needs a name") in message
+    assert len(message.splitlines()) == 1
+
+
+def test_a_missing_folder_of_an_output_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     missing = tmp_path / "none" / "out.npz"
     assert main(["predict", written(tmp_path, paper_scene()), "-o", str(missing)]) == 1
-    assert "out.npz" in capsys.readouterr().err
+    assert f"can't write {missing}: there is no folder {missing.parent}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("outputs", "named"),
+    [
+        (["-o", "same", "--json", "same"], "--json: got same. Allowed: a file of its own, not that of --output."),
+        (["-o", "-", "--json", "-"], "--json: got -."),
+        (["--json", "scene.json"], "not that of the input."),
+        (["--json", "./link.json"], "not that of the input."),
+        (["--rrd", "out.rbl"], "the layout of --rrd: got out.rbl."),
+        (["--rrd", "-"], "--rrd: got -. Allowed: the name of a file"),
+    ],
+)
+def test_outputs_do_not_overwrite_each_other_or_the_scene(
+    outputs: list[str], named: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    scene = Path(written(tmp_path, paper_scene()))
+    (tmp_path / "link.json").symlink_to(scene)
+    before = scene.read_bytes()
+    assert main(["predict", "scene.json", *outputs]) == 2
+    assert named in capsys.readouterr().err
+    assert scene.read_bytes() == before
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["link.json", "scene.json"]
+
+
+def test_an_output_is_whole_or_as_it_was(tmp_path: Path) -> None:
+    file, link = tmp_path / "out.json", tmp_path / "link"
+    file.write_text("before")
+    file.chmod(0o640)
+    link.symlink_to(file)
+
+    def interrupted() -> None:
+        with whole(link) as unfinished:
+            unfinished.write_text("half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert file.read_text() == "before"
+    write_output(str(link), b"after")
+    assert link.is_symlink()
+    assert (file.read_text(), file.stat().st_mode & 0o777) == ("after", 0o640)
+    assert sorted(tmp_path.iterdir()) == [link, file]
+
+
+def in_shell(line: str, tmp_path: Path) -> subprocess.CompletedProcess[str]:
+    """Run a line of a shell in which `dlo` is the command line."""
+    script = f'dlo() {{ "{sys.executable}" -m app.cli "$@"; }}\n{line}'
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "DLO_DATA_DIR": str(tmp_path / "data")}
+    return subprocess.run(
+        ["bash", "-c", script], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+@pytest.mark.parametrize(
+    ("line", "code", "said"),
+    [
+        ("dlo predict scene.json --json - | true; exit ${PIPESTATUS[0]}", 141, "converged: "),
+        ("dlo predict scene.json --json - > /dev/full", 1, "can't write standard output: No space left on device"),
+        ("dlo predict scene.json --json - >&-", 1, "--json: standard output is closed"),
+        ("dlo predict - <&-", 2, "standard input is closed"),
+        ("dlo predict scene.json 2>&-", 0, ""),
+        ("dlo --version", 0, ""),
+    ],
+)
+def test_closed_and_full_ends_are_told_in_one_line(line: str, code: int, said: str, tmp_path: Path) -> None:
+    written(tmp_path, paper_scene())
+    done = in_shell(line, tmp_path)
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+    assert code == 141 or said in done.stderr
+
+
+def test_an_interrupt_while_it_still_starts_is_one(tmp_path: Path) -> None:
+    written(tmp_path, paper_scene())
+    done = in_shell(f'timeout -s INT 0.3 "{sys.executable}" -m app.cli predict scene.json', tmp_path)
+    assert done.returncode == 124  # of timeout, which had to end it
+    assert done.stderr == ""
+
+
+def test_a_name_that_is_given_twice_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "scene.json").write_text('{"cable": {"preset": "paper"}, "cable": {"preset": "black-wire"}}')
+    assert main(["predict", str(tmp_path / "scene.json")]) == 2
+    assert "got 'cable' twice in one object" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("method", ["paper", "spacetime"])
+def test_a_method_that_needs_a_grid_is_named_with_its_option(
+    method: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = written(tmp_path, paper_scene(quality="auto"))
+    assert main(["predict", scene, "--method", method]) == 2
+    assert f"--method: got {method}. Allowed: march or reference, or a scene whose quality" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("models", ["bend", "", "scalars,scalars"])
+def test_an_unknown_model_is_refused(models: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["validate", str(tmp_path), "--models", models]) == 2
+    assert f"--models: got {models!r}. Allowed: scalars or bends" in capsys.readouterr().err
+
+
+def test_a_comparison_with_nothing_in_common_is_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene, before = written(tmp_path, paper_scene()), str(tmp_path / "before.json")
+    quick = ["--methods", "march", "--parts", "runs", "--repeats", "1"]
+    assert main(["study", scene, "--grids", "9x13", *quick, "-o", before]) == 0
+    assert main(["study", scene, "--grids", "9x13", "7x11", *quick, "--compare", before]) in (0, 4)  # times may differ
+    assert "1 runs compared" in capsys.readouterr().out
+    assert main(["study", scene, "--grids", "7x11", *quick, "--compare", before]) == 2
+    output = capsys.readouterr()
+    assert "not measured now: scene: march, 9 x 13" in output.out
+    assert f"{before} has no run in common with this study" in output.err
 
 
 def test_a_recording_of_the_command_line_is_that_of_the_solve(tmp_path: Path) -> None:
@@ -151,10 +293,40 @@ def test_a_recording_of_the_command_line_is_that_of_the_solve(tmp_path: Path) ->
     assert rr.chunk.RrdReader(tmp_path / "out.rbl").blueprints()
 
 
-def test_a_bad_setting_is_named(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setenv("DLO_PORT", "here")
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [
+        ("DLO_PORT", "here", "DLO_PORT: got 'here'. "),
+        ("DLO_ALLOWED_ORIGINS", "foo", "DLO_ALLOWED_ORIGINS: got 'foo'. Allowed: Other origins"),
+        ("DLO_TOKEN", "short", "DLO_TOKEN: got a secret. "),
+    ],
+)
+def test_a_bad_setting_is_named(
+    name: str, value: str, told: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv(name, value)
     assert main(["serve"]) == 2
-    assert "DLO_PORT" in capsys.readouterr().err
+    message = capsys.readouterr().err
+    assert message.startswith(f"dlo: {told}")
+    assert "short" not in message
+
+
+def test_what_serve_can_not_have_is_named_before_it_says_where_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("DLO_DATA_DIR", str(tmp_path))
+    assert main(["serve", "--port", "99999"]) == 2
+    assert "--port: got 99999. " in capsys.readouterr().err
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        assert main(["serve", "--port", str(port)]) == 1
+    assert f"can't listen on port {port} of 127.0.0.1: Address already in use. " in capsys.readouterr().err
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("DLO_DATA_DIR", str(tmp_path / "file" / "data"))
+    assert main(["serve", "--port", "0"]) == 1
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert f"DLO_DATA_DIR: can't make {tmp_path}/file/data: Not a directory" in output.err
 
 
 def test_help_reads_well(capsys: pytest.CaptureFixture[str]) -> None:

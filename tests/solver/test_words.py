@@ -1,8 +1,8 @@
-"""Lengths as messages write them."""
+"""Lengths, times and counts as messages write them."""
 
 import pytest
 
-from dlocore.words import in_mm
+from dlocore.words import counted, in_mm, in_ms
 
 
 @pytest.mark.parametrize(
@@ -21,3 +21,8 @@ from dlocore.words import in_mm
 )
 def test_a_length_has_its_digits_and_no_exponent_where_it_is_long(length: float, digits: int, words: str) -> None:
     assert in_mm(length, digits) == words
+
+
+def test_times_and_counts():
+    assert [in_ms(time) for time in (2.0, 1.2345, 0.0123, 4e-7)] == ["2000 ms", "1234 ms", "12.3 ms", "0.0004 ms"]
+    assert [counted(count, "iteration") for count in (0, 1, 2)] == ["0 iterations", "1 iteration", "2 iterations"]

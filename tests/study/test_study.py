@@ -1,5 +1,6 @@
 """Studies: what they measure, that they are read again, and what a comparison tells."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -91,11 +92,30 @@ def test_a_study_is_read_as_it_was_written(measured: Study, tmp_path: Path) -> N
     assert record.load(tmp_path / "study.json") == whole
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": 7}', '{"format": 1, "runs": 3}'])
+NO_STUDIES = ["", "[]", "{}", '{"format": 7}', '{"format": 1, "runs": 3}', '{"format": ' + "[" * 100_000]
+
+
+@pytest.mark.parametrize("text", NO_STUDIES, ids=lambda text: text[:30])
 def test_what_is_no_study_is_refused_in_words(text: str, tmp_path: Path) -> None:
     (tmp_path / "no.json").write_text(text)
     with pytest.raises(record.StudyError, match=r"\w"):
         record.load(tmp_path / "no.json")
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("wall_time", "fast"), ("wall_time", None), ("wall_time", 0.0), ("error", True), ("n_u", 9.5), ("status", 1)],
+)
+def test_a_run_of_a_study_with_a_wrong_value_is_refused_by_its_name(measured: Study, name: str, value: object) -> None:
+    document = json.loads(record.as_json(measured))
+    document["runs"][0] = {**document["runs"][0], name: value}
+    with pytest.raises(record.StudyError, match=f"{name}: got {value!r}. Allowed: "):
+        record.from_document(document)
+
+
+def test_a_study_without_a_machine_is_refused(measured: Study) -> None:
+    with pytest.raises(record.StudyError, match="no study"):
+        record.from_document({**record.to_document(measured), "machine": None})
 
 
 def changed(study: Study, **by: float) -> Study:
@@ -166,6 +186,9 @@ def test_a_grid_without_room_is_noted_and_the_rest_is_measured() -> None:
         ({"effects": {"odd": {"drag": "maybe"}}}, "effects.drag"),
         ({"parts": ("all",)}, "parts"),
         ({"judge": "me"}, "judge"),
+        ({"grids": ((9, 13), (9, 13))}, "grids"),
+        ({"methods": ("march", "march")}, "methods"),
+        ({"methods": ("march",), "deltas": (1e-5, 1e-6)}, "deltas"),
         ({"grids": tuple((n, 13) for n in range(5, 129)), "deltas": tuple(np.geomspace(1e-9, 1e-3, 20))}, "scenes"),
     ],
 )

@@ -1,0 +1,105 @@
+"""What commands read and write: files, and standard input and output by the name "-"."""
+
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TextIO
+
+from app.commands.errors import FAILED, CommandError
+from dlocore.files import write_whole
+
+STANDARD = "-"
+
+
+def read_input(path: str) -> bytes:
+    """Read a file, "-" for standard input."""
+    if path == STANDARD:
+        if sys.stdin is None:
+            raise CommandError("standard input is closed")
+        return sys.stdin.buffer.read()
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise CommandError(f"can't read {path}: {error.strerror}") from None
+
+
+def check_outputs(
+    outputs: Mapping[str, str | None], inputs: Sequence[str] = (), folders: Mapping[str, str | None] | None = None
+) -> None:
+    """Refuse outputs that can't be written, or overwrite each other or an input, before any work is done for them.
+
+    Args:
+        outputs: files by the option that asks for them, None where it does not.
+        inputs: files that are read.
+        folders: likewise, folders that are made where they are missing.
+    """
+    taken = {str(Path(path).resolve()): "the input" for path in inputs if path != STANDARD}
+    for option, path in outputs.items():
+        if path is None:
+            continue
+        if path == STANDARD and sys.stdout is None:
+            raise CommandError(f"{option}: standard output is closed", FAILED)
+        if path != STANDARD:
+            _check_file(path)
+        own = path == STANDARD or not Path(path).exists() or Path(path).is_file()  # a device takes all there is
+        place = path if path == STANDARD else str(Path(path).resolve())
+        if own and place in taken:
+            raise CommandError(f"{option}: got {path}. Allowed: a file of its own, not that of {taken[place]}.")
+        taken[place] = option
+    for path in (folders or {}).values():
+        if path is not None:
+            _check_folder(path)
+
+
+def _check_file(path: str) -> None:
+    file = Path(path)
+    if path == "":
+        raise CommandError("an output needs a name", FAILED)
+    if file.is_dir():
+        raise _unwritable(path, "Is a directory")
+    if not file.parent.exists():
+        raise _unwritable(path, f"there is no folder {file.parent}")
+    if not file.parent.is_dir():
+        raise _unwritable(path, f"{file.parent} is no folder")
+    if not os.access(file if file.exists() else file.parent, os.W_OK):
+        raise _unwritable(path, "Permission denied")
+
+
+def _check_folder(path: str) -> None:
+    folder = Path(path)
+    made = next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
+    if path == "":
+        raise CommandError("an output needs a name", FAILED)
+    if not made.is_dir():
+        raise _unwritable(path, f"{made} is no folder")
+    if not os.access(made, os.W_OK):
+        raise _unwritable(path, "Permission denied")
+
+
+def _unwritable(path: str, reason: str | None) -> CommandError:
+    return CommandError(f"can't write {path}: {reason}", FAILED)
+
+
+def write_output(path: str, content: bytes) -> None:
+    """Write a file, whole or not at all; "-" for standard output."""
+    try:
+        if path == STANDARD:
+            sys.stdout.buffer.write(content)
+            sys.stdout.buffer.flush()
+        else:
+            write_whole(Path(path), content)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise _unwritable("standard output" if path == STANDARD else path, error.strerror) from None
+
+
+def for_people(*outputs: str | None) -> TextIO:
+    """Return where to print a table: beside what goes to standard output, if anything does, it would be no data."""
+    return sys.stderr if STANDARD in outputs else sys.stdout
+
+
+def shows_progress() -> bool:
+    """Tell whether someone watches standard error."""
+    return sys.stderr is not None and sys.stderr.isatty()
