@@ -25,8 +25,8 @@ _EPILOG = """examples:
   dlo validate DATASET                  fit and predict published measurements
 
 Settings come from the environment, e.g. DLO_PORT=9000, DLO_DATA_DIR=/srv/dlo, DLO_WORKERS=4."""
-_EXIT = """exit codes: 0 converged; 1 an output can't be written; 2 bad input, named on stderr; 3 not converged (the output
-is still written)"""
+_EXIT = """exit codes: 0 converged; 1 an output can't be written; 2 bad input, named on stderr;
+3 not converged (the output is still written)"""
 
 READER_LEFT = 128 + 13  # exit code, as a shell gives it to what a closed pipe ends
 
