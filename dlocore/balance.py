@@ -109,7 +109,7 @@ def _motion(
     rates, accelerations = (problem.rates(x[..., :3], x[..., 3]) for x in moved[1:])
     histories = [grid.past() for _ in at]
     if problem.twist is not None:
-        for history, q, director in zip(histories, states, directors(problem, surface, at), strict=True):
+        for history, q, director in zip(histories, states, directors(problem, surface, at, material), strict=True):
             start_frames(grid.knots, q, grid.tables, director, history.past)
     if material is not None:
         for q, history, t in zip(states, histories, at, strict=True):

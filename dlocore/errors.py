@@ -46,7 +46,7 @@ class Cancelled(DloError):  # noqa: N818 - named for what happened
 
 
 def _shorten(value: Any) -> str:
-    if isinstance(value, np.ndarray):
+    if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     text = value if isinstance(value, str) else repr(value)
     return text if len(text) <= 120 else text[:117] + "..."

@@ -66,7 +66,12 @@ def parser() -> argparse.ArgumentParser:
         choices=get_args(Method),
         help="solve by this method instead of the scene's; reference keeps only its target_error, and takes seconds",
     )
-    predict.set_defaults(run=lambda o: commands.predict(o.scene, npz=o.output, json=o.json, rrd=o.rrd, method=o.method))
+    predict.add_argument("--deadline", type=float, metavar="S", help="answer with the best there is after S seconds")
+    predict.set_defaults(
+        run=lambda o: commands.predict(
+            o.scene, npz=o.output, json=o.json, rrd=o.rrd, method=o.method, deadline=o.deadline
+        )
+    )
 
     calibrate = subcommands.add_parser(
         "calibrate",

@@ -86,15 +86,25 @@ def _is_loopback(host: str) -> bool:
         return host == "localhost"
 
 
-def predict(scene: str, *, npz: str | None, json: str | None, rrd: str | None, method: Method | None = None) -> int:
-    """Predict one scene, write what is asked for, and say how it went on stderr."""
+def predict(
+    scene: str,
+    *,
+    npz: str | None,
+    json: str | None,
+    rrd: str | None,
+    method: Method | None = None,
+    deadline: float | None = None,
+) -> int:
+    """Predict one scene, write what is asked for, and say how it went on stderr; within a deadline [s] of the solve."""
+    if deadline is not None and not 0.0 < deadline < math.inf:
+        raise CommandError(f"--deadline: got {deadline:g}. Allowed: a finite number above 0 [s].")
     _check_predict(scene, npz=npz, json=json, rrd=rrd)
     raw = read_input(scene)
     request = _request(raw)
     if method is not None:
         request = _by(request, method)
         raw = request.model_dump_json(exclude_unset=True).encode()
-    prediction = _solve(request)
+    prediction = _solve(request, deadline)
     document = from_prediction(prediction, "", request.output.samples_u, request.output.samples_t)
     del document["links"], document["id"], document["state"]
     if npz is not None:
@@ -251,7 +261,7 @@ def _stored(id: str) -> Any:
     return RunStore(_settings()).motion(id)
 
 
-def _solve(request: PredictionRequest) -> Prediction:
+def _solve(request: PredictionRequest, deadline: float | None) -> Prediction:
     from tqdm import tqdm
 
     from dlocore import predict as solve
@@ -268,7 +278,7 @@ def _solve(request: PredictionRequest) -> Prediction:
             scene = to_scene(request, _stored)
             warm_up()  # so that the reported time is that of the solve
             cost = stored_cost(_settings().calibration_file) if scene.quality.time_budget is not None else None
-            return solve(scene, on_iteration=show, cost=cost)
+            return solve(scene, on_iteration=show, deadline=deadline, cost=cost)
         except SceneError as error:
             raise CommandError(_words([BadField.from_scene_error(error)])) from None
 

@@ -15,6 +15,7 @@ from dlocore.kernels.angles import angles_with
 from dlocore.kernels.basis import spline_values
 from dlocore.kernels.timefit import fit_time
 from dlocore.kernels.twisted import twist_rates
+from dlocore.kernels.twisted_rows import DIRECTOR, FRAME, TANGENT
 from dlocore.problem.discretisation import axial_strain, start_director
 from dlocore.problem.grid import Grid
 from dlocore.problem.problem import Problem
@@ -138,7 +139,7 @@ def material_of(
         natural = np.zeros((memory.shape[1], 3))
         natural[:, 0] = grid.history.memory[:, 1]
     else:
-        directors = carried(start_director(problem), tangents)[kept]
+        directors = carried(_first_director(problem, grid, tangents[0]), tangents)[kept]
         sections, natural = memory[kept], grid.history.memory[:, 3:]
     u = np.array(grid.tables.curvature_u)
     stretch = np.array([np.interp(u, grid.tables.axial_u, row) for row in axial[kept]])
@@ -155,9 +156,30 @@ def stretch_of(grid: Grid, times: Floats, states: Floats) -> StretchMotion:
     return StretchMotion(times=times[kept], u=np.array(grid.tables.axial_u), strain=strain)
 
 
-def directors(problem: Problem, surface: SplineSurface, times: Floats) -> Floats:
-    """Return the directors (k, 3) of the section at u = 0, where its theta is zero, at `times` (k,) [s]."""
+def _first_director(problem: Problem, grid: Grid, tangent: Floats) -> Floats:
+    """Return the director (3,) at u = 0, of the section where its theta is zero, as a motion begins along `tangent`.
+
+    The frames of a start that has settled were carried along with the cable, each by itself: it is found from that of
+    the first curvature point, and by how much they are twisted on the way to it.
+    """
+    if not problem.scene.shape.settle:
+        return start_director(problem)
+    past, (u, after) = grid.history.past, grid.tables.curvature_u[:2]
+    director = transported(past[0, TANGENT : TANGENT + 3], tangent, past[0, DIRECTOR : DIRECTOR + 3])
+    rate = past[0, FRAME] - 0.5 * u * (past[1, FRAME] - past[0, FRAME]) / (after - u)  # half-way
+    return np.asarray(np.cos(rate * u) * director - np.sin(rate * u) * np.cross(tangent, director))
+
+
+def directors(problem: Problem, surface: SplineSurface, times: Floats, material: MaterialMotion | None) -> Floats:
+    """Return the directors (k, 3) of the section at u = 0, where its theta is zero, at `times` (k,) [s].
+
+    Where the `material` of the motion is not known it begins with that of the given start, which settles in one turn.
+    """
     spans = np.unique(surface.knots_t)
     fine = np.unique(np.concatenate([np.linspace(a, b, 9) for a, b in pairwise(spans)] + [times]))
     tangents = unit(surface([0.0], fine, du=1)[:, 0, :3])
-    return carried(start_director(problem), tangents)[np.searchsorted(fine, times)]
+    if material is None:
+        first = transported(unit(problem.start(0.0, 1)[0]), tangents[0], start_director(problem))
+    else:
+        first = material.director[0]
+    return carried(first, tangents)[np.searchsorted(fine, times)]

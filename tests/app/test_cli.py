@@ -250,6 +250,15 @@ def test_an_interrupt_while_it_still_starts_is_one(tmp_path: Path) -> None:
     assert done.stderr == ""
 
 
+def test_a_deadline_ends_a_solve(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    long = written(tmp_path, {**paper_scene(quality={"target_error": 1e-6}), "horizon": 500.0})
+    assert main(["predict", long, "--deadline", "0.5"]) == 3
+    assert capsys.readouterr().err.startswith("time_limit: ")
+    for bad in ("0", "-1", "nan", "inf"):
+        assert main(["predict", long, "--deadline", bad]) == 2
+        assert f"--deadline: got {bad}. Allowed: a finite number above 0 [s]." in capsys.readouterr().err
+
+
 def test_a_name_that_is_given_twice_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "scene.json").write_text('{"cable": {"preset": "paper"}, "cable": {"preset": "black-wire"}}')
     assert main(["predict", str(tmp_path / "scene.json")]) == 2

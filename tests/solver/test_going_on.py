@@ -22,6 +22,7 @@ from dlocore import (
     Scene,
     SceneError,
     Straight,
+    energies,
     predict,
 )
 from dlocore.problem.discretisation import axial_strain, corners
@@ -139,6 +140,33 @@ def test_the_spin_of_the_sections_is_that_of_the_march(wire: Prediction, t: floa
     assert curve.theta_rate is not None
     assert np.abs(curve.spin_at(u) - curve.theta_rate(u)[:, 0]).max() > 3.0  # [rad/s], of the frame
     np.testing.assert_allclose(curve.spin_at(u), marched, atol=0.3)
+
+
+def test_sections_that_were_turned_as_the_start_settled_go_on_turned() -> None:
+    # a coil that a clamp holds near its end uncoils under its weight: at the other end the tangent turns by 42 degrees
+    s = np.linspace(0.0, 1.0, 61)[:, None]
+    coil = np.concatenate([0.12 * np.cos(7.0 * s), 0.12 * np.sin(7.0 * s), 0.5 * s], axis=1)
+    whole = predict(
+        Scene(
+            cable=Cable(length=1.0, diameter=0.006, linear_density=0.05, bending_stiffness=1e-3, rest_shape="initial"),
+            shape=Points(points=coil, settle=True),
+            grasps=(Grasp(u=0.8, hold="clamp", path=Move(displacement=(0.05, 0.1, 0.0), duration=0.4)),),
+            horizon=0.7,
+            environment=Environment(drag=0.2),
+            quality=Quality(target_error=2e-3),
+        )
+    )
+    given = start_curve(whole.scene.shape, 1.0)(0.0, 1)[0]
+    settled = whole.surface([0.0], [0.0], du=1)[0, 0, :3]
+    assert np.degrees(np.arccos(given @ settled / np.linalg.norm(given) / np.linalg.norm(settled))) > 40.0
+    part = rest(whole, 0.4)
+    assert part.status == "converged"
+    assert apart(whole, 0.4, part) < (whole.accuracy.error_estimate or 0.0) + (part.accuracy.error_estimate or 0.0)
+    found = energies(whole.scene, whole.surface, [0.4], whole.material)
+    assert found["bend"][0] + found["twist"][0] + found["stretch"][0] == pytest.approx(part.start_energy, rel=0.02)
+    assert whole.material is not None
+    without = energies(whole.scene, whole.surface, [0.4])  # about, as the way on which it settled is not known
+    assert without["bend"][0] == pytest.approx(found["bend"][0], rel=0.1)
 
 
 def test_the_strain_of_a_start_is_that_of_the_tension_that_its_weight_calls_for() -> None:
