@@ -6,6 +6,9 @@ the markers with a `.json` of the same name beside it.
 
 import csv
 import json
+import zipfile
+import zlib
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,12 +17,14 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dlocore.errors import SceneError, array, number
+from dlocore.errors import SceneError, array, number, within
+from dlocore.words import counted
 
 Floats = NDArray[np.float64]
 
 PAIR = 0.06  # of the length: two held neighbours at an end, nearer than this to each other, are one clamp
 LEAST_SEEN = 0.2  # of the frames in which each marker must be seen
+LEAST_FRAMES = 10  # of a motion
 _FACTS = ("u", "held", "length", "diameter", "linear_density", "gravity", "static", "name")
 
 
@@ -75,9 +80,13 @@ class Recording:
         times = array("times", self.times, shape=(None,), unit="s")
         if not (np.diff(times) > 0).all():
             k = int(np.argmin(np.diff(times)))
-            raise SceneError(f"times[{k + 1}]", times[k + 1], "rising times [s]")
-        if not self.static and len(times) < 10:
-            raise SceneError("times", f"{len(times)} frames", "at least 10 frames of a motion")
+            raise SceneError(f"times[{k + 1}]", float(times[k + 1]), "rising times [s]")
+        for name, kind, allowed in (("static", bool | np.bool_, "true or false"), ("name", str, "text")):
+            if not isinstance(getattr(self, name), kind):
+                raise SceneError(name, repr(getattr(self, name)), allowed)
+        put("static", bool(self.static))
+        if not self.static and len(times) < LEAST_FRAMES:
+            raise SceneError("times", counted(len(times), "frame"), f"at least {LEAST_FRAMES} frames of a motion")
         put("times", times)
         put("markers", _markers(self.markers, len(times)))
         count = cast(Floats, self.markers).shape[1]
@@ -98,6 +107,11 @@ class Recording:
         """Return coordinates from the median distances of neighbours, from 0 at the first marker."""
         distance = np.linalg.norm(np.diff(cast(Floats, self.markers), axis=1), axis=2)
         return np.concatenate([[0.0], np.cumsum(np.nanmedian(distance, axis=0))])
+
+    @property
+    def place(self) -> str:
+        """The path of its fields in errors."""
+        return f"recordings[{self.name!r}]"
 
     @property
     def duration(self) -> float:
@@ -132,14 +146,28 @@ class Recording:
         return tuple(found)
 
     def part(self, begin: float, end: float) -> "Recording":
-        """Return the frames from `begin` to `end` [s], counted from the first frame."""
+        """Return the frames from `begin` to `end` [s], counted from the first frame.
+
+        Raises:
+            SceneError: they are too few for a motion.
+        """
         times = cast(Floats, self.times)
         inside = (times >= times[0] + begin - 1e-9) & (times <= times[0] + end + 1e-9)
+        if not self.static and inside.sum() < LEAST_FRAMES:
+            given = f"{counted(int(inside.sum()), 'frame')} between {begin:.6g} and {end:.6g} s"
+            reason = f"Frames are up to {np.diff(times).max():.3g} s apart: times in another unit than s, or a pause"
+            raise SceneError("times", given, f"at least {LEAST_FRAMES} frames in every window of a motion", reason)
         return replace(self, times=times[inside], markers=cast(Floats, self.markers)[inside])
 
 
 def _markers(value: ArrayLike, frames: int) -> Floats:
-    markers = np.array(value, dtype=float)
+    try:
+        raw = np.asarray(value)
+    except ValueError:
+        raise SceneError("markers", "rows that differ in length", "as many markers in every frame") from None
+    if raw.dtype.kind not in "fiu":
+        raise SceneError("markers", f"{raw.dtype}", "numbers [m], NaN where a marker was lost")
+    markers = np.array(raw, dtype=float)
     if markers.ndim != 3 or markers.shape[0] != frames or markers.shape[2] not in (2, 3) or markers.shape[1] < 3:
         raise SceneError("markers", f"shape {markers.shape}", f"({frames}, at least 3 markers, 2 or 3) [m]")
     if np.isinf(markers).any() or not np.nanmax(np.abs(markers), initial=0.0) < 1e5:
@@ -214,46 +242,94 @@ def recording_of(times: ArrayLike, markers: ArrayLike, facts: Mapping[str, Any])
     return Recording(times=times, markers=markers, **{**facts, "held": tuple(held)})
 
 
-def _from_npz(path: Path) -> Recording:
+def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a `.npz`.
+
+    Raises:
+        SceneError: it is none, or damaged, or holds objects.
+        OSError: it can't be read.
+    """
+    allowed = "a NumPy .npz file of numbers and text"
+    with path.open("rb") as file:
+        if not zipfile.is_zipfile(file):
+            raise SceneError(path.name, "no archive, or one whose end is missing", allowed)
+        file.seek(0)
+        try:
+            data = np.load(file, allow_pickle=False)
+            return {name: np.asarray(data[name]) for name in data.files}
+        except (ValueError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+            raise SceneError(path.name, f"an archive that can't be unpacked: {error}", allowed) from error
+
+
+def read_facts(path: Path) -> dict[str, Any]:
+    """Return the JSON object in a file.
+
+    Raises:
+        SceneError: it holds none, or says something twice.
+        OSError: it can't be read.
+    """
     try:
-        with np.load(path, allow_pickle=False) as data:
-            arrays = {name: data[name] for name in data.files}
-    except (ValueError, EOFError) as error:
-        raise SceneError("recording", path.name, "a NumPy .npz file") from error
+        return _json(path.read_text(encoding="utf-8-sig"), path.name)
+    except UnicodeDecodeError as error:
+        raise SceneError(path.name, str(error), "text in UTF-8") from None
+
+
+def _from_npz(path: Path) -> Recording:
+    arrays = read_arrays(path)
     missing = [name for name in ("times", "markers") if name not in arrays]
     if missing:
-        raise SceneError(
-            missing[0], sorted(arrays), "the arrays times (k,) and markers (k, m, 2 or 3)", "It is missing"
-        )
-    facts = _json(str(arrays["about"]), path.name) if "about" in arrays else {}
-    facts.setdefault("name", path.stem)
-    return recording_of(arrays["times"], arrays["markers"], facts)
+        allowed = "the arrays times (k,) and markers (k, m, 2 or 3)"
+        raise SceneError(f"recordings[{path.name!r}].{missing[0]}", sorted(arrays), allowed, "It is missing")
+    facts = _json(str(arrays["about"]), f"{path.name}, about") if "about" in arrays else {}
+    return _of_file(path, arrays["times"], arrays["markers"], facts)
 
 
 def _from_csv(path: Path) -> Recording:
-    """Read rows of time, then x, y (and z) of each marker; an empty cell or `nan` is a lost marker."""
+    """Read rows of time, then x, y (and z) of each marker; an empty cell or `nan` is a lost marker.
+
+    A first row without a number names the columns.
+    """
+    rows = _rows(path)
     beside = path.with_suffix(".json")
-    facts = _json(beside.read_text(), beside.name) if beside.exists() else {}
-    facts.setdefault("name", path.stem)
-    dimensions = 2 if facts.pop("dimensions", 3) == 2 else 3
-    with path.open(newline="") as file:
-        rows = [row for row in csv.reader(file) if row]
-    if rows and not _is_number(rows[0][0]):
-        rows = rows[1:]  # names of the columns
-    width = len(rows[0]) if rows else 0
+    if not beside.exists():
+        allowed = "a .json of the same name with what is known of it"
+        raise SceneError(path.name, f"no {beside.name} beside it", allowed)
+    facts = read_facts(beside)
+    dimensions = facts.pop("dimensions", 3)
+    if type(dimensions) is not int or dimensions not in (2, 3):
+        raise SceneError(f"recordings[{path.name!r}].dimensions", repr(dimensions), "2 or 3")
+    if rows and not any(_is_number(cell) for cell in rows[0][1]):
+        rows = rows[1:]
+    width = len(rows[0][1]) if rows else 0
     if width < 1 + 3 * dimensions or (width - 1) % dimensions:
-        raise SceneError(
-            "recording", f"{width} columns", f"time and {dimensions} columns for each of 3 markers or more"
-        )
+        allowed = f"time and {dimensions} columns for each of 3 markers or more, between commas"
+        raise SceneError(f"{path.name}, line {rows[0][0]}" if rows else path.name, counted(width, "column"), allowed)
     values = np.empty((len(rows), width))
-    for i, row in enumerate(rows):
+    for i, (line, row) in enumerate(rows):
+        place = f"{path.name}, line {line}"
         if len(row) != width:
-            raise SceneError(f"row {i + 1}", f"{len(row)} columns", f"{width} columns, as in the first row")
+            raise SceneError(place, counted(len(row), "column"), f"{width} columns, as in line {rows[0][0]}")
         try:
             values[i] = [float(cell) if cell.strip() else np.nan for cell in row]
         except ValueError:
-            raise SceneError(f"row {i + 1}", ",".join(row), "numbers, empty where a marker was lost") from None
-    return recording_of(values[:, 0], values[:, 1:].reshape(len(rows), -1, dimensions), facts)
+            wrong = next(cell for cell in row if cell.strip() and not _is_number(cell))
+            raise SceneError(place, wrong, "numbers, empty where a marker was lost") from None
+    return _of_file(path, values[:, 0], values[:, 1:].reshape(len(rows), -1, dimensions), facts)
+
+
+def _rows(path: Path) -> list[tuple[int, list[str]]]:
+    """Return the rows of a `.csv` that are not empty, with the lines of the file on which they end."""
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.reader(file)
+            return [(reader.line_num, row) for row in reader if row]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise SceneError(path.name, str(error), "rows of numbers as text in UTF-8") from None
+
+
+def _of_file(path: Path, times: ArrayLike, markers: ArrayLike, facts: dict[str, Any]) -> Recording:
+    with within(f"recordings[{path.name!r}]"):
+        return recording_of(times, markers, {"name": path.stem, **facts})
 
 
 def _is_number(cell: str) -> bool:
@@ -265,10 +341,18 @@ def _is_number(cell: str) -> bool:
 
 
 def _json(text: str, name: str) -> dict[str, Any]:
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        for key, count in Counter(key for key, _ in pairs).most_common(1):
+            if count > 1:
+                raise SceneError(name, f"{key!r} {count} times", "each name once")
+        return dict(pairs)
+
     try:
-        facts = json.loads(text)
-    except ValueError:
-        raise SceneError("about", name, "JSON") from None
+        facts = json.loads(text, object_pairs_hook=once)
+    except SceneError:
+        raise
+    except (ValueError, RecursionError) as error:
+        raise SceneError(name, str(error), "a JSON object") from None
     if not isinstance(facts, dict):
-        raise SceneError("about", name, "a JSON object")
+        raise SceneError(name, facts, "a JSON object")
     return facts

@@ -50,7 +50,7 @@ def _load(path: str) -> Recording:
 
 def _show(progress: "Progress") -> None:
     values = "  ".join(f"{name} {value:.4g}" for name, value in list(progress.values.items())[:5])
-    print(f"{progress.iteration:>3}  {1e3 * progress.distance:6.2f} mm  {values}", file=sys.stderr, flush=True)
+    print(f"{progress.iteration:>3}  median {1e3 * progress.distance:6.2f} mm  {values}", file=sys.stderr, flush=True)
 
 
 def validate(datasets: list[str], *, fit: int, models: list[str], json: str | None, plots: str | None) -> int:

@@ -1,15 +1,14 @@
 """Published data sets that a user has on disk, as recordings: motion capture of cables, hanging wires."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.errors import SceneError
-from dlocore.recordings import Recording
+from dlocore.errors import SceneError, number, within
+from dlocore.recordings import Recording, read_arrays, read_facts
 
 Floats = NDArray[np.float64]
 
@@ -45,29 +44,34 @@ def load_datasets(paths: list[Path], fit: int = FIT) -> tuple[list[MovedCable], 
     over the first of them, and all others are predicted.
 
     Args:
-        paths: `.npz` files with a `.json` beside each, or folders of them.
+        paths: `.npz` files with a `.json` beside each, or folders of them, of which other files are passed over.
         fit: number of windows of each cable to fit on.
 
     Raises:
-        SceneError: a file is not of a known set, or nothing is there.
+        SceneError: a file is damaged, or a given one is not of a known set, or nothing is there.
+        OSError: a file can't be read.
     """
+    if type(fit) is not int or fit < 1:
+        raise SceneError("fit", fit, "an integer, at least 1")
     files: list[Path] = []
     for path in paths:
         if not path.exists():
             raise SceneError("dataset", str(path), "a file or a folder that exists")
+        if not path.is_dir() and path.suffix != ".npz":
+            raise SceneError("dataset", path.name, "a .npz file, with a .json beside it, or a folder of them")
         files += sorted(path.glob("*.npz")) if path.is_dir() else [path]
     moved: dict[str, list[tuple[Path, Floats, dict[str, Any]]]] = {}
     wires = []
     for file in files:
-        beside = file.with_suffix(".json")
-        facts = json.loads(beside.read_text()) if beside.exists() else {}
-        with np.load(file) as data:
-            markers = np.array(data["markers"], dtype=float) if "markers" in data.files else np.zeros(0)
+        markers, beside = read_arrays(file).get("markers", np.zeros(0)), file.with_suffix(".json")
+        facts = read_facts(beside) if beside.exists() else {}
         if markers.ndim == 4:
-            moved.setdefault(file.stem.split("_")[0], []).append((file, markers, facts))
-        elif markers.ndim == 3 and facts.get("static") and file.stem.endswith("_hang"):
-            wires.append(_wire(file.stem.removesuffix("_hang"), markers, facts))
-        elif len(paths) == len(files):
+            numbers = _numbers(f"{_place(file)}.markers", markers)
+            moved.setdefault(file.stem.split("_")[0], []).append((file, numbers, facts))
+        elif markers.ndim == 3 and facts.get("static") is True and file.stem.endswith("_hang"):
+            with within(_place(file)):
+                wires.append(_wire(file.stem.removesuffix("_hang"), _numbers("markers", markers), facts))
+        elif file in paths:
             raise SceneError("dataset", file.name, "markers (windows, frames, markers, 3), or shapes of a hanging wire")
     cables = [_moved(name, parts, fit) for name, parts in moved.items()]
     if not cables and not wires:
@@ -82,19 +86,34 @@ def _moved(name: str, parts: list[tuple[Path, Floats, dict[str, Any]]], fit: int
         raise SceneError("fit", fit, f"fewer than the {len(markers)} windows of {first.name}")
     chosen = np.unique(np.linspace(0, len(markers), fit, endpoint=False).astype(int))
     u = _coordinates(markers[chosen])
-    held = tuple(int(i) for i in facts.get("held_markers", (0, 1, -2, -1)))
+    held = facts.get("held_markers", [0, 1, -2, -1])
+    if not isinstance(held, list):
+        raise SceneError(f"{_place(first)}.held_markers", held, "a list of markers' numbers")
 
     def recording(part: tuple[Path, Floats, dict[str, Any]], window: int) -> Recording:
         path, x, about = part
-        number = about.get("windows", list(range(len(x))))[window]
-        times = 0.01 * np.arange(x.shape[1])
-        density = float(about.get("nominal_linear_density", 0.04))
-        label = f"{path.stem} {number}"
-        return Recording(times=times, markers=x[window], u=u, held=held, linear_density=density, name=label)
+        with within(_place(path)):
+            numbers = about.get("windows", list(range(len(x))))
+            if not isinstance(numbers, list) or len(numbers) != len(x):
+                raise SceneError("windows", numbers, f"a list of the numbers of its {len(x)} windows")
+            times = 0.01 * np.arange(x.shape[1])
+            density = number("nominal_linear_density", about.get("nominal_linear_density", 0.04), above=0.0)
+            label = f"{path.stem} {numbers[window]}"
+            return Recording(times=times, markers=x[window], u=u, held=tuple(held), linear_density=density, name=label)
 
     test = [recording(parts[0], i) for i in range(len(markers)) if i not in chosen]
     test += [recording(part, i) for part in parts[1:] for i in range(len(part[1]))]
     return MovedCable(name=name, fit=tuple(recording(parts[0], int(i)) for i in chosen), test=tuple(test))
+
+
+def _place(file: Path) -> str:
+    return f"datasets[{file.name!r}]"
+
+
+def _numbers(field: str, markers: NDArray[Any]) -> Floats:
+    if markers.dtype.kind not in "fiu" or 0 in markers.shape or markers.shape[-2] < 3:
+        raise SceneError(field, f"{markers.dtype} {markers.shape}", "numbers [m] of 3 markers or more")
+    return np.array(markers, dtype=float)
 
 
 def _coordinates(markers: Floats) -> Floats:
@@ -103,7 +122,12 @@ def _coordinates(markers: Floats) -> Floats:
 
 
 def _wire(name: str, markers: Floats, facts: dict[str, Any]) -> HangingWire:
-    length = float(facts["length_m"])
+    length = number("length_m", facts.get("length_m"), above=0.0, unit="m")
+    density = number("linear_density_kg_per_m", facts.get("linear_density_kg_per_m"), above=0.0, unit="kg/m")
+    published = facts.get("bend_stiffness_EI_identified_Nm2", {})
+    if not isinstance(published, dict):
+        raise SceneError("bend_stiffness_EI_identified_Nm2", published, 'an object with a "mean"')
+    mean = published.get("mean")
     u = _coordinates(markers[None])
     recording = Recording(
         times=np.arange(len(markers), dtype=float),
@@ -112,9 +136,10 @@ def _wire(name: str, markers: Floats, facts: dict[str, Any]) -> HangingWire:
         held=(0, 1, -2, -1),
         length=length,
         diameter=facts.get("diameter_m"),
-        linear_density=float(facts["linear_density_kg_per_m"]),
+        linear_density=density,
         static=True,
         name=name,
     )
-    published = cast(dict[str, Any], facts.get("bend_stiffness_EI_identified_Nm2", {})).get("mean")
-    return HangingWire(name=name, recording=recording, published_bending_stiffness=published)
+    if mean is not None:
+        mean = number("bend_stiffness_EI_identified_Nm2.mean", mean, above=0.0, unit="N m^2")
+    return HangingWire(name=name, recording=recording, published_bending_stiffness=mean)

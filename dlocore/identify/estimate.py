@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.errors import SceneError
+from dlocore.errors import SceneError, within
 from dlocore.identify.candidate import Candidate
 from dlocore.identify.identification import Identification, Progress
 from dlocore.identify.intervals import assess
@@ -17,7 +17,7 @@ from dlocore.identify.replay import Resolution
 from dlocore.identify.search import Search, robust_deviation
 from dlocore.recordings import Recording
 from dlocore.scene.cable import Cable
-from dlocore.scene.scene import Environment
+from dlocore.scene.scene import MAX_N_U, Environment
 
 Floats = NDArray[np.float64]
 
@@ -27,6 +27,8 @@ _MOST_SHORT = 8  # of them
 _COARSE = 13  # control points that they are replayed with at most
 _STIFFNESSES = 0.1, 0.3, 3.0, 10.0  # times the given one, that are tried first
 _BEGINNING = 4  # iterations on them
+_LEAST_N_U = 5  # as of a scene's grid
+_DENSITY = 0.04  # [kg/m] of a cable whose recordings tell none
 
 
 def identify(
@@ -64,6 +66,9 @@ def identify(
     began = perf_counter()
     if not recordings:
         raise SceneError("recordings", [], "at least one recording")
+    resolution = resolution or Resolution()
+    if type(resolution.n_u) is not int or not _LEAST_N_U <= resolution.n_u <= MAX_N_U:
+        raise SceneError("n_u", resolution.n_u, f"an integer, {_LEAST_N_U} to {MAX_N_U}")
     windows = cut(recordings, window)
     clamps = max(sum(h.towards is not None for h in r.holds) for r in windows)
     free = sorted({int(i) for r in windows for i in r.free})
@@ -71,12 +76,19 @@ def identify(
     given = start or Candidate(cable=cable or cable_of(recordings), environment=environment or Environment())
     markers = max(cast(Floats, r.markers).shape[1] for r in windows)
     candidate = prepared(given, tuple(p.name for p in chosen), clamps, markers)
-    resolution = resolution or Resolution()
     if start is None:
         candidate = _begun(recordings, candidate, chosen, resolution, cancelled)
     search = Search(windows, chosen, resolution, cancelled)
     state = search.run(candidate, iterations, on_progress)
-    return assess(search, state, perf_counter() - began)
+    found = assess(search, state, perf_counter() - began)
+    known = cable is not None or any(r.linear_density is not None for r in recordings)
+    if known or "linear_density" in names:
+        return found
+    assumed = (
+        f"The recordings tell no linear density: {given.cable.linear_density:g} kg/m is assumed, and stiffnesses, "
+        "damping and drag are in proportion to it."
+    )
+    return replace(found, message=f"{found.message} {assumed}")
 
 
 def _begun(
@@ -133,23 +145,28 @@ def cable_of(recordings: Sequence[Recording]) -> Cable:
 
     The axial stiffness is that of a cable that nothing stretches.
     """
-    first = recordings[0]
+    density = next((r.linear_density for r in recordings if r.linear_density is not None), _DENSITY)
     return Cable(
-        length=cast(float, first.length),
-        diameter=first.diameter or 0.005,
-        linear_density=first.linear_density or 0.04,
-        bending_stiffness=1e-3 * (first.linear_density or 0.04) / 0.04,
-        axial_stiffness=500.0 * (first.linear_density or 0.04) / 0.04,
+        length=cast(float, recordings[0].length),
+        diameter=next((r.diameter for r in recordings if r.diameter is not None), 0.005),
+        linear_density=density,
+        bending_stiffness=1e-3 * density / _DENSITY,
+        axial_stiffness=500.0 * density / _DENSITY,
         bending_damping=2e-4,
     )
 
 
 def cut(recordings: Sequence[Recording], window: float) -> list[Recording]:
-    """Return the recordings in windows of about `window` seconds."""
+    """Return the recordings in windows of about `window` seconds.
+
+    Raises:
+        SceneError: a window has too few frames.
+    """
     out = []
     for recording in recordings:
         parts = 1 if recording.static else max(1, round(recording.duration / window))
-        for i in range(parts):
-            width = recording.duration / parts
-            out.append(recording if parts == 1 else recording.part(i * width, (i + 1) * width))
+        with within(recording.place):
+            for i in range(parts):
+                width = recording.duration / parts
+                out.append(recording if parts == 1 else recording.part(i * width, (i + 1) * width))
     return out

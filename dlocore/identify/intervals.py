@@ -14,7 +14,7 @@ from dlocore.identify.rest import Rest
 from dlocore.identify.search import Search, State, robust_deviation, weights
 from dlocore.identify.tracks import noise_of_free
 from dlocore.spline import DEGREE
-from dlocore.words import in_mm
+from dlocore.words import counted, in_mm
 
 Floats = NDArray[np.float64]
 
@@ -78,7 +78,8 @@ def assess(search: Search, state: State, seconds: float) -> Identification:
         )
         for replay, played in zip(search.replays, state.played, strict=True)
     )
-    message = " ".join([_message(state, estimated, correlations), *_doubts(search, deviation, spread_by_noise)])
+    doubts = _doubts(search, state, deviation, spread_by_noise)
+    message = " ".join([_message(state, estimated, correlations), *doubts])
     return Identification(
         status=state.status,
         message=message,
@@ -187,11 +188,11 @@ def _estimated(
     )
 
 
-def _doubts(search: Search, deviation: float, by_noise: float) -> list[str]:
+def _doubts(search: Search, state: State, deviation: float, by_noise: float) -> list[str]:
     """Return in words why intervals may not hold.
 
     Args:
-        search: that has ended.
+        search, state: that has ended, and where.
         deviation: robust deviation of the residuals [m].
         by_noise: by which noise of the held markers and the start moves the prediction [m]; infinite where not known.
     """
@@ -205,7 +206,8 @@ def _doubts(search: Search, deviation: float, by_noise: float) -> list[str]:
     if not deviation > _UNEXPLAINED * explained:
         return []
     return [
-        f"The markers are missed by {in_mm(deviation)}, {deviation / explained:.2g} times what noise explains:",
+        f"The free markers are missed by {in_mm(search.distance(state), 3)} in the median,",
+        f"{deviation / explained:.2g} times what noise explains:",
         "the model lacks something, or another cable meets them better. Intervals tell of noise alone.",
     ]
 
@@ -213,7 +215,8 @@ def _doubts(search: Search, deviation: float, by_noise: float) -> list[str]:
 def _message(state: State, estimated: tuple[Estimated, ...], correlations: Floats) -> str:
     """Return in words how the search ended, and what it does not tell."""
     done = "Converged" if state.status == "converged" else "Stopped without converging"
-    parts = [f"{done} in {state.iterations} iterations."]
+    why = ", as no step betters the fit: near values of the parameters make the prediction jump, or fail"
+    parts = [f"{done} in {counted(state.iterations, 'iteration')}{why if state.stuck else ''}."]
     parts += [e.statement for e in estimated if not e.identifiable]
     n = len(estimated)
     tied = [(i, j) for i in range(n) for j in range(i) if abs(correlations[i, j]) > 0.95]

@@ -7,7 +7,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.errors import Cancelled, SceneError
+from dlocore.errors import Cancelled, SceneError, within
 from dlocore.identify.candidate import Candidate
 from dlocore.identify.identification import Progress, Status
 from dlocore.identify.parameters import Parameter
@@ -29,13 +29,14 @@ _CONVERGED = 1e-3  # relative decrease of the cost
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Where the search stands: candidate, replays of it, residuals."""
+    """Where the search stands: candidate, replays of it, residuals; stuck: no step did what the slope promised."""
 
     candidate: Candidate
     played: list[Played | Settled]
     residuals: list[Floats]
     status: Status = "max_iterations"
     iterations: int = 0
+    stuck: bool = False
     derivatives: list[Floats] | None = None
 
 
@@ -55,9 +56,9 @@ class Search:
 
     def replay(self, window: Recording, shake: np.random.Generator | None = None) -> Replay | Rest:
         """Return what replays a window, or its shape at rest; with `shake` from other noise of what is held."""
-        if window.static:
-            return Rest(window, self.resolution, self.references, shake)
-        return Replay(window, self.resolution, self.references, shake)
+        kind = Rest if window.static else Replay
+        with within(window.place):
+            return kind(window, self.resolution, self.references, shake)
 
     def check(self) -> None:
         """Raise Cancelled where the search was cancelled."""
@@ -69,7 +70,7 @@ class Search:
     ) -> State:
         """Return the best candidate found from the given one, and its derivatives."""
         state = self.play(candidate)
-        damping, status, done = 1e-3, cast(Status, "max_iterations"), 0
+        damping, status, done, stuck = 1e-3, cast(Status, "max_iterations"), 0, False
         even = np.array([not p.logarithmic for p in self.chosen])
         for done in range(1, iterations + 1):
             r = np.concatenate(state.residuals)
@@ -79,7 +80,7 @@ class Search:
             x = self.coordinates(state.candidate)
             H, g = self._normal(J, r, deviation, x)
             before = self.cost(r, deviation, x)
-            free = self._free(x, g)
+            free = self._free(x, H, g)
             found: State | None = None
             after, hoped = before, 0.0
             for _ in range(6):
@@ -101,19 +102,20 @@ class Search:
                     break
                 damping = max(10.0 * damping, 1e-2)
             if found is None:  # no better one is near; where much was hoped for, that is no minimum
-                status = "converged" if hoped < _HOPED * before else "max_iterations"
+                stuck = hoped >= _HOPED * before
+                status = "max_iterations" if stuck else "converged"
                 break
             damping = max(0.2 * damping, 1e-7)
             state = found
             if on_progress is not None:
                 values = {p.name: p.get(state.candidate) for p in self.chosen}
-                on_progress(Progress(iteration=done, distance=self._distance(state), values=values))
+                on_progress(Progress(iteration=done, distance=self.distance(state), values=values))
             if before - after < _CONVERGED * before:
                 status = "converged"
                 break
         if state.derivatives is None:
             state = replace(state, derivatives=self.derivatives(state))
-        return replace(state, status=status, iterations=done)
+        return replace(state, status=status, iterations=done, stuck=stuck)
 
     def play(self, candidate: Candidate) -> State:
         """Return all windows replayed with a candidate."""
@@ -121,7 +123,8 @@ class Search:
         residuals = []
         for replay in self.replays:
             self.check()
-            one = replay.play(candidate)
+            with within(replay.recording.place):
+                one = replay.play(candidate)
             played.append(one)
             residuals.append(self._residuals(replay, one.predicted))
         return State(candidate, played, residuals)
@@ -200,10 +203,10 @@ class Search:
         least = [-np.inf if p.logarithmic else p.least / p.scale for p in self.chosen]
         return np.maximum(x, least)
 
-    def _free(self, x: Floats, g: Floats) -> NDArray[np.int64]:
-        """Return the parameters that are not held at their bound."""
+    def _free(self, x: Floats, H: Floats, g: Floats) -> NDArray[np.int64]:
+        """Return the parameters that change what was measured, or have a prior, and are not held at their bound."""
         held = [not p.logarithmic and x[j] <= p.least / p.scale and g[j] > 0 for j, p in enumerate(self.chosen)]
-        return np.flatnonzero(~np.array(held))
+        return np.flatnonzero((np.diag(H) > 0.0) & ~np.array(held))
 
     def _normal(self, J: Floats, r: Floats, deviation: float, x: Floats) -> tuple[Floats, Floats]:
         """Return the normal matrix and gradient of the cost."""
@@ -230,7 +233,9 @@ class Search:
         """Return the robust cost of residuals."""
         return float((np.sqrt(1.0 + (r / (_KNEE * deviation)) ** 2) - 1.0).sum()) * _KNEE**2
 
-    def _distance(self, state: State) -> float:
+    @staticmethod
+    def distance(state: State) -> float:
+        """Return the median distance of the free markers from their predictions [m]."""
         found = [np.linalg.norm(r.reshape(-1, 3), axis=1) for r in state.residuals]
         every = np.concatenate(found)
         return float(np.median(every[every > 0.0]))

@@ -105,8 +105,7 @@ class StartFit:
         springs = stiffness * np.kron(rows.free.T @ (B.T @ B) @ rows.free, np.eye(3))
         Z = np.kron(rows.free, np.eye(3))
         if guess is None:
-            middle = greville(knots)
-            guess = np.column_stack([np.interp(middle, u, markers[:, d]) for d in range(3)])
+            guess = _along(greville(knots), u, markers)
         C = np.vstack([design_matrix(knots, [at], order) for at, order in self.held]) if self.held else np.zeros((0, n))
         q = guess + rows.offset @ (targets - C @ guess)
 
@@ -174,6 +173,15 @@ def start_fit(length: float, n_u: int, held: tuple[tuple[float, int], ...]) -> S
     cable = Cable(length=length, diameter=0.01 * length, linear_density=1.0, bending_stiffness=1.0)
     straight = Scene(cable=cable, shape=Straight(), grasps=grasps, horizon=1.0, effects={"twist": "off"})
     return StartFit(make_grid(pose(straight), n_u), held)
+
+
+def _along(at: Floats, u: Floats, markers: Floats) -> Floats:
+    """Return points (n, 3) [m] at coordinates on the polygon of markers, which goes on straight beyond its ends."""
+    out = np.column_stack([np.interp(at, u, markers[:, d]) for d in range(3)])
+    for end, inner, beyond in ((0, 1, u[0] - at), (-1, -2, at - u[-1])):
+        chord = markers[end] - markers[inner]
+        out += np.maximum(beyond, 0.0)[:, None] * chord / max(float(np.linalg.norm(chord)), _TOLERANCE * u[-1])
+    return out
 
 
 def _matrix(first: NDArray[np.int64], values: Floats, n: int) -> Floats:

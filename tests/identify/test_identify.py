@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from dlocore import (
 )
 from dlocore.identify import Candidate, Replay, Resolution, identify
 from dlocore.identify.datasets import load_datasets
+from dlocore.identify.search import Search
 from dlocore.recordings import Recording
 
 FINE = Resolution(n_u=17)
@@ -196,7 +198,7 @@ def test_a_model_that_misses_the_markers_says_so() -> None:
     recording = swung(1.0, 0.05, 1e-2, noise=5e-4)
     wrong = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=5e-2, axial_stiffness=250.0)
     found = identify([recording], wrong, Environment(drag=0.0125), names=("drag",))  # EI, which is wrong, is not sought
-    assert "The markers are missed by" in found.message
+    assert "The free markers are missed by" in found.message
     assert "times what noise explains" in found.message
 
 
@@ -219,3 +221,76 @@ def test_a_motion_that_noise_alone_leads_astray_is_told_of() -> None:
     found = identify([recording], guess, Environment(drag=0.0125), names=("drag",))
     assert "Noise of the held markers and the start alone moves the prediction by" in found.message
     assert "times what noise explains" not in found.message
+
+
+def still(frames: int = 40, step: float = 0.02, **facts: Any) -> Recording:
+    """Return a recording of a cable that hangs still from its first marker."""
+    markers = np.zeros((frames, 6, 3))
+    markers[:, :, 2] = -0.1 * np.arange(6)
+    given: dict[str, Any] = {"held": (0,), "linear_density": 0.05, "name": "still"} | facts
+    return Recording(times=np.arange(frames) * step, markers=markers, **given)
+
+
+def test_of_a_cable_that_hangs_still_nothing_is_told() -> None:
+    found = identify([still()])
+    assert found.status == "converged"
+    assert not any(p.identifiable for p in found.parameters)
+    for p in found.parameters:
+        assert f"{p.name} can't be seen in these recordings" in found.message
+
+
+@pytest.mark.parametrize("density", [None, 0.05])
+def test_a_density_that_was_assumed_is_told_of(density: float | None) -> None:
+    known, unknown = still(name="known", linear_density=density), still(name="unknown", linear_density=None)
+    found = identify([unknown, known], names=("drag",))
+    assert found.cable.linear_density == (density or 0.04)
+    told = "0.04 kg/m is assumed, and stiffnesses, damping and drag are in proportion to it." in found.message
+    assert told is (density is None)
+
+
+@pytest.mark.parametrize("n_u", [100_000, 4, 0, -5, 13.0, True])
+def test_a_number_of_control_points_out_of_range_is_refused(n_u: Any) -> None:
+    with pytest.raises(SceneError) as error:
+        identify([still()], resolution=Resolution(n_u=n_u))
+    assert error.value.field == "n_u"
+
+
+@pytest.mark.parametrize(
+    ("other", "field", "said"),
+    [
+        (still(held=(), name="other"), "recordings['other'].held", "()"),
+        (still(held=(), static=True, name="other"), "recordings['other'].held", "()"),
+        (still(step=1e3, name="other"), "recordings['other'].times", "1 frame between 0 and 5 s"),
+    ],
+)
+def test_the_recording_that_can_not_be_replayed_is_named(other: Recording, field: str, said: str) -> None:
+    with pytest.raises(SceneError) as error:
+        identify([still(), other])
+    assert error.value.field == field
+    assert said in error.value.given
+
+
+def test_frames_too_far_apart_are_named_as_such() -> None:
+    times = np.arange(40) * 0.02
+    times[20:] += 1e6
+    with pytest.raises(SceneError, match=r"Frames are up to 1e\+06 s apart"):
+        identify([replace(still(), times=times)])
+
+
+def test_a_part_of_the_cable_may_be_tracked() -> None:
+    whole = swung(1.0, 0.05, 1e-2, noise=5e-4)
+    part = replace(whole, markers=np.asarray(whole.markers)[:, :7], u=np.asarray(whole.u)[:7])
+    guess = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=0.0147, axial_stiffness=250.0)
+    found = identify([part], guess, Environment(drag=0.01), names=("bending_stiffness", "drag"))
+    assert found.status == "converged"
+    assert found.parameters[0].value == pytest.approx(4.905e-3, rel=0.02)
+    assert found.parameters[1].value == pytest.approx(0.0125, rel=0.02)
+
+
+def test_a_search_that_no_step_betters_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    costs = iter(range(1, 1000))
+    monkeypatch.setattr(Search, "cost", lambda *_: float(next(costs)))
+    start = Candidate(cable=replace(CABLE, bending_stiffness=1e-2), environment=DRAG)
+    found = identify([simulated(3, 1.0, cable=CABLE, environment=DRAG)], names=("drag",), start=start)
+    assert found.status == "max_iterations"
+    assert found.message.startswith("Stopped without converging in 1 iteration, as no step betters the fit")

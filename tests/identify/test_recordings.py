@@ -93,3 +93,110 @@ def test_files_that_are_no_recordings_are_refused(tmp_path: Path) -> None:
     for name in ("a.npz", "b.npz", "c.csv", "d.txt"):
         with pytest.raises((SceneError, OSError)):
             load_recording(tmp_path / name)
+
+
+def rows(first: int = 0) -> list[str]:
+    x = markers()
+    return [f"{t:.3f}," + ",".join(f"{v:g}" for v in frame.ravel()) for t, frame in zip(TIMES, x, strict=True)][first:]
+
+
+def written(folder: Path, lines: list[str], facts: str = '{"held": [0]}', encoding: str = "utf-8") -> Path:
+    (folder / "table.csv").write_text("\n".join(lines), encoding=encoding)
+    (folder / "table.json").write_text(facts, encoding="utf-8")
+    return folder / "table.csv"
+
+
+@pytest.mark.parametrize("head", [[], ["t,x0,y0,z0"], ["", "t,x0,y0,z0"]])
+def test_a_byte_order_mark_costs_no_frame(tmp_path: Path, head: list[str]) -> None:
+    found = load_recording(written(tmp_path, head + rows(), encoding="utf-8-sig"))
+    np.testing.assert_array_equal(np.asarray(found.times), np.round(TIMES, 3))
+
+
+@pytest.mark.parametrize(
+    ("head", "place"),
+    [
+        (["", "t,x0", "", "0,1,2"], "table.csv, line 4"),
+        (["t,x0", *rows()[:3], "", "0.03," + 15 * "a,"], "table.csv, line 6"),
+        (["t,x0", rows()[0].replace("0.000", "zero")], "table.csv, line 2"),
+        (["zero" + rows()[0].removeprefix("0.000")], "table.csv, line 1"),
+    ],
+)
+def test_a_wrong_row_is_named_by_its_line_of_the_file(tmp_path: Path, head: list[str], place: str) -> None:
+    with pytest.raises(SceneError) as error:
+        load_recording(written(tmp_path, [*head, *rows(4)]))
+    assert error.value.field == place
+
+
+@pytest.mark.parametrize(
+    ("facts", "field", "said"),
+    [
+        ('{"dimensions": 4}', "recordings['table.csv'].dimensions", "4"),
+        ('{"dimensions": "3"}', "recordings['table.csv'].dimensions", "'3'"),
+        ('{"dimensions": true}', "recordings['table.csv'].dimensions", "True"),
+        ('{"static": "false"}', "recordings['table.csv'].static", "'false'"),
+        ('{"static": 0}', "recordings['table.csv'].static", "0"),
+        ('{"name": 5}', "recordings['table.csv'].name", "5"),
+        ('{"held": [9]}', "recordings['table.csv'].held[0]", "9"),
+        ('{"held": [0], "held": [1]}', "table.json", "'held' 2 times"),
+        ("[]", "table.json", "[]"),
+        ("{", "table.json", "line 1"),
+        ("[" * 100_000, "table.json", "recursion"),
+    ],
+)
+def test_what_is_wrong_with_the_facts_of_a_table_is_named(tmp_path: Path, facts: str, field: str, said: str) -> None:
+    with pytest.raises(SceneError) as error:
+        load_recording(written(tmp_path, rows(), facts))
+    assert error.value.field == field
+    assert said in error.value.given
+
+
+def test_a_table_without_its_facts_tells_which_file_is_missing(tmp_path: Path) -> None:
+    path = written(tmp_path, rows())
+    path.with_suffix(".json").unlink()
+    with pytest.raises(SceneError, match=r"^table\.csv: got no table\.json beside it"):
+        load_recording(path)
+
+
+def test_text_in_another_encoding_is_refused(tmp_path: Path) -> None:
+    path = written(tmp_path, ["Zeit in µs", *rows()], encoding="latin-1")
+    with pytest.raises(SceneError, match=r"^table\.csv: .*UTF-8"):
+        load_recording(path)
+    written(tmp_path, rows()).with_suffix(".json").write_bytes(b'{"name": "\xb5"}')
+    with pytest.raises(SceneError, match=r"^table\.json: .*UTF-8"):
+        load_recording(path)
+
+
+def damaged(good: bytes, how: str) -> bytes:
+    at = good.index(b"NUMPY") + 200
+    flipped = good[:at] + bytes([good[at] ^ 0xFF]) + good[at + 1 :]
+    return {"cut": good[: len(good) // 2], "flipped": flipped, "empty": b""}[how]
+
+
+@pytest.mark.parametrize("how", ["cut", "flipped", "empty"])
+def test_a_damaged_npz_is_named(tmp_path: Path, how: str) -> None:
+    np.savez(tmp_path / "good.npz", times=TIMES, markers=markers())
+    (tmp_path / "bad.npz").write_bytes(damaged((tmp_path / "good.npz").read_bytes(), how))
+    with pytest.raises(SceneError) as error:
+        load_recording(tmp_path / "bad.npz")
+    assert error.value.field == "bad.npz"
+
+
+def test_an_npz_of_something_else_is_named(tmp_path: Path) -> None:
+    np.save(tmp_path / "one.npy", markers())
+    (tmp_path / "one.npy").rename(tmp_path / "one.npz")
+    np.savez(tmp_path / "objects.npz", times=TIMES, markers=np.array([{}]))
+    np.savez(tmp_path / "words.npz", times=TIMES, markers=markers().astype(str))
+    np.savez(tmp_path / "complex.npz", times=TIMES, markers=markers() + 1j)
+    for name in ("one", "objects", "words", "complex"):
+        with pytest.raises(SceneError) as error:
+            load_recording(tmp_path / f"{name}.npz")
+        assert f"{name}.npz" in error.value.field
+
+
+def test_whether_it_rests_may_be_a_boolean_of_numpy() -> None:
+    assert recording(static=np.bool_(True)).static is True
+
+
+def test_times_that_do_not_rise_are_shown_as_numbers() -> None:
+    with pytest.raises(SceneError, match=r"times\[4\]: got 0\.02\."):
+        recording(times=[*TIMES[:4], 0.02, *TIMES[5:]])
