@@ -18,6 +18,7 @@ from dlocore.kernels.twisted import twist_rates
 from dlocore.kernels.twisted_rows import DIRECTOR, FRAME, TANGENT
 from dlocore.problem.discretisation import axial_strain, start_director
 from dlocore.problem.grid import Grid
+from dlocore.problem.plane import turned_about
 from dlocore.problem.problem import Problem
 from dlocore.spline import DEGREE, SplineSurface
 
@@ -167,7 +168,7 @@ def _first_director(problem: Problem, grid: Grid, tangent: Floats) -> Floats:
     past, (u, after) = grid.history.past, grid.tables.curvature_u[:2]
     director = transported(past[0, TANGENT : TANGENT + 3], tangent, past[0, DIRECTOR : DIRECTOR + 3])
     rate = past[0, FRAME] - 0.5 * u * (past[1, FRAME] - past[0, FRAME]) / (after - u)  # half-way
-    return np.asarray(np.cos(rate * u) * director - np.sin(rate * u) * np.cross(tangent, director))
+    return turned_about(tangent, director, -float(rate * u))
 
 
 def directors(problem: Problem, surface: SplineSurface, times: Floats, material: MaterialMotion | None) -> Floats:

@@ -34,6 +34,7 @@ GROWTH = math.log(10.0)  # of a disturbance, from which on it matters that there
 _SPREAD = 0.315
 _SPANS = 24  # of the knots of a bowed start, in each part
 _AGES = 1e6  # times the horizon: all the time that a disturbance needs
+_LEANS = 1025  # places along a start, at which its frames are looked at
 _TIMES = 65  # at which each stretch of the motion is looked at
 
 
@@ -108,7 +109,24 @@ def out_of_plane(scene: Scene, start: StartCurve, normal: Floats) -> StartCurve:
     # one that buckles has a side already: what is left to tell is whether it leaves the plane that this gave it
     aside = np.sum([_bow(part, u) for part in parts], axis=0) * (BOW if start.bow else 1.0)
     control = fit_to_knots(start, knots) + np.outer(aside, normal)
-    return replace(start, knots=knots, control_points=control, aside=float(aside.max()))
+    bowed = replace(start, knots=knots, control_points=control, aside=float(aside.max()))
+    remembers = start.material is not None or not isinstance(scene.cable.rest_shape, str)
+    return replace(bowed, lean=-_mean_lean(bowed, length, normal)) if remembers else bowed
+
+
+def _mean_lean(curve: StartCurve, length: float, normal: Floats) -> float:
+    """Return by how much frames without twist, level at u = 0, lean out of a plane in the mean over a curve [rad].
+
+    With tangent t and unit normal N of the plane they lean by f about t, f' = -(t . N) N . (t x t')/(1 - (t . N)^2).
+    Sections in such frames, of which only those at u = 0 are level, would tell the ends of the cable from each other.
+    """
+    u = np.linspace(0.0, length, _LEANS)
+    first, second = curve(u, 1), curve(u, 2)
+    speed = np.linalg.norm(first, axis=1)
+    out = first @ normal / speed
+    rate = -out * (np.cross(first, second) @ normal) / speed**2 / (1.0 - out**2)
+    lean = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(u))])
+    return float(np.trapezoid(lean, u) / length)
 
 
 def _joined(a: Floats, b: Floats) -> Floats:

@@ -20,7 +20,7 @@ from dlocore.kernels.twisted_rows import DIRECTOR, PAST
 from dlocore.problem.features import LASTING, OPENING, find_features, free_ends
 from dlocore.problem.grid import Grid
 from dlocore.problem.holding import Starts, close_grasps, hold
-from dlocore.problem.plane import leftwards
+from dlocore.problem.plane import leftwards, turned_about
 from dlocore.problem.problem import Problem
 from dlocore.scene.paths import Waypoints
 from dlocore.scene.scene import Material, Points
@@ -138,14 +138,14 @@ def _history_of(problem: Problem, grid: Grid) -> History:
 def start_director(problem: Problem) -> Floats:
     """Return the director (3,) of the section at u = 0, where its theta is zero, at t = 0.
 
-    It is the remembered one, or the horizontal one to the left of the tangent.
+    It is the remembered one, or the horizontal one to the left of the tangent; turned, where a bow makes it `lean`.
     """
     tangent = problem.start(0.0, 1)[0]
     tangent = tangent / np.linalg.norm(tangent)
     material = problem.start.material
     director = leftwards(tangent) if material is None else cast(Floats, material.director)
     across = director - tangent * (tangent @ director)
-    return np.asarray(across / np.linalg.norm(across))
+    return turned_about(tangent, across / np.linalg.norm(across), problem.start.lean)
 
 
 def corners(curve: SplineCurve, length: float) -> list[float]:

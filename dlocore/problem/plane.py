@@ -268,6 +268,11 @@ def _remembered_bends(start: StartCurve, flat: float) -> Floats:
     return bends if sizes[1] > flat * sizes[0] else bends[:1]
 
 
+def turned_about(tangent: Floats, director: Floats, angle: float) -> Floats:
+    """Return a director (3,), turned by an angle [rad] about the unit tangent (3,) that it is across."""
+    return math.cos(angle) * director + math.sin(angle) * np.cross(tangent, director)
+
+
 def leftwards(tangent: Floats) -> Floats:
     """Return the horizontal unit vector (3,) to the left of a tangent (3,); x for a vertical one."""
     left = np.array([-tangent[1], tangent[0], 0.0])

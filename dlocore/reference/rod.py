@@ -323,7 +323,7 @@ def _with_start(rod: Rod) -> Rod:
     director = np.cross([0.0, 0.0, 1.0], tangents[0]) if rod.planar else leftwards(tangents[0])
     if material is not None and not rod.planar:
         director = cast(Floats, material.director) - tangents[0] * (tangents[0] @ cast(Floats, material.director))
-    director = unit(director)
+    director = carried(tangents[0], tangents[0], unit(director), start.lean)
     halves = np.sort(np.concatenate([u, 0.5 * (u[1:] + u[:-1])]))
     twisted = start.theta is not None and not rod.planar
     angle = start.theta(halves)[:, 0] if twisted and start.theta is not None else np.zeros(len(halves))
