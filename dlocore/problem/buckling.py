@@ -110,23 +110,27 @@ def out_of_plane(scene: Scene, start: StartCurve, normal: Floats) -> StartCurve:
     aside = np.sum([_bow(part, u) for part in parts], axis=0) * (BOW if start.bow else 1.0)
     control = fit_to_knots(start, knots) + np.outer(aside, normal)
     bowed = replace(start, knots=knots, control_points=control, aside=float(aside.max()))
-    remembers = start.material is not None or not isinstance(scene.cable.rest_shape, str)
-    return replace(bowed, lean=-_mean_lean(bowed, length, normal)) if remembers else bowed
+    if start.material is None and isinstance(scene.cable.rest_shape, str):
+        return bowed  # it has no bends but its own
+    return replace(bowed, lean=-_lean(scene, bowed, normal))
 
 
-def _mean_lean(curve: StartCurve, length: float, normal: Floats) -> float:
-    """Return by how much frames without twist, level at u = 0, lean out of a plane in the mean over a curve [rad].
+def _lean(scene: Scene, curve: StartCurve, normal: Floats) -> float:
+    """Return by how much frames without twist, level at u = 0, lean out of a plane where grasps hold a curve [rad].
 
     With tangent t and unit normal N of the plane they lean by f about t, f' = -(t . N) N . (t x t')/(1 - (t . N)^2).
     Sections in such frames, of which only those at u = 0 are level, would tell the ends of the cable from each other.
+    It is the mean over the clamps, which keep sections as they are, else over all grasps, else of the ends.
     """
-    u = np.linspace(0.0, length, _LEANS)
+    u = np.linspace(0.0, scene.cable.length, _LEANS)
     first, second = curve(u, 1), curve(u, 2)
     speed = np.linalg.norm(first, axis=1)
     out = first @ normal / speed
     rate = -out * (np.cross(first, second) @ normal) / speed**2 / (1.0 - out**2)
     lean = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(u))])
-    return float(np.trapezoid(lean, u) / length)
+    clamps = [g.u for g in scene.grasps if g.hold == "clamp"]
+    places = clamps or [g.u for g in scene.grasps] or [0.0, scene.cable.length]
+    return float(np.interp(places, u, lean).mean())
 
 
 def _joined(a: Floats, b: Floats) -> Floats:

@@ -62,8 +62,8 @@ class StartCurve(SplineCurve):
         bow: height of the bow without stress that a straight start was given to buckle by [m], see
             `problem/buckling.py`.
         aside: that of the bow that a planar start was given out of its plane [m].
-        lean: angle about the tangent by which its sections are turned at u = 0 so that in the mean they lie as they did
-            in the plane [rad].
+        lean: angle about the tangent by which its sections are turned at u = 0 so that where grasps hold them they lie
+            as they did in the plane, in the mean [rad].
     """
 
     velocity: SplineCurve | None = None
