@@ -163,12 +163,17 @@ def _first_director(problem: Problem, grid: Grid, tangent: Floats) -> Floats:
     The frames of a start that has settled were carried along with the cable, each by itself: it is found from that of
     the first curvature point, and by how much they are twisted on the way to it.
     """
-    if not problem.scene.shape.settle:
-        return start_director(problem)
+    if not problem.scene.shape.settle or problem.twist is None:
+        return _in_one_turn(problem, tangent)
     past, (u, after) = grid.history.past, grid.tables.curvature_u[:2]
     director = transported(past[0, TANGENT : TANGENT + 3], tangent, past[0, DIRECTOR : DIRECTOR + 3])
     rate = past[0, FRAME] - 0.5 * u * (past[1, FRAME] - past[0, FRAME]) / (after - u)  # half-way
     return turned_about(tangent, director, -float(rate * u))
+
+
+def _in_one_turn(problem: Problem, tangent: Floats) -> Floats:
+    """Return the director (3,) of the given start, turned as its tangent is to another (3,) in one turn."""
+    return transported(unit(problem.start(0.0, 1)[0]), tangent, start_director(problem))
 
 
 def directors(problem: Problem, surface: SplineSurface, times: Floats, material: MaterialMotion | None) -> Floats:
@@ -179,8 +184,5 @@ def directors(problem: Problem, surface: SplineSurface, times: Floats, material:
     spans = np.unique(surface.knots_t)
     fine = np.unique(np.concatenate([np.linspace(a, b, 9) for a, b in pairwise(spans)] + [times]))
     tangents = unit(surface([0.0], fine, du=1)[:, 0, :3])
-    if material is None:
-        first = transported(unit(problem.start(0.0, 1)[0]), tangents[0], start_director(problem))
-    else:
-        first = material.director[0]
+    first = _in_one_turn(problem, tangents[0]) if material is None else material.director[0]
     return carried(first, tangents)[np.searchsorted(fine, times)]

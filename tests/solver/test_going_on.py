@@ -250,3 +250,25 @@ def test_a_bad_strain_or_velocity_is_refused(field: str, value: list[float], all
         ControlPoints(control_points=control, **{field: value})  # type: ignore[arg-type]
     assert field in str(error.value)
     assert allowed in str(error.value)
+
+
+def test_a_settled_start_without_twist_goes_on() -> None:
+    # straight, and free of stress as it begins: in space, but nothing twists it
+    whole = predict(
+        Scene(
+            cable=Cable(length=1.0, diameter=0.006, linear_density=0.05, bending_stiffness=1e-3, rest_shape="initial"),
+            shape=Straight(direction=(1.0, 0.0, -1.0), settle=True),
+            grasps=(Grasp(u=0.0, path=Move(displacement=(0.05, 0.1, 0.05), duration=0.4)),),
+            horizon=0.8,
+            environment=Environment(drag=0.2),
+            quality=Quality(target_error=2e-3),
+        )
+    )
+    assert (whole.accuracy.dimensions, whole.surface.control_points.shape[2]) == (3, 4)
+    material = whole.material
+    assert material is not None
+    assert not material.memory.any()
+    tangents = whole.surface([0.0], material.times, du=1)[:, 0, :3]
+    np.testing.assert_allclose((material.director * tangents).sum(axis=1), 0.0, atol=0.02)  # of the march
+    part = rest(whole, 0.5)
+    assert apart(whole, 0.5, part) < (whole.accuracy.error_estimate or 0.0) + (part.accuracy.error_estimate or 0.0)
