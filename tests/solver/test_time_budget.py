@@ -45,7 +45,7 @@ def test_a_budget_that_ends_within_a_march_has_the_grid_before_as_its_answer(mon
     found = predict(scene)
     assert len(sizes) == 3
     assert found.accuracy.n_u == sizes[1].n_u
-    assert "The best grid in 6e+05 ms" in found.message
+    assert "The best grid in 600000 ms" in found.message
     assert found.accuracy.error_estimate is not None
 
 
