@@ -81,11 +81,15 @@ class Calibration:
         """Return the points of motions in the plane, 2, or in space, 3."""
         return tuple(p for p in self.points if p.dimensions == dimensions)
 
+    def as_json(self) -> bytes:
+        """Return it as JSON."""
+        return json.dumps(to_document(self), indent=1).encode()
+
     def save(self, path: Path | None = None) -> Path:
         """Write it whole or not at all, to the user's data directory by default, and return where."""
         path = path or default_path()
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, json.dumps(to_document(self), indent=1).encode())
+        write_whole(path, self.as_json())
         return path
 
 

@@ -4,12 +4,14 @@ Bad input is an exception that names the field, the value and what is allowed. N
 (`Prediction.status`), never an exception.
 """
 
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+T = TypeVar("T", bound=Hashable)
 
 
 class DloError(Exception):
@@ -50,6 +52,16 @@ def _shorten(value: Any) -> str:
         value = value.tolist()
     text = value if isinstance(value, str) else repr(value)
     return text if len(text) <= 120 else text[:117] + "..."
+
+
+def repeated(values: Iterable[T]) -> T | None:
+    """Return the first of some values that was there before, None where each is there once."""
+    seen = set()
+    for value in values:
+        if value in seen:
+            return value
+        seen.add(value)
+    return None
 
 
 @contextmanager

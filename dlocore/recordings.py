@@ -8,7 +8,6 @@ import csv
 import json
 import zipfile
 import zlib
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +16,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dlocore.errors import SceneError, array, number, within
+from dlocore.errors import SceneError, array, number, repeated, within
 from dlocore.words import counted
 
 Floats = NDArray[np.float64]
@@ -342,9 +341,10 @@ def _is_number(cell: str) -> bool:
 
 def _json(text: str, name: str) -> dict[str, Any]:
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        for key, count in Counter(key for key, _ in pairs).most_common(1):
-            if count > 1:
-                raise SceneError(name, f"{key!r} {count} times", "each name once")
+        names = [key for key, _ in pairs]
+        twice = repeated(names)
+        if twice is not None:
+            raise SceneError(name, f"{twice!r} {names.count(twice)} times", "each name once")
         return dict(pairs)
 
     try:

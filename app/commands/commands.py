@@ -16,12 +16,13 @@ from pydantic import ValidationError
 from pydantic_settings import SettingsError
 
 from app.commands.errors import FAILED, NOT_CONVERGED, CommandError
-from app.commands.files import check_outputs, for_people, read_input, shows_progress, write_output
+from app.commands.files import check_outputs, for_people, read_input, write_output
 from app.http.fields import BadField, bad_fields
 from app.schemas import PredictionRequest, from_prediction, to_scene
 from app.schemas.surroundings import QualityModel
 from app.settings import Settings
 from dlocore import Iteration, Prediction, Scene, SceneError
+from dlocore.errors import repeated
 from dlocore.files import whole
 from dlocore.scene.scene import Method
 from dlocore.words import in_mm, in_ms
@@ -145,7 +146,7 @@ def calibrate(*, repeats: int, json: str | None) -> int:
     kept = _settings().calibration_file if json is None else None
     if kept is not None:
         _check_data_dir(kept.parent)
-    with tqdm(desc="calibrating", file=sys.stderr, disable=not shows_progress(), leave=False) as bar:
+    with tqdm(desc="calibrating", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
 
         def show(done: int, total: int, what: str) -> None:
             bar.total = total
@@ -154,7 +155,7 @@ def calibrate(*, repeats: int, json: str | None) -> int:
 
         found = measure(repeats=repeats, on_progress=show)
     if json is not None:
-        write_output(json, stdlib_json.dumps(calibration.to_document(found), indent=1).encode())
+        write_output(json, found.as_json())
     else:
         found.save(kept)
     print(calibration.table(found), file=for_people(json))
@@ -232,12 +233,10 @@ def _by(request: PredictionRequest, method: Method) -> PredictionRequest:
 
 
 def _with_each_name_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) < len(pairs):
-        names = [name for name, _ in pairs]
-        twice = next(name for name in names if names.count(name) > 1)
+    twice = repeated(name for name, _ in pairs)
+    if twice is not None:
         raise CommandError(f"the scene: got {twice!r} twice in one object. Allowed: each name once.")
-    return found
+    return dict(pairs)
 
 
 def _words(fields: list[BadField]) -> str:
@@ -268,7 +267,7 @@ def _solve(request: PredictionRequest, deadline: float | None) -> Prediction:
     from dlocore import warm_up
     from dlocore.calibration import stored_cost
 
-    with tqdm(desc="solving", unit=" iterations", file=sys.stderr, disable=not shows_progress(), leave=False) as bar:
+    with tqdm(desc="solving", unit=" iterations", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
 
         def show(iteration: Iteration) -> None:
             bar.set_postfix(update=f"{iteration.update:.2g} m", residual=f"{iteration.residual:.2g}")

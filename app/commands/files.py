@@ -38,13 +38,14 @@ def check_outputs(
     for option, path in outputs.items():
         if path is None:
             continue
-        if path == STANDARD and sys.stdout is None:
-            raise CommandError(f"{option}: standard output is closed", FAILED)
+        place, shared = path, False
         if path != STANDARD:
             _check_file(path)
-        own = path == STANDARD or not Path(path).exists() or Path(path).is_file()  # a device takes all there is
-        place = path if path == STANDARD else str(Path(path).resolve())
-        if own and place in taken:
+            place = str(Path(path).resolve())
+            shared = Path(path).exists() and not Path(path).is_file()  # a device takes all there is
+        elif sys.stdout is None:
+            raise CommandError(f"{option}: standard output is closed", FAILED)
+        if place in taken and not shared:
             raise CommandError(f"{option}: got {path}. Allowed: a file of its own, not that of {taken[place]}.")
         taken[place] = option
     for path in (folders or {}).values():
@@ -53,27 +54,31 @@ def check_outputs(
 
 
 def _check_file(path: str) -> None:
-    file = Path(path)
-    if path == "":
-        raise CommandError("an output needs a name", FAILED)
+    file = _named(path)
     if file.is_dir():
         raise _unwritable(path, "Is a directory")
     if not file.parent.exists():
         raise _unwritable(path, f"there is no folder {file.parent}")
-    if not file.parent.is_dir():
-        raise _unwritable(path, f"{file.parent} is no folder")
-    if not os.access(file if file.exists() else file.parent, os.W_OK):
-        raise _unwritable(path, "Permission denied")
+    _check_made(path, file.parent, file if file.exists() else file.parent)
 
 
 def _check_folder(path: str) -> None:
-    folder = Path(path)
+    folder = _named(path)
     made = next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
+    _check_made(path, made, made)
+
+
+def _named(path: str) -> Path:
     if path == "":
         raise CommandError("an output needs a name", FAILED)
-    if not made.is_dir():
-        raise _unwritable(path, f"{made} is no folder")
-    if not os.access(made, os.W_OK):
+    return Path(path)
+
+
+def _check_made(path: str, folder: Path, written: Path) -> None:
+    """Refuse an output inside what is no folder, or for which what is there already can't be written to."""
+    if not folder.is_dir():
+        raise _unwritable(path, f"{folder} is no folder")
+    if not os.access(written, os.W_OK):
         raise _unwritable(path, "Permission denied")
 
 
@@ -98,8 +103,3 @@ def write_output(path: str, content: bytes) -> None:
 def for_people(*outputs: str | None) -> TextIO:
     """Return where to print a table: beside what goes to standard output, if anything does, it would be no data."""
     return sys.stderr if STANDARD in outputs else sys.stdout
-
-
-def shows_progress() -> bool:
-    """Tell whether someone watches standard error."""
-    return sys.stderr is not None and sys.stderr.isatty()

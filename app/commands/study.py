@@ -10,7 +10,7 @@ from typing import Any, cast
 
 from app.commands.commands import read_scene
 from app.commands.errors import FAILED, CommandError
-from app.commands.files import check_outputs, for_people, shows_progress, write_output
+from app.commands.files import check_outputs, for_people, write_output
 from dlocore import Scene, SceneError
 from dlocore.scene.scene import EFFECTS, Switch
 
@@ -37,7 +37,7 @@ def study(options: argparse.Namespace) -> int:
         plan = Plan(**_asked(options))
     except SceneError as error:
         raise CommandError(str(error)) from None
-    with tqdm(desc="measuring", file=sys.stderr, disable=not shows_progress(), leave=False) as bar:
+    with tqdm(desc="measuring", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
 
         def show(done: int, total: int, what: str) -> None:
             bar.total = total

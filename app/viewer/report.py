@@ -12,7 +12,7 @@ from app.viewer.palette import ColourScale, css_ramp
 from dlocore import EffectReport, Prediction
 from dlocore.accuracy.fallback import errs
 from dlocore.calibration import Measured, front_of
-from dlocore.words import counted, in_mm
+from dlocore.words import counted, in_mm, in_ms
 
 _CARD = (
     "margin: 0 0.75rem 0.6rem; padding: 0.55rem 0.7rem; border-radius: 0.5rem; font-size: 0.8rem; line-height: 1.35;"
@@ -28,12 +28,6 @@ _WORDS = {
     "stalled": "Stalled",
     "time_limit": "Out of time",
 }
-
-
-def milliseconds(seconds: float) -> str:
-    """Return a duration [s] in milliseconds, with two significant digits below 10 ms."""
-    ms = 1e3 * seconds
-    return f"{ms:.2g} ms" if ms < 10 else f"{ms:.0f} ms"
 
 
 def millimetres(metres: float | None) -> str:
@@ -58,7 +52,7 @@ def status_card(prediction: Prediction, *, preview: bool) -> str:
     state = "Preview" if preview else _WORDS[prediction.status]
     numbers = [
         (state, "status"),
-        (milliseconds(accuracy.wall_time), "solve time"),
+        (in_ms(accuracy.wall_time, 2), "solve time"),
         (millimetres(accuracy.error_estimate), "estimated error"),
     ]
     cells = "".join(
@@ -120,7 +114,7 @@ def effect_note(effect: EffectReport, cost: float | None) -> str:
     price = ""
     if cost is not None:
         verb = "costs" if cost >= 0 else "saves"
-        price = f" <b>It {verb} {escape(milliseconds(abs(cost)))}.</b>"
+        price = f" <b>It {verb} {escape(in_ms(abs(cost), 2))}.</b>"
     state = "active" if effect.active else "not active"
     return (
         f'<div style="opacity: {opacity}; margin: -0.35rem 0.75rem 0.5rem; font-size: 0.75rem; line-height: 1.3;" '

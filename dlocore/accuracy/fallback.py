@@ -7,7 +7,6 @@ does not come to its end, is left for finer ones.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import cast
 
 from dlocore.accuracy.refinement import AUTO_ENOUGH
 from dlocore.errors import SceneError
@@ -139,5 +138,6 @@ def _is_nearer(finer: Prediction, found: Prediction) -> bool:
     Where that stalled it says what is wrong with the scene.
     """
     error, given = finer.accuracy.error_estimate, found.accuracy.error_estimate
-    known = error is not None and given is not None and found.status != "stalled"
-    return known and cast(float, error) < _NEARER * cast(float, given)
+    if error is None or given is None or found.status == "stalled":
+        return False
+    return error < _NEARER * given

@@ -17,7 +17,7 @@ from dlocore.identify.replay import Resolution
 from dlocore.identify.search import Search, robust_deviation
 from dlocore.recordings import Recording
 from dlocore.scene.cable import Cable
-from dlocore.scene.scene import MAX_N_U, Environment
+from dlocore.scene.scene import Environment, Quality
 
 Floats = NDArray[np.float64]
 
@@ -27,7 +27,6 @@ _MOST_SHORT = 8  # of them
 _COARSE = 13  # control points that they are replayed with at most
 _STIFFNESSES = 0.1, 0.3, 3.0, 10.0  # times the given one, that are tried first
 _BEGINNING = 4  # iterations on them
-_LEAST_N_U = 5  # as of a scene's grid
 _DENSITY = 0.04  # [kg/m] of a cable whose recordings tell none
 
 
@@ -67,8 +66,7 @@ def identify(
     if not recordings:
         raise SceneError("recordings", [], "at least one recording")
     resolution = resolution or Resolution()
-    if type(resolution.n_u) is not int or not _LEAST_N_U <= resolution.n_u <= MAX_N_U:
-        raise SceneError("n_u", resolution.n_u, f"an integer, {_LEAST_N_U} to {MAX_N_U}")
+    Quality(n_u=resolution.n_u, n_t=resolution.n_u)  # refuses what is no number of control points
     windows = cut(recordings, window)
     clamps = max(sum(h.towards is not None for h in r.holds) for r in windows)
     free = sorted({int(i) for r in windows for i in r.free})

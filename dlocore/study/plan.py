@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
-from dlocore.errors import SceneError, choice
+from dlocore.errors import SceneError, choice, repeated
 from dlocore.scene.scene import EFFECTS, Method, Quality, Scene, Switch
 from dlocore.study.record import PARTS, Part
 from dlocore.study.scenes import accuracy_scenes
@@ -67,8 +67,7 @@ class Plan:
             if not getattr(self, name):
                 raise SceneError(name, "none", "at least one")
         for name in ("grids", "methods", "deltas", "parts"):
-            given = getattr(self, name)
-            twice = next((x for x in given if given.count(x) > 1), None)
+            twice = repeated(getattr(self, name))
             if twice is not None:
                 raise SceneError(name, twice, "each once")
         if len(self.deltas) > 1 and set(self.methods) == {"march"}:

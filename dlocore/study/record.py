@@ -8,7 +8,6 @@ from types import NoneType
 from typing import Any, Literal, TypeVar
 
 from dlocore.errors import DloError
-from dlocore.files import write_whole
 
 FORMAT = 1
 Part = Literal["runs", "scaling", "effects"]
@@ -193,11 +192,6 @@ def _plain(kind: type[_Row], values: Mapping[str, Any]) -> _Row:
 def as_json(study: Study) -> bytes:
     """Return a study as JSON."""
     return json.dumps(to_document(study), indent=1).encode()
-
-
-def save(study: Study, path: Path) -> None:
-    """Write a study as JSON, whole or not at all."""
-    write_whole(path, as_json(study))
 
 
 def load(path: Path) -> Study:

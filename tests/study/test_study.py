@@ -88,7 +88,7 @@ def test_a_study_is_read_as_it_was_written(measured: Study, tmp_path: Path) -> N
         scaling=(Scaled(variable="n_u", value=9.0, method="march", wall_time=1e-3, spread=1e-5),),
         effects=(EffectCost(effect="drag", present=2e-3, absent=1e-3),),
     )
-    record.save(whole, tmp_path / "study.json")
+    (tmp_path / "study.json").write_bytes(record.as_json(whole))
     assert record.load(tmp_path / "study.json") == whole
 
 
