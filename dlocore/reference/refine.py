@@ -24,10 +24,11 @@ LEVELS = 6  # of refinement: up to 640 elements
 LEAST = 3  # rods, of which two changes tell how fast they converge
 FIRMER = 4.0  # times: friction holds within a quarter of the way with each refinement
 STEP = 1e-2  # of the target: the error of a step of the coarsest rod; a quarter of it with each refinement
-SECOND = 4.0  # change over next change, of the second order: a faster fall may be chance
+SECOND = 4.0  # change over next change, of the second order
 ORDERLY = (2.5, 8.0)  # change over next change, about 4: motions that converge with the second order
-SLOWEST = 1.5  # change over next change, below which nothing is said of the limit
+SLOWEST = 1.5  # change over next change, below which nothing is said of the limit, as above those that are orderly
 SLOW = 2.0  # times the last change: the estimate where nothing is said of the limit
+CHANCE = 0.05  # of the change before: the estimate is no less where the last is far smaller, which may be chance
 FOURTH = 15.0  # what is left of a change by an extrapolation of the fourth order
 DEEP = 0.02  # of the diameter: a motion that goes deeper into a surface is done again with stiffer contact
 STIFFER = (2.0, 30.0)  # at least and at most by these ratios
@@ -202,8 +203,10 @@ def _compared(problem: Problem, levels: list[Level], motion: Motion) -> Level:
 
 def left(before: float, change: float) -> float:
     """Return what the next refinements will change, about, after the last two changes [m]."""
-    ratio = min(before / max(change, 1e-300), SECOND)
-    return change / (ratio - 1.0) if ratio > SLOWEST else SLOW * change
+    ratio = before / max(change, 1e-300)
+    if SLOWEST < ratio <= ORDERLY[1]:
+        return change / (min(ratio, SECOND) - 1.0)
+    return max(SLOW * change, CHANCE * before)
 
 
 def _farthest(a: Floats, b: Floats) -> float:

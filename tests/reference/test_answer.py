@@ -78,11 +78,13 @@ def test_the_estimate_bounds_the_error_and_the_target_is_met():
     [
         (4e-3, 2e-3, 2e-3),
         (4e-3, 1e-3, 1e-3 / 3.0),
-        (4.6e-3, 1.3e-4, 1.3e-4 / 3.0),
+        (6e-3, 1e-3, 1e-3 / 3.0),
         (3e-3, 2.5e-3, 5e-3),
-        (1e-3, 0.0, 0.0),
+        (155e-3, 19.1e-3, 38.2e-3),  # 35:63: the next rod moved it by 335 mm
+        (155e-3, 1e-3, 7.75e-3),
+        (0.0, 0.0, 0.0),
     ],
-    ids=["first order", "second order", "by chance", "hardly", "none"],
+    ids=["first order", "second order", "faster", "hardly", "of no order", "by chance", "at rest"],
 )
 def test_what_is_left_of_changes_is_that_of_the_second_order_at_best(before, change, expected):
     assert left(before, change) == pytest.approx(expected)
