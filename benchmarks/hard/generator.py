@@ -23,6 +23,7 @@ from dlocore.problem.problem import pose
 from dlocore.problem.time_grid import smallest_n_t
 
 IMPOSSIBLE = 0.05  # share of scenes that no cable can follow
+CROWDED = 1000  # seed from which scenes have several obstacles
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +46,10 @@ class Drawn:
 
 
 def draw(seed: int, index: int, *, small: bool = False) -> Drawn:
-    """Draw the scene `index` of a seed; `small`: on a grid of some ten by twenty control points, for quick tests."""
+    """Draw the scene `index` of a seed; `small`: on a grid of some ten by twenty control points, for quick tests.
+
+    Scenes of seeds from CROWDED on have two to four obstacles each, others one in some of them.
+    """
     r = np.random.default_rng([seed, index])
     length = 1.0 if chance(r, 0.6) else spread(r, 0.05, 50.0)
     thick = spread(r, 0.002, 0.02) if chance(r, 0.5) else 0.005 * length
@@ -56,7 +60,7 @@ def draw(seed: int, index: int, *, small: bool = False) -> Drawn:
         d.families.append("geometry: a cable of " + ("5 to 50 m" if length > 1 else "0.05 to 0.2 m"))
     draw_motion(r, d)
     _bring_within_reach(d)
-    draw_environment(r, d)
+    draw_environment(r, d, crowded=seed >= CROWDED)
     damping = draw_drag(r, d)
     draw_stiffness(r, d)
     draw_damping(r, d, damping)

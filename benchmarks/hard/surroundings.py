@@ -21,18 +21,22 @@ def draw_gravity(r: Rng, room: Room) -> float:
     return float(pick(r, kinds[room]))
 
 
-def draw_environment(r: Rng, d: Draft) -> None:
+def draw_environment(r: Rng, d: Draft, *, crowded: bool) -> None:
+    """Draw gravity, a table and obstacles: two to four where it is crowded, else one in some scenes."""
     d.environment["gravity"] = (0.0, 0.0, -d.gravity)
     kind = {0.0: "weightless", 100.0: "gravity of 100 m/s^2"}.get(d.gravity, "gravity")
     if d.room == "flat" and d.gravity > 0:
         kind = pick(r, {"smooth table": 2, "rough table": 3})
         d.environment["table"] = Table(friction=r.uniform(0.05, 0.8) if kind == "rough table" else 0.0)
     d.families.append(f"effects: {kind}")
-    if chance(r, 0.12 if kind in ("smooth table", "rough table", "gravity") else 0.0):
-        _obstacles(r, d, kind)
+    if crowded:
+        for _ in range(int(r.integers(2, 5))):
+            _add_obstacle(r, d, kind)
+    elif chance(r, 0.12 if kind in ("smooth table", "rough table", "gravity") else 0.0):
+        _add_obstacle(r, d, kind)
 
 
-def _obstacles(r: Rng, d: Draft, kind: str) -> None:
+def _add_obstacle(r: Rng, d: Draft, kind: str) -> None:
     """Put a solid in the way of the cable, clear of its start and of the grasped points."""
     start, length = started(d), d.length
     points = start(np.linspace(0.0, length, 201))
@@ -60,7 +64,7 @@ def _obstacles(r: Rng, d: Draft, kind: str) -> None:
         row = np.array([solid.row()])
         clear = np.concatenate([points, *paths])
         if distances(row, np.ascontiguousarray(clear)).min() > 2.0 * d.diameter + 0.005 * length:
-            d.environment["obstacles"] = (solid,)
+            d.environment["obstacles"] = (*d.environment.get("obstacles", ()), solid)
             d.families.append("effects: obstacle")
             return
 

@@ -356,7 +356,7 @@ def _depth(scene: Scene, start: StartCurve, along: Floats, part: _Part, way: Flo
             deepest = np.maximum(deepest, environment.table.height - end[:, 2])
         if environment.obstacles and "obstacles" in on:
             rows = np.array([obstacle.row() for obstacle in environment.obstacles])
-            deepest = np.maximum(deepest, radius - distances(rows, end).min(axis=0))
+            deepest = np.maximum(deepest, radius - distances(rows, end).min(axis=1))
     return deepest
 
 

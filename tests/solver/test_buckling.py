@@ -342,8 +342,17 @@ PUSHED = {
     "into a wall": replace(
         pushed(around=replace(LYING, obstacles=(WALL,))), grasps=(replace(FOOT, path=way(0.4, 0.0, 0.0)),)
     ),
+    "into the nearer of two walls": replace(
+        pushed(around=replace(LYING, obstacles=(replace(WALL, center=(2.0, 0.0, 0.0)), WALL))),
+        grasps=(replace(FOOT, path=way(0.4, 0.0, 0.0)),),
+    ),
     "on to the table": Scene(
         cable=cord(), shape=ABOVE, grasps=(Grasp(u=0.0, path=way(0.0, 0.0, -0.5)),), environment=LYING
+    ),
+    "past two balls": replace(
+        pushed(around=replace(LYING, obstacles=(BALL, replace(BALL, center=(1.5, 0.3, 0.0))))),
+        cable=cord(bending_stiffness=1e-4),
+        grasps=(Grasp(u=0.0, path=way(0.5, 0.0, 0.0, time=0.7)),),
     ),
     "let fall on its end": Scene(
         cable=cord(bending_stiffness=0.1), shape=replace(ABOVE, start=(0.0, 0.0, 1.2)), environment=LYING, horizon=0.6
