@@ -23,6 +23,7 @@ from dlocore.machine import machine_line
 
 Floats = NDArray[np.float64]
 SCALARS = ("update", "residual", "energy", "wall_time", "damping", "step_length")  # of an iteration
+PEAKS = ("peak_force", "peak_force_time", "peak_moment", "peak_moment_time")  # of a grasp
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,8 +148,9 @@ def surface_npz(document: dict[str, Any], material: MaterialMotion | None) -> by
     """Return the surface, the spline and the reactions of a response document, and the material, as .npz.
 
     Arrays: `u` (k_u,), `t` (k_t,), `positions` (k_t, k_u, 3), `twist` (k_t, k_u), `control_points` (n_t, n_u, 4),
-    `knots_u`, `knots_t`, `degree`, `grasp_u` (g,), `reaction` and `moment` (g, k_t, 3); where the cable remembers,
-    `material_` and each field of `MaterialMotion`; SI units.
+    `knots_u`, `knots_t`, `degree`, `grasp_u` (g,), `reaction` and `moment` (g, k_t, 3), `peak_force`,
+    `peak_force_time`, `peak_moment` and `peak_moment_time` (g,), which are NaN of a document without them; where the
+    cable remembers, `material_` and each field of `MaterialMotion`; SI units.
     """
     surface, grasps = document["surface"], document["grasps"]
     times = len(surface["t"])
@@ -160,6 +162,7 @@ def surface_npz(document: dict[str, Any], material: MaterialMotion | None) -> by
             "grasp_u": np.array([grasp["u"] for grasp in grasps], dtype=float),
             "reaction": np.array([grasp["reaction"] for grasp in grasps], dtype=float).reshape(-1, times, 3),
             "moment": np.array([grasp["moment"] for grasp in grasps], dtype=float).reshape(-1, times, 3),
+            **{name: np.array([grasp.get(name, np.nan) for grasp in grasps], dtype=float) for name in PEAKS},
             **_named("material_", material),
         }
     )

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from dlocore import Prediction
-from dlocore.answer.parts import Iteration, Status
+from dlocore.answer.parts import GraspReaction, Iteration, Status
 from dlocore.spline import DEGREE
 
 Floats = NDArray[np.float64]
@@ -40,6 +40,17 @@ class GraspModel(BaseModel):
     moment: list[list[float]] = Field(
         description="Moment at the times of the surface [t][3] [N m].", examples=[[[0.0, 0.0, 0.0]]]
     )
+    peak_force: float | None = Field(
+        default=None,
+        description="Largest force over the whole motion, also between the times of the surface [N]; this and the "
+        "other peaks are absent of a run that was stored before they were noted.",
+        examples=[0.31],
+    )
+    peak_force_time: float | None = Field(default=None, description="When the force is largest [s].", examples=[0.42])
+    peak_moment: float | None = Field(
+        default=None, description="Largest moment over the whole motion [N m].", examples=[0.0]
+    )
+    peak_moment_time: float | None = Field(default=None, description="When the moment is largest [s].", examples=[0.0])
 
 
 class EffectModel(BaseModel):
@@ -272,10 +283,7 @@ def from_prediction(prediction: Prediction, id: str, samples_u: int = 101, sampl
         "knots_u": prediction.surface.knots_u,
         "knots_t": prediction.surface.knots_t,
         "degree": DEGREE,
-        "grasps": [
-            {"u": grasp.u, "reaction": _at(t, grasp.times, grasp.reaction), "moment": _at(t, grasp.times, grasp.moment)}
-            for grasp in prediction.grasps
-        ],
+        "grasps": [_grasp_document(grasp, t) for grasp in prediction.grasps],
         "effects": [{**vars(effect), "magnitude": _finite(effect.magnitude)} for effect in prediction.effects],
         "iterations": [iteration_document(iteration) for iteration in prediction.iterations],
         "accuracy": {**accuracy, "error_estimate": _finite(prediction.accuracy.error_estimate)},
@@ -295,6 +303,20 @@ def iteration_document(iteration: Iteration) -> dict[str, Any]:
 
 def _finite(value: float | None) -> float | None:
     return float(value) if value is not None and np.isfinite(value) else None
+
+
+def _grasp_document(grasp: GraspReaction, t: Floats) -> dict[str, Any]:
+    """Return what a gripper must give: at the times `t` (k,) [s], and at most."""
+    document: dict[str, Any] = {
+        "u": grasp.u,
+        "reaction": _at(t, grasp.times, grasp.reaction),
+        "moment": _at(t, grasp.times, grasp.moment),
+    }
+    for name, values in (("peak_force", grasp.reaction), ("peak_moment", grasp.moment)):
+        sizes = np.linalg.norm(values, axis=1)
+        k = int(sizes.argmax())
+        document |= {name: float(sizes[k]), f"{name}_time": float(grasp.times[k])}
+    return document
 
 
 def _at(t: Floats, times: Floats, values: Floats) -> Floats:

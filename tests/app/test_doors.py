@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from app.archive import surface_npz
 from app.schemas import EXAMPLES, PredictionRequest, PredictionResponse, to_scene
 from dlocore import predict
 from tests.app.conftest import ROOT, contract_scene, paper_scene, put
@@ -62,8 +63,29 @@ def test_npz_holds_what_json_holds(client: TestClient, answer: dict[str, Any]) -
         for name in ("control_points", "knots_u", "knots_t", "degree"):
             np.testing.assert_array_equal(npz[name], answer[name])
         np.testing.assert_array_equal(npz["grasp_u"], [grasp["u"] for grasp in answer["grasps"]])
-        np.testing.assert_array_equal(npz["reaction"], [grasp["reaction"] for grasp in answer["grasps"]])
-        np.testing.assert_array_equal(npz["moment"], [grasp["moment"] for grasp in answer["grasps"]])
+        for name in ("reaction", "moment", "peak_force", "peak_force_time", "peak_moment", "peak_moment_time"):
+            np.testing.assert_array_equal(npz[name], [grasp[name] for grasp in answer["grasps"]])
+
+
+def test_the_peaks_of_what_a_gripper_gives_are_those_of_the_whole_motion(client: TestClient) -> None:
+    scene = put(paper_scene(output={"samples_u": 2, "samples_t": 2}), "primitives.0.hold", "tangent")
+    (grasp,) = predict(to_scene(PredictionRequest.model_validate(scene), nothing_stored)).grasps
+    (shown,) = client.post("/v1/predictions?store=false", json=scene).json()["grasps"]
+    for name, values, sampled in (
+        ("peak_force", grasp.reaction, shown["reaction"]),
+        ("peak_moment", grasp.moment, shown["moment"]),
+    ):
+        sizes = np.linalg.norm(values, axis=1)
+        np.testing.assert_allclose(shown[name], sizes.max(), **SAME)
+        assert shown[f"{name}_time"] == grasp.times[sizes.argmax()]
+        assert shown[name] > 1.5 * np.linalg.norm(sampled, axis=1).max()
+
+
+def test_a_run_that_was_stored_before_peaks_were_noted_still_gives_its_arrays(answer: dict[str, Any]) -> None:
+    before = [{name: grasp[name] for name in ("u", "reaction", "moment")} for grasp in answer["grasps"]]
+    npz = arrays(surface_npz({**answer, "grasps": before}, None))
+    np.testing.assert_array_equal(npz["reaction"], [grasp["reaction"] for grasp in before])
+    np.testing.assert_array_equal(npz["peak_force"], [np.nan])
 
 
 def test_a_prediction_can_be_asked_for_as_npz(client: TestClient, answer: dict[str, Any]) -> None:
