@@ -256,12 +256,32 @@ def test_an_id_that_is_none_is_not_found(client: TestClient, id: str, part: str)
     the_problem(response, 404)
 
 
-def test_a_wrong_method_or_address_is_a_problem_too(client: TestClient) -> None:
+def test_a_wrong_address_is_a_problem_too(client: TestClient) -> None:
     the_problem(client.get("/v1/nothing"), 404)
     the_problem(client.get("/nothing"), 404)
-    the_problem(client.put("/v1/predictions", json=PAPER), 405)
-    the_problem(client.post("/health"), 405)
     the_problem(client.delete("/v1/predictions/" + "0" * 28), 404)
+
+
+@pytest.mark.parametrize(
+    ("method", "address", "allowed"),
+    [
+        ("PUT", "/v1/predictions", "GET, POST"),
+        ("PATCH", "/v1/predictions/" + "0" * 28, "DELETE, GET"),
+        ("GET", "/v1/predictions:batch", "POST"),
+        ("PUT", "/v1/calibration", "DELETE, GET, POST"),
+        ("POST", "/health", "GET"),
+        ("POST", "/docs", "GET"),
+        ("DELETE", "/scene/", "GET"),
+        ("PUT", "/", "GET, HEAD"),
+        ("PUT", "/static-offline-docs/swagger-ui.css", "GET, HEAD"),
+    ],
+)
+def test_a_wrong_method_is_told_which_ones_are_right(
+    client: TestClient, method: str, address: str, allowed: str
+) -> None:
+    response = client.request(method, address)
+    the_problem(response, 405)
+    assert response.headers["allow"] == allowed
 
 
 @pytest.mark.parametrize(("query", "field"), [("limit=0", "limit"), ("limit=x", "limit"), ("offset=-1", "offset")])
