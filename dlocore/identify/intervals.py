@@ -23,7 +23,6 @@ _SHAKES = 12  # replays with other noise of the held markers and the start
 _UNSEEN = 0.5  # standard deviation of a logarithm, or share of the prior's, from which on a parameter is not identified
 _UNEXPLAINED = 3.0  # times what noise explains: a model that misses markers by more lacks something
 _ASTRAY = 0.01  # of the length, by which noise may move a prediction for intervals to hold
-_SMALL = 0.1  # of the scale of a parameter without a prior
 
 
 def assess(search: Search, state: State, seconds: float) -> Identification:
@@ -164,7 +163,9 @@ def _estimated(
         low = max(low, p.least)
     unseen = not information > 1e-8
     wide = deviation > _UNSEEN * (1.0 if p.logarithmic else max(1.0, abs(x)))
-    scale = max(abs(value), _SMALL * p.scale)
+    half = 0.5 * (high - low)
+    # one that may have either sign has no size to be measured by
+    known = f"{100 * half / value:.2g} %" if np.isfinite(p.least) else f"{half:.2g} {p.unit}"
     if unseen:
         statement = f"{p.name} can't be seen in these recordings: it changes nothing that was measured."
     elif wide:
@@ -172,7 +173,7 @@ def _estimated(
     elif not p.logarithmic and np.isfinite(p.least) and low <= p.least:
         statement = f"{p.name} is at most {high:.2g} {p.unit}, and may be zero."
     else:
-        statement = f"{p.name} = {value:.3g} {p.unit}, known to {100 * 0.5 * (high - low) / scale:.2g} %."
+        statement = f"{p.name} = {f'{value:.3g} {p.unit}'.rstrip()}, known to {known}."
     rests: dict[str, float] = {}
     for replay, part in zip(search.replays, parts, strict=True):
         rests[replay.recording.name] = rests.get(replay.recording.name, 0.0) + float(part)
