@@ -58,7 +58,7 @@ def called_for(level: Level, fine: bool = True) -> dict[str, str]:
     switch = problem.scene.effects.get
     if not problem.choices["plasticity"].active and switch("plasticity", "auto") == "auto":
         found.update(_yields(level))
-    if not problem.choices["obstacles"].active and switch("obstacles", "auto") == "auto":
+    if switch("obstacles", "auto") == "auto":
         found.update(_touches(level))
     if problem.inertia is None and switch("inertia", "auto") == "auto":
         moved = _response(level, "inertia")

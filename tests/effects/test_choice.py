@@ -18,6 +18,7 @@ from dlocore import (
     Prediction,
     Quality,
     Scene,
+    Sphere,
     Straight,
     Table,
     plan,
@@ -76,6 +77,24 @@ def test_plasticity_is_switched_on_by_a_motion_that_yields_only():
     elastic = bent(0.5)
     assert not effect(elastic, "plasticity")[0]
     assert not np.any(elastic.material.memory)
+
+
+def test_where_one_obstacle_is_in_reach_a_motion_that_comes_to_others_calls_for_them():
+    # the limp cable swings past the one beside its start, and against the one that it reaches only as it falls
+    near, far = Sphere(center=(0.0, 0.22, 0.0), radius=0.2), Sphere(center=(0.3, 0.0, -0.75), radius=0.2)
+    scene = Scene(
+        cable=cable(bending_stiffness=1e-4),
+        shape=Straight(direction=(1.0, 0.0, 0.0)),
+        grasps=(Grasp(u=0.0),),
+        environment=Environment(drag=0.3, obstacles=(near, far)),
+        horizon=1.0,
+    )
+    assert effect(plan(scene), "obstacles") == (True, "1 of 2 are in the cable's reach")
+    found = predict(scene)
+    assert found.status == "converged"
+    assert effect(found, "obstacles") == (True, "the motion passes through an obstacle")
+    away = np.linalg.norm(found.surface.sample(65, 65)[2][..., :3] - far.center, axis=-1).min() - far.radius
+    assert away > 0.4 * scene.cable.diameter
 
 
 def test_an_obstacle_out_of_reach_is_called_for_by_a_motion_that_comes_to_it():
