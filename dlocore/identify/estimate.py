@@ -12,7 +12,7 @@ from dlocore.errors import SceneError, within
 from dlocore.identify.candidate import Candidate
 from dlocore.identify.identification import Identification, Progress
 from dlocore.identify.intervals import assess
-from dlocore.identify.parameters import DEFAULT, Parameter, parameters, prepared
+from dlocore.identify.parameters import DEFAULT, PLACES, Parameter, parameters, prepared
 from dlocore.identify.replay import Resolution
 from dlocore.identify.search import Search, robust_deviation
 from dlocore.recordings import Recording
@@ -70,10 +70,13 @@ def identify(
     windows = cut(recordings, window)
     clamps = max(sum(h.towards is not None for h in r.holds) for r in windows)
     free = sorted({int(i) for r in windows for i in r.free})
-    chosen = parameters(names, clamps, free)
     given = start or Candidate(cable=cable or cable_of(recordings), environment=environment or Environment())
-    markers = max(cast(Floats, r.markers).shape[1] for r in windows)
-    candidate = prepared(given, tuple(p.name for p in chosen), clamps, markers)
+    places = PLACES if given.rest_curvature is None else len(given.rest_curvature)
+    chosen = parameters(names, clamps, free, places)
+    markers = sorted({cast(Floats, r.markers).shape[1] for r in windows})
+    if len(markers) > 1 and any(p.name.startswith("marker_offsets") for p in chosen):
+        raise SceneError("recordings", f"{markers} markers", "recordings of the same markers, for marker_offsets")
+    candidate = prepared(given, tuple(p.name for p in chosen), clamps, markers[-1])
     if start is None:
         candidate = _begun(recordings, candidate, chosen, resolution, cancelled)
     search = Search(windows, chosen, resolution, cancelled)

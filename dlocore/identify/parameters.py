@@ -59,33 +59,40 @@ DEFAULT = ("bending_stiffness", "drag", "drag_quadratic", "bending_damping")
 _FIRST = {"bending_damping": 1e-4, "drag": 0.05, "drag_quadratic": 0.02, "yield_strain": 0.02}  # where none is given
 _INDEXED = re.compile(r"(rest_curvature|clamp_angles|marker_offsets)\[(\d+)\]\[([01])\]")
 _SEVERAL = {"rest_curvature": ("1/m", 2.0), "clamp_angles": ("rad", 0.2), "marker_offsets": ("m", 0.01)}
+_NEEDED = {"clamp_angles": "where a recording has a clamp", "marker_offsets": "where a recording has free markers"}
 PLACES = 5  # along the cable at which its rest curvature is sought
-CLAMPS = 2
 
 
-def parameters(names: tuple[str, ...], clamps: int, free: Sequence[int] = ()) -> tuple[Parameter, ...]:
+def parameters(
+    names: tuple[str, ...], clamps: int, free: Sequence[int] = (), places: int = PLACES
+) -> tuple[Parameter, ...]:
     """Return the parameters of names; "rest_curvature", "clamp_angles" and "marker_offsets" stand for all of theirs.
 
     Args:
         names: of the parameters.
         clamps: their number.
         free: markers that nothing holds.
+        places: along the cable at which its rest curvature is sought.
 
     Raises:
-        SceneError: a name is unknown or given twice.
+        SceneError: a name is unknown or given twice, or of a place, clamp or marker that is not there.
     """
+    there = {"rest_curvature": range(places), "clamp_angles": range(clamps), "marker_offsets": [int(i) for i in free]}
     found: list[Parameter] = []
     for name in names:
-        if name == "rest_curvature":
-            found += [_component("rest_curvature", i, d) for i in range(PLACES) for d in range(2)]
-        elif name == "clamp_angles":
-            found += [_component("clamp_angles", i, d) for i in range(clamps) for d in range(2)]
-        elif name == "marker_offsets":
-            found += [_component("marker_offsets", int(i), d) for i in free for d in range(2)]
+        match = _INDEXED.fullmatch(name)
+        several = match[1] if match else name
+        if several in there and not there[several]:
+            raise SceneError("parameters", name, _NEEDED[several])
+        if match and int(match[2]) not in there[several]:
+            numbers = ", ".join(str(i) for i in there[several])
+            raise SceneError("parameters", name, f"{several}[i][0] and {several}[i][1] for i of {numbers}")
+        if match:
+            found.append(_component(several, int(match[2]), int(match[3])))
+        elif several in there:
+            found += [_component(several, i, d) for i in there[several] for d in range(2)]
         elif name in SCALARS:
             found.append(_scalar(name))
-        elif match := _INDEXED.fullmatch(name):
-            found.append(_component(match[1], int(match[2]), int(match[3])))
         else:
             raise SceneError("parameters", name, "one of " + ", ".join([*SCALARS, *_SEVERAL]))
     if len({p.name for p in found}) != len(found):

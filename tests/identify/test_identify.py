@@ -294,3 +294,10 @@ def test_a_search_that_no_step_betters_says_so(monkeypatch: pytest.MonkeyPatch) 
     found = identify([simulated(3, 1.0, cable=CABLE, environment=DRAG)], names=("drag",), start=start)
     assert found.status == "max_iterations"
     assert found.message.startswith("Stopped without converging in 1 iteration, as no step betters the fit")
+
+
+def test_offsets_of_markers_need_the_same_markers_in_every_recording() -> None:
+    seen = still(name="known")
+    fewer = replace(seen, markers=np.asarray(seen.markers)[:, :5], u=np.asarray(seen.u)[:5], name="fewer")
+    with pytest.raises(SceneError, match=r"^recordings: got \[5, 6\] markers\."):
+        identify([seen, fewer], names=("marker_offsets",))
