@@ -8,10 +8,10 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from app.schemas.base import MAX_REPORTED
 from app.schemas.request import PredictionRequest
 from dlocore import SceneError
 
-MAX_REPORTED = 50
 _WHOLE = "body"
 
 

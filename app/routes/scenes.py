@@ -32,7 +32,7 @@ async def explain(
 ) -> Response:
     """Say which effects the scene calls for and why, and what grid and time a solve would take.
 
-    422 names everything that is wrong with the scene, not only the first fault.
+    422 names every part of the scene that is wrong, not only the first.
     """
     negotiated(request.headers.get("accept"), (JSON,))
     service.check_ready()

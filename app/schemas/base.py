@@ -11,6 +11,7 @@ Flag = Annotated[bool, Field(strict=True)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Point = Annotated[list[Number], Field(min_length=2, max_length=3)]
 RunId = Annotated[str, Field(pattern="^[0-9a-f]{28}$|^$")]  # or "", for none
+MAX_REPORTED = 50  # faults of a request that an answer names at most
 LIKE = (
     "Id of a run of a scene much like this one, a target moved by centimetres say: its grid and its error estimate are "
     "taken on, which saves the search for them. Where the two differ too much for that, or the service has forgotten "
