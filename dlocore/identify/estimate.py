@@ -71,6 +71,7 @@ def identify(
     clamps = max(sum(h.towards is not None for h in r.holds) for r in windows)
     free = sorted({int(i) for r in windows for i in r.free})
     given = start or Candidate(cable=cable or cable_of(recordings), environment=environment or Environment())
+    given = replace(given, environment=replace(given.environment, gravity=recordings[0].gravity))
     places = PLACES if given.rest_curvature is None else len(given.rest_curvature)
     chosen = parameters(names, clamps, free, places)
     markers = sorted({cast(Floats, r.markers).shape[1] for r in windows})

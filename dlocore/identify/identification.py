@@ -99,7 +99,7 @@ class Identification:
 
     @property
     def environment(self) -> Environment:
-        """The drag found."""
+        """The drag found, with the gravity of the first recording."""
         return self.candidate.environment
 
 
