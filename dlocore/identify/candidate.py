@@ -29,7 +29,7 @@ class Candidate:
         marker_offsets: (m, 2) [m] of the markers beside the centreline, across it, in a frame that is carried from the
             first clamp without twist; None: on it.
         length_ratio: of the cable's length and its markers' coordinates to those of the recording.
-        twist: simulate twist; needed for rest_curvature and a torsional stiffness.
+        twist: simulate twist; needed for rest_curvature, a torsional stiffness, and bends that stay.
     """
 
     cable: Cable
@@ -40,6 +40,11 @@ class Candidate:
     marker_offsets: Floats | None = None
     length_ratio: float = 1.0
     twist: bool = False
+
+    @property
+    def yields(self) -> bool:
+        """Its cable has a strain at which bends, or twist or stretch, stay."""
+        return (self.cable.yield_strain, self.cable.yield_twist, self.cable.yield_stretch) != (None, None, None)
 
 
 def varied(problem: Problem, before: Candidate, after: Candidate) -> Problem | None:

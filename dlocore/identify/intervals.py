@@ -163,9 +163,6 @@ def _estimated(
         low = max(low, p.least)
     unseen = not information > 1e-8
     wide = deviation > _UNSEEN * (1.0 if p.logarithmic else max(1.0, abs(x)))
-    half = 0.5 * (high - low)
-    # one that may have either sign has no size to be measured by
-    known = f"{100 * half / value:.2g} %" if np.isfinite(p.least) else f"{half:.2g} {p.unit}"
     if unseen:
         statement = f"{p.name} can't be seen in these recordings: it changes nothing that was measured."
     elif wide:
@@ -173,6 +170,9 @@ def _estimated(
     elif not p.logarithmic and np.isfinite(p.least) and low <= p.least:
         statement = f"{p.name} is at most {high:.2g} {p.unit}, and may be zero."
     else:
+        half = 0.5 * (high - low)
+        # one that may have either sign has no size to be measured by
+        known = f"{100 * half / value:.2g} %" if np.isfinite(p.least) else f"{half:.2g} {p.unit}"
         statement = f"{p.name} = {f'{value:.3g} {p.unit}'.rstrip()}, known to {known}."
     rests: dict[str, float] = {}
     for replay, part in zip(search.replays, parts, strict=True):

@@ -110,13 +110,13 @@ def prepared(candidate: Candidate, names: tuple[str, ...], clamps: int, markers:
         candidate = replace(candidate, clamp_angles=np.zeros((clamps, 2)))
     if any(n.startswith("marker_offsets") for n in names) and candidate.marker_offsets is None:
         candidate = replace(candidate, marker_offsets=np.zeros((markers, 2)))
-    if "turn" in names or "torsional_stiffness" in names:
-        candidate = replace(candidate, twist=True)
     for name in names:
         if name in _FIRST:
             parameter = _scalar(name)
             if not (parameter.get(candidate) or 0.0) > 0.0:
                 candidate = parameter.put(candidate, _FIRST[name])
+    if "turn" in names or "torsional_stiffness" in names or candidate.yields:
+        candidate = replace(candidate, twist=True)
     return candidate
 
 

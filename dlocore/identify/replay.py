@@ -208,6 +208,8 @@ class Replay:
         if candidate.twist:
             shape = with_sections(shape, candidate.rest_curvature, candidate.turn, frames)
         switches: dict[str, Switch] = {"inertia": "on", "twist": "on" if candidate.twist else "off"}
+        if candidate.twist and candidate.yields:
+            switches["plasticity"] = "on"
         return Scene(
             cable=replace(candidate.cable, length=length),
             shape=shape,

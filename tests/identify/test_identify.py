@@ -22,6 +22,7 @@ from dlocore import (
 )
 from dlocore.identify import Candidate, Replay, Resolution, identify
 from dlocore.identify.datasets import load_datasets
+from dlocore.identify.parameters import parameters, prepared
 from dlocore.identify.search import Search
 from dlocore.recordings import Recording
 
@@ -301,3 +302,21 @@ def test_offsets_of_markers_need_the_same_markers_in_every_recording() -> None:
     fewer = replace(seen, markers=np.asarray(seen.markers)[:, :5], u=np.asarray(seen.u)[:5], name="fewer")
     with pytest.raises(SceneError, match=r"^recordings: got \[5, 6\] markers\."):
         identify([seen, fewer], names=("marker_offsets",))
+
+
+def test_a_cable_that_yields_gives_back_its_yield_strain() -> None:
+    recording = simulated(21, 1.5, cable=CABLE, environment=DRAG)
+    replay = Replay(recording, Resolution(n_u=9))
+    yielding = Candidate(cable=replace(CABLE, yield_strain=0.006, memory_rate=100.0), environment=DRAG, twist=True)
+    bent = replay.play(yielding).predicted
+    elastic = replay.play(replace(yielding, cable=CABLE)).predicted
+    markers = np.array(recording.markers)
+    free = recording.free
+    seen = bent[:, free] + 1e-3 * np.random.default_rng(1).standard_normal(bent[:, free].shape)
+    markers[replay.compared[:, None], free] = seen
+    assert np.abs(bent - elastic).max() > 5e-3  # what yields is seen in the noise
+    (strain,) = chosen = parameters(("yield_strain",), 2)
+    start = prepared(Candidate(cable=CABLE, environment=DRAG), ("yield_strain",), 2)
+    found = Search([replace(recording, markers=markers)], chosen, Resolution(n_u=9)).run(start, 15)
+    assert found.status == "converged"
+    assert strain.get(found.candidate) == pytest.approx(0.006, rel=0.02)  # of the same model; noise alone is left
