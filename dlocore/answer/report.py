@@ -7,8 +7,8 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.answer.clearance import least_distance
 from dlocore.answer.parts import EffectReport, GraspReaction, MaterialMotion
-from dlocore.effects.distance import distances
 from dlocore.kernels.assembly import History, stored_energy
 from dlocore.problem.grid import Grid
 from dlocore.problem.holding import SMOOTH, Held
@@ -17,6 +17,8 @@ from dlocore.scene.scene import Grasp
 from dlocore.spline import SplineSurface
 
 Floats = NDArray[np.float64]
+
+_NEAR = 0.01  # of the diameter: to which the gap to obstacles is found
 
 
 def surface_of(problem: Problem, knots_u: Floats, knots_t: Floats, control: Floats) -> SplineSurface:
@@ -124,10 +126,9 @@ def effect_reports(
     if problem.friction is not None and environment.table is not None:
         sizes["friction"] = (environment.table.friction * weight, "N")
     if problem.obstacles:
-        near = surface.positions(np.linspace(0.0, cable.length, 129), np.linspace(0.0, surface.horizon, 65))
         rows = np.array([obstacle.row() for obstacle in problem.obstacles])
-        gap = distances(rows, np.ascontiguousarray(near.reshape(-1, 3))).min() - 0.5 * cable.diameter
-        sizes["obstacles"] = (float(gap), "m, the smallest gap")
+        gap = least_distance(surface, rows, _NEAR * cable.diameter) - 0.5 * cable.diameter
+        sizes["obstacles"] = (gap, "m, the smallest gap")
     if problem.choices["plasticity"].active:
         kept = material()
         if kept is not None:

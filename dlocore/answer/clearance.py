@@ -1,0 +1,114 @@
+"""How near a motion comes to obstacles: the least gap over the whole surface, between its samples too."""
+
+from functools import reduce
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.effects.distance import distances
+from dlocore.kernels.basis import basis_rows
+from dlocore.spline import DEGREE, SplineSurface
+
+Floats = NDArray[np.float64]
+
+_PARTS = 4  # into which a cell is cut, along or in time, whichever leaves more in doubt
+_MOST = 256  # cells that are cut at once: where a cable lies on an obstacle for long, many are as near
+_ROUNDS = 30  # of cuts: rounding ends before
+_STEP = 1e-6  # of half a cell, over which slopes are found
+
+
+def least_distance(surface: SplineSurface, rows: Floats, tolerance: float) -> float:
+    """Return the least signed distance [m] of a surface's centreline from obstacles, to `tolerance` [m].
+
+    Obstacles are convex, so that the distance is nowhere below its tangent at the middle of a cell of the surface, from
+    which the cell's points deviate by no more than the control points of the second derivatives allow. Cells that can't
+    be nearer than the nearest point so far are left, the others cut.
+
+    Args:
+        surface: the motion.
+        rows: of the obstacles (m, ROW), see `effects/distance.py`.
+        tolerance: above zero.
+    """
+    (u, half_u), (t, half_t) = _spans(surface.knots_u), _spans(surface.knots_t)
+    gaps = distances(rows, np.ascontiguousarray(surface.positions(u, t).reshape(-1, 3))).min(axis=1)
+    least = float(gaps.min())
+    way = _largest(surface, 1, 0) * half_u + _largest(surface, 0, 1) * half_t[:, None]
+    near = (gaps.reshape(way.shape) - way < least - tolerance) & (half_u > 0.0) & (half_t > 0.0)[:, None]
+    if not near.any():
+        return least
+    k, i = np.nonzero(near)
+    cells = np.column_stack([u[i], t[k], half_u[i], half_t[k]])
+    bends = np.column_stack([_largest(surface, *order)[k, i] for order in ((2, 0), (1, 1), (0, 2))])
+    for _ in range(_ROUNDS):
+        if len(cells) == 0:
+            break
+        gaps, doubt = _looked_at(surface, rows, cells, bends)
+        least = min(least, float(gaps.min()))
+        nearest = (gaps - doubt.sum(axis=0)).min(axis=1)
+        left = np.flatnonzero(nearest < least - tolerance)
+        if len(left) > _MOST:
+            left = left[np.argpartition(nearest[left], _MOST)[:_MOST]]
+        in_time = doubt[1, left].max(axis=1) > doubt[0, left].max(axis=1)
+        cells, bends = _cut(cells[left], in_time.astype(int)), np.repeat(bends[left], _PARTS, axis=0)
+    return least
+
+
+def _spans(knots: Floats) -> tuple[Floats, Floats]:
+    """Return middles and half widths (k,) of the spans between knots (k + 7,), those of no width among them."""
+    begin, end = knots[DEGREE : -DEGREE - 1], knots[DEGREE + 1 : -DEGREE]
+    return 0.5 * (begin + end), 0.5 * (end - begin)
+
+
+def _largest(surface: SplineSurface, du: int, dt: int) -> Floats:
+    """Return a bound of a derivative of r in each span (spans in time, spans along) [m/(m^du s^dt)]."""
+    control = surface.control_points[..., :3]
+    for axis, knots, order in ((1, surface.knots_u, du), (0, surface.knots_t, dt)):
+        for k in range(1, order + 1):
+            n = control.shape[axis] - 1
+            width = knots[DEGREE + 1 : DEGREE + 1 + n] - knots[k : k + n]
+            factor = np.divide(DEGREE + 1.0 - k, width, out=np.zeros(n), where=width > 0.0)
+            control = np.diff(control, axis=axis) * np.expand_dims(factor, (1 - axis, 2))
+    bound = np.sqrt(np.einsum("kid,kid->ki", control, control))
+    for order in (dt, du):  # the control points of a span, first in time, then along
+        count = len(bound) - DEGREE + order
+        bound = reduce(np.maximum, (bound[k : k + count] for k in range(DEGREE + 1 - order))).T
+    return bound
+
+
+def _looked_at(surface: SplineSurface, rows: Floats, cells: Floats, bends: Floats) -> tuple[Floats, Floats]:
+    """Return the distances (k, m) [m] of the middles of cells from obstacles, and how much less they may be elsewhere
+    in the cells, along and in time (2, k, m) [m].
+
+    Args:
+        surface: the motion.
+        rows: of the obstacles (m, ROW).
+        cells: their middles u [m], t [s] and half widths (k, 4).
+        bends: bounds of |r_uu|, |r_ut| and |r_tt| in them (k, 3).
+    """
+    u, t, half_u, half_t = cells.T
+    places, times = [u, u + _STEP * half_u, u], [t, t, t + _STEP * half_t]
+    found = distances(rows, _points(surface, np.concatenate(places), np.concatenate(times)))
+    gaps, beside, after = found.reshape(3, len(cells), -1)
+    slopes = np.abs([beside - gaps, after - gaps]) / _STEP
+    across = bends[:, 1] * half_u * half_t
+    bent = 0.5 * np.array([bends[:, 0] * half_u**2 + across, bends[:, 2] * half_t**2 + across])
+    return gaps, slopes + bent[:, :, None]
+
+
+def _cut(cells: Floats, along: NDArray[np.int64]) -> Floats:
+    """Return the cells (k, 4) cut into _PARTS each, in u where `along` (k,) is 0 and in t where it is 1."""
+    out = np.repeat(cells, _PARTS, axis=0)
+    k, axis = np.arange(len(out)), np.repeat(along, _PARTS)
+    place = (2.0 * np.arange(_PARTS) + 1.0) / _PARTS - 1.0  # of the middles of the parts, over half the width
+    out[k, axis] += np.tile(place, len(cells)) * out[k, axis + 2]
+    out[k, axis + 2] /= _PARTS
+    return out
+
+
+def _points(surface: SplineSurface, u: Floats, t: Floats) -> Floats:
+    """Return the points r (k, 3) [m] at the places u (k,) [m] and times t (k,) [s]."""
+    first_u, over_u = basis_rows(np.array(surface.knots_u), u, 0)
+    first_t, over_t = basis_rows(np.array(surface.knots_t), t, 0)
+    near = np.arange(DEGREE + 1)
+    control = surface.control_points[(first_t[:, None] + near)[:, :, None], (first_u[:, None] + near)[:, None]]
+    return np.asarray((over_t @ (over_u[:, None] @ control).squeeze(2))[:, 0, :3])
