@@ -3,7 +3,7 @@
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from fastapi import FastAPI
+from fastapi import Depends, FastAPI
 from fastapi.middleware.cors import CORSMiddleware
 from fastapi_offline import FastAPIOffline
 
@@ -11,6 +11,7 @@ from app import viewer
 from app.http import openapi, problems
 from app.http.access import Access
 from app.http.middleware import AccessLog, BodyLimit, PageHeaders
+from app.http.query import check_query
 from app.routes import (
     batch,
     cables,
@@ -68,20 +69,9 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             expose_headers=["Location", "Preference-Applied", "Retry-After"],
         )
     app.add_middleware(AccessLog)
-    for routes in (
-        batch,
-        predictions,
-        files,
-        scenes,
-        examples,
-        shapes,
-        cables,
-        health,
-        rerun,
-        calibration,
-        studies,
-        identify,
-    ):
+    for routes in (batch, predictions, files, scenes, examples, shapes, cables, calibration, studies, identify):
+        app.include_router(routes.router, dependencies=[Depends(check_query)])
+    for routes in (health, rerun):
         app.include_router(routes.router)
     viewer.add_routes(app)
     pages.add_pages(app)

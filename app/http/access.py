@@ -17,6 +17,7 @@ from app.http.problems import ProblemError, problem_response
 
 OPEN = frozenset({"/health", "/ready"})
 COOKIE = "dlo-session"
+IN_QUERY = "token"  # name in the query of a page that is opened with it
 _POLICY_VIOLATION = 1008
 
 
@@ -58,10 +59,10 @@ class Access:
         return cookie is not None and _same(cookie.value, self._session)
 
     def _in_query(self, scope: Scope) -> bool:
-        return any(name == "token" and _same(value, self._token) for name, value in _query(scope))
+        return any(name == IN_QUERY and _same(value, self._token) for name, value in _query(scope))
 
     def _welcome(self, scope: Scope) -> RedirectResponse:
-        rest = urlencode([(name, value) for name, value in _query(scope) if name != "token"])
+        rest = urlencode([(name, value) for name, value in _query(scope) if name != IN_QUERY])
         path = "/" + quote(scope["path"]).lstrip("/")  # one slash: two would lead to another host
         response = RedirectResponse(path + (f"?{rest}" if rest else ""), 303)
         secure = scope.get("scheme") == "https"

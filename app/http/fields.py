@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from app.schemas.base import MAX_REPORTED
+from app.schemas.base import MAX_REPORTED, RUN_ID
 from app.schemas.request import PredictionRequest
 from dlocore import SceneError
 
@@ -38,6 +38,12 @@ class BadField:
         return BadField(
             error.field, error.given, error.allowed, f"{reason}Got {error.given}. Allowed: {error.allowed}."
         )
+
+    @staticmethod
+    def unknown(field: str, value: str, allowed: str) -> "BadField":
+        """Return a query parameter that there is not."""
+        given = _shown(value, "")
+        return BadField(field, given, allowed, f"There is no such query parameter. Got {given}. Allowed: {allowed}.")
 
 
 def bad_fields(errors: Sequence[Any], body: Any, model: type[BaseModel] = PredictionRequest) -> list[BadField]:
@@ -75,7 +81,7 @@ def _bad_field(error: Any, body: Any, schema: "_Schema") -> BadField:
     by_kind = not context.get("tag", "").startswith("~")  # else by form, which has no field of its own
     if kind == "union_tag_invalid" and by_kind:
         steps, given = [*steps, "kind"], _shown(error["input"].get("kind"), kind)
-    allowed = _allowed(kind, context, tagged, schema)
+    allowed = _allowed(kind, context, tagged, schema if where == _WHOLE else _NONE)
     return BadField(_text(steps), given, allowed, f"{_WHAT.get(kind, '')}Got {given}. Allowed: {allowed}.")
 
 
@@ -165,10 +171,15 @@ def _allowed(kind: str, context: dict[str, Any], loc: list[Any], whole: "_Schema
     if kind == "union_tag_not_found":
         return "the kind of object, one of " + ", ".join(schema.get("discriminator", {}).get("mapping", {}))
     if kind == "literal_error":
-        return "one of " + context["expected"].replace("'", "").replace(" or ", ", ")
+        values = "one of " + context["expected"].replace("'", "").replace(" or ", ", ")
+        return " or ".join([values, *whole.other_forms(loc)])
+    if kind == "string_pattern_mismatch":
+        return RUN_ID
     if kind in ("too_short", "too_long"):
         return _bounds(context, "min_length", "max_length", "{} items")
     text = _TYPES.get(kind, "")
+    if kind in ("string_too_short", "string_too_long"):
+        text = _bounds(context, "min_length", "max_length", "{} characters")
     if kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
         text = _range(schema) or _bounds(context, "ge", "le", "{}")
     description = schema.get("description", "").split("\n")[0].rstrip(".")
@@ -225,6 +236,12 @@ class _Schema:
         options = [node, *map(self._resolved, _options(node))]
         return next((list(option["properties"]) for option in options if "properties" in option), [])
 
+    def other_forms(self, loc: list[Any]) -> list[str]:
+        """Return in words what the field at `loc` may be besides a text."""
+        options = [self._resolved(option) for option in _options(self.at(loc))]
+        words = {"array": "a list", "object": "an object with some of " + ", ".join(self.names(loc))}
+        return [words[option["type"]] for option in options if option.get("type") in words]
+
     def _resolved(self, node: dict[str, Any]) -> dict[str, Any]:
         while "$ref" in node:
             node = self._document["$defs"][node["$ref"].rsplit("/", 1)[1]]
@@ -243,6 +260,9 @@ class _Schema:
             if found:
                 return found
         return {}
+
+
+_NONE = _Schema({})  # of what is no field of the body
 
 
 @cache

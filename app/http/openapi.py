@@ -22,9 +22,9 @@ def install(app: FastAPI) -> None:
             schemas = document.setdefault("components", {}).setdefault("schemas", {})
             for model in (PredictionResponse, JobResponse, BatchLine, MeasurementResponse, ProblemDocument):
                 schemas.update(_schemas(model))
-            for path in document["paths"].values():
+            for address, path in document["paths"].items():
                 for operation in path.values():
-                    _describe_bad_request(operation["responses"])
+                    _describe_bad_request(address, operation["responses"])
             for name in ("HTTPValidationError", "ValidationError"):
                 schemas.pop(name, None)
             app.openapi_schema = document
@@ -39,8 +39,11 @@ def _schemas(model: type[BaseModel]) -> dict[str, Any]:
     return {**parts, model.__name__: schema}
 
 
-def _describe_bad_request(responses: dict[str, Any]) -> None:
-    """Replace FastAPI's own description of a bad request, which it adds wherever something is validated."""
+def _describe_bad_request(address: str, responses: dict[str, Any]) -> None:
+    """Describe a bad request, which every address of the API can have by its query, where its route does not.
+
+    FastAPI's own description, which it adds wherever something is validated, is replaced.
+    """
     content = responses.get("422", {}).get("content", {})
-    if "application/json" in content:
+    if "application/json" in content or ("422" not in responses and address.startswith("/v1/")):
         responses["422"] = problem_document("The request is wrong: `errors` names each field.")

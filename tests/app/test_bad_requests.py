@@ -263,6 +263,49 @@ def test_a_wrong_address_is_a_problem_too(client: TestClient) -> None:
 
 
 @pytest.mark.parametrize(
+    ("query", "allowed"),
+    [
+        ("?like=xyz", {"like": "the id of a run, 28 of the characters 0 to 9 and a to f"}),
+        ("?stor=false&foo=1", {"stor": "one of store, like", "foo": "one of store, like"}),
+        (":batch?store=false", {"store": "no query parameter"}),
+    ],
+)
+def test_a_wrong_query_is_told_what_is_allowed_and_nothing_is_stored(
+    client: TestClient, query: str, allowed: dict[str, str]
+) -> None:
+    before = client.get("/v1/predictions").json()["total"]
+    body = {"scenes": [PAPER], "store": True} if query.startswith(":") else PAPER
+    problem = the_problem(client.post(f"/v1/predictions{query}", json=body), 422)
+    assert {error["field"]: error["allowed"] for error in problem["errors"]} == allowed
+    assert client.get("/v1/predictions").json()["total"] == before
+
+
+@pytest.mark.parametrize("address", ["/v1/examples", "/v1/cables", "/v1/studies", "/v1/predictions/" + "0" * 28])
+def test_every_address_of_the_api_refuses_an_unknown_query(client: TestClient, address: str) -> None:
+    problem = the_problem(client.get(f"{address}?page=2"), 422)
+    assert [error["field"] for error in problem["errors"]] == ["page"]
+
+
+@pytest.mark.parametrize("address", ["/v1/examples?token=x", "/health?now=1", "/?token=x", "/scene/?example=paper-25"])
+def test_pages_probes_and_a_token_are_no_unknown_query(client: TestClient, address: str) -> None:
+    assert client.get(address).status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "allowed"),
+    [
+        ("quality", "best", "one of auto or an object with some of n_u, n_t,"),
+        ("effects", "on", "one of auto or an object with some of inertia, drag,"),
+        ("cable.rest_shape", "bent", "one of straight, initial or a list"),
+        ("name", "x" * 5000, "at most 200 characters"),
+    ],
+)
+def test_every_form_and_bound_of_a_text_is_told(client: TestClient, path: str, value: str, allowed: str) -> None:
+    (error,) = the_problem(client.post("/v1/predictions", json=put(PAPER, path, value)), 422)["errors"]
+    assert error["allowed"].startswith(allowed)
+
+
+@pytest.mark.parametrize(
     ("method", "address", "allowed"),
     [
         ("PUT", "/v1/predictions", "GET, POST"),
