@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from dlocore.errors import SceneError
 from dlocore.identify.identification import Estimated, Fit, Identification
 from dlocore.identify.parameters import Parameter
 from dlocore.identify.replay import Played, Replay
@@ -47,10 +48,11 @@ def assess(search: Search, state: State, seconds: float) -> Identification:
     spread = sum((np.outer(g, g) for g in blocks), np.zeros_like(data))
     spread *= len(blocks) / max(len(blocks) - len(x), 1)
     clustered = inverse @ spread @ inverse
-    noise, spread_by_noise = _shaken(search, state, w / deviation**2)
+    noise, spread_by_noise, unshaken = _shaken(search, state, w / deviation**2)
     shaken = inverse @ noise @ inverse
     plain = np.diag(inverse)
-    refined = inverse @ _refined(search, state, w / deviation**2)
+    pull, unrefined = _refined(search, state, w / deviation**2)
+    refined = inverse @ pull
     variance = np.maximum(plain, np.diag(clustered)) + np.diag(shaken) + refined**2
     quantile = float(student.ppf(0.975, max(len(blocks) - len(x), 2)))
     share = np.array([_information(D, residual, deviation) for D, residual in
@@ -77,7 +79,7 @@ def assess(search: Search, state: State, seconds: float) -> Identification:
         )
         for replay, played in zip(search.replays, state.played, strict=True)
     )
-    doubts = _doubts(search, state, deviation, spread_by_noise)
+    doubts = [*_left_out(unshaken, unrefined), *_doubts(search, state, deviation, spread_by_noise)]
     message = " ".join([_message(state, estimated, correlations), *doubts])
     return Identification(
         status=state.status,
@@ -108,15 +110,15 @@ def _blocks(search: Search, state: State, pull: Floats) -> list[Floats]:
     return out
 
 
-def _shaken(search: Search, state: State, scale: Floats) -> tuple[Floats, float]:
+def _shaken(search: Search, state: State, scale: Floats) -> tuple[Floats, float, int]:
     """Return what noise of the held markers and the start does.
 
     That is the covariance of the gradient of the misfit, and the robust deviation of a coordinate of the free markers
-    [m]; infinite for shapes at rest, of which it is not known.
+    [m]; infinite for shapes at rest, of which it is not known. At last, the number of replays that could not begin.
     """
     size = len(search.chosen)
     total = np.zeros((size, size))
-    at, moved = 0, list[Floats]()
+    at, moved, lost = 0, list[Floats](), 0
     for i, (replay, played) in enumerate(zip(search.replays, state.played, strict=True)):
         D = cast(list[Floats], state.derivatives)[i]
         factor = scale[at : at + len(D)]
@@ -127,31 +129,53 @@ def _shaken(search: Search, state: State, scale: Floats) -> tuple[Floats, float]
         found = []
         for seed in range(_SHAKES):
             search.check()
-            other = search.replay(replay.recording, np.random.default_rng([i, seed]))
-            change = other.play(state.candidate).predicted - played.predicted
+            try:
+                other = search.replay(replay.recording, np.random.default_rng([i, seed])).play(state.candidate)
+            except SceneError:
+                lost += 1
+                continue
+            change = other.predicted - played.predicted
             found.append(D.T @ (factor * change[:, free].ravel()))
             moved.append(change[:, free].ravel())
-        total += np.array(found).T @ np.array(found) / _SHAKES
-    return total, robust_deviation(np.concatenate(moved)) if moved else np.inf
+        if found:
+            total += np.array(found).T @ np.array(found) / len(found)
+    return total, robust_deviation(np.concatenate(moved)) if moved else np.inf, lost
 
 
-def _refined(search: Search, state: State, scale: Floats) -> Floats:
-    """Return the gradient of the misfit that a net twice as fine and half the step give."""
+def _refined(search: Search, state: State, scale: Floats) -> tuple[Floats, int]:
+    """Return the gradient of the misfit that a net twice as fine and half the step give.
+
+    And the number of windows that could not be replayed so.
+    """
     resolution = search.resolution
     finer = replace(resolution, n_u=2 * resolution.n_u - DEGREE, step=0.5 * resolution.step)
     total = np.zeros(len(search.chosen))
-    at = 0
+    at, lost = 0, 0
     for i, (replay, played) in enumerate(zip(search.replays, state.played, strict=True)):
         search.check()
         D = cast(list[Floats], state.derivatives)[i]
         factor = scale[at : at + len(D)]
         at += len(D)
         kind = Rest if isinstance(replay, Rest) else Replay
-        other = kind(replay.recording, finer, search.references).play(state.candidate)
+        try:
+            other = kind(replay.recording, finer, search.references).play(state.candidate)
+        except SceneError:
+            lost += 1
+            continue
         if not other.stopped:
             change = other.predicted - played.predicted
             total += D.T @ (factor * change[:, replay.recording.free].ravel())
-    return total
+    return total, lost
+
+
+def _left_out(unshaken: int, unrefined: int) -> list[str]:
+    """Return in words what intervals leave out, as so many replays with other noise, or on a finer net, can't begin."""
+    parts = [
+        f"{counted(lost, 'replay')} {how} can't begin"
+        for lost, how in ((unshaken, "with other noise of the start"), (unrefined, "on a finer net"))
+        if lost
+    ]
+    return [f"{' and '.join(parts)}: intervals leave out what they would add."] if parts else []
 
 
 def _estimated(

@@ -32,6 +32,7 @@ from dlocore.statics.statics import start_grid
 
 Floats = NDArray[np.float64]
 
+LIES_SO = "markers that tell how the cable lies, a first guess nearer to it, or more control points"
 _SLACK = 1.003  # of the cable between two grippers: held markers farther apart are brought nearer
 _REST_FRAMES = 8  # from which on a start can be seen to be at rest
 _CARRIED = 3  # tangents from a marker to the next, over which a frame is carried
@@ -228,9 +229,10 @@ class Replay:
         try:
             problem = pose(self.scene(candidate))
         except SceneError as error:
-            given = f"the first frames of {self.recording.name!r}"
-            allowed = "markers that tell how the cable lies, a first guess nearer to it, or more control points"
-            raise SceneError("markers", given, allowed, f"No such cable can begin so ({error})") from None
+            times = cast(Floats, self.recording.times)
+            last = self.compared[0] - 1
+            given = f"the first frames of {self.recording.name!r}, {times[0]:.4g} to {times[last]:.4g} s"
+            raise SceneError("markers", given, LIES_SO, no_such_cable(error)) from None
         return problem, start_grid(problem, self.resolution.n_u, Monitor(None, None, None))
 
     def play(self, candidate: Candidate, like: Played | None = None) -> Played:
@@ -308,6 +310,12 @@ class Replay:
     def differentiable(self, played: Played) -> bool:
         """Tell whether motions beside the played one can be followed."""
         return not objection(played.problem, played.motion)
+
+
+def no_such_cable(error: SceneError) -> str:
+    """Return in words why a cable can't lie as its markers tell, without the fields of a shape that they made."""
+    shaped = error.field.startswith("shape.")
+    return f"No such cable can lie so: {'it would be folded or stretched' if shaped else str(error).rstrip('.')}"
 
 
 def common_references(recordings: Sequence[Recording]) -> Floats | None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from dlocore.errors import SceneError
 from dlocore.identify.candidate import Candidate
 from dlocore.identify.frames import across, tilted, turned_from, with_sections
-from dlocore.identify.replay import Resolution
+from dlocore.identify.replay import LIES_SO, Resolution, no_such_cable
 from dlocore.identify.span import Span
 from dlocore.identify.start import start_fit
 from dlocore.problem.discretisation import make_grid
@@ -75,11 +75,18 @@ class Rest:
         return np.stack(found, axis=1) if found else np.zeros((len(self.given), 0, 3))
 
     def play(self, candidate: Candidate) -> Settled:
-        """Settle every shape with a candidate."""
+        """Settle every shape with a candidate.
+
+        Raises:
+            SceneError: no cable with these numbers can lie as the markers of a shape tell.
+        """
         shapes, stopped = [], False
         for frame in range(len(self.given)):
             scene = self.scene(candidate, frame)
-            problem = pose(scene)
+            try:
+                problem = pose(scene)
+            except SceneError as error:
+                raise SceneError(f"markers[{frame}]", "a shape at rest", LIES_SO, no_such_cable(error)) from None
             grid = make_grid(problem, self.resolution.n_u)
             found = settle(problem, grid, 0.0, Monitor(None, None, None))
             stopped |= found.rest != "settled"

@@ -180,14 +180,19 @@ class Search:
                 return (change[:, free] / _FOLLOWED).ravel()
             except ValueError:
                 pass  # it strayed: marched instead
-        moved = x.copy()
-        moved[j] += _MARCHED
-        beside = self.candidate(candidate, moved)
-        if isinstance(replay, Replay) and isinstance(played, Played):
-            change = replay.play(beside, played).predicted - played.predicted
-        else:
-            change = replay.play(beside).predicted - played.predicted
-        return (change[:, free] / _MARCHED).ravel()
+        for step in (_MARCHED, -_MARCHED):
+            moved = x.copy()
+            moved[j] += step
+            beside = self.candidate(candidate, moved)
+            try:
+                if isinstance(replay, Replay) and isinstance(played, Played):
+                    change = replay.play(beside, played).predicted - played.predicted
+                else:
+                    change = replay.play(beside).predicted - played.predicted
+            except SceneError:  # no such cable begins so
+                continue
+            return (change[:, free] / step).ravel()
+        return np.zeros(played.predicted[:, free].size)  # the window tells nothing of it
 
     def coordinates(self, candidate: Candidate) -> Floats:
         """Return the parameters of a candidate on the scales on which they are sought."""

@@ -23,6 +23,7 @@ from dlocore import (
 from dlocore.identify import Candidate, Replay, Resolution, identify
 from dlocore.identify.datasets import load_datasets
 from dlocore.identify.parameters import parameters, prepared
+from dlocore.identify.rest import Rest
 from dlocore.identify.search import Search
 from dlocore.recordings import Recording
 
@@ -208,10 +209,11 @@ def test_a_start_that_no_cable_has_is_told_of_the_recording() -> None:
     markers = np.array(recording.markers)
     markers[:, 1:] = markers[:, :1] + 3.0 * (markers[:, 1:] - markers[:, :1])  # in feet, say
     guess = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=5e-3)
-    with pytest.raises(SceneError, match=r"^markers: got the first frames of"):
+    with pytest.raises(SceneError, match=r"^markers: got the first frames of 'recording', 0 to 0\.18") as error:
         Replay(replace(recording, markers=markers), Resolution()).play(
             Candidate(cable=guess, environment=Environment())
         )
+    assert "control_points" not in str(error.value)  # which nobody gave
 
 
 def test_a_motion_that_noise_alone_leads_astray_is_told_of() -> None:
@@ -320,3 +322,55 @@ def test_a_cable_that_yields_gives_back_its_yield_strain() -> None:
     found = Search([replace(recording, markers=markers)], chosen, Resolution(n_u=9)).run(start, 15)
     assert found.status == "converged"
     assert strain.get(found.candidate) == pytest.approx(0.006, rel=0.02)  # of the same model; noise alone is left
+
+
+def test_a_shape_that_no_cable_has_is_told_by_its_number() -> None:
+    markers = np.array(still(static=True).markers)
+    markers[3, 1:] *= 3.0
+    guess = Cable(length=0.5, diameter=0.005, linear_density=0.05, bending_stiffness=5e-3)
+    rest = Rest(replace(still(static=True), markers=markers), Resolution())
+    with pytest.raises(SceneError, match=r"^markers\[3\]: got a shape at rest") as error:
+        rest.play(Candidate(cable=guess, environment=Environment()))
+    assert "control_points" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("shaken", "12 replays with other noise of the start can't begin"),
+        ("finer", "1 replay on a finer net can't begin"),
+    ],
+)
+def test_a_search_whose_errors_can_not_all_be_assessed_is_kept_with_a_doubt(
+    name: str, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = Replay.__init__
+
+    def refuse(self: Replay, recording: Recording, resolution: Resolution, *others: Any) -> None:
+        if {"shaken": others[-1] is not None and len(others) > 1, "finer": resolution.n_u > 13}[name]:
+            raise SceneError("markers", "the first frames", "others")
+        made(self, recording, resolution, *others)
+
+    monkeypatch.setattr(Replay, "__init__", refuse)
+    found = identify([still()], names=("drag",), start=Candidate(cable=CABLE, environment=DRAG))
+    assert found.status == "converged"
+    assert f"{said}: intervals leave out what they would add." in found.message
+
+
+def test_a_derivative_is_taken_to_the_side_on_which_the_cable_can_begin(monkeypatch: pytest.MonkeyPatch) -> None:
+    search = Search([still()], parameters(("bending_stiffness",), 2), Resolution(n_u=9))
+    state = search.play(Candidate(cable=CABLE, environment=DRAG))
+    given = CABLE.bending_stiffness
+    predicted = state.played[0].predicted
+
+    def play(self: Replay, candidate: Candidate, like: Any = None) -> Any:
+        stiffness = candidate.cable.bending_stiffness
+        assert stiffness is not None
+        assert given is not None
+        if stiffness > given:
+            raise SceneError("markers", "the first frames", "others")
+        return replace(state.played[0], predicted=predicted + np.log(stiffness / given))
+
+    monkeypatch.setattr(Replay, "differentiable", lambda *_: False)
+    monkeypatch.setattr(Replay, "play", play)
+    np.testing.assert_allclose(search.derivatives(state)[0], 1.0, rtol=1e-9)
