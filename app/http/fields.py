@@ -72,7 +72,8 @@ def _bad_field(error: Any, body: Any, schema: "_Schema") -> BadField:
     if kind == "json_invalid":
         at = loc[1] if len(loc) > 1 else 0
         given = str(body or "")[max(0, at - 30) : at + 30]
-        return BadField(_WHOLE, given, "JSON (RFC 8259) in UTF-8", f"The body is not JSON: {context['error']}.")
+        allowed = "JSON (RFC 8259) in UTF-8, with each name once in an object"
+        return BadField(_WHOLE, given, allowed, f"The body can't be read: {context['error']}. Allowed: {allowed}.")
     loc = loc[1:] if loc and loc[0] in ("body", "path", "query", "header") else loc
     tagged, steps = _steps(loc, body) if where == _WHOLE else (loc, loc)
     if kind == "union_tag_not_found":

@@ -199,6 +199,32 @@ def test_grasps_farther_apart_than_the_cable_between_them_are_refused_in_those_w
     assert "apart" in problem["detail"]
 
 
+def posted(client: TestClient, address: str, body: str) -> Any:
+    return client.post(address, content=body.encode(), headers={"content-type": "application/json"})
+
+
+@pytest.mark.parametrize(
+    ("address", "body", "name"),
+    [
+        ("/v1/predictions", json.dumps(PAPER)[:-1] + ', "cable": {}}', "cable"),
+        ("/v1/predictions", json.dumps(PAPER).replace('"u": 0.25', '"u": 0.25, "u" : 0.5'), "u"),
+        ("/v1/predictions", json.dumps({"name": 'a "{" \\'} | PAPER)[:-1] + ', "name": "b"}', "name"),
+        ("/v1/scenes:explain", json.dumps(PAPER).replace('"drag"', '"Lücke": 0, "Lücke": 0, "drag"'), "Lücke"),
+        ("/v1/predictions:batch", json.dumps({"scenes": [PAPER]})[:-1] + ', "scenes": []}', "scenes"),
+    ],
+)
+def test_a_name_that_is_given_twice_is_refused(client: TestClient, address: str, body: str, name: str) -> None:
+    (error,) = the_problem(posted(client, address, body), 422)["errors"]
+    assert error["field"] == "body"
+    assert f'"{name}" is there twice in one object' in error["message"]
+    assert error["given"].count(name) >= 1
+
+
+def test_a_name_in_two_objects_or_in_a_text_is_no_name_twice(client: TestClient) -> None:
+    scene = {**HANGING, "name": 'two "grasps": {"u": 1, "u": 2} \\'}
+    assert posted(client, "/v1/predictions?store=false", json.dumps(scene)).status_code == 200
+
+
 @pytest.mark.parametrize("literal", ["NaN", "Infinity", "-Infinity", "1e999"])
 def test_a_number_that_is_not_finite_is_refused_by_the_name_of_its_field(client: TestClient, literal: str) -> None:
     body = json.dumps(put(PAPER, "environment.drag", 0.05)).replace('"drag": 0.05', f'"drag": {literal}')
