@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore import Grasp, Prediction, Scene, Waypoints, energies
+from dlocore.scene.paths import held_at
 from dlocore.shape.shape import start_curve
 
 Floats = NDArray[np.float64]
@@ -86,7 +87,8 @@ def held(prediction: Prediction) -> tuple[float, float]:
         else:
             settled = getattr(scene.shape, "settle", False) or scene.environment.table is not None
             begin = surface.positions(g.u, 0.0)[0, 0] if settled else start(g.u)[0]
-        away = np.linalg.norm(surface.positions(g.u, t)[:, 0] - g.path.at(t - g.start, begin), axis=1)
+        path = held_at(g.path, t - g.start, begin) if g.start > 0.0 else g.path.at(t, begin)
+        away = np.linalg.norm(surface.positions(g.u, t)[:, 0] - path, axis=1)
         ends = away[(t == 0.0) | (t == surface.horizon)] if g.start == 0.0 else away[:0]
         worst_end, worst = max(worst_end, ends.max(initial=0.0)), max(worst, away.max())
     return float(worst_end), float(worst)

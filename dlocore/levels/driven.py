@@ -1,10 +1,11 @@
-"""What no cable can follow and only its motion tells: grippers that drive what they hold into something.
+"""What no cable can follow and only its motion tells: grippers that close beside it, or drive it into something.
 
 Grasps that hold from the beginning are looked at before anything is solved (`problem/checks.py`). One that closes
 later has its path begin where the cable is by then, and whether two strands meet is not known beforehand.
 """
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import NamedTuple, cast
 
@@ -13,11 +14,14 @@ from numpy.typing import NDArray
 
 from dlocore.effects.distance import distances
 from dlocore.effects.selfcontact import APART
-from dlocore.levels.level import TOO_DEEP
+from dlocore.problem.brought import GRASP_TOLERANCE
+from dlocore.problem.checks import TOO_DEEP
 from dlocore.problem.problem import Problem
+from dlocore.scene.paths import Waypoints, held_at
 from dlocore.scene.scene import Grasp, Scene
 from dlocore.solvers.march import March
 from dlocore.spline import design_matrix
+from dlocore.words import in_mm
 
 Floats = NDArray[np.float64]
 
@@ -55,6 +59,32 @@ def driven(problem: Problem, motion: March) -> Driven | None:
     deepest = max(found, key=lambda one: one.depth, default=None)
     too_deep = TOO_DEEP * scene.cable.diameter
     return deepest if deepest is not None and deepest.depth > too_deep else None
+
+
+def closes_beside(problem: Problem, motion: March) -> str:
+    """Return in words that a gripper closes beside the cable, see `beside`, or ""."""
+    late = [isinstance(g.path, Waypoints) and g.start > 0.0 for g in problem.scene.grasps]
+    if not any(late):
+        return ""
+    return beside(problem.scene, [_begin(problem, motion, g) for g in problem.scene.grasps])
+
+
+def beside(scene: Scene, begins: Sequence[Floats | None]) -> str:
+    """Return in words that a gripper with waypoints closes beside the cable, farther off than the start may be, or "".
+
+    `begins` are where the cable is as each grasp closes (3,) [m], None where that is not known.
+    """
+    for k, (grasp, begin) in enumerate(zip(scene.grasps, begins, strict=True)):
+        if begin is None or grasp.start == 0.0 or not isinstance(grasp.path, Waypoints):
+            continue
+        away = math.dist(begin, cast(Floats, grasp.path.positions)[0])
+        if away > GRASP_TOLERANCE:
+            there = ", ".join(f"{x:.4g}" for x in begin)
+            return (
+                f"primitives[{k}].path.positions[0] is {in_mm(away)} from the cable at u = {grasp.u:g} m, which is at "
+                f"({there}) m as the gripper closes there, at {grasp.start:.4g} s. Allowed: {in_mm(GRASP_TOLERANCE)}."
+            )
+    return ""
 
 
 def words(problem: Problem, found: Driven) -> str:
@@ -97,7 +127,7 @@ def _into_surroundings(problem: Problem, begins: list[Floats | None]) -> Iterato
         t = _held(scene, [grasp])
         if grasp.start == 0.0 or begin is None or not len(t):
             continue
-        path = np.ascontiguousarray(grasp.path.at(t - grasp.start, begin))
+        path = np.ascontiguousarray(held_at(grasp.path, t - grasp.start, begin))
         depths = list(radius - distances(rows, path).T) if names else []
         depths += [] if table is None else [table.height - path[:, 2]]
         for name, depth in zip([*names, "the table"], depths, strict=False):
@@ -115,7 +145,7 @@ def _into_each_other(problem: Problem, begins: list[Floats | None]) -> Iterator[
         first, second, t = begins[j], begins[k], _held(scene, [a, b])
         if first is None or second is None or not len(t) or abs(a.u - b.u) < APART * diameter:
             continue
-        apart = np.linalg.norm(a.path.at(t - a.start, first) - b.path.at(t - b.start, second), axis=1)
+        apart = np.linalg.norm(held_at(a.path, t - a.start, first) - held_at(b.path, t - b.start, second), axis=1)
         if apart[0] >= diameter:
             nearest = int(np.argmin(apart))
             into = f"the one that primitives[{j}] holds"

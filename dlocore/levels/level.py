@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from dlocore.effects.contact import DEEPEST
 from dlocore.kernels.growth import LOOKS
 from dlocore.kernels.timefit import farthest, sampled
+from dlocore.problem.checks import TOO_DEEP
 from dlocore.problem.discretisation import smallest_n_u
 from dlocore.problem.events import moments, swings
 from dlocore.problem.grid import Grid
@@ -39,7 +40,6 @@ TEARS = 1.5  # times the strain of another march: what strains a cable so much m
 _STIFFER = 5  # times that contact is made stiffer on one grid
 _MISSED = 0.01  # of the diameter: what the time spline may miss of a motion with contact
 _SAMPLES = 33  # along the cable, and in time while it swings once, at which surfaces are compared
-TOO_DEEP = 0.25  # of the diameter, in the table, an obstacle or itself: no cable is pressed in so far
 _YIELDING = 0.8  # of the depth, at most, is left by a stiffer contact where it is one of stiffness
 ACCEPT = 0.75  # of the target: an answer with a smaller estimated error is believed
 

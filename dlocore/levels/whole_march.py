@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import NamedTuple, cast
 
 from dlocore.answer.parts import Status
-from dlocore.levels.driven import driven, words
+from dlocore.levels.driven import closes_beside, driven, words
 from dlocore.levels.level import (
     CREDIBLE_STRAIN,
     TOO_DEEP,
@@ -112,6 +112,9 @@ def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
         least, most = motion.slopes
         seen = f"|r'| is {least:.2g} to {most:.2g} within a span"
         return "stalled", f"The cable is folded finer than its control points can show: {seen}. Take more of them."
+    off = "" if motion.stopped == "time" else closes_beside(problem, motion)
+    if off:
+        return "stalled", off
     inside = None if motion.stopped == "time" else driven(problem, motion)
     if inside is not None:
         return "stalled", words(problem, inside)

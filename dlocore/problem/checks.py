@@ -1,6 +1,8 @@
 """What no cable can follow, found before anything is solved: grasps too far apart, a start inside table or obstacle."""
 
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import cast
 
 import numpy as np
@@ -16,21 +18,12 @@ from dlocore.shape.shape import StartCurve
 
 Floats = NDArray[np.float64]
 
-GRASP_TOLERANCE = 0.010  # [m]: of the first waypoint from the cable
-
 CROSSING = 0.05  # of the diameter: strands of a start that are nearer pass through each other
-
-
-def check_waypoints(scene: Scene, start: StartCurve) -> None:
-    """Refuse waypoints that begin away from the grasped point."""
-    for i, grasp in enumerate(scene.grasps):
-        if isinstance(grasp.path, Waypoints) and grasp.start == 0.0:
-            first = cast(Floats, grasp.path.positions)[0]
-            off = float(np.linalg.norm(first - start(grasp.u)[0]))
-            if not off <= GRASP_TOLERANCE:
-                reason = f"The cable is {off:.3g} m from it at u = {grasp.u:g} m"
-                allowed = f"a point within {GRASP_TOLERANCE:g} m of the grasped point"
-                raise SceneError(f"primitives[{i}].path.positions[0]", first, allowed, reason)
+TOO_DEEP = 0.25  # of the diameter, in the table, an obstacle or itself: no cable is pressed in so far
+_MIDDLE = 0.5  # of the diameter: what was seen of a cable may lie so deep in an obstacle, which moves it out again
+_PLACES = 101  # of a curve, at first, at which it is looked at for what it goes into
+_FINE = 0.1  # of the radius: no finer
+_LONGER = 1.1  # times the straight way between two places of a curve is its way, at most
 
 
 def check_reach(scene: Scene, start: StartCurve) -> None:
@@ -115,19 +108,56 @@ def check_outside(scene: Scene, start: StartCurve, met: tuple[int, ...]) -> None
     if not met:
         return
     rows = np.array([scene.environment.obstacles[i].row() for i in met])
-    radius = 0.5 * scene.cable.diameter
-
-    def depth(points: Floats) -> tuple[float, int]:
-        gaps = distances(rows, np.ascontiguousarray(points)).min(axis=0) - radius
-        return -float(gaps.min()), met[int(gaps.argmin())]
-
-    inside, i = depth(start(np.linspace(0.0, scene.cable.length, 101)))
+    diameter = scene.cable.diameter
+    seen = min(table_tolerance(scene), _MIDDLE * diameter)
+    inside, i = _deepest(rows, 0.5 * diameter, start, np.linspace(0.0, scene.cable.length, _PLACES), seen)
     allowed = "the cable outside all obstacles, or effects.obstacles off"
-    if inside > table_tolerance(scene):
+    if inside > seen:
         reason = f"The cable starts up to {inside:.3g} m inside it"
-        raise SceneError(f"environment.obstacles[{i}]", f"{inside:.3g} m inside", allowed, reason)
+        raise SceneError(f"environment.obstacles[{met[i]}]", f"{inside:.3g} m inside", allowed, reason)
     for k, grasp in enumerate(scene.grasps):
-        inside, i = depth(grasp.path.at(np.linspace(0.0, grasp.path.duration, 65), start(grasp.u)[0]))
-        if grasp.start == 0.0 and inside > table_tolerance(scene):
-            reason = f"It takes the cable {inside:.3g} m into obstacles[{i}]"
+        if grasp.start > 0.0:
+            continue  # from where the cable is by then
+        path = partial(grasp.path.at, start=start(grasp.u)[0])
+        borne = min(table_tolerance(scene), TOO_DEEP * diameter)
+        inside, i = _deepest(rows, 0.5 * diameter, path, _moments(grasp.path), borne)
+        if inside > borne:
+            reason = f"It takes the cable {inside:.3g} m into obstacles[{met[i]}]"
             raise SceneError(f"primitives[{k}].path", f"{inside:.3g} m inside", allowed, reason)
+
+
+def _deepest(
+    rows: Floats, radius: float, curve: Callable[[Floats], Floats], s: Floats, borne: float
+) -> tuple[float, int]:
+    """Return how deep a cable of a radius is inside the obstacles of `rows` on a curve r(s) [m], and in which.
+
+    It is looked at s (k,), and where two of these leave room between them for what is inside by more than `borne`,
+    however thin, half-way, again and again: no point is farther from an obstacle than its neighbour and the way there.
+    """
+
+    def looked(at: Floats) -> tuple[Floats, Floats]:
+        points = np.ascontiguousarray(curve(at))
+        gaps = distances(rows, points) - radius
+        found.append((-float(gaps.min()), int(gaps.min(axis=0).argmin())))
+        return points, gaps.min(axis=1)
+
+    found: list[tuple[float, int]] = []
+    points, gaps = looked(s)
+    ends, at, gap = (np.stack([x[:-1], x[1:]]) for x in (s, points, gaps))
+    while True:
+        way = np.linalg.norm(at[1] - at[0], axis=1)
+        room = (0.5 * (gap.sum(axis=0) - _LONGER * way) < -borne) & (way > _FINE * radius)
+        if found[-1][0] > borne or not room.any():
+            return max(found)
+        ends, at, gap = ends[:, room], at[:, room], gap[:, room]
+        middle = ends.mean(axis=0)
+        points, gaps = looked(middle)
+        ends, at, gap = (
+            np.concatenate([[x[0], m], [m, x[1]]], axis=1) for x, m in ((ends, middle), (at, points), (gap, gaps))
+        )
+
+
+def _moments(path: Path) -> Floats:
+    """Return times (k,) [s] of a path that miss no turn of it."""
+    times = np.linspace(0.0, path.duration, _PLACES)
+    return np.union1d(times, cast(Floats, path.times)) if isinstance(path, Waypoints) else times

@@ -11,7 +11,7 @@ from dlocore.kernels.holding import ROW, hold_rows, place, spun
 from dlocore.problem.grid import Grid
 from dlocore.problem.plane import unit_across
 from dlocore.problem.problem import Problem
-from dlocore.scene.paths import STAYS
+from dlocore.scene.paths import STAYS, held_at
 from dlocore.scene.scene import Grasp
 
 Floats = NDArray[np.float64]
@@ -106,7 +106,7 @@ def constraint_rows(
         line, number = g.path.line, -1
         if line is None:
             line, number = STAYS, len(sampled)
-            sampled.append(g.path.at(t - g.start, starts[g][0]))
+            sampled.append(held_at(g.path, t - g.start, starts[g][0]))
         rows.append((i, 0))
         table.append((g.u, 0, directed, number, g.start, *line, *begun[0]))
         if directed:

@@ -24,8 +24,9 @@ from dlocore.effects.stretch import Stretch, StretchDamping
 from dlocore.effects.twist import Twist
 from dlocore.errors import SceneError
 from dlocore.kernels.projection import in_world
+from dlocore.problem.brought import brought
 from dlocore.problem.buckling import out_of_plane, with_side
-from dlocore.problem.checks import check_above, check_apart, check_outside, check_reach, check_waypoints
+from dlocore.problem.checks import check_above, check_apart, check_outside, check_reach
 from dlocore.problem.events import Event, find_events
 from dlocore.problem.features import Features, find_features
 from dlocore.problem.plane import Plane, find_plane, is_straight, lay_on_table, off_the_table, rest_plane
@@ -287,8 +288,7 @@ def pose(scene: Scene, called_for: Mapping[str, str] | None = None, *, at_rest: 
         SceneError: the scene asks what no cable can follow, or switches off what the rest of it needs.
     """
     cable, environment = scene.cable, scene.environment
-    start = start_curve(scene.shape, cable.length)
-    check_waypoints(scene, start)
+    start = brought(scene, start_curve(scene.shape, cable.length))
     check_reach(scene, start)
     table, switch = environment.table, scene.effects.get
     called_for = called_for or {}

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from dlocore.reference.body import CLAMP, DIRECTION, GYRATION, REAL, Body, Guide, State
 from dlocore.reference.rod import Memory, Rod, Snapshot, carried, unit
+from dlocore.scene.paths import held_at
 from dlocore.scene.scene import Grasp
 
 Floats = NDArray[np.float64]
@@ -82,7 +83,7 @@ class Chain:
 
     def _positions(self, grip: Grip, t: Floats) -> Floats:
         start = self.rod.world(grip.position)
-        return self.rod.inside(grip.grasp.path.at(t - grip.grasp.start, start))
+        return self.rod.inside(held_at(grip.grasp.path, t - grip.grasp.start, start))
 
     def acceleration(self, grip: Grip, t: float, span: float) -> Floats:
         """Return the acceleration (3,) [m/s^2] of a gripper at t [s] by differences over `span` [s]."""

@@ -12,7 +12,6 @@ from dlocore.problem.problem import Problem
 from dlocore.reference import body as places
 from dlocore.reference.surface import BOX, CYLINDER, FRICTION, PLANE, ROUNDING, ROW
 from dlocore.scene.obstacles import Box, Capsule, Cylinder, Obstacle, Sphere
-from dlocore.scene.paths import Waypoints
 from dlocore.scene.scene import Points
 from dlocore.shape.shape import SplineCurve, start_curve
 
@@ -311,9 +310,7 @@ def _with_start(rod: Rod) -> Rod:
     fixed = {}
     for g in problem.scene.grasps:
         if g.start == 0.0:
-            point = start(g.u)
-            at = g.path.at(np.zeros(1), point[0]) if isinstance(g.path, Waypoints) else point
-            fixed[rod.node(g.u)] = _flat(rod, rod.inside(at))[0]
+            fixed[rod.node(g.u)] = _flat(rod, rod.inside(start(g.u)))[0]
     strain = start.strain_at(0.5 * (u[1:] + u[:-1]))
     if not start.bow:  # whose length is without stress
         x = _of_length(x, np.diff(u) * (1.0 + strain), fixed)

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dlocore.answer.parts import Accuracy, EffectReport, GraspReaction, Iteration, Status
 from dlocore.errors import SceneError
+from dlocore.levels.driven import beside
 from dlocore.levels.whole_march import sided
 from dlocore.prediction import Prediction
 from dlocore.problem.buckling import side_notes
@@ -167,6 +168,10 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
     motion = last.motion
     estimate = sum(_parts(refined, fitted).values())
     status, message = _status(refined, target)
+    grasps, surface = problem.scene.grasps, fitted.surface
+    off = beside(problem.scene, [surface.positions(g.u, min(g.start, problem.horizon))[0, 0] for g in grasps])
+    if off and not motion.stopped:
+        status, message = "stalled", off
     control = fitted.surface.control_points
     return Prediction(
         scene=problem.scene,

@@ -23,6 +23,7 @@ _PROFILES: dict[str, tuple[float, ...]] = {
     "cubic": (0.0, 3.0, -2.0, 0.0, 0.0),
 }
 MAX_WAYPOINTS = 100_000
+DRAWN = 0.2  # [s]: in which a gripper that closes beside the cable draws it on to its waypoints
 STAYS = (1.0, *_PROFILES["linear"], 0.0, 0.0, 0.0)  # a straight move, or a turn about one axis, that is none
 
 
@@ -92,9 +93,7 @@ class Move:
 
     def _share(self, t: Floats) -> Floats:
         """Return the share of the way that is done at times `t` (k,) [s]."""
-        x = np.clip(t / self.duration, 0.0, 1.0)
-        a, b, c, d, e = _PROFILES[self.profile]
-        return np.asarray(x * (a + x * (b + x * (c + x * (d + x * e)))))
+        return _share(self.profile, t / self.duration)
 
     def at(self, t: Floats, start: Floats) -> Floats:
         """Positions at times `t` (k,) [s] of a grasp that began at `start` (3,) [m]; (k, 3) [m]."""
@@ -129,8 +128,8 @@ class Waypoints:
 
     It starts at rest; with `start` "moving" at the velocity that the first waypoints tell, as a recorded path does.
     `orientations` (n, 4), unit quaternions (w, x, y, z), turn the grasp by their rotation since the first. The first
-    position must be that of the cable at the grasped point, within `dlocore.problem.checks.GRASP_TOLERANCE`; the start
-    shape is then brought to it.
+    position must be that of the cable at the grasped point as the grasp closes, within GRASP_TOLERANCE of
+    `dlocore.problem.brought`; the start shape is brought to it, and a cable in motion drawn to it within DRAWN.
     """
 
     times: ArrayLike
@@ -215,3 +214,23 @@ class Waypoints:
 
 
 Path = Still | Move | Waypoints
+
+
+def held_at(path: Path, t: Floats, start: Floats) -> Floats:
+    """Positions (k, 3) [m] at times `t` (k,) [s] of what a gripper holds that was at `start` (3,) [m] as it closed.
+
+    Those of its path; one with waypoints draws it from where it is on to them, by minimum jerk within DRAWN, or within
+    the time of all waypoints where that is shorter.
+    """
+    at = path.at(t, start)
+    if not isinstance(path, Waypoints):
+        return at
+    drawn = _share("minimum_jerk", t / min(DRAWN, path.duration))
+    return at + (1.0 - drawn)[:, None] * (start - cast(Floats, path.positions)[0])
+
+
+def _share(profile: Profile, x: Floats) -> Floats:
+    """Return the share of the way that is done by a profile at x (k,), 0 at its begin and 1 at its end."""
+    x = np.clip(x, 0.0, 1.0)
+    a, b, c, d, e = _PROFILES[profile]
+    return np.asarray(x * (a + x * (b + x * (c + x * (d + x * e)))))

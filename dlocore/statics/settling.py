@@ -16,6 +16,7 @@ from dlocore.problem.events import closed_grasps
 from dlocore.problem.grid import Grid
 from dlocore.problem.holding import Held, Starts, close_grasps, hold
 from dlocore.problem.problem import Problem
+from dlocore.scene.paths import held_at
 from dlocore.scene.scene import Grasp
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.spline import greville
@@ -216,7 +217,8 @@ def _carry(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, t:
     dimensions = problem.plane.dimensions
     shift = np.array(
         [
-            problem.plane.points(g.path.at(np.array([t - g.start]), starts[g][0])[0]) - grid.at(q, g.u)[:dimensions]
+            problem.plane.points(held_at(g.path, np.array([t - g.start]), starts[g][0])[0])
+            - grid.at(q, g.u)[:dimensions]
             for g in order
         ]
     )

@@ -9,7 +9,7 @@ from benchmarks.hard.generator import draw
 from benchmarks.hard.judge import DRIVEN, faults, run
 from benchmarks.hard.shares import GROWTHS, Strata, is_left, strata
 from dlocore import Environment, Grasp, Move, Points, Prediction, Quality, Scene, Sphere, Straight, Table, predict
-from dlocore.levels.level import TOO_DEEP
+from dlocore.problem.checks import TOO_DEEP
 from tests.solver.scenes import WEIGHTLESS, cable, march
 
 FOLLOWS = "which no cable follows"

@@ -1,0 +1,88 @@
+"""Grippers with waypoints begin beside the cable as it was seen: it is brought to them, and they are told apart."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dlocore import Environment, Grasp, Prediction, Quality, Scene, SceneError, Straight, Table, Waypoints, predict
+from dlocore.problem.brought import GRASP_TOLERANCE
+from dlocore.problem.problem import pose
+from dlocore.scene.paths import DRAWN, Move, held_at
+from tests.solver.scenes import Floats, cable
+
+UP = np.array([0.0, 0.05, 0.0])
+ROUGH = Environment(drag=0.1, table=Table(friction=0.3))
+
+
+def along(u: float, aside: float, **changes: Any) -> Grasp:
+    """Return a grasp at u [m] of a straight cable along x that begins `aside` of it [m] and goes 0.1 m farther."""
+    positions = [[u, aside, 0.0], [u, aside + 0.05, 0.0], [u, aside + 0.1, 0.0]]
+    return Grasp(u=u, path=Waypoints(times=[0.0, 0.5, 1.0], positions=positions), **changes)
+
+
+def carried(*grasps: Grasp, **changes: Any) -> Scene:
+    return Scene(cable=cable(), shape=Straight(), grasps=grasps, environment=ROUGH, **changes)
+
+
+def strongest(found: Prediction) -> float:
+    return max(float(np.linalg.norm(g.reaction, axis=1).max()) for g in found.grasps)
+
+
+@pytest.mark.parametrize("aside", [1e-4, 3e-3, -9e-3])
+def test_a_cable_that_one_gripper_holds_is_moved_to_it_as_a_whole(aside: float) -> None:
+    found, there = (predict(carried(along(0.8, y))) for y in (aside, 0.0))
+    assert found.start_energy == pytest.approx(there.start_energy, abs=1e-15)
+    assert strongest(found) == pytest.approx(
+        strongest(there), rel=1e-6
+    )  # bent beside its gripper it was thousands of newtons
+    np.testing.assert_allclose(
+        found.surface.sample(33, 33)[2][..., :3],
+        there.surface.sample(33, 33)[2][..., :3] + [0.0, aside, 0.0],
+        atol=1e-8,
+    )
+
+
+@pytest.mark.parametrize("shape", [Straight(), None], ids=["straight", "goes on"])
+def test_between_two_grippers_it_bends_no_more_than_it_has_to(shape: Any) -> None:
+    if shape is None:
+        shape = predict(carried(Grasp(u=0.2, path=Move(displacement=(0.0, 0.2, 0.0), duration=1.0)))).shape_at()
+    given = pose(Scene(cable=cable(), shape=shape, environment=ROUGH, horizon=1.0)).start
+    asides = np.array([[0.003, -0.002, 0.0], [-0.001, 0.004, 0.0]])
+    begins = given([0.2, 0.8]) + asides
+    paths = [Waypoints(times=[0.0, 1.0], positions=[at, at + UP]) for at in begins]
+    held = [Grasp(u=u, path=path) for u, path in zip((0.2, 0.8), paths, strict=True)]
+    scene = Scene(cable=cable(), shape=shape, grasps=held, environment=ROUGH)
+    start = pose(scene).start
+    np.testing.assert_allclose(start([0.2, 0.8]), begins, atol=1e-11)
+    u = np.linspace(0.0, 1.0, 101)
+    assert np.linalg.norm(start(u) - given(u), axis=1).max() < 1.01 * np.linalg.norm(asides, axis=1).max()
+    bends: Floats = np.linalg.norm(start(u, 2) - given(u, 2), axis=1)
+    assert bends.max() < 1.2 * 6.0 * np.linalg.norm(asides[1] - asides[0]) / 0.6**2
+    np.testing.assert_allclose(start([0.2, 0.8], 1), given([0.2, 0.8], 1), atol=1e-3)
+
+
+def test_beyond_the_tolerance_the_first_waypoint_is_refused() -> None:
+    with pytest.raises(SceneError, match=r"primitives\[1\].path.positions\[0\].*within 0.01 m"):
+        predict(carried(Grasp(u=0.2), along(0.8, 1.01 * GRASP_TOLERANCE)))
+
+
+def test_a_gripper_that_closes_a_little_beside_draws_the_cable_to_its_path() -> None:
+    scene = carried(along(0.8, 0.006, grasp_time=0.5), quality=Quality(target_error=1e-3))
+    found = predict(scene)
+    assert found.status == "converged"
+    assert strongest(found) < 0.2  # carried there at once it was hundreds of newtons
+    t = np.linspace(0.5, 1.5, 41)
+    at = found.surface.positions([0.8], t)[:, 0]
+    path = held_at(scene.grasps[0].path, t - 0.5, at[0])
+    np.testing.assert_allclose(at, path, atol=2e-4)
+    late = t >= 0.5 + DRAWN
+    np.testing.assert_allclose(path[late], scene.grasps[0].path.at(t[late] - 0.5, at[0]), atol=1e-15)
+
+
+@pytest.mark.parametrize("method", ["auto", "reference"])
+def test_one_that_closes_far_beside_is_no_success(method: Any) -> None:
+    quality = Quality(method=method, target_error=5e-3)
+    found = predict(carried(along(0.8, 0.03, grasp_time=0.5), quality=quality))
+    assert found.status == "stalled"
+    assert "primitives[0].path.positions[0] is 30 mm from the cable at u = 0.8 m" in found.message
