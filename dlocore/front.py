@@ -287,6 +287,7 @@ def _answer(
     grid = level.motion.grid
     surface = surface_at(problem, level, level.control)
     left_out = neglected(level)
+    stretch = partial(stretch_of, problem, grid, level.motion.times, level.motion.states)
     errors: dict[str, float] = {}
     if outcome.errors is not None:
         errors = {**outcome.errors, "neglected": left_out}
@@ -297,9 +298,9 @@ def _answer(
         said=outcome.message,
         surface=surface,
         report_grasps=partial(_reactions, level, find_forces),
-        report_effects=partial(effect_reports, problem, grid, partial(_material, problem, level)),
+        report_effects=partial(effect_reports, problem, partial(_material, problem, level), stretch),
         report_material=partial(_material, problem, level),
-        report_stretch=partial(stretch_of, grid, level.motion.times, level.motion.states),
+        report_stretch=stretch,
         iterations=tuple(monitor.iterations),
         accuracy=Accuracy(
             method=method,

@@ -98,7 +98,7 @@ class Prediction:
 
     @cached_property
     def stretch(self) -> StretchMotion:
-        """How far the cable is stretched over time."""
+        """How far the cable is stretched over time, to the accuracy of a tension."""
         return self.report_stretch()
 
     def shape_at(self, t: float | None = None) -> ControlPoints:

@@ -114,10 +114,11 @@ class SplineSurface:
         return self.twist_rate(u, t) - (binormal * third).sum(axis=-1) / square
 
     def axial_strain(self, u: ArrayLike, t: ArrayLike) -> Floats:
-        """Return the axial strain |r'| - 1 on the grid; (k_t, k_u).
+        """Return the axial strain |r'| - 1 of the spline on the grid; (k_t, k_u).
 
-        It is read at the middle of each span, where reduced integration controls it, and linear between: elsewhere the
-        derivative of the spline oscillates about it.
+        It is read at the middle of each span and linear between, elsewhere the derivative of the spline oscillates
+        about it. In the two spans beside an end, a grasp or a load it may be off by a fifth: the strain that balances
+        the forces on the cable, from which to read a tension, is `Prediction.stretch`.
         """
         breaks = np.unique(self.knots_u)
         middles = 0.5 * (breaks[:-1] + breaks[1:])

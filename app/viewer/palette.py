@@ -90,12 +90,12 @@ def _twist(prediction: Prediction, u: Floats, t: Floats) -> Floats:
 
 
 def _strain(prediction: Prediction, u: Floats, t: Floats) -> Floats:
-    return prediction.surface.axial_strain(u, t)
+    return prediction.stretch.along(u, t)
 
 
 def _tension(prediction: Prediction, u: Floats, t: Floats) -> Floats:
     """Return the axial force by which the cable passes the grippers' reactions on [N]."""
-    return cast(float, prediction.scene.cable.axial_stiffness) * prediction.surface.axial_strain(u, t)
+    return cast(float, prediction.scene.cable.axial_stiffness) * prediction.stretch.along(u, t)
 
 
 QUANTITIES = {

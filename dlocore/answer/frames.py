@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.answer.parts import MaterialMotion, StretchMotion
+from dlocore.answer.tension import balanced
 from dlocore.answer.transport import transported
 from dlocore.kernels.angles import angles_with
 from dlocore.kernels.basis import spline_values
@@ -150,11 +151,12 @@ def material_of(
     )  # fmt: skip
 
 
-def stretch_of(grid: Grid, times: Floats, states: Floats) -> StretchMotion:
+def stretch_of(problem: Problem, grid: Grid, times: Floats, states: Floats) -> StretchMotion:
     """Return how far a cable is stretched in the states (k, n_u, nc) at the times (k,) [s] of a motion."""
     kept = np.unique(np.linspace(0, len(times) - 1, STRETCH_TIMES).round().astype(int))
-    strain = axial_strain(grid.tables, states[kept][..., :3])
-    return StretchMotion(times=times[kept], u=np.array(grid.tables.axial_u), strain=strain)
+    u = np.unique(np.concatenate([[0.0], grid.tables.axial_u, grid.knots[-1:]]))
+    at_points = axial_strain(grid.tables, states[kept][..., : problem.plane.dimensions])
+    return StretchMotion(times=times[kept], u=u, strain=at_points @ balanced(problem.scene, grid, u).T)
 
 
 def _first_director(problem: Problem, grid: Grid, tangent: Floats) -> Floats:

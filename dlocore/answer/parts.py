@@ -142,8 +142,10 @@ class StretchMotion:
 
     Attributes:
         times: (m,) [s].
-        u: (k,) [m].
-        strain: axial strain (m, k).
+        u: (k,) [m], with both ends.
+        strain: axial strain (m, k) that balances the forces on the cable (docs/model.md, selective reduced
+            integration). In an elastic cable without axial damping EA times it is the tension [N]; where a force acts
+            in a point, the mean of both sides.
     """
 
     times: Floats
@@ -154,6 +156,10 @@ class StretchMotion:
         """Return the axial strain (k,) at time `t` [s], linear between the stored times."""
         k, s = _bracket(self.times, t)
         return np.asarray((1 - s) * self.strain[k] + s * self.strain[k + 1])
+
+    def along(self, u: Floats, t: Floats) -> Floats:
+        """Return the axial strain (k_t, k_u) at the places `u` (k_u,) [m] and times `t` (k_t,) [s], linear between."""
+        return np.array([np.interp(u, self.u, self.at(s)) for s in t])
 
 
 def _bracket(times: Floats, t: float) -> tuple[int, float]:

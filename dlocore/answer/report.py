@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.answer.clearance import least_distance
-from dlocore.answer.parts import EffectReport, GraspReaction, MaterialMotion
+from dlocore.answer.parts import EffectReport, GraspReaction, MaterialMotion, StretchMotion
 from dlocore.kernels.assembly import History, stored_energy
 from dlocore.problem.grid import Grid
 from dlocore.problem.holding import SMOOTH, Held
@@ -91,20 +91,18 @@ def planned_effects(problem: Problem) -> tuple[EffectReport, ...]:
 
 
 def effect_reports(
-    problem: Problem, grid: Grid, material: Callable[[], MaterialMotion | None], surface: SplineSurface
+    problem: Problem,
+    material: Callable[[], MaterialMotion | None],
+    stretch: Callable[[], StretchMotion],
+    surface: SplineSurface,
 ) -> tuple[EffectReport, ...]:
-    """Return for each effect whether it was simulated, why, and its size on the predicted motion.
-
-    The axial strain is that at the axial points: between them reduced integration leaves it free to oscillate.
-    """
+    """Return for each effect whether it was simulated, why, and its size on the predicted motion."""
     cable, environment = problem.scene.cable, problem.scene.environment
     u = np.linspace(0.0, cable.length, 33)
     t = np.linspace(0.0, surface.horizon, 33)
     speed = np.linalg.norm(surface(u, t, dt=1)[..., :3], axis=-1)
     acceleration = np.linalg.norm(surface(u, t, dt=2)[..., :3], axis=-1)
     curvature = surface.curvature(u, t)
-    controls = surface.states(t)
-    states = problem.coordinates(controls[..., :3], controls[..., 3])
     tau = surface.twist_rate(u, t)
     mu, EI = cable.linear_density, cast(float, cable.bending_stiffness)
     drag = environment.drag * speed + environment.drag_quadratic * speed**2
@@ -114,7 +112,7 @@ def effect_reports(
         "drag": (float(np.trapezoid(drag, u, axis=1).max()), "N"),
         "damping": (float(cable.bending_damping * np.abs(np.gradient(curvature, t, axis=0)).max()), "N m"),
         "gravity": (weight, "N"),
-        "stretch": (grid.largest_strain(states), "axial strain"),
+        "stretch": (float(np.abs(stretch().strain).max()), "axial strain"),
         "bend": (float(EI * curvature.max()), "N m"),
         "table": (weight, "N"),
         "twist": (float(cast(float, cable.torsional_stiffness) * np.abs(tau).max()), "N m"),

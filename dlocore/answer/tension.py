@@ -1,0 +1,54 @@
+"""The axial strain that balances the forces along the cable, from that at the points of reduced integration.
+
+It is the quadratic spline e on the knots of the grid with
+
+    int e phi_j du = sum_p w_p e_p phi_j(u_p)   for all quadratic basis functions phi_j,
+
+of which the b_i' are combinations, so that the forces on all control points are those of the e_p (docs/model.md,
+selective reduced integration). Where a force acts in a point a step is added, where a direction is held, with unit
+length, a force on phi_j(u_g): both are as large as leaves e least curved.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+
+from dlocore.kernels.basis import GAUSS_3, gauss_points
+from dlocore.problem.grid import Grid
+from dlocore.scene.scene import Scene
+from dlocore.spline import DEGREE
+
+Floats = NDArray[np.float64]
+
+
+def balanced(scene: Scene, grid: Grid, u: Floats) -> Floats:
+    """Return the matrix (k, p) that makes the axial strain at u (k,) [m] of that at the axial points (p,) of a grid."""
+    tables, knots, length = grid.tables, grid.knots[1:-1], float(grid.knots[-1])
+    points, weights = gauss_points(np.array(grid.knots), *GAUSS_3)
+    at_points = _basis(knots, points)
+    mass = at_points.T @ (weights[:, None] * at_points)
+    held = sorted({g.u for g in scene.grasps if g.hold != "point"})
+    inside = sorted({u for u in (*(g.u for g in scene.grasps), *(f.u for f in scene.loads)) if 0.0 < u < length})
+    sides = [np.nextafter(g, to) for g in held for to in (0.0, length)]  # not the same where the knot is triple
+    steps = np.array([np.heaviside(points - g, 0.5) for g in inside]).reshape(-1, len(points))
+    given = np.hstack(
+        [
+            _basis(knots, tables.axial_u).T * tables.axial_w,
+            _basis(knots, np.array(sides)).T,
+            -at_points.T @ (weights * steps).T,
+        ]
+    )
+    found = np.linalg.solve(mass, given)
+    count = len(tables.axial_w)
+    own, others = found[:, :count], found[:, count:]
+    begins, ends = np.unique(knots)[:-1], np.unique(knots)[1:]
+    curved = (ends - begins)[:, None] ** 2 * _basis(knots, 0.5 * (begins + ends), 2)
+    forces = -np.linalg.pinv(curved @ others) @ (curved @ own)
+    jumps = np.array([np.heaviside(u - g, 0.5) for g in inside]).reshape(-1, len(u)).T
+    return _basis(knots, u) @ (own + others @ forces) + jumps @ forces[len(sides) :]
+
+
+def _basis(knots: Floats, u: Floats, derivative: int = 0) -> Floats:
+    """Return the quadratic splines on knots (n + 3,) [m], or derivatives, at u (k,) [m]; (k, n)."""
+    n = len(knots) - DEGREE
+    return np.asarray(BSpline(knots, np.eye(n), DEGREE - 1)(u, derivative))

@@ -1,0 +1,96 @@
+"""The tension along a cable as its axial strain tells, against the forces on it and the reference."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dlocore import Cable, Environment, Grasp, Load, Move, Prediction, Quality, Scene, Straight, predict
+from tests.solver.scenes import Floats, G
+
+CABLE = Cable.preset("black-electric-cable")  # of 1 m and 1 kg
+DOWN = Straight(direction=(0.0, 0.0, -1.0), settle=True)
+NOWHERE = Environment(gravity=(0.0, 0.0, 0.0))
+GRIDS = {
+    "free": Quality(),
+    "9": Quality(n_u=9, n_t=13, keep_grid=True),
+    "33": Quality(n_u=33, n_t=13, keep_grid=True),
+}
+PULL = (0.0, 0.0, -20.0)  # [N]
+
+
+def tension(prediction: Prediction, t: float) -> tuple[Floats, Floats]:
+    """Return the places (k,) [m] at which a prediction tells the strain, and the tension there (k,) [N]."""
+    return prediction.stretch.u, prediction.scene.cable.axial_stiffness * prediction.stretch.at(t)
+
+
+def held(hold: str, grid: str, **rest: Any) -> Scene:
+    """Return the scene of a cable that is held at its top."""
+    grasps = [Grasp(u=0.0, hold=hold)]  # type: ignore[arg-type]
+    return Scene(**{"cable": CABLE, "shape": DOWN, "grasps": grasps, "horizon": 1.0, "quality": GRIDS[grid], **rest})
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+@pytest.mark.parametrize("hold", ["point", "clamp"])
+def test_the_tension_of_a_hanging_cable_is_the_weight_below(hold: str, grid: str) -> None:
+    u, found = tension(predict(held(hold, grid)), 1.0)
+    assert u[0] == 0.0
+    assert u[-1] == 1.0
+    np.testing.assert_allclose(found, G * (1.0 - u), atol=1e-6 * G)
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+@pytest.mark.parametrize("hold", ["point", "clamp"])
+def test_the_tension_of_a_cable_that_is_pulled_at_its_end_is_the_pull(hold: str, grid: str) -> None:
+    _, found = tension(predict(held(hold, grid, loads=[Load(u=1.0, force=PULL)], environment=NOWHERE)), 1.0)
+    np.testing.assert_allclose(found, 20.0, rtol=1e-6)
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+@pytest.mark.parametrize("hold", ["point", "clamp"])
+def test_the_tension_jumps_where_a_weight_hangs_on_the_cable(hold: str, grid: str) -> None:
+    u, found = tension(predict(held(hold, grid, loads=[Load(u=0.5, force=PULL)])), 1.0)
+    np.testing.assert_allclose(found, G * (1.0 - u) + 20.0 * np.heaviside(0.5 - u, 0.5), atol=1e-6 * G)
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+@pytest.mark.parametrize("hold", ["point", "clamp"])
+def test_the_tension_of_a_cable_that_is_pulled_along_itself_accelerates_what_follows(hold: str, grid: str) -> None:
+    up = Move(displacement=(0.0, 0.0, 0.5), duration=1.0)
+    scene = held(hold, grid, shape=replace(DOWN, settle=False), environment=NOWHERE)
+    prediction = predict(replace(scene, grasps=(replace(scene.grasps[0], path=up),)))
+    t = prediction.stretch.times[np.argmin(np.abs(prediction.stretch.times - 0.21))]
+    acceleration = 0.5 * (60.0 * t - 180.0 * t**2 + 120.0 * t**3)  # of the minimum jerk
+    assert acceleration > 2.5
+    u, found = tension(prediction, t)
+    np.testing.assert_allclose(found, acceleration * (1.0 - u), atol=0.005 * acceleration)
+
+
+def test_the_tension_of_a_cable_that_swings_between_two_grippers_is_that_of_the_reference() -> None:
+    carried = Grasp(u=0.0, path=Move(displacement=(0.3, 0.0, 0.2), duration=0.5))
+    scene = Scene(
+        cable=CABLE,
+        shape=Straight(settle=True),
+        grasps=[carried, Grasp(u=1.0)],
+        environment=Environment(drag=2.0),
+        horizon=0.6,
+    )
+    u, found = tension(predict(scene), 0.6)
+    places, true = tension(predict(replace(scene, quality=Quality(method="reference"))), 0.6)
+    assert true.max() > 6.0
+    np.testing.assert_allclose(found, np.interp(u, places, true), atol=0.1)
+
+
+def test_the_reported_stretch_is_that_at_the_top_of_a_hanging_cable() -> None:
+    (stretch,) = (effect for effect in predict(held("point", "free")).effects if effect.name == "stretch")
+    assert stretch.magnitude == pytest.approx(G / CABLE.axial_stiffness, rel=1e-6)
+
+
+def test_the_strain_is_read_linearly_between_places_and_times() -> None:
+    stretch = predict(held("point", "free")).stretch
+    t = 0.5 * (stretch.times[3] + stretch.times[4])
+    found = stretch.along(0.5 * (stretch.u[1:] + stretch.u[:-1]), np.array([0.0, t]))
+    assert found.shape == (2, len(stretch.u) - 1)
+    row = stretch.at(t)
+    np.testing.assert_allclose(found[1], 0.5 * (row[1:] + row[:-1]), rtol=1e-12)
