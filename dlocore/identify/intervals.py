@@ -22,8 +22,8 @@ Floats = NDArray[np.float64]
 _BLOCK = 0.5  # [s] in which residuals hang together
 _SHAKES = 12  # replays with other noise of the held markers and the start
 _UNSEEN = 0.5  # standard deviation of a logarithm, or share of the prior's, from which on a parameter is not identified
-_UNEXPLAINED = 3.0  # times what noise explains: a model that misses markers by more lacks something
-_ASTRAY = 0.01  # of the length, by which noise may move a prediction for intervals to hold
+_UNEXPLAINED = 2.0  # times what noise explains: a model that misses markers by more lacks something
+_ASTRAY = 0.01  # of the length: what misses the markers by more, or is moved so far by noise, is none to trust
 
 
 def assess(search: Search, state: State, seconds: float) -> Identification:
@@ -79,7 +79,7 @@ def assess(search: Search, state: State, seconds: float) -> Identification:
         )
         for replay, played in zip(search.replays, state.played, strict=True)
     )
-    doubts = [*_left_out(unshaken, unrefined), *_doubts(search, state, deviation, spread_by_noise)]
+    doubts = [*_left_out(unshaken, unrefined), *_doubts(search, state, spread_by_noise)]
     message = " ".join([_message(state, estimated, correlations), *doubts])
     return Identification(
         status=state.status,
@@ -213,12 +213,11 @@ def _estimated(
     )
 
 
-def _doubts(search: Search, state: State, deviation: float, by_noise: float) -> list[str]:
+def _doubts(search: Search, state: State, by_noise: float) -> list[str]:
     """Return in words why intervals may not hold.
 
     Args:
         search, state: that has ended, and where.
-        deviation: robust deviation of the residuals [m].
         by_noise: by which noise of the held markers and the start moves the prediction [m]; infinite where not known.
     """
     length = max(cast(float, window.length) for window in search.windows)
@@ -227,14 +226,26 @@ def _doubts(search: Search, state: State, deviation: float, by_noise: float) -> 
             f"Noise of the held markers and the start alone moves the prediction by {in_mm(by_noise)}:",
             "intervals don't hold for a motion so wild. Record a slower one, or replay shorter windows.",
         ]
-    explained = float(np.hypot(by_noise, max(noise_of_free(window) for window in search.windows)))
-    if not deviation > _UNEXPLAINED * explained:
-        return []
-    return [
-        f"The free markers are missed by {in_mm(search.distance(state), 3)} in the median,",
-        f"{deviation / explained:.2g} times what noise explains:",
-        "the model lacks something, or another cable meets them better. Intervals tell of noise alone.",
-    ]
+    noise = max((noise_of_free(window) for window in search.windows if not window.static), default=np.inf)
+    said = list[str]()
+    for static in (False, True):
+        residuals = [r for w, r in zip(search.windows, state.residuals, strict=True) if w.static is static]
+        if not residuals:
+            continue
+        deviation = robust_deviation(np.concatenate(residuals))
+        explained = np.inf if static else float(np.hypot(by_noise, noise))  # of shapes at rest nothing tells the noise
+        if deviation > _UNEXPLAINED * explained:
+            much = f"{deviation / explained:.2g} times what noise explains"
+        elif deviation > _ASTRAY * length:
+            much = f"with a deviation of {100 * deviation / length:.2g} % of the length"
+        else:
+            continue
+        missed = search.distance(replace(state, residuals=residuals))
+        said += [
+            f"The free markers {'at rest ' if static else ''}are missed by {in_mm(missed, 3)} in the median, {much}:",
+            "the model lacks something, or another cable meets them better. Intervals tell of noise alone.",
+        ]
+    return said
 
 
 def _message(state: State, estimated: tuple[Estimated, ...], correlations: Floats) -> str:

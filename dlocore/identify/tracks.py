@@ -44,9 +44,13 @@ def held_paths(recording: Recording, shake: np.random.Generator | None) -> dict[
 def noise_of(x: Floats) -> float:
     """Return the standard deviation of the noise of samples x (k, 3) [m] in a row, or more; infinite of three.
 
-    Third differences tell it, to which a path that is well sampled adds little.
+    Third differences tell it, to which a path that is well sampled adds little. Coordinates that never change, as z of
+    2D markers, tell nothing.
     """
-    return 1.4826 * float(np.median(np.abs(np.diff(x, n=3, axis=0)))) / np.sqrt(20.0) if len(x) > 3 else np.inf
+    if len(x) < 4:
+        return np.inf
+    away = np.abs(np.diff(x[:, np.ptp(x, axis=0) > 0.0], n=3, axis=0))
+    return 1.4826 * float(np.median(away)) / np.sqrt(20.0) if away.size else 0.0
 
 
 def noise_of_free(recording: Recording) -> float:

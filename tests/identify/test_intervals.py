@@ -1,12 +1,32 @@
 """How well parameters are known, in words and numbers."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from dlocore.identify.intervals import _estimated
+from benchmarks.simulated_recordings import CABLE, DRAG, Tracking, simulated
+from dlocore.identify import Candidate
+from dlocore.identify.intervals import _doubts, _estimated
 from dlocore.identify.parameters import parameters
 from dlocore.identify.replay import Resolution
 from dlocore.identify.search import Search
+from dlocore.recordings import Recording
+
+TRUTH = Candidate(cable=CABLE, environment=DRAG)
+CLEAN = Tracking(noise=0.0, held=0.0, outliers=0.0, lost=0.0)
+
+
+def doubts(*recordings: Recording, by_noise: float = 1e-3) -> str:
+    """Return what is doubted where the recordings are replayed with the truth."""
+    search = Search(recordings, parameters(("drag",), 2), Resolution(n_u=9))
+    return " ".join(_doubts(search, search.play(TRUTH), by_noise))
+
+
+def at_rest() -> Recording:
+    """Return the first shape of a motion that begins at rest."""
+    moving = simulated(4, 0.5, cable=CABLE, environment=DRAG, tracking=CLEAN)
+    return replace(moving, times=[0.0], markers=np.asarray(moving.markers)[:1], static=True)
 
 
 @pytest.mark.parametrize(
@@ -26,3 +46,24 @@ def test_a_statement_tells_half_the_interval(name: str, value: float, deviation:
     # two deviations of a logarithm, or of a usual value (0.05 N s/m^2 of drag, 1 rad of turn)
     found = _estimated(p, p.coordinate(value), deviation, 2.0, 1.0, search, np.zeros(0))
     assert found.statement == said
+
+
+def test_shapes_at_rest_that_the_model_misses_are_doubted() -> None:
+    shape = at_rest()
+    exchanged = replace(shape, markers=np.asarray(shape.markers)[..., [0, 2, 1]])  # y for z
+    assert not doubts(shape, by_noise=np.inf)
+    assert "The free markers at rest are missed by" in doubts(exchanged, by_noise=np.inf)
+    assert " % of the length" in doubts(exchanged, by_noise=np.inf)
+
+
+def test_shapes_at_rest_are_not_hidden_by_a_motion_that_is_met() -> None:
+    shape, moving = at_rest(), simulated(4, 1.0, cable=CABLE, environment=DRAG)
+    exchanged = replace(shape, markers=np.asarray(shape.markers)[..., [0, 2, 1]])
+    assert not doubts(moving)
+    assert doubts(moving, exchanged).count("are missed by") == 1
+
+
+def test_outliers_so_many_that_they_pass_for_noise_are_doubted() -> None:
+    wild = simulated(4, 1.0, cable=CABLE, environment=DRAG, tracking=Tracking(outliers=0.3, size=0.1))
+    # 30 % of 10 cm: most of the third differences that tell the noise hold one
+    assert " % of the length" in doubts(wild)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dlocore import SceneError
-from dlocore.identify.tracks import held_paths
+from dlocore.identify.tracks import held_paths, noise_of
 from dlocore.recordings import Recording
 
 TIMES = np.arange(1200) / 200.0
@@ -54,3 +54,10 @@ def test_too_few_sound_samples_are_named() -> None:
 def recorded_short(path: np.ndarray, seen: np.ndarray) -> Recording:
     free = path[:, None] + np.array([[0.2, 0.0, 0.0], [0.4, 0.0, 0.0]])
     return Recording(times=TIMES[:12], markers=np.concatenate([seen[:, None], free], axis=1), held=(0,))
+
+
+def test_a_coordinate_that_never_changes_tells_nothing_of_noise() -> None:
+    seen = swinging()[:, :2] + 1e-3 * np.random.default_rng(2).standard_normal((len(TIMES), 2))
+    flat = np.column_stack([seen, np.full(len(seen), 0.3)])
+    assert noise_of(flat) == pytest.approx(1e-3, rel=0.1)  # 2400 differences, of which three in a row hang together
+    assert noise_of(np.zeros((20, 3))) == 0.0
