@@ -16,7 +16,7 @@ from pydantic import ValidationError
 from pydantic_settings import SettingsError
 
 from app.commands.errors import FAILED, NOT_CONVERGED, CommandError
-from app.commands.files import check_outputs, for_people, read_input, write_output
+from app.commands.files import STANDARD, check_outputs, for_people, is_device, read_input, write_output
 from app.http.fields import BadField, bad_fields
 from app.schemas import PredictionRequest, from_prediction, to_scene
 from app.schemas.surroundings import QualityModel
@@ -125,6 +125,9 @@ def _check_predict(scene: str, *, npz: str | None, json: str | None, rrd: str | 
         raise CommandError("--rrd: got -. Allowed: the name of a file, which has its layout beside it.")
     layout = str(_layout_of(rrd)) if rrd is not None and Path(rrd).name else None
     check_outputs({"--output": npz, "--json": json, "--rrd": rrd, "the layout of --rrd": layout}, [scene])
+    if npz is not None and npz != STANDARD and Path(npz).suffix.lower() != ".npz" and not is_device(npz):
+        allowed = "a name that ends in .npz; the whole answer as JSON is written by --json"
+        raise CommandError(f"--output: got {npz}. Allowed: {allowed}.")
 
 
 def _layout_of(rrd: str) -> Path:

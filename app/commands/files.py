@@ -42,7 +42,7 @@ def check_outputs(
         if path != STANDARD:
             _check_file(path)
             place = str(Path(path).resolve())
-            shared = Path(path).exists() and not Path(path).is_file()  # a device takes all there is
+            shared = is_device(path)
         elif sys.stdout is None:
             raise CommandError(f"{option}: standard output is closed", FAILED)
         if place in taken and not shared:
@@ -51,6 +51,11 @@ def check_outputs(
     for path in (folders or {}).values():
         if path is not None:
             _check_folder(path)
+
+
+def is_device(path: str) -> bool:
+    """Return whether something is there that is no file, and takes all that is written to it."""
+    return Path(path).exists() and not Path(path).is_file()
 
 
 def _check_file(path: str) -> None:

@@ -195,6 +195,19 @@ def test_outputs_do_not_overwrite_each_other_or_the_scene(
     assert sorted(file.name for file in tmp_path.iterdir()) == ["link.json", "scene.json"]
 
 
+@pytest.mark.parametrize("name", ["out.csv", "out", "out.json"])
+def test_arrays_are_not_written_under_the_name_of_another_format(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / name
+    assert main(["predict", str(tmp_path / "not there"), "-o", str(output)]) == 2
+    assert f"--output: got {output}. Allowed: a name that ends in .npz; " in capsys.readouterr().err
+
+
+def test_a_device_takes_arrays_under_any_name(tmp_path: Path) -> None:
+    assert main(["predict", written(tmp_path, paper_scene()), "-o", os.devnull]) == 0
+
+
 def test_an_output_is_whole_or_as_it_was(tmp_path: Path) -> None:
     file, link = tmp_path / "out.json", tmp_path / "link"
     file.write_text("before")
