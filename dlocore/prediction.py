@@ -19,6 +19,7 @@ from dlocore.answer.parts import (
     with_notes,
 )
 from dlocore.errors import number
+from dlocore.problem.notes import scene_notes
 from dlocore.scene.scene import MAX_STRAIN, ControlPoints, Scene
 from dlocore.spline import SplineSurface, greville
 
@@ -68,8 +69,8 @@ class Prediction:
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """What is to be known beside the status: strains, instabilities, what effects that are off would have done."""
-        return tuple(self.find_objections())
+        """What is to be known beside the status: of the scene as given, strains, instabilities, effects left out."""
+        return (*scene_notes(self.scene), *self.find_objections())
 
     @cached_property
     def message(self) -> str:

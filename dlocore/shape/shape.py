@@ -54,6 +54,7 @@ class StartCurve(SplineCurve):
         fit_rms: root mean square distance of the given points from the curve [m]; 0 where it is given exactly.
         fit_max: the largest of these distances [m].
         length_given: length of the curve before it was made as long as the cable [m].
+        ends_moved: by how much that moved the end that it moved farther [m]; 0 where the curve is given exactly.
         theta: angle of the sections, a spline with control points (n, 1) [rad], or None where it is the same
             everywhere.
         theta_rate: its rate, a spline with control points (n, 1) [rad/s], or None where no section spins.
@@ -70,6 +71,7 @@ class StartCurve(SplineCurve):
     fit_rms: float = 0.0
     fit_max: float = 0.0
     length_given: float = 0.0
+    ends_moved: float = 0.0
     theta: SplineCurve | None = None
     theta_rate: SplineCurve | None = None
     strain: tuple[Floats, Floats] | None = None
@@ -210,6 +212,7 @@ def _fitted(shape: Points, length: float) -> StartCurve:
     knots, at = fit.curve.t * scale, np.minimum(fit.at * scale, length)
     knots[-DEGREE - 1 :] = length
     control = middle + centre + scale * (fit.curve.c - centre)
+    ends = np.linalg.norm(fit.curve.c[[0, -1]] - centre, axis=1)
     distance = _distance(SplineCurve(knots=knots, control_points=control), at, points)
     return StartCurve(
         knots=knots,
@@ -218,6 +221,7 @@ def _fitted(shape: Points, length: float) -> StartCurve:
         fit_rms=float(np.sqrt((distance**2).mean())),
         fit_max=float(distance.max()),
         length_given=fit.length_given,
+        ends_moved=abs(scale - 1.0) * float(ends.max()),
     )
 
 

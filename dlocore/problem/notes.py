@@ -1,0 +1,28 @@
+"""What is to be known of a scene as it was given, whatever its motion."""
+
+from dlocore.scene.scene import Points, Scene
+from dlocore.shape.shape import start_curve
+from dlocore.words import in_mm
+
+SAME_LENGTH = 5e-3  # of the cable's: lengths of points that differ by less are as good as the same
+SAME_ENDS = 1e-3  # of the length: and so are ends, as those of noisy points, which the cable's length decides about
+
+
+def scene_notes(scene: Scene) -> list[str]:
+    """Return what is to be known of a scene as it was given, in words."""
+    return _of_lengths(scene)
+
+
+def _of_lengths(scene: Scene) -> list[str]:
+    """Return what is told of points that were made as long as the cable."""
+    if not isinstance(scene.shape, Points):
+        return []
+    length = scene.cable.length
+    start = start_curve(scene.shape, length)
+    differ = abs(start.length_given - length) > SAME_LENGTH * length
+    if not (differ and start.ends_moved > SAME_ENDS * length):
+        return []
+    return [
+        f"the points of the shape are {start.length_given:.4g} m long and the cable {length:.4g} m: they are scaled "
+        f"to it about their middle, which moves an end by up to {in_mm(start.ends_moved)}, and a gripper that holds it"
+    ]

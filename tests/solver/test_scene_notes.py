@@ -1,0 +1,57 @@
+"""Notes on a scene as it was given, whatever its motion."""
+
+import numpy as np
+import pytest
+
+from dlocore import Grasp, Points, Quality, Scene, Straight, equilibrium, predict
+from dlocore.problem.notes import scene_notes
+from tests.solver.scenes import Floats, arc, cable
+
+HOLD = Grasp(u=0.0)
+
+
+def along(points: Floats) -> Scene:
+    """Return the scene of a cable of 1 m that is seen at these points."""
+    return Scene(cable=cable(), shape=Points(points=points), grasps=[HOLD], horizon=0.1)
+
+
+def straight(length: float) -> Floats:
+    return np.linspace(0.0, length, 40)[:, None] * [1.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("length", [0.91, 1.05])
+def test_points_of_another_length_than_the_cable_are_told_of_with_how_far_the_ends_moved(length: float) -> None:
+    prediction = predict(along(straight(length)))
+    (note,) = prediction.notes
+    moved = 0.5 * abs(1.0 - length)
+    assert f"{length:.4g} m long and the cable 1 m" in note
+    assert f"moves an end by up to {1e3 * moved:.2g} mm" in note
+    assert note in prediction.message
+    begins = prediction.surface.positions([0.0], [0.0])[0, 0]
+    assert np.linalg.norm(begins) == pytest.approx(moved, rel=1e-6)
+
+
+def test_an_equilibrium_tells_of_points_of_another_length_too() -> None:
+    assert "0.95 m long and the cable 1 m" in equilibrium(along(straight(0.95))).message
+
+
+def test_the_reference_tells_of_points_of_another_length_too() -> None:
+    quality = Quality(method="reference", target_error=0.02)
+    scene = Scene(cable=cable(), shape=Points(points=straight(0.95)), grasps=[HOLD], horizon=0.02, quality=quality)
+    assert "0.95 m long and the cable 1 m" in predict(scene).message
+
+
+@pytest.mark.parametrize("length", [1.0, 1.0 + 1e-9, 0.996, 1.004])
+def test_points_as_long_as_the_cable_but_for_rounding_are_not_told_of(length: float) -> None:
+    assert scene_notes(along(straight(length))) == []
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_points_that_only_noise_makes_longer_are_not_told_of(seed: int) -> None:
+    noise = np.random.default_rng(seed).normal(scale=0.003, size=(100, 3))
+    points = arc(1.0, 2.5, 100) + noise
+    assert scene_notes(along(points)) == []
+
+
+def test_a_straight_cable_has_nothing_to_be_told_of() -> None:
+    assert scene_notes(Scene(cable=cable(), shape=Straight(), grasps=[HOLD], horizon=1.0)) == []
