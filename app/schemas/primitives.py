@@ -78,7 +78,11 @@ class PrimitiveModel(Model):
 class ForceOverTime(Model):
     """A force given at times, linear between them and constant outside."""
 
-    times: list[Number] = Field(min_length=1, description="Rising times [s].", examples=[[0, 1]])
+    times: list[Number] = Field(
+        min_length=1,
+        description="Rising times [s]; the first force acts before them, too, and the last one after.",
+        examples=[[0, 1]],
+    )
     values: list[Vector] = Field(
         min_length=1, description="One force for each time [N].", examples=[[[0, 0, 0], [0, 1, 0]]]
     )
