@@ -15,7 +15,7 @@ from dlocore.spline import greville
 Floats = NDArray[np.float64]
 
 GRASP_TOLERANCE = 0.010  # [m]: of the first waypoint from the cable
-_SPANS = 32  # at least, of a start that is brought to more than one place
+_SPANS = 32  # at least, of a start of which a part is moved
 _ROUNDING = 1e-12  # of the length
 _TIMES = 20  # that it is brought nearer, at most
 
@@ -44,7 +44,7 @@ def brought(scene: Scene, start: StartCurve) -> StartCurve:
             raise SceneError(f"primitives[{scene.grasps.index(g)}].path.positions[0]", target, allowed, reason)
     if not off.max() > _ROUNDING * scene.cable.length:
         return start
-    knots = start.knots if start.material is not None else _finer(start.knots, u)
+    knots = start.knots if start.material is not None or len(u) < 2 else finer(start.knots)
     control = fit_to_knots(start, knots)
     for _ in range(_TIMES):
         missed = targets - SplineCurve(knots=knots, control_points=control)(u)
@@ -63,10 +63,8 @@ def _between(places: Floats, u: Floats, ways: Floats) -> Floats:
     return cast(Floats, ways[left] + (ways[right] - ways[left]) * s**2 * (3.0 - 2.0 * s))
 
 
-def _finer(knots: Floats, u: Floats) -> Floats:
-    """Return knots (n,) with more of them, so that a way between two grasps can be shown, if there are two."""
-    if len(u) < 2:
-        return knots
+def finer(knots: Floats) -> Floats:
+    """Return knots with more of them, (n,) [m], so that a part of the cable can be moved."""
     length = knots[-1]
     even = np.linspace(0.0, length, _SPANS + 1)[1:-1]
     apart = np.abs(even[:, None] - knots[None]).min(axis=1)

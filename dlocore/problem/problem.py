@@ -27,6 +27,7 @@ from dlocore.kernels.projection import in_world
 from dlocore.problem.brought import brought
 from dlocore.problem.buckling import out_of_plane, with_side
 from dlocore.problem.checks import check_above, check_apart, check_outside, check_reach
+from dlocore.problem.cleared import cleared
 from dlocore.problem.events import Event, find_events
 from dlocore.problem.features import Features, find_features
 from dlocore.problem.plane import Plane, find_plane, is_straight, lay_on_table, off_the_table, rest_plane
@@ -297,6 +298,7 @@ def pose(scene: Scene, called_for: Mapping[str, str] | None = None, *, at_rest: 
         check_above(scene, start)
     met = reached(scene, start, called_for)
     check_outside(scene, start, met)
+    start = cleared(scene, start, met, with_table)
     leaves = off_the_table(scene, start, met) if with_table else "there is no table"
     lies_over = not leaves
     leaves = leaves or called_for.get("side", "")

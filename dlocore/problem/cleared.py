@@ -1,0 +1,79 @@
+"""A start that is moved out of what it was seen in."""
+
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.effects.contact import DEEPEST
+from dlocore.effects.distance import distances
+from dlocore.problem.brought import finer
+from dlocore.scene.paths import Waypoints
+from dlocore.scene.scene import Scene
+from dlocore.shape.shape import StartCurve, fit_to_knots
+from dlocore.spline import greville
+
+Floats = NDArray[np.float64]
+
+REACH = 0.1  # of the length: from what is moved out, what is so far along the cable stays where it is
+_PLACES = 401  # at which a start is looked at, as long as that is often enough for a tenth of REACH
+_HELD = 0.25  # of REACH: so near to a first waypoint, which stays, what is inside is left to contact
+_NEAR = 1e-3  # of the diameter: over which the way out is found
+_TIMES = 8  # that it is moved, at most
+
+
+def cleared(scene: Scene, start: StartCurve, met: tuple[int, ...], with_table: bool) -> StartCurve:
+    """Return a start whose centreline is a radius off the obstacles that it meets, and no lower than the table.
+
+    What was seen of a cable that touches them may be some millimetres inside (`checks.check_outside`). What is deepest
+    is moved out by its depth, and with it the cable to either side, less and less up to REACH: pushed out by contact
+    alone, span by span, it would be bent by thousands of newtons. A start that goes on from a motion lies as that left
+    it, pressed in a little, and stays.
+    """
+    environment, diameter, length = scene.environment, scene.cable.diameter, scene.cable.length
+    if start.material is not None or start.velocity is not None or not (met or with_table):
+        return start
+    rows = np.array([environment.obstacles[i].row() for i in met])
+    floor = environment.table.height if with_table and environment.table is not None else -np.inf
+    held = np.array([g.u for g in scene.grasps if g.start == 0.0 and isinstance(g.path, Waypoints)])
+    u = np.linspace(0.0, length, _PLACES)
+    moved = start
+    for _ in range(_TIMES):
+        ways = _ways_out(rows, floor, moved(u), 0.5 * diameter)
+        depths = np.linalg.norm(ways, axis=1)
+        inside = np.flatnonzero(depths > DEEPEST * diameter)
+        if not len(inside):
+            break
+        if moved is start:
+            knots = finer(start.knots)
+            moved = replace(start, knots=knots, control_points=fit_to_knots(start, knots))
+        places = greville(moved.knots)
+        shares = depths[inside] * _fading(places[:, None] - u[inside], REACH * length)  # of each, at each place
+        deepest = inside[shares.argmax(axis=1)]
+        change = shares.max(axis=1)[:, None] * ways[deepest] / depths[deepest][:, None]
+        change *= np.prod(1.0 - _fading(places[:, None] - held, _HELD * REACH * length), axis=1)[:, None]
+        moved = replace(moved, control_points=moved.control_points + change)
+    return moved
+
+
+def _fading(away: Floats, reach: float) -> Floats:
+    """Return 1 where what is `away` [m] is 0, and less and less, smoothly, to 0 at `reach` [m] and beyond."""
+    s = np.minimum(np.abs(away) / reach, 1.0)
+    return cast(Floats, 1.0 - s**2 * (3.0 - 2.0 * s))
+
+
+def _ways_out(rows: Floats, floor: float, points: Floats, radius: float) -> Floats:
+    """Return the shortest ways (n, 3) [m] out of obstacles and table for points (n, 3) [m] of a cable, 0 outside."""
+    ways = np.zeros_like(points)
+    ways[:, 2] = np.maximum(floor - points[:, 2], 0.0)
+    if len(rows):
+        gaps = distances(rows, np.ascontiguousarray(points)) - radius
+        nearest = gaps.argmin(axis=1)
+        for k in np.flatnonzero(gaps.min(axis=1) < -ways[:, 2]):
+            row, step = rows[nearest[k]][None], 2.0 * radius * _NEAR
+            around = np.ascontiguousarray(points[k] + step * np.concatenate([np.eye(3), -np.eye(3)]))
+            slopes = distances(row, around)[:, 0]
+            up = slopes[:3] - slopes[3:]
+            ways[k] = -gaps[k, nearest[k]] * up / max(float(np.linalg.norm(up)), 1e-300)
+    return ways
