@@ -10,7 +10,7 @@ from scipy.stats import t as student
 from dlocore.errors import SceneError
 from dlocore.identify.identification import Estimated, Fit, Identification
 from dlocore.identify.parameters import Parameter
-from dlocore.identify.replay import Played, Replay
+from dlocore.identify.replay import Replay
 from dlocore.identify.rest import Rest
 from dlocore.identify.search import Search, State, robust_deviation, weights
 from dlocore.identify.tracks import noise_of_free
@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 _BLOCK = 0.5  # [s] in which residuals hang together
 _SHAKES = 12  # replays with other noise of the held markers and the start
-_UNSEEN = 0.5  # standard deviation of a logarithm, or share of the prior's, from which on a parameter is not identified
+_UNSEEN = 1.0  # half the interval of a logarithm, or in usual values, from which on a parameter is not identified
 _UNEXPLAINED = 2.0  # times what noise explains: a model that misses markers by more lacks something
 _ASTRAY = 0.01  # of the length: what misses the markers by more, or is moved so far by noise, is none to trust
 
@@ -113,8 +113,8 @@ def _blocks(search: Search, state: State, pull: Floats) -> list[Floats]:
 def _shaken(search: Search, state: State, scale: Floats) -> tuple[Floats, float, int]:
     """Return what noise of the held markers and the start does.
 
-    That is the covariance of the gradient of the misfit, and the robust deviation of a coordinate of the free markers
-    [m]; infinite for shapes at rest, of which it is not known. At last, the number of replays that could not begin.
+    That is the covariance of the gradient of the misfit; the robust deviation of a coordinate of the free markers of
+    motions [m], infinite where there are none; and the number of replays that could not begin.
     """
     size = len(search.chosen)
     total = np.zeros((size, size))
@@ -123,23 +123,33 @@ def _shaken(search: Search, state: State, scale: Floats) -> tuple[Floats, float,
         D = cast(list[Floats], state.derivatives)[i]
         factor = scale[at : at + len(D)]
         at += len(D)
-        if not isinstance(replay, Replay) or not isinstance(played, Played):
-            continue
         free = replay.recording.free
         found = []
         for seed in range(_SHAKES):
             search.check()
+            noise = np.random.default_rng([i, seed])
             try:
-                other = search.replay(replay.recording, np.random.default_rng([i, seed])).play(state.candidate)
+                other = _disturbed(search, replay, state.residuals[i], noise).play(state.candidate)
             except SceneError:
                 lost += 1
                 continue
-            change = other.predicted - played.predicted
-            found.append(D.T @ (factor * change[:, free].ravel()))
-            moved.append(change[:, free].ravel())
+            change = (other.predicted - played.predicted)[:, free].ravel()
+            found.append(D.T @ (factor * change))
+            if not replay.recording.static:
+                moved.append(change)
         if found:
             total += np.array(found).T @ np.array(found) / len(found)
     return total, robust_deviation(np.concatenate(moved)) if moved else np.inf, lost
+
+
+def _disturbed(search: Search, replay: Replay | Rest, residuals: Floats, noise: np.random.Generator) -> Replay | Rest:
+    """Return a replay with other noise of what is held; of shapes at rest with noise of the size of the residuals."""
+    recording = replay.recording
+    if not recording.static:
+        return search.replay(recording, noise)
+    markers = cast(Floats, recording.markers)
+    size = min(robust_deviation(residuals), _ASTRAY * cast(float, recording.length))
+    return search.replay(replace(recording, markers=markers + size * noise.standard_normal(markers.shape)))
 
 
 def _refined(search: Search, state: State, scale: Floats) -> tuple[Floats, int]:
@@ -186,7 +196,7 @@ def _estimated(
     if not p.logarithmic:
         low = max(low, p.least)
     unseen = not information > 1e-8
-    wide = deviation > _UNSEEN * (1.0 if p.logarithmic else max(1.0, abs(x)))
+    wide = quantile * deviation > _UNSEEN * (1.0 if p.logarithmic else max(1.0, abs(x)))
     if unseen:
         statement = f"{p.name} can't be seen in these recordings: it changes nothing that was measured."
     elif wide:

@@ -37,28 +37,15 @@ class Rest:
         recording: of shapes at rest, with every held marker seen in every frame.
         resolution: its n_u.
         references: direction of each clamp about which its frame is chosen (clamps, 3); None: its mean.
-        shake: seeds noise of the markers, as large as that of the repeats.
     """
 
-    def __init__(
-        self,
-        recording: Recording,
-        resolution: Resolution,
-        references: Floats | None = None,
-        shake: np.random.Generator | None = None,
-    ) -> None:
+    def __init__(self, recording: Recording, resolution: Resolution, references: Floats | None = None) -> None:
         if not recording.holds:
             raise SceneError("held", recording.held, "at least one held marker", "Nothing holds the cable")
         self.recording, self.resolution = recording, resolution
-        markers = np.array(recording.markers)
-        if shake is not None:
-            spread = np.nanstd(markers - np.nanmean(markers, axis=0), axis=0).mean() if len(markers) > 1 else 0.0
-            markers = markers + spread * 0.1 * shake.standard_normal(markers.shape)
-        self.given = markers
         self.markers = cast(Floats, recording.markers)
-        self.compared = np.arange(len(markers))
-        self.begin = 0.0
-        held = markers[:, list(recording.held)]
+        self.compared = np.arange(len(self.markers))
+        held = self.markers[:, list(recording.held)]
         if not np.isfinite(held).all():
             frame = int(np.argwhere(~np.isfinite(held))[0, 0])
             raise SceneError(f"markers[{frame}]", "a lost held marker", "held markers seen in every shape at rest")
@@ -70,9 +57,9 @@ class Rest:
         found = []
         for h in self.holds:
             if h.towards is not None:
-                along = (self.given[:, h.towards] - self.given[:, h.marker]) * (1.0 if h.forward else -1.0)
+                along = (self.markers[:, h.towards] - self.markers[:, h.marker]) * (1.0 if h.forward else -1.0)
                 found.append(along / np.linalg.norm(along, axis=1)[:, None])
-        return np.stack(found, axis=1) if found else np.zeros((len(self.given), 0, 3))
+        return np.stack(found, axis=1) if found else np.zeros((len(self.markers), 0, 3))
 
     def play(self, candidate: Candidate) -> Settled:
         """Settle every shape with a candidate.
@@ -81,7 +68,7 @@ class Rest:
             SceneError: no cable with these numbers can lie as the markers of a shape tell.
         """
         shapes, stopped = [], False
-        for frame in range(len(self.given)):
+        for frame in range(len(self.markers)):
             scene = self.scene(candidate, frame)
             try:
                 problem = pose(scene)
@@ -103,7 +90,7 @@ class Rest:
             at = float(np.clip(u[h.marker], 0.0, length))
             kind: Literal["point", "tangent", "clamp"] = "point"
             held.append((at, 0))
-            targets.append(self.given[frame, h.marker])
+            targets.append(self.markers[frame, h.marker])
             if h.towards is not None:
                 kind = "clamp" if candidate.twist else "tangent"
                 turn = turned_from(self.references[clamp], directions[clamp : clamp + 1])[0]
@@ -116,11 +103,11 @@ class Rest:
             grasps.append(Grasp(u=at, hold=kind))
         cable = replace(candidate.cable, length=length)
         environment = replace(candidate.environment, gravity=self.recording.gravity)
-        seen = np.flatnonzero(np.isfinite(self.given[frame, :, 0]))
+        seen = np.flatnonzero(np.isfinite(self.markers[frame, :, 0]))
         seen = seen[span.inside(seen)]
         fit = start_fit(length, self.resolution.n_u, tuple(held))
         gravity = cast(Floats, environment.gravity)
-        q = fit.shape(cable, gravity, u[seen], self.given[frame, seen], np.array(targets))
+        q = fit.shape(cable, gravity, u[seen], self.markers[frame, seen], np.array(targets))
         shape = ControlPoints(control_points=q, knots=fit.grid.knots)
         if candidate.twist:
             shape = with_sections(shape, candidate.rest_curvature, candidate.turn, frames)

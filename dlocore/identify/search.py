@@ -55,10 +55,11 @@ class Search:
         self.replays = [self.replay(w) for w in windows]
 
     def replay(self, window: Recording, shake: np.random.Generator | None = None) -> Replay | Rest:
-        """Return what replays a window, or its shape at rest; with `shake` from other noise of what is held."""
-        kind = Rest if window.static else Replay
+        """Return what replays a window, or its shapes at rest; with `shake` from other noise of what moves it."""
         with within(window.place):
-            return kind(window, self.resolution, self.references, shake)
+            if window.static:
+                return Rest(window, self.resolution, self.references)
+            return Replay(window, self.resolution, self.references, shake)
 
     def check(self) -> None:
         """Raise Cancelled where the search was cancelled."""
