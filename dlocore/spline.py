@@ -5,9 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dlocore.errors import SceneError
+
 Floats = NDArray[np.float64]
 DEGREE = 3
+_ORDERS = tuple(range(DEGREE + 1))  # of derivatives
 _TINY = 1e-300  # the least |r'|^3 that is divided by
+_ROUNDING = 1e-9  # of the length, or of the time: how far beyond its ends a surface is read
 
 
 def uniform_knots(n: int, end: float) -> Floats:
@@ -33,6 +37,23 @@ def spline_at(knots: Floats, control_points: Floats, x: ArrayLike, derivative: i
     from scipy.interpolate import BSpline  # slow to import, and not needed to make a scene
 
     return np.asarray(BSpline(knots, control_points, DEGREE)(np.asarray(x, dtype=float), derivative))
+
+
+def _within(name: str, x: ArrayLike, end: float, unit: str) -> Floats:
+    """Return `x` as an array (k,), or raise SceneError unless all of it is within 0 to `end`, but for rounding."""
+    x = np.atleast_1d(np.asarray(x, dtype=float))
+    margin = _ROUNDING * end
+    for k in (x.argmin(), x.argmax()) if x.size else ():  # of what is not a number, where there is any
+        if not -margin <= x.item(k) <= end + margin:
+            raise SceneError(name, x.item(k), f"finite numbers at least 0 at most {end:g} [{unit}]")
+    return x
+
+
+def _order(name: str, order: int) -> int:
+    """Return the order of a derivative, or raise SceneError unless a cubic has it."""
+    if order not in _ORDERS:
+        raise SceneError(name, order, "an order of 0 to 3, which a cubic has")
+    return order
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,15 +91,20 @@ class SplineSurface:
 
         Returns:
             (k_t, k_u, 4) [m, m, m, rad], per m^du s^dt.
+
+        Raises:
+            SceneError: a place is off the cable, a time outside the predicted time, or an order none of 0 to 3; as of
+                all that reads the surface.
         """
-        over, t = design_matrix(self.knots_u, np.atleast_1d(u), du), np.atleast_1d(t)
+        over = design_matrix(self.knots_u, _within("u", u, self.length, "m"), _order("du", du))
+        t = _within("t", t, self.horizon, "s")
         if len(t) < len(self.control_points):
-            return np.asarray(over @ self.states(t, dt))
-        return spline_at(self.knots_t, over @ self.control_points, t, dt)
+            return np.asarray(over @ spline_at(self.knots_t, self.control_points, t, _order("dt", dt)))
+        return spline_at(self.knots_t, over @ self.control_points, t, _order("dt", dt))
 
     def states(self, t: ArrayLike, dt: int = 0) -> Floats:
         """Return the control points of the spatial spline, or their derivatives, at times `t` (k,) [s]; (k, n_u, 4)."""
-        return spline_at(self.knots_t, self.control_points, np.atleast_1d(t), dt)
+        return spline_at(self.knots_t, self.control_points, _within("t", t, self.horizon, "s"), _order("dt", dt))
 
     def positions(self, u: ArrayLike, t: ArrayLike) -> Floats:
         """Return r on the grid of `t` and `u`; (k_t, k_u, 3) [m]."""
@@ -120,7 +146,7 @@ class SplineSurface:
         about it. In the two spans beside an end, a grasp or a load it may be off by a fifth: the strain that balances
         the forces on the cable, from which to read a tension, is `Prediction.stretch`.
         """
-        breaks = np.unique(self.knots_u)
+        u, breaks = _within("u", u, self.length, "m"), np.unique(self.knots_u)
         middles = 0.5 * (breaks[:-1] + breaks[1:])
         strain = np.linalg.norm(self(middles, t, du=1)[..., :3], axis=-1) - 1.0
-        return np.array([np.interp(np.atleast_1d(u), middles, row) for row in strain])
+        return np.array([np.interp(u, middles, row) for row in strain])

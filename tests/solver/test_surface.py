@@ -5,6 +5,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from dlocore import SceneError
 from dlocore.spline import SplineSurface, design_matrix, uniform_knots
 
 
@@ -35,3 +36,41 @@ def test_a_long_motion_is_read_at_every_step_in_little_memory():
     tracemalloc.stop()
     assert found.shape == (100_000, 1, 4)
     assert most < 10 * found.nbytes
+
+
+@pytest.mark.parametrize(("u", "given"), [([250.0], "250.0"), ([0.3, -0.01, 0.5], "-0.01"), ([np.nan], "nan")])
+def test_a_place_off_the_cable_is_refused_by_its_value(u: list[float], given: str):
+    for read in (surface(9, 20).positions, surface(9, 20).axial_strain):
+        with pytest.raises(SceneError) as caught:
+            read(u, [0.5])
+        assert (caught.value.field, caught.value.given) == ("u", given)
+        assert caught.value.allowed == "finite numbers at least 0 at most 1.5 [m]"
+
+
+@pytest.mark.parametrize("times", [1, 40], ids=["fewer times than control points", "more"])
+@pytest.mark.parametrize("t", [-0.1, 2.1, np.inf])
+def test_a_time_outside_the_predicted_time_is_refused_by_its_value(t: float, times: int):
+    for read in (lambda t: surface(9, 20)([0.5], t), surface(9, 20).states):
+        with pytest.raises(SceneError) as caught:
+            read(np.full(times, t))
+        assert (caught.value.field, caught.value.given) == ("t", repr(t))
+        assert caught.value.allowed == "finite numbers at least 0 at most 2 [s]"
+
+
+@pytest.mark.parametrize("order", [-1, 4])
+def test_a_derivative_that_a_cubic_does_not_have_is_refused(order: int):
+    q = surface(9, 20)
+    for name in ("du", "dt"):
+        with pytest.raises(SceneError, match="0 to 3") as caught:
+            q([0.5], [0.5], **{name: order})
+        assert caught.value.field == name
+    with pytest.raises(SceneError, match="dt: got"):
+        q.states([0.5], order)
+
+
+def test_the_ends_are_read_with_their_rounding():
+    q = surface(9, 20)
+    ends = q([0.0, 1.5], [0.0, 2.0])
+    beyond = q([-1e-12, 1.5 * (1.0 + 1e-12)], [-1e-12, 2.0 * (1.0 + 1e-12)])
+    np.testing.assert_allclose(beyond, ends, rtol=0.0, atol=1e-9)
+    assert q([], [0.5]).shape == (1, 0, 4)
