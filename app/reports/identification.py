@@ -1,5 +1,7 @@
 """What an identification says, as JSON and as one page of HTML: tables, plots, worst moments."""
 
+from collections import Counter
+from collections.abc import Sequence
 from html import escape
 from typing import Any
 
@@ -7,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.identify import Fit, Identification
+from dlocore.words import counted
 
 Floats = NDArray[np.float64]
 
 _BLUE, _ORANGE, _GREY = "#0072b2", "#d55e00", "#8a8f98"  # Okabe-Ito
+_LYING = 0.2  # of its width: a cable that rises by less lies flat
 _STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#1c2024}
 h1{font-size:1.5rem}h2{font-size:1.15rem;margin-top:2rem}table{border-collapse:collapse;width:100%}
 td,th{padding:.3rem .6rem;border-bottom:1px solid #dde;text-align:right}td:first-child,th:first-child{text-align:left}
@@ -24,7 +28,7 @@ def document_of_identification(found: Identification) -> dict[str, Any]:
     cable = candidate.cable
     names = (
         "length", "diameter", "linear_density", "bending_stiffness", "axial_stiffness", "torsional_stiffness",
-        "bending_damping", "axial_damping",
+        "bending_damping", "axial_damping", "yield_strain", "memory_rate",
     )  # fmt: skip
     document: dict[str, Any] = {
         "status": found.status,
@@ -45,13 +49,13 @@ def document_of_identification(found: Identification) -> dict[str, Any]:
         "correlations": [[None if np.isnan(x) else float(x) for x in row] for row in found.correlations],
         "fit": [
             {
-                "recording": fit.name,
+                "recording": name,
                 "mean": float(np.nanmean(fit.distances)),
                 "median": float(np.nanmedian(fit.distances)),
                 "worst": float(np.nanmax(fit.distances)),
                 "stalled": fit.stalled,
             }
-            for fit in found.fits
+            for name, fit in zip(_window_names(found.fits), found.fits, strict=True)
         ],
         "deviation": found.deviation,
         "iterations": found.iterations,
@@ -63,6 +67,8 @@ def document_of_identification(found: Identification) -> dict[str, Any]:
         document["clamp_angles"] = candidate.clamp_angles.tolist()
     if candidate.marker_offsets is not None:
         document["marker_offsets"] = candidate.marker_offsets.tolist()
+    if any(p.name == "turn" for p in found.parameters):
+        document["turn"] = candidate.turn
     if any(p.name == "length_ratio" for p in found.parameters):
         document["cable"]["length"] = cable.length * candidate.length_ratio
     return document
@@ -80,13 +86,14 @@ def report_of(found: Identification, title: str) -> str:
         + f"<td>{escape(p.unit)}</td></tr>"
         for p in found.parameters
     )
+    names = _window_names(found.fits)
     fits = "".join(
-        f"<tr><td>{escape(f.name)}</td><td>{1e3 * np.nanmean(f.distances):.1f}</td>"
+        f"<tr><td>{escape(name)}</td><td>{1e3 * np.nanmean(f.distances):.1f}</td>"
         f"<td>{1e3 * np.nanmedian(f.distances):.1f}</td><td>{1e3 * np.nanmax(f.distances):.1f}</td>"
         f"<td>{'stalled' if f.stalled else ''}</td></tr>"
-        for f in found.fits
+        for name, f in zip(names, found.fits, strict=True)
     )
-    figures = "".join(_figures(fit) for fit in found.fits[:8])
+    figures = "".join(_figures(*pair) for pair in zip(names[:8], found.fits[:8], strict=True))
     more = f"<p>{len(found.fits) - 8} more windows are in the table.</p>" if len(found.fits) > 8 else ""
     every = np.concatenate([f.distances.ravel() for f in found.fits])
     typical = 1e3 * float(np.nanmedian(every))
@@ -96,8 +103,8 @@ def report_of(found: Identification, title: str) -> str:
         f"the markers</h1><p>{escape(found.message)}</p><h2>Parameters</h2><table><tr><th>parameter</th><th>value</th>"
         f"<th>95 % interval</th><th>unit</th></tr>{rows}</table>{_correlations(found)}<h2>Distance of free markers "
         f"from the prediction [mm]</h2><table><tr><th>recording</th><th>mean</th><th>median</th><th>worst</th>"
-        f"<th></th></tr>{fits}</table>{figures}{more}<p>{found.iterations} iterations in {found.seconds:.1f} s.</p>"
-        "</body></html>"
+        f"<th></th></tr>{fits}</table>{figures}{more}<p>{counted(found.iterations, 'iteration')} in "
+        f"{found.seconds:.1f} s.</p></body></html>"
     )
 
 
@@ -115,17 +122,26 @@ def _correlations(found: Identification) -> str:
     return f"<h2>Correlations</h2><table><tr><th></th>{head}</tr>{body}</table>"
 
 
-def _figures(fit: Fit) -> str:
-    # the median of the markers, which outliers of the tracking do not make
-    distance = np.array([np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else 0.0 for row in fit.distances])
-    distance *= 1e3
-    worst = int(np.argmax(distance))
+def _window_names(fits: Sequence[Fit]) -> list[str]:
+    """Return the name of each recording, with the time of the window where it has several."""
+    several = Counter(fit.name for fit in fits)
+    return [f"{f.name}, {f.begin:.4g} to {f.end:.4g} s" if several[f.name] > 1 else f.name for f in fits]
+
+
+def _figures(name: str, fit: Fit) -> str:
+    # the median of the markers, which outliers of the tracking do not make; NaN where all were lost
+    seen = np.asarray(np.isfinite(fit.distances).any(axis=1))
+    distance = np.full(len(seen), np.nan)
+    distance[seen] = 1e3 * np.nanmedian(fit.distances[seen], axis=1)
+    worst = int(np.nanargmax(distance))
     overlay = _overlay(fit, worst)
-    caption = f"{fit.name}: worst moment, {distance[worst]:.0f} mm in the median at {fit.times[worst]:.2f} s"
-    if len(fit.times) < 10:
+    when = f"of shape {worst + 1} of {len(seen)}" if fit.static else f"at {fit.times[worst]:.2f} s"
+    what = "worst shape" if fit.static else "worst moment"
+    caption = f"{name}: {what}, {distance[worst]:.0f} mm in the median {when}"
+    if fit.static or len(fit.times) < 10:
         return f"<figure>{overlay}<figcaption>{escape(caption)}</figcaption></figure>"
     return (
-        f'<div class="row"><figure>{_over_time(fit.times, distance)}<figcaption>{escape(fit.name)}: median distance of '
+        f'<div class="row"><figure>{_over_time(fit.times, distance)}<figcaption>{escape(name)}: median distance of '
         f"the free markers over time</figcaption></figure><figure>{overlay}<figcaption>{escape(caption)}: "
         f'<span style="color:{_ORANGE}">measured</span>, <span style="color:{_BLUE}">predicted</span></figcaption>'
         "</figure></div>"
@@ -137,8 +153,13 @@ def _over_time(times: Floats, distance: Floats) -> str:
     most = _round_up(float(np.nanmax(distance)))
     x = left + width * (times - times[0]) / (times[-1] - times[0])
     y = top + height * (1.0 - distance / most)
-    line = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True) if np.isfinite(b))
-    parts = [f'<polyline points="{line}" fill="none" stroke="{_BLUE}" stroke-width="1.5"/>']
+    lost = np.flatnonzero(np.diff(np.isfinite(y))) + 1
+    lines = [
+        " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(*piece, strict=True))
+        for piece in zip(np.split(x, lost), np.split(y, lost), strict=True)
+        if np.isfinite(piece[1][0])
+    ]
+    parts = [f'<polyline points="{line}" fill="none" stroke="{_BLUE}" stroke-width="1.5"/>' for line in lines]
     for share in (0.0, 0.5, 1.0):
         at = top + height * (1.0 - share)
         parts.append(f'<line x1="{left}" x2="{left + width}" y1="{at}" y2="{at}" stroke="#dde"/>')
@@ -150,15 +171,13 @@ def _over_time(times: Floats, distance: Floats) -> str:
 
 
 def _overlay(fit: Fit, frame: int) -> str:
-    """Return a view along the direction in which the shape is flattest, x-like to the right and up upwards."""
+    """Return a view of the measured and the predicted markers of a frame."""
     measured, predicted = fit.measured[frame], fit.predicted[frame]
     middle = predicted.mean(axis=0)
-    spread = (predicted - middle)[:, :2]
-    along = np.linalg.svd(spread)[2][0]
-    along = along * (1.0 if along[np.argmax(np.abs(along))] > 0 else -1.0)
+    right, up = _view(fit.gravity, predicted - middle)
 
     def seen(points: Floats) -> Floats:
-        return np.column_stack([(points - middle)[:, :2] @ along, points[:, 2]])
+        return np.asarray((points - middle) @ np.column_stack([right, up]))
 
     a, b = seen(measured), seen(predicted)
     every = np.concatenate([a[np.isfinite(a).all(axis=1)], b])
@@ -179,6 +198,20 @@ def _overlay(fit: Fit, frame: int) -> str:
     parts.append(f'<line x1="10" y1="232" x2="{10 + 0.1 * scale:.1f}" y2="232" stroke="#333" stroke-width="2"/>')
     parts.append(_text(10, 226, "0.1 m", "start"))
     return _svg(420, 240, parts)
+
+
+def _view(gravity: Floats, points: Floats) -> tuple[Floats, Floats]:
+    """Return unit vectors (3,) to the right and upwards of a view of points (m, 3) about their middle.
+
+    Upwards is against gravity, or z without it; of a cable that lies flat, seen from above, it is across that.
+    """
+    weight = float(np.linalg.norm(gravity))
+    up = -gravity / weight if weight > 0.0 else np.array([0.0, 0.0, 1.0])
+    level = np.eye(3) - np.outer(up, up)
+    right = np.linalg.svd(np.vstack([points @ level, 1e-9 * level]))[2][0]
+    right = right * (1.0 if right[np.argmax(np.abs(right))] > 0 else -1.0)
+    across = np.cross(up, right)
+    return right, across if np.ptp(points @ up) < _LYING * np.ptp(points @ across) else up
 
 
 def _round_up(value: float) -> float:

@@ -44,7 +44,9 @@ class Fit:
 
     Attributes:
         name: of the recording.
-        begin: of the window in it [s].
+        begin, end: of the window in it [s].
+        static: its frames are shapes at rest, which `times` only number.
+        gravity: as recorded (3,) [m/s^2].
         times: of the compared frames in it (k,) [s].
         measured, predicted: (k, m, 3) [m].
         free: the markers that nothing holds.
@@ -53,6 +55,9 @@ class Fit:
 
     name: str
     begin: float
+    end: float
+    static: bool
+    gravity: Floats
     times: Floats
     measured: Floats
     predicted: Floats

@@ -10,8 +10,8 @@ from scipy.stats import t as student
 from dlocore.errors import SceneError
 from dlocore.identify.identification import Estimated, Fit, Identification
 from dlocore.identify.parameters import Parameter
-from dlocore.identify.replay import Replay
-from dlocore.identify.rest import Rest
+from dlocore.identify.replay import Played, Replay
+from dlocore.identify.rest import Rest, Settled
 from dlocore.identify.search import Search, State, robust_deviation, weights
 from dlocore.identify.tracks import noise_of_free
 from dlocore.spline import DEGREE
@@ -67,18 +67,7 @@ def assess(search: Search, state: State, seconds: float) -> Identification:
     correlations = inverse / np.outer(size, size)
     correlations[~told] = np.nan
     correlations[:, ~told] = np.nan
-    fits = tuple(
-        Fit(
-            name=replay.recording.name,
-            begin=0.0,
-            times=cast(Floats, replay.recording.times)[replay.compared],
-            measured=replay.markers,
-            predicted=played.predicted,
-            free=replay.recording.free,
-            stalled=played.stopped,
-        )
-        for replay, played in zip(search.replays, state.played, strict=True)
-    )
+    fits = tuple(_fit(*pair) for pair in zip(search.replays, state.played, strict=True))
     doubts = [*_left_out(unshaken, unrefined), *_doubts(search, state, spread_by_noise)]
     message = " ".join([_message(state, estimated, correlations), *doubts])
     return Identification(
@@ -91,6 +80,23 @@ def assess(search: Search, state: State, seconds: float) -> Identification:
         deviation=deviation,
         iterations=state.iterations,
         seconds=seconds,
+    )
+
+
+def _fit(replay: Replay | Rest, played: Played | Settled) -> Fit:
+    recording = replay.recording
+    times = cast(Floats, recording.times)
+    return Fit(
+        name=recording.name,
+        begin=float(times[0]),
+        end=float(times[-1]),
+        static=recording.static,
+        gravity=cast(Floats, recording.gravity),
+        times=times[replay.compared],
+        measured=replay.markers,
+        predicted=played.predicted,
+        free=recording.free,
+        stalled=played.stopped,
     )
 
 
