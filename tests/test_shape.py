@@ -3,7 +3,7 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
@@ -381,6 +381,43 @@ def test_a_cable_that_doubles_back_on_itself_is_refused_by_name() -> None:
         with pytest.raises(SceneError) as error:
             fitted(np.column_stack([np.minimum(u, 2 * middle - u), 0 * u, 0 * u]))
         assert error.value.field == "shape.points"
+
+
+def along(x: ArrayLike) -> Floats:
+    """Return points (n, 3) [m] on a straight line."""
+    return np.asarray(x, dtype=float)[:, None] * [1.0, 0.0, 0.0]
+
+
+def with_outlier() -> Floats:
+    """Return points of a straight cable of which one is 0.3 m beside it."""
+    points = along(np.linspace(0.0, 1.0, 101))
+    points[40, 1] = 0.3
+    return points
+
+
+@pytest.mark.parametrize(
+    ("points", "at"),
+    [
+        (along([0, 0.1, 0.2, 0.15, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1]), 2),
+        (along([0, 0.1, 0.2, 0.3, 0.3, 0.5, 0.4, 0.6, 0.7, 0.8, 0.9, 1]), 5),
+        (along(np.random.default_rng(1).permutation(np.linspace(0.0, 1.0, 200))), 1),
+        (with_outlier(), 40),
+    ],
+    ids=["a step back", "two swapped, one repeated", "in any order", "an outlier"],
+)
+def test_points_out_of_order_are_told_of_as_such_and_not_by_a_length(points: Floats, at: int) -> None:
+    with pytest.raises(SceneError) as error:
+        fitted(points)
+    assert error.value.given == f"points that double back on themselves at points[{at}]"
+    assert "POST /v1/shapes:fit" in error.value.allowed
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_points_in_order_along_another_cable_are_told_of_by_their_length(noise: float) -> None:
+    count = 5000 if noise else 50
+    points = along(np.linspace(0.0, 3.0, count)) + np.random.default_rng(0).normal(scale=noise, size=(count, 3))
+    with pytest.raises(SceneError, match=r"got a curve 3\.?\d* m long\. The cable is 1 m long"):
+        fitted(points)
 
 
 def test_a_fit_that_is_kept_is_that_of_its_points_and_length() -> None:

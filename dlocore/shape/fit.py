@@ -26,6 +26,8 @@ MARGIN = 0.05  # of the length: how far feet of noisy points may lie beyond the 
 SPEED_ERROR = 3e-4  # at quarter points; between them it is at most twice that, below the 1e-3 strain of a taut cable
 SLOWEST = 1e-3  # of the chord's speed: where the parameter of a fit moves on and the curve doesn't, it is a cusp
 STEPS, MIN_STEPS = 16, 512  # of the arclength of a fit, a knot span and in all: its inverse is smooth to SPEED_ERROR
+STEP_BACK = 0.04  # of the size of the curve: steps that are shorter turn back by noise
+TURNED_BACK = -0.5  # the cosine of two steps in a row
 MISSED = 0.01  # of the length, by which a fit with fewer spans may miss the points in the mean
 MIN_SPANS = 8  # of a fit, at which even few points can show three bends
 MIN_UNIT_SPANS, MAX_UNIT_SPANS = 64, 4096  # beyond which a curve is too sharp for a cable, and is fitted with fewer
@@ -94,7 +96,8 @@ def _fit(coordinates: bytes, length: float) -> PointFit:
         most_missed = min(most_missed, missed + MISSED * length)
         if not _is_about(given, length) and _is_about(chords[-1], length):
             continue  # the spline loops at a corner between points that tell of none
-        check_length("shape.points", "points along the whole cable", given, length)
+        if not _is_about(given, length):
+            break
         doubt = 2 * END_NOISE * missed
         extra = float(np.clip(length - given, -doubt, doubt))
         start, end = first - extra / 2, last + extra / 2
@@ -102,8 +105,10 @@ def _fit(coordinates: bytes, length: float) -> PointFit:
         if curve is not None:
             at = np.clip(np.interp(share, progress, s) - start, 0.0, end - start)
             return PointFit(curve=curve, length_given=given, at=at[which])
-    check_length("shape.points", "points along the whole cable", given, length)
-    raise _doubled_back()
+    back = _turns_back(points)
+    if back is None:
+        check_length("shape.points", "points along the whole cable", given, length)
+    raise _doubled_back(back)
 
 
 def _smoothed(
@@ -117,7 +122,7 @@ def _smoothed(
         first, last = _ends(s, noise)
         x, span = s - first, max(last - first, np.ptp(s) / 2)
         if not span > 0:
-            raise _doubled_back()
+            raise _doubled_back(_turns_back(p))
         spline = smooth(x, p, weight, span, spans, most_noise, stiffness)
         stiffness = stiffness_of(spline)
         if len(p) > SPARSE:
@@ -127,9 +132,28 @@ def _smoothed(
     return spline, x, s, measured
 
 
-def _doubled_back() -> SceneError:
-    allowed = "points in order along a curve that a cable can follow"
-    return SceneError("shape.points", "points that double back on themselves", allowed)
+def _turns_back(points: Floats) -> int | None:
+    """Return the first of the points (n, 3) at which the way along them turns back by more than noise, or None.
+
+    It does between two steps that are long against the curve, by more than a corner that a cable can follow.
+    """
+    kept = np.flatnonzero(np.concatenate([[True], np.any(np.diff(points, axis=0) != 0.0, axis=1)]))
+    steps = np.diff(points[kept], axis=0)
+    lengths = np.sqrt((steps**2).sum(axis=1))
+    long = lengths > STEP_BACK * np.sqrt((np.ptp(points, axis=0) ** 2).sum())
+    cosines = (steps[:-1] * steps[1:]).sum(axis=1) / (lengths[:-1] * lengths[1:])
+    back = np.flatnonzero(long[:-1] & long[1:] & (cosines < TURNED_BACK))
+    return int(kept[back[0] + 1]) if len(back) else None
+
+
+def _doubled_back(at: int | None) -> SceneError:
+    """Return the error of points whose way turns back at the point `at`, or that are too sharp elsewhere."""
+    allowed = (
+        "points in order along a curve that a cable can follow, without outliers; dlocore.shape.cloud.fit_cloud, or "
+        "POST /v1/shapes:fit, fits points without order (ordered false) or with outliers"
+    )
+    where = "" if at is None else f" at points[{at}]"
+    return SceneError("shape.points", f"points that double back on themselves{where}", allowed)
 
 
 def check_length(name: str, allowed: str, given: float, length: float) -> None:
