@@ -43,8 +43,9 @@ async def batch(
 
     async def produce(emit: Emit) -> None:
         try:
+            asked = wanted.root
             await predict_all(
-                service, scenes, emit, store=wanted.root.store, like=wanted.root.like, order=wanted.root.order
+                service, scenes, emit, store=asked.store, like=asked.like, order=asked.order, fields=asked.fields
             )
         finally:
             service.worker.release()

@@ -3,11 +3,11 @@
 from typing import Annotated, Any, Literal
 
 from fastapi.openapi.models import Example
-from pydantic import BaseModel, Discriminator, Field, RootModel, Tag
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, RootModel, Tag
 
 from app.schemas.base import LIKE, Flag, Model, RunId
 from app.schemas.request import PAPER, TWO_GRIPPERS
-from app.schemas.response import PredictionResponse, ProblemDocument
+from app.schemas.response import OPTIONAL_FIELDS, OptionalField, PredictionResponse, ProblemDocument
 
 _MOST = 100_000  # a service may allow less: DLO_MAX_BATCH
 
@@ -19,6 +19,13 @@ class _Batch(Model):
         default="index",
         description="Lines in the order of the scenes, each as soon as all before it are done; or as they finish.",
         examples=["index"],
+    )
+    fields: list[OptionalField] = Field(
+        default=list(OPTIONAL_FIELDS),
+        max_length=len(OPTIONAL_FIELDS),
+        description="What each result has besides `id`, `state`, `created`, `status`, `message`, `accuracy` and "
+        "`links`; what is left out is not worked out. A stored run has everything.",
+        examples=[["surface", "grasps"]],
     )
 
 
@@ -67,6 +74,16 @@ class BatchRequest(RootModel):
         return [{**self.root.scene, "primitives": primitives} for primitives in self.root.primitives]
 
 
+def _some_optional(schema: dict[str, Any]) -> None:
+    schema["required"] = [name for name in schema["required"] if name not in OPTIONAL_FIELDS]
+
+
+class BatchResult(PredictionResponse):
+    """A predicted motion, with those `fields` that the batch asks for."""
+
+    model_config = ConfigDict(json_schema_extra=_some_optional)
+
+
 class BatchLine(BaseModel):
     """One line of the answer: `result` or `problem`."""
 
@@ -74,7 +91,7 @@ class BatchLine(BaseModel):
     status: str = Field(
         description="That of the prediction, e.g. `converged`; `failed` where there is none.", examples=["converged"]
     )
-    result: PredictionResponse | None = Field(default=None, description="The prediction.")
+    result: BatchResult | None = Field(default=None, description="The prediction.")
     problem: ProblemDocument | None = Field(default=None, description="Why there is none.")
 
 

@@ -1,8 +1,9 @@
 """The response of the predictions, as data to serialise and as a schema to read."""
 
-from dataclasses import fields
+from collections.abc import Callable, Collection
+from dataclasses import fields as dataclass_fields
 from datetime import UTC, datetime
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,10 @@ from dlocore.answer.parts import GraspReaction, Iteration, Status
 from dlocore.spline import DEGREE
 
 Floats = NDArray[np.float64]
+OptionalField = Literal[
+    "surface", "control_points", "knots_u", "knots_t", "degree", "grasps", "effects", "iterations", "start"
+]
+OPTIONAL_FIELDS: tuple[OptionalField, ...] = get_args(OptionalField)  # of an answer, which a batch may do without
 _ID = "019b1f5a2c07f3e9d1c5b6a7e8f0"
 _RUN = f"/v1/predictions/{_ID}"
 
@@ -261,7 +266,13 @@ def now() -> str:
     return datetime.now(UTC).isoformat(timespec="microseconds").replace("+00:00", "Z")
 
 
-def from_prediction(prediction: Prediction, id: str, samples_u: int = 101, samples_t: int = 33) -> dict[str, Any]:
+def from_prediction(
+    prediction: Prediction,
+    id: str,
+    samples_u: int = 101,
+    samples_t: int = 33,
+    fields: Collection[str] = OPTIONAL_FIELDS,
+) -> dict[str, Any]:
     """Return the response document of `prediction`, with NumPy arrays in it.
 
     Args:
@@ -269,32 +280,41 @@ def from_prediction(prediction: Prediction, id: str, samples_u: int = 101, sampl
         id: id of the stored run.
         samples_u: samples along the cable.
         samples_t: samples in time.
+        fields: which of `OPTIONAL_FIELDS` it has; the others are not worked out.
     """
     u, t, q = prediction.surface.sample(samples_u, samples_t)
     accuracy = vars(prediction.accuracy)
+    parts: dict[str, Callable[[], Any]] = {
+        "surface": lambda: {
+            "u": u,
+            "t": t,
+            "positions": np.ascontiguousarray(q[..., :3]),
+            "twist": q[..., 3].copy(),
+        },
+        "control_points": lambda: np.ascontiguousarray(prediction.surface.control_points, dtype=float),
+        "knots_u": lambda: prediction.surface.knots_u,
+        "knots_t": lambda: prediction.surface.knots_t,
+        "degree": lambda: DEGREE,
+        "grasps": lambda: [_grasp_document(grasp, t) for grasp in prediction.grasps],
+        "effects": lambda: [{**vars(effect), "magnitude": _finite(effect.magnitude)} for effect in prediction.effects],
+        "iterations": lambda: [iteration_document(iteration) for iteration in prediction.iterations],
+        "start": lambda: {"elastic_energy": prediction.start_energy, "fit_error": prediction.start_fit},
+    }
     return {
         "id": id,
         "state": "done",
         "created": now(),
         "status": prediction.status,
         "message": prediction.message,
-        "surface": {"u": u, "t": t, "positions": np.ascontiguousarray(q[..., :3]), "twist": q[..., 3].copy()},
-        "control_points": np.ascontiguousarray(prediction.surface.control_points, dtype=float),
-        "knots_u": prediction.surface.knots_u,
-        "knots_t": prediction.surface.knots_t,
-        "degree": DEGREE,
-        "grasps": [_grasp_document(grasp, t) for grasp in prediction.grasps],
-        "effects": [{**vars(effect), "magnitude": _finite(effect.magnitude)} for effect in prediction.effects],
-        "iterations": [iteration_document(iteration) for iteration in prediction.iterations],
+        **{name: part() for name, part in parts.items() if name in fields},
         "accuracy": {**accuracy, "error_estimate": _finite(prediction.accuracy.error_estimate)},
-        "start": {"elastic_energy": prediction.start_energy, "fit_error": prediction.start_fit},
         "links": links(id),
     }
 
 
 def iteration_document(iteration: Iteration) -> dict[str, Any]:
     """Return an iteration without its surface, with None where a value is not finite."""
-    named = [f.name for f in fields(iteration) if f.name not in ("find_surface", "find_energy")]
+    named = [f.name for f in dataclass_fields(iteration) if f.name not in ("find_surface", "find_energy")]
     document = {name: getattr(iteration, name) for name in (*named, "energy")}
     for name in ("update", "residual", "energy", "damping", "step_length"):
         document[name] = _finite(document[name])

@@ -1,6 +1,7 @@
 """Many predictions in one request: all workers at once, a line for each, one bad scene spoiling no other."""
 
 import logging
+from collections.abc import Collection
 from threading import Event
 from typing import Any, Literal
 
@@ -23,7 +24,14 @@ AHEAD = 4  # lines that may be ready before the one that is due, for each worker
 
 
 async def predict_all(
-    service: Service, scenes: list[Any], emit: Emit, *, store: bool, like: str, order: Literal["index", "finished"]
+    service: Service,
+    scenes: list[Any],
+    emit: Emit,
+    *,
+    store: bool,
+    like: str,
+    order: Literal["index", "finished"],
+    fields: Collection[str],
 ) -> None:
     """Predict `scenes` and emit a line of JSON for each; when cancelled, cancel those under way.
 
@@ -34,6 +42,7 @@ async def predict_all(
         store: whether to keep the runs.
         like: id of a run that all go on from; "": none.
         order: in that of the scenes, or as they finish.
+        fields: which of `OPTIONAL_FIELDS` each answer has.
     """
     waiting: dict[int, bytes] = {}
     turn = anyio.Condition()
@@ -54,7 +63,7 @@ async def predict_all(
 
     async def work() -> None:
         for index in indices:
-            line = await _line(service, index, scenes[index], store, like)
+            line = await _line(service, index, scenes[index], store, like, fields)
             if order == "index":
                 await deliver(index, line)
             else:
@@ -66,7 +75,7 @@ async def predict_all(
             tasks.start_soon(work)
 
 
-async def _line(service: Service, index: int, data: Any, store: bool, like: str) -> bytes:
+async def _line(service: Service, index: int, data: Any, store: bool, like: str, fields: Collection[str]) -> bytes:
     id = new_id()
     RUN.set(id)
     try:
@@ -74,7 +83,7 @@ async def _line(service: Service, index: int, data: Any, store: bool, like: str)
         prediction = await service.solve(scene, Event(), like=like, on_start=lambda: None, on_iteration=_pass)
 
         def keep() -> bytes:
-            return service.keep(prediction, request, orjson.dumps(data), id, store)
+            return service.keep(prediction, request, orjson.dumps(data), id, store, fields)
 
         document = await anyio.to_thread.run_sync(keep)
         head = orjson.dumps({"index": index, "status": prediction.status})

@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Collection
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field, replace
 from threading import Event
@@ -17,7 +17,7 @@ from fastapi import Depends, Request
 from app.http.problems import ProblemError, problem_of
 from app.logs import RUN
 from app.schemas import PredictionRequest, from_prediction, to_scene
-from app.schemas.response import iteration_document
+from app.schemas.response import OPTIONAL_FIELDS, iteration_document
 from app.service.jobs import Job, Jobs
 from app.service.measurements import Measurement, Measurements, Work
 from app.service.metrics import Metrics
@@ -213,15 +213,36 @@ class Service:
         )
         return prediction
 
-    def keep(self, prediction: Prediction, request: PredictionRequest, raw: bytes, id: str, store: bool) -> bytes:
-        """Return the answer as JSON, store it where that is asked for, and remember it; for any thread."""
+    def keep(
+        self,
+        prediction: Prediction,
+        request: PredictionRequest,
+        raw: bytes,
+        id: str,
+        store: bool,
+        fields: Collection[str] = OPTIONAL_FIELDS,
+    ) -> bytes:
+        """Return the answer as JSON, store it where that is asked for, and remember it; for any thread.
+
+        Args:
+            prediction: what was solved.
+            request: the valid request.
+            raw: the same as it was sent.
+            id: of the run.
+            store: whether to keep it.
+            fields: which of `OPTIONAL_FIELDS` the answer has; what is stored has all.
+        """
         self.recent.add(id, prediction)
         u, t = request.output.samples_u, request.output.samples_t
         if not store:
-            document = {**from_prediction(prediction, id, u, t), "links": None}
+            document = {**from_prediction(prediction, id, u, t, fields), "links": None}
             return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
         self.runs.save(raw, prediction, samples_u=u, samples_t=t, id=id, name=request.name)
-        return self.runs.document(id) or b""
+        stored = self.runs.document(id) or b""
+        left_out = set(OPTIONAL_FIELDS).difference(fields)
+        if not left_out:
+            return stored
+        return orjson.dumps({name: part for name, part in orjson.loads(stored).items() if name not in left_out})
 
     def document(self, id: str, job: Job | None = None) -> bytes | None:
         """Return the answer `id` as JSON, or None where there is none; for any thread.

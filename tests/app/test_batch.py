@@ -64,6 +64,24 @@ def test_one_scene_is_moved_in_many_ways_and_stored_where_asked(client: TestClie
     assert client.get("/v1/predictions?name=SWEEP").json()["total"] == 3
 
 
+@pytest.mark.parametrize("fields", [[], ["surface", "grasps"]])
+@pytest.mark.parametrize("store", [False, True])
+def test_a_result_has_the_fields_that_are_asked_for_and_a_stored_run_all(
+    client: TestClient, answer: dict[str, Any], fields: list[str], store: bool
+) -> None:
+    batch = {"scenes": [paper_scene()], "fields": fields, "store": store}
+    (line,) = lines(client.post(BATCH, json=batch).text)
+    result = line["result"]
+    always = {"id", "state", "created", "status", "message", "accuracy", "links"}
+    assert set(result) == always | set(fields)
+    for name in fields:
+        assert result[name] == answer[name]
+    if store:
+        stored = client.get(result["links"]["self"]).json()
+        assert {name: stored[name] for name in result} == result
+        PredictionResponse.model_validate(stored, strict=True)
+
+
 def test_lines_come_as_they_finish_where_asked(client: TestClient) -> None:
     scenes = [SLOW, *[paper_scene()] * 5]
     as_they_finish = lines(client.post(BATCH, json={"scenes": scenes, "order": "finished"}).text)
@@ -84,10 +102,11 @@ def test_lines_come_as_they_finish_where_asked(client: TestClient) -> None:
         ({"scene": 3, "primitives": [[]]}, "scene"),
         ({"scenes": [1], "store": "yes"}, "store"),
         ({"scenes": [1], "order": "any"}, "order"),
+        ({"scenes": [1], "fields": ["shape"]}, "fields[0]"),
         ({"scenes": [1], "scene": paper_scene(), "primitives": [[]]}, "scenes"),
         ([], "scenes"),
     ],
-    ids=range(9),
+    ids=range(10),
 )
 def test_a_batch_that_is_none_is_refused_as_a_whole(client: TestClient, body: Any, field: str) -> None:
     problem = the_problem(client.post(BATCH, json=body), 422)
