@@ -13,6 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 T = TypeVar("T", bound=Hashable)
 
+MILLIMETRES = "Lengths are in metres, and this looks like millimetres"  # why something is far too large
+
 
 class DloError(Exception):
     """Anything this package raises on purpose."""

@@ -10,7 +10,7 @@ from typing import Literal, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dlocore.errors import SceneError, array, choice, columns_of, number, points_array
+from dlocore.errors import MILLIMETRES, SceneError, array, choice, columns_of, number, points_array
 from dlocore.scene.cable import Cable
 from dlocore.scene.obstacles import Obstacle
 from dlocore.scene.paths import Move, Path, Still, Waypoints
@@ -404,6 +404,7 @@ class Scene:
         for name, u in places:
             if not u <= length:
                 raise SceneError(name, u, f"0 to the cable's length, {length:g} [m]")
+        self._check_sizes()
         self._check_horizon()
         self._check_effects()
         self._check_overlap()
@@ -411,6 +412,18 @@ class Scene:
             last = float(cast(Floats, self.shape.knots)[-1])
             if not abs(last - length) <= 1e-9 * length:
                 raise SceneError("shape.knots[-1]", last, f"the cable's length, {length:g} [m]")
+
+    def _check_sizes(self) -> None:
+        """Refuse what is so large against the cable that it is in another unit."""
+        length, target = self.cable.length, self.quality.target_error
+        if target is not None and not target <= length:
+            raise SceneError("quality.target_error", target, f"at most the cable's length, {length:g} [m]", MILLIMETRES)
+        most = max(FARTHEST * length, FAR)
+        for i, grasp in enumerate(self.grasps):
+            name, far = _farthest(grasp.path)
+            if not far <= most:
+                field = f"primitives[{i}].path.{name}"
+                raise SceneError(field, f"a way of {far:g} m", f"at most {most:g} [m] for this cable", MILLIMETRES)
 
     def _check_horizon(self) -> None:
         if self.horizon is not None:
@@ -443,4 +456,15 @@ class Scene:
                     raise SceneError(f"primitives[{j}].u", b.u, f"at least {nearest:g} m from it", reason)
 
 
+def _farthest(path: Path) -> tuple[str, float]:
+    """Return how far from where it begins a path goes [m], and the name of what tells it."""
+    if isinstance(path, Move):
+        return "displacement", float(np.linalg.norm(cast(Floats, path.displacement)))
+    if isinstance(path, Waypoints):
+        positions = cast(Floats, path.positions)
+        return "positions", float(np.linalg.norm(positions - positions[0], axis=1).max())
+    return "", 0.0
+
+
+FARTHEST, FAR = 100.0, 50.0  # of the length, and [m]: a gripper that goes farther than both has another unit
 MIN_GRASP_DISTANCE = 1e-4  # of the length, between two grasps that hold at the same time

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline, CubicHermiteSpline, make_interp_spline
 
-from dlocore.errors import SceneError
+from dlocore.errors import MILLIMETRES, SceneError
+from dlocore.scene.scene import FARTHEST
 from dlocore.shape.smoothing import smooth, stiffness_of
 from dlocore.spline import DEGREE
 
@@ -160,6 +161,8 @@ def check_length(name: str, allowed: str, given: float, length: float) -> None:
     """Raise SceneError on the field `name` unless a curve of length `given` [m] fits a cable of `length` [m]."""
     if not _is_about(given, length):
         reason = f"The cable is {length:.4g} m long; the two may differ by {MAX_LENGTH_MISMATCH:.0%}"
+        if given > FARTHEST * length:
+            reason = f"{MILLIMETRES}. {reason}"
         raise SceneError(name, f"a curve {given:.4g} m long", f"{allowed}, or another cable.length", reason)
 
 

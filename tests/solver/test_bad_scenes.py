@@ -122,6 +122,11 @@ BAD: list[tuple[str, Callable[[], object]]] = [
     ("obstacles", lambda: Environment(obstacles=[Sphere(center=(0, 0, 0), radius=0.1)] * 101)),
     ("environment.table.height", lambda: predict(scene(shape=Straight(start=(0, 0, -0.1)), environment=Environment(table=Table())))),
     ("primitives[0].path", lambda: predict(scene(grasps=(Grasp(u=0.3, path=Move(displacement=(0, 0, -0.1), duration=1.0)),), environment=Environment(table=Table())))),
+    # lengths in millimetres
+    ("primitives[0].path.displacement", lambda: scene(grasps=(Grasp(u=0.3, path=Move(displacement=(0, 500, 0), duration=1.6)),))),
+    ("primitives[1].path.positions", lambda: scene(grasps=(SIDE, Grasp(u=0.8, path=Waypoints(times=[0, 1], positions=[[800, 0, 0], [800, 300, 0]]))))),
+    ("quality.target_error", lambda: scene(quality=Quality(target_error=2.0))),
+    ("shape.points", lambda: predict(scene(shape=Points(points=1000.0 * arc(1.0, 1.0))))),
     # the whole
     ("horizon", lambda: scene(grasps=())),
     ("horizon", lambda: scene(horizon=0.0)),
@@ -160,6 +165,22 @@ def test_bad_scene_is_refused_by_the_name_of_its_field(field, make):
     assert isinstance(error, DloError)
     assert isinstance(error, ValueError)
     assert str(error).startswith(f"{field}: got ")
+
+
+def test_what_is_as_large_as_in_millimetres_is_told_of_as_such():
+    far = Move(displacement=(0.0, 500.0, 0.0), duration=1.6)
+    with pytest.raises(SceneError, match=r"a way of 500 m\. .* looks like millimetres\. Allowed: at most 100 \[m\]"):
+        scene(grasps=(Grasp(u=0.3, path=far),))
+    with pytest.raises(SceneError, match="looks like millimetres"):
+        scene(quality=Quality(target_error=2.0))
+    with pytest.raises(SceneError, match=r"a curve 1000 m long\. .* looks like millimetres"):
+        predict(scene(shape=Points(points=1000.0 * arc(1.0, 1.0))))
+
+
+def test_a_short_cable_may_be_carried_through_a_hall():
+    carried = Grasp(u=0.0, path=Move(displacement=(40.0, 0.0, 0.0), duration=60.0))
+    short = Cable(length=0.1, diameter=0.002, linear_density=0.01, bending_stiffness=1e-4)
+    assert Scene(cable=short, shape=Straight(), grasps=(carried,)).horizon == 60.0
 
 
 def test_two_grasps_pulled_exactly_taut_are_no_bad_scene():

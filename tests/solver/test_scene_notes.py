@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from dlocore import Grasp, Points, Quality, Scene, Straight, equilibrium, predict
+from dlocore import Cable, Grasp, Points, Quality, Scene, Straight, equilibrium, predict
 from dlocore.problem.notes import scene_notes
+from dlocore.scene.cable import PRESETS
 from tests.solver.scenes import Floats, arc, cable
 
 HOLD = Grasp(u=0.0)
@@ -55,3 +56,15 @@ def test_points_that_only_noise_makes_longer_are_not_told_of(seed: int) -> None:
 
 def test_a_straight_cable_has_nothing_to_be_told_of() -> None:
     assert scene_notes(Scene(cable=cable(), shape=Straight(), grasps=[HOLD], horizon=1.0)) == []
+
+
+def test_a_cable_that_is_lighter_than_air_is_asked_whether_it_is_in_millimetres() -> None:
+    wire = Cable(length=1000.0, diameter=5.0, linear_density=0.05, bending_stiffness=1e-3)
+    (note,) = scene_notes(Scene(cable=wire, shape=Straight(), grasps=[HOLD], horizon=1.0))
+    assert "5 m thick and weighs 0.05 kg/m" in note
+    assert "in millimetres?" in note
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_real_cables_are_not_asked_for_their_unit(name: str) -> None:
+    assert scene_notes(Scene(cable=Cable.preset(name), shape=Straight(), grasps=[HOLD], horizon=1.0)) == []
