@@ -97,8 +97,8 @@ def parser() -> argparse.ArgumentParser:
         "--parameters",
         metavar="NAMES",
         default="bending_stiffness,drag,drag_quadratic,bending_damping",
-        help="which, by commas; also torsional_stiffness, length_ratio, turn, clamp_angles, marker_offsets, "
-        "rest_curvature",
+        help="which, by commas (default %(default)s); also torsional_stiffness, linear_density, length_ratio, "
+        "turn, yield_strain, clamp_angles, marker_offsets, rest_curvature",
     )
     find.add_argument("--n-u", type=int, default=13, help="control points along the cable (default 13)")
     find.set_defaults(

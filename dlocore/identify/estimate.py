@@ -15,6 +15,7 @@ from dlocore.identify.intervals import assess
 from dlocore.identify.parameters import DEFAULT, PLACES, Parameter, parameters, prepared
 from dlocore.identify.replay import Resolution
 from dlocore.identify.search import Search, robust_deviation
+from dlocore.identify.together import check_together
 from dlocore.recordings import Recording
 from dlocore.scene.cable import Cable
 from dlocore.scene.scene import Environment, Quality
@@ -65,6 +66,7 @@ def identify(
     began = perf_counter()
     if not recordings:
         raise SceneError("recordings", [], "at least one recording")
+    check_together(recordings)
     resolution = resolution or Resolution()
     Quality(n_u=resolution.n_u, n_t=resolution.n_u)  # refuses what is no number of control points
     windows = cut(recordings, window)
@@ -83,14 +85,37 @@ def identify(
     search = Search(windows, chosen, resolution, cancelled)
     state = search.run(candidate, iterations, on_progress)
     found = assess(search, state, perf_counter() - began)
-    known = cable is not None or any(r.linear_density is not None for r in recordings)
-    if known or "linear_density" in names:
-        return found
-    assumed = (
-        f"The recordings tell no linear density: {given.cable.linear_density:g} kg/m is assumed, and stiffnesses, "
-        "damping and drag are in proportion to it."
-    )
-    return replace(found, message=f"{found.message} {assumed}")
+    told = _assumed(recordings, given, names, cable is None and start is None, environment is None and start is None)
+    return replace(found, message=" ".join([found.message, *told]))
+
+
+def _assumed(
+    recordings: Sequence[Recording], given: Candidate, names: tuple[str, ...], cable: bool, drag: bool
+) -> list[str]:
+    """Return in words what was kept at a value that was neither given nor sought.
+
+    Args:
+        recordings: of the cable.
+        given: what the search began with.
+        names: of what was sought.
+        cable, drag: the numbers of the cable, those of its drag, were not given.
+    """
+    moves = any(not r.static for r in recordings)
+    assumed = {
+        "bending_stiffness": cable, "bending_damping": cable and moves,
+        "drag": drag and moves, "drag_quadratic": drag and moves,
+    }  # fmt: skip
+    kept = [p for p in parameters(DEFAULT, 0) if assumed[p.name] and p.name not in names]
+    said = []
+    if kept:
+        values = ", ".join(f"{p.name} {p.get(given):g} {p.unit}" for p in kept)
+        said.append(f"Neither given nor sought, and kept at what is assumed: {values}.")
+    if cable and not any(r.linear_density is not None for r in recordings) and "linear_density" not in names:
+        said.append(
+            f"The recordings tell no linear density: {given.cable.linear_density:g} kg/m is assumed, and stiffnesses, "
+            "damping and drag are in proportion to it."
+        )
+    return said
 
 
 def _begun(

@@ -278,7 +278,7 @@ def test_of_a_cable_that_hangs_still_nothing_is_told() -> None:
 
 @pytest.mark.parametrize("density", [None, 0.05])
 def test_a_density_that_was_assumed_is_told_of(density: float | None) -> None:
-    known, unknown = still(name="known", linear_density=density), still(name="unknown", linear_density=None)
+    known, unknown = still(name="known", linear_density=density), still(41, name="unknown", linear_density=None)
     found = identify([unknown, known], names=("drag",))
     assert found.cable.linear_density == (density or 0.04)
     told = "0.04 kg/m is assumed, and stiffnesses, damping and drag are in proportion to it." in found.message
@@ -295,8 +295,8 @@ def test_a_number_of_control_points_out_of_range_is_refused(n_u: Any) -> None:
 @pytest.mark.parametrize(
     ("other", "field", "said"),
     [
-        (still(held=(), name="other"), "recordings['other'].held", "()"),
-        (still(held=(), static=True, name="other"), "recordings['other'].held", "()"),
+        (still(41, held=(), name="other"), "recordings['other'].held", "()"),
+        (still(41, held=(), static=True, name="other"), "recordings['other'].held", "()"),
         (still(step=1e3, name="other"), "recordings['other'].times", "1 frame between 0 and 5 s"),
     ],
 )
@@ -408,3 +408,25 @@ def test_a_derivative_is_taken_to_the_side_on_which_the_cable_can_begin(monkeypa
     monkeypatch.setattr(Replay, "differentiable", lambda *_: False)
     monkeypatch.setattr(Replay, "play", play)
     np.testing.assert_allclose(search.derivatives(state)[0], 1.0, rtol=1e-9)
+
+
+def test_what_is_kept_at_an_assumed_value_is_told_of() -> None:
+    assert (
+        "Neither given nor sought, and kept at what is assumed: bending_stiffness 0.00125 N m^2, "
+        "drag_quadratic 0 N s^2/m^3, bending_damping 0.0002 N m^2 s." in identify([still()], names=("drag",)).message
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "kept"),
+    [
+        ({"cable": CABLE}, ": drag_quadratic 0 N s^2/m^3."),
+        ({"environment": DRAG}, ": bending_stiffness 0.00125 N m^2, bending_damping 0.0002 N m^2 s."),
+        ({"cable": CABLE, "environment": DRAG}, ""),
+        ({"start": Candidate(cable=CABLE, environment=DRAG)}, ""),
+    ],
+)
+def test_what_is_given_is_not_told_of_as_assumed(given: dict[str, Any], kept: str) -> None:
+    message = identify([still()], names=("drag",), **given).message
+    assert message.endswith(kept)
+    assert ("Neither given nor sought" in message) is bool(kept)

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from app.commands.command_line import parser
 from dlocore import Cable, Environment, SceneError
 from dlocore.identify import Candidate
-from dlocore.identify.parameters import parameters, prepared
+from dlocore.identify.parameters import SCALARS, parameters, prepared
 
 FREE = (2, 3, 4)
 
@@ -51,3 +52,11 @@ def test_what_is_put_into_a_candidate_is_got_from_it() -> None:
         changed = p.put(candidate, 0.3 + 0.1 * k)
         np.testing.assert_equal(p.get(changed), 0.3 + 0.1 * k)
         assert p.get(candidate) != p.get(changed)
+
+
+def test_the_help_of_the_command_names_every_parameter(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        parser().parse_args(["identify", "--help"])
+    told = "".join(capsys.readouterr().out.split())
+    for name in (*SCALARS, "clamp_angles", "marker_offsets", "rest_curvature"):
+        assert name in told, name

@@ -1,0 +1,53 @@
+"""Whether recordings can be of one cable: none twice, none in other units, and facts that agree."""
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.errors import SceneError
+from dlocore.recordings import Recording
+
+Floats = NDArray[np.float64]
+
+LONGEST = 50.0  # [m] of a cable: what is longer was tracked in millimetres
+_STRETCHED = 2.0  # times what its coordinates tell, that no cable is long
+_ALIKE = 0.02  # relative, to which lengths, diameters and densities of one cable agree
+
+
+def check_together(recordings: Sequence[Recording]) -> None:
+    """Refuse recordings that can't be of one cable, each seen once, in metres.
+
+    Raises:
+        SceneError: one is in other units, given twice, or tells another length, diameter or density than another.
+    """
+    for recording in recordings:
+        _check_metres(recording)
+    for first, second in combinations(recordings, 2):
+        if _same(first.times, second.times) and _same(first.markers, second.markers):
+            twice = "It counts twice, which makes intervals too narrow"
+            raise SceneError(second.place, f"what {first.name!r} has too", "each recording once", twice)
+        for name, unit in (("length", "m"), ("diameter", "m"), ("linear_density", "kg/m")):
+            one, other = getattr(first, name), getattr(second, name)
+            if one is not None and other is not None and abs(other - one) > _ALIKE * one:
+                allowed = f"{one:.4g} {unit} as of {first.name!r}, to {_ALIKE:.0%}"
+                raise SceneError(f"{second.place}.{name}", f"{other:.4g} {unit}", allowed, "All are of one cable")
+
+
+def _check_metres(recording: Recording) -> None:
+    length, u = cast(float, recording.length), cast(Floats, recording.u)
+    if length > LONGEST:
+        allowed = f"at most {LONGEST:g} m"
+        raise SceneError(f"{recording.place}.length", f"{length:.4g} m", allowed, "Are the markers in millimetres?")
+    steps = np.linalg.norm(np.diff(cast(Floats, recording.markers), axis=1), axis=2)
+    tracked = float(np.nanmedian(np.nansum(steps, axis=1)))
+    if tracked > _STRETCHED * (u[-1] - u[0]):
+        allowed = f"about {u[-1] - u[0]:.4g} m, as `u` tells"
+        reason = "Are the markers in millimetres?"
+        raise SceneError(f"{recording.place}.markers", f"{tracked:.4g} m from the first to the last", allowed, reason)
+
+
+def _same(a: object, b: object) -> bool:
+    return np.array_equal(cast(Floats, a), cast(Floats, b), equal_nan=True)
