@@ -1,6 +1,7 @@
 """What is to be known of a scene as it was given, whatever its motion."""
 
 import math
+from typing import cast
 
 from dlocore.scene.scene import Points, Scene
 from dlocore.shape.shape import start_curve
@@ -13,6 +14,11 @@ SAME_ENDS = 1e-3  # of the length: and so are ends, as those of noisy points, wh
 
 def scene_notes(scene: Scene) -> list[str]:
     """Return what is to be known of a scene as it was given, in words."""
+    return [*cable_notes(scene), *_of_times(scene)]
+
+
+def cable_notes(scene: Scene) -> list[str]:
+    """Return what is to be known of a scene's cable and how it lies, in words."""
     return [*_of_units(scene), *_of_lengths(scene)]
 
 
@@ -38,4 +44,14 @@ def _of_lengths(scene: Scene) -> list[str]:
     return [
         f"the points of the shape are {start.length_given:.4g} m long and the cable {length:.4g} m: they are scaled "
         f"to it about their middle, which moves an end by up to {in_mm(start.ends_moved)}, and a gripper that holds it"
+    ]
+
+
+def _of_times(scene: Scene) -> list[str]:
+    """Return what is told of grippers that would close when the motion is over."""
+    horizon = cast(float, scene.horizon)
+    return [
+        f"primitives[{i}] never holds the cable: it closes at {grasp.start:g} s and the horizon is {horizon:g} s"
+        for i, grasp in enumerate(scene.grasps)
+        if grasp.start >= horizon
     ]

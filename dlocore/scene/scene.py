@@ -194,7 +194,8 @@ class Grasp:
         u: material coordinate [m], 0 to the cable's length.
         hold: "point" holds the position, "tangent" position and direction, "clamp" the twist of the section too.
         path: `Still`, `Move` or `Waypoints`; its clock starts at `grasp_time`.
-        grasp_time: when the gripper closes [s]; None: it holds from the start.
+        grasp_time: when the gripper closes [s]; None: it holds from the start. One that would close at the horizon or
+            later never holds the cable, which `Prediction.notes` tells.
         release_time: when it opens [s]; None: never.
     """
 

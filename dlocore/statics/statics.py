@@ -15,7 +15,7 @@ from dlocore.problem.buckling import UNSTABLE, side_notes
 from dlocore.problem.discretisation import make_grid, smallest_n_u
 from dlocore.problem.events import closed_grasps
 from dlocore.problem.grid import Grid
-from dlocore.problem.notes import scene_notes
+from dlocore.problem.notes import cable_notes
 from dlocore.problem.problem import Problem, pose
 from dlocore.scene.scene import Scene
 from dlocore.solvers.monitor import Monitor
@@ -104,7 +104,7 @@ def equilibrium(
     target = scene.quality.target_error or 1e-4 * scene.cable.length
     least = smallest_n_u(problem)
     sizes = [n_u] if n_u is not None else [max(n, least + 2 * i) for i, n in enumerate(LEVELS)]
-    rest, notes = _refined(problem, sizes, at, target, monitor), scene_notes(scene)
+    rest, notes = _refined(problem, sizes, at, target, monitor), cable_notes(scene)
     found = rest.settled
     if rest.status == "converged" and is_unstable(problem, rest.grid, found.q, at, found.history):
         if lacks_twist(problem):

@@ -68,3 +68,17 @@ def test_a_cable_that_is_lighter_than_air_is_asked_whether_it_is_in_millimetres(
 @pytest.mark.parametrize("name", PRESETS)
 def test_real_cables_are_not_asked_for_their_unit(name: str) -> None:
     assert scene_notes(Scene(cable=Cable.preset(name), shape=Straight(), grasps=[HOLD], horizon=1.0)) == []
+
+
+@pytest.mark.parametrize("closes", [1.0, 3.0])
+def test_a_gripper_that_closes_after_the_horizon_is_told_of(closes: float) -> None:
+    late = Grasp(u=1.0, grasp_time=closes)
+    prediction = predict(Scene(cable=cable(), shape=Straight(), grasps=[HOLD, late], horizon=1.0))
+    note = f"primitives[1] never holds the cable: it closes at {closes:g} s and the horizon is 1 s"
+    assert prediction.notes == (note,)
+    assert not prediction.grasps[1].reaction.any()
+
+
+def test_a_gripper_that_closes_before_the_horizon_is_not_told_of() -> None:
+    late = Grasp(u=1.0, grasp_time=0.9, release_time=3.0)
+    assert scene_notes(Scene(cable=cable(), shape=Straight(), grasps=[HOLD, late], horizon=1.0)) == []
