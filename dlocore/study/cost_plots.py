@@ -81,9 +81,7 @@ def effect_costs(study: Study) -> Figure:
         xscale="log",
         xlim=(0.8 * min(1, *ratios), 1.6 * max(ratios)),
     )
-    axes.set_xticks(ticks := [0.5, 1, 1.5, 2, 3, 4, 6, 8], [f"{x:g}" for x in ticks])
-    axes.set_xlim(0.8 * min(1, *ratios), 1.6 * max(ratios))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    write_decimals(axes.xaxis)
     axes.set_title(f"The dearest effect is {rows[-1].effect.replace('_', ' ')}: {ratios[-1]:.1f} times as long with it")
     axes.set_axisbelow(True)
     axes.grid(alpha=0.25, axis="x", linewidth=0.5)
@@ -109,7 +107,7 @@ def scaling(study: Study) -> Figure:
         values = sorted({row.value for row in rows})
         axes.set_xticks(values, [f"{v:g}" for v in values])
         axes.xaxis.set_minor_formatter(NullFormatter())
-        write_decimals(axes, only_y=True)
+        write_decimals(axes.yaxis)
         axes.set_title(f"{variable}: exponent " + ", ".join(f"{p:.2f} ({method})" for method, p in found))
         axes.grid(alpha=0.25, which="major", linewidth=0.5)
         axes.legend(fontsize=8)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from textwrap import wrap
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
@@ -11,6 +12,8 @@ from dlocore.study.cost_plots import effect_costs, phases, scaling
 from dlocore.study.record import Study
 
 _DPI = 110
+_PER_INCH = 17  # letters of the caption
+_LINE = 0.12  # [in] of its lines
 
 
 def draw_all(study: Study, folder: Path, command: str = "dlo study") -> list[Path]:
@@ -43,7 +46,14 @@ def draw_all(study: Study, folder: Path, command: str = "dlo study") -> list[Pat
 
 
 def _caption(figure: Figure, study: Study, command: str) -> None:
+    """Write below a figure what was measured where, in as many lines as its width asks for."""
     machine = ", ".join([study.machine["processor"], f"Python {study.machine.get('Python', '?')}"])
     day = study.measured_at.replace("T", " ").replace("Z", " UTC")
     text = f"{command}; {machine}; {day}; program {study.source}; one thread, time on a core of its own"
-    figure.text(0.995, 0.008, text, ha="right", va="bottom", fontsize=7, color="#666666")
+    width, height = figure.get_size_inches()
+    lines = wrap(text, int(_PER_INCH * width))
+    below = (_LINE * len(lines) + 0.04) / height
+    figure.set_layout_engine("constrained", rect=(0.0, below, 1.0, 1.0 - below))
+    figure.text(
+        0.995, 0.04 / height, "\n".join(lines), ha="right", va="bottom", fontsize=7, linespacing=1.2, color="#666666"
+    )

@@ -113,7 +113,7 @@ class Study:
         duration: how long it took [s].
         judge: what the errors are distances to.
         runs: scenes over grids, thresholds, methods and sets of effects.
-        refused: runs that the solver does not take, and why.
+        refused: what could not be measured, and why: runs that the solver does not take, times that noise drowned.
         scaling: cost against the size of a problem.
         effects: cost by effect.
     """

@@ -18,6 +18,7 @@ from dlocore.study.record import EffectCost, Run, Scaled, Step, Study
 from dlocore.study.scaling import effect_pairs, sizes
 from dlocore.study.timing import Times, timed
 from dlocore.warming import warm_up
+from dlocore.words import in_ms
 
 OnProgress = Callable[[int, int, str], None]
 _PATIENCE = 2.0  # [s] for the repeats of one solve
@@ -139,7 +140,10 @@ class _Measuring:
                 marches[key] = times.median
             else:  # how many iterations a solve takes is no matter of its size
                 count, before = len(prediction.iterations), marches[key]
-            if times.median > before:
+            if times.median <= before:
+                began = f"{in_ms(times.median)}, not above the {in_ms(before)} of the march that it begins with"
+                self.refused.append(f"cost against {size.variable} = {size.value:g}: {method} took {began}")
+            else:
                 time, spread = (times.median - before) / count, times.spread / count
                 found.append(Scaled(variable=key[0], value=key[1], method=method, wall_time=time, spread=spread))
         return tuple(found)

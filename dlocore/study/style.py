@@ -5,31 +5,43 @@ from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator
 
 # Okabe-Ito, one colour a method everywhere
 COLOURS = {"march": "#0072B2", "spacetime": "#D55E00", "paper": "#CC79A7", "reference": "#009E73"}
 MARKS = {"march": "o", "spacetime": "s", "paper": "^", "reference": "D"}
+_LEAST = 3  # numbers at an axis
 
 
 def new_figure(width: float, height: float, rows: int = 1, columns: int = 1) -> tuple[Figure, list[Axes]]:
-    """Return a figure of so many inches and its axes, row by row; the caption has its place at the bottom."""
+    """Return a figure of so many inches and its axes, row by row."""
     figure = Figure(figsize=(width, height))
     axes = figure.subplots(rows, columns, squeeze=False)
-    figure.set_layout_engine("constrained", rect=(0.0, 0.03, 1.0, 0.97))
+    figure.set_layout_engine("constrained")
     return figure, list(axes.ravel())
 
 
-def write_decimals(axes: Axes, *, only_y: bool = False) -> None:
-    """Write the numbers of logarithmic axes as decimals, those between the powers of ten where there is room."""
-    for axis in (axes.yaxis,) if only_y else (axes.xaxis, axes.yaxis):
+def write_decimals(*axes: Axis) -> None:
+    """Write the numbers of logarithmic axes as decimals, at least three of them, and more where there is room."""
+    for axis in axes:
         low, high = axis.get_view_interval()
         axis.set_major_formatter("{x:g}")
-        between = (2.0, 5.0) if high < 300 * low else ()
         axis.set_minor_locator(LogLocator(subs=range(2, 10)))
+        choices = ((2, 5), range(2, 10)) if high < 300 * low else ((), (2, 5))
+        between = next((digits for digits in choices if _numbers(low, high, digits) >= _LEAST), ())
+        if _numbers(low, high, between) < _LEAST:  # it reaches hardly from one digit to the next
+            axis.set_major_locator(MaxNLocator(_LEAST + 1))
         axis.set_minor_formatter(FuncFormatter(partial(_between, between)))
 
 
-def _between(shown: Sequence[float], x: float, position: int | None = None) -> str:
+def _numbers(low: float, high: float, digits: Sequence[int]) -> int:
+    """Return how many numbers stand between `low` and `high` where powers of ten and these digits are written."""
+    powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
+    at = np.outer(powers, (1, *digits))
+    return int(((at >= low) & (at <= high)).sum())
+
+
+def _between(shown: Sequence[int], x: float, position: int | None = None) -> str:
     return f"{x:g}" if any(np.isclose(x / 10 ** np.floor(np.log10(x)), digit) for digit in shown) else ""

@@ -6,10 +6,12 @@ import pytest
 
 pytest.importorskip("matplotlib")
 
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 
 from dlocore.study import accuracy_plots, cost_plots, drawing
 from dlocore.study.record import EffectCost, Run, Scaled, Step, Study
+from dlocore.study.style import new_figure, write_decimals
 
 
 def run(method: str, n_u: int, time: float, error: float, **changes: object) -> Run:
@@ -60,6 +62,67 @@ def test_the_title_names_the_fastest_way_to_a_millimetre() -> None:
     (axes,) = accuracy_plots.work_precision(study()).axes
     # 0.1/n^2 m: 0.35 mm at n = 17 in 1e-5 17^2 s = 2.9 ms, which 9 (1.2 mm) does not reach
     assert "1 mm in 2.9 ms by march" in axes.get_title()
+
+
+def test_the_title_counts_the_scene_that_errs_most() -> None:
+    both = [
+        run("march", n, 1e-5 * n**2, share * 0.1 / n**2, scene=f"scene {share}")
+        for n in (9, 17, 33) for share in (0.25, 4.0)
+    ]  # fmt: skip
+    (axes,) = accuracy_plots.work_precision(study(runs=tuple(both))).axes
+    # geometric means as before, but the worse scene errs by 1.4 mm at n = 17 and by 0.37 mm at n = 33, in 11 ms
+    assert "1 mm in 11 ms by march" in axes.get_title()
+    (axes,) = accuracy_plots.work_precision(study(runs=tuple(both[:4]))).axes
+    assert "at best 1.4 mm, in 2.9 ms by march" in axes.get_title()
+
+
+def written(axis: Axis) -> list[float]:
+    """Return the numbers at an axis, within what is seen of it."""
+    low, high = axis.get_view_interval()
+    found = []
+    for at, form in (
+        (axis.get_majorticklocs(), axis.get_major_formatter()),
+        (axis.get_minorticklocs(), axis.get_minor_formatter()),
+    ):
+        found += [float(form(x, k)) for k, x in enumerate(at) if low <= x <= high and form(x, k)]
+    return sorted(found)
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [(0.6, 0.95), (0.82, 2.1), (1.1, 1.7), (3.0, 30.0), (8.0, 21.0), (3.0, 90.0), (0.5, 2000.0)]
+)
+def test_an_axis_has_three_numbers_at_least(low: float, high: float) -> None:
+    _, (axes,) = new_figure(4.0, 3.0)
+    axes.set(xscale="log", xlim=(low, high))
+    write_decimals(axes.xaxis)
+    assert len(written(axes.xaxis)) >= 3
+    assert all(low <= x <= high for x in written(axes.xaxis))
+
+
+def test_effects_that_make_it_faster_have_numbers_too() -> None:
+    costs = (EffectCost(effect="bend", present=1e-3, absent=5e-3), EffectCost(effect="drag", present=2e-3, absent=1e-3))
+    (axes,) = cost_plots.effect_costs(study(effects=costs)).axes
+    assert written(axes.xaxis) == [0.2, 0.5, 1.0, 2.0]
+
+
+def test_the_caption_stays_within_a_narrow_figure_and_below_its_axes() -> None:
+    named = study(machine={"processor": "a processor with a long name at so many GHz " * 3, "Python": "3.11"})
+    figure = accuracy_plots.work_precision(named)
+    drawing._caption(figure, named, "dlo study")
+    figure.draw_without_rendering()
+    (caption,) = figure.texts
+    box = caption.get_window_extent()
+    assert 0 <= box.x0 < box.x1 <= figure.bbox.x1
+    assert 0 <= box.y0 < box.y1 <= figure.axes[0].get_tightbbox().y0
+
+
+def test_the_legend_of_the_convergence_hides_no_iterations() -> None:
+    figure = accuracy_plots.convergence(study())
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    legend = axes.get_legend().get_window_extent()
+    assert legend.x0 >= axes.bbox.x1
+    assert legend.x1 <= figure.bbox.x1
 
 
 def test_the_exponents_in_the_titles_are_those_of_the_data() -> None:

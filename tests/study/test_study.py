@@ -3,12 +3,13 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from dlocore import Cancelled, Quality, SceneError, predict
-from dlocore.study import record
+from dlocore.study import record, running
 from dlocore.study.compare import compare, words
 from dlocore.study.judge import finest_march, largest_error, step_by_step
 from dlocore.study.plan import Plan
@@ -16,7 +17,7 @@ from dlocore.study.record import EffectCost, Scaled, Study
 from dlocore.study.running import run_study
 from dlocore.study.scaling import effect_pairs, sizes
 from dlocore.study.scenes import accuracy_scenes, hanging, paper_case
-from dlocore.study.timing import timed
+from dlocore.study.timing import Times, timed
 
 GRIDS = ((9, 13), (13, 19), (17, 25))
 
@@ -239,3 +240,16 @@ def test_the_standard_scenes_move_in_the_plane_and_in_space() -> None:
     quality = Quality(n_u=9, n_t=13, method="march", estimate=False)
     found = [predict(replace(s, quality=quality)).accuracy.dimensions for s in accuracy_scenes().values()]
     assert found == [2, 2, 2, 2, 3]
+
+
+def test_a_size_whose_time_is_drowned_by_noise_is_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    chosen = [size for size in sizes() if size.variable == "n_u" and size.value in (9, 13)]
+    monkeypatch.setattr(running, "sizes", lambda: chosen)
+    times = iter([2e-3, 2e-3, 1.9e-3, 4e-3])  # the marches, then the solves that begin with them
+    solved = SimpleNamespace(iterations=[None, None])
+    monkeypatch.setattr(running._Measuring, "_solved", lambda *_: (solved, Times(next(times), 1e-5, 5)))
+    found = run_study(Plan(parts=("scaling",)))
+    assert [(row.method, row.value) for row in found.scaling] == [("march", 9), ("march", 13), ("spacetime", 13)]
+    assert found.scaling[-1].wall_time == pytest.approx(1e-3)
+    (told,) = found.refused
+    assert told.startswith("cost against n_u = 9: spacetime took 1.9 ms, not above the 2 ms of the march")
