@@ -19,7 +19,6 @@ from dlocore.answer.parts import (
     with_notes,
 )
 from dlocore.errors import number
-from dlocore.problem.notes import scene_notes
 from dlocore.scene.scene import MAX_STRAIN, ControlPoints, Scene
 from dlocore.spline import SplineSurface, greville
 
@@ -70,6 +69,8 @@ class Prediction:
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """What is to be known beside the status: of the scene as given, strains, instabilities, effects left out."""
+        from dlocore.problem.notes import scene_notes  # it needs the compiler, which to make a scene does not
+
         return (*scene_notes(self.scene), *self.find_objections())
 
     @cached_property

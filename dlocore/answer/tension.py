@@ -11,7 +11,6 @@ length, a force on phi_j(u_g): both are as large as leaves e least curved.
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
 
 from dlocore.kernels.basis import GAUSS_3, gauss_points
 from dlocore.problem.grid import Grid
@@ -50,5 +49,7 @@ def balanced(scene: Scene, grid: Grid, u: Floats) -> Floats:
 
 def _basis(knots: Floats, u: Floats, derivative: int = 0) -> Floats:
     """Return the quadratic splines on knots (n + 3,) [m], or derivatives, at u (k,) [m]; (k, n)."""
+    from scipy.interpolate import BSpline  # slow to import, and needed only where the stretch is read
+
     n = len(knots) - DEGREE
     return np.asarray(BSpline(knots, np.eye(n), DEGREE - 1)(u, derivative))
