@@ -6,12 +6,14 @@ Bad input is an exception that names the field, the value and what is allowed. N
 
 from collections.abc import Hashable, Iterable, Iterator
 from contextlib import contextmanager
+from types import UnionType
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 T = TypeVar("T", bound=Hashable)
+Kind = type | UnionType
 
 MILLIMETRES = "Lengths are in metres, and this looks like millimetres"  # why something is far too large
 
@@ -56,6 +58,11 @@ def _shorten(value: Any) -> str:
     return text if len(text) <= 120 else text[:117] + "..."
 
 
+def _typed(value: Any) -> Any:
+    """Return a value of a wrong type as it is typed: text in quotes, as bare it would read like what is allowed."""
+    return repr(value) if isinstance(value, str) else value
+
+
 def repeated(values: Iterable[T]) -> T | None:
     """Return the first of some values that was there before, None where each is there once."""
     seen = set()
@@ -92,7 +99,7 @@ def number(
     ]
     allowed = " ".join(["a finite number", *[b for b in bounds if b]]) + (f" [{unit}]" if unit else "")
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.integer | np.floating):
-        raise SceneError(field, value, allowed)
+        raise SceneError(field, _typed(value), allowed)
     try:
         x = float(value)
     except OverflowError:
@@ -117,7 +124,7 @@ def array(field: str, value: ArrayLike, *, shape: tuple[int | None, ...], unit: 
     except ValueError:
         raise SceneError(field, value, allowed, "The rows differ in length") from None
     if raw.dtype.kind not in "fiu":
-        raise SceneError(field, value, allowed)
+        raise SceneError(field, _typed(value), allowed)
     x = np.array(raw, dtype=float)
     if x.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, x.shape, strict=True)):
         raise SceneError(field, f"shape {x.shape}", allowed)
@@ -144,6 +151,27 @@ def points_array(field: str, value: ArrayLike) -> NDArray[np.float64]:
         points = np.column_stack([points, np.zeros(len(points))])
         points.setflags(write=False)
     return points
+
+
+def instance(field: str, value: Any, kind: Kind, allowed: str) -> None:
+    """Raise SceneError unless `value` is of a `kind`, as `isinstance` takes it, which `allowed` says in words."""
+    if not isinstance(value, kind):
+        raise SceneError(field, _typed(value), allowed)
+
+
+def instances(field: str, values: Any, kind: Kind, allowed: str) -> tuple[Any, ...]:
+    """Return `values` as a tuple, or raise SceneError unless they are a list or the like of a `kind` (`instance`)."""
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise SceneError(field, _typed(values), f"a list of {allowed}")
+    found = tuple(values)
+    for i, value in enumerate(found):
+        instance(f"{field}[{i}]", value, kind, allowed)
+    return found
+
+
+def flag(field: str, value: Any) -> None:
+    """Raise SceneError unless `value` is True or False."""
+    instance(field, value, bool | np.bool_, "True or False")
 
 
 def choice(field: str, value: Any, options: tuple[str, ...]) -> str:

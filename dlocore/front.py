@@ -25,7 +25,7 @@ from dlocore.accuracy.refinement import climb
 from dlocore.answer.frames import material_of, stretch_of
 from dlocore.answer.parts import Accuracy, GraspReaction, MaterialMotion, OnIteration, Status
 from dlocore.answer.report import WindowForces, effect_reports, elastic_energy, reactions
-from dlocore.errors import SceneError
+from dlocore.errors import SceneError, flag, instance
 from dlocore.levels.given import evenly_fitted, given_status, march_given
 from dlocore.levels.level import Level
 from dlocore.levels.progress import record, record_level, surface_at
@@ -35,7 +35,7 @@ from dlocore.prediction import Prediction
 from dlocore.problem.problem import Problem, pose
 from dlocore.problem.time_grid import smallest_n_t
 from dlocore.scene.scene import Method, Quality, Scene
-from dlocore.solvers.monitor import Monitor, TimeIsUp
+from dlocore.solvers.monitor import Monitor, TimeIsUp, time_allowed
 from dlocore.solvers.paper import BEYOND, solve_as_printed
 from dlocore.solvers.spacetime import solve
 from dlocore.words import counted, in_ms
@@ -75,10 +75,13 @@ def predict(
         The prediction. Not converging is a status, not an exception.
 
     Raises:
-        SceneError: the scene can't be solved as it was given.
+        SceneError: the scene can't be solved as it was given, or `deadline` is no time.
         Cancelled: `cancelled` returned True.
     """
-    monitor = Monitor(on_iteration, deadline, cancelled)
+    instance("scene", scene, Scene, "a Scene")
+    instance("like", like, Prediction | None, "a Prediction, or None")
+    flag("keep_grid", keep_grid)
+    monitor = Monitor(on_iteration, time_allowed(deadline), cancelled)
     keep_grid = keep_grid or scene.quality.keep_grid
     if like is None:
         return _shown(scene, monitor, cost, keep_grid)

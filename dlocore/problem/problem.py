@@ -22,7 +22,7 @@ from dlocore.effects.plasticity import BendingMemory, StretchMemory, TwistMemory
 from dlocore.effects.selfcontact import SelfContact
 from dlocore.effects.stretch import Stretch, StretchDamping
 from dlocore.effects.twist import Twist
-from dlocore.errors import SceneError
+from dlocore.errors import SceneError, instance
 from dlocore.kernels.projection import in_world
 from dlocore.problem.brought import brought
 from dlocore.problem.buckling import out_of_plane, with_side
@@ -288,6 +288,7 @@ def pose(scene: Scene, called_for: Mapping[str, str] | None = None, *, at_rest: 
     Raises:
         SceneError: the scene asks what no cable can follow, or switches off what the rest of it needs.
     """
+    instance("scene", scene, Scene, "a Scene")
     cable, environment = scene.cable, scene.environment
     start = brought(scene, start_curve(scene.shape, cable.length))
     check_reach(scene, start)

@@ -10,7 +10,18 @@ from typing import Literal, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dlocore.errors import MILLIMETRES, SceneError, array, choice, columns_of, number, points_array
+from dlocore.errors import (
+    MILLIMETRES,
+    SceneError,
+    array,
+    choice,
+    columns_of,
+    flag,
+    instance,
+    instances,
+    number,
+    points_array,
+)
 from dlocore.scene.cable import Cable
 from dlocore.scene.obstacles import Obstacle
 from dlocore.scene.paths import Move, Path, Still, Waypoints
@@ -67,6 +78,7 @@ class Straight:
         if not np.linalg.norm(direction) > 1e-12:
             raise SceneError("direction", direction, "a vector that is not zero")
         object.__setattr__(self, "direction", direction)
+        flag("settle", self.settle)
         object.__setattr__(self, "velocity", _velocity(self.velocity, None))
 
 
@@ -84,6 +96,7 @@ class Points:
     def __post_init__(self) -> None:
         points = _points("points", self.points, at_least=4)
         object.__setattr__(self, "points", points)
+        flag("settle", self.settle)
         object.__setattr__(self, "velocity", _velocity(self.velocity, len(points)))
 
 
@@ -154,6 +167,8 @@ class ControlPoints:
             if not (clamped and (np.diff(knots[3:-3]) >= 0).all()):
                 raise SceneError("knots", knots, "rising, four equal at each end, from 0 to the cable's length")
             object.__setattr__(self, "knots", knots)
+        flag("settle", self.settle)
+        instance("material", self.material, Material | None, "a Material, or None")
         columns = 4 if self.velocity is not None and columns_of(self.velocity) == 4 else 3
         object.__setattr__(self, "velocity", _velocity(self.velocity, len(points), columns))
         if self.strain is not None:
@@ -208,8 +223,7 @@ class Grasp:
     def __post_init__(self) -> None:
         object.__setattr__(self, "u", number("u", self.u, at_least=0.0, at_most=1000.0, unit="m"))
         choice("hold", self.hold, ("point", "tangent", "clamp"))
-        if not isinstance(self.path, Still | Move | Waypoints):
-            raise SceneError("path", self.path, "Still, Move or Waypoints")
+        instance("path", self.path, Path, "Still, Move or Waypoints")
         if self.hold == "point":
             turns = any(getattr(self.path, name, None) is not None for name in ("rotation", "orientations"))
             if turns:
@@ -284,12 +298,11 @@ class Environment:
         object.__setattr__(self, "drag", number("drag", self.drag, at_least=0.0, at_most=1e6, unit="N s/m^2"))
         quadratic = number("drag_quadratic", self.drag_quadratic, at_least=0.0, at_most=1e6, unit="N s^2/m^3")
         object.__setattr__(self, "drag_quadratic", quadratic)
-        object.__setattr__(self, "obstacles", tuple(self.obstacles))
-        if len(self.obstacles) > MAX_OBSTACLES:
-            raise SceneError("obstacles", f"{len(self.obstacles)} obstacles", f"at most {MAX_OBSTACLES}")
-        for i, obstacle in enumerate(self.obstacles):
-            if not isinstance(obstacle, Obstacle):
-                raise SceneError(f"obstacles[{i}]", obstacle, "Sphere, Capsule, Cylinder or Box")
+        instance("table", self.table, Table | None, "a Table, or None")
+        obstacles = instances("obstacles", self.obstacles, Obstacle, "Sphere, Capsule, Cylinder or Box")
+        if len(obstacles) > MAX_OBSTACLES:
+            raise SceneError("obstacles", f"{len(obstacles)} obstacles", f"at most {MAX_OBSTACLES}")
+        object.__setattr__(self, "obstacles", obstacles)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -337,6 +350,8 @@ class Quality:
         if self.delta is not None:
             object.__setattr__(self, "delta", number("delta", self.delta, at_least=1e-10, at_most=1e-2, unit="m"))
         choice("method", self.method, ("auto", "march", "spacetime", "paper", "reference"))
+        flag("estimate", self.estimate)
+        flag("keep_grid", self.keep_grid)
         if (self.n_u is None) != (self.n_t is None):
             missing = "n_u" if self.n_u is None else "n_t"
             raise SceneError(missing, None, "both n_u and n_t, or neither", "One of the two is missing")
@@ -395,8 +410,13 @@ class Scene:
     quality: Quality = field(default_factory=Quality)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "grasps", tuple(self.grasps))
-        object.__setattr__(self, "loads", tuple(self.loads))
+        instance("cable", self.cable, Cable, "a Cable")
+        instance("shape", self.shape, Shape, "Straight, Points or ControlPoints")
+        instance("environment", self.environment, Environment, "an Environment")
+        instance("effects", self.effects, Mapping, 'a dict of "on", "off" or "auto" by effect name')
+        instance("quality", self.quality, Quality, "a Quality")
+        object.__setattr__(self, "grasps", instances("grasps", self.grasps, Grasp, "Grasp"))
+        object.__setattr__(self, "loads", instances("loads", self.loads, Load, "Load"))
         length = self.cable.length
         if len(self.grasps) > MAX_GRASPS:
             raise SceneError("primitives", f"{len(self.grasps)} primitives", f"at most {MAX_GRASPS}")

@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable
 
 from dlocore.answer.parts import Iteration, OnIteration
-from dlocore.errors import Cancelled
+from dlocore.errors import Cancelled, number
 
 
 class TimeIsUp(Exception):  # noqa: N818 - no error: the solver answers with what it has
@@ -12,6 +12,11 @@ class TimeIsUp(Exception):  # noqa: N818 - no error: the solver answers with wha
 
     Its arguments name the effects that a motion was found to call for, and that there was no time to march with.
     """
+
+
+def time_allowed(deadline: float | None) -> float | None:
+    """Return `deadline` [s], or raise SceneError unless it is None or a number of at least 0."""
+    return None if deadline is None else number("deadline", deadline, at_least=0.0, unit="s")
 
 
 class Monitor:

@@ -18,7 +18,7 @@ from dlocore.problem.grid import Grid
 from dlocore.problem.notes import cable_notes
 from dlocore.problem.problem import Problem, pose
 from dlocore.scene.scene import Scene
-from dlocore.solvers.monitor import Monitor
+from dlocore.solvers.monitor import Monitor, time_allowed
 from dlocore.spline import design_matrix
 from dlocore.stability.determined import UNDETERMINED, bend_in_words, bent
 from dlocore.stability.sideways import WITH_TWIST, is_unstable, lacks_twist, solved_in_space
@@ -100,7 +100,7 @@ def equilibrium(
         raise SceneError(
             "primitives", "no grasp", "a grasp that holds the cable", "Nothing holds it against its forces"
         )
-    monitor = Monitor(None, deadline, cancelled)
+    monitor = Monitor(None, time_allowed(deadline), cancelled)
     target = scene.quality.target_error or 1e-4 * scene.cable.length
     least = smallest_n_u(problem)
     sizes = [n_u] if n_u is not None else [max(n, least + 2 * i) for i, n in enumerate(LEVELS)]

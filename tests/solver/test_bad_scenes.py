@@ -25,6 +25,7 @@ from dlocore import (
     Table,
     Waypoints,
     equilibrium,
+    plan,
     predict,
 )
 from dlocore.problem.problem import Problem, pose
@@ -122,6 +123,35 @@ BAD: list[tuple[str, Callable[[], object]]] = [
     ("obstacles", lambda: Environment(obstacles=[Sphere(center=(0, 0, 0), radius=0.1)] * 101)),
     ("environment.table.height", lambda: predict(scene(shape=Straight(start=(0, 0, -0.1)), environment=Environment(table=Table())))),
     ("primitives[0].path", lambda: predict(scene(grasps=(Grasp(u=0.3, path=Move(displacement=(0, 0, -0.1), duration=1.0)),), environment=Environment(table=Table())))),
+    # parts of another type
+    ("cable", lambda: scene(cable={"length": 1.0})),
+    ("shape", lambda: scene(shape=[[0, 0, 0], [1, 0, 0]])),
+    ("environment", lambda: scene(environment=None)),
+    ("effects", lambda: scene(effects="auto")),
+    ("quality", lambda: scene(quality="auto")),
+    ("grasps", lambda: scene(grasps=SIDE)),
+    ("grasps", lambda: scene(grasps=None)),
+    ("grasps[1]", lambda: scene(grasps=[SIDE, {"u": 0.8}])),
+    ("loads", lambda: scene(loads=Load(u=0.1, force=(0, 0, 1)))),
+    ("loads[0]", lambda: scene(loads=[{"u": 0.1}])),
+    ("table", lambda: Environment(table=True)),  # type: ignore[arg-type]
+    ("table", lambda: Environment(table=0.0)),  # type: ignore[arg-type]
+    ("obstacles", lambda: Environment(obstacles=Sphere(center=(0, 0, 0), radius=0.1))),  # type: ignore[arg-type]
+    ("obstacles", lambda: Environment(obstacles="sphere")),  # type: ignore[arg-type]
+    ("settle", lambda: Straight(settle="yes")),  # type: ignore[arg-type]
+    ("settle", lambda: Points(points=arc(1.0, 1.0), settle=1)),  # type: ignore[arg-type]
+    ("material", lambda: ControlPoints(control_points=np.eye(4, 3), material={})),  # type: ignore[arg-type]
+    ("estimate", lambda: Quality(estimate="no")),  # type: ignore[arg-type]
+    ("keep_grid", lambda: Quality(n_u=9, n_t=13, keep_grid=None)),  # type: ignore[arg-type]
+    ("scene", lambda: predict({"cable": {}})),  # type: ignore[arg-type]
+    ("scene", lambda: plan(None)),  # type: ignore[arg-type]
+    ("scene", lambda: equilibrium(Straight())),  # type: ignore[arg-type]
+    ("like", lambda: predict(scene(), like=scene())),  # type: ignore[arg-type]
+    ("keep_grid", lambda: predict(scene(), keep_grid="no")),  # type: ignore[arg-type]
+    ("deadline", lambda: predict(scene(), deadline="5")),  # type: ignore[arg-type]
+    ("deadline", lambda: predict(scene(), deadline=-1.0)),
+    ("deadline", lambda: predict(scene(), deadline=NAN)),
+    ("deadline", lambda: equilibrium(scene(), deadline=-1.0)),
     # lengths in millimetres
     ("primitives[0].path.displacement", lambda: scene(grasps=(Grasp(u=0.3, path=Move(displacement=(0, 500, 0), duration=1.6)),))),
     ("primitives[1].path.positions", lambda: scene(grasps=(SIDE, Grasp(u=0.8, path=Waypoints(times=[0, 1], positions=[[800, 0, 0], [800, 300, 0]]))))),
@@ -181,6 +211,28 @@ def test_a_short_cable_may_be_carried_through_a_hall():
     carried = Grasp(u=0.0, path=Move(displacement=(40.0, 0.0, 0.0), duration=60.0))
     short = Cable(length=0.1, diameter=0.002, linear_density=0.01, bending_stiffness=1e-4)
     assert Scene(cable=short, shape=Straight(), grasps=(carried,)).horizon == 60.0
+
+
+@pytest.mark.parametrize(
+    ("make", "given"),
+    [
+        (lambda: cable(length="1"), "length: got '1'. Allowed: a finite number"),
+        (lambda: cable(length=np.True_), "length: got True. Allowed: a finite number"),
+        (lambda: Straight(start="here"), "start: got 'here'. Allowed: finite numbers"),
+        (lambda: scene(quality="auto"), "quality: got 'auto'. Allowed: a Quality."),
+        (lambda: scene(grasps="all"), "grasps: got 'all'. Allowed: a list of Grasp."),
+    ],
+)
+def test_text_where_none_is_allowed_is_told_in_quotes(make, given):
+    with pytest.raises(SceneError) as caught:
+        make()
+    assert str(caught.value).startswith(given)
+
+
+def test_grasps_loads_and_obstacles_may_come_from_any_iterable():
+    balls = (Sphere(center=(0.0, 9.0, i), radius=0.1) for i in range(2))
+    found = scene(grasps=iter([SIDE]), loads=iter([]), environment=Environment(obstacles=balls))  # type: ignore[arg-type]
+    assert (found.grasps, found.loads, len(found.environment.obstacles)) == ((SIDE,), (), 2)
 
 
 def test_two_grasps_pulled_exactly_taut_are_no_bad_scene():
