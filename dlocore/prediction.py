@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from dlocore.answer.parts import (
     with_notes,
 )
 from dlocore.errors import number
+from dlocore.pickling import state_with
 from dlocore.scene.scene import MAX_STRAIN, ControlPoints, Scene
 from dlocore.spline import SplineSurface, greville
 
@@ -30,7 +31,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prediction:
-    """A predicted motion.
+    """A predicted motion. It can be pickled, with all that is read from it and may be found only then.
 
     Attributes:
         scene: what was asked.
@@ -71,7 +72,11 @@ class Prediction:
         """What is to be known beside the status: of the scene as given, strains, instabilities, effects left out."""
         from dlocore.problem.notes import scene_notes  # it needs the compiler, which to make a scene does not
 
-        return (*scene_notes(self.scene), *self.find_objections())
+        return (*scene_notes(self.scene), *self._objections)
+
+    @cached_property
+    def _objections(self) -> list[str]:
+        return self.find_objections()
 
     @cached_property
     def message(self) -> str:
@@ -102,6 +107,17 @@ class Prediction:
     def stretch(self) -> StretchMotion:
         """How far the cable is stretched over time, to the accuracy of a tension."""
         return self.report_stretch()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return state_with(
+            self,
+            grasps="report_grasps",
+            effects="report_effects",
+            material="report_material",
+            stretch="report_stretch",
+            start_energy="find_start_energy",
+            _objections="find_objections",
+        )
 
     def shape_at(self, t: float | None = None) -> ControlPoints:
         """Return the cable at time `t` [s], its last by default, as the start of another motion.

@@ -9,9 +9,10 @@ ROOT = Path(__file__).parents[1]
 # folders, and the files beside them, from the ground up
 LAYERS = {
     "dlocore": [
-        "errors", "words", "machine", "files", "compiling", "effects", "kernels", "spline", "scene", "shape", "problem",
-        "answer", "solvers", "stability", "statics", "levels", "prediction", "accuracy", "reference", "front", "many",
-        "planning", "balance", "sensitivity", "warming", "calibration", "study", "recordings", "identify",
+        "errors", "words", "machine", "files", "pickling", "compiling", "effects", "kernels", "spline", "scene",
+        "shape", "problem", "answer", "solvers", "stability", "statics", "levels", "prediction", "accuracy",
+        "reference", "front", "many", "planning", "balance", "sensitivity", "warming", "calibration", "study",
+        "recordings", "identify",
     ],
     "app": [
         "settings", "logs", "solids", "schemas", "archive", "pages", "http", "recording", "reports", "store", "service",

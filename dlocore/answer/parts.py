@@ -3,11 +3,12 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.pickling import state_with
 from dlocore.scene.scene import Material
 from dlocore.spline import SplineSurface
 
@@ -81,6 +82,9 @@ class Iteration:
     def energy(self) -> float:
         """Elastic energy at the end of the motion [J]."""
         return self.find_energy()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return state_with(self, surface="find_surface", energy="find_energy")
 
 
 OnIteration = Callable[[Iteration], None]

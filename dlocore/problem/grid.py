@@ -3,13 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.kernels.assembly import History, slopes
 from dlocore.kernels.basis import Tables, basis_rows
+from dlocore.pickling import Known, state_with
 
 Floats = NDArray[np.float64]
 
@@ -55,16 +56,18 @@ class Grid:
         tipped: bool = False,
     ) -> "Grid":
         """Return the grid with another start, other tables, or something else behind it; the rest as it is."""
-        kept_tables, kept_history = tables or self.tables, history or self.history
         return Grid(
             self.knots,
             self.start if start is None else start,
             self.velocity,
-            lambda knots: kept_tables,
-            lambda grid: kept_history,
+            Known(tables or self.tables),
+            Known(history or self.history),
             self.watched or tables is not None,
             self.tipped or tipped,
         )
+
+    def __getstate__(self) -> dict[str, Any]:
+        return state_with(self, tables="find_tables", history="find_history")
 
     def past(self) -> History:
         """Return a copy of the history, to be carried on."""

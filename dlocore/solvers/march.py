@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from dlocore.kernels.march import (
 )
 from dlocore.kernels.tension import COLUMNS
 from dlocore.kernels.twisted_rows import PAST
+from dlocore.pickling import state_with
 from dlocore.problem.discretisation import applied_forces
 from dlocore.problem.events import closed_grasps
 from dlocore.problem.grid import Grid
@@ -108,6 +109,9 @@ class March:
     def forces(self) -> tuple[WindowForces, ...]:
         """What holds the cable between each two events."""
         return self.find_forces()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return state_with(self, forces="find_forces")
 
     @property
     def kinked(self) -> bool:
