@@ -251,15 +251,16 @@ def _doubts(search: Search, state: State, by_noise: float) -> list[str]:
         deviation = robust_deviation(np.concatenate(residuals))
         explained = np.inf if static else float(np.hypot(by_noise, noise))  # of shapes at rest nothing tells the noise
         if deviation > _UNEXPLAINED * explained:
-            much = f"{deviation / explained:.2g} times what noise explains"
+            much, why = f"{deviation / explained:.2g} times what noise explains", "the model lacks something"
         elif deviation > _ASTRAY * length:
             much = f"with a deviation of {100 * deviation / length:.2g} % of the length"
+            why = "the tracking is wild, the model lacks something"
         else:
             continue
         missed = search.distance(replace(state, residuals=residuals))
         said += [
             f"The free markers {'at rest ' if static else ''}are missed by {in_mm(missed, 3)} in the median, {much}:",
-            "the model lacks something, or another cable meets them better. Intervals tell of noise alone.",
+            f"{why}, or another cable meets them better. Intervals tell of noise alone.",
         ]
     return said
 

@@ -7,7 +7,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.errors import SceneError
+from dlocore.errors import MILLIMETRES, SceneError
 from dlocore.recordings import Recording
 
 Floats = NDArray[np.float64]
@@ -27,8 +27,9 @@ def check_together(recordings: Sequence[Recording]) -> None:
         _check_metres(recording)
     for first, second in combinations(recordings, 2):
         if _same(first.times, second.times) and _same(first.markers, second.markers):
-            twice = "It counts twice, which makes intervals too narrow"
-            raise SceneError(second.place, f"what {first.name!r} has too", "each recording once", twice)
+            given = f"times and markers of {first.name!r} again"
+            twice = "What counts twice makes intervals too narrow"
+            raise SceneError(second.place, given, "each recording once", twice)
         for name, unit in (("length", "m"), ("diameter", "m"), ("linear_density", "kg/m")):
             one, other = getattr(first, name), getattr(second, name)
             if one is not None and other is not None and abs(other - one) > _ALIKE * one:
@@ -40,13 +41,13 @@ def _check_metres(recording: Recording) -> None:
     length, u = cast(float, recording.length), cast(Floats, recording.u)
     if length > LONGEST:
         allowed = f"at most {LONGEST:g} m"
-        raise SceneError(f"{recording.place}.length", f"{length:.4g} m", allowed, "Are the markers in millimetres?")
+        raise SceneError(f"{recording.place}.length", f"{length:.4g} m", allowed, MILLIMETRES)
     steps = np.linalg.norm(np.diff(cast(Floats, recording.markers), axis=1), axis=2)
     tracked = float(np.nanmedian(np.nansum(steps, axis=1)))
     if tracked > _STRETCHED * (u[-1] - u[0]):
         allowed = f"about {u[-1] - u[0]:.4g} m, as `u` tells"
-        reason = "Are the markers in millimetres?"
-        raise SceneError(f"{recording.place}.markers", f"{tracked:.4g} m from the first to the last", allowed, reason)
+        given = f"{tracked:.4g} m from the first to the last"
+        raise SceneError(f"{recording.place}.markers", given, allowed, MILLIMETRES)
 
 
 def _same(a: object, b: object) -> bool:

@@ -66,4 +66,4 @@ def test_shapes_at_rest_are_not_hidden_by_a_motion_that_is_met() -> None:
 def test_outliers_so_many_that_they_pass_for_noise_are_doubted() -> None:
     wild = simulated(4, 1.0, cable=CABLE, environment=DRAG, tracking=Tracking(outliers=0.3, size=0.1))
     # 30 % of 10 cm: most of the third differences that tell the noise hold one
-    assert " % of the length" in doubts(wild)
+    assert " % of the length: the tracking is wild, the model lacks something," in doubts(wild)
