@@ -22,6 +22,7 @@ from dlocore.levels.level import CREDIBLE_STRAIN, Level
 from dlocore.levels.spin import bends_sharply, spin_forces
 from dlocore.problem.buckling import BOW, UNSTABLE, side_notes
 from dlocore.problem.events import closed_grasps, moments
+from dlocore.problem.notes import start_notes
 from dlocore.problem.problem import Problem
 from dlocore.problem.strands import nearest_strands
 from dlocore.scene.obstacles import Obstacle
@@ -117,6 +118,7 @@ def objections(level: Level) -> list[str]:
     if level.motion.largest_strain > STRAINED:
         found.append(f"the motion strains the cable by up to {level.motion.largest_strain:.0%} along itself")
     found += _stretched(level)
+    found += start_notes(problem.scene, problem.start)
     found += side_notes(problem.start)
     found += turn_notes(problem, level.motion.grid)
     found += tip_notes(level.motion.grid.tipped, problem.scene.cable.length)

@@ -3,13 +3,17 @@
 import math
 from typing import cast
 
+import numpy as np
+
 from dlocore.scene.scene import Points, Scene
-from dlocore.shape.shape import start_curve
+from dlocore.shape.shape import StartCurve, start_curve
 from dlocore.words import in_mm
 
 LIGHTEST = 0.1  # [kg/m^3] of a cable: a tenth of air
 SAME_LENGTH = 5e-3  # of the cable's: lengths of points that differ by less are as good as the same
 SAME_ENDS = 1e-3  # of the length: and so are ends, as those of noisy points, which the cable's length decides about
+SAME_START = 1e-3  # of the length: a start that is moved by less was seen there
+_PLACES = 65  # of a start at which it is looked at
 
 
 def scene_notes(scene: Scene) -> list[str]:
@@ -20,6 +24,19 @@ def scene_notes(scene: Scene) -> list[str]:
 def cable_notes(scene: Scene) -> list[str]:
     """Return what is to be known of a scene's cable and how it lies, in words."""
     return [*_of_units(scene), *_of_lengths(scene)]
+
+
+def start_notes(scene: Scene, start: StartCurve) -> list[str]:
+    """Return what is told of a start that is not where it was given, in words; of a bow `side_notes` tell."""
+    if start.bow or start.aside:
+        return []
+    length = scene.cable.length
+    u = np.linspace(0.0, length, _PLACES)
+    moved = float(np.linalg.norm(start(u) - start_curve(scene.shape, length)(u), axis=1).max())
+    if moved <= SAME_START * length:
+        return []
+    why = "to the first waypoints of its grippers, on to the table, or out of what it was in"
+    return [f"the start is moved by up to {in_mm(moved)} from where it was given, {why}"]
 
 
 def _of_units(scene: Scene) -> list[str]:

@@ -13,6 +13,7 @@ from dlocore.levels.whole_march import sided
 from dlocore.prediction import Prediction
 from dlocore.problem.buckling import side_notes
 from dlocore.problem.events import closed_grasps
+from dlocore.problem.notes import start_notes
 from dlocore.problem.problem import Problem, pose
 from dlocore.reference.chain import chain, grip
 from dlocore.reference.energy import energies
@@ -202,7 +203,11 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
         report_effects=lambda surface: _effects(refined, surface),
         report_material=lambda: material_of(motion, last.taken),
         report_stretch=lambda: stretch_of(motion),
-        find_objections=lambda: [*side_notes(problem.start), *tip_notes(motion.tipped, problem.scene.cable.length)],
+        find_objections=lambda: [
+            *start_notes(problem.scene, problem.start),
+            *side_notes(problem.start),
+            *tip_notes(motion.tipped, problem.scene.cable.length),
+        ],
     )
 
 
