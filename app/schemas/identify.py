@@ -107,6 +107,7 @@ class IdentifyResponse(BaseModel):
     rest_curvature: list[list[float]] | None = Field(
         default=None, description="[1/m], where it was asked for.", examples=[[[0.1, 0.0]]]
     )
+    turn: float | None = Field(default=None, description="[rad], where it was asked for.", examples=[0.1])
     clamp_angles: list[list[float]] | None = Field(
         default=None, description="[rad], where they were asked for.", examples=[[[0.05, -0.02]]]
     )

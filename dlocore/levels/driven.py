@@ -5,7 +5,8 @@ later has its path begin where the cable is by then, and whether two strands mee
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import combinations
 from typing import NamedTuple, cast
 
@@ -63,22 +64,19 @@ def driven(problem: Problem, motion: March) -> Driven | None:
 
 def closes_beside(problem: Problem, motion: March) -> str:
     """Return in words that a gripper closes beside the cable, see `beside`, or ""."""
-    late = [isinstance(g.path, Waypoints) and g.start > 0.0 for g in problem.scene.grasps]
-    if not any(late):
-        return ""
-    return beside(problem.scene, [_begin(problem, motion, g) for g in problem.scene.grasps])
+    return beside(problem.scene, partial(_begin, problem, motion))
 
 
-def beside(scene: Scene, begins: Sequence[Floats | None]) -> str:
+def beside(scene: Scene, place: Callable[[Grasp], Floats | None]) -> str:
     """Return in words that a gripper with waypoints closes beside the cable, farther off than the start may be, or "".
 
-    `begins` are where the cable is as each grasp closes (3,) [m], None where that is not known.
+    `place` returns where the cable is as a grasp closes (3,) [m], None where that is not known.
     """
-    for k, (grasp, begin) in enumerate(zip(scene.grasps, begins, strict=True)):
-        if begin is None or grasp.start == 0.0 or not isinstance(grasp.path, Waypoints):
+    for k, grasp in enumerate(scene.grasps):
+        if not (isinstance(grasp.path, Waypoints) and 0.0 < grasp.start < cast(float, scene.horizon)):
             continue
-        away = math.dist(begin, cast(Floats, grasp.path.positions)[0])
-        if away > GRASP_TOLERANCE:
+        begin, first = place(grasp), cast(Floats, grasp.path.positions)[0]
+        if begin is not None and (away := math.dist(begin, first)) > GRASP_TOLERANCE:
             there = ", ".join(f"{x:.4g}" for x in begin)
             return (
                 f"primitives[{k}].path.positions[0] is {in_mm(away)} from the cable at u = {grasp.u:g} m, which is at "

@@ -112,12 +112,13 @@ def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
         least, most = motion.slopes
         seen = f"|r'| is {least:.2g} to {most:.2g} within a span"
         return "stalled", f"The cable is folded finer than its control points can show: {seen}. Take more of them."
-    off = "" if motion.stopped == "time" else closes_beside(problem, motion)
-    if off:
-        return "stalled", off
-    inside = None if motion.stopped == "time" else driven(problem, motion)
-    if inside is not None:
-        return "stalled", words(problem, inside)
+    if motion.stopped != "time":
+        off = closes_beside(problem, motion)
+        if off:
+            return "stalled", off
+        inside = driven(problem, motion)
+        if inside is not None:
+            return "stalled", words(problem, inside)
     deep = motion.deepest / problem.scene.cable.diameter
     if not motion.stopped and deep > TOO_DEEP:
         pushed = f"The cable is pressed {deep:.0%} of its diameter into the table, an obstacle or itself."

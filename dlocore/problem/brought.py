@@ -30,9 +30,9 @@ def brought(scene: Scene, start: StartCurve) -> StartCurve:
     Raises:
         SceneError: a first waypoint is farther than GRASP_TOLERANCE from the cable.
     """
-    held = sorted((g for g in scene.grasps if g.start == 0.0), key=lambda g: g.u)
-    if not any(isinstance(g.path, Waypoints) for g in held):
+    if not any(isinstance(g.path, Waypoints) and g.start == 0.0 for g in scene.grasps):
         return start
+    held = sorted((g for g in scene.grasps if g.start == 0.0), key=lambda g: g.u)
     u = np.array([g.u for g in held])
     begins = start(u)
     targets = np.array([g.path.at(np.zeros(1), begin)[0] for g, begin in zip(held, begins, strict=True)])

@@ -32,10 +32,11 @@ def cleared(scene: Scene, start: StartCurve, met: tuple[int, ...], with_table: b
     it, pressed in a little, and stays.
     """
     environment, diameter, length = scene.environment, scene.cable.diameter, scene.cable.length
-    if start.material is not None or start.velocity is not None or not (met or with_table):
-        return start
-    rows = np.array([environment.obstacles[i].row() for i in met])
     floor = environment.table.height if with_table and environment.table is not None else -np.inf
+    low = start.heights[0] < floor - DEEPEST * diameter
+    if start.material is not None or start.velocity is not None or not (met or low):
+        return start
+    rows = [environment.obstacles[i].row()[None] for i in met]
     held = np.array([g.u for g in scene.grasps if g.start == 0.0 and isinstance(g.path, Waypoints)])
     u = np.linspace(0.0, length, _PLACES)
     moved = start
@@ -63,17 +64,21 @@ def _fading(away: Floats, reach: float) -> Floats:
     return cast(Floats, 1.0 - s**2 * (3.0 - 2.0 * s))
 
 
-def _ways_out(rows: Floats, floor: float, points: Floats, radius: float) -> Floats:
-    """Return the shortest ways (n, 3) [m] out of obstacles and table for points (n, 3) [m] of a cable, 0 outside."""
+def _ways_out(rows: list[Floats], floor: float, points: Floats, radius: float) -> Floats:
+    """Return the ways (n, 3) [m] out of what points (n, 3) [m] of a cable are deepest in, 0 where they are outside.
+
+    `rows` are those of obstacles, (1, ROW) each, and `floor` is the table's height [m].
+    """
     ways = np.zeros_like(points)
     ways[:, 2] = np.maximum(floor - points[:, 2], 0.0)
-    if len(rows):
-        gaps = distances(rows, np.ascontiguousarray(points)) - radius
-        nearest = gaps.argmin(axis=1)
-        for k in np.flatnonzero(gaps.min(axis=1) < -ways[:, 2]):
-            row, step = rows[nearest[k]][None], 2.0 * radius * _NEAR
-            around = np.ascontiguousarray(points[k] + step * np.concatenate([np.eye(3), -np.eye(3)]))
-            slopes = distances(row, around)[:, 0]
-            up = slopes[:3] - slopes[3:]
-            ways[k] = -gaps[k, nearest[k]] * up / max(float(np.linalg.norm(up)), 1e-300)
+    deepest = ways[:, 2].copy()
+    around = 2.0 * radius * _NEAR * np.concatenate([np.eye(3), -np.eye(3)])
+    for row in rows:
+        depths = radius - distances(row, np.ascontiguousarray(points))[:, 0]
+        inside = np.flatnonzero(depths > deepest)
+        gaps = distances(row, np.ascontiguousarray((points[inside, None] + around).reshape(-1, 3))).reshape(-1, 2, 3)
+        up = gaps[:, 0] - gaps[:, 1]
+        up /= np.maximum(np.linalg.norm(up, axis=1), 1e-300)[:, None]
+        ways[inside] = depths[inside, None] * up
+        deepest[inside] = depths[inside]
     return ways

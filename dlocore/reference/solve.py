@@ -169,8 +169,7 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
     motion = last.motion
     estimate = sum(_parts(refined, fitted).values())
     status, message = _status(refined, target)
-    grasps, surface = problem.scene.grasps, fitted.surface
-    off = beside(problem.scene, [surface.positions(g.u, min(g.start, problem.horizon))[0, 0] for g in grasps])
+    off = beside(problem.scene, lambda g: fitted.surface.positions(g.u, g.start)[0, 0])
     if off and not motion.stopped:
         status, message = "stalled", off
     control = fitted.surface.control_points

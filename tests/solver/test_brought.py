@@ -90,3 +90,12 @@ def test_one_that_closes_far_beside_is_no_success(method: Any) -> None:
     found = predict(carried(along(0.8, 0.03, grasp_time=0.5), quality=quality))
     assert found.status == "stalled"
     assert "primitives[0].path.positions[0] is 30 mm from the cable at u = 0.8 m" in found.message
+
+
+@pytest.mark.parametrize("method", ["auto", "reference"])
+def test_one_that_closes_only_when_the_motion_is_over_is_beside_nothing(method: Any) -> None:
+    held = Grasp(u=0.2, path=Move(displacement=(0.0, 0.02, 0.0), duration=0.4))
+    quality = Quality(method=method, target_error=5e-3)
+    found = predict(carried(held, along(0.8, 0.03, grasp_time=0.5), horizon=0.5, quality=quality))
+    assert found.status == "converged"
+    assert "never holds the cable" in found.message
