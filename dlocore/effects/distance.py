@@ -136,6 +136,21 @@ def signed_distance(rows: Any, k: int, x: Vector) -> tuple[float, Vector, Symmet
     return d, (_dot(a, n), _dot(b, n), _dot(c, n)), turned
 
 
+@law
+def to_edge(rows: Any, k: int, x: Vector) -> float:
+    """Return how far [m] what obstacle k has nearest to x is from an edge of it; below zero where that is an edge."""
+    if rows[k, 0] == SPHERE or rows[k, 0] == CAPSULE:
+        return np.inf
+    q = (x[0] - rows[k, 1], x[1] - rows[k, 2], x[2] - rows[k, 3])
+    a = abs(_dot((rows[k, 4], rows[k, 5], rows[k, 6]), q))
+    b = abs(_dot((rows[k, 7], rows[k, 8], rows[k, 9]), q))
+    c = abs(_dot((rows[k, 10], rows[k, 11], rows[k, 12]), q)) - rows[k, 15]
+    if rows[k, 0] == CYLINDER:
+        return -min(np.sqrt(a * a + b * b) - rows[k, 13], c)
+    a, b = a - rows[k, 13], b - rows[k, 14]
+    return min(max(-a, -b), max(-a, -c), max(-b, -c))  # minus the second largest
+
+
 @kernel
 def distances(rows: Any, points: Any) -> Any:
     """Return the signed distances (n, m) [m] of `points` (n, 3) from the obstacles of `rows` (m, ROW)."""

@@ -46,6 +46,7 @@ class History(NamedTuple):
         axial: (axial points, 3) stress-free axial strain, and the axial strain of the two last steps.
         stick: (contact nodes, 3) anchor of the friction there [m]; (0, 3) without.
         slide: (body points, 2) anchor of the friction of a cable that lies on the table [m]; (0, 2) without.
+        pressing: (contact nodes,) weights [m] of the contact at its nodes, zero where another node stands for one.
         tension: (axial points, 4) what the tangent of a march knows of the tension, see `tension.py`; (0, 4) elsewhere.
         room: what assemblies in space write over and keep nothing in, of `ROOM` numbers in `space` or `twisted_rows`
             and so many for each point; (0,) in the plane. Kernels that hand the GIL over need one of their own.
@@ -56,6 +57,7 @@ class History(NamedTuple):
     axial: Any
     stick: Any
     slide: Any
+    pressing: Any
     tension: Any
     room: Any
 
@@ -65,7 +67,8 @@ def history_at(histories: Any, k: int) -> Any:
     """Return the `History` of time k from one with arrays (1 or more times, ...)."""
     at = min(k, len(histories.memory) - 1)
     h = histories
-    return History(h.memory[at], h.past[at], h.axial[min(k, len(h.axial) - 1)], h.stick, h.slide, h.tension, h.room)
+    axial = h.axial[min(k, len(h.axial) - 1)]
+    return History(h.memory[at], h.past[at], axial, h.stick, h.slide, h.pressing, h.tension, h.room)
 
 
 @leaf
@@ -108,7 +111,9 @@ def assemble(
         if active[QUADRATIC_DRAG]:
             space.body(len(axes), q, v, tables, active, p, scales, tangent, f, K)
     if active[CONTACT]:
-        contact.contact(len(axes), q, v, tables, active, p, history.stick, rates[3], scales, tangent, f, K)
+        contact.contact(
+            len(axes), q, v, tables, active, p, history.stick, history.pressing, rates[3], scales, tangent, f, K
+        )
     if active[FRICTION] and p[FRICTION, 2] > 0.0:
         contact.lying(len(axes), q, v, tables, p, history.slide, rates[3], scales, tangent, f, K)
 
@@ -124,7 +129,7 @@ def remember(axes: Any, q: Any, tables: Any, active: Any, p: Any, history: Any, 
     """
     deepest = 0.0
     if active[CONTACT]:
-        deepest = contact.remember(len(axes), q, tables, active, p, history.stick, loose)
+        deepest = contact.remember(len(axes), q, tables, p, history.stick, history.pressing, loose)
     if active[FRICTION] and p[FRICTION, 2] > 0.0:
         contact.drag_anchors(len(axes), q, tables, p, history.slide, loose)
     if active[STRETCH_MEMORY] or active[STRETCH_DAMPING]:

@@ -185,9 +185,10 @@ class Tables(NamedTuple):
     their basis functions [1/m], `*_b2` second [1/m^2], `*_b0` values; `*_w` (p,): weights [m]; `curvature_pairs`: see
     `pairs.py`; `curvature_lanes`: see `lanes.py`. Axial points: one a span and two in an end span whose end direction
     is free (selective reduced integration, docs/model.md). Curvature and body points: three a span. Contact nodes:
-    every span in parts of one length, with their ends; none where contact is off. Strand nodes: ends of the segments,
-    as long on every grid, that the cable's contact with itself looks at; none where that is off. `mass` (n, 4):
-    integrals of b_i b_{i+d} du [m]; `weight` (n,): integrals of b_i du [m].
+    every span in parts of one length, with their ends, once for the table, the first `table_nodes`, and once for the
+    obstacles, where one node in a `cell` of them is enough away from edges; none where contact is off. Strand nodes:
+    ends of the segments, as long on every grid, that the cable's contact with itself looks at; none where that is off.
+    `mass` (n, 4): integrals of b_i b_{i+d} du [m]; `weight` (n,): integrals of b_i du [m].
     """
 
     axial_u: Any
@@ -208,6 +209,8 @@ class Tables(NamedTuple):
     contact_first: Any
     contact_b0: Any
     contact_w: Any
+    table_nodes: Any
+    cell: Any
     strand_u: Any
     strand_first: Any
     strand_b0: Any
@@ -315,13 +318,16 @@ def build_tables(
     w3: Any,
     rule4: Any,
     w4: Any,
+    above: float,
     spacing: float,
+    cell: int,
     segment: float,
 ) -> Any:
     """Return `Tables` of the clamped cubic `knots`.
 
-    `free_*`: the direction at that end of the cable is free; `spacing`, `segment`: largest distance of contact nodes,
-    and of strand nodes [m], infinite for none.
+    `free_*`: the direction at that end of the cable is free; `above`, `spacing`: largest distance of contact nodes for
+    the table and for obstacles [m]; `cell`: see `Tables`; `segment`: largest distance of strand nodes [m]. A distance
+    is infinite for none.
     """
     u, axial_w = _axial_points(knots, free_start, free_end, rule2, w2)
     axial_first, table = basis_rows(knots, u, 1)
@@ -331,7 +337,9 @@ def build_tables(
     b0 = np.ascontiguousarray(table[:, 0])
     b1 = np.ascontiguousarray(table[:, 1])
     b2 = np.ascontiguousarray(table[:, 2])
-    contact_u, contact_w = _nodes(knots, spacing)
+    u_above, w_above = _nodes(knots, above)
+    u_beside, w_beside = _nodes(knots, spacing)
+    contact_u, contact_w = np.append(u_above, u_beside), np.append(w_above, w_beside)
     contact_first, table = basis_rows(knots, contact_u, 0)
     contact_b0 = np.ascontiguousarray(table[:, 0])
     strand_u = np.linspace(0.0, knots[-1], 1 + int(np.ceil(knots[-1] / segment - 1e-9)) if segment < np.inf else 0)
@@ -351,5 +359,6 @@ def build_tables(
     return Tables(
         u, axial_first, axial_b1, axial_w, curvature_u, curvature_first, b1, b2, curvature_w, pair_products(b1, b2),
         side_by_side(curvature_first, curvature_u, curvature_w, b0, b1, b2), curvature_first, b0, curvature_w,
-        contact_u, contact_first, contact_b0, contact_w, strand_u, strand_first, strand_b0, mass, weight,
+        contact_u, contact_first, contact_b0, contact_w, len(u_above), cell, strand_u, strand_first, strand_b0, mass,
+        weight,
     )  # fmt: skip

@@ -1,8 +1,10 @@
 """Assembly of contact and friction, in the plane and in space.
 
-Contact acts at nodes as close as the cable is thick. The distance to an obstacle grows at most as fast as one goes
-along the cable, so from a node that is far away the next ones are skipped. `stick` (nodes, 3) holds the anchor of the
-friction, `slide` (body points, 2) that of a cable that lies on the table.
+Contact acts at nodes: with the table at the first `table_nodes` of them, with obstacles at the others, which lie
+closer, as an obstacle may be thin or have edges. Away from edges they needn't: there one node of a `cell` of them
+stands for all (`pressing`: the weights [m] of the nodes until the next step). The distance to an obstacle grows at most
+as fast as one goes along the cable, so from a node that is far away the next ones are skipped. `stick` (nodes, 3) holds
+the anchor of the friction, `slide` (body points, 2) that of a cable that lies on the table.
 """
 
 from typing import Any
@@ -12,7 +14,7 @@ import numpy as np
 from dlocore.compiling.kernel import law, leaf, part
 from dlocore.effects.base import Symmetric, Vector
 from dlocore.effects.contact import normal_force
-from dlocore.effects.distance import signed_distance
+from dlocore.effects.distance import signed_distance, to_edge
 from dlocore.effects.friction import friction
 from dlocore.effects.kinds import BOX, CYLINDER
 from dlocore.effects.laws import CONTACT, COUNT, FRICTION, TABLE
@@ -25,6 +27,8 @@ _FLAT = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _SLACK = 0.9  # of the distance that is skipped: a strained cable is longer
 _THROUGH = 0.5  # of the way to the middle of an obstacle: a node that was deeper on its way went through it
 _LEAVES = 0.05  # of it: by so much it has to have come out again
+_INSIDE = 2.0  # lengths of a cell: so far from an edge, at least, one node stands for those of a cell
+_PASSED = 2.0  # times as far as it slides are the nodes from a node that were where it comes to, at most
 _SEARCH = 24  # times that the deepest place of such a way is looked for, each in two thirds of the last part
 
 
@@ -36,6 +40,12 @@ def _point(nc: int, q: Any, k: int, b: tuple[float, float, float, float]) -> Vec
     if nc > 2:
         z = b[0] * q[k, 2] + b[1] * q[k + 1, 2] + b[2] * q[k + 2, 2] + b[3] * q[k + 3, 2]
     return x, y, z
+
+
+@law
+def _met_at(tables: Any, p: Any, n: int) -> tuple[int, int]:
+    """Return the first contact that node n may meet, and the one after the last: the table, or the obstacles."""
+    return (COUNT - 1, COUNT) if n < tables.table_nodes else (COUNT, len(p))
 
 
 @law
@@ -87,23 +97,28 @@ def _mixed(a: float, A: Symmetric, b: float, B: Symmetric) -> Symmetric:
 
 @part
 def contact(
-    nc: int, q: Any, v: Any, tables: Any, active: Any, p: Any, stick: Any, h: float, scales: Any, tangent: bool, f: Any,
-    K: Any,
+    nc: int, q: Any, v: Any, tables: Any, active: Any, p: Any, stick: Any, weights: Any, h: float, scales: Any,
+    tangent: bool, f: Any, K: Any,
 ) -> None:  # fmt: skip
-    """Subtract the forces, and add the tangents, of contact with table and obstacles and of friction on them."""
+    """Subtract the forces, and add the tangents, of contact with table and obstacles and of friction on them.
+
+    `weights` (nodes,) [m]: of the nodes, zero where another stands for one.
+    """
     elastic, viscous, geometric = scales
-    firsts, b0, weights, places = tables.contact_first, tables.contact_b0, tables.contact_w, tables.contact_u
+    firsts, b0, places = tables.contact_first, tables.contact_b0, tables.contact_u
     k_n, width, damping = p[CONTACT, 1], p[CONTACT, 2], p[CONTACT, 3]
     reach = 0.0  # up to where nothing can touch
-    begin = COUNT - 1 if active[TABLE] else COUNT
     for n in range(len(weights)):
-        if places[n] < reach:
+        if n == tables.table_nodes:
+            reach = 0.0
+        if places[n] < reach or weights[n] == 0.0:
             continue
+        begin, end = _met_at(tables, p, n)
         k, w = firsts[n], weights[n]
         b = row_of(b0, n)
         x = _point(nc, q, k, b)
         nearest = np.inf
-        for i in range(begin, len(p)):
+        for i in range(begin, end):
             gap, normal, bend, mu = _gap(p, i, x)
             nearest = min(nearest, gap)
             if gap >= 0.0:
@@ -136,7 +151,8 @@ def energy(nc: int, q: Any, tables: Any, active: Any, p: Any) -> float:
     k, w = p[CONTACT, 1], p[CONTACT, 2]
     for n in range(len(tables.contact_w)):
         x = _point(nc, q, tables.contact_first[n], row_of(tables.contact_b0, n))
-        for i in range(COUNT - 1 if active[TABLE] else COUNT, len(p)):
+        begin, end = _met_at(tables, p, n)
+        for i in range(begin, end):
             d = -_gap(p, i, x)[0]
             if d > w:
                 total += tables.contact_w[n] * k * (0.5 * d * (d - w) + w * w / 6.0)
@@ -145,26 +161,52 @@ def energy(nc: int, q: Any, tables: Any, active: Any, p: Any) -> float:
     return total
 
 
+@law
+def _nearest_within(
+    nc: int, q: Any, tables: Any, p: Any, i: int, n: int, way: float, first: int, last: int
+) -> float:  # fmt: skip
+    """Return the smallest gap [m] from contact i of those of the nodes first to last within `way` [m] of node n."""
+    nearest = np.inf
+    for side in (-1, 1):
+        m = n if side < 0 else n + 1
+        while first <= m < last and abs(tables.contact_u[m] - tables.contact_u[n]) <= way and nearest > 0.0:
+            x = _point(nc, q, tables.contact_first[m], row_of(tables.contact_b0, m))
+            nearest = min(nearest, _gap(p, i, x)[0])
+            m += side
+    return nearest
+
+
 @leaf
-def strikes(nc: int, q0: Any, q1: Any, tables: Any, active: Any, p: Any) -> float:
-    """Return how far a node has come towards what it newly touches [m], the largest; 0 where nothing is new."""
-    most = 0.0
+def strikes(nc: int, q0: Any, q1: Any, tables: Any, p: Any, weights: Any, least: float) -> bool:
+    """Tell whether a node comes by more than `least` [m], from q0 to q1 (n, nc), towards what it newly touches.
+
+    It does not come towards it by sliding to where others were, as around an edge.
+    """
     reach = 0.0
-    for n in range(len(tables.contact_w)):
-        if tables.contact_u[n] < reach:
+    for n in range(len(weights)):
+        if n == tables.table_nodes:
+            reach = 0.0
+        if tables.contact_u[n] < reach or weights[n] == 0.0:
             continue
+        begin, end = _met_at(tables, p, n)
         k, b = tables.contact_first[n], row_of(tables.contact_b0, n)
         x = _point(nc, q1, k, b)
         nearest = np.inf
-        for i in range(COUNT - 1 if active[TABLE] else COUNT, len(p)):
-            gap = _gap(p, i, x)[0]
+        for i in range(begin, end):
+            gap, normal = _gap(p, i, x)[:2]
             nearest = min(nearest, gap)
             if gap < 0.0:
-                before = _gap(p, i, _point(nc, q0, k, b))[0]
-                if before > 0.0:
-                    most = max(most, before - gap)
+                y = _point(nc, q0, k, b)
+                before = _gap(p, i, y)[0]
+                if before > 0.0 and before - gap > least:
+                    move = (x[0] - y[0], x[1] - y[1], x[2] - y[2])
+                    way = _PASSED * np.sqrt(max(0.0, dot(move, move) - dot(move, normal) ** 2))
+                    first, last = (0, tables.table_nodes) if i < COUNT else (tables.table_nodes, len(weights))
+                    before = _nearest_within(nc, q0, tables, p, i, n, way, first, last)
+                    if before > 0.0 and before - gap > least:
+                        return True
         reach = tables.contact_u[n] + _SLACK * nearest
-    return most
+    return False
 
 
 @law
@@ -183,7 +225,7 @@ def _between(x: Vector, y: Vector, s: float) -> Vector:
 
 
 @leaf
-def passes(nc: int, q0: Any, q1: Any, tables: Any, p: Any) -> bool:
+def passes(nc: int, q0: Any, q1: Any, tables: Any, p: Any, weights: Any) -> bool:
     """Tell whether a node goes through an obstacle on its straight way from q0 to q1 (n, nc), as a step too long may.
 
     The distance from a convex body is convex along a straight way, so that its least is found by thirds.
@@ -198,8 +240,8 @@ def passes(nc: int, q0: Any, q1: Any, tables: Any, p: Any) -> bool:
         longest = max(longest, square)
     longest = np.sqrt(longest)
     reach = 0.0  # up to where nothing is near enough
-    for n in range(len(tables.contact_w)):
-        if tables.contact_u[n] < reach:
+    for n in range(tables.table_nodes, len(weights)):
+        if tables.contact_u[n] < reach or weights[n] == 0.0:
             continue
         k, b = tables.contact_first[n], row_of(tables.contact_b0, n)
         x, y = _point(nc, q0, k, b), _point(nc, q1, k, b)
@@ -228,40 +270,89 @@ def passes(nc: int, q0: Any, q1: Any, tables: Any, p: Any) -> bool:
     return False
 
 
+@law
+def _met(tables: Any, p: Any, n: int, x: Vector, near: float) -> tuple[float, float, Vector, float]:
+    """Return what node n at x meets.
+
+    Returns:
+        the smallest gap [m]; the depth [m] and the normal where it touches what is rough, the deepest; and how far it
+        is from an edge of what is nearer than `near` [m].
+    """
+    nearest, depth, normal, inside = np.inf, 0.0, _ANY, np.inf
+    begin, end = _met_at(tables, p, n)
+    for i in range(begin, end):
+        gap, gradient, _, mu = _gap(p, i, x)
+        nearest = min(nearest, gap)
+        if -gap > depth and mu > 0.0:
+            depth, normal = -gap, gradient
+        if i >= COUNT and gap < near:
+            inside = min(inside, to_edge(p, i, x))
+    return nearest, depth, normal, inside
+
+
+@law
+def _drag(p: Any, stick: Any, n: int, x: Vector, depth: float, normal: Vector) -> None:
+    """Drag the anchor of node n at x behind it; where it touches nothing rough, put it under it."""
+    if len(stick) == 0:
+        return
+    s, kept = _ANY, 0.0
+    if depth > 0.0:
+        a = (x[0] - stick[n, 0], x[1] - stick[n, 1], x[2] - stick[n, 2])
+        along = dot(a, normal)
+        s = (a[0] - along * normal[0], a[1] - along * normal[1], a[2] - along * normal[2])
+        size = np.sqrt(dot(s, s))
+        kept = 1.0 if size <= p[FRICTION, 0] else p[FRICTION, 0] / size
+    for d in range(3):
+        stick[n, d] = x[d] - kept * s[d]
+
+
 @leaf
-def remember(nc: int, q: Any, tables: Any, active: Any, p: Any, stick: Any, loose: bool) -> float:
-    """Drag the anchors of the friction behind q, and return the largest depth [m].
+def remember(nc: int, q: Any, tables: Any, p: Any, stick: Any, pressing: Any, loose: bool) -> float:
+    """Drag the anchors of the friction behind q, note where few nodes will do, and return the largest depth [m].
 
     Where the cable is `loose`, as at the start, the anchors are put under it.
     """
     deepest = 0.0
     reach = 0.0
-    begin = COUNT - 1 if active[TABLE] else COUNT
-    for n in range(len(tables.contact_w)):
-        x = _point(nc, q, tables.contact_first[n], row_of(tables.contact_b0, n))
-        depth, normal = 0.0, _ANY
-        if tables.contact_u[n] >= reach:
-            nearest = np.inf
-            for i in range(begin, len(p)):
-                gap, gradient, _, mu = _gap(p, i, x)
-                nearest = min(nearest, gap)
-                if -gap > depth and mu > 0.0:
-                    depth, normal = -gap, gradient
+    first, b0, u, weights = tables.contact_first, tables.contact_b0, tables.contact_u, tables.contact_w
+    n = 0
+    while n < len(weights):
+        if n == tables.table_nodes:
+            reach = 0.0
+        cell = 1 if n < tables.table_nodes else min(tables.cell, len(weights) - n)
+        long = u[n + cell - 1] - u[n]
+        middle = n + cell // 2
+        near = 0.5 * _INSIDE * long
+        x = _point(nc, q, first[middle], row_of(b0, middle))
+        nearest, depth, normal, inside = np.inf, 0.0, _ANY, -np.inf
+        if u[n + cell - 1] >= reach:
+            nearest, depth, normal, inside = _met(tables, p, middle, x, near)
+        few = cell > 1 and nearest < near and inside > _INSIDE * long
+        if few or cell == 1:
             deepest = max(deepest, -nearest)
-            reach = tables.contact_u[n] + _SLACK * nearest
-        if len(stick) == 0:
-            continue
-        if depth > 0.0 and not loose:
-            a = (x[0] - stick[n, 0], x[1] - stick[n, 1], x[2] - stick[n, 2])
-            along = a[0] * normal[0] + a[1] * normal[1] + a[2] * normal[2]
-            s = (a[0] - along * normal[0], a[1] - along * normal[1], a[2] - along * normal[2])
-            size = np.sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2])
-            kept = 1.0 if size <= p[FRICTION, 0] else p[FRICTION, 0] / size
-            for d in range(3):
-                stick[n, d] = x[d] - kept * s[d]
-        else:
-            for d in range(3):
-                stick[n, d] = x[d]
+            _drag(p, stick, middle, x, 0.0 if loose else depth, normal)
+        if _SLACK * nearest > u[middle] - u[n] and nearest < np.inf:
+            reach = u[middle] + _SLACK * nearest
+        total = 0.0
+        for m in range(n, n + cell):
+            total += weights[m]
+            pressing[m] = 0.0 if few else weights[m]
+            if cell == 1 or (few and (m == middle or len(stick) == 0)):
+                continue
+            y = _point(nc, q, first[m], row_of(b0, m))
+            if few:  # as far behind it as that of the middle
+                for d in range(3):
+                    stick[m, d] = y[d] + stick[middle, d] - x[d]
+                continue
+            nearest, depth, normal = np.inf, 0.0, _ANY
+            if u[m] >= reach:
+                nearest, depth, normal, _ = _met(tables, p, m, y, 0.0)
+                reach = u[m] + _SLACK * nearest
+            deepest = max(deepest, -nearest)
+            _drag(p, stick, m, y, 0.0 if loose else depth, normal)
+        if few:
+            pressing[middle] = total
+        n += cell
     return deepest
 
 

@@ -158,13 +158,13 @@ def march_steps(
         dull -= 1
         converged = False
         # plain and robust; where the cable strikes something, both by backward Euler; plain ones first with the tension
-        # of the last step, then with that at hand
+        # of the last step, then, where nothing touches, with that at hand
         for turn in range(2 * attempts):
             attempt = turn // 2
             robust = attempt % 2 == 1
             late = attempt >= 2
             assumes = turn % 2 == 0 and not robust
-            if attempt < first or (robust and turn % 2 == 1):
+            if attempt < first or (turn % 2 == 1 and (robust or touches)):
                 continue
             al_m, al_f = (0.0, 0.0) if late else (alpha_m, alpha_f)
             ta = 1.0 / (h * h) if late else to_a
@@ -316,12 +316,12 @@ def march_steps(
                 if not robust:
                     found[0], share = clear_way(x0, x1, tables.strand_u, thick, separation, found[0])
                     converged = share == 1.0
-            struck = 0.0
+            struck = False
             if converged and not late and touches:
-                struck = strikes(nc, q0, q1, tables, active, p)
+                struck = strikes(nc, q0, q1, tables, p, history.pressing, _STRIKE * h)
             if converged and not late and pairs > 0:
-                struck = max(struck, closing(x0, x1, tables.strand_u, thick, found[0], pairs))
-            if struck > _STRIKE * h:
+                struck = struck or closing(x0, x1, tables.strand_u, thick, found[0], pairs) > _STRIKE * h
+            if struck:
                 if k >= info[DIVIDED_FROM]:
                     info[FAILED_STEP], info[STRUCK] = k, 1.0
                     return
@@ -331,7 +331,7 @@ def march_steps(
                 continue
             if converged:
                 break
-        if not converged or (touches and passes(nc, q0, q1, tables, p)):
+        if not converged or (touches and passes(nc, q0, q1, tables, p, history.pressing)):
             info[FAILED_STEP] = k
             return
         keep(history.tension)

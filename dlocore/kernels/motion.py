@@ -61,7 +61,8 @@ def smooth_motion(
         [N] that hold them, what lies behind the motion at its end, the control points (n_t, n, nc) [m] of the time
         spline and what it misses each state by (steps + 1,) [m].
     """
-    tables = build_tables(knots, free_start, free_end, rule2, w2, rule3, w3, rule4, w4, np.inf, np.inf)
+    one = np.int64(1)
+    tables = build_tables(knots, free_start, free_end, rule2, w2, rule3, w3, rule4, w4, np.inf, np.inf, one, np.inf)
     n, nc = start.shape
     points, stretched = len(tables.curvature_w), len(tables.axial_w)
     history = History(
@@ -70,6 +71,7 @@ def smooth_motion(
         np.zeros((stretched, 3)),
         np.zeros((0, 6)),
         np.zeros((0, 2)),
+        np.zeros(0),
         np.full((stretched, COLUMNS), np.nan),
         np.zeros(0 if nc == 2 else ROOM + ROOM_OF_POINT * points),
     )
@@ -114,7 +116,7 @@ def smooth_motion(
         # by np.expand_dims they would be arrays of another kind, for which the rest would be compiled anew
         m, past, axial = history.memory, history.past, history.axial
         kept = m.reshape((1, *m.shape)), past.reshape((1, *past.shape)), axial.reshape((1, *axial.shape))
-        behind = History(*kept, history.stick, history.slide, np.zeros((0, COLUMNS)), history.room)
+        behind = History(*kept, history.stick, history.slide, history.pressing, np.zeros((0, COLUMNS)), history.room)
         at, lasts = looked_at(steps, looks), times[-1] - times[near]
         rates = fastest_growth(
             axes, states[at[1:]], behind, tables, active, p, density, dragged, e, SLOWEST / lasts,

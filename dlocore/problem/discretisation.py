@@ -90,8 +90,8 @@ def grid_on(problem: Problem, knots: Floats) -> Grid:
 
 def _tables_of(problem: Problem, knots: Floats) -> Tables:
     rules = (*GAUSS_2, *GAUSS_3, *GAUSS_4)
-    spacings = problem.contact_spacing(), problem.strand_spacing()
-    return cast(Tables, build_tables(knots, *free_ends(problem.scene), *rules, *spacings))
+    nodes = problem.table_spacing(), problem.contact_spacing(), problem.contact_cell()
+    return cast(Tables, build_tables(knots, *free_ends(problem.scene), *rules, *nodes, problem.strand_spacing()))
 
 
 def room_for(nc: int, points: int) -> int:
@@ -114,6 +114,7 @@ def _no_history(problem: Problem, tables: Tables) -> History:
         axial=np.zeros((len(tables.axial_w), 3)),
         stick=np.zeros((len(tables.contact_w) if rubs else 0, 3)),
         slide=np.zeros((len(tables.body_w) if lies else 0, 2)),
+        pressing=tables.contact_w.copy(),
         tension=np.zeros((0, COLUMNS)),
         room=np.zeros(room_for(nc, points)),
     )

@@ -44,6 +44,7 @@ _SAG = 0.005  # of the diameter: by how much a cable comes nearer to something r
 _SEGMENTS = 800  # of the cable that its contact with itself looks at, where they are shorter than it is thick
 _STIFFENING = 10.0  # times that contact is made stiffer at once, at most
 _EDGES = 16.0  # of them on a diameter, where obstacles have edges
+_ON_TABLE = 64.0  # of them on the cable, for a table
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,23 +238,41 @@ class Problem:
             parameters[laws.TABLE, 0] += self.contact.depth_under(max(0.0, -float(self.weight()[2])))
         return active, parameters
 
+    def table_spacing(self) -> float:
+        """Return how close the nodes of contact with the table lie [m]: there is nothing to fall between."""
+        return np.inf if self.contact is None or self.table is None else self.scene.cable.length / _ON_TABLE
+
     def contact_spacing(self) -> float:
-        """Return how close the nodes of contact lie [m]; infinite where there is none.
+        """Return how close the nodes of contact with obstacles lie [m]; infinite where there is none.
 
         Between nodes a cable that lies about something round comes nearer to it by _SAG of its diameter at most: on a
         peg of 2 cm nodes may be 2.1 mm apart, farther they would hold a cable that slides. Over an edge it slides from
-        node to node unless they are much closer; on a table there is nothing to fall between.
+        node to node unless they are much closer.
         """
-        cable = self.scene.cable
         if self.contact is None or not self.obstacles:
-            return np.inf if self.contact is None else cable.length / 64
-        flat = [o for o in self.obstacles if isinstance(o, Box | Cylinder)]
-        sharp = (bool(flat) and not self.on_table) or any(isinstance(o, Box) for o in flat)
-        if sharp:
-            return max(cable.diameter / _EDGES, cable.length / MOST_NODES)
-        radii = [0.5 * cable.diameter + o.radius for o in self.obstacles if not isinstance(o, Box)]
-        round_it = float(np.sqrt(8.0 * _SAG * cable.diameter * min(radii, default=np.inf)))
-        return max(min(cable.diameter, round_it), cable.length / MOST_NODES)
+            return np.inf
+        cable = self.scene.cable
+        closest = cable.diameter / _EDGES if self._meets_edges else self._round_spacing
+        return max(closest, cable.length / MOST_NODES)
+
+    def contact_cell(self) -> int:
+        """Return how many of those nodes one may stand for, away from edges."""
+        if self.contact is None or not self.obstacles or not self._meets_edges:
+            return 1
+        return max(1, int(self._round_spacing / self.contact_spacing()))
+
+    @property
+    def _meets_edges(self) -> bool:
+        """Whether an obstacle has edges that the cable may slide over."""
+        flat = any(isinstance(o, Box | Cylinder) for o in self.obstacles)
+        return (flat and not self.on_table) or any(isinstance(o, Box) for o in self.obstacles)
+
+    @property
+    def _round_spacing(self) -> float:
+        """How close nodes lie on what is round or flat [m]."""
+        diameter = self.scene.cable.diameter
+        radii = [0.5 * diameter + o.radius for o in self.obstacles if not isinstance(o, Box)]
+        return min(diameter, float(np.sqrt(8.0 * _SAG * diameter * min(radii, default=np.inf))))
 
     def strand_spacing(self) -> float:
         """Return how close the nodes lie between which the cable's strands are straight to each other [m]; or infinite.

@@ -28,7 +28,7 @@ class Damped:
 
     def __init__(self, n_u: int) -> None:
         self.knots = uniform_knots(n_u, LENGTH)
-        self.tables = build_tables(self.knots, True, True, *GAUSS_2, *GAUSS_3, *GAUSS_4, np.inf, np.inf)
+        self.tables = build_tables(self.knots, True, True, *GAUSS_2, *GAUSS_3, *GAUSS_4, np.inf, np.inf, 1, np.inf)
         self.active, self.parameters = np.zeros(laws.COUNT, np.int64), np.zeros((laws.COUNT, laws.PARAMETERS))
         self.active[laws.DAMPING], self.parameters[laws.DAMPING, 0] = 1, Damping(ETA).parameters()[0]
 
@@ -37,7 +37,7 @@ class Damped:
         points = len(self.tables.curvature_w)
         history = History(
             np.zeros((points, 6)), np.zeros((points, 9)), np.zeros((len(self.tables.axial_w), 3)), np.zeros((0, 6)),
-            np.zeros((0, 2)), np.zeros((0, 4)), np.zeros(room_for(3, points)),
+            np.zeros((0, 2)), np.zeros(0), np.zeros((0, 4)), np.zeros(room_for(3, points)),
         )  # fmt: skip
         for x in past:
             remember_start(AXES, x, self.tables, self.active, self.parameters, history)

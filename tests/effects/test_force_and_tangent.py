@@ -80,7 +80,7 @@ def body(name: str, nc: int, n_u: int = N_U, rest: float = 0.0) -> Body:
     feature = np.array([0.3])
     one = np.ones(1, np.int64)
     knots = graded_knots(n_u, LENGTH, feature, one, np.array([0.6]), np.array([0.02]))
-    tables = build_tables(knots, True, True, *GAUSS_2, *GAUSS_3, *GAUSS_4, np.inf, np.inf)
+    tables = build_tables(knots, True, True, *GAUSS_2, *GAUSS_3, *GAUSS_4, np.inf, np.inf, 1, np.inf)
     active, parameters = np.zeros(laws.COUNT, np.int64), np.zeros((laws.COUNT, laws.PARAMETERS))
     chosen = list(LAWS) if name == "all" else [name.removesuffix(" with memory")]
     for row, effect in (LAWS[c] for c in chosen):
@@ -91,7 +91,7 @@ def body(name: str, nc: int, n_u: int = N_U, rest: float = 0.0) -> Body:
     if name.endswith("memory") and nc == 2:
         memory[:] = rest or 3.0
     past = np.zeros((len(memory), 2 if nc == 2 else 9))
-    none = np.zeros((0, 6)), np.zeros((0, 2)), np.zeros((0, 4)), np.zeros(room_for(nc, len(memory)))
+    none = np.zeros((0, 6)), np.zeros((0, 2)), np.zeros(0), np.zeros((0, 4)), np.zeros(room_for(nc, len(memory)))
     history = History(memory, past, np.zeros((len(tables.axial_w), 3)), *none)
     return Body(nc, knots, tables, active, parameters, history)
 

@@ -29,7 +29,9 @@ class Body:
     def __init__(self, remembered: bool = True) -> None:
         one = np.ones(1, np.int64)
         self.knots = graded_knots(N_U, LENGTH, np.array([0.3]), one, np.array([0.6]), np.array([0.02]))
-        self.tables: Tables = build_tables(self.knots, True, True, *GAUSS_2, *GAUSS_3, *GAUSS_4, np.inf, np.inf)
+        self.tables: Tables = build_tables(
+            self.knots, True, True, *GAUSS_2, *GAUSS_3, *GAUSS_4, np.inf, np.inf, 1, np.inf
+        )
         self.active = np.zeros(laws.COUNT, np.int64)
         self.p = np.zeros((laws.COUNT, laws.PARAMETERS))
         effects = ((laws.STRETCH, Stretch(60.0)), (laws.BEND, Bend(1e-3)), (laws.TWIST, Twist(2e-3, 0.005)))
@@ -40,7 +42,7 @@ class Body:
         memory = np.tile([2.0, -1.0, 0.7, 2.0, -1.0, 0.7], (points, 1)) * remembered
         axial = np.zeros((len(self.tables.axial_w), 3))
         self.history = History(
-            memory, np.zeros((points, PAST)), axial, np.zeros((0, 6)), np.zeros((0, 2)), np.zeros((0, 4)),
+            memory, np.zeros((points, PAST)), axial, np.zeros((0, 6)), np.zeros((0, 2)), np.zeros(0), np.zeros((0, 4)),
             np.zeros(room_for(4, points)),
         )  # fmt: skip
 

@@ -322,6 +322,7 @@ def _forces(problem: Problem, x: Floats, tables: Any) -> Floats:
         np.zeros((stretched, 3)),
         np.zeros((0, 6)),
         np.zeros((0, 2)),
+        np.zeros(0),
         np.zeros((0, COLUMNS)),
         np.zeros(room_for(3, points)),
     )

@@ -60,7 +60,7 @@ def test_few_states_predict_nothing() -> None:
 def test_inertia_and_drag_are_those_of_the_dense_matrices(nc: int) -> None:
     rng = np.random.default_rng(nc)
     n, density, dragged, alpha_m, alpha_f = 9, 0.7, 0.3, 0.2, 0.4
-    unit = build_tables(uniform_knots(n, 1.0), True, True, *GAUSS_2, *GAUSS_3, *GAUSS_4, np.inf, np.inf).mass
+    unit = build_tables(uniform_knots(n, 1.0), True, True, *GAUSS_2, *GAUSS_3, *GAUSS_4, np.inf, np.inf, 1, np.inf).mass
     U = np.zeros((n, n))
     for i in range(n):
         for o in range(min(4, n - i)):

@@ -1,0 +1,118 @@
+"""Where contact acts: the table at few nodes, obstacles at many about edges; and what slides does not strike."""
+
+import numpy as np
+import pytest
+
+from dlocore import Box, Cable, Cylinder, Environment, Grasp, Move, Quality, Scene, Sphere, Straight, Table, predict
+from dlocore.kernels.contact import strikes
+from dlocore.kernels.entry import remember_start
+from dlocore.problem.discretisation import make_grid
+from dlocore.problem.grid import Grid
+from dlocore.problem.problem import Problem, pose
+from dlocore.scene.obstacles import Obstacle
+from tests.solver.scenes import Floats
+
+D = 0.005  # [m]
+PEG = Cylinder(center=(0.5, 0.0, -0.02 - D / 2), axis=(0.0, 1.0, 0.0), radius=0.02, height=0.2)
+
+
+def block(length: float, friction: float = 0.0) -> Box:
+    """Return a block whose top a cable at z = 0 just touches, and whose edges lie half its length from its middle."""
+    return Box(center=(0.5, 0.0, -0.1 - D / 2), size=(length, 1.0, 0.2), friction=friction)
+
+
+def posed(*obstacles: Obstacle, table: Table | None = None) -> tuple[Problem, Grid]:
+    """Return the problem and the grid of a straight cable along x from the origin, drawn on by its end."""
+    cable = Cable(length=1.0, diameter=D, linear_density=0.05, bending_stiffness=1e-3)
+    pull = Grasp(u=1.0, path=Move(displacement=(0.02, 0.0, 0.01), duration=1.0))
+    scene = Scene(
+        cable=cable, shape=Straight(direction=(1.0, 0.0, 0.0)), grasps=(pull,),
+        environment=Environment(obstacles=obstacles, table=table), effects={"obstacles": "on"} if obstacles else {},
+    )  # fmt: skip
+    problem = pose(scene)
+    return problem, make_grid(problem, 20)
+
+
+def pressing(problem: Problem, grid: Grid) -> tuple[Floats, Floats]:
+    """Return where the nodes for obstacles lie that act [m], and their weights [m]."""
+    history = grid.past()
+    remember_start(problem.axes, grid.start, grid.tables, *problem.laws, history)
+    weights = history.pressing[grid.tables.table_nodes :]
+    acts = weights > 0.0
+    return np.asarray(grid.tables.contact_u[grid.tables.table_nodes :][acts]), weights[acts]
+
+
+def apart(u: Floats, low: float, high: float) -> float:
+    """Return the largest distance [m] of neighbours among the places u from `low` to `high`."""
+    return float(np.diff(u[(u > low) & (u < high)]).max())
+
+
+# --- nodes ---
+
+
+def test_few_nodes_act_on_the_inside_of_a_face_and_many_about_its_edges() -> None:
+    u, weights = pressing(*posed(block(0.4)))
+    assert apart(u, 0.33, 0.67) == pytest.approx(D, rel=0.1)
+    for edge in (0.3, 0.7):
+        assert apart(u, edge - 1.5 * D, edge + 1.5 * D) <= D / 16
+    assert apart(u, 0.0, 0.28) <= D / 16  # where it touches nothing it may come upon an edge
+    assert weights.sum() == pytest.approx(1.0)
+
+
+def test_something_round_needs_few_nodes_beside_something_with_edges() -> None:
+    ball = Sphere(center=(0.5, 0.0, -0.05 - D / 2), radius=0.05)
+    u, _ = pressing(*posed(ball, Box(center=(0.5, 0.0, 0.5), size=(0.1, 0.1, 0.1))))
+    needed = np.sqrt(0.04 * D * (0.05 + D / 2))
+    assert 0.5 * needed < apart(u, 0.495, 0.505) <= needed
+
+
+def test_a_table_has_nodes_of_its_own_however_fine_those_for_obstacles_are() -> None:
+    alone = posed(table=Table(height=-D))[1].tables
+    beside = posed(block(0.4), table=Table(height=-0.3))[1].tables
+    assert beside.table_nodes == alone.table_nodes < 100
+    assert len(beside.contact_u) - beside.table_nodes > 2000
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.4])
+def test_the_top_of_a_block_is_as_good_as_a_table(friction: float) -> None:
+    cable = Cable(length=1.0, diameter=D, linear_density=0.05, bending_stiffness=2e-3, bending_damping=2e-5)
+    grasp = Grasp(u=0.0, hold="clamp", path=Move(displacement=(0.2, 0.1, 0.1), duration=1.0))
+    ends = []
+    for environment in (
+        Environment(drag=0.05, table=Table(height=0.0, friction=friction)),
+        Environment(drag=0.05, obstacles=(block(3.0, friction),)),
+    ):
+        scene = Scene(
+            cable=cable, shape=Straight(direction=(1.0, 0.0, 0.0)), grasps=(grasp,), environment=environment,
+            quality=Quality(target_error=1e-3), horizon=1.2,
+        )  # fmt: skip
+        prediction = predict(scene)
+        assert prediction.status == "converged"
+        ends.append(prediction.surface(np.linspace(0.0, 1.0, 41), np.linspace(0.0, 1.2, 25))[..., :3])
+    assert np.linalg.norm(ends[0] - ends[1], axis=-1).max() < 2e-3  # what both may err by
+
+
+# --- strikes ---
+
+
+def strike(obstacle: Obstacle, before: Floats, move: tuple[float, float, float]) -> bool:
+    """Tell whether the straight cable, displaced by `before` [m], strikes as it moves by `move` [m]."""
+    problem, grid = posed(obstacle)
+    q0 = grid.start + np.asarray(before)
+    q1 = q0 + np.asarray(move)
+    return bool(strikes(problem.nc, q0, q1, grid.tables, problem.laws[1], grid.tables.contact_w, 1e-4))
+
+
+DEEP = -0.02 * D
+
+
+@pytest.mark.parametrize("obstacle", [PEG, block(0.04)], ids=["peg", "block"])
+def test_what_slides_to_where_its_neighbours_touched_does_not_strike(obstacle: Obstacle) -> None:
+    assert not strike(obstacle, np.array([0.0, 0.0, DEEP]), (0.02, 0.0, DEEP))
+
+
+@pytest.mark.parametrize("obstacle", [PEG, block(0.04), block(3.0)], ids=["peg", "block", "face"])
+@pytest.mark.parametrize("along", [0.0, 0.05])
+def test_what_comes_down_on_something_strikes(obstacle: Obstacle, along: float) -> None:
+    assert strike(obstacle, np.array([0.0, 0.0, 5e-4]), (along, 0.0, -6e-4))
+    assert not strike(obstacle, np.array([0.0, 0.0, 5e-5]), (along, 0.0, -9e-5))  # too slowly
