@@ -1,8 +1,12 @@
 """Where contact acts: the table at few nodes, obstacles at many about edges; and what slides does not strike."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from benchmarks.pairs import Drawn, paired
+from benchmarks.table_scenes import draw
 from dlocore import Box, Cable, Cylinder, Environment, Grasp, Move, Quality, Scene, Sphere, Straight, Table, predict
 from dlocore.kernels.contact import strikes
 from dlocore.kernels.entry import remember_start
@@ -90,6 +94,17 @@ def test_the_top_of_a_block_is_as_good_as_a_table(friction: float) -> None:
         assert prediction.status == "converged"
         ends.append(prediction.surface(np.linspace(0.0, 1.0, 41), np.linspace(0.0, 1.2, 25))[..., :3])
     assert np.linalg.norm(ends[0] - ends[1], axis=-1).max() < 2e-3  # what both may err by
+
+
+@pytest.mark.parametrize("index", [20, 24])
+def test_a_cable_lifted_among_obstacles_on_a_table_moves_as_the_reference_does(index: int) -> None:
+    scene, families = draw(1, index)
+    found = predict(scene)
+    assert {"obstacles", "table", "friction"} <= {effect.name for effect in found.effects if effect.active}
+    quality = Quality(method="reference", target_error=3e-3 * scene.cable.length)
+    reference = predict(replace(scene, quality=quality))
+    assert found.status == reference.status == "converged"
+    assert paired(Drawn(index, families, scene), found, reference).apart < 5e-3
 
 
 # --- strikes ---
