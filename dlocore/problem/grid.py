@@ -70,8 +70,10 @@ class Grid:
         return state_with(self, tables="find_tables", history="find_history")
 
     def past(self) -> History:
-        """Return a copy of the history, to be carried on."""
-        return History(*(x.copy() for x in self.history))
+        """Return a copy of the history, to be carried on; until a step is taken contact acts at all nodes."""
+        past = History(*(x.copy() for x in self.history))
+        past.pressing[:] = self.tables.contact_w
+        return past
 
     @property
     def n_u(self) -> int:

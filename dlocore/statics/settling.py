@@ -84,7 +84,6 @@ def settle(
     q, history = (grid.start.copy(), grid.past()) if begin is None else begin
     if len(history.tension) == 0:
         history = history._replace(tension=np.zeros((len(grid.tables.axial_w), COLUMNS)))
-    history.pressing[:] = grid.tables.contact_w  # it may go far from what it lies on as it begins
     carried = at > 0.0 and starts is None
     starts = {} if starts is None else starts
     before_t = 0.0 if carried else at

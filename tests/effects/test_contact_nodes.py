@@ -63,6 +63,11 @@ def test_few_nodes_act_on_the_inside_of_a_face_and_many_about_its_edges() -> Non
     assert weights.sum() == pytest.approx(1.0)
 
 
+def test_what_is_not_a_step_of_a_march_has_all_nodes() -> None:
+    _, grid = posed(block(0.4))
+    assert np.array_equal(grid.past().pressing, grid.tables.contact_w)
+
+
 def test_something_round_needs_few_nodes_beside_something_with_edges() -> None:
     ball = Sphere(center=(0.5, 0.0, -0.05 - D / 2), radius=0.05)
     u, _ = pressing(*posed(ball, Box(center=(0.5, 0.0, 0.5), size=(0.1, 0.1, 0.1))))
