@@ -239,8 +239,15 @@ class Problem:
         return active, parameters
 
     def table_spacing(self) -> float:
-        """Return how close the nodes of contact with the table lie [m]: there is nothing to fall between."""
-        return np.inf if self.contact is None or self.table is None else self.scene.cable.length / _ON_TABLE
+        """Return how close the nodes of contact with the table lie [m]: there is nothing to fall between.
+
+        With twist beside obstacles they are as close as those for obstacles: how evenly a bent cable is borne decides
+        on when its sections turn over (scene 102:21).
+        """
+        if self.contact is None or self.table is None:
+            return np.inf
+        apart = self.scene.cable.length / _ON_TABLE
+        return apart if self.twist is None else min(apart, self.contact_spacing())
 
     def contact_spacing(self) -> float:
         """Return how close the nodes of contact with obstacles lie [m]; infinite where there is none.
