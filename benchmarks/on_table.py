@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.machine import machine_line
-from benchmarks.pairs import Drawn, Pair, indices, paired, scenes_parser, solved
+from benchmarks.pairs import Pair, indices, paired, scenes_parser, solved
 from benchmarks.random_reference import TARGET, WRONG
 from benchmarks.table_scenes import draw
 from dlocore import Quality, SceneError, predict, warm_up
@@ -45,18 +45,18 @@ class Outcome(NamedTuple):
 def run(seed: int, reference: bool, index: int) -> Outcome | None:
     """Predict the scene of a seed and an index; None where it is refused."""
     try:
-        scene, families = draw(seed, index)
-        begun = time.perf_counter()
+        drawn = draw(seed, index)
+        scene, begun = drawn.scene, time.perf_counter()
         found = predict(scene, deadline=DEADLINE)
     except SceneError:
         return None
     obstacles = len(scene.environment.obstacles)
-    one = Outcome(index, families, found.status, time.perf_counter() - begun, found.message, obstacles)
+    one = Outcome(index, drawn.families, found.status, time.perf_counter() - begun, found.message, obstacles)
     if not reference or found.status != "converged":
         return one
     quality = Quality(method="reference", target_error=TARGET * scene.cable.length)
     other = solved(replace(scene, quality=quality), PATIENCE)
-    return one if other is None else one._replace(pair=paired(Drawn(index, families, scene), found, other))
+    return one if other is None else one._replace(pair=paired(drawn, found, other))
 
 
 def report(outcomes: Iterable[Outcome | None]) -> None:

@@ -1,11 +1,13 @@
 """Random scenes of a cable that grippers lift, lay, carry or bring together among obstacles on a table."""
 
-from typing import Any, Literal, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.catalogue.parts import bow
+from benchmarks.catalogue.parts import bow, wave
+from benchmarks.pairs import Drawn
+from benchmarks.robot_scenes import HOLDS
 from dlocore import (
     Box,
     Cable,
@@ -27,19 +29,12 @@ from dlocore.scene.obstacles import Obstacle
 from dlocore.shape.shape import StartCurve, start_curve
 
 Floats = NDArray[np.float64]
-Hold = Literal["point", "tangent", "clamp"]
-HOLDS: tuple[Hold, ...] = ("point", "tangent", "clamp")
 
 
-class Handled(NamedTuple):
-    """A scene, and what is done in it: kind of motion, shape at rest on the table, stress-free shape, obstacles."""
+def draw(seed: int, index: int) -> Drawn:
+    """Return the scene of a seed and an index, with its kind of motion, shape, stress-free shape and obstacles.
 
-    scene: Scene
-    families: tuple[str, ...]
-
-
-def draw(seed: int, index: int) -> Handled:
-    """Return the scene of a seed and an index. Some of them no cable can follow: a path may lead into an obstacle.
+    Some of them no cable can follow: a path may lead into an obstacle.
 
     Raises:
         SceneError: it is no scene at all.
@@ -64,7 +59,7 @@ def draw(seed: int, index: int) -> Handled:
         cable=cable, shape=shape, grasps=grasps, loads=loads, environment=environment,
         horizon=duration * r.uniform(1.0, 1.4), effects={"self_contact": "off"},
     )  # fmt: skip
-    return Handled(scene, (kind, lies, f"rests {rest}", f"{len(obstacles)} obstacles"))
+    return Drawn(index, (kind, lies, f"rests {rest}", f"{len(obstacles)} obstacles"), scene)
 
 
 def _shape(r: np.random.Generator, lies: str, length: float) -> Straight | Points:
@@ -72,10 +67,7 @@ def _shape(r: np.random.Generator, lies: str, length: float) -> Straight | Point
         return Straight(direction=(1.0, 0.0, 0.0))
     if lies == "bow":
         return Points(points=bow(length, r.uniform(0.3, 2.5)))
-    x = np.linspace(0.0, length, 81)
-    points = np.column_stack([x, r.uniform(0.02, 0.12) * length * np.sin(r.uniform(1.0, 3.0) * np.pi * x / length)])
-    long = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
-    return Points(points=points * length / long)
+    return Points(points=wave(length, r.uniform(0.02, 0.12) * length, r.uniform(0.5, 1.5)))
 
 
 def _cable(r: np.random.Generator, length: float) -> tuple[Cable, str]:

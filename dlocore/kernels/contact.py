@@ -162,10 +162,9 @@ def energy(nc: int, q: Any, tables: Any, active: Any, p: Any) -> float:
 
 
 @law
-def _nearest_within(
-    nc: int, q: Any, tables: Any, p: Any, i: int, n: int, way: float, first: int, last: int
-) -> float:  # fmt: skip
-    """Return the smallest gap [m] from contact i of those of the nodes first to last within `way` [m] of node n."""
+def _nearest_within(nc: int, q: Any, tables: Any, p: Any, i: int, n: int, way: float) -> float:
+    """Return the smallest gap [m] from contact i of its nodes within `way` [m] of node n; one below 0 will do."""
+    first, last = (0, tables.table_nodes) if i < COUNT else (tables.table_nodes, len(tables.contact_u))
     nearest = np.inf
     for side in (-1, 1):
         m = n if side < 0 else n + 1
@@ -201,8 +200,7 @@ def strikes(nc: int, q0: Any, q1: Any, tables: Any, p: Any, weights: Any, least:
                 if before > 0.0 and before - gap > least:
                     move = (x[0] - y[0], x[1] - y[1], x[2] - y[2])
                     way = _PASSED * np.sqrt(max(0.0, dot(move, move) - dot(move, normal) ** 2))
-                    first, last = (0, tables.table_nodes) if i < COUNT else (tables.table_nodes, len(weights))
-                    before = _nearest_within(nc, q0, tables, p, i, n, way, first, last)
+                    before = _nearest_within(nc, q0, tables, p, i, n, way)
                     if before > 0.0 and before - gap > least:
                         return True
         reach = tables.contact_u[n] + _SLACK * nearest
@@ -320,24 +318,20 @@ def remember(nc: int, q: Any, tables: Any, p: Any, stick: Any, pressing: Any, lo
         if n == tables.table_nodes:
             reach = 0.0
         cell = 1 if n < tables.table_nodes else min(tables.cell, len(weights) - n)
-        long = u[n + cell - 1] - u[n]
-        middle = n + cell // 2
-        near = 0.5 * _INSIDE * long
+        few, middle, total = False, n + cell // 2, 0.0
         x = _point(nc, q, first[middle], row_of(b0, middle))
-        nearest, depth, normal, inside = np.inf, 0.0, _ANY, -np.inf
-        if u[n + cell - 1] >= reach:
+        if cell > 1 and u[n + cell - 1] >= reach:
+            long = u[n + cell - 1] - u[n]
+            near = 0.5 * _INSIDE * long
             nearest, depth, normal, inside = _met(tables, p, middle, x, near)
-        few = cell > 1 and nearest < near and inside > _INSIDE * long
-        if few or cell == 1:
-            deepest = max(deepest, -nearest)
-            _drag(p, stick, middle, x, 0.0 if loose else depth, normal)
-        if _SLACK * nearest > u[middle] - u[n] and nearest < np.inf:
-            reach = u[middle] + _SLACK * nearest
-        total = 0.0
+            few = nearest < near and inside > _INSIDE * long
+            if few:
+                deepest = max(deepest, -nearest)
+                _drag(p, stick, middle, x, 0.0 if loose else depth, normal)
         for m in range(n, n + cell):
             total += weights[m]
             pressing[m] = 0.0 if few else weights[m]
-            if cell == 1 or (few and (m == middle or len(stick) == 0)):
+            if few and (m == middle or len(stick) == 0):
                 continue
             y = _point(nc, q, first[m], row_of(b0, m))
             if few:  # as far behind it as that of the middle

@@ -264,9 +264,7 @@ class Problem:
 
     def contact_cell(self) -> int:
         """Return how many of those nodes one may stand for, away from edges."""
-        if self.contact is None or not self.obstacles or not self._meets_edges:
-            return 1
-        return max(1, int(self._round_spacing / self.contact_spacing()))
+        return max(1, int(self._round_spacing / self.contact_spacing())) if self._meets_edges else 1
 
     @property
     def _meets_edges(self) -> bool:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.pairs import Drawn, paired
+from benchmarks.pairs import paired
 from benchmarks.table_scenes import draw
 from dlocore import Box, Cable, Cylinder, Environment, Grasp, Move, Quality, Scene, Sphere, Straight, Table, predict
 from dlocore.kernels.contact import strikes
@@ -103,13 +103,13 @@ def test_the_top_of_a_block_is_as_good_as_a_table(friction: float) -> None:
 
 @pytest.mark.parametrize("index", [20, 24])
 def test_a_cable_lifted_among_obstacles_on_a_table_moves_as_the_reference_does(index: int) -> None:
-    scene, families = draw(1, index)
-    found = predict(scene)
+    drawn = draw(1, index)
+    scene, found = drawn.scene, predict(drawn.scene)
     assert {"obstacles", "table", "friction"} <= {effect.name for effect in found.effects if effect.active}
     quality = Quality(method="reference", target_error=3e-3 * scene.cable.length)
     reference = predict(replace(scene, quality=quality))
     assert found.status == reference.status == "converged"
-    assert paired(Drawn(index, families, scene), found, reference).apart < 5e-3
+    assert paired(drawn, found, reference).apart < 5e-3
 
 
 # --- strikes ---
