@@ -19,6 +19,7 @@ from dlocore.kernels.assembly import (
 )
 from dlocore.kernels.banded import multiply_band, place_held, solve_free
 from dlocore.kernels.march import constrained_mass_solve
+from dlocore.kernels.nearby import nothing_known
 from dlocore.kernels.selfcontact import press
 
 _LASTS = 0.25  # (h w)^2 of a wave of which a step keeps half the acceleration that it begins with, inverse
@@ -63,7 +64,7 @@ def begin_stretch(
     assemble(axes, q, before, tables, active, p, history, rates, (0.0, 0.0, 0.0), G, K)
     if active[SELF_CONTACT]:
         x = np.empty((len(tables.strand_u), min(nc, 3)))
-        press(q, v, tables, p, x, np.empty((64, 2), np.int64), G)
+        press(q, v, tables, p, x, nothing_known(len(q), nc), G)
     if keeps_history(active):
         remember(axes, q, tables, active, p, history, 0.0, False)
     multiply_scalar_band(dragged * unit, v, 1.0, G)

@@ -26,10 +26,10 @@ from dlocore.kernels.contact import passes, strikes
 from dlocore.kernels.inertia import both_sides, effective, follow, padded, residual
 from dlocore.kernels.mixing import mixed, room
 from dlocore.kernels.narrow import ROOM, factor_step, solve_step
+from dlocore.kernels.nearby import clear, nothing_known
 from dlocore.kernels.newmark import coefficients
 from dlocore.kernels.predictor import differences_of, predict_by, shift
-from dlocore.kernels.selfcontact import closing, factor_wide, place_nodes, press, solve_wide, widen
-from dlocore.kernels.strands import clear_way
+from dlocore.kernels.selfcontact import closing, factor_wide, press, solve_wide, widen
 from dlocore.kernels.tension import assume_last, keep, point_on
 
 FAILED_STEP, LEFT, DEEPEST, DIVIDED_FROM, STRUCK = range(5)  # places in `info`
@@ -136,11 +136,10 @@ def march_steps(
     # contact of the cable with itself: nodes before, at and after an update, pairs, and the widened tangent
     shape = (len(tables.strand_u) if tight else 0, min(nc, 3))
     x0, x1, x2 = np.empty(shape), np.empty(shape), np.empty(shape)
-    found = [np.empty((64 if tight else 0, 2), np.int64)]  # in a list: as a variable it costs counts in every step
-    row_end = np.empty(free if tight else 0, np.int64)
-    S = np.empty((free if tight else 0, free if tight else 0))
+    near = nothing_known(n, nc)
+    row_end = np.zeros(free if tight else 0, np.int64)
+    S = np.zeros((free if tight else 0, free if tight else 0))
     filled, columns = np.empty_like(row_end), np.empty(S.shape, np.int32)
-    thick, separation = p[SELF_CONTACT, 0], p[SELF_CONTACT, 4]
     pairs, wide, depth, share = 0, False, 0.0, 1.0
     first_contraction, first_update, unmeasured = 1.0, 1.0, _UNMEASURED  # of the first update of a step, as measured
     # the acceleration at the start knows of no damping yet, which would make too much of it
@@ -189,14 +188,11 @@ def march_steps(
                 for d in range(nc):
                     a1[i, d] = ta * (q1[i, d] - q0[i, d] - h * v[i, d]) - carry * a[i, d]
                     v1[i, d] = v[i, d] + h * ((1.0 - gm) * a[i, d] + gm * a1[i, d])
-            if tight:
-                place_nodes(q0, tables, x0)
-                if robust:
-                    place_nodes(q1, tables, x1)
-                    found[0], share = clear_way(x0, x1, tables.strand_u, thick, separation, found[0])
-                    if share < 1.0:
-                        converged = False
-                        continue  # what is held passes through a strand
+            if tight and robust:
+                share = clear(q0, q1, tables, p, x0, x1, near)
+                if share < 1.0:
+                    converged = False
+                    continue  # what is held passes through a strand
             assume_last(history.tension, assumes)
             # --- iterate
             limit = plain_iterations if not robust else _ROBUST_ITERATIONS
@@ -208,7 +204,7 @@ def march_steps(
                 scales = (1.0, tv, 1.0) if refactor else (0.0, 0.0, 0.0)
                 assemble(axes, q1, v1, tables, active, p, history, rates, scales, f, K)
                 if tight:
-                    found[0], pairs, depth = press(q1, v1, tables, p, x1, found[0], f)
+                    pairs, depth = press(q1, v1, tables, p, x1, near, f)
                 residual(nc, rows, density, dragged, al_m, al_f, a, a1, v1, load, G, f, R, stacked)
                 reduce_vector(e, flat, x)
                 if refactor:
@@ -217,7 +213,7 @@ def march_steps(
                     wide = pairs > 0
                     if wide:
                         part = (1.0 - al_f, (1.0 - al_f) * tv, 1.0 - al_f)
-                        widen(nc, v1, tables, p, x1, found[0], pairs, part, e, A[:free], row_end, S)
+                        widen(nc, v1, tables, p, x1, near.met[0], pairs, part, e, A[:free], row_end, S)
                     if (factor_wide(S, row_end, filled, columns) if wide else factor_step(A, free)) >= 0:
                         if not robust:
                             break
@@ -228,7 +224,7 @@ def march_steps(
                         reduce_matrix(e, K, A)
                         if wide:
                             part = (1.0 - al_f, (1.0 - al_f) * tv, 0.0)
-                            widen(nc, v1, tables, p, x1, found[0], pairs, part, e, A[:free], row_end, S)
+                            widen(nc, v1, tables, p, x1, near.met[0], pairs, part, e, A[:free], row_end, S)
                         if (factor_wide(S, row_end, filled, columns) if wide else factor_step(A, free)) >= 0:
                             break
                     fresh = True
@@ -252,8 +248,7 @@ def march_steps(
                     break
                 length = 1.0
                 if tight and robust:
-                    place_nodes(q1 + step_change, tables, x2)
-                    found[0], length = clear_way(x1, x2, tables.strand_u, thick, separation, found[0])
+                    length = clear(q1, q1 + step_change, tables, p, x1, x2, near)
                 work = 0.0
                 if robust and update > tolerance:
                     for i in range(free):
@@ -267,7 +262,7 @@ def march_steps(
                         a2 = a1 + (length * ta) * step_change
                         assemble(axes, q2, v2, tables, active, p, history, rates, (0.0, 0.0, 0.0), f, K)
                         if tight:
-                            found[0], pairs, depth = press(q2, v2, tables, p, x2, found[0], f)
+                            pairs, depth = press(q2, v2, tables, p, x2, near, f)
                         residual(nc, rows, density, dragged, al_m, al_f, a, a2, v2, load, G, f, R, stacked)
                         reduce_vector(e, flat, x)
                         after = 0.0
@@ -311,16 +306,14 @@ def march_steps(
                         break
                     fresh = contraction <= _REFRESH
                 previous = update
-            if converged and tight:
-                place_nodes(q1, tables, x1)
-                if not robust:
-                    found[0], share = clear_way(x0, x1, tables.strand_u, thick, separation, found[0])
-                    converged = share == 1.0
+            if converged and tight and not robust:
+                share = clear(q0, q1, tables, p, x0, x1, near)
+                converged = share == 1.0
             struck = False
             if converged and not late and touches:
                 struck = strikes(nc, q0, q1, tables, p, history.pressing, _STRIKE * h)
             if converged and not late and pairs > 0:
-                struck = struck or closing(x0, x1, tables.strand_u, thick, found[0], pairs) > _STRIKE * h
+                struck = struck or closing(q0, q1, tables, p, x0, x1, near.met[0], pairs) > _STRIKE * h
             if struck:
                 if k >= info[DIVIDED_FROM]:
                     info[FAILED_STEP], info[STRUCK] = k, 1.0
@@ -340,7 +333,7 @@ def march_steps(
         if anew:
             assemble(axes, q1, v1, tables, active, p, history, rates, (0.0, 0.0, 0.0), f, K)
             if tight:
-                found[0], pairs, depth = press(q1, v1, tables, p, x1, found[0], f)
+                pairs, depth = press(q1, v1, tables, p, x1, near, f)
                 info[DEEPEST] = max(info[DEEPEST], depth)
             residual(nc, rows, density, dragged, al_m, al_f, a, a1, v1, load, G, f, R, stacked)
         if keeps:

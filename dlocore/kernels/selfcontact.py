@@ -21,24 +21,13 @@ from dlocore.compiling.kernel import kernel, law, leaf
 from dlocore.effects.base import Vector
 from dlocore.effects.contact import normal_force
 from dlocore.effects.laws import SELF_CONTACT
-from dlocore.kernels.strands import between, between_nodes, closest, dot, near_pairs
+from dlocore.kernels.nearby import look, place_pairs
+from dlocore.kernels.strands import between, between_nodes, closest, dot
 
 _DRAWN = 0.05  # eps
 _WINDOW = 8  # control points of a segment, at most
 _GATHERED = 3  # times as long takes an entry that is looked up as one that is next
 _ROOM = 4096  # reduced entries of a pair, at most: held control points may follow many free ones
-
-
-@leaf
-def place_nodes(q: Any, tables: Any, x: Any) -> None:
-    """Write the positions x (nodes, 2 or 3) [m] of the strand nodes of the control points q (n, nc)."""
-    for n in range(len(x)):
-        k = tables.strand_first[n]
-        for d in range(x.shape[1]):
-            value = 0.0
-            for i in range(4):
-                value += tables.strand_b0[n, i] * q[k + i, d]
-            x[n, d] = value
 
 
 @law
@@ -89,24 +78,27 @@ def _rate(v: Any, point: Any, c: Any, m: int, y: Vector) -> float:
 
 
 @kernel
-def press(q: Any, v: Any, tables: Any, p: Any, x: Any, found: Any, f: Any) -> Any:
-    """Subtract the forces of the contact from f (n, nc); return (found, count, depth), the pairs and the deepest [m].
+def press(q: Any, v: Any, tables: Any, p: Any, x: Any, near: Any, f: Any) -> Any:
+    """Subtract the forces of the contact from f (n, nc); return how many pairs touch, `near.met`, and how deep [m].
 
     Args:
         q, v: control points and their velocities (n, nc) [m, m/s].
-        x: (nodes, 2 or 3), written: the nodes' positions [m].
-        found: room for the pairs, see `near_pairs`.
+        x: (nodes, 2 or 3), written: the positions of the nodes of these pairs at least [m].
+        near: see `Nearby`.
     """
-    place_nodes(q, tables, x)
+    look(q, tables, p, x, near)
     u, first, b0 = tables.strand_u, tables.strand_first, tables.strand_b0
     D, stiffness, passage, damping = p[SELF_CONTACT, 0], p[SELF_CONTACT, 1], p[SELF_CONTACT, 2], p[SELF_CONTACT, 3]
-    found, count = near_pairs(x, u, D, p[SELF_CONTACT, 4], found)
+    pairs, count = near.pairs[0], near.count[0]
+    if count > len(near.met[0]):
+        near.met[0] = np.empty_like(pairs)
+    found = near.met[0]
     point = np.empty(2 * _WINDOW, np.int64)
     c = np.empty(2 * _WINDOW)
     kept = 0
     deepest = 0.0
     for n in range(count):
-        i, j = found[n, 0], found[n, 1]
+        i, j = pairs[n, 0], pairs[n, 1]
         y, rho, s, t, _, _, _, _ = _pair(x, u, D, i, j)
         if rho >= D:
             continue
@@ -121,7 +113,7 @@ def press(q: Any, v: Any, tables: Any, p: Any, x: Any, found: Any, f: Any) -> An
         for o in range(m):
             for d in range(x.shape[1]):
                 f[point[o], d] -= scale * c[o] * y[d]
-    return found, kept, deepest
+    return kept, deepest
 
 
 @kernel
@@ -182,7 +174,8 @@ def widen(
         found, count: of `press`.
         scales: of `assemble`, times what the tangent counts in a step.
         e: elimination of the held degrees of freedom.
-        end: (free,), written: the place after the last column of each row that the factorisation of S fills.
+        S, end: what the last call wrote, and its factorisation, or zeros. `end` (free,) is the place after the last
+            column of each row that the factorisation fills.
     """
     free, width = A.shape
     nd = x.shape[1]
@@ -193,8 +186,8 @@ def widen(
     rows = np.empty(_ROOM, np.int64)
     place = np.empty(_ROOM, np.int64)
     share = np.empty(_ROOM)
-    S[:] = 0.0
     for r in range(free):
+        S[r, r : end[r]] = 0.0
         end[r] = min(r + width, free)
         for o in range(end[r] - r):
             S[r, r + o] = A[r, o]
@@ -271,9 +264,12 @@ def solve_wide(S: Any, filled: Any, columns: Any, x: Any) -> None:
         x[j] = total / S[j, j]
 
 
-@leaf
-def closing(x0: Any, x1: Any, u: Any, D: float, found: Any, count: int) -> float:
-    """Return how far, from x0 to x1, a pair that newly touches has come towards each other [m], the largest."""
+@kernel
+def closing(q0: Any, q1: Any, tables: Any, p: Any, x0: Any, x1: Any, found: Any, count: int) -> float:
+    """Return how far, from q0 to q1, a pair that newly touches has come towards each other [m], the largest."""
+    place_pairs(q0, tables, found, count, x0)
+    place_pairs(q1, tables, found, count, x1)
+    u, D = tables.strand_u, p[SELF_CONTACT, 0]
     most = 0.0
     for n in range(count):
         i, j = found[n, 0], found[n, 1]

@@ -310,16 +310,22 @@ def clear_way(x0: Any, x1: Any, u: Any, diameter: float, separation: float, foun
     """Return (found, share): how far, 0 to 1, the nodes may go from x0 straight to x1 without strands passing strands.
 
     That is up to where a pair of segments comes nearer than `_TOO_NEAR` diameters; one that is nearer already, than a
-    fifth nearer still. Distances change at most as fast as the nodes move against each other, which is how far one may
-    look ahead.
+    fifth nearer still. `u`, `separation`, `found`: see `near_pairs`.
+    """
+    found, count = meeting_pairs(x0, x1, u, _TOO_NEAR * diameter, separation, found)
+    return found, 0.0 if count < 0 else clear_way_of(x0, x1, diameter, found, count)
+
+
+@leaf
+def clear_way_of(x0: Any, x1: Any, diameter: float, pairs: Any, count: int) -> float:
+    """Return the share of `clear_way` where no others can meet than these pairs of segments.
+
+    Distances change at most as fast as the nodes move against each other, which is how far one may look ahead.
     """
     share = 1.0
     near = _TOO_NEAR * diameter
-    found, count = meeting_pairs(x0, x1, u, near, separation, found)
-    if count < 0:
-        return found, 0.0
     for c in range(count):
-        i, j = found[c, 0], found[c, 1]
+        i, j = pairs[c, 0], pairs[c, 1]
         r0, a0, b0 = between_nodes(x0, i, j), between_nodes(x0, i + 1, i), between_nodes(x0, j + 1, j)
         r1, a1, b1 = between_nodes(x1, i, j), between_nodes(x1, i + 1, i), between_nodes(x1, j + 1, j)
         fastest = 0.0
@@ -331,7 +337,7 @@ def clear_way(x0: Any, x1: Any, u: Any, diameter: float, separation: float, foun
         if fastest == 0.0:
             continue
         if not fastest < np.inf:
-            return found, 0.0
+            return 0.0
         least = near
         z = 0.0
         while z < share:
@@ -349,7 +355,7 @@ def clear_way(x0: Any, x1: Any, u: Any, diameter: float, separation: float, foun
                 break
             # a look at least so far ahead that the gap changes by a tenth of what is kept
             z += max(gap - least, 0.1 * least, _LOOK * diameter) / fastest
-    return found, share
+    return share
 
 
 @kernel

@@ -2,10 +2,11 @@
 
 from dataclasses import replace
 from itertools import pairwise
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pytest
+from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -14,6 +15,7 @@ from dlocore import Cable, Environment, Grasp, Move, Points, Prediction, Quality
 from dlocore.effects import laws
 from dlocore.effects.selfcontact import APART
 from dlocore.kernels.banded import Elimination, elimination, factor, reduce_matrix, solve
+from dlocore.kernels.nearby import clear, nothing_known
 from dlocore.kernels.selfcontact import factor_wide, press, solve_wide, widen
 from dlocore.kernels.strands import clear_way, meeting_pairs, near_pairs
 from dlocore.levels.level import distance, run_level
@@ -170,6 +172,39 @@ def test_strands_apart_feel_nothing(table: Table | None) -> None:
 # --- the law
 
 
+@njit  # type: ignore[untyped-decorator]  # numba has no types
+def pressed(states: Any, v: Any, tables: Any, p: Any, x: Any, f: Any) -> Any:
+    """Press at states (k, n, nc) in turn; return the pairs of the last, their number, and that of looks for pairs."""
+    near = nothing_known(states.shape[1], states.shape[2])
+    count, looks = 0, 0
+    seen = np.full_like(states[0], np.nan)
+    for k in range(len(states)):
+        count, _ = press(states[k], v, tables, p, x, near, f[k])
+        looks += not np.array_equal(seen, near.seen)
+        seen[:] = near.seen
+    return near.met[0], count, looks
+
+
+@njit  # type: ignore[untyped-decorator]
+def ways(q: Any, others: Any, v: Any, tables: Any, p: Any, x: Any, y: Any) -> Any:
+    """Return how far the cable may go from q to each of the others (k, n, nc).
+
+    Returns:
+        (k, 2), with nothing known of pairs and with what is known after pressing at q; whether that left alone what
+        touches.
+    """
+    shares = np.empty((len(others), 2))
+    kept = True
+    for k in range(len(others)):
+        near = nothing_known(*q.shape)
+        shares[k, 0] = clear(q, others[k], tables, p, x, y, near)
+        count, _ = press(q, v, tables, p, x, near, np.zeros_like(q))
+        met = near.met[0][:count].copy()
+        shares[k, 1] = clear(q, others[k], tables, p, x, y, near)
+        kept = kept and np.array_equal(near.met[0][:count], met)
+    return shares, kept
+
+
 class Tangle:
     """A cable whose strands lie on each other in random ways, with the compiled law's parameters."""
 
@@ -192,12 +227,11 @@ class Tangle:
 
     def press(self, q: Floats, v: Floats | None = None) -> tuple[Floats, Floats, NDArray[np.int64], int]:
         """Return the forces, the nodes, the pairs and their number."""
-        f = np.zeros_like(q)
+        f = np.zeros((1, *q.shape))
         x = np.empty((len(self.grid.tables.strand_u), min(q.shape[1], 3)))
-        room = np.empty((4, 2), np.int64)
         v = self.still if v is None else v
-        found, count, _ = press(q, v, self.grid.tables, self.parameters, x, room, f)
-        return f, x, found, count
+        found, count, _ = pressed(q[None], v, self.grid.tables, self.parameters, x, f)
+        return f[0], x, found, count
 
     def elimination(self) -> Elimination:
         """Return the elimination of what the scene's grasps hold."""
@@ -211,8 +245,7 @@ class Tangle:
         """Return the widened tangent above its diagonal and the ends of its rows."""
         _, x, found, count = self.press(self.q)
         assert count > 10
-        S = np.empty((len(band), len(band)))
-        end = np.empty(len(band), np.int64)
+        S, end = np.zeros((len(band), len(band))), np.zeros(len(band), np.int64)
         widen(self.q.shape[1], self.still, self.grid.tables, self.parameters, x, found, count, scales, e, band, end, S)
         return S, end
 
@@ -316,7 +349,7 @@ def test_a_tangent_without_pairs_is_the_band() -> None:
     for o in range(12):
         band[len(band) - o :, o] = 0.0
     _, x, found, _ = tangle.press(tangle.q)
-    S, end = np.empty((len(band), len(band))), np.empty(len(band), np.int64)
+    S, end = np.zeros((len(band), len(band))), np.zeros(len(band), np.int64)
     tables, scales = tangle.grid.tables, (1.0, 0.0, 1.0)
     widen(3, tangle.still, tables, tangle.parameters, x, found, 0, scales, e, band, end, S)
     a, b = np.ones(len(band)), np.ones(len(band))
@@ -350,6 +383,75 @@ def test_strands_that_strike_do_so_alike_on_every_grid() -> None:
     first, second = (distance(a, b, problem) for a, b in pairwise(levels))
     assert second < 0.6 * first  # 1/1.5^2 and less
     assert second < 0.005 * scene.cable.length
+
+
+@POINTS
+@DIMENSIONS
+def test_a_tangent_is_written_over_the_last_one(nc: int, n_u: int) -> None:
+    random = np.random.default_rng(13)
+    tangle = Tangle(nc, 13, n_u)
+    e = tangle.elimination()
+    band = random.normal(0.0, 1.0, (tangle.q.size - len(e.held), 4 * nc))
+    band[:, 0] += 1e6
+    S, end = tangle.tangent(e, band)
+    assert factor_wide(S, end, np.empty_like(end), np.empty(S.shape, np.int32)) == -1
+    # the next tangent is of fewer pairs
+    _, x, found, count = tangle.press(tangle.q)
+    p, tables, scales = tangle.parameters, tangle.grid.tables, (1.0, 0.0, 1.0)
+    widen(nc, tangle.still, tables, p, x, found, count // 3, scales, e, band, end, S)
+    fresh, its_end = np.zeros_like(S), np.zeros_like(end)
+    widen(nc, tangle.still, tables, p, x, found, count // 3, scales, e, band, its_end, fresh)
+    assert np.array_equal(end, its_end)
+    assert np.array_equal(S, fresh)
+
+
+# --- what is known of pairs
+
+
+@POINTS
+@DIMENSIONS
+def test_what_is_known_of_pairs_changes_no_force(nc: int, n_u: int) -> None:
+    random = np.random.default_rng(14)
+    tangle = Tangle(nc, 14, n_u)
+    D = tangle.parameters[laws.SELF_CONTACT, 0]
+    # carried as a whole, which brings nothing nearer to anything, and crumpled by diameters
+    sizes = np.array([0.0, 0.2, 0.5, 0.7])[:, None, None] * D
+    states = tangle.q + 50.0 * D + sizes * random.uniform(-0.5, 0.5, (4, *tangle.q.shape))
+    x, f = tangle.press(tangle.q)[1], np.zeros_like(states)
+    found, count, looks = pressed(states, tangle.still, tangle.grid.tables, tangle.parameters, x, f)
+    assert looks == 1
+    anew = [tangle.press(state) for state in states]
+    assert np.array_equal(f, [one[0] for one in anew])
+    assert np.array_equal(found[:count], anew[-1][2][: anew[-1][3]])
+    assert len({one[3] for one in anew}) > 1, "pairs come and go"
+
+
+@DIMENSIONS
+def test_pairs_are_looked_for_anew_where_parts_of_the_cable_have_moved_against_each_other(nc: int) -> None:
+    tangle = Tangle(nc, 16)
+    D = tangle.parameters[laws.SELF_CONTACT, 0]
+    half = np.arange(len(tangle.q))[:, None] < len(tangle.q) // 2
+    for way, expected in ((1.9, 1), (2.1, 2)):
+        states = np.array([tangle.q, tangle.q + half * way * D * np.eye(nc)[1]])
+        x, f = tangle.press(tangle.q)[1], np.zeros_like(states)
+        *_, looks = pressed(states, tangle.still, tangle.grid.tables, tangle.parameters, x, f)
+        assert looks == expected
+        assert np.array_equal(f[1], tangle.press(states[1])[0])
+
+
+@DIMENSIONS
+def test_what_is_known_of_pairs_changes_no_way(nc: int) -> None:
+    random = np.random.default_rng(15)
+    tangle = Tangle(nc, 15)
+    tables, p = tangle.grid.tables, tangle.parameters
+    D = p[laws.SELF_CONTACT, 0]
+    others = tangle.q + D * random.uniform(-0.55, 0.55, (20, *tangle.q.shape))
+    x = tangle.press(tangle.q)[1]
+    shares, kept = ways(tangle.q, others, tangle.still, tables, p, x, np.empty_like(x))
+    assert np.array_equal(shares[:, 0], shares[:, 1])
+    assert shares.min() < 1.0
+    assert shares.max() > 0.0
+    assert kept, "the pairs that touch are still those that touch"
 
 
 # --- strands on their way

@@ -1,0 +1,118 @@
+"""Pairs of the cable's strands that are near each other, known as long as the cable moves little.
+
+To place all strand nodes of a long thin cable and look for pairs takes longer than the rest of an assembly. So pairs
+are looked for up to `_ROOM` diameters farther apart than where strands meet; until two points of the cable have moved
+that far against each other, all that meet are among them.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dlocore.compiling.kernel import kernel, law, leaf
+from dlocore.effects.laws import SELF_CONTACT
+from dlocore.kernels.strands import clear_way, clear_way_of, near_pairs
+
+_ROOM = 2.0  # diameters
+
+
+class Nearby(NamedTuple):
+    """What is known of pairs of segments between neighbouring strand nodes; each list holds one array (room, 2).
+
+    Attributes:
+        pairs, count: those near each other, and how many (1,) they are; -1 before the first look.
+        seen: control points (n, nc) [m] at the last look.
+        met: a list of those that touch.
+        passed: a list of those that meet on a way.
+    """
+
+    pairs: Any
+    count: Any
+    seen: Any
+    met: Any
+    passed: Any
+
+
+@kernel
+def nothing_known(n: int, nc: int) -> Any:
+    """Return a `Nearby` for n control points."""
+    return Nearby(
+        [np.empty((64, 2), np.int64)], np.full(1, -1, np.int64), np.zeros((n, nc)), [np.empty((64, 2), np.int64)],
+        [np.empty((64, 2), np.int64)],
+    )  # fmt: skip
+
+
+@law
+def _place(q: Any, tables: Any, n: int, x: Any) -> None:
+    k = tables.strand_first[n]
+    for d in range(x.shape[1]):
+        value = 0.0
+        for i in range(4):
+            value += tables.strand_b0[n, i] * q[k + i, d]
+        x[n, d] = value
+
+
+@leaf
+def place_nodes(q: Any, tables: Any, x: Any) -> None:
+    """Write the positions x (nodes, 2 or 3) [m] of the strand nodes of the control points q (n, nc)."""
+    for n in range(len(x)):
+        _place(q, tables, n, x)
+
+
+@leaf
+def place_pairs(q: Any, tables: Any, pairs: Any, count: int, x: Any) -> None:
+    """Do what `place_nodes` does for the ends of `count` pairs of segments; other nodes may stay as they are."""
+    if 2 * count > len(x):
+        place_nodes(q, tables, x)
+        return
+    for c in range(count):
+        for side in range(2):
+            i = pairs[c, side]
+            if c == 0 or pairs[c - 1, side] != i:
+                _place(q, tables, i, x)
+                _place(q, tables, i + 1, x)
+
+
+@leaf
+def _is_known(q: Any, seen: Any, count: int, nd: int, D: float) -> bool:
+    """Tell whether all pairs that meet at q (n, nc) are among those found at the control points `seen`."""
+    if count < 0:
+        return False
+    square = 0.0
+    for d in range(nd):
+        low, high = np.inf, -np.inf
+        for i in range(len(q)):
+            move = q[i, d] - seen[i, d]
+            low, high = min(low, move), max(high, move)
+        square += (high - low) ** 2
+    return square <= (_ROOM * D) ** 2
+
+
+@kernel
+def look(q: Any, tables: Any, p: Any, x: Any, near: Any) -> None:
+    """Place the nodes x of the pairs that may meet at the control points q (n, nc), of which `near` has all then."""
+    D = p[SELF_CONTACT, 0]
+    if _is_known(q, near.seen, near.count[0], x.shape[1], D):
+        place_pairs(q, tables, near.pairs[0], near.count[0], x)
+        return
+    place_nodes(q, tables, x)
+    near.pairs[0], near.count[0] = near_pairs(x, tables.strand_u, (1.0 + _ROOM) * D, p[SELF_CONTACT, 4], near.pairs[0])
+    near.seen[:] = q
+
+
+@kernel
+def clear(q0: Any, q1: Any, tables: Any, p: Any, x0: Any, x1: Any, near: Any) -> float:
+    """Return how far, 0 to 1, the cable may go from q0 straight to q1 (n, nc) without strands passing strands.
+
+    x0, x1 (nodes, 2 or 3) are written, for pairs at least that are near each other.
+    """
+    D = p[SELF_CONTACT, 0]
+    pairs, seen, count, nd = near.pairs[0], near.seen, near.count[0], x0.shape[1]
+    if _is_known(q0, seen, count, nd, D) and _is_known(q1, seen, count, nd, D):
+        place_pairs(q0, tables, pairs, count, x0)
+        place_pairs(q1, tables, pairs, count, x1)
+        return clear_way_of(x0, x1, D, pairs, count)
+    place_nodes(q0, tables, x0)
+    place_nodes(q1, tables, x1)
+    near.passed[0], share = clear_way(x0, x1, tables.strand_u, D, p[SELF_CONTACT, 4], near.passed[0])
+    return share
