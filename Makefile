@@ -27,11 +27,10 @@ compile: $(VENV)/.dev-installed
 	@echo 'Compiling; this takes some minutes the first time.'
 	$(BIN)/python -c 'import dlocore; dlocore.warm_up()'
 
-# three at once: those that wait for a browser or a server leave half a core
 test: compile
 	@command -v chromium >/dev/null || command -v chromium-browser >/dev/null || command -v google-chrome >/dev/null || \
 		echo 'No Chromium found: the browser tests will be skipped.'
-	$(BIN)/python -m pytest --numprocesses 3 --dist loadfile --no-loadscope-reorder $(PYTEST_ARGS)
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder $(PYTEST_ARGS)
 
 check: $(VENV)/.dev-installed
 	$(BIN)/ruff check .

@@ -205,8 +205,9 @@ class _Motion:
         turning = [hold for hold in holds if hold.turns]
         hinges = rod.hinges(turning)
 
-        def table(columns: list[Floats]) -> Floats:
-            return np.stack([c[:, axes] for c in columns], axis=1) if columns else np.zeros((len(t), 0, len(axes)))
+        def table(columns: list[Floats]) -> Floats:  # in one order, for which alone the march is compiled
+            at = [c[:, axes] for c in columns]
+            return np.ascontiguousarray(np.stack(at, axis=1)) if at else np.zeros((len(t), 0, len(axes)))
 
         march = march_plane if len(axes) == 2 else march_space
         self.previous = march(
