@@ -426,13 +426,15 @@ class _Climb:
         if status == "converged" and self.estimate <= self.enough:
             self.astray = self.astray or self._find_astray(best)
             outcome = self._agreeing(best)
-            finest = " No finer grid was tried." if self.estimate > self.target else ""
+            finest = " No finer one was tried." if self.estimate > self.target else ""
             return outcome._replace(message=outcome.message + finest)
         elif status == "converged" and self.monitor.remaining() <= 0:
             status, message = "time_limit", f"The time limit passed; {left}. {advice}"
         elif status == "converged":
             self.astray = self.astray or self._find_astray(best)
-            return self._answer(best, "max_iterations", f"No finer grid was tried; {left}.", f" {advice}")
+            finest = f"{best.motion.grid.n_u} control points along the cable and {best.motion.steps} steps"
+            spent = f"From {finest} on no finer grid is expected to reach the target in what may be spent"
+            return self._answer(best, "max_iterations", f"{spent}; {left}.", f" {advice}")
         return Outcome(best, status, message, self.changes.parts(best))
 
 

@@ -89,7 +89,10 @@ def test_who_gives_a_deadline_gets_more_work_for_a_target_that_ends_before_it(mo
     scene = swinging(Quality(target_error=2e-4))
     free = predict(scene).accuracy
     monkeypatch.setattr(budget, "MOST_WORK", 0.5 * free.n_u * free.steps)
-    assert predict(scene).status == "max_iterations"
+    few = predict(scene)
+    assert few.status == "max_iterations"
+    finest = f"{few.accuracy.n_u} control points along the cable and {few.accuracy.steps} steps"
+    assert f"From {finest} on no finer grid is expected to reach the target in what may be spent" in few.message
     found = predict(scene, deadline=60.0)
     assert found.status == "converged"
     assert (found.accuracy.n_u, found.accuracy.steps) == (free.n_u, free.steps)
