@@ -58,7 +58,7 @@ $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "dlo needs Python 3.11 or later: PYTHON=python3.12 make")'
 	$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
 
-# what a lock file names and the project itself: by uv in a fifth of the time, by pip where uv or its index is not to be had
+# what a lock file names and the project itself: by uv in a third of the time, by pip where uv or its index is not to be had
 define install
 	@echo 'Installing into $(VENV); this may take a minute or two the first time.'
 	{ $(PIP) install --quiet $(UV) && \

@@ -318,9 +318,9 @@ def remember(nc: int, q: Any, tables: Any, p: Any, stick: Any, pressing: Any, lo
         if n == tables.table_nodes:
             reach = 0.0
         cell = 1 if n < tables.table_nodes else min(tables.cell, len(weights) - n)
-        few, middle, total = False, n + cell // 2, 0.0
-        x = _point(nc, q, first[middle], row_of(b0, middle))
+        few, middle, total, x = False, n + cell // 2, 0.0, _ANY
         if cell > 1 and u[n + cell - 1] >= reach:
+            x = _point(nc, q, first[middle], row_of(b0, middle))
             long = u[n + cell - 1] - u[n]
             near = 0.5 * _INSIDE * long
             nearest, depth, normal, inside = _met(tables, p, middle, x, near)

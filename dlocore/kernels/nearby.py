@@ -14,32 +14,32 @@ from dlocore.effects.laws import SELF_CONTACT
 from dlocore.kernels.strands import clear_way, clear_way_of, near_pairs
 
 _ROOM = 2.0  # diameters
+_FIRST = 64  # pairs that there is room for at first
 
 
 class Nearby(NamedTuple):
-    """What is known of pairs of segments between neighbouring strand nodes; each list holds one array (room, 2).
+    """What is known of pairs of segments between neighbouring strand nodes.
+
+    Arrays of pairs that may be replaced by larger ones are in lists: as variables they cost counts in every step.
 
     Attributes:
-        pairs, count: those near each other, and how many (1,) they are; -1 before the first look.
+        pairs, count: a list of one array (room, 2) of those near each other, and how many (1,) they are; -1 before the
+            first look.
         seen: control points (n, nc) [m] at the last look.
-        met: a list of those that touch.
-        passed: a list of those that meet on a way.
+        met: a list of one array (room, 2) of those that touch.
     """
 
     pairs: Any
     count: Any
     seen: Any
     met: Any
-    passed: Any
 
 
 @kernel
 def nothing_known(n: int, nc: int) -> Any:
     """Return a `Nearby` for n control points."""
-    return Nearby(
-        [np.empty((64, 2), np.int64)], np.full(1, -1, np.int64), np.zeros((n, nc)), [np.empty((64, 2), np.int64)],
-        [np.empty((64, 2), np.int64)],
-    )  # fmt: skip
+    count, seen = np.full(1, -1, np.int64), np.zeros((n, nc))
+    return Nearby([np.empty((_FIRST, 2), np.int64)], count, seen, [np.empty((_FIRST, 2), np.int64)])
 
 
 @law
@@ -114,5 +114,5 @@ def clear(q0: Any, q1: Any, tables: Any, p: Any, x0: Any, x1: Any, near: Any) ->
         return clear_way_of(x0, x1, D, pairs, count)
     place_nodes(q0, tables, x0)
     place_nodes(q1, tables, x1)
-    near.passed[0], share = clear_way(x0, x1, tables.strand_u, D, p[SELF_CONTACT, 4], near.passed[0])
-    return share
+    found = np.empty((_FIRST, 2), np.int64)
+    return clear_way(x0, x1, tables.strand_u, D, p[SELF_CONTACT, 4], found)[1]
