@@ -121,15 +121,18 @@ def _read_all(answer: Prediction) -> None:
 
 
 def _others() -> None:
-    """An equilibrium in a plane, without contact, strands that meet, and the reference."""
+    """An equilibrium in a plane, without contact, strands that meet, the printed scheme, and the reference."""
     hangs = Scene(cable=CABLE, shape=Straight(direction=(0.0, 0.0, -1.0)), grasps=(Grasp(u=0.0),), horizon=1.0)
     equilibrium(hangs, n_u=9)
     turned = np.linspace(0.0, 7.0, 9)
     loop = np.column_stack([np.cos(turned), np.sin(turned), 0.1 * U[:9, 0]])
     nearest_strands(uniform_knots(9, 1.0), loop[None], 3, 0.01, 0.03)
+    as_printed = Quality(n_u=6, n_t=6, method="paper", delta=0.01, keep_grid=True)
+    predict(Scene(cable=CABLE, shape=ARC, grasps=(GRASP,), environment=Environment(table=Table()), quality=as_printed))
     still = Environment(gravity=(0.0, 0.0, 0.0))
     by_reference = Quality(method="reference", target_error=1.0)
-    predict(Scene(cable=CABLE, shape=replace(ARC, settle=True), environment=still, horizon=1e-3, quality=by_reference))
+    settled = Scene(cable=CABLE, shape=replace(ARC, settle=True), environment=still, horizon=1e-3, quality=by_reference)
+    _read_all(predict(settled))
 
 
 # whole smooth motions first: the code of a function that is loaded first serves all who call it, and they run faster

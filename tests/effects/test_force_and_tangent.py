@@ -219,7 +219,7 @@ def greville(knots: Floats) -> Floats:
 def control_points_of(b: Body, curve) -> Floats:
     """Return the control points (n_u, nc) of the spline nearest to a curve."""
     u = np.linspace(0.0, LENGTH, 20 * len(b.knots))
-    return np.linalg.lstsq(design_matrix(b.knots, u), curve(u), rcond=None)[0][:, : b.nc]
+    return np.ascontiguousarray(np.linalg.lstsq(design_matrix(b.knots, u), curve(u), rcond=None)[0][:, : b.nc])
 
 
 def circle(kappa: float):

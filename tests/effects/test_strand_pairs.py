@@ -320,7 +320,7 @@ def test_strands_on_their_way_stop_before_they_pass(nd: int) -> None:
         if nd == 2:
             second = first[::-1] + np.array([0.0, 0.02, 0.0])
         far = np.array([[0.5, 0.5, 0.5]])
-        before = np.concatenate([first, far, second])[:, :nd]
+        before = np.ascontiguousarray(np.concatenate([first, far, second])[:, :nd])
         move = np.array([random.uniform(-0.02, 0.02), -0.05, 0.0] if nd == 2 else [0.0, 0.0, -0.05])
         after = before.copy()
         after[41:] += move[:nd]
