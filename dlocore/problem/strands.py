@@ -26,7 +26,7 @@ def nearest_strands(knots: Floats, states: Floats, dimensions: int, diameter: fl
         diameter: of the cable [m].
         within: largest distance of interest [m], less than `APART` diameters.
     """
-    knots = np.array(knots)  # those of a start that was given can't be written to, which the kernels are not compiled for
+    knots = np.array(knots)  # those of a given start are read-only, for which the kernels are not compiled
     apart = lengths_apart(states, knots, dimensions, 2.0 * float(np.arccos(within / (APART * diameter))))
     which = np.flatnonzero(apart < knots[-1])
     if len(which) == 0:
