@@ -15,6 +15,7 @@ from dlocore.compiling.caching import is_kept
 from dlocore.front import predict
 from dlocore.kernels.march import march_steps
 from dlocore.prediction import Prediction
+from dlocore.problem.problem import pose
 from dlocore.problem.strands import nearest_strands
 from dlocore.scene.cable import Cable
 from dlocore.scene.obstacles import Sphere
@@ -49,6 +50,23 @@ def warm_up(processes: int | None = None) -> None:
         _compile_in_processes(at_once)
     for part in PARTS.values():
         part()
+
+
+def warm_up_for(scene: Scene) -> None:
+    """Load what a prediction of one scene takes, of all that is compiled; where nothing is, compile all of it.
+
+    A motion that leaves its plane, or turns out to need another effect, loads what that takes as it comes to it.
+
+    Raises:
+        SceneError: the scene can't be solved as it was given.
+    """
+    if not is_kept(march_steps):
+        warm_up()
+        return
+    for name in TAKEN[pose(scene).nc]:
+        PARTS[name]()
+    if scene.quality.method == "reference":
+        PARTS["others"]()
 
 
 def _compile_in_processes(at_once: int) -> None:
@@ -147,6 +165,12 @@ PARTS = {
     "derivatives in space": lambda: _differentiated(None, "off"),
     "derivatives with twist": lambda: _differentiated(None, "on"),
     "others": _others,
+}
+# what motions of two, three and four coordinates take
+TAKEN = {
+    2: ("smooth in a plane", "in a plane"),
+    3: ("smooth in space", "in space"),
+    4: ("smooth in space", "with twist"),
 }
 # what one process compiles, the longest first
 SHARES = (

@@ -267,8 +267,8 @@ def _solve(request: PredictionRequest, deadline: float | None) -> Prediction:
     from tqdm import tqdm
 
     from dlocore import predict as solve
-    from dlocore import warm_up
     from dlocore.calibration import stored_cost
+    from dlocore.warming import warm_up_for
 
     with tqdm(desc="solving", unit=" iterations", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
 
@@ -278,7 +278,7 @@ def _solve(request: PredictionRequest, deadline: float | None) -> Prediction:
 
         try:
             scene = to_scene(request, _stored)
-            warm_up()  # so that the reported time is that of the solve
+            warm_up_for(scene)  # so that the reported time is that of the solve
             cost = stored_cost(_settings().calibration_file) if scene.quality.time_budget is not None else None
             return solve(scene, on_iteration=show, deadline=deadline, cost=cost)
         except SceneError as error:
