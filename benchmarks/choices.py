@@ -26,7 +26,7 @@ from benchmarks.hard.curves import arc, bend
 from benchmarks.machine import machine_line
 from benchmarks.paper_case import errors, paper_scene, reference
 from dlocore import Cable, Environment, Grasp, Move, Points, Prediction, Quality, Scene, Straight, energies, predict
-from dlocore.kernels.basis import GAUSS_2, basis_rows, build_tables, graded_knots
+from dlocore.kernels.basis import GAUSS_2, AxialPoints, basis_rows, build_tables, graded_knots
 from dlocore.levels import given
 from dlocore.levels import level as levels
 from dlocore.problem import discretisation
@@ -63,9 +63,8 @@ def stretch_points(rule: tuple[Any, Any]) -> Callable[..., Any]:
 
     def build(knots: Any, *arguments: Any) -> Any:
         u, w, first, table = gauss_rows(knots, rule, 1)
-        return build_tables(knots, *arguments)._replace(
-            axial_u=u, axial_w=w, axial_first=first, axial_b1=np.ascontiguousarray(table[:, 1])
-        )
+        points = AxialPoints(u, first, np.ascontiguousarray(table[:, 1]), w)
+        return build_tables(knots, *arguments)._replace(axial=points)
 
     return build
 
@@ -75,10 +74,9 @@ def bending_points(rule: tuple[Any, Any]) -> Callable[..., Any]:
 
     def build(knots: Any, *arguments: Any) -> Any:
         u, w, first, table = gauss_rows(knots, rule, 2)
-        b1, b2 = (np.ascontiguousarray(table[:, order]) for order in (1, 2))
-        return build_tables(knots, *arguments)._replace(
-            curvature_u=u, curvature_w=w, curvature_first=first, curvature_b1=b1, curvature_b2=b2
-        )
+        b0, b1, b2 = (np.ascontiguousarray(table[:, order]) for order in range(3))
+        tables = build_tables(knots, *arguments)
+        return tables._replace(curvature=tables.curvature._replace(u=u, first=first, b0=b0, b1=b1, b2=b2, w=w))
 
     return build
 

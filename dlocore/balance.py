@@ -110,7 +110,7 @@ def _motion(
     histories = [grid.past() for _ in at]
     if problem.twist is not None:
         for history, q, director in zip(histories, states, directors(problem, surface, at, material), strict=True):
-            start_frames(grid.knots, q, grid.tables, director, history.past)
+            start_frames(grid.knots, q, grid.tables.curvature, director, history.past)
     if material is not None:
         for q, history, t in zip(states, histories, at, strict=True):
             write_material(problem, grid, q, history, material.at(float(t)))

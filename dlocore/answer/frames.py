@@ -47,9 +47,9 @@ def free_of_frames(problem: Problem, grid: Grid, states: Floats, frames: Floats)
 
 def rates_of(problem: Problem, grid: Grid, states: Floats, frames: Floats) -> Floats:
     """Return the twist rates (k, points) [rad/m] of the states (k, n_u, 4) at the curvature points, see above."""
-    tau = np.empty((len(states), len(grid.tables.curvature_w)))
+    tau = np.empty((len(states), len(grid.tables.curvature.w)))
     _, parameters = problem.laws
-    twist_rates(np.ascontiguousarray(states), grid.tables, parameters, np.ascontiguousarray(frames), tau)
+    twist_rates(np.ascontiguousarray(states), grid.tables.curvature, parameters, np.ascontiguousarray(frames), tau)
     return tau
 
 
@@ -143,8 +143,8 @@ def material_of(
     else:
         directors = carried(_first_director(problem, grid, tangents[0]), tangents)[kept]
         sections, natural = memory[kept], grid.history.memory[:, 3:]
-    u = np.array(grid.tables.curvature_u)
-    stretch = np.array([np.interp(u, grid.tables.axial_u, row) for row in axial[kept]])
+    u = np.array(grid.tables.curvature.u)
+    stretch = np.array([np.interp(u, grid.tables.axial.u, row) for row in axial[kept]])
     return MaterialMotion(
         times=times[kept], director=directors, u=u, memory=sections,
         stretch=stretch, natural=np.array(natural),
@@ -154,7 +154,7 @@ def material_of(
 def stretch_of(problem: Problem, grid: Grid, times: Floats, states: Floats) -> StretchMotion:
     """Return how far a cable is stretched in the states (k, n_u, nc) at the times (k,) [s] of a motion."""
     kept = np.unique(np.linspace(0, len(times) - 1, STRETCH_TIMES).round().astype(int))
-    u = np.unique(np.concatenate([[0.0], grid.tables.axial_u, grid.knots[-1:]]))
+    u = np.unique(np.concatenate([[0.0], grid.tables.axial.u, grid.knots[-1:]]))
     at_points = axial_strain(grid.tables, states[kept][..., : problem.plane.dimensions])
     return StretchMotion(times=times[kept], u=u, strain=at_points @ balanced(problem.scene, grid, u).T)
 
@@ -167,7 +167,7 @@ def _first_director(problem: Problem, grid: Grid, tangent: Floats) -> Floats:
     """
     if not problem.scene.shape.settle or problem.twist is None:
         return _in_one_turn(problem, tangent)
-    past, (u, after) = grid.history.past, grid.tables.curvature_u[:2]
+    past, (u, after) = grid.history.past, grid.tables.curvature.u[:2]
     director = transported(past[0, TANGENT : TANGENT + 3], tangent, past[0, DIRECTOR : DIRECTOR + 3])
     rate = past[0, FRAME] - 0.5 * u * (past[1, FRAME] - past[0, FRAME]) / (after - u)  # half-way
     return turned_about(tangent, director, -float(rate * u))

@@ -32,13 +32,13 @@ def balanced(scene: Scene, grid: Grid, u: Floats) -> Floats:
     steps = np.array([np.heaviside(points - g, 0.5) for g in inside]).reshape(-1, len(points))
     given = np.hstack(
         [
-            _basis(knots, tables.axial_u).T * tables.axial_w,
+            _basis(knots, tables.axial.u).T * tables.axial.w,
             _basis(knots, np.array(sides)).T,
             -at_points.T @ (weights * steps).T,
         ]
     )
     found = np.linalg.solve(mass, given)
-    count = len(tables.axial_w)
+    count = len(tables.axial.w)
     own, others = found[:, :count], found[:, count:]
     begins, ends = np.unique(knots)[:-1], np.unique(knots)[1:]
     curved = (ends - begins)[:, None] ** 2 * _basis(knots, 0.5 * (begins + ends), 2)

@@ -99,7 +99,7 @@ class StartFit:
         p[laws.STRETCH, 0] = max(_AXIAL[0] * _ON_EARTH * density * length, _AXIAL[1] * bending / length**2)
         p[laws.BEND, 0] = bending
         # a motion in a plane, too, starts from a shape that is found in space
-        history = self.grid.past()._replace(room=np.zeros(room_for(len(_AXES), len(tables.curvature_w))))
+        history = self.grid.past()._replace(room=np.zeros(room_for(len(_AXES), len(tables.curvature.w))))
         B = design_matrix(knots, u)
         load = np.asarray(tables.weight)[:, None] * (density * gravity)
         springs = stiffness * np.kron(rows.free.T @ (B.T @ B) @ rows.free, np.eye(3))
@@ -144,11 +144,11 @@ class StartFit:
         tables, n, length = self.grid.tables, len(q), float(self.grid.knots[-1])
         rows = self.rows
         B = design_matrix(self.grid.knots, u)
-        first = _matrix(tables.axial_first, tables.axial_b1, n)
+        first = _matrix(tables.axial.first, tables.axial.b1, n)
         tangent = first @ q
         tangent /= np.linalg.norm(tangent, axis=1)[:, None]
-        second = _matrix(tables.curvature_first, tables.curvature_b2, n)
-        second *= np.sqrt(_EVEN * length**3 * np.asarray(tables.curvature_w))[:, None]
+        second = _matrix(tables.curvature.first, tables.curvature.b2, n)
+        second *= np.sqrt(_EVEN * length**3 * np.asarray(tables.curvature.w))[:, None]
         stretch = (_KEPT_LENGTH * length * first[:, :, None] * tangent[:, None, :]).reshape(len(first), -1)
         J = np.vstack([np.kron(B, np.eye(3)), stretch, np.kron(second, np.eye(3))])
         known = rows.offset @ targets

@@ -22,32 +22,32 @@ def stiffness_across(states: Any, tables: Any, bending: float, axial: float) -> 
     bands = np.zeros((len(states), states.shape[1], 4))
     for s in range(len(states)):
         q, band = states[s], bands[s]
-        for n in range(len(tables.curvature_w)):
-            k = tables.curvature_first[n]
+        for n in range(len(tables.curvature.w)):
+            k = tables.curvature.first[n]
             ax, ay, cx, cy = 0.0, 0.0, 0.0, 0.0
             for i in range(4):
-                ax += tables.curvature_b1[n, i] * q[k + i, 0]
-                ay += tables.curvature_b1[n, i] * q[k + i, 1]
-                cx += tables.curvature_b2[n, i] * q[k + i, 0]
-                cy += tables.curvature_b2[n, i] * q[k + i, 1]
+                ax += tables.curvature.b1[n, i] * q[k + i, 0]
+                ay += tables.curvature.b1[n, i] * q[k + i, 1]
+                cx += tables.curvature.b2[n, i] * q[k + i, 0]
+                cy += tables.curvature.b2[n, i] * q[k + i, 1]
             square, along, across = ax * ax + ay * ay, ax * cx + ay * cy, ax * cy - ay * cx
-            w = bending * tables.curvature_w[n]
+            w = bending * tables.curvature.w[n]
             second, mixed = w / square, -w * along / square**2
             first = w * (cx * cx + cy * cy) / square**2 - 2.0 * w * across * across / square**3
             for j in range(4):
-                b, c = tables.curvature_b1[n, j], tables.curvature_b2[n, j]
+                b, c = tables.curvature.b1[n, j], tables.curvature.b2[n, j]
                 for i in range(j, 4):
-                    bi, ci = tables.curvature_b1[n, i], tables.curvature_b2[n, i]
+                    bi, ci = tables.curvature.b1[n, i], tables.curvature.b2[n, i]
                     band[k + j, i - j] += second * ci * c + first * bi * b + mixed * (bi * c + ci * b)
-        for n in range(len(tables.axial_w)):
-            k = tables.axial_first[n]
+        for n in range(len(tables.axial.w)):
+            k = tables.axial.first[n]
             x, y = 0.0, 0.0
             for i in range(4):
-                x += tables.axial_b1[n, i] * q[k + i, 0]
-                y += tables.axial_b1[n, i] * q[k + i, 1]
+                x += tables.axial.b1[n, i] * q[k + i, 0]
+                y += tables.axial.b1[n, i] * q[k + i, 1]
             length = np.sqrt(x * x + y * y)
-            pull = axial * tables.axial_w[n] * (length - 1.0) / length
+            pull = axial * tables.axial.w[n] * (length - 1.0) / length
             for j in range(4):
                 for i in range(j, 4):
-                    band[k + j, i - j] += pull * tables.axial_b1[n, i] * tables.axial_b1[n, j]
+                    band[k + j, i - j] += pull * tables.axial.b1[n, i] * tables.axial.b1[n, j]
     return bands

@@ -25,8 +25,8 @@ def angles_with(tables: Any, slopes: Any, given: Any, smooth: float) -> Any:
     n, count = len(tables.weight), len(slopes)
     R, right = np.zeros((n, 4)), np.zeros((n, count))
     row, own = np.empty(4), np.empty(count)
-    for span in range(len(tables.curvature_w) // POINTS):
-        T, s, first = tables.curvature_lanes[span // SPANS], span % SPANS, tables.curvature_first[POINTS * span]
+    for span in range(len(tables.curvature.w) // POINTS):
+        T, s, first = tables.curvature.lanes[span // SPANS], span % SPANS, tables.curvature.first[POINTS * span]
         width = added(T, WEIGHT, s)
         for m in range(POINTS):
             lane = SPANS * m + s

@@ -89,33 +89,34 @@ def assemble(
         scales: (stiffness, viscosity, geometric) factors of the tangent.
         f, K: outputs; K is untouched where all scales are zero.
     """
+    points = tables.curvature
     tangent = scales[0] != 0.0 or scales[1] != 0.0
     clear(f)
     if tangent:
         clear(K)
     bends = active[BEND] or active[DAMPING]
     if len(axes) == 2:
-        plane.axial(q, v, tables, active, p, history.axial, history.tension, rates, scales, tangent, f, K)
+        plane.axial(q, v, tables.axial, active, p, history.axial, history.tension, rates, scales, tangent, f, K)
         if bends:
-            plane.curvature(q, v, tables, active, p, history.memory, history.past, rates, scales, tangent, f, K)
+            plane.curvature(q, v, points, active, p, history.memory, history.past, rates, scales, tangent, f, K)
         if active[QUADRATIC_DRAG]:
-            plane.body(q, v, tables, active, p, scales, tangent, f, K)
+            plane.body(q, v, points, active, p, scales, tangent, f, K)
     else:
         past, tension = history.axial, history.tension
-        space.axial(len(axes), q, v, tables, active, p, past, tension, rates, scales, tangent, f, K)
+        space.axial(len(axes), q, v, tables.axial, active, p, past, tension, rates, scales, tangent, f, K)
         if len(axes) == 4:
             memory, room = history.memory, history.room
-            twisted.curvature(q, v, tables, active, p, memory, history.past, rates, scales, tangent, room, f, K)
+            twisted.curvature(q, v, points, active, p, memory, history.past, rates, scales, tangent, room, f, K)
         elif bends:
-            space.curvature(q, v, tables, active, p, history.past, rates, scales, tangent, history.room, f, K)
+            space.curvature(q, v, points, active, p, history.past, rates, scales, tangent, history.room, f, K)
         if active[QUADRATIC_DRAG]:
-            space.body(len(axes), q, v, tables, active, p, scales, tangent, f, K)
+            space.body(len(axes), q, v, points, active, p, scales, tangent, f, K)
     if active[CONTACT]:
         contact.contact(
-            len(axes), q, v, tables, active, p, history.stick, history.pressing, rates[3], scales, tangent, f, K
+            len(axes), q, v, tables.contact, active, p, history.stick, history.pressing, rates[3], scales, tangent, f, K
         )
     if active[FRICTION] and p[FRICTION, 2] > 0.0:
-        contact.lying(len(axes), q, v, tables, p, history.slide, rates[3], scales, tangent, f, K)
+        contact.lying(len(axes), q, v, points, p, history.slide, rates[3], scales, tangent, f, K)
 
 
 @part
@@ -129,12 +130,12 @@ def remember(axes: Any, q: Any, tables: Any, active: Any, p: Any, history: Any, 
     """
     deepest = 0.0
     if active[CONTACT]:
-        deepest = contact.remember(len(axes), q, tables, p, history.stick, history.pressing, loose)
+        deepest = contact.remember(len(axes), q, tables.contact, p, history.stick, history.pressing, loose)
     if active[FRICTION] and p[FRICTION, 2] > 0.0:
-        contact.drag_anchors(len(axes), q, tables, p, history.slide, loose)
+        contact.drag_anchors(len(axes), q, tables.curvature, p, history.slide, loose)
     if active[STRETCH_MEMORY] or active[STRETCH_DAMPING]:
-        for n in range(len(tables.axial_w)):
-            slope = squared_slope(q, tables.axial_first[n], row_of(tables.axial_b1, n), min(len(axes), 3))
+        for n in range(len(tables.axial.w)):
+            slope = squared_slope(q, tables.axial.first[n], row_of(tables.axial.b1, n), min(len(axes), 3))
             strain = np.sqrt(slope) - 1.0
             free, _ = axial_memory(active, p, strain, history.axial[n, 0], history.axial[n, 1], h)
             history.axial[n, 0] = free
@@ -143,11 +144,11 @@ def remember(axes: Any, q: Any, tables: Any, active: Any, p: Any, history: Any, 
     if len(history.past) == 0:
         return deepest
     if len(axes) == 2:
-        plane.remember(q, tables, active, p, history.memory, history.past, h)
+        plane.remember(q, tables.curvature, active, p, history.memory, history.past, h)
     elif len(axes) == 3:
-        space.remember(q, tables, history.past, history.room)
+        space.remember(q, tables.curvature, history.past, history.room)
     else:
-        twisted.remember(q, tables, active, p, history.memory, history.past, h, history.room)
+        twisted.remember(q, tables.curvature, active, p, history.memory, history.past, h, history.room)
     return deepest
 
 
@@ -173,16 +174,16 @@ def stored_energy(axes: Any, q: Any, tables: Any, active: Any, p: Any, history: 
     """Return the elastic energy [J] of the control points q (n, nc)."""
     if len(axes) == 2:
         return plane.energy(q, tables, active, p, history.memory, history.axial)
-    total = space.axial_energies(q, tables, active, p, history.axial)
+    total = space.axial_energies(q, tables.axial, active, p, history.axial)
     if len(axes) == 4:
-        return total + twisted.energy(q, tables, active, p, history.memory, history.past)
-    return total + space.energy(q, tables, active, p)
+        return total + twisted.energy(q, tables.curvature, active, p, history.memory, history.past)
+    return total + space.energy(q, tables.curvature, active, p)
 
 
 @leaf
 def contact_energy(axes: Any, q: Any, tables: Any, active: Any, p: Any) -> float:
     """Return the potential of contact [J] at the control points q (n, nc)."""
-    return contact.energy(len(axes), q, tables, active, p) if active[CONTACT] else 0.0
+    return contact.energy(len(axes), q, tables.contact, active, p) if active[CONTACT] else 0.0
 
 
 @leaf
@@ -200,21 +201,21 @@ def slopes(states: Any, every: int, first: Any, b1: Any) -> tuple[float, float]:
 
 
 @leaf
-def largest_curvature(axes: Any, states: Any, tables: Any, memory: Any) -> float:
+def largest_curvature(axes: Any, states: Any, points: Any, memory: Any) -> float:
     """Return the largest |kappa - kappa_0| [1/m] at the curvature points over the states (k, n, nc).
 
     In space without twist the stress-free shape is straight; with twist, what it is bent by is left out.
     """
     largest = 0.0
     for s in range(len(states)):
-        for n in range(len(tables.curvature_w)):
-            k = tables.curvature_first[n]
+        for n in range(len(points.w)):
+            k = points.first[n]
             if len(axes) == 2:
-                kappa = plane.curvature_at(states[s], tables, n) - memory[n, 0]
+                kappa = plane.curvature_at(states[s], points, n) - memory[n, 0]
                 largest = max(largest, abs(kappa))
             else:
-                a = space.combine(states[s], k, row_of(tables.curvature_b1, n))
-                bend = space_curvature(a, space.combine(states[s], k, row_of(tables.curvature_b2, n)))[3]
+                a = space.combine(states[s], k, row_of(points.b1, n))
+                bend = space_curvature(a, space.combine(states[s], k, row_of(points.b2, n)))[3]
                 largest = max(largest, np.sqrt(bend[0] * bend[0] + bend[1] * bend[1] + bend[2] * bend[2]))
     return largest
 

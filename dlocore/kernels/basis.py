@@ -178,42 +178,94 @@ def row_of(table: Any, i: int) -> tuple[float, float, float, float]:
     return table[i, 0], table[i, 1], table[i, 2], table[i, 3]
 
 
-class Tables(NamedTuple):
-    """Basis functions at the quadrature points of a set of knots.
+class AxialPoints(NamedTuple):
+    """Quadrature points of the stretch: one a span and two in an end span whose end direction is free.
 
-    `*_first` (p,): index of the first of the four control points at each point; `*_b1` (p, 4): first derivatives of
-    their basis functions [1/m], `*_b2` second [1/m^2], `*_b0` values; `*_w` (p,): weights [m]; `curvature_pairs`: see
-    `pairs.py`; `curvature_lanes`: see `lanes.py`. Axial points: one a span and two in an end span whose end direction
-    is free (selective reduced integration, docs/model.md). Curvature and body points: three a span. Contact nodes:
-    every span in parts of one length, with their ends, once for the table, the first `table_nodes`, and once for the
-    obstacles, where one node in a `cell` of them is enough away from edges; none where contact is off. Strand nodes:
-    ends of the segments, as long on every grid, that the cable's contact with itself looks at; none where that is off.
-    `mass` (n, 4): integrals of b_i b_{i+d} du [m]; `weight` (n,): integrals of b_i du [m].
+    That is selective reduced integration, docs/model.md.
+
+    Attributes:
+        u: (p,) [m].
+        first: (p,) index of the first of the four control points at each.
+        b1: (p, 4) first derivatives of their basis functions [1/m].
+        w: (p,) weights [m].
     """
 
-    axial_u: Any
-    axial_first: Any
-    axial_b1: Any
-    axial_w: Any
-    curvature_u: Any
-    curvature_first: Any
-    curvature_b1: Any
-    curvature_b2: Any
-    curvature_w: Any
-    curvature_pairs: Any
-    curvature_lanes: Any
-    body_first: Any
-    body_b0: Any
-    body_w: Any
-    contact_u: Any
-    contact_first: Any
-    contact_b0: Any
-    contact_w: Any
+    u: Any
+    first: Any
+    b1: Any
+    w: Any
+
+
+class CurvaturePoints(NamedTuple):
+    """Quadrature points of bending, twist and forces on the body of the cable: three a span.
+
+    Attributes:
+        u: (p,) [m].
+        first: (p,) index of the first of the four control points at each.
+        b0, b1, b2: (p, 4) values [-] and first and second derivatives [1/m, 1/m^2] of their basis functions.
+        w: (p,) weights [m].
+        pairs: see `pairs.py`.
+        lanes: see `lanes.py`.
+    """
+
+    u: Any
+    first: Any
+    b0: Any
+    b1: Any
+    b2: Any
+    w: Any
+    pairs: Any
+    lanes: Any
+
+
+class ContactNodes(NamedTuple):
+    """Nodes of contact: every span in parts of one length, with their ends, twice; none where contact is off.
+
+    Attributes:
+        u: (p,) [m].
+        first: (p,) index of the first of the four control points at each.
+        b0: (p, 4) values of their basis functions.
+        w: (p,) weights [m].
+        table_nodes: how many of them, the first, are for the table; the others are for the obstacles.
+        cell: of how many of the latter one is enough away from edges.
+    """
+
+    u: Any
+    first: Any
+    b0: Any
+    w: Any
     table_nodes: Any
     cell: Any
-    strand_u: Any
-    strand_first: Any
-    strand_b0: Any
+
+
+class StrandNodes(NamedTuple):
+    """Ends of the segments, as long on every grid, that contact of the cable with itself looks at; none without it.
+
+    Attributes:
+        u: (p,) [m].
+        first: (p,) index of the first of the four control points at each.
+        b0: (p, 4) values of their basis functions.
+    """
+
+    u: Any
+    first: Any
+    b0: Any
+
+
+class Tables(NamedTuple):
+    """Basis functions of a set of knots at the points that kernels look at: each kernel is given those it needs.
+
+    Attributes:
+        axial, curvature: quadrature points.
+        contact, strands: nodes.
+        mass: (n, 4) integrals of b_i b_{i+d} du [m].
+        weight: (n,) integrals of b_i du [m].
+    """
+
+    axial: AxialPoints
+    curvature: CurvaturePoints
+    contact: ContactNodes
+    strands: StrandNodes
     mass: Any
     weight: Any
 
@@ -326,8 +378,8 @@ def build_tables(
     """Return `Tables` of the clamped cubic `knots`.
 
     `free_*`: the direction at that end of the cable is free; `above`, `spacing`: largest distance of contact nodes for
-    the table and for obstacles [m]; `cell`: see `Tables`; `segment`: largest distance of strand nodes [m]. A distance
-    is infinite for none.
+    the table and for obstacles [m]; `cell`: see `ContactNodes`; `segment`: largest distance of strand nodes [m]. A
+    distance is infinite for none.
     """
     u, axial_w = _axial_points(knots, free_start, free_end, rule2, w2)
     axial_first, table = basis_rows(knots, u, 1)
@@ -356,9 +408,8 @@ def build_tables(
             weight[f + i] += weights4[p] * table4[p, 0, i]
             for j in range(i, 4):
                 mass[f + i, j - i] += weights4[p] * table4[p, 0, i] * table4[p, 0, j]
-    return Tables(
-        u, axial_first, axial_b1, axial_w, curvature_u, curvature_first, b1, b2, curvature_w, pair_products(b1, b2),
-        side_by_side(curvature_first, curvature_u, curvature_w, b0, b1, b2), curvature_first, b0, curvature_w,
-        contact_u, contact_first, contact_b0, contact_w, len(u_above), cell, strand_u, strand_first, strand_b0, mass,
-        weight,
-    )  # fmt: skip
+    axial = AxialPoints(u, axial_first, axial_b1, axial_w)
+    lanes = side_by_side(curvature_first, curvature_u, curvature_w, b0, b1, b2)
+    curvature = CurvaturePoints(curvature_u, curvature_first, b0, b1, b2, curvature_w, pair_products(b1, b2), lanes)
+    contact = ContactNodes(contact_u, contact_first, contact_b0, contact_w, len(u_above), cell)
+    return Tables(axial, curvature, contact, StrandNodes(strand_u, strand_first, strand_b0), mass, weight)

@@ -43,9 +43,9 @@ def _point(nc: int, q: Any, k: int, b: tuple[float, float, float, float]) -> Vec
 
 
 @law
-def _met_at(tables: Any, p: Any, n: int) -> tuple[int, int]:
+def _met_at(nodes: Any, p: Any, n: int) -> tuple[int, int]:
     """Return the first contact that node n may meet, and the one after the last: the table, or the obstacles."""
-    return (COUNT - 1, COUNT) if n < tables.table_nodes else (COUNT, len(p))
+    return (COUNT - 1, COUNT) if n < nodes.table_nodes else (COUNT, len(p))
 
 
 @law
@@ -97,7 +97,7 @@ def _mixed(a: float, A: Symmetric, b: float, B: Symmetric) -> Symmetric:
 
 @part
 def contact(
-    nc: int, q: Any, v: Any, tables: Any, active: Any, p: Any, stick: Any, weights: Any, h: float, scales: Any,
+    nc: int, q: Any, v: Any, nodes: Any, active: Any, p: Any, stick: Any, weights: Any, h: float, scales: Any,
     tangent: bool, f: Any, K: Any,
 ) -> None:  # fmt: skip
     """Subtract the forces, and add the tangents, of contact with table and obstacles and of friction on them.
@@ -105,15 +105,15 @@ def contact(
     `weights` (nodes,) [m]: of the nodes, zero where another stands for one.
     """
     elastic, viscous, geometric = scales
-    firsts, b0, places = tables.contact_first, tables.contact_b0, tables.contact_u
+    firsts, b0, places = nodes.first, nodes.b0, nodes.u
     k_n, width, damping = p[CONTACT, 1], p[CONTACT, 2], p[CONTACT, 3]
     reach = 0.0  # up to where nothing can touch
     for n in range(len(weights)):
-        if n == tables.table_nodes:
+        if n == nodes.table_nodes:
             reach = 0.0
         if places[n] < reach or weights[n] == 0.0:
             continue
-        begin, end = _met_at(tables, p, n)
+        begin, end = _met_at(nodes, p, n)
         k, w = firsts[n], weights[n]
         b = row_of(b0, n)
         x = _point(nc, q, k, b)
@@ -145,50 +145,50 @@ def contact(
 
 
 @leaf
-def energy(nc: int, q: Any, tables: Any, active: Any, p: Any) -> float:
+def energy(nc: int, q: Any, nodes: Any, active: Any, p: Any) -> float:
     """Return the potential of the contact [J]."""
     total = 0.0
     k, w = p[CONTACT, 1], p[CONTACT, 2]
-    for n in range(len(tables.contact_w)):
-        x = _point(nc, q, tables.contact_first[n], row_of(tables.contact_b0, n))
-        begin, end = _met_at(tables, p, n)
+    for n in range(len(nodes.w)):
+        x = _point(nc, q, nodes.first[n], row_of(nodes.b0, n))
+        begin, end = _met_at(nodes, p, n)
         for i in range(begin, end):
             d = -_gap(p, i, x)[0]
             if d > w:
-                total += tables.contact_w[n] * k * (0.5 * d * (d - w) + w * w / 6.0)
+                total += nodes.w[n] * k * (0.5 * d * (d - w) + w * w / 6.0)
             elif d > 0.0:
-                total += tables.contact_w[n] * k * d * d * d / (6.0 * w)
+                total += nodes.w[n] * k * d * d * d / (6.0 * w)
     return total
 
 
 @law
-def _nearest_within(nc: int, q: Any, tables: Any, p: Any, i: int, n: int, way: float) -> float:
+def _nearest_within(nc: int, q: Any, nodes: Any, p: Any, i: int, n: int, way: float) -> float:
     """Return the smallest gap [m] from contact i of its nodes within `way` [m] of node n; one below 0 will do."""
-    first, last = (0, tables.table_nodes) if i < COUNT else (tables.table_nodes, len(tables.contact_u))
+    first, last = (0, nodes.table_nodes) if i < COUNT else (nodes.table_nodes, len(nodes.u))
     nearest = np.inf
     for side in (-1, 1):
         m = n if side < 0 else n + 1
-        while first <= m < last and abs(tables.contact_u[m] - tables.contact_u[n]) <= way and nearest > 0.0:
-            x = _point(nc, q, tables.contact_first[m], row_of(tables.contact_b0, m))
+        while first <= m < last and abs(nodes.u[m] - nodes.u[n]) <= way and nearest > 0.0:
+            x = _point(nc, q, nodes.first[m], row_of(nodes.b0, m))
             nearest = min(nearest, _gap(p, i, x)[0])
             m += side
     return nearest
 
 
 @leaf
-def strikes(nc: int, q0: Any, q1: Any, tables: Any, p: Any, weights: Any, least: float) -> bool:
+def strikes(nc: int, q0: Any, q1: Any, nodes: Any, p: Any, weights: Any, least: float) -> bool:
     """Tell whether a node comes by more than `least` [m], from q0 to q1 (n, nc), towards what it newly touches.
 
     It does not come towards it by sliding to where others were, as around an edge.
     """
     reach = 0.0
     for n in range(len(weights)):
-        if n == tables.table_nodes:
+        if n == nodes.table_nodes:
             reach = 0.0
-        if tables.contact_u[n] < reach or weights[n] == 0.0:
+        if nodes.u[n] < reach or weights[n] == 0.0:
             continue
-        begin, end = _met_at(tables, p, n)
-        k, b = tables.contact_first[n], row_of(tables.contact_b0, n)
+        begin, end = _met_at(nodes, p, n)
+        k, b = nodes.first[n], row_of(nodes.b0, n)
         x = _point(nc, q1, k, b)
         nearest = np.inf
         for i in range(begin, end):
@@ -200,10 +200,10 @@ def strikes(nc: int, q0: Any, q1: Any, tables: Any, p: Any, weights: Any, least:
                 if before > 0.0 and before - gap > least:
                     move = (x[0] - y[0], x[1] - y[1], x[2] - y[2])
                     way = _PASSED * np.sqrt(max(0.0, dot(move, move) - dot(move, normal) ** 2))
-                    before = _nearest_within(nc, q0, tables, p, i, n, way)
+                    before = _nearest_within(nc, q0, nodes, p, i, n, way)
                     if before > 0.0 and before - gap > least:
                         return True
-        reach = tables.contact_u[n] + _SLACK * nearest
+        reach = nodes.u[n] + _SLACK * nearest
     return False
 
 
@@ -223,7 +223,7 @@ def _between(x: Vector, y: Vector, s: float) -> Vector:
 
 
 @leaf
-def passes(nc: int, q0: Any, q1: Any, tables: Any, p: Any, weights: Any) -> bool:
+def passes(nc: int, q0: Any, q1: Any, nodes: Any, p: Any, weights: Any) -> bool:
     """Tell whether a node goes through an obstacle on its straight way from q0 to q1 (n, nc), as a step too long may.
 
     The distance from a convex body is convex along a straight way, so that its least is found by thirds.
@@ -238,10 +238,10 @@ def passes(nc: int, q0: Any, q1: Any, tables: Any, p: Any, weights: Any) -> bool
         longest = max(longest, square)
     longest = np.sqrt(longest)
     reach = 0.0  # up to where nothing is near enough
-    for n in range(tables.table_nodes, len(weights)):
-        if tables.contact_u[n] < reach or weights[n] == 0.0:
+    for n in range(nodes.table_nodes, len(weights)):
+        if nodes.u[n] < reach or weights[n] == 0.0:
             continue
-        k, b = tables.contact_first[n], row_of(tables.contact_b0, n)
+        k, b = nodes.first[n], row_of(nodes.b0, n)
         x, y = _point(nc, q0, k, b), _point(nc, q1, k, b)
         way = np.sqrt((y[0] - x[0]) ** 2 + (y[1] - x[1]) ** 2 + (y[2] - x[2]) ** 2)
         nearest = np.inf
@@ -264,12 +264,12 @@ def passes(nc: int, q0: Any, q1: Any, tables: Any, p: Any, weights: Any) -> bool
                     low = left
             if least < deep and least < min(begin, end) + _LEAVES * deep:
                 return True
-        reach = tables.contact_u[n] + _SLACK * (nearest - longest)
+        reach = nodes.u[n] + _SLACK * (nearest - longest)
     return False
 
 
 @law
-def _met(tables: Any, p: Any, n: int, x: Vector, near: float) -> tuple[float, float, Vector, float]:
+def _met(nodes: Any, p: Any, n: int, x: Vector, near: float) -> tuple[float, float, Vector, float]:
     """Return what node n at x meets.
 
     Returns:
@@ -277,7 +277,7 @@ def _met(tables: Any, p: Any, n: int, x: Vector, near: float) -> tuple[float, fl
         is from an edge of what is nearer than `near` [m].
     """
     nearest, depth, normal, inside = np.inf, 0.0, _ANY, np.inf
-    begin, end = _met_at(tables, p, n)
+    begin, end = _met_at(nodes, p, n)
     for i in range(begin, end):
         gap, gradient, _, mu = _gap(p, i, x)
         nearest = min(nearest, gap)
@@ -305,25 +305,25 @@ def _drag(p: Any, stick: Any, n: int, x: Vector, depth: float, normal: Vector) -
 
 
 @leaf
-def remember(nc: int, q: Any, tables: Any, p: Any, stick: Any, pressing: Any, loose: bool) -> float:
+def remember(nc: int, q: Any, nodes: Any, p: Any, stick: Any, pressing: Any, loose: bool) -> float:
     """Drag the anchors of the friction behind q, note where few nodes will do, and return the largest depth [m].
 
     Where the cable is `loose`, as at the start, the anchors are put under it.
     """
     deepest = 0.0
     reach = 0.0
-    first, b0, u, weights = tables.contact_first, tables.contact_b0, tables.contact_u, tables.contact_w
+    first, b0, u, weights = nodes.first, nodes.b0, nodes.u, nodes.w
     n = 0
     while n < len(weights):
-        if n == tables.table_nodes:
+        if n == nodes.table_nodes:
             reach = 0.0
-        cell = 1 if n < tables.table_nodes else min(tables.cell, len(weights) - n)
+        cell = 1 if n < nodes.table_nodes else min(nodes.cell, len(weights) - n)
         few, middle, total, x = False, n + cell // 2, 0.0, _ANY
         if cell > 1 and u[n + cell - 1] >= reach:
             x = _point(nc, q, first[middle], row_of(b0, middle))
             long = u[n + cell - 1] - u[n]
             near = 0.5 * _INSIDE * long
-            nearest, depth, normal, inside = _met(tables, p, middle, x, near)
+            nearest, depth, normal, inside = _met(nodes, p, middle, x, near)
             few = nearest < near and inside > _INSIDE * long
             if few:
                 deepest = max(deepest, -nearest)
@@ -340,7 +340,7 @@ def remember(nc: int, q: Any, tables: Any, p: Any, stick: Any, pressing: Any, lo
                 continue
             nearest, depth, normal = np.inf, 0.0, _ANY
             if u[m] >= reach:
-                nearest, depth, normal, _ = _met(tables, p, m, y, 0.0)
+                nearest, depth, normal, _ = _met(nodes, p, m, y, 0.0)
                 reach = u[m] + _SLACK * nearest
             deepest = max(deepest, -nearest)
             _drag(p, stick, m, y, 0.0 if loose else depth, normal)
@@ -352,14 +352,14 @@ def remember(nc: int, q: Any, tables: Any, p: Any, stick: Any, pressing: Any, lo
 
 @part
 def lying(
-    nc: int, q: Any, v: Any, tables: Any, p: Any, slide: Any, h: float, scales: Any, tangent: bool, f: Any, K: Any
+    nc: int, q: Any, v: Any, points: Any, p: Any, slide: Any, h: float, scales: Any, tangent: bool, f: Any, K: Any
 ) -> None:
     """Subtract the friction, and add its tangents, of a cable that lies on the table and moves in its plane."""
     elastic, viscous, _ = scales
     limit = p[FRICTION, 2]
-    for n in range(len(tables.body_w)):
-        k, w = tables.body_first[n], tables.body_w[n]
-        b = row_of(tables.body_b0, n)
+    for n in range(len(points.w)):
+        k, w = points.first[n], points.w[n]
+        b = row_of(points.b0, n)
         u = _point(nc, v, k, b)
         slip = _ANY
         if h != 0.0:
@@ -372,10 +372,10 @@ def lying(
 
 
 @leaf
-def drag_anchors(nc: int, q: Any, tables: Any, p: Any, slide: Any, loose: bool) -> None:
+def drag_anchors(nc: int, q: Any, points: Any, p: Any, slide: Any, loose: bool) -> None:
     """Drag the anchors of a lying cable behind q; put them under it where it is `loose`, as at the start."""
     for n in range(len(slide)):
-        x = _point(nc, q, tables.body_first[n], row_of(tables.body_b0, n))
+        x = _point(nc, q, points.first[n], row_of(points.b0, n))
         a, b = x[0] - slide[n, 0], x[1] - slide[n, 1]
         size = np.sqrt(a * a + b * b)
         kept = 0.0 if loose else 1.0 if size <= p[FRICTION, 0] else p[FRICTION, 0] / size

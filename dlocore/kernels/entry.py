@@ -63,8 +63,8 @@ def begin_stretch(
     K = np.empty((1, 1))
     assemble(axes, q, before, tables, active, p, history, rates, (0.0, 0.0, 0.0), G, K)
     if active[SELF_CONTACT]:
-        x = np.empty((len(tables.strand_u), min(nc, 3)))
-        press(q, v, tables, p, x, nothing_known(len(q), nc), G)
+        x = np.empty((len(tables.strands.u), min(nc, 3)))
+        press(q, v, tables.strands, p, x, nothing_known(len(q), nc), G)
     if keeps_history(active):
         remember(axes, q, tables, active, p, history, 0.0, False)
     multiply_scalar_band(dragged * unit, v, 1.0, G)

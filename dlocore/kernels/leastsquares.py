@@ -68,10 +68,10 @@ def collocation(knots: Any) -> Any:
 
 
 @leaf
-def _strain(tables: Any, n: int, q: Any) -> float:
+def _strain(points: Any, n: int, q: Any) -> float:
     """Return the axial strain of control points q (n, nc) at the n-th axial point."""
-    row = row_of(tables.axial_b1, n)
-    return np.sqrt(squared_slope(q, tables.axial_first[n], row, min(q.shape[1], 3))) - 1.0
+    row = row_of(points.b1, n)
+    return np.sqrt(squared_slope(q, points.first[n], row, min(q.shape[1], 3))) - 1.0
 
 
 @kernel
@@ -98,7 +98,7 @@ def resting_strains(
         share = (at[k] - times[s]) / h
         axial = behind[min(k, len(behind) - 1)]
         for n in range(behind.shape[1]):
-            before, after = _strain(tables, n, states[s]), _strain(tables, n, states[s + 1])
+            before, after = _strain(tables.axial, n, states[s]), _strain(tables.axial, n, states[s + 1])
             strain = (1.0 - share) * before + share * after
             tension = stiffness * (strain - axial[n, 0]) + viscosity * (after - before) / h
             out[k, n, 0], out[k, n, 1], out[k, n, 2] = strain - tension / soft, axial[n, 1], axial[n, 2]

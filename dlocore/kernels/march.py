@@ -134,7 +134,7 @@ def march_steps(
     v1 = np.empty((n, nc))
     a1 = np.empty((n, nc))
     # contact of the cable with itself: nodes before, at and after an update, pairs, and the widened tangent
-    shape = (len(tables.strand_u) if tight else 0, min(nc, 3))
+    shape = (len(tables.strands.u) if tight else 0, min(nc, 3))
     x0, x1, x2 = np.empty(shape), np.empty(shape), np.empty(shape)
     near = nothing_known(n, nc)
     row_end = np.zeros(free if tight else 0, np.int64)
@@ -189,7 +189,7 @@ def march_steps(
                     a1[i, d] = ta * (q1[i, d] - q0[i, d] - h * v[i, d]) - carry * a[i, d]
                     v1[i, d] = v[i, d] + h * ((1.0 - gm) * a[i, d] + gm * a1[i, d])
             if tight and robust:
-                share = clear(q0, q1, tables, p, x0, x1, near)
+                share = clear(q0, q1, tables.strands, p, x0, x1, near)
                 if share < 1.0:
                     converged = False
                     continue  # what is held passes through a strand
@@ -204,7 +204,7 @@ def march_steps(
                 scales = (1.0, tv, 1.0) if refactor else (0.0, 0.0, 0.0)
                 assemble(axes, q1, v1, tables, active, p, history, rates, scales, f, K)
                 if tight:
-                    pairs, depth = press(q1, v1, tables, p, x1, near, f)
+                    pairs, depth = press(q1, v1, tables.strands, p, x1, near, f)
                 residual(nc, rows, density, dragged, al_m, al_f, a, a1, v1, load, G, f, R, stacked)
                 reduce_vector(e, flat, x)
                 if refactor:
@@ -213,7 +213,7 @@ def march_steps(
                     wide = pairs > 0
                     if wide:
                         part = (1.0 - al_f, (1.0 - al_f) * tv, 1.0 - al_f)
-                        widen(nc, v1, tables, p, x1, near.met[0], pairs, part, e, A[:free], row_end, S)
+                        widen(nc, v1, tables.strands, p, x1, near.met[0], pairs, part, e, A[:free], row_end, S)
                     if (factor_wide(S, row_end, filled, columns) if wide else factor_step(A, free)) >= 0:
                         if not robust:
                             break
@@ -224,7 +224,7 @@ def march_steps(
                         reduce_matrix(e, K, A)
                         if wide:
                             part = (1.0 - al_f, (1.0 - al_f) * tv, 0.0)
-                            widen(nc, v1, tables, p, x1, near.met[0], pairs, part, e, A[:free], row_end, S)
+                            widen(nc, v1, tables.strands, p, x1, near.met[0], pairs, part, e, A[:free], row_end, S)
                         if (factor_wide(S, row_end, filled, columns) if wide else factor_step(A, free)) >= 0:
                             break
                     fresh = True
@@ -248,7 +248,7 @@ def march_steps(
                     break
                 length = 1.0
                 if tight and robust:
-                    length = clear(q1, q1 + step_change, tables, p, x1, x2, near)
+                    length = clear(q1, q1 + step_change, tables.strands, p, x1, x2, near)
                 work = 0.0
                 if robust and update > tolerance:
                     for i in range(free):
@@ -262,7 +262,7 @@ def march_steps(
                         a2 = a1 + (length * ta) * step_change
                         assemble(axes, q2, v2, tables, active, p, history, rates, (0.0, 0.0, 0.0), f, K)
                         if tight:
-                            pairs, depth = press(q2, v2, tables, p, x2, near, f)
+                            pairs, depth = press(q2, v2, tables.strands, p, x2, near, f)
                         residual(nc, rows, density, dragged, al_m, al_f, a, a2, v2, load, G, f, R, stacked)
                         reduce_vector(e, flat, x)
                         after = 0.0
@@ -295,7 +295,7 @@ def march_steps(
                     first_contraction, first_update, unmeasured = contraction, previous, 0
                 converged = left <= tolerance and length == 1.0
                 if converged or assumes:
-                    point_on(nc, q1, step_change, tables, history.tension)
+                    point_on(nc, q1, step_change, tables.axial, history.tension)
                 if converged:
                     info[LEFT] = max(info[LEFT], left)
                     break
@@ -307,13 +307,13 @@ def march_steps(
                     fresh = contraction <= _REFRESH
                 previous = update
             if converged and tight and not robust:
-                share = clear(q0, q1, tables, p, x0, x1, near)
+                share = clear(q0, q1, tables.strands, p, x0, x1, near)
                 converged = share == 1.0
             struck = False
             if converged and not late and touches:
-                struck = strikes(nc, q0, q1, tables, p, history.pressing, _STRIKE * h)
+                struck = strikes(nc, q0, q1, tables.contact, p, history.pressing, _STRIKE * h)
             if converged and not late and pairs > 0:
-                struck = struck or closing(q0, q1, tables, p, x0, x1, near.met[0], pairs) > _STRIKE * h
+                struck = struck or closing(q0, q1, tables.strands, p, x0, x1, near.met[0], pairs) > _STRIKE * h
             if struck:
                 if k >= info[DIVIDED_FROM]:
                     info[FAILED_STEP], info[STRUCK] = k, 1.0
@@ -324,7 +324,7 @@ def march_steps(
                 continue
             if converged:
                 break
-        if not converged or (touches and passes(nc, q0, q1, tables, p, history.pressing)):
+        if not converged or (touches and passes(nc, q0, q1, tables.contact, p, history.pressing)):
             info[FAILED_STEP] = k
             return
         keep(history.tension)
@@ -333,7 +333,7 @@ def march_steps(
         if anew:
             assemble(axes, q1, v1, tables, active, p, history, rates, (0.0, 0.0, 0.0), f, K)
             if tight:
-                pairs, depth = press(q1, v1, tables, p, x1, near, f)
+                pairs, depth = press(q1, v1, tables.strands, p, x1, near, f)
                 info[DEEPEST] = max(info[DEEPEST], depth)
             residual(nc, rows, density, dragged, al_m, al_f, a, a1, v1, load, G, f, R, stacked)
         if keeps:

@@ -64,7 +64,7 @@ def smooth_motion(
     one = np.int64(1)
     tables = build_tables(knots, free_start, free_end, rule2, w2, rule3, w3, rule4, w4, np.inf, np.inf, one, np.inf)
     n, nc = start.shape
-    points, stretched = len(tables.curvature_w), len(tables.axial_w)
+    points, stretched = len(tables.curvature.w), len(tables.axial.w)
     history = History(
         memory.copy() if len(memory) > 0 else np.zeros((points, MEMORY_IN_PLANE if nc == 2 else MEMORY_IN_SPACE)),
         np.zeros((points if keeps_curvature(active) else 0, PAST_IN_PLANE if nc == 2 else PAST_IN_SPACE)),
@@ -109,9 +109,9 @@ def smooth_motion(
     if h * jump > least_jump:
         closed = after_jump(e, offsets[:near], times[1] - times[0], states[0], states[1], h)
     control, off = fitted(knots_t, times[near:], states, closed, nc)
-    least, most = slopes(states, 1, tables.axial_first, tables.axial_b1)
+    least, most = slopes(states, 1, tables.axial.first, tables.axial.b1)
     info[STRAIN] = max(0.0, most - 1.0, 1.0 - least)
-    info[LEAST_SLOPE], info[MOST_SLOPE] = slopes(states, every, tables.curvature_first, tables.curvature_b1)
+    info[LEAST_SLOPE], info[MOST_SLOPE] = slopes(states, every, tables.curvature.first, tables.curvature.b1)
     if looks > 0:
         # by np.expand_dims they would be arrays of another kind, for which the rest would be compiled anew
         m, past, axial = history.memory, history.past, history.axial

@@ -43,34 +43,34 @@ def nothing_known(n: int, nc: int) -> Any:
 
 
 @law
-def _place(q: Any, tables: Any, n: int, x: Any) -> None:
-    k = tables.strand_first[n]
+def _place(q: Any, nodes: Any, n: int, x: Any) -> None:
+    k = nodes.first[n]
     for d in range(x.shape[1]):
         value = 0.0
         for i in range(4):
-            value += tables.strand_b0[n, i] * q[k + i, d]
+            value += nodes.b0[n, i] * q[k + i, d]
         x[n, d] = value
 
 
 @leaf
-def place_nodes(q: Any, tables: Any, x: Any) -> None:
+def place_nodes(q: Any, nodes: Any, x: Any) -> None:
     """Write the positions x (nodes, 2 or 3) [m] of the strand nodes of the control points q (n, nc)."""
     for n in range(len(x)):
-        _place(q, tables, n, x)
+        _place(q, nodes, n, x)
 
 
 @leaf
-def place_pairs(q: Any, tables: Any, pairs: Any, count: int, x: Any) -> None:
+def place_pairs(q: Any, nodes: Any, pairs: Any, count: int, x: Any) -> None:
     """Do what `place_nodes` does for the ends of `count` pairs of segments; other nodes may stay as they are."""
     if 2 * count > len(x):
-        place_nodes(q, tables, x)
+        place_nodes(q, nodes, x)
         return
     for c in range(count):
         for side in range(2):
             i = pairs[c, side]
             if c == 0 or pairs[c - 1, side] != i:
-                _place(q, tables, i, x)
-                _place(q, tables, i + 1, x)
+                _place(q, nodes, i, x)
+                _place(q, nodes, i + 1, x)
 
 
 @leaf
@@ -89,19 +89,19 @@ def _is_known(q: Any, seen: Any, count: int, nd: int, D: float) -> bool:
 
 
 @kernel
-def look(q: Any, tables: Any, p: Any, x: Any, near: Any) -> None:
+def look(q: Any, nodes: Any, p: Any, x: Any, near: Any) -> None:
     """Place the nodes x of the pairs that may meet at the control points q (n, nc), of which `near` has all then."""
     D = p[SELF_CONTACT, 0]
     if _is_known(q, near.seen, near.count[0], x.shape[1], D):
-        place_pairs(q, tables, near.pairs[0], near.count[0], x)
+        place_pairs(q, nodes, near.pairs[0], near.count[0], x)
         return
-    place_nodes(q, tables, x)
-    near.pairs[0], near.count[0] = near_pairs(x, tables.strand_u, (1.0 + _ROOM) * D, p[SELF_CONTACT, 4], near.pairs[0])
+    place_nodes(q, nodes, x)
+    near.pairs[0], near.count[0] = near_pairs(x, nodes.u, (1.0 + _ROOM) * D, p[SELF_CONTACT, 4], near.pairs[0])
     near.seen[:] = q
 
 
 @kernel
-def clear(q0: Any, q1: Any, tables: Any, p: Any, x0: Any, x1: Any, near: Any) -> float:
+def clear(q0: Any, q1: Any, nodes: Any, p: Any, x0: Any, x1: Any, near: Any) -> float:
     """Return how far, 0 to 1, the cable may go from q0 straight to q1 (n, nc) without strands passing strands.
 
     x0, x1 (nodes, 2 or 3) are written, for pairs at least that are near each other.
@@ -109,10 +109,10 @@ def clear(q0: Any, q1: Any, tables: Any, p: Any, x0: Any, x1: Any, near: Any) ->
     D = p[SELF_CONTACT, 0]
     pairs, seen, count, nd = near.pairs[0], near.seen, near.count[0], x0.shape[1]
     if _is_known(q0, seen, count, nd, D) and _is_known(q1, seen, count, nd, D):
-        place_pairs(q0, tables, pairs, count, x0)
-        place_pairs(q1, tables, pairs, count, x1)
+        place_pairs(q0, nodes, pairs, count, x0)
+        place_pairs(q1, nodes, pairs, count, x1)
         return clear_way_of(x0, x1, D, pairs, count)
-    place_nodes(q0, tables, x0)
-    place_nodes(q1, tables, x1)
+    place_nodes(q0, nodes, x0)
+    place_nodes(q1, nodes, x1)
     found = np.empty((_FIRST, 2), np.int64)
-    return clear_way(x0, x1, tables.strand_u, D, p[SELF_CONTACT, 4], found)[1]
+    return clear_way(x0, x1, nodes.u, D, p[SELF_CONTACT, 4], found)[1]

@@ -1,7 +1,7 @@
 """Tangents of the curvature points of a knot span, added up before they go into the band.
 
 What a point adds to the block of the tangent between control points i and j is a sum of blocks of the point, each times
-a product of a derivative of a basis function of i and one of j. `Tables.curvature_pairs` (points, PAIRS, 4) has these
+a product of a derivative of a basis function of i and one of j. `Tables.curvature.pairs` (points, PAIRS, 4) has these
 products. The blocks of a point and the sums of its span lie in one array, a row each, so that whole rows are added: a
 compiler that sees them in two would have to find out each time that they are not the same. With twist there are too
 many blocks for that, and spans are taken side by side, see `lanes.py`.

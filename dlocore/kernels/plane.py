@@ -45,7 +45,7 @@ def _add_block(K: Any, k: int, i: int, j: int, xx: float, xy: float, yx: float, 
 
 @part
 def axial(
-    q: Any, v: Any, tables: Any, active: Any, p: Any, past: Any, kept: Any, rates: Any, scales: Any, tangent: bool,
+    q: Any, v: Any, points: Any, active: Any, p: Any, past: Any, kept: Any, rates: Any, scales: Any, tangent: bool,
     f: Any, K: Any,
 ) -> None:  # fmt: skip
     """Add the forces and tangents of the axial site.
@@ -55,7 +55,7 @@ def axial(
     elastic, viscous, geometric = scales
     if viscous != 0.0 and rates[0] != 0.0:
         viscous = rates[0]
-    firsts, b1, weights = tables.axial_first, tables.axial_b1, tables.axial_w
+    firsts, b1, weights = points.first, points.b1, points.w
     for n in range(len(weights)):
         k, w = firsts[n], weights[n]
         b = row_of(b1, n)
@@ -90,14 +90,14 @@ def axial(
 
 @part
 def curvature(
-    q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any, tangent: bool,
+    q: Any, v: Any, points: Any, active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any, tangent: bool,
     f: Any, K: Any,
 ) -> None:  # fmt: skip
     """Add the forces and tangents of the curvature site; `past` holds kappa of the two last steps (points, 2)."""
     elastic, viscous, geometric = scales
     if viscous != 0.0 and rates[0] != 0.0:
         viscous = rates[0]
-    firsts, b1, b2, weights = tables.curvature_first, tables.curvature_b1, tables.curvature_b2, tables.curvature_w
+    firsts, b1, b2, weights = points.first, points.b1, points.b2, points.w
     for n in range(len(weights)):
         k, w = firsts[n], weights[n]
         b, c = row_of(b1, n), row_of(b2, n)
@@ -144,19 +144,19 @@ def curvature(
 
 
 @law
-def curvature_at(q: Any, tables: Any, n: int) -> float:
+def curvature_at(q: Any, points: Any, n: int) -> float:
     """Return the curvature [1/m] of q at a curvature point."""
-    k = tables.curvature_first[n]
-    ax, ay = _combine(q, k, row_of(tables.curvature_b1, n))
-    cx, cy = _combine(q, k, row_of(tables.curvature_b2, n))
+    k = points.first[n]
+    ax, ay = _combine(q, k, row_of(points.b1, n))
+    cx, cy = _combine(q, k, row_of(points.b2, n))
     return plane_curvature(ax, ay, cx, cy)[0]
 
 
 @leaf
-def remember(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h: float) -> None:
+def remember(q: Any, points: Any, active: Any, p: Any, memory: Any, past: Any, h: float) -> None:
     """Make kappa of q the last one in `past` (points, 2), the last one the one before; let what yielded be memory."""
     for n in range(len(past)):
-        kappa = curvature_at(q, tables, n)
+        kappa = curvature_at(q, points, n)
         free, _ = curvature_memory(
             active, p, (kappa, 0.0, 0.0), (memory[n, 0], 0.0, 0.0), (memory[n, 1], 0.0, 0.0), (past[n, 0], 0.0, 0.0), h
         )
@@ -166,10 +166,10 @@ def remember(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h
 
 
 @part
-def body(q: Any, v: Any, tables: Any, active: Any, p: Any, scales: Any, tangent: bool, f: Any, K: Any) -> None:
+def body(q: Any, v: Any, points: Any, active: Any, p: Any, scales: Any, tangent: bool, f: Any, K: Any) -> None:
     """Subtract the forces, and add the tangents, of the body site."""
     elastic, viscous, _ = scales
-    firsts, b0, weights = tables.body_first, tables.body_b0, tables.body_w
+    firsts, b0, weights = points.first, points.b0, points.w
     for n in range(len(weights)):
         k, w = firsts[n], weights[n]
         b = row_of(b0, n)
@@ -193,10 +193,10 @@ def body(q: Any, v: Any, tables: Any, active: Any, p: Any, scales: Any, tangent:
 def energy(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any) -> float:
     """Return the stored energy [J]."""
     total = 0.0
-    for n in range(len(tables.axial_w)):
-        x, y = _combine(q, tables.axial_first[n], row_of(tables.axial_b1, n))
-        total += tables.axial_w[n] * axial_energy(active, p, np.sqrt(x * x + y * y) - 1.0, past[n, 0])
-    for n in range(len(tables.curvature_w)):
-        kappa = curvature_at(q, tables, n)
-        total += tables.curvature_w[n] * curvature_energy(active, p, (kappa, 0.0, 0.0), (memory[n, 0], 0.0, 0.0))
+    for n in range(len(tables.axial.w)):
+        x, y = _combine(q, tables.axial.first[n], row_of(tables.axial.b1, n))
+        total += tables.axial.w[n] * axial_energy(active, p, np.sqrt(x * x + y * y) - 1.0, past[n, 0])
+    for n in range(len(tables.curvature.w)):
+        kappa = curvature_at(q, tables.curvature, n)
+        total += tables.curvature.w[n] * curvature_energy(active, p, (kappa, 0.0, 0.0), (memory[n, 0], 0.0, 0.0))
     return total

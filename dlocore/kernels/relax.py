@@ -132,7 +132,7 @@ def relax(
                 after = np.nan
         q -= length * step
         if len(axes) == 4:
-            carry(q, tables, active, p, history.memory, history.past, 0.0, history.room)
+            carry(q, tables.curvature, active, p, history.memory, history.past, 0.0, history.room)
         if update <= tolerance:
             return update, it + 1
         if np.isfinite(after):  # carried frames change nothing but rounding
@@ -195,8 +195,8 @@ def descend(
             break
         q += step
         if nc == 4:
-            carry(q, tables, active, p, history.memory, history.past, 0.0, history.room)
-        point_on(nc, q, step, tables, history.tension)
+            carry(q, tables.curvature, active, p, history.memory, history.past, 0.0, history.room)
+        point_on(nc, q, step, tables.axial, history.tension)
         if it == 1:
             enough = max(tolerance, close * update)
         if update <= enough or stuck:

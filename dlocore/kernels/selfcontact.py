@@ -78,7 +78,7 @@ def _rate(v: Any, point: Any, c: Any, m: int, y: Vector) -> float:
 
 
 @kernel
-def press(q: Any, v: Any, tables: Any, p: Any, x: Any, near: Any, f: Any) -> Any:
+def press(q: Any, v: Any, nodes: Any, p: Any, x: Any, near: Any, f: Any) -> Any:
     """Subtract the forces of the contact from f (n, nc); return how many pairs touch, `near.met`, and how deep [m].
 
     Args:
@@ -86,8 +86,8 @@ def press(q: Any, v: Any, tables: Any, p: Any, x: Any, near: Any, f: Any) -> Any
         x: (nodes, 2 or 3), written: the positions of the nodes of these pairs at least [m].
         near: see `Nearby`.
     """
-    look(q, tables, p, x, near)
-    u, first, b0 = tables.strand_u, tables.strand_first, tables.strand_b0
+    look(q, nodes, p, x, near)
+    u, first, b0 = nodes.u, nodes.first, nodes.b0
     D, stiffness, passage, damping = p[SELF_CONTACT, 0], p[SELF_CONTACT, 1], p[SELF_CONTACT, 2], p[SELF_CONTACT, 3]
     pairs, count = near.pairs[0], near.count[0]
     if count > len(near.met[0]):
@@ -166,7 +166,7 @@ def _pair_tangent(
 
 @kernel
 def widen(
-    nc: int, v: Any, tables: Any, p: Any, x: Any, found: Any, count: int, scales: Any, e: Any, A: Any, end: Any, S: Any
+    nc: int, v: Any, nodes: Any, p: Any, x: Any, found: Any, count: int, scales: Any, e: Any, A: Any, end: Any, S: Any
 ) -> None:
     """Write the banded reduced tangent A (free, width) plus that of the pairs to S (free, free), above its diagonal.
 
@@ -179,7 +179,7 @@ def widen(
     """
     free, width = A.shape
     nd = x.shape[1]
-    u, first, b0 = tables.strand_u, tables.strand_first, tables.strand_b0
+    u, first, b0 = nodes.u, nodes.first, nodes.b0
     push = (p[SELF_CONTACT, 0], p[SELF_CONTACT, 1], p[SELF_CONTACT, 2], p[SELF_CONTACT, 3])
     point = np.empty(2 * _WINDOW, np.int64)
     H = np.empty((2 * _WINDOW * nd, 2 * _WINDOW * nd))
@@ -265,11 +265,11 @@ def solve_wide(S: Any, filled: Any, columns: Any, x: Any) -> None:
 
 
 @kernel
-def closing(q0: Any, q1: Any, tables: Any, p: Any, x0: Any, x1: Any, found: Any, count: int) -> float:
+def closing(q0: Any, q1: Any, nodes: Any, p: Any, x0: Any, x1: Any, found: Any, count: int) -> float:
     """Return how far, from q0 to q1, a pair that newly touches has come towards each other [m], the largest."""
-    place_pairs(q0, tables, found, count, x0)
-    place_pairs(q1, tables, found, count, x1)
-    u, D = tables.strand_u, p[SELF_CONTACT, 0]
+    place_pairs(q0, nodes, found, count, x0)
+    place_pairs(q1, nodes, found, count, x1)
+    u, D = nodes.u, p[SELF_CONTACT, 0]
     most = 0.0
     for n in range(count):
         i, j = found[n, 0], found[n, 1]

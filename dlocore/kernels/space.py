@@ -57,7 +57,7 @@ def add_symmetric(nc: int, K: Any, k: int, i: int, j: int, s: float, H: Symmetri
 
 @part
 def axial(
-    nc: int, q: Any, v: Any, tables: Any, active: Any, p: Any, past: Any, kept: Any, rates: Any, scales: Any,
+    nc: int, q: Any, v: Any, points: Any, active: Any, p: Any, past: Any, kept: Any, rates: Any, scales: Any,
     tangent: bool, f: Any, K: Any,
 ) -> None:  # fmt: skip
     """Add the forces and tangents of the axial site.
@@ -67,7 +67,7 @@ def axial(
     elastic, viscous, geometric = scales
     if viscous != 0.0 and rates[0] != 0.0:
         viscous = rates[0]
-    firsts, b1, weights = tables.axial_first, tables.axial_b1, tables.axial_w
+    firsts, b1, weights = points.first, points.b1, points.w
     for n in range(len(weights)):
         k, w = firsts[n], weights[n]
         b = row_of(b1, n)
@@ -100,11 +100,11 @@ def axial(
 
 
 @leaf
-def _write_state(q: Any, tables: Any, state: Any) -> None:
+def _write_state(q: Any, points: Any, state: Any) -> None:
     """Write l, h, t and kappa of the curvature points (points, 8)."""
     for n in range(len(state)):
-        k = tables.curvature_first[n]
-        a, c = combine(q, k, row_of(tables.curvature_b1, n)), combine(q, k, row_of(tables.curvature_b2, n))
+        k = points.first[n]
+        a, c = combine(q, k, row_of(points.b1, n)), combine(q, k, row_of(points.b2, n))
         length, h, t, kappa = space_curvature(a, c)
         state[n, LENGTH], state[n, H] = length, h
         for d in range(3):
@@ -112,11 +112,11 @@ def _write_state(q: Any, tables: Any, state: Any) -> None:
 
 
 @leaf
-def _write_rate(v: Any, tables: Any, state: Any, turning: Any, rate: Any) -> None:
+def _write_rate(v: Any, points: Any, state: Any, turning: Any, rate: Any) -> None:
     """Write the rates of the tangent and of the curvature as sections that do not spin see them (points, 3)."""
     for n in range(len(state)):
-        k = tables.curvature_first[n]
-        a, c = combine(v, k, row_of(tables.curvature_b1, n)), combine(v, k, row_of(tables.curvature_b2, n))
+        k = points.first[n]
+        a, c = combine(v, k, row_of(points.b1, n)), combine(v, k, row_of(points.b2, n))
         length, t = state[n, LENGTH], vector(state, n, TANGENT)
         change = space_curvature_rate(length, state[n, H], t, vector(state, n, BEND), a, c)
         along = a[0] * t[0] + a[1] * t[1] + a[2] * t[2]
@@ -127,7 +127,7 @@ def _write_rate(v: Any, tables: Any, state: Any, turning: Any, rate: Any) -> Non
 
 @leaf
 def curvature(
-    q: Any, v: Any, tables: Any, active: Any, p: Any, past: Any, rates: Any, scales: Any, tangent: bool, room: Any,
+    q: Any, v: Any, points: Any, active: Any, p: Any, past: Any, rates: Any, scales: Any, tangent: bool, room: Any,
     f: Any, K: Any,
 ) -> None:  # fmt: skip
     """Add the forces and tangents of the curvature site; `past` holds kappa of two steps and t of the last (points, 9).
@@ -137,21 +137,21 @@ def curvature(
     what the spin of the sections depends on, all of the cable, and the torque that keeps them from twisting are in the
     forces only. `room` is that of a `History`.
     """
-    damped = len(tables.curvature_w) if active[DAMPING] else 0
+    damped = len(points.w) if active[DAMPING] else 0
     blocks = room[:ROOM].reshape(SUMS + PAIRS, 9)
     rows = room[ROOM:].reshape((len(room) - ROOM) // STATE, STATE)
     state, rate, by_torque = rows[:damped], rows[damped : 2 * damped], rows[2 * damped : 3 * damped]
     elastic, viscous, geometric = scales
     if viscous != 0.0 and rates[0] != 0.0:
         viscous = rates[0]
-    firsts, b1, b2, weights = tables.curvature_first, tables.curvature_b1, tables.curvature_b2, tables.curvature_w
-    pairs = tables.curvature_pairs
+    firsts, b1, b2, weights = points.first, points.b1, points.b2, points.w
+    pairs = points.pairs
     if damped:
-        _write_state(q, tables, state)
+        _write_state(q, points, state)
         if rates[0] != 0.0:
             rate_by_steps(weights, state, past, rates, rate)
         else:
-            _write_rate(v, tables, state, by_torque, rate)
+            _write_rate(v, points, state, by_torque, rate)
             rate_by_velocity(weights, state, by_torque, rate)
         torques(weights, state, p[DAMPING, 0], rate, by_torque)
     for n in range(len(weights)):
@@ -203,14 +203,14 @@ def curvature(
 
 
 @leaf
-def remember(q: Any, tables: Any, past: Any, room: Any) -> None:
+def remember(q: Any, points: Any, past: Any, room: Any) -> None:
     """Make kappa and t of q the last ones in `past` (points, 9), and the last kappa, carried along, the one before."""
-    points = len(past)
+    count = len(past)
     rows = room[ROOM:].reshape((len(room) - ROOM) // STATE, STATE)
-    state, before = rows[:points], rows[points : 2 * points]
-    _write_state(q, tables, state)
-    carry(tables.curvature_w, state, past, 1.0, 1.0, 0.0, before)
-    for n in range(points):
+    state, before = rows[:count], rows[count : 2 * count]
+    _write_state(q, points, state)
+    carry(points.w, state, past, 1.0, 1.0, 0.0, before)
+    for n in range(count):
         for d in range(3):
             past[n, 3 + d] = before[n, d]
             past[n, d] = state[n, BEND + d]
@@ -218,10 +218,10 @@ def remember(q: Any, tables: Any, past: Any, room: Any) -> None:
 
 
 @part
-def body(nc: int, q: Any, v: Any, tables: Any, active: Any, p: Any, scales: Any, tangent: bool, f: Any, K: Any) -> None:
+def body(nc: int, q: Any, v: Any, points: Any, active: Any, p: Any, scales: Any, tangent: bool, f: Any, K: Any) -> None:
     """Subtract the forces, and add the tangents, of the body site."""
     elastic, viscous, _ = scales
-    firsts, b0, weights = tables.body_first, tables.body_b0, tables.body_w
+    firsts, b0, weights = points.first, points.b0, points.w
     for n in range(len(weights)):
         k, w = firsts[n], weights[n]
         b = row_of(b0, n)
@@ -241,23 +241,23 @@ def body(nc: int, q: Any, v: Any, tables: Any, active: Any, p: Any, scales: Any,
 
 
 @leaf
-def axial_energies(q: Any, tables: Any, active: Any, p: Any, past: Any) -> float:
+def axial_energies(q: Any, points: Any, active: Any, p: Any, past: Any) -> float:
     """Return the stored energy of the axial site [J]."""
     total = 0.0
-    for n in range(len(tables.axial_w)):
-        x, y, z = combine(q, tables.axial_first[n], row_of(tables.axial_b1, n))
+    for n in range(len(points.w)):
+        x, y, z = combine(q, points.first[n], row_of(points.b1, n))
         strain = np.sqrt(x * x + y * y + z * z) - 1.0
-        total += tables.axial_w[n] * axial_energy(active, p, strain, past[n, 0])
+        total += points.w[n] * axial_energy(active, p, strain, past[n, 0])
     return total
 
 
 @leaf
-def energy(q: Any, tables: Any, active: Any, p: Any) -> float:
+def energy(q: Any, points: Any, active: Any, p: Any) -> float:
     """Return the stored energy of the curvature site [J]."""
     total = 0.0
-    for n in range(len(tables.curvature_w)):
-        k = tables.curvature_first[n]
-        a = combine(q, k, row_of(tables.curvature_b1, n))
-        kappa = space_curvature(a, combine(q, k, row_of(tables.curvature_b2, n)))[3]
-        total += tables.curvature_w[n] * curvature_energy(active, p, kappa, STRAIGHT)
+    for n in range(len(points.w)):
+        k = points.first[n]
+        a = combine(q, k, row_of(points.b1, n))
+        kappa = space_curvature(a, combine(q, k, row_of(points.b2, n)))[3]
+        total += points.w[n] * curvature_energy(active, p, kappa, STRAIGHT)
     return total

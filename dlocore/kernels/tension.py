@@ -38,11 +38,11 @@ def assume_last(kept: Any, known: bool) -> None:
 
 
 @part
-def point_on(nc: int, q: Any, change: Any, tables: Any, kept: Any) -> None:
+def point_on(nc: int, q: Any, change: Any, points: Any, kept: Any) -> None:
     """Take the tension that a change (n, nc) [m] to q points to from where forces and tangent were last assembled."""
     for n in range(len(kept)):
-        k = tables.axial_first[n]
-        b = row_of(tables.axial_b1, n)
+        k = points.first[n]
+        b = row_of(points.b1, n)
         square, along = 0.0, 0.0
         for d in range(min(nc, 3)):
             slope, turn = 0.0, 0.0

@@ -109,12 +109,12 @@ _STEPS = 8  # of the transport along the cable between two curvature points
 
 
 @part
-def _measure(q: Any, tables: Any, past: Any, inverse: float, group: int, W: Any) -> None:
+def _measure(q: Any, points: Any, past: Any, inverse: float, group: int, W: Any) -> None:
     """Write the geometry of a group of spans and its twist rate, and what it is measured against."""
-    _gather(q, tables.curvature_first, past, group, W)
-    _locate(tables.curvature_lanes[group], inverse, W)
+    _gather(q, points.first, past, group, W)
+    _locate(points.lanes[group], inverse, W)
     _bend(W)
-    _smooth(tables.curvature_lanes[group], TAU, W)
+    _smooth(points.lanes[group], TAU, W)
 
 
 @leaf
@@ -224,7 +224,7 @@ def _direct(W: Any) -> None:
 
 @leaf
 def curvature(
-    q: Any, v: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any, tangent: bool,
+    q: Any, v: Any, points: Any, active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any, tangent: bool,
     room: Any, f: Any, K: Any,
 ) -> None:  # fmt: skip
     """Add the forces and tangents of curvature and twist.
@@ -235,16 +235,16 @@ def curvature(
     `room` is that of a `History`.
     """
     W, block = room[:SIZE], room[SIZE : SIZE + BLOCK]
-    first, inverse = tables.curvature_first, p[TWIST, 1]
+    first, inverse = points.first, p[TWIST, 1]
     damped = active[DAMPING] or active[TWIST_DAMPING]
-    for group in range(len(tables.curvature_lanes)):
-        T = tables.curvature_lanes[group]
-        _measure(q, tables, past, inverse, group, W)
+    for group in range(len(points.lanes)):
+        T = points.lanes[group]
+        _measure(q, points, past, inverse, group, W)
         _measure_bends(active, memory, group, W)
         if damped and rates[0] != 0.0:
             _rate_by_steps(past, rates, group, W)
         elif damped:
-            _rate_by_velocity(v, tables, inverse, group, W)
+            _rate_by_velocity(v, points, inverse, group, W)
         _stress(active, p, memory, past, rates, scales, damped, group, T, W)
         _force(T, inverse, W)
         _scatter_force(first, count_of(len(past), group), group, W, f)
@@ -268,23 +268,23 @@ def _rate_by_steps(past: Any, rates: Any, group: int, W: Any) -> None:
 
 
 @leaf
-def _rate_by_velocity(v: Any, tables: Any, inverse: float, group: int, W: Any) -> None:
+def _rate_by_velocity(v: Any, points: Any, inverse: float, group: int, W: Any) -> None:
     """Write the rates of k1, k2 and twist that the velocity v (n, 4) makes."""
-    first = tables.curvature_first
+    first = points.first
     for s in range(count_of(len(first), group)):
         for m in range(POINTS):
             n, lane = POINTS * (SPANS * group + s) + m, SPANS * m + s
-            k, b = first[n], row_of(tables.curvature_b1, n)
-            a, c = combine(v, k, b), combine(v, k, row_of(tables.curvature_b2, n))
+            k, b = first[n], row_of(points.b1, n)
+            a, c = combine(v, k, b), combine(v, k, row_of(points.b2, n))
             length, h, k1, k2 = at(W, LENGTH, lane), at(W, ALONG, lane), at(W, K1, lane), at(W, K2, lane)
             t, spin = vector_at(W, NOW, lane), vector_at(W, SPIN, lane)
             O1, P1 = derivatives(length, h, vector_at(W, M1, lane), k2, spin, -k1, t)
             O2, P2 = derivatives(length, h, vector_at(W, M2, lane), -k1, spin, -k2, t)
-            turn, twisting = inverse * _angle(v, k, row_of(tables.body_b0, n)), inverse * _angle(v, k, b)
+            turn, twisting = inverse * _angle(v, k, row_of(points.b0, n)), inverse * _angle(v, k, b)
             twisting += dot(vector_at(W, BY_FIRST, lane), a) + dot(spin, c) / length
             rate = (dot(O1, a) + dot(P1, c) + k2 * turn, dot(O2, a) + dot(P2, c) - k1 * turn, twisting)
             put_vector(W, RATE, lane, rate)
-    _smooth(tables.curvature_lanes[group], RATE + 2, W)
+    _smooth(points.lanes[group], RATE + 2, W)
 
 
 @law
@@ -371,18 +371,18 @@ def _scatter_force(first: Any, count: int, group: int, W: Any, f: Any) -> None:
 
 
 @leaf
-def remember(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any, h: float, room: Any) -> None:
+def remember(q: Any, points: Any, active: Any, p: Any, memory: Any, past: Any, h: float, room: Any) -> None:
     """Carry the frames to q, note its strain, and let what yielded in a step h become memory."""
     W, knots = room[:SIZE], room[SIZE + BLOCK :].reshape((len(past) // POINTS + 1, KNOT))
     turns = bool(active[DAMPING] or active[BENDING_MEMORY])
     for n in range(len(memory)):
         turns = turns or memory[n, 0] != 0.0 or memory[n, 1] != 0.0
-    for group in range(len(tables.curvature_lanes)):
-        _measure(q, tables, past, p[TWIST, 1], group, W)
+    for group in range(len(points.lanes)):
+        _measure(q, points, past, p[TWIST, 1], group, W)
         _measure_bends(active, memory, group, W)
         _note(active, p, memory, past, h, group, W)
     if turns:
-        correct_angles(q, tables, p[TWIST, 1], past, knots)
+        correct_angles(q, points, p[TWIST, 1], past, knots)
 
 
 @leaf
@@ -410,18 +410,18 @@ def _note(active: Any, p: Any, memory: Any, past: Any, h: float, group: int, W: 
 
 
 @kernel
-def energy(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any) -> float:
+def energy(q: Any, points: Any, active: Any, p: Any, memory: Any, past: Any) -> float:
     """Return the stored energy of curvature and twist [J]."""
     total = 0.0
     W = np.empty(SIZE)
-    for group in range(len(tables.curvature_lanes)):
-        _measure(q, tables, past, p[TWIST, 1], group, W)
+    for group in range(len(points.lanes)):
+        _measure(q, points, past, p[TWIST, 1], group, W)
         _measure_bends(active, memory, group, W)
         for s in range(count_of(len(past), group)):
             for m in range(POINTS):
                 n, lane = POINTS * (SPANS * group + s) + m, SPANS * m + s
                 free = (memory[n, 0], memory[n, 1], 0.0)
-                total += tables.curvature_w[n] * (
+                total += points.w[n] * (
                     curvature_energy(active, p, (at(W, K1, lane), at(W, K2, lane), 0.0), free)
                     + twist_energy(active, p, at(W, TAU, lane), memory[n, 2])
                 )
@@ -429,19 +429,19 @@ def energy(q: Any, tables: Any, active: Any, p: Any, memory: Any, past: Any) -> 
 
 
 @kernel
-def twist_rates(states: Any, tables: Any, p: Any, frames: Any, out: Any) -> None:
+def twist_rates(states: Any, points: Any, p: Any, frames: Any, out: Any) -> None:
     """Write the twist rate (k, points) [rad/m] of the states (k, n, 4) measured against `frames` (k, points, PAST)."""
     W = np.empty(SIZE)
     for k in range(len(states)):
-        for group in range(len(tables.curvature_lanes)):
-            _measure(states[k], tables, frames[k], p[TWIST, 1], group, W)
+        for group in range(len(points.lanes)):
+            _measure(states[k], points, frames[k], p[TWIST, 1], group, W)
             for s in range(count_of(out.shape[1], group)):
                 for m in range(POINTS):
                     out[k, POINTS * (SPANS * group + s) + m] = at(W, TAU, SPANS * m + s)
 
 
 @kernel
-def start_frames(knots: Any, q: Any, tables: Any, director: Any, past: Any) -> None:
+def start_frames(knots: Any, q: Any, points: Any, director: Any, past: Any) -> None:
     """Write frames without twist along the cable q (n, >= 3) to `past`, from `director` (3,) at u = 0."""
     row = np.empty((3, 4))
     before = 0.0
@@ -454,7 +454,7 @@ def start_frames(knots: Any, q: Any, tables: Any, director: Any, past: Any) -> N
     d0 = (x[0] / size, x[1] / size, x[2] / size)
     for n in range(len(past)):
         for step in range(1, _STEPS + 1):
-            u = before + (tables.curvature_u[n] - before) * step / _STEPS
+            u = before + (points.u[n] - before) * step / _STEPS
             span = find_span(knots, u)
             basis(knots, span, u, 2, row)
             _, _, t, kappa = space_curvature(combine(q, span - 3, row_of(row, 1)), combine(q, span - 3, row_of(row, 2)))
@@ -466,4 +466,4 @@ def start_frames(knots: Any, q: Any, tables: Any, director: Any, past: Any) -> N
                     past[n, BEND + d] = kappa[d]
                     past[n, DIRECTOR + d] = d0[d]
                 past[n, FRAME] = 0.0
-        before = tables.curvature_u[n]
+        before = points.u[n]

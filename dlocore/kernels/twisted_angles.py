@@ -31,7 +31,7 @@ _V3, _D3 = 3.0 * _Z**2 - 2.0 * _Z**3, _Z**3 - _Z**2
 
 
 @part
-def correct_angles(q: Any, tables: Any, inverse: float, past: Any, knots: Any) -> None:
+def correct_angles(q: Any, points: Any, inverse: float, past: Any, knots: Any) -> None:
     """Write what theta misses of the angles at the points, and turn the strain that is noted there with the sections.
 
     S between two knots is the cubic through the four nearest, none of them beyond a triple knot.
@@ -42,7 +42,7 @@ def correct_angles(q: Any, tables: Any, inverse: float, past: Any, knots: Any) -
         past: (points, PAST).
         knots: (spans + 1, KNOT), written over.
     """
-    first, w = tables.curvature_first, tables.curvature_w
+    first, w = points.first, points.w
     spans = len(past) // POINTS
     for s in range(spans):
         n = POINTS * s
@@ -52,8 +52,8 @@ def correct_angles(q: Any, tables: Any, inverse: float, past: Any, knots: Any) -
         turned = knots[s, 2] + w[n] * past[n, FRAME] + w[n + 1] * past[n + 1, FRAME] + w[n + 2] * past[n + 2, FRAME]
         angle = 0.0
         for i in range(4):
-            values = _V1 * tables.body_b0[n, i] + _V3 * tables.body_b0[end, i]
-            slopes = _D1 * tables.curvature_b1[n, i] + _D3 * tables.curvature_b1[end, i]
+            values = _V1 * points.b0[n, i] + _V3 * points.b0[end, i]
+            slopes = _D1 * points.b1[n, i] + _D3 * points.b1[end, i]
             angle += (values + _BETWEEN * h * slopes) * q[first[n] + i, 3]
         knots[s + 1, 0], knots[s + 1, 1], knots[s + 1, 2] = knots[s, 0] + h, inverse * angle + turned, turned
     for s in range(spans):
@@ -67,13 +67,13 @@ def correct_angles(q: Any, tables: Any, inverse: float, past: Any, knots: Any) -
                 share = 1.0
                 for j in range(low, high + 1):
                     if j != k:
-                        share *= (tables.curvature_u[n + m] - knots[j, 0]) / (knots[k, 0] - knots[j, 0])
+                        share *= (points.u[n + m] - knots[j, 0]) / (knots[k, 0] - knots[j, 0])
                 smooth += share * knots[k, 1]
             turned, angle = knots[s, 2], 0.0
             for j in range(POINTS):
                 turned += h * _INTEGRALS[m, j] * past[n + j, FRAME]
             for i in range(4):
-                angle += inverse * tables.body_b0[n + m, i] * q[first[n] + i, 3]
+                angle += inverse * points.b0[n + m, i] * q[first[n] + i, 3]
             offset = smooth - turned - angle
             more = offset - past[n + m, OFFSET]
             past[n + m, OFFSET] = offset

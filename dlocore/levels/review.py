@@ -220,7 +220,7 @@ def _yields(level: Level) -> dict[str, str]:
     problem, cable = level.problem, level.problem.scene.cable
     grid, states = level.motion.grid, level.motion.states
     if cable.yield_strain is not None:
-        most = float(largest_curvature(problem.axes, states, grid.tables, grid.history.memory))
+        most = float(largest_curvature(problem.axes, states, grid.tables.curvature, grid.history.memory))
         threshold = 2.0 * cable.yield_strain / cable.diameter
         if most > threshold:
             return {"plasticity": f"the motion bends the cable by {most:.3g}/m, and it yields at {threshold:.3g}/m"}

@@ -23,7 +23,7 @@ _CONTROLS = np.arange(4)
 def bends_sharply(problem: Problem, grid: Grid, states: Floats) -> bool:
     """Tell whether states (k, n_u, nc) bend to a radius below `SHARP` diameters."""
     some = np.ascontiguousarray(states[::_STRIDE])
-    most = float(largest_curvature(problem.axes, some, grid.tables, grid.history.memory))
+    most = float(largest_curvature(problem.axes, some, grid.tables.curvature, grid.history.memory))
     return most * SHARP * problem.scene.cable.diameter > 1.0
 
 
@@ -38,8 +38,8 @@ def spin_forces(problem: Problem, grid: Grid, q: Floats, v: Floats, a: Floats, c
     """
     cable, tables = problem.scene.cable, grid.tables
     inertia = cable.linear_density * cable.diameter**2 / 8.0
-    u, w = tables.curvature_u, tables.curvature_w
-    reach = tables.curvature_first[:, None] + _CONTROLS
+    u, w = tables.curvature.u, tables.curvature.w
+    reach = tables.curvature.first[:, None] + _CONTROLS
 
     def derivative(b: Floats, x: Floats) -> Floats:
         return np.einsum("pi,pid->pd", b, x[reach])
@@ -47,11 +47,11 @@ def spin_forces(problem: Problem, grid: Grid, q: Floats, v: Floats, a: Floats, c
     def across(x: Floats) -> Floats:
         return np.asarray(x - np.einsum("pd,pd->p", x, t)[:, None] * t)
 
-    slope = derivative(tables.curvature_b1, q)
+    slope = derivative(tables.curvature.b1, q)
     size = np.linalg.norm(slope, axis=1, keepdims=True)
     t = slope / size
-    kappa, rate = (across(derivative(tables.curvature_b2, x)) / size**2 for x in (q, v))
-    turns, turned = (across(derivative(tables.curvature_b1, x)) / size for x in (v, a))
+    kappa, rate = (across(derivative(tables.curvature.b2, x)) / size**2 for x in (q, v))
+    turns, turned = (across(derivative(tables.curvature.b1, x)) / size for x in (v, a))
     slip = np.einsum("pd,pd->p", t, np.cross(turned, kappa) + np.cross(turns, rate))
     spin = -np.cumsum(slip * w)
     spin -= np.average(spin, weights=w) if clamped is None else np.interp(clamped, u, spin)
@@ -60,5 +60,5 @@ def spin_forces(problem: Problem, grid: Grid, q: Floats, v: Floats, a: Floats, c
         torque[u > clamped] -= torque[-1]
     force = np.zeros_like(q)
     work = across(np.cross(kappa, t)) * (torque * w)[:, None] / size
-    np.add.at(force, reach, tables.curvature_b1[:, :, None] * work[:, None, :])
+    np.add.at(force, reach, tables.curvature.b1[:, :, None] * work[:, None, :])
     return force

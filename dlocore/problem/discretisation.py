@@ -103,7 +103,7 @@ def room_for(nc: int, points: int) -> int:
 
 
 def _no_history(problem: Problem, tables: Tables) -> History:
-    points, nc = len(tables.curvature_w), problem.nc
+    points, nc = len(tables.curvature.w), problem.nc
     kept = points if problem.keeps_curvature else 0
     columns = {2: PAST_IN_PLANE, 3: PAST_IN_SPACE, 4: PAST}[nc]
     rubs = problem.friction is not None
@@ -111,10 +111,10 @@ def _no_history(problem: Problem, tables: Tables) -> History:
     return History(
         memory=np.zeros((points, MEMORY_IN_PLANE if nc == 2 else MEMORY_IN_SPACE)),
         past=np.zeros((kept, columns)),
-        axial=np.zeros((len(tables.axial_w), 3)),
-        stick=np.zeros((len(tables.contact_w) if rubs else 0, 3)),
-        slide=np.zeros((len(tables.body_w) if lies else 0, 2)),
-        pressing=tables.contact_w.copy(),
+        axial=np.zeros((len(tables.axial.w), 3)),
+        stick=np.zeros((len(tables.contact.w) if rubs else 0, 3)),
+        slide=np.zeros((len(tables.curvature.w) if lies else 0, 2)),
+        pressing=tables.contact.w.copy(),
         tension=np.zeros((0, COLUMNS)),
         room=np.zeros(room_for(nc, points)),
     )
@@ -124,11 +124,11 @@ def _history_of(problem: Problem, grid: Grid) -> History:
     """Return what the start of a grid has behind it: its stress-free strain, and frames without twist along it."""
     history = _no_history(problem, grid.tables)
     if problem.twist is not None:
-        start_frames(grid.knots, grid.start, grid.tables, start_director(problem), history.past)
+        start_frames(grid.knots, grid.start, grid.tables.curvature, start_director(problem), history.past)
     history.memory[:] = _memory(problem, grid, history)
     if problem.start.bow:
         strain = axial_strain(grid.tables, grid.start[:, : problem.plane.dimensions])
-        history.axial[:, 0] = strain - problem.start.strain_at(grid.tables.axial_u)
+        history.axial[:, 0] = strain - problem.start.strain_at(grid.tables.axial.u)
     if problem.start.material is not None:
         _write_stretch(grid, history, problem.start.material)
     if problem.keeps_history:
@@ -181,16 +181,16 @@ def corners(curve: SplineCurve, length: float) -> list[float]:
 
 def plane_curvature_of(tables: Tables, q: Floats) -> Floats:
     """Return the signed curvature (points, 1) [1/m] of planar control points q (n_u, 2) at the curvature points."""
-    index = tables.curvature_first[:, None] + np.arange(4)
-    a = np.einsum("pi,pid->pd", tables.curvature_b1, q[index])
-    b = np.einsum("pi,pid->pd", tables.curvature_b2, q[index])
+    index = tables.curvature.first[:, None] + np.arange(4)
+    a = np.einsum("pi,pid->pd", tables.curvature.b1, q[index])
+    b = np.einsum("pi,pid->pd", tables.curvature.b2, q[index])
     return ((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / (a * a).sum(axis=1))[:, None]
 
 
 def axial_strain(tables: Tables, r: Floats) -> Floats:
     """Return the axial strain (..., points) of control points r (..., n_u, 2 or 3) at the axial points."""
-    index = tables.axial_first[:, None] + np.arange(4)
-    slopes = np.einsum("pi,...pid->...pd", tables.axial_b1, r[..., index, :])
+    index = tables.axial.first[:, None] + np.arange(4)
+    slopes = np.einsum("pi,...pid->...pd", tables.axial.b1, r[..., index, :])
     return np.asarray(np.linalg.norm(slopes, axis=-1) - 1.0)
 
 
@@ -243,7 +243,7 @@ def _as_stressed(problem: Problem, grid: Grid, remembered: Floats) -> Floats:
     tables = _tables_of(problem, knots)
     there = _section_bends(problem, knots, tables, problem.coordinates(curve.control_points, theta))
     here = _section_bends(problem, grid.knots, grid.tables, _untouched(problem, grid))
-    missed = here - _between(grid.tables.curvature_u, tables.curvature_u, there, knots)
+    missed = here - _between(grid.tables.curvature.u, tables.curvature.u, there, knots)
     out, half, bends = remembered.copy(), remembered.shape[1] // 2, missed.shape[1]
     out[:, :bends] += missed
     out[:, half : half + bends] += missed
@@ -256,7 +256,7 @@ def _section_bends(problem: Problem, knots: Floats, tables: Tables, q: Floats) -
         return plane_curvature_of(tables, q)
     along, across = _bends(knots, q, tables, start_director(problem))
     assert problem.twist is not None, "without twist in space no bends are remembered"
-    theta = spline_at(knots, q[:, 3:], tables.curvature_u)[:, 0] / problem.twist.radius
+    theta = spline_at(knots, q[:, 3:], tables.curvature.u)[:, 0] / problem.twist.radius
     return np.column_stack(
         [np.cos(theta) * along + np.sin(theta) * across, np.cos(theta) * across - np.sin(theta) * along]
     )
@@ -264,8 +264,8 @@ def _section_bends(problem: Problem, knots: Floats, tables: Tables, q: Floats) -
 
 def _bends(knots: Floats, q: Floats, tables: Tables, director: Floats) -> tuple[Floats, Floats]:
     """Return the two bends (points,) of control points q (n, >= 3) in the frame without twist from a director (3,)."""
-    frames = np.zeros((len(tables.curvature_u), PAST))
-    start_frames(knots, np.ascontiguousarray(q), tables, director, frames)
+    frames = np.zeros((len(tables.curvature.u), PAST))
+    start_frames(knots, np.ascontiguousarray(q), tables.curvature, director, frames)
     first, bends = frames[:, DIRECTOR : DIRECTOR + 3], frames[:, 3:6]
     return (bends * first).sum(axis=1), (bends * np.cross(frames[:, :3], first)).sum(axis=1)
 
@@ -280,7 +280,7 @@ def write_material(problem: Problem, grid: Grid, q: Floats, history: History, ma
 
 def _write_stretch(grid: Grid, history: History, material: Material) -> None:
     if material.stretch is not None:
-        history.axial[:, 0] = np.interp(grid.tables.axial_u, cast(Floats, material.u), cast(Floats, material.stretch))
+        history.axial[:, 0] = np.interp(grid.tables.axial.u, cast(Floats, material.u), cast(Floats, material.stretch))
 
 
 def _remembered(problem: Problem, grid: Grid, material: Material, tangent: Floats, knots: Floats) -> Floats:
@@ -288,7 +288,7 @@ def _remembered(problem: Problem, grid: Grid, material: Material, tangent: Float
 
     `tangent` (3,) is that at u = 0, where the material's director lies; `knots` are those of what it remembers.
     """
-    u, places = grid.tables.curvature_u, cast(Floats, material.u)
+    u, places = grid.tables.curvature.u, cast(Floats, material.u)
     values = np.concatenate(_memories(material), axis=1)
     if _has_yielded(material):
         sections = np.column_stack([np.interp(u, places, row) for row in values.T])
@@ -351,7 +351,7 @@ def consistent_start(problem: Problem, grid: Grid, *, touches: bool = True) -> F
     active, parameters = line.law_table()
     kept = [laws.STRETCH, *([laws.CONTACT, laws.TABLE] if touches else [])]
     active[[row for row in range(laws.COUNT) if row not in kept]] = 0
-    history.axial[:, 0] = problem.start.strain_at(grid.tables.axial_u)
+    history.axial[:, 0] = problem.start.strain_at(grid.tables.axial.u)
     strength = 1e-3 * parameters[0, 0] * (grid.n_u / problem.scene.cable.length) ** 2
     q = start.copy()
     relax(

@@ -72,7 +72,7 @@ class Grid:
     def past(self) -> History:
         """Return a copy of the history, to be carried on; until a step is taken contact acts at all nodes."""
         past = History(*(x.copy() for x in self.history))
-        past.pressing[:] = self.tables.contact_w
+        past.pressing[:] = self.tables.contact.w
         return past
 
     @property
@@ -92,5 +92,5 @@ class Grid:
 
     def largest_strain(self, states: Floats) -> float:
         """Return the largest |axial strain| at the axial points over the states (k, n_u, nc)."""
-        least, most = slopes(states, 1, self.tables.axial_first, self.tables.axial_b1)
+        least, most = slopes(states, 1, self.tables.axial.first, self.tables.axial.b1)
         return float(max(0.0, most - 1.0, 1.0 - least))

@@ -130,17 +130,17 @@ class March:
     @property
     def frames(self) -> Floats:
         """Frames of the curvature points at the times `logged` (rows, points, PAST); no columns without twist."""
-        return self.log[:, : len(self.grid.tables.curvature_w), : self.log.shape[2] - self._remembered]
+        return self.log[:, : len(self.grid.tables.curvature.w), : self.log.shape[2] - self._remembered]
 
     @property
     def memory(self) -> Floats:
         """Stress-free strain of the curvature points at the times `logged` (rows, points, 1 in the plane or 3)."""
-        return self.log[:, : len(self.grid.tables.curvature_w), self.log.shape[2] - self._remembered :]
+        return self.log[:, : len(self.grid.tables.curvature.w), self.log.shape[2] - self._remembered :]
 
     @property
     def axial_memory(self) -> Floats:
         """Stress-free axial strain at the times `logged` (rows, axial points); no columns where none is kept."""
-        return np.asarray(self.log[:, len(self.grid.tables.curvature_w) :, :1].sum(axis=2))
+        return np.asarray(self.log[:, len(self.grid.tables.curvature.w) :, :1].sum(axis=2))
 
     @property
     def _remembered(self) -> int:
@@ -258,7 +258,7 @@ class _Walk:
         self._info[FAILED_STEP] = -1
         self._starts: Starts = {}
         self._forces: list[WindowForces] = []
-        self._history = grid.past()._replace(tension=np.full((len(grid.tables.axial_w), COLUMNS), np.nan))
+        self._history = grid.past()._replace(tension=np.full((len(grid.tables.axial.w), COLUMNS), np.nan))
         if len(self._kept.log):
             note(problem.axes, self._history, self._kept.log[0])
         self._reached, self._split, self._strain = 0, 0, 0.0
@@ -326,7 +326,7 @@ class _Walk:
         reached, states = kept.stand_still(self._reached), kept.states
         grid, forces = self._grid, tuple(self._forces)
         tables, every = grid.tables, every_of(len(states))
-        least, most = slopes(states, every, tables.curvature_first, tables.curvature_b1)
+        least, most = slopes(states, every, tables.curvature.first, tables.curvature.b1)
         return March(
             grid=grid,
             times=self._times[kept.steps],
@@ -475,5 +475,5 @@ def _columns(problem: Problem, grid: Grid) -> tuple[int, int]:
     kept = (problem.twist, problem.bending_memory, problem.twist_memory, problem.stretch_memory)
     if all(effect is None for effect in kept):
         return 0, 0
-    points = len(grid.tables.curvature_w) + (len(grid.tables.axial_w) if problem.stretch_memory is not None else 0)
+    points = len(grid.tables.curvature.w) + (len(grid.tables.axial.w) if problem.stretch_memory is not None else 0)
     return points, PAST + 3 if problem.twist is not None else 1

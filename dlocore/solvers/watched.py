@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dlocore.kernels.basis import GAUSS_3, Tables, basis_rows
+from dlocore.kernels.basis import GAUSS_3, AxialPoints, Tables, basis_rows
 from dlocore.problem.grid import Grid
 
 _SHARE = 0.3  # of the axial stiffness, at the points added: a fifth still leaves folds, more locks the bending more
@@ -20,19 +20,20 @@ def watched(grid: Grid) -> Grid:
     half, (rule, weights) = 0.5 * np.diff(breaks)[:, None], GAUSS_3
     more = (breaks[:-1, None] + half * (1.0 + rule)).ravel()
     first, rows = basis_rows(grid.knots, more, 1)
-    u = np.concatenate([tables.axial_u, more])
+    u = np.concatenate([tables.axial.u, more])
     order = np.argsort(u, kind="stable")
 
     def merged(own: np.ndarray, added: np.ndarray) -> np.ndarray:
         return np.ascontiguousarray(np.concatenate([own, added])[order])
 
-    finer: Tables = tables._replace(
-        axial_u=u[order],
-        axial_first=merged(tables.axial_first, first),
-        axial_b1=merged(tables.axial_b1, rows[:, 1]),
-        axial_w=merged((1.0 - _SHARE) * tables.axial_w, _SHARE * (half * weights).ravel()),
+    points = AxialPoints(
+        u=u[order],
+        first=merged(tables.axial.first, first),
+        b1=merged(tables.axial.b1, rows[:, 1]),
+        w=merged((1.0 - _SHARE) * tables.axial.w, _SHARE * (half * weights).ravel()),
     )
-    behind = [np.interp(finer.axial_u, tables.axial_u, column) for column in grid.history.axial.T]
+    finer: Tables = tables._replace(axial=points)
+    behind = [np.interp(finer.axial.u, tables.axial.u, column) for column in grid.history.axial.T]
     past = grid.past()
     history = past._replace(axial=np.ascontiguousarray(np.transpose(behind)))
     return grid.changed(tables=finer, history=history)

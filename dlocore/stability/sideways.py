@@ -156,7 +156,7 @@ def _leasts_of_bent(
         q[:, :3] = posed.plane.points(problem.plane.world(flat))
         # in a plane the sections turn as the tangent does
         across = np.cross(normal, space.at(q, 0.0, 1)[:3])
-        start_frames(grid.knots, q, space.tables, across / np.linalg.norm(across), history.past)
+        start_frames(grid.knots, q, space.tables.curvature, across / np.linalg.norm(across), history.past)
         history.memory[:, 0] = natural
         yield from _turned(posed, space, q, t, normal, history, posed.law_table(), slack)
 
@@ -216,8 +216,8 @@ def _leasts_of_lying(
     without stress turns with them. As elsewhere they count as the way D/sqrt(8) p.
     """
     cable, tables = problem.scene.cable, grid.tables
-    first, basis = basis_rows(grid.knots, tables.curvature_u, 1)
-    scale = 8.0 / cable.diameter**2 * tables.curvature_w[:, None]
+    first, basis = basis_rows(grid.knots, tables.curvature.u, 1)
+    scale = 8.0 / cable.diameter**2 * tables.curvature.w[:, None]
     twists = scale * cast(float, cable.torsional_stiffness) * _products(basis[:, 1])
     for t, q, natural in zip(times, states, bends, strict=True):
         turning = cast(float, cable.bending_stiffness) * plane_curvature_of(tables, q)[:, 0] * natural
@@ -305,7 +305,8 @@ def _elastic(problem: Problem, grid: Grid, flat: Floats) -> Floats:
     for q in flat:
         kappa = np.abs(plane_curvature_of(tables, q)[:, 0])
         share = 1.0 - np.minimum(natural / np.maximum(kappa, 1e-300), 1.0)
-        bands.append(stiffness_across(q[None].copy(), tables._replace(curvature_w=share * tables.curvature_w), *moduli))
+        weighed = tables._replace(curvature=tables.curvature._replace(w=share * tables.curvature.w))
+        bands.append(stiffness_across(q[None].copy(), weighed, *moduli))
     return np.concatenate(bands)
 
 
@@ -355,10 +356,10 @@ def _twisting(problem: Problem, grid: Grid, q: Floats, held: list[Grasp]) -> Flo
     clamps = sorted(g.u for g in held if g.hold == "clamp")
     if len(clamps) < 2:
         return added
-    at = tables.curvature_first[:, None] + np.arange(4)
-    turns = tables.curvature_w[:, None] * plane_curvature_of(tables, q) * tables.curvature_b1
+    at = tables.curvature.first[:, None] + np.arange(4)
+    turns = tables.curvature.w[:, None] * plane_curvature_of(tables, q) * tables.curvature.b1
     for begin, end in pairwise(clamps):
-        between = (tables.curvature_u > begin) & (tables.curvature_u < end)
+        between = (tables.curvature.u > begin) & (tables.curvature.u < end)
         g = np.zeros(len(q))
         np.add.at(g, at[between], turns[between])
         added += cast(float, problem.scene.cable.torsional_stiffness) / (end - begin) * np.outer(g, g)

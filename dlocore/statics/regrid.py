@@ -20,7 +20,7 @@ _ASTRAY = 0.3  # [rad]: a held section that turns out farther from where it was 
 
 def starts_folded(grid: Grid) -> bool:
     """Tell whether the start of a grid is folded within a span."""
-    least, most = slopes(grid.start[None], 1, grid.tables.curvature_first, grid.tables.curvature_b1)
+    least, most = slopes(grid.start[None], 1, grid.tables.curvature.first, grid.tables.curvature.b1)
     return not (least >= 1.0 - _FOLDED and most <= 1.0 + _FOLDED)
 
 
@@ -42,7 +42,7 @@ def begin_on(problem: Problem, grid: Grid, settled: Grid) -> tuple[Floats, Histo
         q[:, 3] = 0.0
         remember_start(problem.axes, q, grid.tables, *problem.laws, history)
         there = rates_of(problem, settled, settled.start[None], settled.history.past[None])[0]
-        missing = np.interp(grid.tables.curvature_u, settled.tables.curvature_u, there)
+        missing = np.interp(grid.tables.curvature.u, settled.tables.curvature.u, there)
         missing -= rates_of(problem, grid, q[None], history.past[None])[0]
         q[:, 3] = angles_of(problem, grid, missing[None], settled.start[:1, 3])[0]
         held = [g.u for g in closed_grasps(problem.scene, 0.0, 0.0) if g.hold == "clamp"]
@@ -53,10 +53,10 @@ def begin_on(problem: Problem, grid: Grid, settled: Grid) -> tuple[Floats, Histo
         if not np.abs(off).max(initial=0.0) <= _ASTRAY * problem.twist.radius or not np.isfinite(q).all():
             return None
     tables, behind = settled.tables, settled.history.axial
-    index = tables.axial_first[:, None] + np.arange(4)
-    along = np.einsum("pi,pid->pd", tables.axial_b1, settled.start[index, :dimensions])
+    index = tables.axial.first[:, None] + np.arange(4)
+    along = np.einsum("pi,pid->pd", tables.axial.b1, settled.start[index, :dimensions])
     strain = np.sqrt((along * along).sum(axis=1)) - 1.0 - behind[:, 0]
-    tension = np.zeros((len(grid.tables.axial_w), COLUMNS))
+    tension = np.zeros((len(grid.tables.axial.w), COLUMNS))
     pull = problem.stretch.axial_stiffness * strain
-    tension[:, ASSUMED] = np.interp(grid.tables.axial_u, tables.axial_u, pull)
+    tension[:, ASSUMED] = np.interp(grid.tables.axial.u, tables.axial.u, pull)
     return q, history._replace(tension=tension)

@@ -58,7 +58,7 @@ def _slid(problem: Problem, grid: Grid, monitor: Monitor) -> tuple[Floats, Rest,
     active, parameters = firmer(problem, 0.0).law_table()
     active[list(_RATES)] = 0
     axes, tables, length = problem.axes, grid.tables, cable.length
-    history = grid.past()._replace(tension=np.full((len(tables.axial_w), COLUMNS), np.nan))
+    history = grid.past()._replace(tension=np.full((len(tables.axial.w), COLUMNS), np.nan))
     starts: Starts = {}
     grasps = closed_grasps(problem.scene, 0.0, 0.0)
     close_grasps(problem, grid, grasps, starts, None)

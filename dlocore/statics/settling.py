@@ -83,7 +83,7 @@ def settle(
     """
     q, history = (grid.start.copy(), grid.past()) if begin is None else begin
     if len(history.tension) == 0:
-        history = history._replace(tension=np.zeros((len(grid.tables.axial_w), COLUMNS)))
+        history = history._replace(tension=np.zeros((len(grid.tables.axial.w), COLUMNS)))
     carried = at > 0.0 and starts is None
     starts = {} if starts is None else starts
     before_t = 0.0 if carried else at
@@ -153,7 +153,7 @@ def _relaxed(
                 axes, q, before, searched, applied, tables, active, parameters, untouched, elimination, offset,
                 tolerance * length, _ITERATIONS,
             )  # fmt: skip
-            if passes(problem.nc, before, q, tables, parameters, history.pressing):
+            if passes(problem.nc, before, q, tables.contact, parameters, history.pressing):
                 q[:] = before
                 searched *= _STRONGER
                 rounds -= 1

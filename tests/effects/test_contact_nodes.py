@@ -41,9 +41,9 @@ def pressing(problem: Problem, grid: Grid) -> tuple[Floats, Floats]:
     """Return where the nodes for obstacles lie that act [m], and their weights [m]."""
     history = grid.past()
     remember_start(problem.axes, grid.start, grid.tables, *problem.laws, history)
-    weights = history.pressing[grid.tables.table_nodes :]
+    weights = history.pressing[grid.tables.contact.table_nodes :]
     acts = weights > 0.0
-    return np.asarray(grid.tables.contact_u[grid.tables.table_nodes :][acts]), weights[acts]
+    return np.asarray(grid.tables.contact.u[grid.tables.contact.table_nodes :][acts]), weights[acts]
 
 
 def apart(u: Floats, low: float, high: float) -> float:
@@ -65,7 +65,7 @@ def test_few_nodes_act_on_the_inside_of_a_face_and_many_about_its_edges() -> Non
 
 def test_what_is_not_a_step_of_a_march_has_all_nodes() -> None:
     _, grid = posed(block(0.4))
-    assert np.array_equal(grid.past().pressing, grid.tables.contact_w)
+    assert np.array_equal(grid.past().pressing, grid.tables.contact.w)
 
 
 def test_something_round_needs_few_nodes_beside_something_with_edges() -> None:
@@ -78,8 +78,8 @@ def test_something_round_needs_few_nodes_beside_something_with_edges() -> None:
 def test_a_table_has_nodes_of_its_own_however_fine_those_for_obstacles_are() -> None:
     alone = posed(table=Table(height=-D))[1].tables
     beside = posed(block(0.4), table=Table(height=-0.3))[1].tables
-    assert beside.table_nodes == alone.table_nodes < 100
-    assert len(beside.contact_u) - beside.table_nodes > 2000
+    assert beside.contact.table_nodes == alone.contact.table_nodes < 100
+    assert len(beside.contact.u) - beside.contact.table_nodes > 2000
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.4])
@@ -120,7 +120,7 @@ def strike(obstacle: Obstacle, before: Floats, move: tuple[float, float, float])
     problem, grid = posed(obstacle)
     q0 = grid.start + np.asarray(before)
     q1 = q0 + np.asarray(move)
-    return bool(strikes(problem.nc, q0, q1, grid.tables, problem.laws[1], grid.tables.contact_w, 1e-4))
+    return bool(strikes(problem.nc, q0, q1, grid.tables.contact, problem.laws[1], grid.tables.contact.w, 1e-4))
 
 
 DEEP = -0.02 * D

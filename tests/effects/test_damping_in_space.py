@@ -34,9 +34,9 @@ class Damped:
 
     def forces(self, q: Floats, v: Floats | None = None, past: tuple[Floats, ...] = (), h: float = 0.0) -> Floats:
         """Return the forces (n_u, 3) at a velocity, or by differences of step h from the two states of the `past`."""
-        points = len(self.tables.curvature_w)
+        points = len(self.tables.curvature.w)
         history = History(
-            np.zeros((points, 6)), np.zeros((points, 9)), np.zeros((len(self.tables.axial_w), 3)), np.zeros((0, 6)),
+            np.zeros((points, 6)), np.zeros((points, 9)), np.zeros((len(self.tables.axial.w), 3)), np.zeros((0, 6)),
             np.zeros((0, 2)), np.zeros(0), np.zeros((0, 4)), np.zeros(room_for(3, points)),
         )  # fmt: skip
         for x in past:

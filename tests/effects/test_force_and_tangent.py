@@ -87,12 +87,12 @@ def body(name: str, nc: int, n_u: int = N_U, rest: float = 0.0) -> Body:
         active[row] = 1
         values = effect.parameters()
         parameters[row, : len(values)] = values
-    memory = np.zeros((len(tables.curvature_w), 2 if nc == 2 else 6))
+    memory = np.zeros((len(tables.curvature.w), 2 if nc == 2 else 6))
     if name.endswith("memory") and nc == 2:
         memory[:] = rest or 3.0
     past = np.zeros((len(memory), 2 if nc == 2 else 9))
     none = np.zeros((0, 6)), np.zeros((0, 2)), np.zeros(0), np.zeros((0, 4)), np.zeros(room_for(nc, len(memory)))
-    history = History(memory, past, np.zeros((len(tables.axial_w), 3)), *none)
+    history = History(memory, past, np.zeros((len(tables.axial.w), 3)), *none)
     return Body(nc, knots, tables, active, parameters, history)
 
 

@@ -68,7 +68,7 @@ def ways(problem: Problem, before: Floats, after: Floats) -> bool:
     grid = make_grid(problem, 9)
     along = np.linspace(0.0, 1.0, 9)[:, None]
     states = [(1.0 - along) * ends[0] + along * ends[1] - problem.plane.origin for ends in (before, after)]
-    return bool(passes(3, *states, grid.tables, problem.laws[1], grid.tables.contact_w))
+    return bool(passes(3, *states, grid.tables.contact, problem.laws[1], grid.tables.contact.w))
 
 
 SOLIDS: dict[str, Obstacle] = {

@@ -12,7 +12,7 @@ from tests.solver.scenes import Floats, arc
 
 def over_spans(tables: Tables) -> Floats:
     """Return the matrix (points, points) that takes values to their means over the spans, or to straight lines."""
-    first, weights, u = tables.curvature_first, tables.curvature_w, tables.curvature_u
+    first, weights, u = tables.curvature.first, tables.curvature.w, tables.curvature.u
     out = np.zeros((len(u), len(u)))
     spans = np.unique(first)
     for k, span in enumerate(spans):
@@ -39,12 +39,12 @@ def test_angles_are_the_smoothest_of_those_with_the_twist_rates():
     for n_u in (9, 21, 60):
         grid = make_grid(problem, n_u)
         tables, random = grid.tables, np.random.default_rng(n_u)
-        rates, first = random.normal(0.0, 1.0, (3, len(tables.curvature_w))), random.normal(0.0, 0.01, 3)
-        slopes, bends = np.zeros((2, len(tables.curvature_w), n_u))
-        for p, k in enumerate(tables.curvature_first):
-            slopes[p, k : k + 4], bends[p, k : k + 4] = tables.curvature_b1[p], tables.curvature_b2[p]
-        root = np.sqrt(tables.curvature_w)[:, None]
-        widths = np.repeat(tables.curvature_w.reshape(-1, 3).sum(axis=1), 3)[:, None]
+        rates, first = random.normal(0.0, 1.0, (3, len(tables.curvature.w))), random.normal(0.0, 0.01, 3)
+        slopes, bends = np.zeros((2, len(tables.curvature.w), n_u))
+        for p, k in enumerate(tables.curvature.first):
+            slopes[p, k : k + 4], bends[p, k : k + 4] = tables.curvature.b1[p], tables.curvature.b2[p]
+        root = np.sqrt(tables.curvature.w)[:, None]
+        widths = np.repeat(tables.curvature.w.reshape(-1, 3).sum(axis=1), 3)[:, None]
         rows = np.concatenate([root * (over_spans(tables) @ slopes), _SMOOTH * widths * root * bends])
         found = angles_of(problem, grid, rates, first)
         for values, rate, given in zip(found, rates, first, strict=True):

@@ -40,7 +40,7 @@ def pressed(states: Any, v: Any, tables: Any, p: Any, x: Any, f: Any) -> Any:
     count, looks = 0, 0
     seen = np.full_like(states[0], np.nan)
     for k in range(len(states)):
-        count, _ = press(states[k], v, tables, p, x, near, f[k])
+        count, _ = press(states[k], v, tables.strands, p, x, near, f[k])
         looks += not np.array_equal(seen, near.seen)
         seen[:] = near.seen
     return near.met[0], count, looks
@@ -58,10 +58,10 @@ def ways(q: Any, others: Any, v: Any, tables: Any, p: Any, x: Any, y: Any) -> An
     kept = True
     for k in range(len(others)):
         near = nothing_known(*q.shape)
-        shares[k, 0] = clear(q, others[k], tables, p, x, y, near)
-        count, _ = press(q, v, tables, p, x, near, np.zeros_like(q))
+        shares[k, 0] = clear(q, others[k], tables.strands, p, x, y, near)
+        count, _ = press(q, v, tables.strands, p, x, near, np.zeros_like(q))
         met = near.met[0][:count].copy()
-        shares[k, 1] = clear(q, others[k], tables, p, x, y, near)
+        shares[k, 1] = clear(q, others[k], tables.strands, p, x, y, near)
         kept = kept and np.array_equal(near.met[0][:count], met)
     return shares, kept
 
@@ -78,7 +78,7 @@ class Tangle:
             # segments of 25 mm, so long that control points lie between those of their ends
             self.problem = replace(self.problem, scene=replace(scene, cable=replace(scene.cable, diameter=0.05)))
         self.grid: Grid = make_grid(self.problem, n_u)
-        first = self.grid.tables.strand_first
+        first = self.grid.tables.strands.first
         assert (np.diff(first).max() > 4) == (n_u > FEW)
         self.parameters = self.problem.law_table()[1]
         self.parameters[laws.SELF_CONTACT, 0] = 0.02 if nc > 2 else 0.085  # [m]: so thick that many pairs touch
@@ -89,7 +89,7 @@ class Tangle:
     def press(self, q: Floats, v: Floats | None = None) -> tuple[Floats, Floats, NDArray[np.int64], int]:
         """Return the forces, the nodes, the pairs and their number."""
         f = np.zeros((1, *q.shape))
-        x = np.empty((len(self.grid.tables.strand_u), min(q.shape[1], 3)))
+        x = np.empty((len(self.grid.tables.strands.u), min(q.shape[1], 3)))
         v = self.still if v is None else v
         found, count, _ = pressed(q[None], v, self.grid.tables, self.parameters, x, f)
         return f[0], x, found, count
@@ -107,7 +107,20 @@ class Tangle:
         _, x, found, count = self.press(self.q)
         assert count > 10
         S, end = np.zeros((len(band), len(band))), np.zeros(len(band), np.int64)
-        widen(self.q.shape[1], self.still, self.grid.tables, self.parameters, x, found, count, scales, e, band, end, S)
+        widen(
+            self.q.shape[1],
+            self.still,
+            self.grid.tables.strands,
+            self.parameters,
+            x,
+            found,
+            count,
+            scales,
+            e,
+            band,
+            end,
+            S,
+        )
         return S, end
 
 
@@ -212,7 +225,7 @@ def test_a_tangent_without_pairs_is_the_band() -> None:
     _, x, found, _ = tangle.press(tangle.q)
     S, end = np.zeros((len(band), len(band))), np.zeros(len(band), np.int64)
     tables, scales = tangle.grid.tables, (1.0, 0.0, 1.0)
-    widen(3, tangle.still, tables, tangle.parameters, x, found, 0, scales, e, band, end, S)
+    widen(3, tangle.still, tables.strands, tangle.parameters, x, found, 0, scales, e, band, end, S)
     a, b = np.ones(len(band)), np.ones(len(band))
     filled, columns = np.empty_like(end), np.empty(S.shape, np.int32)
     assert factor_wide(S, end, filled, columns) == -1
@@ -248,9 +261,9 @@ def test_a_tangent_is_written_over_the_last_one(nc: int, n_u: int) -> None:
     # the next tangent is of fewer pairs
     _, x, found, count = tangle.press(tangle.q)
     p, tables, scales = tangle.parameters, tangle.grid.tables, (1.0, 0.0, 1.0)
-    widen(nc, tangle.still, tables, p, x, found, count // 3, scales, e, band, end, S)
+    widen(nc, tangle.still, tables.strands, p, x, found, count // 3, scales, e, band, end, S)
     fresh, its_end = np.zeros_like(S), np.zeros_like(end)
-    widen(nc, tangle.still, tables, p, x, found, count // 3, scales, e, band, its_end, fresh)
+    widen(nc, tangle.still, tables.strands, p, x, found, count // 3, scales, e, band, its_end, fresh)
     assert np.array_equal(end, its_end)
     assert np.array_equal(S, fresh)
 

@@ -38,16 +38,16 @@ class Body:
         for row, effect in effects:
             self.active[row] = 1
             self.p[row, : len(effect.parameters())] = effect.parameters()
-        points = len(self.tables.curvature_w)
+        points = len(self.tables.curvature.w)
         memory = np.tile([2.0, -1.0, 0.7, 2.0, -1.0, 0.7], (points, 1)) * remembered
-        axial = np.zeros((len(self.tables.axial_w), 3))
+        axial = np.zeros((len(self.tables.axial.w), 3))
         self.history = History(
             memory, np.zeros((points, PAST)), axial, np.zeros((0, 6)), np.zeros((0, 2)), np.zeros(0), np.zeros((0, 4)),
             np.zeros(room_for(4, points)),
         )  # fmt: skip
 
     def carry_frames(self, q: Floats) -> None:
-        start_frames(self.knots, q, self.tables, np.array([0.0, 1.0, 0.2]), self.history.past)
+        start_frames(self.knots, q, self.tables.curvature, np.array([0.0, 1.0, 0.2]), self.history.past)
 
     def energy(self, q: Floats) -> float:
         return float(stored_energy(AXES, q, self.tables, self.active, self.p, self.history))
@@ -192,7 +192,7 @@ def test_frames_carried_in_time_have_the_twist_that_frames_without_twist_along_t
     fresh.carry_frames(end)
     turned = [angle_between(b[6:9], a[6:9], b[:3]) for a, b in zip(body.history.past, fresh.history.past, strict=True)]
     rate = body.history.past[:, LAST + 2]
-    u = body.tables.curvature_u
+    u = body.tables.curvature.u
     total = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(u))])
     assert np.ptp(total) > 0.02  # there is something to compare
     # the trapezoidal sum over points up to 8 cm apart

@@ -68,18 +68,18 @@ def test_watching_points_bear_folds_and_nothing_else():
     own = watched(grid)
     length = problem.scene.cable.length
     tables = own.tables
-    assert np.all(np.diff(tables.axial_u) >= 0.0)  # what is remembered there is interpolated along the cable
-    np.testing.assert_allclose(tables.axial_w.sum(), length, rtol=1e-14)  # rounding of a sum of 33 numbers
-    assert len(own.history.axial) == len(tables.axial_u)
+    assert np.all(np.diff(tables.axial.u) >= 0.0)  # what is remembered there is interpolated along the cable
+    np.testing.assert_allclose(tables.axial.w.sum(), length, rtol=1e-14)  # rounding of a sum of 33 numbers
+    assert len(own.history.axial) == len(tables.axial.u)
 
     def stretch(q: np.ndarray, of: object) -> float:
-        first, b1 = of.axial_first, of.axial_b1  # type: ignore[attr-defined]
+        first, b1 = of.axial.first, of.axial.b1  # type: ignore[attr-defined]
         slope = np.linalg.norm(np.einsum("pi,pid->pd", b1, q[first[:, None] + np.arange(4)]), axis=1)
-        return float((of.axial_w * (slope - 1.0) ** 2).sum())  # type: ignore[attr-defined]
+        return float((of.axial.w * (slope - 1.0) ** 2).sum())  # type: ignore[attr-defined]
 
     assert stretch(grid.start, tables) < 1e-20  # straight: rounding squared
     # r' of unit length that turns to and fro at the points of the grid: between them it is shorter, and none sees that
-    first, b1 = grid.tables.axial_first, grid.tables.axial_b1
+    first, b1 = grid.tables.axial.first, grid.tables.axial.b1
     rows = np.zeros((len(first), grid.n_u))
     np.put_along_axis(rows, first[:, None] + np.arange(4), b1, axis=1)
     turned = 1.2 * (-1.0) ** np.arange(len(first))

@@ -228,7 +228,7 @@ def test_a_straight_cable_that_is_given_a_bow_keeps_its_stretch() -> None:
     assert pushed.level is not None
     problem, grid = pushed.level.problem, pushed.level.motion.grid
     assert problem.start.bow > 0.0
-    given = problem.start.strain_at(grid.tables.axial_u)
+    given = problem.start.strain_at(grid.tables.axial.u)
     np.testing.assert_allclose(given, 0.004, atol=5e-4)  # waves run along it
     strain = axial_strain(grid.tables, grid.start[:, : problem.plane.dimensions])
     np.testing.assert_allclose(strain - grid.history.axial[:, 0], given, atol=1e-12)

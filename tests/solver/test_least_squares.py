@@ -212,8 +212,8 @@ def test_strained_as_the_march_it_bears_the_tension_of_the_march(soft: float) ->
     tables, stiffness = motion.grid.tables, problem.stretch.axial_stiffness
     step = np.diff(motion.times)[:, None]
     between = 0.5 * (motion.times[1:] + motion.times[:-1])
-    index = tables.axial_first[:, None] + np.arange(4)
-    slopes = np.einsum("pi,kpid->kpd", tables.axial_b1, motion.states[:, index])
+    index = tables.axial.first[:, None] + np.arange(4)
+    slopes = np.einsum("pi,kpid->kpd", tables.axial.b1, motion.states[:, index])
     strains = np.linalg.norm(slopes, axis=-1) - 1.0
     mean = 0.5 * (strains[1:] + strains[:-1])
     damping = problem.stretch_damping

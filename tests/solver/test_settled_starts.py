@@ -54,7 +54,7 @@ def relaxed(problem: Problem, springs: float, *, plain: bool) -> tuple[Floats, f
     applied = applied_forces(problem, grid, np.zeros(1))[0]
     active, parameters = problem.law_table()
     if plain:
-        history = grid.past()._replace(tension=np.zeros((len(grid.tables.axial_w), COLUMNS)))
+        history = grid.past()._replace(tension=np.zeros((len(grid.tables.axial.w), COLUMNS)))
         update, _ = descend(
             problem.axes, q, springs, applied, grid.tables, active, parameters, history, held.elimination,
             held.offsets[0], 0.0, 1e-12, 1e-10,

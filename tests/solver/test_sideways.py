@@ -317,7 +317,7 @@ def _in_space(problem: Problem) -> Problem:
 
 
 def _forces(problem: Problem, x: Floats, tables: Any) -> Floats:
-    points, stretched = len(tables.curvature_w), len(tables.axial_w)
+    points, stretched = len(tables.curvature.w), len(tables.axial.w)
     past = (
         np.zeros((stretched, 3)),
         np.zeros((0, 6)),

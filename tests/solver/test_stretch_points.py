@@ -34,8 +34,8 @@ def grid_of(name: str, n_u: int) -> Grid:
 def strains(grid: Grid) -> Floats:
     """Return the matrix (points, n_u) from control points along a straight cable to strains at the points."""
     tables = grid.tables
-    out = np.zeros((len(tables.axial_w), grid.n_u))
-    np.put_along_axis(out, tables.axial_first[:, None] + np.arange(4), tables.axial_b1, axis=1)
+    out = np.zeros((len(tables.axial.w), grid.n_u))
+    np.put_along_axis(out, tables.axial.first[:, None] + np.arange(4), tables.axial.b1, axis=1)
     return out
 
 
@@ -52,7 +52,7 @@ def test_only_a_rigid_shift_costs_no_stretch_energy(name, n_u):
 @pytest.mark.parametrize("name", GRASPS)
 def test_weights_of_the_stretch_points_fill_the_cable(name):
     grid = grid_of(name, 13)
-    w = grid.tables.axial_w
+    w = grid.tables.axial.w
     assert w.sum() == pytest.approx(1.0, rel=1e-12)
     assert w.min() > 0
     # a stretch that grows along the cable, on either side of a double knot: exact in all but the graded spans

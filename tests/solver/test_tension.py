@@ -59,7 +59,7 @@ class Line(NamedTuple):
 def line(around: Environment) -> Line:
     problem = pose(Scene(cable=CABLE, shape=Straight(), environment=around, effects={"twist": "off"}, horizon=1.0))
     grid = make_grid(problem, 9)
-    tension = np.full((len(grid.tables.axial_w), COLUMNS), np.nan)
+    tension = np.full((len(grid.tables.axial.w), COLUMNS), np.nan)
     return Line(problem, grid.tables, grid.past()._replace(tension=tension))
 
 
@@ -80,7 +80,7 @@ def test_the_tension_is_pointed_to_to_first_order(around: Environment) -> None:
     missed = []
     for step in (1e-4, 1e-5):
         cable.force(q)
-        point_on(q.shape[1], q + step * change, step * change, cable.tables, cable.kept)
+        point_on(q.shape[1], q + step * change, step * change, cable.tables.axial, cable.kept)
         pointed = cable.kept[:, ASSUMED].copy()
         cable.force(q + step * change)
         missed.append(np.abs(cable.kept[:, AT_HAND] - pointed).max())
@@ -143,8 +143,8 @@ def test_a_march_ends_with_the_tension_of_its_last_state(around: Environment) ->
     motion = march(problem, make_grid(problem, 9), 80, Monitor(None, None, None))
     kept = motion.history.tension
     tables = motion.grid.tables
-    index = tables.axial_first[:, None] + np.arange(4)
-    slopes = np.einsum("pi,pid->pd", tables.axial_b1, motion.states[-1][index][..., : problem.plane.dimensions])
+    index = tables.axial.first[:, None] + np.arange(4)
+    slopes = np.einsum("pi,pid->pd", tables.axial.b1, motion.states[-1][index][..., : problem.plane.dimensions])
     tension = EA * (np.linalg.norm(slopes, axis=1) - 1.0)
     # the strain of the last state is known to what Newton's method leaves of it, 1e-7 L over a span of L/8
     np.testing.assert_allclose(kept[:, LAST], tension, atol=0.05 * np.abs(tension).max() + EA * 1e-6)
