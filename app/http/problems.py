@@ -48,11 +48,16 @@ class ProblemError(Exception):
         self.extra = extra
 
 
+def phrase_of(status: int) -> str:
+    """Return the phrase of a status, as RFC 9110 has it; Python before 3.13 has older ones."""
+    return {413: "Content Too Large", 422: "Unprocessable Content"}.get(status, HTTPStatus(status).phrase)
+
+
 def document_of(problem: ProblemError) -> dict[str, Any]:
     """Return the problem as its document."""
     return {
         "type": f"urn:dlo:problem:{problem.kind}",
-        "title": HTTPStatus(problem.status).phrase,
+        "title": phrase_of(problem.status),
         "status": problem.status,
         "detail": problem.detail,
         **problem.extra,
@@ -92,7 +97,7 @@ async def _on_validation_error(request: Request, error: Exception) -> Response:
 
 async def _on_http_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
-    kind = HTTPStatus(error.status_code).phrase.lower().replace(" ", "-")
+    kind = phrase_of(error.status_code).lower().replace(" ", "-")
     detail = _DETAILS.get(error.status_code, str(error.detail))
     headers = {**(error.headers or {}), **({"Allow": _allowed(request)} if error.status_code == 405 else {})}
     return problem_response(ProblemError(error.status_code, kind, detail, headers=headers))

@@ -179,6 +179,7 @@ def test_a_wrong_field_is_named_with_what_is_allowed(
     client: TestClient, scene: dict[str, Any], path: str, value: Any, field: str
 ) -> None:
     problem = the_problem(client.post("/v1/predictions", json=put(scene, path, value)), 422)
+    assert problem["title"] == "Unprocessable Content"  # as RFC 9110 has it; Python before 3.13 has an older phrase
     assert [error["field"] for error in problem["errors"]] == [field]
     (error,) = problem["errors"]
     assert set(error) == {"field", "given", "allowed", "message"}
@@ -268,7 +269,8 @@ def test_another_content_type_is_refused(client: TestClient, media: str) -> None
 def test_a_body_beyond_the_limit_is_refused_whether_it_says_so_or_not(client: TestClient) -> None:
     headers = {"content-type": "application/json"}
     large = b" " * 10_000_001
-    the_problem(client.post("/v1/predictions", content=large, headers=headers), 413)
+    problem = the_problem(client.post("/v1/predictions", content=large, headers=headers), 413)
+    assert problem["title"] == "Content Too Large"
     chunks = (b" " * 1_000_000 for _ in range(11))
     the_problem(client.post("/v1/predictions", content=chunks, headers=headers), 413)
 

@@ -1,4 +1,4 @@
-"""Bends that are free of stress and swing about the cable beside them (docs/model.md eq. 19a)."""
+"""Bends that are free of stress and swing about the cable beside them (docs/model.md eq. 19b)."""
 
 from dataclasses import replace
 
