@@ -99,7 +99,7 @@ def _integrated(u: float, length: float, features: Any, power: Any, width: Any) 
 def graded_knots(n: int, length: float, features: Any, multiplicity: Any, power: Any, width: Any) -> Any:
     """Return clamped knots for `n` control points on [0, length] with knots at, and graded towards, the features.
 
-    The density of knots is 1 + sum_f (w_f / (w_f + |u - u_f| / L))^p_f: features are grasps and loads. A feature inside
+    The density of knots is 1 + sum_f ((w_f + 1) / (w_f + |u - u_f| / L))^p_f: features are grasps and loads. A feature inside
     becomes a knot of its multiplicity. Spans are shared among the segments between features in proportion to the
     integral of the density (each at least one), and spread within each by it.
 
@@ -107,7 +107,7 @@ def graded_knots(n: int, length: float, features: Any, multiplicity: Any, power:
         n: number of control points, at least 4 + the multiplicities inside.
         length: L [m].
         features: sorted material coordinates (m,) [m].
-        multiplicity: of the knot at each feature (m,), 1 or 2; at the ends of the cable ignored.
+        multiplicity: of the knot at each feature (m,), 1 to 3; at the ends of the cable ignored.
         power: grading exponent p_f (m,).
         width: grading width w_f (m,), fraction of L.
 

@@ -1,4 +1,4 @@
-"""The angle of the sections between the knots (docs/model.md eq. 19a): what the spline of theta can't follow.
+"""The angle of the sections between the knots (docs/model.md eq. 19b): what the spline of theta can't follow.
 
 Frames that are carried in time turn against each other as a bend swings. With R(u) the integral of their twist rate
 from u = 0, the angle of a section against its frame is S - R, where S' is the twist rate of the cable. S is smooth, as
