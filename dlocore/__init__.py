@@ -97,3 +97,8 @@ def __getattr__(name: str) -> Any:
     import importlib
 
     return getattr(importlib.import_module(f"dlocore.{homes[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    """Return the public names, of which completion would miss those that are imported on first use."""
+    return __all__

@@ -6,13 +6,15 @@ from numpy.typing import ArrayLike, NDArray
 from dlocore.answer.frames import directors
 from dlocore.answer.parts import MaterialMotion
 from dlocore.effects import laws
+from dlocore.errors import SceneError, instance
 from dlocore.kernels.assembly import NO_RATES, History, assemble, multiply_scalar_band, stored_energy
 from dlocore.kernels.twisted import start_frames
 from dlocore.problem.discretisation import grid_on, write_material
+from dlocore.problem.features import SAME
 from dlocore.problem.grid import Grid
 from dlocore.problem.problem import Problem
 from dlocore.scene.scene import Scene
-from dlocore.spline import SplineSurface
+from dlocore.spline import SplineSurface, within
 from dlocore.stability.sideways import pose_as_shown
 
 Floats = NDArray[np.float64]
@@ -35,6 +37,9 @@ def energies(
     "gravity", -mu g . r relative to the first of the times. Each is integrated over the cable as the solver does it.
     What is off in the scene is zero. `material` is what the sections remember (`Prediction.material`), for a cable that
     yields.
+
+    Raises:
+        SceneError: a time is outside the predicted time, or the surface is of a cable of another length.
     """
     problem, grid, states, rates, _, histories = _motion(scene, surface, times, material)
     active, parameters = problem.law_table()
@@ -60,6 +65,9 @@ def effect_forces(
     """Return how large the generalised forces of each active effect are in the motion [N].
 
     It is the root mean square over `times` (k,) [s] of the norm of the forces at the control points.
+
+    Raises:
+        SceneError: as `energies`.
     """
     problem, grid, states, rates, accelerations, histories = _motion(scene, surface, times, material)
     active, parameters = problem.law_table()
@@ -97,13 +105,19 @@ def _motion(
 
     What had yielded by then is not in a surface but in `material`; without it the stress-free shape is the start's.
     """
+    instance("scene", scene, Scene, "a Scene")
+    instance("surface", surface, SplineSurface, "a SplineSurface, as Prediction.surface")
     cable = scene.cable
     yields = any(x is not None for x in (cable.yield_strain, cable.yield_twist, cable.yield_stretch))
     called = material is not None and yields and scene.effects.get("plasticity", "auto") != "off"
     shown = {"plasticity": "it shows in the motion"} if called else {}
     problem = pose_as_shown(scene, shown, surface.control_points)
     grid = grid_on(problem, surface.knots_u)
-    at = np.clip(np.atleast_1d(np.asarray(times, dtype=float)), 0.0, surface.horizon)
+    if abs(surface.length - cable.length) > SAME * cable.length:
+        raise SceneError(
+            "surface", f"that of a cable of {surface.length:g} m", f"one of the scene's, {cable.length:g} m"
+        )
+    at = np.clip(within("times", times, surface.horizon, "s"), 0.0, surface.horizon)
     moved = [surface.states(at, order) for order in range(3)]
     states = problem.coordinates(moved[0][..., :3], moved[0][..., 3])
     rates, accelerations = (problem.rates(x[..., :3], x[..., 3]) for x in moved[1:])

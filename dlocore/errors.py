@@ -98,6 +98,8 @@ def number(
         f"at most {at_most:g}" if at_most is not None else "",
     ]
     allowed = " ".join(["a finite number", *[b for b in bounds if b]]) + (f" [{unit}]" if unit else "")
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.integer | np.floating):
         raise SceneError(field, _typed(value), allowed)
     try:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dlocore.accuracy.again import Again, as_solved, march_again
 from dlocore.accuracy.changes import MISSED_COUNTS
-from dlocore.accuracy.companion import by_coarser, by_finer
+from dlocore.accuracy.companion import Compared, by_coarser, by_finer
 from dlocore.accuracy.cost import Cost
 from dlocore.accuracy.fallback import (
     as_marched,
@@ -249,7 +249,8 @@ def _least_squares(
         errors = None if again.errors is None else {**again.errors, "iteration": left}
         return _answer(monitor, method, Outcome(level, status, message + again.said, errors), find_forces, again.judged)
     known = quality.estimate and (method != "paper" or converged)
-    estimate, doubt = by_finer(problem, level, monitor) if known else (None, "")
+    estimate, doubt, turned = by_finer(problem, level, monitor) if known else Compared(None)
+    level = replace(level, turned=turned)
     errors = None if estimate is None else {"grid": estimate, "iteration": left}
     return _answer(monitor, method, Outcome(level, status, message + doubt, errors), find_forces)
 
@@ -271,7 +272,8 @@ def _given(problem: Problem, quality: Quality, monitor: Monitor, level: Level | 
         level = evenly_fitted(march_given(problem, quality.n_u, quality.n_t, monitor))
     problem = level.problem
     record_level(problem, level, monitor)
-    estimate, doubt = by_coarser(problem, level, monitor) if quality.estimate else (None, "")
+    estimate, doubt, turned = by_coarser(problem, level, monitor) if quality.estimate else Compared(None)
+    level = replace(level, turned=turned)
     if estimate is not None:
         estimate = max(estimate, MISSED_COUNTS * level.missed)
     status, message = given_status(level)

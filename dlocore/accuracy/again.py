@@ -90,7 +90,7 @@ def march_again(problem: Problem, like: Prediction, monitor: Monitor) -> Again |
     )  # fmt: skip
     errors = {n: error for n, error in judged.accuracy.error_parts.items() if n not in _NOT_OF_THE_GRID}
     change = distance(judged.level, level, problem) if errors else np.inf
-    level = replace(level, change=change, note="on the grid of a motion like it")
+    level = replace(level, change=change, turned=judged.level.turned, note="on the grid of a motion like it")
     if level.motion.stopped == "time":
         return Again(level, judged, None)
     length = problem.scene.cable.length

@@ -1,6 +1,8 @@
 """The march on another grid that the error on a given one is estimated with."""
 
-from dlocore.levels.level import Level, Size, distance, run_level
+from typing import NamedTuple
+
+from dlocore.levels.level import Level, Size, distance, run_level, turned
 from dlocore.levels.whole_march import march_status
 from dlocore.problem.discretisation import smallest_n_u
 from dlocore.problem.problem import Problem
@@ -17,6 +19,20 @@ TOO_LATE = "The time limit passed before its error was estimated."
 UNKNOWN = "Its error is not known"
 
 
+class Compared(NamedTuple):
+    """What a march on another grid tells of the error of one.
+
+    Attributes:
+        estimate: the estimated error [m], None where there is none.
+        doubt: why there is none, in words.
+        turned: largest angle between the sections of the two [rad].
+    """
+
+    estimate: float | None
+    doubt: str = ""
+    turned: float = 0.0
+
+
 def coarser(problem: Problem, size: Size) -> Size | None:
     """Return the size of the march that the error of one on a given grid is estimated with, None where it is finer."""
     other = _resized(problem, size, COARSER, FEWER)
@@ -28,8 +44,8 @@ def finer(problem: Problem, size: Size) -> Size:
     return _resized(problem, size, FINER, FINER)
 
 
-def by_coarser(problem: Problem, level: Level, monitor: Monitor) -> tuple[float | None, str]:
-    """Return the estimated error of a march on a given grid [m], or None and why there is none, in words.
+def by_coarser(problem: Problem, level: Level, monitor: Monitor) -> Compared:
+    """Return the estimated error of a march on a given grid.
 
     It is a share of the distance to a march on a coarser grid, which takes less than half of its time. Where the grid
     has no room for one, or it fails, a finer one takes its place.
@@ -38,24 +54,24 @@ def by_coarser(problem: Problem, level: Level, monitor: Monitor) -> tuple[float 
     if size is not None:
         other, said = _marched(problem, size, level, monitor)
         if other is None:
-            return None, said
+            return Compared(None, said)
         if march_status(problem, other)[0] == "converged":
             left = _LEFT_KINKED if level.motion.kinked else _LEFT
-            return left * distance(level, other, problem), ""
+            return Compared(left * distance(level, other, problem), turned=turned(level, other, problem))
     return by_finer(problem, level, monitor)
 
 
-def by_finer(problem: Problem, level: Level, monitor: Monitor) -> tuple[float | None, str]:
-    """Return the estimated error of a solution on a given grid [m], or None and why there is none, in words.
+def by_finer(problem: Problem, level: Level, monitor: Monitor) -> Compared:
+    """Return the estimated error of a solution on a given grid.
 
     It is the distance to a march on a grid half as fine again, with a margin.
     """
     other, said = _marched(problem, finer(problem, level.size), level, monitor)
     if other is None:
-        return None, said
+        return Compared(None, said)
     if other.motion.stopped:
-        return None, f" {UNKNOWN}: the finer march to compare it with found no equilibrium."
-    return _SAFETY * distance(level, other, problem), ""
+        return Compared(None, f" {UNKNOWN}: the finer march to compare it with found no equilibrium.")
+    return Compared(_SAFETY * distance(level, other, problem), turned=turned(level, other, problem))
 
 
 def _resized(problem: Problem, size: Size, points: float, steps: float) -> Size:

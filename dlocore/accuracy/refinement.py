@@ -17,6 +17,7 @@ from dlocore.levels.level import (
     credible_after,
     distance,
     stretched,
+    turned,
 )
 from dlocore.levels.progress import record_level
 from dlocore.levels.whole_march import Outcome, is_folded, is_uneven, march_level, march_status
@@ -195,7 +196,8 @@ class _Climb:
             self.problem, size, self.monitor, rho, free_knots=True, rough=True, before=before, whole=before is not None
         )
         if before is not None and level.posed is self.problem:
-            level = replace(level, change=distance(before, level, self.problem))
+            change = distance(before, level, self.problem)
+            level = replace(level, change=change, turned=turned(before, level, self.problem))
             if not self._is_rough(level):  # so strands do not meet because of the grid
                 level = march_level(self.problem, size, self.monitor, rho, free_knots=True, known=level, whole=True)
         if level.posed is not self.problem:

@@ -6,11 +6,11 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dlocore.pickling import state_with
 from dlocore.scene.scene import Material
-from dlocore.spline import SplineSurface
+from dlocore.spline import SplineSurface, within
 
 Floats = NDArray[np.float64]
 Status = Literal["converged", "max_iterations", "stalled", "time_limit"]
@@ -161,8 +161,13 @@ class StretchMotion:
         k, s = _bracket(self.times, t)
         return np.asarray((1 - s) * self.strain[k] + s * self.strain[k + 1])
 
-    def along(self, u: Floats, t: Floats) -> Floats:
-        """Return the axial strain (k_t, k_u) at the places `u` (k_u,) [m] and times `t` (k_t,) [s], linear between."""
+    def along(self, u: ArrayLike, t: ArrayLike) -> Floats:
+        """Return the axial strain (k_t, k_u) at the places `u` (k_u,) [m] and times `t` (k_t,) [s], linear between.
+
+        Raises:
+            SceneError: a place is off the cable, or a time outside the predicted time.
+        """
+        u, t = within("u", u, float(self.u[-1]), "m"), within("t", t, float(self.times[-1]), "s")
         return np.array([np.interp(u, self.u, self.at(s)) for s in t])
 
 

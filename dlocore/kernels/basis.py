@@ -99,8 +99,8 @@ def _integrated(u: float, length: float, features: Any, power: Any, width: Any) 
 def graded_knots(n: int, length: float, features: Any, multiplicity: Any, power: Any, width: Any) -> Any:
     """Return clamped knots for `n` control points on [0, length] with knots at, and graded towards, the features.
 
-    The density of knots is 1 + sum_f ((w_f + 1) / (w_f + |u - u_f| / L))^p_f: features are grasps and loads. A feature inside
-    becomes a knot of its multiplicity. Spans are shared among the segments between features in proportion to the
+    The density of knots is 1 + sum_f ((w_f + 1) / (w_f + |u - u_f| / L))^p_f: features are grasps and loads. A feature
+    inside becomes a knot of its multiplicity. Spans are shared among the segments between features in proportion to the
     integral of the density (each at least one), and spread within each by it.
 
     Args:

@@ -65,6 +65,8 @@ class Level:
         control: (n_t, n_u, nc) [m].
         missed: what the time spline misses of the march [m], but for moments such as a start that springs away.
         change: largest distance to the level before [m], infinite at the first.
+        turned: largest angle of the sections from those of the level before, or of the march that its error was
+            estimated with [rad]; 0 without twist.
         note: what was found on it, in words.
         mended: what was done differently from other marches on a given grid as it failed on that one, in words.
     """
@@ -77,6 +79,7 @@ class Level:
     control: Floats
     missed: float
     change: float
+    turned: float = 0.0
     note: str = ""
     mended: str = ""
 
@@ -257,3 +260,10 @@ def credible_after(level: Level) -> float:
 def distance(a: Level, b: Level, problem: Problem) -> float:
     """Return the largest distance between the surfaces of two levels [m]."""
     return float(farthest(a.samples, b.samples, problem.plane.dimensions))
+
+
+def turned(a: Level, b: Level, problem: Problem) -> float:
+    """Return the largest angle between the sections of two levels [rad], of those that both have; 0 without twist."""
+    if problem.twist is None or a.samples.shape != b.samples.shape or a.samples.shape[2] < 4:
+        return 0.0
+    return float(np.abs(a.samples[..., 3] - b.samples[..., 3]).max()) / problem.twist.radius

@@ -43,6 +43,7 @@ MATTERS = 0.001  # of the length: what a neglected effect may move the cable bef
 _TURNS = 0.1  # of that, and of the target: what the sections' spin may move it, which a motion that snaps enlarges
 STRAINED = 0.05  # axial strain: few cables bear more
 FAR_MORE = 2.0  # times the strain of the march: what its spline adds is worth a word
+TURNED, OF_TURN = 0.2, 0.05  # [rad], and of the largest angle of its sections: what grids may differ by without a word
 _PLACES, _MOMENTS = 4, 33  # in a span, and in time while it swings once, at which a surface is searched for strain
 _BLOCK = 4096  # states whose gaps to obstacles are found at once
 _LOOKS = 5  # states of each stretch of a motion at which neglected forces are weighed
@@ -118,6 +119,7 @@ def objections(level: Level) -> list[str]:
     if level.motion.largest_strain > STRAINED:
         found.append(f"the motion strains the cable by up to {level.motion.largest_strain:.0%} along itself")
     found += _stretched(level)
+    found += _twisted(level)
     found += start_notes(problem.scene, problem.start)
     found += side_notes(problem.start)
     found += turn_notes(problem, level.motion.grid)
@@ -167,6 +169,20 @@ def _undetermined(level: Level) -> list[str]:
         settles_elsewhere(problem, level.motion.grid, Monitor()),
     )
     return [f"on this grid {in_words(problem, moved)}"] if moved > UNDETERMINED * problem.scene.cable.length else []
+
+
+def _twisted(level: Level) -> list[str]:
+    """Return what is told of a motion whose twist two grids do not agree on, which no distance between them shows."""
+    if level.turned <= TURNED:
+        return []
+    twist = level.problem.twist
+    assert twist is not None
+    if level.turned <= OF_TURN * float(np.abs(level.samples[..., 3]).max()) / twist.radius:
+        return []
+    return [
+        "the angle of its sections, and the torque with it, is not as sure as its positions, as two grids differ by up "
+        f"to {level.turned:.2g} rad: a given grid with larger n_u and n_t shows waves of twist"
+    ]
 
 
 def _stretched(level: Level) -> list[str]:

@@ -48,7 +48,7 @@ def check_reach(scene: Scene, start: StartCurve) -> None:
                 raise SceneError(
                     f"primitives[{j}].path",
                     f"{apart[k]:.4g} m from primitives[{i}] at {t[k]:.3g} s",
-                    f"at most {between:.4g} m",
+                    f"at most {between:.4g} m, and {MAX_PRESCRIBED_STRAIN:.1%} more",
                     "No cable can follow: the two grasps are farther apart than the cable between them",
                 )
 
@@ -82,7 +82,7 @@ def check_above(scene: Scene, start: StartCurve) -> None:
             continue
         path = grasp.path.at(np.linspace(0.0, grasp.path.duration, 65), start(grasp.u)[0])
         below = table.height - float(path[:, 2].min())
-        if not below <= table_tolerance(scene):
+        if not below <= min(table_tolerance(scene), TOO_DEEP * scene.cable.diameter):
             reason = f"It takes the cable {below:.3g} m into the table"
             raise SceneError(
                 f"primitives[{i}].path", f"{below:.3g} m below", f"a path above {table.height:g} m", reason

@@ -4,21 +4,26 @@ import math
 from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
+from dlocore.scene.paths import Move
 from dlocore.scene.scene import Points, Scene
 from dlocore.shape.shape import StartCurve, start_curve
 from dlocore.words import in_mm
 
-LIGHTEST = 0.1  # [kg/m^3] of a cable: a tenth of air
+Floats = NDArray[np.float64]
+
+LIGHTEST, HEAVIEST = 0.1, 2.5e4  # [kg/m^3] of a cable: a tenth of air, more than any metal
 SAME_LENGTH = 5e-3  # of the cable's: lengths of points that differ by less are as good as the same
 SAME_ENDS = 1e-3  # of the length: and so are ends, as those of noisy points, which the cable's length decides about
 SAME_START = 1e-3  # of the length: a start that is moved by less was seen there
+ABOUT_ITSELF = 0.9  # of the turn of a gripper: what is about the cable that it holds, so that little else is left
 _PLACES = 65  # of a start at which it is looked at
 
 
 def scene_notes(scene: Scene) -> list[str]:
     """Return what is to be known of a scene as it was given, in words."""
-    return [*cable_notes(scene), *_of_times(scene)]
+    return [*cable_notes(scene), *_of_times(scene), *_of_turns(scene)]
 
 
 def cable_notes(scene: Scene) -> list[str]:
@@ -40,13 +45,15 @@ def start_notes(scene: Scene, start: StartCurve) -> list[str]:
 
 
 def _of_units(scene: Scene) -> list[str]:
-    """Return what is told of a cable that is lighter than air, as one with its lengths in millimetres is."""
+    """Return what is told of a cable lighter than air, as one with its lengths in millimetres is, or than no metal."""
     cable = scene.cable
     density = cable.linear_density / (0.25 * math.pi * cable.diameter**2)
-    if density >= LIGHTEST:
+    if LIGHTEST <= density <= HEAVIEST:
         return []
     thick = f"{cable.diameter:g} m thick and weighs {cable.linear_density:g} kg/m"
-    return [f"the cable is {thick}, which is less than air does: are its length and diameter in millimetres?"]
+    if density < LIGHTEST:
+        return [f"the cable is {thick}, which is less than air does: its length and diameter may be in millimetres"]
+    return [f"the cable is {thick}, more than any metal does: linear_density is its mass per length in kg/m"]
 
 
 def _of_lengths(scene: Scene) -> list[str]:
@@ -72,3 +79,23 @@ def _of_times(scene: Scene) -> list[str]:
         for i, grasp in enumerate(scene.grasps)
         if grasp.start >= horizon
     ]
+
+
+def _of_turns(scene: Scene) -> list[str]:
+    """Return what is told of grippers that turn about the cable where they hold its direction alone."""
+    notes = []
+    for i, grasp in enumerate(scene.grasps):
+        path = grasp.path
+        if grasp.hold != "tangent" or not isinstance(path, Move) or grasp.start > 0.0:
+            continue
+        if path.rotation is None:
+            continue
+        turn = cast(Floats, path.rotation)
+        along = start_curve(scene.shape, scene.cable.length)(grasp.u, 1)[0]
+        about = abs(float(turn @ along)) / float(np.linalg.norm(along))
+        if about > ABOUT_ITSELF * float(np.linalg.norm(turn)):
+            notes.append(
+                f"primitives[{i}] turns about the cable, which hold 'tangent' lets turn in the gripper: "
+                "hold 'clamp' twists it"
+            )
+    return notes

@@ -19,6 +19,10 @@ class Cable:
     same EI) and GJ = EI (measured wires lie at 0.8 to 1.6). The axial damping that is not given lets waves of stretch
     die out as fast as they can: 2 L/pi sqrt(mu EA), critical for the slowest one (docs/model.md eq. 7a).
 
+    What was not given is kept as a number: `dataclasses.replace(cable, bending_stiffness=...)` leaves EA, GJ and the
+    axial damping as they were. With `axial_stiffness=None`, `torsional_stiffness=None` and `axial_damping=None` they
+    follow anew.
+
     Args:
         length: L [m], 0.01 to 1000.
         diameter: D [m].

@@ -392,7 +392,7 @@ class Scene:
         grasps: what holds and moves it (the contract's `primitives`).
         loads: known forces.
         environment: gravity, drag, table.
-        horizon: predicted time [s]; None: until the last path ends.
+        horizon: predicted time [s]; None: until the last path ends, the last grasp opens and the last load is given.
         effects: "on", "off" or "auto" by effect name; "auto" for those not named.
         quality: asked accuracy or grid.
 

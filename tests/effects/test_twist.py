@@ -384,3 +384,41 @@ def test_drag_resists_the_spin_of_the_sections(method):
     late = found.times > 1.0
     expected = 50.0 * 0.02**2 / 8.0 * 1.5
     np.testing.assert_allclose(found.moment[late, 0], expected, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("quality", "told"),
+    [
+        (Quality(), True),
+        (Quality(n_u=9, n_t=13), True),
+        (Quality(n_u=9, n_t=13, method="spacetime"), True),
+        (Quality(n_u=25, n_t=201), False),
+    ],
+)
+def test_waves_of_twist_that_grids_do_not_show_are_told_of(quality: Quality, told: bool) -> None:
+    # a hose of 20 m whose end is turned by half a turn in 0.2 s; the wave runs to and fro (d'Alembert)
+    length, diameter, density, stiffness = 20.0, 0.02, 0.2, 0.08
+    hose = cable(
+        length=length, diameter=diameter, linear_density=density, bending_stiffness=0.1, torsional_stiffness=stiffness
+    )
+    turn = Move(displacement=(0.0, 0.0, 0.0), rotation=(np.pi, 0.0, 0.0), duration=0.2)
+    ends = (Grasp(u=0.0, hold="clamp"), Grasp(u=length, hold="clamp", path=turn))
+    found = predict(
+        Scene(cable=hose, shape=Straight(), grasps=ends, horizon=1.0, environment=WEIGHTLESS, quality=quality)
+    )
+    assert found.status == "converged"
+    assert any("two grids differ by up to" in note for note in found.notes) == told
+    speed = np.sqrt(stiffness / (density * diameter**2 / 8.0))
+
+    def turned_by(t: Floats) -> Floats:
+        x = np.clip(t / 0.2, 0.0, 1.0)
+        return np.asarray(np.pi * x**3 * (10.0 - 15.0 * x + 6.0 * x * x))
+
+    t = np.linspace(0.0, 1.0, 101)
+    way = 0.5 * length
+    exact = sum(
+        turned_by(t - (way + 2 * n * length) / speed) - turned_by(t - (length + way + 2 * n * length) / speed)
+        for n in range(3)
+    )
+    off = np.abs(found.surface([way], t)[:, 0, 3] - exact).max()
+    assert (off > 0.2) if told else (off < 0.1)

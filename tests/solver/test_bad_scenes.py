@@ -254,3 +254,11 @@ def test_a_start_is_on_the_table_within_what_is_seen_of_such_a_cable(length: flo
     assert not posed(1.1 * off).on_table
     with pytest.raises(SceneError, match="below a cable that lies on the table"):
         posed(-1.1 * off)
+
+
+def test_a_number_may_be_an_array_of_one_without_dimensions() -> None:
+    assert Grasp(u=np.array(0.25)).u == 0.25
+    with pytest.raises(SceneError, match="u: got"):
+        Grasp(u=np.array([0.25]))
+    with pytest.raises(SceneError, match="u: got"):
+        Grasp(u=np.array(True))

@@ -116,3 +116,13 @@ def test_a_motion_that_goes_on_begins_pressed_in_as_it_ended() -> None:
     second = scene(peg(0.6, 0.05, 0.02))
     onward = Scene(cable=CORD, shape=first.shape_at(), grasps=second.grasps, environment=second.environment)
     np.testing.assert_array_equal(pose(onward).start.control_points[:, :2], first.shape_at().control_points[:, :2])
+
+
+def test_a_path_that_presses_the_cable_into_the_table_is_refused_by_name() -> None:
+    def through(z: float) -> Scene:
+        down = Waypoints(times=[0.0, 0.5, 1.0], positions=[[0.25, 0.0, 0.0], [0.25, 0.1, z], [0.25, 0.2, 0.01]])
+        return scene(path=down)
+
+    with pytest.raises(SceneError, match=r"primitives\[0\].path: got 0.00[0-9]* m below.*into the table"):
+        pose(through(-0.003))
+    pose(through(-0.0008))  # less than a quarter of its diameter: noise

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from dlocore import Cable, Grasp, Points, Quality, Scene, Straight, equilibrium, predict
+from dlocore import Cable, Grasp, Move, Points, Quality, Scene, Straight, equilibrium, predict
 from dlocore.problem.notes import scene_notes
 from dlocore.scene.cable import PRESETS
+from dlocore.scene.scene import Hold
 from tests.solver.scenes import Floats, arc, cable
 
 HOLD = Grasp(u=0.0)
@@ -62,7 +63,26 @@ def test_a_cable_that_is_lighter_than_air_is_asked_whether_it_is_in_millimetres(
     wire = Cable(length=1000.0, diameter=5.0, linear_density=0.05, bending_stiffness=1e-3)
     (note,) = scene_notes(Scene(cable=wire, shape=Straight(), grasps=[HOLD], horizon=1.0))
     assert "5 m thick and weighs 0.05 kg/m" in note
-    assert "in millimetres?" in note
+    assert "may be in millimetres" in note
+
+
+def test_a_cable_that_is_heavier_than_metal_is_told_what_its_density_is() -> None:
+    cord = Cable(length=1.0, diameter=0.005, linear_density=1.2, bending_stiffness=1e-3)  # meant as g/cm^3
+    (note,) = scene_notes(Scene(cable=cord, shape=Straight(), grasps=[HOLD], horizon=1.0))
+    assert "0.005 m thick and weighs 1.2 kg/m" in note
+    assert "mass per length in kg/m" in note
+
+
+@pytest.mark.parametrize(
+    ("hold", "rotation", "told"),
+    [("tangent", (3.0, 0.0, 0.0), True), ("tangent", (0.0, 0.0, 0.3), False), ("clamp", (3.0, 0.0, 0.0), False)],
+)
+def test_a_turn_about_the_cable_that_is_held_by_its_direction_alone_is_told_of(
+    hold: Hold, rotation: tuple[float, float, float], told: bool
+) -> None:
+    turn = Move(displacement=(0.0, 0.0, 0.0), rotation=rotation, duration=1.0)
+    scene = Scene(cable=cable(), shape=Straight(), grasps=[HOLD, Grasp(u=1.0, hold=hold, path=turn)])
+    assert any("primitives[1] turns about the cable" in note for note in scene_notes(scene)) == told
 
 
 @pytest.mark.parametrize("name", PRESETS)

@@ -5,7 +5,21 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from dlocore import SceneError
+import dlocore
+from dlocore import (
+    Cable,
+    Environment,
+    Grasp,
+    Move,
+    Quality,
+    Scene,
+    SceneError,
+    Straight,
+    Table,
+    effect_forces,
+    energies,
+    predict,
+)
 from dlocore.spline import SplineSurface, design_matrix, uniform_knots
 
 
@@ -74,3 +88,33 @@ def test_the_ends_are_read_with_their_rounding():
     beyond = q([-1e-12, 1.5 * (1.0 + 1e-12)], [-1e-12, 2.0 * (1.0 + 1e-12)])
     np.testing.assert_allclose(beyond, ends, rtol=0.0, atol=1e-9)
     assert q([], [0.5]).shape == (1, 0, 4)
+
+
+def test_what_reads_a_motion_refuses_other_times_places_and_cables():
+    def scene(length: float) -> Scene:
+        return Scene(
+            cable=Cable.preset("paper", length=length),
+            shape=Straight(),
+            grasps=[Grasp(u=0.25, path=Move(displacement=(0.0, 0.1, 0.0), duration=1.0))],
+            environment=Environment(table=Table()),
+            quality=Quality(n_u=9, n_t=13, estimate=False),
+        )
+
+    found = predict(scene(1.0))
+    for read in (energies, effect_forces):
+        for t in (-3.0, 50.0, np.nan):
+            with pytest.raises(SceneError, match="times: got"):
+                read(found.scene, found.surface, [t])
+        with pytest.raises(SceneError, match="surface: got that of a cable of 1 m"):
+            read(scene(2.0), found.surface, [0.0])
+    with pytest.raises(SceneError, match="surface: got Prediction"):
+        energies(found.scene, found, [0.0])
+    for u, t in ((2.0, 0.5), (-1.0, 0.5), (0.5, 50.0), (0.5, np.nan)):
+        with pytest.raises(SceneError, match=r"[ut]: got"):
+            found.stretch.along(u, t)
+    assert found.stretch.along(0.5, 0.5) == found.stretch.along([0.5], [0.5])
+
+
+def test_completion_knows_what_is_imported_on_first_use():
+    assert set(dlocore.__all__) == set(dir(dlocore))
+    assert all(hasattr(dlocore, name) for name in dir(dlocore))
