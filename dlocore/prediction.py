@@ -22,11 +22,14 @@ from dlocore.errors import number
 from dlocore.pickling import state_with
 from dlocore.scene.scene import MAX_STRAIN, ControlPoints, Scene
 from dlocore.spline import SplineSurface, greville
+from dlocore.words import in_mm
 
 if TYPE_CHECKING:
     from dlocore.levels.level import Level
 
 Floats = NDArray[np.float64]
+
+PART, TINY = 0.2, 1e-4  # of how far the cable moves, and of its length: up to which an error is not worth a word
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,7 +75,15 @@ class Prediction:
         """What is to be known beside the status: of the scene as given, strains, instabilities, effects left out."""
         from dlocore.problem.notes import scene_notes  # it needs the compiler, which to make a scene does not
 
-        return (*scene_notes(self.scene), *self._objections)
+        return (*scene_notes(self.scene), *self._objections, *self._of_a_small_motion())
+
+    def _of_a_small_motion(self) -> list[str]:
+        """Return what is told of an answer that is good for the length of the cable, but not for so small a motion."""
+        control, error = self.surface.control_points[..., :3], self.accuracy.error_estimate
+        moved = float(np.linalg.norm(control - control[0], axis=-1).max())
+        if self.status != "converged" or error is None or not error > max(PART * moved, TINY * self.surface.length):
+            return []
+        return [f"the cable moves by {in_mm(moved)}, of which the estimated error is much: give a target_error"]
 
     @cached_property
     def _objections(self) -> list[str]:

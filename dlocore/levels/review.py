@@ -42,6 +42,7 @@ CLOSE = 0.01  # of the length: a cable that comes this near to an obstacle left 
 MATTERS = 0.001  # of the length: what a neglected effect may move the cable before it is worth a word
 _TURNS = 0.1  # of that, and of the target: what the sections' spin may move it, which a motion that snaps enlarges
 STRAINED = 0.05  # axial strain: few cables bear more
+RUBBER = 0.01  # axial strain: few cables bear more without harm, of one whose axial stiffness is assumed
 FAR_MORE = 2.0  # times the strain of the march: what its spline adds is worth a word
 TURNED, OF_TURN = 0.2, 0.05  # [rad], and of the largest angle of its sections: what grids may differ by without a word
 _PLACES, _MOMENTS = 4, 33  # in a span, and in time while it swings once, at which a surface is searched for strain
@@ -116,8 +117,7 @@ def objections(level: Level) -> list[str]:
     that few bear.
     """
     problem, found = level.problem, []
-    if level.motion.largest_strain > STRAINED:
-        found.append(f"the motion strains the cable by up to {level.motion.largest_strain:.0%} along itself")
+    found += _strained(level)
     found += _stretched(level)
     found += _twisted(level)
     found += start_notes(problem.scene, problem.start)
@@ -183,6 +183,16 @@ def _twisted(level: Level) -> list[str]:
         "the angle of its sections, and the torque with it, is not as sure as its positions, as two grids differ by up "
         f"to {level.turned:.2g} rad: a given grid with larger n_u and n_t shows waves of twist"
     ]
+
+
+def _strained(level: Level) -> list[str]:
+    """Return what is told of a motion that strains the cable by more than few bear, by less where EA is assumed."""
+    cable, strain = level.problem.scene.cable, level.motion.largest_strain
+    assumed = cable.axial_stiffness == cable.solid_axial_stiffness
+    if not strain > (RUBBER if assumed else STRAINED):
+        return []
+    soft = f", with the {cable.axial_stiffness:.3g} N of a solid section of its bending stiffness: give axial_stiffness"
+    return [f"the motion strains the cable by up to {strain:.0%} along itself{soft if assumed else ''}"]
 
 
 def _stretched(level: Level) -> list[str]:

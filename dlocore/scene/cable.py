@@ -84,7 +84,7 @@ class Cable:
             put("bending_stiffness", self.youngs_modulus * math.pi * diameter**4 / 64)
         if self.axial_stiffness is None:
             modulus = self.youngs_modulus
-            solid = 16 * cast(float, self.bending_stiffness) / diameter**2
+            solid = self.solid_axial_stiffness
             put("axial_stiffness", solid if modulus is None else modulus * math.pi * diameter**2 / 4)
         if self.torsional_stiffness is None:
             modulus = self.shear_modulus
@@ -113,6 +113,11 @@ class Cable:
             choice("rest_shape", self.rest_shape, ("straight", "initial"))
         else:
             put("rest_shape", points_array("rest_shape", self.rest_shape))
+
+    @property
+    def solid_axial_stiffness(self) -> float:
+        """EA of a solid section that has the cable's EI, 16 EI/D^2 [N]: what is assumed where none is given."""
+        return 16 * cast(float, self.bending_stiffness) / self.diameter**2
 
     @staticmethod
     def preset(name: str, **overrides: Any) -> "Cable":
