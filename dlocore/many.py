@@ -40,10 +40,12 @@ def predict_many(
         For each scene, in order, its prediction, or the error that says why it can't be solved as it was given.
 
     Raises:
-        SceneError: `threads` is no positive whole number.
+        SceneError: `threads` is no positive whole number, or `scenes` are none.
         Cancelled: `cancelled` returned True.
     """
     wanted = usable_cores() if threads is None else int(number("threads", threads, at_least=1, at_most=1024))
+    if not isinstance(scenes, Iterable):
+        raise SceneError("scenes", scenes, "scenes one after the other, as a list of them")
     given = list(scenes)
     answers: list[Prediction | SceneError | None] = [None] * len(given)
     failures: list[BaseException] = []

@@ -239,6 +239,8 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     Raises:
         SceneError: a path leads to no number, or to one that can be neither less nor more.
     """
+    if isinstance(wrt, str):
+        raise SceneError("wrt", wrt, 'paths one after the other, as ["cable.bending_stiffness"]')
     scene, accuracy = prediction.scene, prediction.accuracy
     values = [_number(scene, name) for name in wrt]
     monitor = Monitor(None, None, None)

@@ -208,7 +208,10 @@ def _memory(problem: Problem, grid: Grid, history: History) -> Floats:
     if isinstance(rest, str):
         curve: SplineCurve = problem.start
     else:
-        curve = start_curve(Points(points=rest), problem.scene.cable.length)
+        try:
+            curve = start_curve(Points(points=rest), problem.scene.cable.length)
+        except SceneError as error:  # of points, whose field is another
+            raise SceneError("cable.rest_shape", error.given, error.allowed, error.reason) from None
     own = _untouched(problem, grid) if curve is problem.start else problem.coordinates(fit_to_knots(curve, grid.knots))
     if nc == 2:
         kappa = plane_curvature_of(grid.tables, own)

@@ -154,6 +154,11 @@ def test_a_path_that_leads_to_no_number_is_refused(path: str) -> None:
         sensitivities(predict(scene()), [path])
 
 
+def test_one_path_in_place_of_a_list_of_them_is_refused() -> None:
+    with pytest.raises(SceneError, match=r"wrt: got cable\.diameter\. Allowed: paths one after the other"):
+        sensitivities(predict(scene()), "cable.diameter")
+
+
 @pytest.mark.parametrize("name", ["environment.drag", "grasps[0].u"])
 def test_a_number_at_its_bound_is_changed_to_the_other_side(name: str) -> None:
     """As a drag of zero, or the grasp at an end: the derivative is that of the motion with a little more of it."""

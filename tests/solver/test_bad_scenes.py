@@ -164,6 +164,7 @@ BAD: list[tuple[str, Callable[[], object]]] = [
     ("effects.stretch", lambda: scene(effects={"stretch": "off"})),
     ("effects", lambda: scene(effects={"magnetism": "on"})),
     ("effects.bend", lambda: scene(effects={"bend": "maybe"})),
+    ("cable.rest_shape", lambda: predict(scene(cable=cable(rest_shape=arc(3.0, 2.0))))),  # three times as long
     ("cable.rest_shape", lambda: predict(scene(cable=cable(rest_shape=arc(1.0, 2.0)), effects={"twist": "off"}, grasps=(Grasp(u=0.3, path=Move(displacement=(0, 0.1, 0.1), duration=1.0)),)))),
     ("shape.settle", lambda: predict(scene(shape=Straight(settle=True), grasps=(), horizon=1.0))),
     ("primitives", lambda: equilibrium(scene(grasps=(), horizon=1.0))),
