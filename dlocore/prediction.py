@@ -83,7 +83,7 @@ class Prediction:
         moved = float(np.linalg.norm(control - control[0], axis=-1).max())
         if self.status != "converged" or error is None or not error > max(PART * moved, TINY * self.surface.length):
             return []
-        return [f"the cable moves by {in_mm(moved)}, of which the estimated error is much: give a target_error"]
+        return [f"the cable moves by {in_mm(moved)}, of which the estimated error is much: give a smaller target_error"]
 
     @cached_property
     def _objections(self) -> list[str]:

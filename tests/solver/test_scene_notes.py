@@ -3,7 +3,19 @@
 import numpy as np
 import pytest
 
-from dlocore import Cable, Grasp, Move, Points, Quality, Scene, Straight, equilibrium, predict
+from dlocore import (
+    Cable,
+    Environment,
+    Grasp,
+    Move,
+    Points,
+    Quality,
+    Scene,
+    Straight,
+    Table,
+    equilibrium,
+    predict,
+)
 from dlocore.problem.notes import scene_notes
 from dlocore.scene.cable import PRESETS
 from dlocore.scene.scene import Hold
@@ -102,3 +114,29 @@ def test_a_gripper_that_closes_after_the_horizon_is_told_of(closes: float) -> No
 def test_a_gripper_that_closes_before_the_horizon_is_not_told_of() -> None:
     late = Grasp(u=1.0, grasp_time=0.9, release_time=3.0)
     assert scene_notes(Scene(cable=cable(), shape=Straight(), grasps=[HOLD, late], horizon=1.0)) == []
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "told"),
+    [(None, "by up to 6% along itself, with the 39.1 N of a solid section"), (40.0, "6%"), (1e4, "")],
+)
+def test_a_strain_of_a_cable_whose_axial_stiffness_is_assumed_is_told_of_with_it(
+    stiffness: float | None, told: str
+) -> None:
+    # 10 m of a soft wire hang from one end; their weight alone strains them by 4 %
+    wire = Cable.preset("white-wire", length=10.0, axial_stiffness=stiffness)
+    hanging = Scene(cable=wire, shape=Straight(direction=(0.0, 0.0, -1.0)), grasps=[HOLD], horizon=1.0)
+    notes = predict(hanging).notes
+    assert ("give axial_stiffness" in "".join(notes)) == (stiffness is None)
+    assert told in "".join(notes)
+    assert bool(notes) == bool(told)
+
+
+@pytest.mark.parametrize(("length", "told"), [(1000.0, True), (10.0, False)])
+def test_an_error_that_is_much_of_a_small_motion_is_told_of(length: float, told: bool) -> None:
+    # the end of a rope is lifted by a metre: 0.2 % of a kilometre are two
+    rope = Cable(length=length, diameter=0.03, linear_density=1.0, bending_stiffness=1.0)
+    lift = Grasp(u=0.0, path=Move(displacement=(0.0, 0.0, 1.0), duration=1.0))
+    found = predict(Scene(cable=rope, shape=Straight(), grasps=[lift], environment=Environment(table=Table())))
+    assert found.status == "converged"
+    assert any("the cable moves by 1000 mm, of which the estimated error is much" in n for n in found.notes) == told
