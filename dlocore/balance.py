@@ -14,7 +14,7 @@ from dlocore.problem.features import SAME
 from dlocore.problem.grid import Grid
 from dlocore.problem.problem import Problem
 from dlocore.scene.scene import Scene
-from dlocore.spline import SplineSurface, within
+from dlocore.spline import SplineSurface, in_range
 from dlocore.stability.sideways import pose_as_shown
 
 Floats = NDArray[np.float64]
@@ -117,7 +117,7 @@ def _motion(
         raise SceneError(
             "surface", f"that of a cable of {surface.length:g} m", f"one of the scene's, {cable.length:g} m"
         )
-    at = np.clip(within("times", times, surface.horizon, "s"), 0.0, surface.horizon)
+    at = np.clip(in_range("times", times, surface.horizon, "s"), 0.0, surface.horizon)
     moved = [surface.states(at, order) for order in range(3)]
     states = problem.coordinates(moved[0][..., :3], moved[0][..., 3])
     rates, accelerations = (problem.rates(x[..., :3], x[..., 3]) for x in moved[1:])

@@ -250,7 +250,7 @@ def _least_squares(
         return _answer(monitor, method, Outcome(level, status, message + again.said, errors), find_forces, again.judged)
     known = quality.estimate and (method != "paper" or converged)
     estimate, doubt, turned = by_finer(problem, level, monitor) if known else Compared(None)
-    level = replace(level, turned=turned)
+    level = replace(level, turned=turned) if turned else level
     errors = None if estimate is None else {"grid": estimate, "iteration": left}
     return _answer(monitor, method, Outcome(level, status, message + doubt, errors), find_forces)
 
@@ -273,7 +273,7 @@ def _given(problem: Problem, quality: Quality, monitor: Monitor, level: Level | 
     problem = level.problem
     record_level(problem, level, monitor)
     estimate, doubt, turned = by_coarser(problem, level, monitor) if quality.estimate else Compared(None)
-    level = replace(level, turned=turned)
+    level = replace(level, turned=turned) if turned else level
     if estimate is not None:
         estimate = max(estimate, MISSED_COUNTS * level.missed)
     status, message = given_status(level)

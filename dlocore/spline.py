@@ -39,7 +39,7 @@ def spline_at(knots: Floats, control_points: Floats, x: ArrayLike, derivative: i
     return np.asarray(BSpline(knots, control_points, DEGREE)(np.asarray(x, dtype=float), derivative))
 
 
-def within(name: str, x: ArrayLike, end: float, unit: str) -> Floats:
+def in_range(name: str, x: ArrayLike, end: float, unit: str) -> Floats:
     """Return `x` as an array (k,), or raise SceneError unless all of it is within 0 to `end`, but for rounding."""
     x = np.atleast_1d(np.asarray(x, dtype=float))
     margin = _ROUNDING * end
@@ -96,15 +96,15 @@ class SplineSurface:
             SceneError: a place is off the cable, a time outside the predicted time, or an order none of 0 to 3; as of
                 all that reads the surface.
         """
-        over = design_matrix(self.knots_u, within("u", u, self.length, "m"), _order("du", du))
-        t = within("t", t, self.horizon, "s")
+        over = design_matrix(self.knots_u, in_range("u", u, self.length, "m"), _order("du", du))
+        t = in_range("t", t, self.horizon, "s")
         if len(t) < len(self.control_points):
             return np.asarray(over @ spline_at(self.knots_t, self.control_points, t, _order("dt", dt)))
         return spline_at(self.knots_t, over @ self.control_points, t, _order("dt", dt))
 
     def states(self, t: ArrayLike, dt: int = 0) -> Floats:
         """Return the control points of the spatial spline, or their derivatives, at times `t` (k,) [s]; (k, n_u, 4)."""
-        return spline_at(self.knots_t, self.control_points, within("t", t, self.horizon, "s"), _order("dt", dt))
+        return spline_at(self.knots_t, self.control_points, in_range("t", t, self.horizon, "s"), _order("dt", dt))
 
     def positions(self, u: ArrayLike, t: ArrayLike) -> Floats:
         """Return r on the grid of `t` and `u`; (k_t, k_u, 3) [m]."""
@@ -146,7 +146,7 @@ class SplineSurface:
         about it. In the two spans beside an end, a grasp or a load it may be off by a fifth: the strain that balances
         the forces on the cable, from which to read a tension, is `Prediction.stretch`.
         """
-        u, breaks = within("u", u, self.length, "m"), np.unique(self.knots_u)
+        u, breaks = in_range("u", u, self.length, "m"), np.unique(self.knots_u)
         middles = 0.5 * (breaks[:-1] + breaks[1:])
         strain = np.linalg.norm(self(middles, t, du=1)[..., :3], axis=-1) - 1.0
         return np.array([np.interp(u, middles, row) for row in strain])

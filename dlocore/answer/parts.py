@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dlocore.pickling import state_with
 from dlocore.scene.scene import Material
-from dlocore.spline import SplineSurface, within
+from dlocore.spline import SplineSurface, in_range
 
 Floats = NDArray[np.float64]
 Status = Literal["converged", "max_iterations", "stalled", "time_limit"]
@@ -167,7 +167,7 @@ class StretchMotion:
         Raises:
             SceneError: a place is off the cable, or a time outside the predicted time.
         """
-        u, t = within("u", u, float(self.u[-1]), "m"), within("t", t, float(self.times[-1]), "s")
+        u, t = in_range("u", u, float(self.u[-1]), "m"), in_range("t", t, float(self.times[-1]), "s")
         return np.array([np.interp(u, self.u, self.at(s)) for s in t])
 
 

@@ -263,7 +263,7 @@ def distance(a: Level, b: Level, problem: Problem) -> float:
 
 
 def turned(a: Level, b: Level, problem: Problem) -> float:
-    """Return the largest angle between the sections of two levels [rad], of those that both have; 0 without twist."""
-    if problem.twist is None or a.samples.shape != b.samples.shape or a.samples.shape[2] < 4:
+    """Return the largest angle between the sections of two levels of a problem [rad]; 0 without twist."""
+    if problem.twist is None:
         return 0.0
     return float(np.abs(a.samples[..., 3] - b.samples[..., 3]).max()) / problem.twist.radius

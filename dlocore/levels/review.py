@@ -188,11 +188,11 @@ def _twisted(level: Level) -> list[str]:
 def _strained(level: Level) -> list[str]:
     """Return what is told of a motion that strains the cable by more than few bear, by less where EA is assumed."""
     cable, strain = level.problem.scene.cable, level.motion.largest_strain
-    assumed = cable.axial_stiffness == cable.solid_axial_stiffness
-    if not strain > (RUBBER if assumed else STRAINED):
+    solid = cable.axial_stiffness == cable.solid_axial_stiffness  # assumed, or given like that
+    if not strain > (RUBBER if solid else STRAINED):
         return []
     soft = f", with the {cable.axial_stiffness:.3g} N of a solid section of its bending stiffness: give axial_stiffness"
-    return [f"the motion strains the cable by up to {strain:.0%} along itself{soft if assumed else ''}"]
+    return [f"the motion strains the cable by up to {strain:.0%} along itself{soft if solid else ''}"]
 
 
 def _stretched(level: Level) -> list[str]:

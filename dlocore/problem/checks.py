@@ -82,11 +82,16 @@ def check_above(scene: Scene, start: StartCurve) -> None:
             continue
         path = grasp.path.at(np.linspace(0.0, grasp.path.duration, 65), start(grasp.u)[0])
         below = table.height - float(path[:, 2].min())
-        if not below <= min(table_tolerance(scene), TOO_DEEP * scene.cable.diameter):
+        if not below <= _borne(scene):
             reason = f"It takes the cable {below:.3g} m into the table"
             raise SceneError(
                 f"primitives[{i}].path", f"{below:.3g} m below", f"a path above {table.height:g} m", reason
             )
+
+
+def _borne(scene: Scene) -> float:
+    """Return how deep a path may lead into the table or an obstacle [m]: as far as was seen, and as cables give way."""
+    return min(table_tolerance(scene), TOO_DEEP * scene.cable.diameter)
 
 
 def check_apart(scene: Scene, start: StartCurve) -> None:
@@ -119,7 +124,7 @@ def check_outside(scene: Scene, start: StartCurve, met: tuple[int, ...]) -> None
         if grasp.start > 0.0:
             continue  # from where the cable is by then
         path = partial(grasp.path.at, start=start(grasp.u)[0])
-        borne = min(table_tolerance(scene), TOO_DEEP * diameter)
+        borne = _borne(scene)
         inside, i = _deepest(rows, 0.5 * diameter, path, _moments(grasp.path), borne)
         if inside > borne:
             reason = f"It takes the cable {inside:.3g} m into obstacles[{met[i]}]"

@@ -45,7 +45,7 @@ def start_notes(scene: Scene, start: StartCurve) -> list[str]:
 
 
 def _of_units(scene: Scene) -> list[str]:
-    """Return what is told of a cable lighter than air, as one with its lengths in millimetres is, or than no metal."""
+    """Return what is told of a cable lighter than air, as with lengths in millimetres, or heavier than any metal."""
     cable = scene.cable
     density = cable.linear_density / (0.25 * math.pi * cable.diameter**2)
     if LIGHTEST <= density <= HEAVIEST:
@@ -86,9 +86,7 @@ def _of_turns(scene: Scene) -> list[str]:
     notes = []
     for i, grasp in enumerate(scene.grasps):
         path = grasp.path
-        if grasp.hold != "tangent" or not isinstance(path, Move) or grasp.start > 0.0:
-            continue
-        if path.rotation is None:
+        if grasp.hold != "tangent" or grasp.start > 0.0 or not isinstance(path, Move) or path.rotation is None:
             continue
         turn = cast(Floats, path.rotation)
         along = start_curve(scene.shape, scene.cable.length)(grasp.u, 1)[0]
