@@ -132,6 +132,16 @@ def test_a_strain_of_a_cable_whose_axial_stiffness_is_assumed_is_told_of_with_it
     assert bool(notes) == bool(told)
 
 
+@pytest.mark.parametrize("stiffness", [None, 40.0])
+def test_a_strain_that_real_cables_bear_is_told_of_where_the_axial_stiffness_is_assumed(
+    stiffness: float | None,
+) -> None:
+    # half as long it is strained by 3 %
+    wire = Cable.preset("white-wire", length=5.0, axial_stiffness=stiffness)
+    hanging = Scene(cable=wire, shape=Straight(direction=(0.0, 0.0, -1.0)), grasps=[HOLD], horizon=1.0)
+    assert any("strains the cable by up to 3%" in note for note in predict(hanging).notes) == (stiffness is None)
+
+
 @pytest.mark.parametrize(("length", "told"), [(1000.0, True), (10.0, False)])
 def test_an_error_that_is_much_of_a_small_motion_is_told_of(length: float, told: bool) -> None:
     # the end of a rope is lifted by a metre: 0.2 % of a kilometre are two
