@@ -148,11 +148,13 @@ def surface_npz(document: dict[str, Any], material: MaterialMotion | None) -> by
     """Return the surface, the spline and the reactions of a response document, and the material, as .npz.
 
     Arrays: `u` (k_u,), `t` (k_t,), `positions` (k_t, k_u, 3), `twist` (k_t, k_u), `control_points` (n_t, n_u, 4),
-    `knots_u`, `knots_t`, `degree`, `grasp_u` (g,), `reaction` and `moment` (g, k_t, 3), `peak_force`,
-    `peak_force_time`, `peak_moment` and `peak_moment_time` (g,), which are NaN of a document without them; where the
-    cable remembers, `material_` and each field of `MaterialMotion`; SI units.
+    `knots_u`, `knots_t`, `degree`, `grasp_u` (g,), `reaction` and `moment` (g, k_t, 3), `reaction_error` and
+    `moment_error` (g, k_t), `peak_force`, `peak_force_time`, `peak_moment` and `peak_moment_time` (g,), which are NaN
+    of a document without them; `contact` (c,), the names of what presses on the cable, `contact_force` (c, k_t, 3),
+    `contact_pressed` and `contact_force_error` (c, k_t); where the cable remembers, `material_` and each field of
+    `MaterialMotion`; SI units.
     """
-    surface, grasps = document["surface"], document["grasps"]
+    surface, grasps, contacts = document["surface"], document["grasps"], document.get("contacts", [])
     times = len(surface["t"])
     return _npz(
         {
@@ -162,10 +164,24 @@ def surface_npz(document: dict[str, Any], material: MaterialMotion | None) -> by
             "grasp_u": np.array([grasp["u"] for grasp in grasps], dtype=float),
             "reaction": np.array([grasp["reaction"] for grasp in grasps], dtype=float).reshape(-1, times, 3),
             "moment": np.array([grasp["moment"] for grasp in grasps], dtype=float).reshape(-1, times, 3),
+            **{name: _errors(grasps, name, times) for name in ("reaction_error", "moment_error")},
             **{name: np.array([grasp.get(name, np.nan) for grasp in grasps], dtype=float) for name in PEAKS},
+            "contact": np.array([contact["name"] for contact in contacts], dtype=str),
+            "contact_force": np.array([contact["force"] for contact in contacts], dtype=float).reshape(-1, times, 3),
+            "contact_pressed": np.array([contact["pressed"] for contact in contacts], dtype=float).reshape(-1, times),
+            "contact_force_error": _errors(contacts, "force_error", times),
             **_named("material_", material),
         }
     )
+
+
+def _errors(givers: list[dict[str, Any]], name: str, times: int) -> NDArray[np.float64]:
+    """Return the errors of the forces or moments of grasps or contacts (n, times), NaN where there are none."""
+    found = np.full((len(givers), times), np.nan)
+    for row, giver in zip(found, givers, strict=True):
+        if giver.get(name) is not None:
+            row[:] = giver[name]
+    return found
 
 
 def _npz(arrays: dict[str, Any]) -> bytes:

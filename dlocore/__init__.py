@@ -2,7 +2,15 @@
 
 from typing import TYPE_CHECKING, Any
 
-from dlocore.answer.parts import Accuracy, EffectReport, GraspReaction, Iteration, MaterialMotion, StretchMotion
+from dlocore.answer.parts import (
+    Accuracy,
+    ContactForce,
+    EffectReport,
+    GraspReaction,
+    Iteration,
+    MaterialMotion,
+    StretchMotion,
+)
 from dlocore.errors import Cancelled, DloError, SceneError
 from dlocore.prediction import Prediction, continued
 from dlocore.recordings import Recording, load_recording, save_recording
@@ -39,6 +47,7 @@ __all__ = [
     "Cable",
     "Cancelled",
     "Capsule",
+    "ContactForce",
     "ControlPoints",
     "Cylinder",
     "DloError",

@@ -22,9 +22,11 @@ from dlocore.accuracy.fallback import (
     with_finer,
 )
 from dlocore.accuracy.refinement import climb
+from dlocore.answer.contacts import contact_forces, contacts_taken_on, with_contact_errors
 from dlocore.answer.frames import material_of, stretch_of
-from dlocore.answer.parts import Accuracy, GraspReaction, MaterialMotion, OnIteration, Status
-from dlocore.answer.report import WindowForces, effect_reports, elastic_energy, reactions
+from dlocore.answer.parts import Accuracy, ContactForce, GraspReaction, MaterialMotion, OnIteration, Status
+from dlocore.answer.reactions import Windows, reactions, taken_on, with_reaction_errors
+from dlocore.answer.report import effect_reports, elastic_energy
 from dlocore.errors import SceneError, flag, instance
 from dlocore.levels.given import evenly_fitted, given_status, march_given
 from dlocore.levels.level import Level
@@ -32,6 +34,7 @@ from dlocore.levels.progress import record, record_level, surface_at
 from dlocore.levels.review import neglected, objections
 from dlocore.levels.whole_march import TORN, Outcome, march_status, sided
 from dlocore.prediction import Prediction
+from dlocore.problem.grid import Grid
 from dlocore.problem.problem import Problem, pose
 from dlocore.problem.time_grid import smallest_n_t
 from dlocore.scene.scene import Method, Quality, Scene
@@ -41,7 +44,7 @@ from dlocore.solvers.spacetime import solve
 from dlocore.words import counted, in_ms
 
 Floats = NDArray[np.float64]
-FindForces = Callable[[], tuple[WindowForces, ...]]
+FindForces = Callable[[], Windows]
 
 
 def predict(
@@ -249,10 +252,10 @@ def _least_squares(
         errors = None if again.errors is None else {**again.errors, "iteration": left}
         return _answer(monitor, method, Outcome(level, status, message + again.said, errors), find_forces, again.judged)
     known = quality.estimate and (method != "paper" or converged)
-    estimate, doubt, turned = by_finer(problem, level, monitor) if known else Compared(None)
-    level = replace(level, turned=turned) if turned else level
-    errors = None if estimate is None else {"grid": estimate, "iteration": left}
-    return _answer(monitor, method, Outcome(level, status, message + doubt, errors), find_forces)
+    compared = by_finer(problem, level, monitor) if known else Compared(None)
+    errors = None if compared.estimate is None else {"grid": compared.estimate, "iteration": left}
+    outcome = Outcome(compared.on(level), status, message + compared.doubt, errors)
+    return _answer(monitor, method, outcome, find_forces)
 
 
 def check_n_t(problem: Problem, n_t: int) -> None:
@@ -272,12 +275,12 @@ def _given(problem: Problem, quality: Quality, monitor: Monitor, level: Level | 
         level = evenly_fitted(march_given(problem, quality.n_u, quality.n_t, monitor))
     problem = level.problem
     record_level(problem, level, monitor)
-    estimate, doubt, turned = by_coarser(problem, level, monitor) if quality.estimate else Compared(None)
-    level = replace(level, turned=turned) if turned else level
-    if estimate is not None:
-        estimate = max(estimate, MISSED_COUNTS * level.missed)
+    compared = by_coarser(problem, level, monitor) if quality.estimate else Compared(None)
+    level = compared.on(level)
     status, message = given_status(level)
-    return Outcome(level, status, message + doubt, None if estimate is None else {"grid": estimate})
+    estimate = compared.estimate
+    errors = None if estimate is None else {"grid": max(estimate, MISSED_COUNTS * level.missed)}
+    return Outcome(level, status, message + compared.doubt, errors)
 
 
 def _answer(
@@ -302,7 +305,8 @@ def _answer(
         status=outcome.status,
         said=outcome.message,
         surface=surface,
-        report_grasps=partial(_reactions, level, find_forces),
+        report_grasps=partial(_reactions, level, find_forces, judged),
+        report_contacts=partial(_contacts, level, find_forces, judged),
         report_effects=partial(effect_reports, problem, partial(_material, problem, level), stretch),
         report_material=partial(_material, problem, level),
         report_stretch=stretch,
@@ -329,9 +333,24 @@ def _answer(
     )
 
 
-def _reactions(level: Level, find_forces: FindForces | None) -> tuple[GraspReaction, ...]:
+def _reactions(level: Level, find_forces: FindForces | None, judged: Prediction | None) -> tuple[GraspReaction, ...]:
     windows = level.motion.forces if find_forces is None else find_forces()
-    return reactions(level.problem, level.motion.grid, windows)
+    found = reactions(level.problem, level.motion.grid, windows)
+    if judged is not None:
+        return taken_on(found, judged.grasps)
+    return with_reaction_errors(found, windows, _beside(level))
+
+
+def _contacts(level: Level, find_forces: FindForces | None, judged: Prediction | None) -> tuple[ContactForce, ...]:
+    windows = level.motion.forces if find_forces is None else find_forces()
+    found = contact_forces(level.problem, level.motion.grid, windows)
+    if judged is not None:
+        return contacts_taken_on(found, judged.contacts)
+    return with_contact_errors(found, windows, _beside(level))
+
+
+def _beside(level: Level) -> list[tuple[Problem, Grid, Windows]]:
+    return [(other.problem, other.motion.grid, other.motion.forces) for other in level.beside]
 
 
 def _start_energy(level: Level) -> float:

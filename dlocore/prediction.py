@@ -3,13 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.answer.parts import (
     Accuracy,
+    ContactForce,
     EffectReport,
     GraspReaction,
     Iteration,
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 PART, TINY = 0.2, 1e-4  # of how far the cable moves, and of its length: up to which an error is not worth a word
+UNSURE = 0.5  # of a force: from which on its error is worth one, where it is more than TINY of what weighs or bends it
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,10 +44,11 @@ class Prediction:
         said: the status in words, and what to do about it.
         surface: the bivariate spline q(u, t).
         grasps: reaction of each grasp, in the scene's order.
+        contacts: force of the table, and of each obstacle that was simulated, on the cable; of method reference none.
         effects: what was simulated and why.
         notes: what is to be known beside the status, such as what effects that the scene switches off would have done.
         message: what is said, and the notes.
-        start_energy: elastic energy stored in the start shape [J]. These five are functions of the rest, evaluated
+        start_energy: elastic energy stored in the start shape [J]. These six are functions of the rest, evaluated
             when they are first read.
         iterations: how the solve went.
         accuracy: method, estimated error, time.
@@ -62,6 +65,7 @@ class Prediction:
     accuracy: Accuracy
     start_fit: float
     report_grasps: Callable[[], tuple[GraspReaction, ...]] = field(repr=False)
+    report_contacts: Callable[[], tuple[ContactForce, ...]] = field(repr=False)
     report_effects: Callable[[SplineSurface], tuple[EffectReport, ...]] = field(repr=False)
     report_material: Callable[[], MaterialMotion | None] = field(repr=False)
     report_stretch: Callable[[], StretchMotion] = field(repr=False)
@@ -75,7 +79,7 @@ class Prediction:
         """What is to be known beside the status: of the scene as given, strains, instabilities, effects left out."""
         from dlocore.problem.notes import scene_notes  # it needs the compiler, which to make a scene does not
 
-        return (*scene_notes(self.scene), *self._objections, *self._of_a_small_motion())
+        return (*scene_notes(self.scene), *self._objections, *self._of_a_small_motion(), *self._of_unsure_forces())
 
     def _of_a_small_motion(self) -> list[str]:
         """Return what is told of an answer that is good for the length of the cable, but not for so small a motion."""
@@ -84,6 +88,26 @@ class Prediction:
         if self.status != "converged" or error is None or not error > max(PART * moved, TINY * self.surface.length):
             return []
         return [f"the cable moves by {in_mm(moved)}, of which the estimated error is much: give a smaller target_error"]
+
+    def _of_unsure_forces(self) -> list[str]:
+        """Return which forces of grippers are hardly known, for half of the time, though the motion is."""
+        if self.status != "converged":
+            return []
+        cable, told = self.scene.cable, []
+        gravity = float(np.linalg.norm(cast(Floats, self.scene.environment.gravity)))
+        weight, stiffness = cable.linear_density * cable.length * gravity, cast(float, cable.bending_stiffness)
+        small = TINY * max(weight, stiffness / cable.length**2)
+        for grasp in self.grasps:
+            sizes = np.linalg.norm(grasp.reaction, axis=1)
+            if grasp.reaction_error is None or not sizes.any():
+                continue
+            size, error = (float(np.median(values[sizes > 0.0])) for values in (sizes, grasp.reaction_error))
+            if error > max(UNSURE * size, small):
+                told.append(
+                    f"the force of the gripper at u = {grasp.u:.4g} m is {size:.2g} N, give or take {error:.2g} N, as "
+                    "the median over time: give a smaller target_error where it matters"
+                )
+        return told
 
     @cached_property
     def _objections(self) -> list[str]:
@@ -98,6 +122,11 @@ class Prediction:
     def grasps(self) -> tuple[GraspReaction, ...]:
         """Reaction of each grasp, in the scene's order."""
         return self.report_grasps()
+
+    @cached_property
+    def contacts(self) -> tuple[ContactForce, ...]:
+        """Force of the table, and of each obstacle that was simulated, on the cable."""
+        return self.report_contacts()
 
     @cached_property
     def effects(self) -> tuple[EffectReport, ...]:
@@ -123,6 +152,7 @@ class Prediction:
         return state_with(
             self,
             grasps="report_grasps",
+            contacts="report_contacts",
             effects="report_effects",
             material="report_material",
             stretch="report_stretch",

@@ -40,7 +40,7 @@ def layout() -> bytes:
     motion = rrb.Horizontal(
         rrb.Spatial3DView(origin="/motion", name="Motion: cable, grasps, reactions"),
         rrb.Vertical(
-            rrb.TimeSeriesView(origin="/over_time/reaction", name="Reactions"),
+            rrb.TimeSeriesView(origin="/over_time/reaction", name="Reactions and contacts"),
             rrb.TimeSeriesView(origin="/over_time/energy", name="Energy"),
         ),
         column_shares=[5, 2],

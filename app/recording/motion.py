@@ -1,6 +1,6 @@
 """The predicted motion on its own timeline: cable, grasps, obstacles, the forces of the grippers, the energies."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from app.recording.style import (
     SKY,
     STRIPS,
     VERMILION,
+    Colour,
     chunk,
     drawable,
     line_style,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
 _LARGEST_ARROW = 0.25  # of the cable's length
 _GRASPS = (VERMILION, PURPLE, BLUE, SKY, ORANGE)  # of the lines of their forces
+_BOUND = 0.8  # width of the lines that a force lies between
 
 
 def motion_chunks(run: Run) -> "list[Chunk]":
@@ -52,6 +54,8 @@ def motion_chunks(run: Run) -> "list[Chunk]":
     chunks += obstacle_chunks(run.scene.environment.obstacles, "/motion/obstacles")
     for k in range(len(run.document["grasps"])):
         chunks += _grasp(run, k, shown, thick)
+    for k in range(len(run.document.get("contacts", []))):
+        chunks += _contact(run, k)
     for name, values in energies(run.scene, run.surface, surface["t"], run.material).items():
         entity = f"/over_time/energy/{name}"
         chunks += [line_style(entity, f"{name} [J]", ENERGIES.get(name, GREY)), scalars(entity, times, values)]
@@ -59,7 +63,7 @@ def motion_chunks(run: Run) -> "list[Chunk]":
 
 
 def _grasp(run: Run, k: int, shown: NDArray[np.intp], thick: float) -> "list[Chunk]":
-    """Return a grasp and the force of its gripper: where and how large at every time, and all along the motion."""
+    """Return a grasp and the force of its gripper: where, how large and how sure at every time, and all of them."""
     import rerun as rr
 
     grasp, t = run.document["grasps"][k], run.document["surface"]["t"]
@@ -73,7 +77,6 @@ def _grasp(run: Run, k: int, shown: NDArray[np.intp], thick: float) -> "list[Chu
     )
     name = f"grasp at u = {grasp['u']:g} m"
     look = rr.Points3D.columns(colors=[ORANGE], radii=[2.5 * thick], labels=[name], show_labels=[False])
-    entity = f"/over_time/reaction/{k}"
     return [
         chunk(f"/motion/trace/grasps/{k}", [], path),
         chunk(f"/motion/trace/reactions/{k}", [], along.partition([STRIPS])),
@@ -81,9 +84,32 @@ def _grasp(run: Run, k: int, shown: NDArray[np.intp], thick: float) -> "list[Chu
         chunk(f"/motion/grasps/{k}", [], look),
         chunk(f"/motion/reactions/{k}", times, rr.Arrows3D.columns(origins=held, vectors=vectors)),
         chunk(f"/motion/reactions/{k}", [], rr.Arrows3D.columns(colors=[VERMILION], radii=[thick])),
-        line_style(entity, f"{name} [N]", _GRASPS[k % len(_GRASPS)]),
-        scalars(entity, times, np.linalg.norm(forces, axis=1)),
+        *_with_bounds(
+            f"/over_time/reaction/{k}", name, _GRASPS[k % len(_GRASPS)], times, forces, grasp.get("reaction_error")
+        ),
     ]
+
+
+def _contact(run: Run, k: int) -> "list[Chunk]":
+    """Return how hard the table or an obstacle presses at every time, and how sure that is."""
+    import rerun as rr
+
+    contact, t = run.document["contacts"][k], run.document["surface"]["t"]
+    times = [rr.TimeColumn("motion", duration=t)]
+    entity = f"/over_time/reaction/contact_{k}"
+    return _with_bounds(entity, contact["name"], GREY, times, contact["force"], contact["force_error"])
+
+
+def _with_bounds(entity: str, name: str, colour: Colour, times: list[Any], force: Any, errors: Any) -> "list[Chunk]":
+    """Return the lines of the size of a force [N], and of what it is at least and at most where its error is known."""
+    sizes = np.linalg.norm(np.array(force, dtype=float), axis=1)
+    chunks = [line_style(entity, f"{name} [N]", colour), scalars(entity, times, sizes)]
+    if errors is None:
+        return chunks
+    for bound, values in (("least", np.maximum(sizes - errors, 0.0)), ("most", sizes + errors)):
+        chunks.append(line_style(f"{entity}/{bound}", f"at {bound} [N]", colour, width=_BOUND))
+        chunks.append(scalars(f"{entity}/{bound}", times, values))
+    return chunks
 
 
 def arrow_scale(run: Run) -> float:

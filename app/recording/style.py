@@ -58,11 +58,11 @@ def axes_chunk() -> "Chunk":
     return chunk("/", [], rr.ViewCoordinates.columns(xyz=[axes]))
 
 
-def line_style(entity: str, name: str, colour: Colour) -> "Chunk":
-    """Return name and colour of a plotted line."""
+def line_style(entity: str, name: str, colour: Colour, *, width: float = 2.0) -> "Chunk":
+    """Return name, colour and width of a plotted line."""
     import rerun as rr
 
-    return chunk(entity, [], rr.SeriesLines.columns(names=[name], colors=[colour], widths=[2.0]))
+    return chunk(entity, [], rr.SeriesLines.columns(names=[name], colors=[colour], widths=[width]))
 
 
 def scalars(entity: str, indexes: Iterable[Any], values: Floats) -> "Chunk":

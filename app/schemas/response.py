@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from dlocore import Prediction
-from dlocore.answer.parts import GraspReaction, Iteration, Status
+from dlocore.answer.parts import ContactForce, GraspReaction, Iteration, Status
 from dlocore.spline import DEGREE
 
 Floats = NDArray[np.float64]
 OptionalField = Literal[
-    "surface", "control_points", "knots_u", "knots_t", "degree", "grasps", "effects", "iterations", "start"
+    "surface", "control_points", "knots_u", "knots_t", "degree", "grasps", "contacts", "effects", "iterations", "start"
 ]
 OPTIONAL_FIELDS: tuple[OptionalField, ...] = get_args(OptionalField)  # of an answer, which a batch may do without
 _ID = "019b1f5a2c07f3e9d1c5b6a7e8f0"
@@ -45,6 +45,15 @@ class GraspModel(BaseModel):
     moment: list[list[float]] = Field(
         description="Moment at the times of the surface [t][3] [N m].", examples=[[[0.0, 0.0, 0.0]]]
     )
+    reaction_error: list[float] | None = Field(
+        default=None,
+        description="Estimated error of the force at these times, of the discretisation [t] [N]; none where none was "
+        "computed, as by the methods paper and reference.",
+        examples=[[0.002]],
+    )
+    moment_error: list[float] | None = Field(
+        default=None, description="The same of the moment [t] [N m].", examples=[[0.0]]
+    )
     peak_force: float | None = Field(
         default=None,
         description="Largest force over the whole motion, also between the times of the surface [N]; this and the "
@@ -56,6 +65,28 @@ class GraspModel(BaseModel):
         default=None, description="Largest moment over the whole motion [N m].", examples=[0.0]
     )
     peak_moment_time: float | None = Field(default=None, description="When the moment is largest [s].", examples=[0.0])
+
+
+class ContactModel(BaseModel):
+    """How hard the table or an obstacle presses on the cable, without friction."""
+
+    name: str = Field(
+        description="`table`, or `obstacles[i]` with the number of the obstacle in the request.",
+        examples=["obstacles[0]"],
+    )
+    force: list[list[float]] = Field(
+        description="Force on the cable at the times of the surface [t][3] [N].", examples=[[[0.0, 0.0, 0.32]]]
+    )
+    pressed: list[float] = Field(
+        description="Sum of the sizes of the forces along the cable [t] [N]: more than the size of `force` where it "
+        "presses from several sides.",
+        examples=[[0.33]],
+    )
+    force_error: list[float] | None = Field(
+        default=None,
+        description="Estimated error of the force at these times [t] [N]; none where none was computed.",
+        examples=[[0.006]],
+    )
 
 
 class EffectModel(BaseModel):
@@ -158,6 +189,11 @@ class PredictionResponse(BaseModel):
     knots_t: list[float] = Field(description="Knots in time [s].", examples=[[0.0, 0.0, 0.0, 0.0, 1.6, 1.6, 1.6, 1.6]])
     degree: int = Field(description="Degree of the spline.", examples=[3])
     grasps: list[GraspModel] = Field(description="What each gripper must give, in the order of `primitives`.")
+    contacts: list[ContactModel] = Field(
+        default=[],
+        description="How hard the table, and each obstacle that was simulated, presses; empty of a run that was stored "
+        "before it was noted, and of method reference.",
+    )
     effects: list[EffectModel] = Field(description="What was simulated, and why.")
     iterations: list[IterationModel] = Field(description="How the solve went.")
     accuracy: AccuracyModel = Field(description="What the answer is worth and what it cost.")
@@ -296,6 +332,7 @@ def from_prediction(
         "knots_t": lambda: prediction.surface.knots_t,
         "degree": lambda: DEGREE,
         "grasps": lambda: [_grasp_document(grasp, t) for grasp in prediction.grasps],
+        "contacts": lambda: [_contact_document(contact, t) for contact in prediction.contacts],
         "effects": lambda: [{**vars(effect), "magnitude": _finite(effect.magnitude)} for effect in prediction.effects],
         "iterations": lambda: [iteration_document(iteration) for iteration in prediction.iterations],
         "start": lambda: {"elastic_energy": prediction.start_energy, "fit_error": prediction.start_fit},
@@ -332,11 +369,23 @@ def _grasp_document(grasp: GraspReaction, t: Floats) -> dict[str, Any]:
         "reaction": _at(t, grasp.times, grasp.reaction),
         "moment": _at(t, grasp.times, grasp.moment),
     }
+    for name, errors in (("reaction_error", grasp.reaction_error), ("moment_error", grasp.moment_error)):
+        document[name] = None if errors is None else np.interp(t, grasp.times, errors)
     for name, values in (("peak_force", grasp.reaction), ("peak_moment", grasp.moment)):
         sizes = np.linalg.norm(values, axis=1)
         k = int(sizes.argmax())
         document |= {name: float(sizes[k]), f"{name}_time": float(grasp.times[k])}
     return document
+
+
+def _contact_document(contact: ContactForce, t: Floats) -> dict[str, Any]:
+    """Return how hard the table or an obstacle presses at the times `t` (k,) [s]."""
+    return {
+        "name": contact.name,
+        "force": _at(t, contact.times, contact.force),
+        "pressed": np.interp(t, contact.times, contact.pressed),
+        "force_error": None if contact.force_error is None else np.interp(t, contact.times, contact.force_error),
+    }
 
 
 def _at(t: Floats, times: Floats, values: Floats) -> Floats:

@@ -258,7 +258,7 @@ class Panel:
         with self._gui.add_folder("Convergence of this solve"):
             self._convergence = self._gui.add_html("")
             self._message = self._gui.add_html("")
-        with self._gui.add_folder("Largest force of the grippers"):
+        with self._gui.add_folder("Largest forces on the cable"):
             self._forces = self._gui.add_html("")
 
     def _add_share(self) -> None:
@@ -353,7 +353,7 @@ class Panel:
             return
         self.take_scale(scale)
         self._effects.show(prediction.effects, {})
-        self._forces.content = report.grippers_list(prediction)
+        self._forces.content = report.forces_list(prediction)
         self._accuracy.content = report.accuracy_plot(prediction, self._earlier, measured)
         self._convergence.content = report.convergence(prediction)
         self._message.content = report.message(prediction)

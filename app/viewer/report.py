@@ -122,13 +122,16 @@ def effect_note(effect: EffectReport, cost: float | None) -> str:
     )
 
 
-def grippers_list(prediction: Prediction) -> str:
-    """Return the largest force that each gripper has to give."""
+def forces_list(prediction: Prediction) -> str:
+    """Return the largest force on the cable of table, obstacles and grippers, and its estimated error there."""
+    given = [(f"u = {g.u:.2f} m", g.times, g.reaction, g.reaction_error) for g in prediction.grasps]
+    given += [(c.name, c.times, c.force, c.force_error) for c in prediction.contacts if c.force.any()]
     rows = []
-    for grasp in prediction.grasps:
-        size = np.linalg.norm(grasp.reaction, axis=1)
+    for name, times, force, error in given:
+        size = np.linalg.norm(force, axis=1)
         k = int(np.argmax(size))
-        rows.append(f"<div>u = {grasp.u:.2f} m: at most {size[k]:.2g} N, at {grasp.times[k]:.2f} s</div>")
+        known = "" if error is None else f" ± {error[k]:.1g}"
+        rows.append(f"<div>{name}: at most {size[k]:.2g}{known} N, at {times[k]:.2f} s</div>")
     return f'<div style="margin: 0.4rem 0.75rem; font-size: 0.78rem; line-height: 1.5;">{"".join(rows)}</div>'
 
 

@@ -1,5 +1,6 @@
 """The march on another grid that the error on a given one is estimated with."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 from dlocore.levels.level import Level, Size, distance, run_level, turned
@@ -26,11 +27,17 @@ class Compared(NamedTuple):
         estimate: the estimated error [m], None where there is none.
         doubt: why there is none, in words.
         turned: largest angle between the sections of the two [rad].
+        beside: that level, none where there is no estimate.
     """
 
     estimate: float | None
     doubt: str = ""
     turned: float = 0.0
+    beside: tuple[Level, ...] = ()
+
+    def on(self, level: Level) -> Level:
+        """Return a level with what it was compared with."""
+        return replace(level, turned=self.turned, beside=self.beside) if self.beside else level
 
 
 def coarser(problem: Problem, size: Size) -> Size | None:
@@ -57,7 +64,7 @@ def by_coarser(problem: Problem, level: Level, monitor: Monitor) -> Compared:
             return Compared(None, said)
         if march_status(problem, other)[0] == "converged":
             left = _LEFT_KINKED if level.motion.kinked else _LEFT
-            return Compared(left * distance(level, other, problem), turned=turned(level, other, problem))
+            return _compared(left, level, other, problem)
     return by_finer(problem, level, monitor)
 
 
@@ -71,7 +78,13 @@ def by_finer(problem: Problem, level: Level, monitor: Monitor) -> Compared:
         return Compared(None, said)
     if other.motion.stopped:
         return Compared(None, f" {UNKNOWN}: the finer march to compare it with found no equilibrium.")
-    return Compared(_SAFETY * distance(level, other, problem), turned=turned(level, other, problem))
+    return _compared(_SAFETY, level, other, problem)
+
+
+def _compared(share: float, level: Level, other: Level, problem: Problem) -> Compared:
+    """Return the estimate that is a share of the distance to another march."""
+    apart = share * distance(level, other, problem)
+    return Compared(apart, turned=turned(level, other, problem), beside=(other,))
 
 
 def _resized(problem: Problem, size: Size, points: float, steps: float) -> Size:

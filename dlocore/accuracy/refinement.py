@@ -197,7 +197,8 @@ class _Climb:
         )
         if before is not None and level.posed is self.problem:
             change = distance(before, level, self.problem)
-            level = replace(level, change=change, turned=turned(before, level, self.problem))
+            beside = (before.alone, *(() if self.direction == "both" else before.beside[:1]))
+            level = replace(level, change=change, turned=turned(before, level, self.problem), beside=beside)
             if not self._is_rough(level):  # so strands do not meet because of the grid
                 level = march_level(self.problem, size, self.monitor, rho, free_knots=True, known=level, whole=True)
         if level.posed is not self.problem:
@@ -379,7 +380,7 @@ class _Climb:
             return None
         if not self.estimate + away <= self.target:
             return None
-        other = replace(other, change=level.change + away, note="watched at more points")
+        other = replace(other, change=level.change + away, beside=level.beside, note="watched at more points")
         record_level(self.problem, other, self.monitor)
         parts = self.changes.parts(other) or {}
         parts[list(parts)[-1]] += away

@@ -99,12 +99,38 @@ class GraspReaction:
         times: (k,) [s], those of the prediction's reactions.
         reaction: (k, 3) [N]; zero while the gripper is open.
         moment: (k, 3) [N m]; zero for a grasp that holds only the position.
+        reaction_error: estimated error of the force at those times (k,) [N], of the discretisation, from its distance
+            to the force on another grid (docs/accuracy.md, forces); None where none was computed.
+        moment_error: the same of the moment (k,) [N m].
     """
 
     u: float
     times: Floats
     reaction: Floats
     moment: Floats
+    reaction_error: Floats | None = None
+    moment_error: Floats | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ContactForce:
+    """How hard the table or an obstacle presses on the cable, without friction.
+
+    Attributes:
+        name: "table", or "obstacles[i]" with the number of the obstacle in the scene.
+        times: (k,) [s].
+        force: that it gives to the cable (k, 3) [N].
+        pressed: sum of the sizes of what it gives along the cable (k,) [N]: more than the size of `force` where it
+            presses from several sides, as a peg on a cable that is laid around it.
+        force_error: estimated error of the force (k,) [N], as `GraspReaction.reaction_error`; None where none was
+            computed.
+    """
+
+    name: str
+    times: Floats
+    force: Floats
+    pressed: Floats
+    force_error: Floats | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -1,19 +1,17 @@
-"""What a solve tells about itself: world coordinates, reactions, effects and energies."""
+"""What a solve tells about itself: world coordinates, effects and energies."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.answer.clearance import least_distance
-from dlocore.answer.parts import EffectReport, GraspReaction, MaterialMotion, StretchMotion
+from dlocore.answer.parts import EffectReport, MaterialMotion, StretchMotion
 from dlocore.kernels.assembly import History, stored_energy
 from dlocore.problem.grid import Grid
-from dlocore.problem.holding import SMOOTH, Held
 from dlocore.problem.problem import Problem
-from dlocore.scene.scene import Grasp
 from dlocore.spline import SplineSurface
 
 Floats = NDArray[np.float64]
@@ -29,60 +27,6 @@ def surface_of(problem: Problem, knots_u: Floats, knots_t: Floats, control: Floa
 def elastic_energy(problem: Problem, grid: Grid, q: Floats, history: History) -> float:
     """Return the elastic energy stored in control points q (n_u, nc) [J] with `history` behind them."""
     return float(stored_energy(problem.axes, q, grid.tables, *problem.laws, history))
-
-
-@dataclass(frozen=True, eq=False)
-class WindowForces:
-    """What holds the cable over a stretch of time.
-
-    Attributes:
-        held: the held degrees of freedom.
-        times: (k,) [s].
-        forces: residual of the equations at the held degrees of freedom (k, held) [N].
-        states: control points (k, n_u, nc) [m] at those times.
-    """
-
-    held: Held
-    times: Floats
-    forces: Floats
-    states: Floats
-
-
-def reactions(problem: Problem, grid: Grid, windows: tuple[WindowForces, ...]) -> tuple[GraspReaction, ...]:
-    """Return force [N] and moment [N m] of every grasp over time.
-
-    The force is the multiplier of the constraint b(u_g) q = p, the moment d x (multiplier of b'(u_g) q = d).
-    """
-    dimensions = problem.plane.dimensions
-    t = np.concatenate([w.times for w in windows])
-    force = {g: np.zeros((len(t), 3)) for g in problem.scene.grasps}
-    moment = {g: np.zeros((len(t), 3)) for g in problem.scene.grasps}
-    at = 0
-    for window in windows:
-        part = slice(at, at + len(window.times))
-        at = part.stop
-        multipliers = problem.plane.world_vectors(window.held.multipliers(window.forces, dimensions))
-        for row, (i, derivative) in enumerate(window.held.rows):
-            if (i, derivative) == SMOOTH:
-                continue
-            g = window.held.grasps[i]
-            if derivative == 0:
-                force[g][part] = multipliers[:, row]
-            else:
-                moment[g][part] = np.cross(_tangents(problem, grid, window, g), multipliers[:, row])
-        if window.held.turned:
-            assert problem.twist is not None
-            torques = problem.twist.radius * window.held.torques(window.forces, dimensions)
-            for r, i in enumerate(window.held.turned):
-                g = window.held.grasps[i]
-                moment[g][part] += torques[:, r, None] * _tangents(problem, grid, window, g)
-    return tuple(GraspReaction(g.u, t, force[g], moment[g]) for g in problem.scene.grasps)
-
-
-def _tangents(problem: Problem, grid: Grid, window: WindowForces, grasp: Grasp) -> Floats:
-    """Return the tangents (k, 3) of a held direction, which has unit length."""
-    slope = grid.at(window.states, grasp.u, 1)[..., : problem.plane.dimensions]
-    return problem.plane.world_vectors(slope)
 
 
 def planned_effects(problem: Problem) -> tuple[EffectReport, ...]:

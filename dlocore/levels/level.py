@@ -1,6 +1,6 @@
 """One march on one grid, again where it failed or strained the cable, and its time spline."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ from dlocore.problem.checks import TOO_DEEP
 from dlocore.problem.discretisation import smallest_n_u
 from dlocore.problem.events import moments, swings
 from dlocore.problem.grid import Grid
-from dlocore.problem.problem import Problem, stiffer, stiffer_for
+from dlocore.problem.problem import Problem, stiff_as_taut, stiffer, stiffer_for
 from dlocore.problem.time_grid import smallest_n_t, time_knots
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, march
 from dlocore.solvers.monitor import Monitor
@@ -67,6 +67,8 @@ class Level:
         change: largest distance to the level before [m], infinite at the first.
         turned: largest angle of the sections from those of the level before, or of the march that its error was
             estimated with [rad]; 0 without twist.
+        beside: those that its forces are compared with: the one that its error was estimated with, or the level before,
+            and the one before that where the two differ in one direction only.
         note: what was found on it, in words.
         mended: what was done differently from other marches on a given grid as it failed on that one, in words.
     """
@@ -80,8 +82,14 @@ class Level:
     missed: float
     change: float
     turned: float = 0.0
+    beside: "tuple[Level, ...]" = ()
     note: str = ""
     mended: str = ""
+
+    @property
+    def alone(self) -> "Level":
+        """The level without those beside it."""
+        return replace(self, beside=())
 
     @cached_property
     def samples(self) -> Floats:
@@ -174,6 +182,10 @@ def run_level(
         harder = stiffer_for(tried, motion.deepest)
         again = march(harder, grid, steps, monitor, rho=rho, whole=whole)
         if (again.reached, -again.deepest) < (motion.reached, -_YIELDING * motion.deepest):
+            taut = stiff_as_taut(harder) if again.reached == motion.reached else None
+            if taut is not None:  # of what is pulled in, a soft contact stops nothing
+                tried = taut
+                continue
             if problem.self_contact is None or tried is not problem or again.reached < motion.reached:
                 break  # what is this deep was not pushed in
             tried = harder  # strands that strike each other harder by chance are tried once more

@@ -10,7 +10,7 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.answer.report import WindowForces
+from dlocore.answer.reactions import WindowForces
 from dlocore.effects import laws
 from dlocore.effects.damping import Damping
 from dlocore.effects.distance import distances

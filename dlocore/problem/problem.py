@@ -435,6 +435,19 @@ def stiffer_for(problem: Problem, deepest: float, speed: float = 0.0) -> Problem
     return stiffer(problem, max(ratio, stops / contact.stiffness))
 
 
+def stiff_as_taut(problem: Problem) -> Problem | None:
+    """Return the problem with contact that holds a cable pulled taut around something, None where it has that, or none.
+
+    By how much it is pulled is given: what it sinks in, it is stretched less. Contact of k = EA/(L D) takes about half
+    of that in an edge, less in anything round; a softer one takes it all, however much of it there is.
+    """
+    cable, contact = problem.scene.cable, problem.contact
+    if contact is None:
+        return None
+    ratio = cast(float, cable.axial_stiffness) / (cable.length * cable.diameter * contact.stiffness)
+    return stiffer(problem, ratio) if ratio > 1.0 else None
+
+
 def firmer(problem: Problem, step: float) -> Problem:
     """Return the problem with friction that gives way by as much as is in keeping with steps of `step` [s]."""
     if problem.friction is None:

@@ -195,6 +195,7 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
         ),
         find_start_energy=partial(_elastic_energy, last, 0),
         start_fit=problem.start.fit_rms,
+        report_contacts=tuple,
         report_grasps=lambda: tuple(
             GraspReaction(g.u, motion.given_times, motion.forces[i], motion.moments[i])
             for i, g in enumerate(problem.scene.grasps)

@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.answer.report import WindowForces
+from dlocore.answer.reactions import WindowForces
 from dlocore.kernels.assembly import History, note, slopes, times_scalar_band
 from dlocore.kernels.entry import to_ends_of_steps
 from dlocore.kernels.march import (

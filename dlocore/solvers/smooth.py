@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.answer.report import WindowForces
+from dlocore.answer.reactions import WindowForces
 from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4
 from dlocore.kernels.march import FAILED_STEP, LEFT
 from dlocore.kernels.motion import GROWTH, LEAST_SLOPE, MOST_SLOPE, SEEN, STRAIN, smooth_motion

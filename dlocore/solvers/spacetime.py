@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.answer.report import WindowForces
+from dlocore.answer.reactions import WindowForces
 from dlocore.effects import laws
 from dlocore.kernels.anderson import advance, room
 from dlocore.kernels.assembly import History, times_scalar_band

@@ -5,7 +5,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.answer.report import WindowForces
+from dlocore.answer.reactions import WindowForces
 from dlocore.kernels.assembly import NO_RATES, History, assemble
 from dlocore.kernels.contact import passes
 from dlocore.kernels.entry import remember_start

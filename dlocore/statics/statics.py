@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from dlocore.answer.frames import free_of_frames
 from dlocore.answer.parts import Status, with_notes
-from dlocore.answer.report import elastic_energy, reactions
+from dlocore.answer.reactions import reactions
+from dlocore.answer.report import elastic_energy
 from dlocore.errors import SceneError, number
 from dlocore.problem.buckling import UNSTABLE, side_notes
 from dlocore.problem.discretisation import make_grid, smallest_n_u

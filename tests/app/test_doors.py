@@ -16,6 +16,17 @@ from app.schemas import EXAMPLES, PredictionRequest, PredictionResponse, to_scen
 from dlocore import predict
 from tests.app.conftest import ROOT, contract_scene, paper_scene, put
 
+# of each gripper, in JSON and in arrays
+GIVEN = (
+    "reaction",
+    "moment",
+    "reaction_error",
+    "moment_error",
+    "peak_force",
+    "peak_force_time",
+    "peak_moment",
+    "peak_moment_time",
+)
 SAME = {"rtol": 0.0, "atol": 1e-12}  # m: the same compiled code on the same numbers, but for the order of additions
 
 
@@ -63,7 +74,7 @@ def test_npz_holds_what_json_holds(client: TestClient, answer: dict[str, Any]) -
         for name in ("control_points", "knots_u", "knots_t", "degree"):
             np.testing.assert_array_equal(npz[name], answer[name])
         np.testing.assert_array_equal(npz["grasp_u"], [grasp["u"] for grasp in answer["grasps"]])
-        for name in ("reaction", "moment", "peak_force", "peak_force_time", "peak_moment", "peak_moment_time"):
+        for name in GIVEN:
             np.testing.assert_array_equal(npz[name], [grasp[name] for grasp in answer["grasps"]])
 
 
@@ -81,11 +92,31 @@ def test_the_peaks_of_what_a_gripper_gives_are_those_of_the_whole_motion(client:
         assert shown[name] > 1.5 * np.linalg.norm(sampled, axis=1).max()
 
 
+def test_the_errors_of_what_a_gripper_gives_are_those_at_the_times_of_the_surface(client: TestClient) -> None:
+    scene = paper_scene(output={"samples_u": 2, "samples_t": 9})
+    (grasp,) = predict(to_scene(PredictionRequest.model_validate(scene), nothing_stored)).grasps
+    answer = client.post("/v1/predictions?store=false", json=scene).json()
+    for name, errors in (("reaction_error", grasp.reaction_error), ("moment_error", grasp.moment_error)):
+        assert errors is not None
+        np.testing.assert_allclose(
+            answer["grasps"][0][name], np.interp(answer["surface"]["t"], grasp.times, errors), **SAME
+        )
+
+
+def test_where_no_error_was_estimated_there_is_none_of_the_forces(client: TestClient) -> None:
+    scene = paper_scene(quality={"n_u": 7, "n_t": 9, "method": "paper"})
+    answer = client.post("/v1/predictions?store=false", json=scene).json()
+    assert answer["grasps"][0]["reaction_error"] is None
+    assert np.isnan(arrays(surface_npz(answer, None))["reaction_error"]).all()
+
+
 def test_a_run_that_was_stored_before_peaks_were_noted_still_gives_its_arrays(answer: dict[str, Any]) -> None:
     before = [{name: grasp[name] for name in ("u", "reaction", "moment")} for grasp in answer["grasps"]]
     npz = arrays(surface_npz({**answer, "grasps": before}, None))
     np.testing.assert_array_equal(npz["reaction"], [grasp["reaction"] for grasp in before])
     np.testing.assert_array_equal(npz["peak_force"], [np.nan])
+    assert npz["moment_error"].shape == (1, len(answer["surface"]["t"]))
+    assert np.isnan(npz["moment_error"]).all()
 
 
 def test_a_prediction_can_be_asked_for_as_npz(client: TestClient, answer: dict[str, Any]) -> None:

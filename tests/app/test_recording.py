@@ -170,6 +170,10 @@ def test_energies_and_reactions_are_plotted_over_the_motion(
     _, sizes = rows(chunks, "/over_time/reaction/0", "scalars", "motion")
     expected = np.linalg.norm(answer["grasps"][0]["reaction"], axis=1)
     np.testing.assert_allclose([size for (size,) in sizes], expected, rtol=1e-12)
+    error = np.array(answer["grasps"][0]["reaction_error"])
+    for bound, limit in (("least", np.maximum(expected - error, 0.0)), ("most", expected + error)):
+        _, found = rows(chunks, f"/over_time/reaction/0/{bound}", "scalars", "motion")
+        np.testing.assert_allclose([value for (value,) in found], limit, rtol=1e-12)
 
 
 def test_the_log_has_a_line_for_every_iteration(chunks: list[Any], answer: dict[str, Any]) -> None:

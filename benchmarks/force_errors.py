@@ -1,0 +1,173 @@
+"""How honest the estimated errors of forces are: `python -m benchmarks.force_errors [--scenes NAME ...]`.
+
+Every scene of the catalogue with grippers, and random ones, are solved for several target errors and on given grids.
+The force of each gripper is compared with that of a march to a fifty-thousandth of the length, between each two events;
+its estimated error with how far the two are apart. Where the fine one may be off by as much, as it estimates itself,
+the force is not judged: one that rings at a jump of the velocity rings faster on every finer grid.
+
+For every setting: the forces that were judged; the mean part of the time at which the true error is within the
+estimated one; quantiles of estimate/true, both as root mean squares over the motion; the share of ratios in 0.5 to 5,
+and below 0.5. Then every force beyond these bounds. One thread.
+"""
+
+import os
+
+os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
+
+import argparse
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from benchmarks.catalogue import catalogue
+from benchmarks.estimate import HIGH, LOW
+from benchmarks.machine import machine_line
+from benchmarks.robot_scenes import random_scene
+from dlocore import GraspReaction, Prediction, Quality, Scene, SceneError, predict, warm_up
+
+Floats = NDArray[np.float64]
+
+TARGETS = (1e-2, 2e-3)  # of the length
+GRIDS = ((13, 19), (21, 31))
+TRUE = 2e-5  # of the length: target of what they are compared with
+PATIENCE = 20.0  # [s] for one solve
+
+
+@dataclass(frozen=True)
+class Row:
+    """The force of one gripper: root mean squares [N] of it and its errors, and when the true one is within."""
+
+    scene: str
+    setting: str
+    u: float
+    force: float
+    estimate: float
+    error: float
+    within: float
+
+    @property
+    def ratio(self) -> float:
+        return self.estimate / self.error
+
+
+def settings(length: float) -> dict[str, Quality]:
+    """Return what is asked of a cable of some length."""
+    asked = {f"target {100 * part:g} % of L": Quality(target_error=part * length) for part in TARGETS}
+    return asked | {f"march {n_u} x {n_t}": Quality(n_u=n_u, n_t=n_t, method="march") for n_u, n_t in GRIDS}
+
+
+def solved(scene: Scene, quality: Quality) -> Prediction | None:
+    """Return the answer on the grid it is asked for, None where the scene has none on it, or does not converge."""
+    try:
+        answer = predict(replace(scene, quality=quality), deadline=PATIENCE, keep_grid=True)
+    except SceneError:
+        return None
+    return answer if answer.status == "converged" and answer.level is not None else None
+
+
+def side(answer: Prediction) -> bool:
+    """Tell whether a motion starts with a bow out of its plane, which makes it another one."""
+    return answer.level is not None and "side" in answer.level.posed.called_for
+
+
+def events(times: Floats) -> list[slice]:
+    """Return where the times between each two events are: at an event there are two."""
+    ends = [0, *(np.flatnonzero(np.diff(times) <= 0.0) + 1), len(times)]
+    return [slice(int(a), int(b)) for a, b in pairwise(ends)]
+
+
+def apart(own: GraspReaction, true: GraspReaction) -> tuple[Floats, Floats] | None:
+    """Return how far two forces are apart and the estimate of the true one's error, at the times of the first (k,)."""
+    pieces, others = events(own.times), events(true.times)
+    if len(pieces) != len(others) or true.reaction_error is None:
+        return None
+    found = []
+    for here, there in zip(pieces, others, strict=True):
+        t, times = own.times[here], true.times[there]
+        force = np.column_stack([np.interp(t, times, true.reaction[there, d]) for d in range(3)])
+        unsure = np.interp(t, times, true.reaction_error[there])
+        found.append((np.linalg.norm(own.reaction[here] - force, axis=1), unsure))
+    error, unsure = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return error, unsure
+
+
+def rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def rows(name: str, scene: Scene) -> Iterator[Row]:
+    """Yield the forces of a scene that can be judged."""
+    truth = solved(scene, Quality(target_error=TRUE * scene.cable.length))
+    if truth is None:
+        return
+    for setting, quality in settings(scene.cable.length).items():
+        answer = solved(scene, quality)
+        if answer is None or side(answer) != side(truth):
+            continue
+        for own, true in zip(answer.grasps, truth.grasps, strict=True):
+            compared = apart(own, true)
+            if compared is None or own.reaction_error is None:
+                continue
+            error, unsure = compared
+            if rms(error) > rms(unsure):
+                force = rms(np.linalg.norm(own.reaction, axis=1))
+                within = float(np.mean(error <= own.reaction_error))
+                yield Row(name, setting, own.u, force, rms(own.reaction_error), rms(error), within)
+
+
+def summary(found: list[Row]) -> str:
+    """Return a Markdown table with a row for each setting, and one for all."""
+    lines = [
+        "| setting | forces | within | ratio 5 % | 50 % | 95 % | in 0.5-5 | true > 2 x estimate |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for setting in [*dict.fromkeys(row.setting for row in found), "all"]:
+        group = [row for row in found if setting in ("all", row.setting)]
+        ratios = np.array([row.ratio for row in group])
+        low, middle, high = np.quantile(ratios, [0.05, 0.5, 0.95])
+        lines.append(
+            f"| {setting} | {len(group)} | {np.mean([row.within for row in group]):.0%} | {low:.2f} | {middle:.2f} | "
+            f"{high:.2f} | {np.mean((ratios >= LOW) & (ratios <= HIGH)):.0%} | {np.mean(ratios < LOW):.1%} |"
+        )
+    return "\n".join(lines)
+
+
+def offenders(found: list[Row]) -> str:
+    """Return a Markdown table of the forces beyond the bounds, the most dishonest first."""
+    lines = [
+        "| scene | setting | u [m] | force [N] | estimate [N] | true [N] | ratio |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    lines += [
+        f"| {row.scene} | {row.setting} | {row.u:.3g} | {row.force:.3g} | {row.estimate:.2g} | {row.error:.2g} | "
+        f"{row.ratio:.2f} |"
+        for row in sorted(found, key=lambda row: row.ratio)
+        if not LOW <= row.ratio <= HIGH
+    ]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenes", nargs="+", metavar="NAME", help="only scenes whose name contains one of these")
+    parser.add_argument("--random", type=int, default=40, help="random scenes (default 40)")
+    options = parser.parse_args()
+    warm_up()
+    scenes = catalogue() | {f"random {seed}": random_scene(seed) for seed in range(options.random)}
+    if options.scenes:
+        scenes = {n: s for n, s in scenes.items() if any(part in n for part in options.scenes)}
+    shown = tqdm(scenes.items(), unit=" scenes", file=sys.stderr, disable=not sys.stderr.isatty())
+    found = [row for name, scene in shown if scene.grasps for row in rows(name, scene)]
+    if not found:
+        print("No force could be judged.")
+        return
+    print(f"{summary(found)}\n\n{offenders(found)}\n\n({machine_line()})")
+
+
+if __name__ == "__main__":
+    main()

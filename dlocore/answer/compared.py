@@ -1,0 +1,57 @@
+"""How far what is read from a motion may be off, as the same motion marched on other grids tells."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+_LEFT = 1.5  # times the distance to a force on another grid: benchmarks.force_errors
+_NEARBY = 12  # an error holds for this part of the motion: forces of two grids that swing cross each other
+
+
+class Series(NamedTuple):
+    """Vectors over time.
+
+    Attributes:
+        times: (k,) [s].
+        parts: where in them those between each two events are; an event ends one and begins the next.
+        values: (k, 3).
+    """
+
+    times: Floats
+    parts: list[slice]
+    values: Floats
+
+
+def parts_of(lengths: Sequence[int]) -> list[slice]:
+    """Return where parts of these lengths, one after the other, are."""
+    ends = np.cumsum([0, *lengths])
+    return [slice(int(end) - length, int(end)) for end, length in zip(ends[1:], lengths, strict=True)]
+
+
+def errors(own: Series, others: Sequence[Series]) -> Floats | None:
+    """Return the estimated errors (k,) of vectors over time, None where no other series has as many parts.
+
+    It is _LEFT times the largest distance to another series within a _NEARBYth of the motion, each compared between the
+    same two events (docs/model.md, grids and error estimate).
+    """
+    others = [other for other in others if len(other.parts) == len(own.parts)]
+    if not others:
+        return None
+    apart = np.zeros(len(own.times))
+    for other in others:
+        for here, there in zip(own.parts, other.parts, strict=True):
+            t, times, values = own.times[here], other.times[there], other.values[there]
+            met = np.column_stack([np.interp(t, times, values[:, d]) for d in range(3)])
+            apart[here] = np.maximum(apart[here], np.linalg.norm(own.values[here] - met, axis=1))
+    return _LEFT * _largest_nearby(apart)
+
+
+def _largest_nearby(values: Floats) -> Floats:
+    """Return for each of the values (k,), at about even times, the largest within half a _NEARBYth of all times."""
+    from scipy.ndimage import maximum_filter1d  # takes longer to load than most motions to solve
+
+    return np.asarray(maximum_filter1d(values, size=2 * round(0.5 * len(values) / _NEARBY) + 1))

@@ -1,0 +1,190 @@
+"""How hard table and obstacles press: what balances weight and tension, and nothing where nothing touches."""
+
+import math
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.catalogue import catalogue
+from dlocore import (
+    Box,
+    Cable,
+    ControlPoints,
+    Cylinder,
+    Environment,
+    Grasp,
+    Move,
+    Points,
+    Prediction,
+    Quality,
+    Scene,
+    Sphere,
+    Straight,
+    Table,
+    predict,
+)
+
+G = 9.81  # [m/s^2]
+CABLE = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-3)
+WEIGHT = 0.05 * G  # [N]
+SCENES = catalogue()
+OVER_BAR = SCENES["lowered over a bar"]
+LIFTED = SCENES["middle lifted from the table"]
+
+
+def sizes(vectors: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(vectors, axis=1)
+
+
+def at_end(prediction: Prediction) -> np.ndarray:
+    """Return the sum of what contacts and grippers give at the end of a motion [N]."""
+    contacts = [contact.force[-1] for contact in prediction.contacts]
+    return np.sum([*contacts, *[grasp.reaction[-1] for grasp in prediction.grasps]], axis=0)
+
+
+def waiting(scene: Scene, time: float) -> Scene:
+    """Return a scene that waits at the end of its motion [s], comes to rest, and has nothing rough in its way."""
+    end = max(g.start + g.path.duration for g in scene.grasps)
+    smooth = [replace(obstacle, friction=0.0) for obstacle in scene.environment.obstacles]
+    around = replace(scene.environment, drag=max(scene.environment.drag, 0.3), obstacles=smooth)
+    return replace(scene, horizon=end + time, environment=around)
+
+
+@pytest.mark.parametrize("name", ["middle lifted from the table", "end lifted from the table", "lowered over a bar"])
+def test_contacts_and_grippers_together_bear_the_weight_of_a_cable_at_rest(name: str) -> None:
+    prediction = predict(waiting(SCENES[name], 2.0))
+    assert prediction.status == "converged", prediction.message
+    (contact,) = prediction.contacts
+    assert contact.force[-1, 2] > 0.2 * WEIGHT
+    np.testing.assert_allclose(at_end(prediction)[2], WEIGHT, rtol=4e-3)
+
+
+def test_a_cable_in_the_plane_of_the_table_lies_on_it_with_its_weight() -> None:
+    sideways = Grasp(u=0.25, path=Move(displacement=(0.0, 0.3, 0.0), duration=1.0))
+    around = Environment(drag=0.1, table=Table(friction=0.2))
+    prediction = predict(Scene(cable=CABLE, shape=Straight(), grasps=[sideways], environment=around))
+    (contact,) = prediction.contacts
+    assert contact.name == "table"
+    np.testing.assert_array_equal(contact.force, np.tile([0.0, 0.0, WEIGHT], (len(contact.times), 1)))
+    np.testing.assert_array_equal(contact.pressed, WEIGHT)
+
+
+def around_a_peg(EI: float, EA: float, pull: float, gravity: float) -> Scene:
+    """Return a scene in which a cable that lies in a U around a smooth peg is pulled at both ends by `pull` [m]."""
+    cable = Cable(length=0.8, diameter=0.004, linear_density=0.05, bending_stiffness=EI, axial_stiffness=EA)
+    radius = 0.05 + 0.5 * cable.diameter
+    leg = 0.5 * (cable.length - math.pi * radius)
+    angle = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 61)[:, None]
+    along, beside = np.linspace(-leg, 0.0, 41)[:-1, None], np.full((40, 1), radius)
+    turn = radius * np.hstack([np.cos(angle), np.sin(angle)])
+    points = np.concatenate([np.hstack([along, -beside]), turn, np.hstack([along[::-1], beside])])
+    path = Move(displacement=(-pull, 0.0, 0.0), duration=2.0)
+    peg = Cylinder(center=(0.0, 0.0, 0.0), radius=0.05, height=0.1)
+    return Scene(
+        cable=cable,
+        shape=Points(points=points),
+        grasps=[Grasp(u=0.0, path=path), Grasp(u=cable.length, path=path)],
+        environment=Environment(drag=0.5, gravity=(0.0, 0.0, -gravity), table=Table(), obstacles=[peg]),
+        horizon=4.0,
+    )
+
+
+PULLED = {
+    "limp": (1e-5, 200.0, 0.004, G),
+    "bends": (1e-3, 640.0, 0.002, G),
+    "hardly stretches": (1e-4, 1e5, 4e-4, G),
+    "hardly stretches, and stiffer": (1e-3, 1e6, 1e-4, G),
+    "limp and without weight": (1e-6, 200.0, 0.004, 0.0),
+    "limp and without weight, pulled less": (1e-6, 200.0, 0.001, 0.0),
+}
+
+
+@pytest.mark.parametrize("name", PULLED)
+def test_a_cable_that_is_pulled_around_a_smooth_peg_presses_with_its_tension_over_the_wrapped_angle(name: str) -> None:
+    """A smooth peg takes 2 T on the whole, and T - EI/(2 R^2), the tension where the cable is bent, times the angle.
+
+    T is EA times the strain. Where contact was as soft as weight and stiffness alone ask for, a cable that hardly
+    stretches, or has no weight, sank into the peg instead, to 3 % of T and 70 % of its diameter.
+    """
+    EI, EA, pull, gravity = PULLED[name]
+    prediction = predict(around_a_peg(EI, EA, pull, gravity))
+    assert prediction.status == "converged", prediction.message
+    assert prediction.level is not None
+    assert prediction.level.motion.deepest < 0.02 * prediction.scene.cable.diameter
+    (contact,) = [c for c in prediction.contacts if c.name == "obstacles[0]"]
+    tension = np.array([-grasp.reaction[-1, 0] for grasp in prediction.grasps])
+    for grasp in prediction.grasps:
+        assert grasp.reaction_error is not None
+        assert abs(-grasp.reaction[-1, 0] - EA * 2.0 * pull / 0.8) < grasp.reaction_error[-1]
+    assert contact.force[-1, 0] == pytest.approx(tension.sum(), rel=1e-3)
+    assert abs(contact.force[-1, 1]) < 1e-3 * tension[0]
+    where_bent = tension.mean() - 0.5 * EI / (0.05 + 0.5 * 0.004) ** 2
+    assert contact.pressed[-1] == pytest.approx(math.pi * where_bent, rel=0.01)
+
+
+def test_what_is_not_touched_gives_nothing_and_what_is_out_of_reach_is_not_named() -> None:
+    near, far = Sphere(center=(0.3, 0.08, 0.0), radius=0.02), Sphere(center=(0.0, 9.0, 0.0), radius=0.02)
+    around = Environment(drag=0.1, table=Table(), obstacles=[far, near])
+    side = Grasp(u=0.0, path=Move(displacement=(0.0, -0.05, 0.0), duration=1.0))
+    scene = Scene(cable=CABLE, shape=Straight(), grasps=[side], environment=around, effects={"obstacles": "auto"})
+    called = {contact.name: contact for contact in predict(scene).contacts}
+    assert set(called) <= {"table", "obstacles[1]"}
+    both = predict(replace(scene, effects={"obstacles": "on"}))
+    assert [contact.name for contact in both.contacts] == ["table", "obstacles[0]", "obstacles[1]"]
+    for contact in both.contacts[1:]:
+        assert not contact.force.any()
+        assert not contact.pressed.any()
+
+
+def test_the_force_of_a_box_on_a_cable_pulled_over_its_edge_bears_what_grippers_do_not() -> None:
+    prediction = predict(waiting(SCENES["pulled over the edge of a box"], 1.5))
+    assert prediction.status == "converged", prediction.message
+    scene = prediction.scene
+    assert isinstance(scene.environment.obstacles[0], Box)
+    weight = scene.cable.linear_density * scene.cable.length * G
+    assert at_end(prediction)[2] == pytest.approx(weight, rel=0.01)
+
+
+def test_the_error_of_a_force_holds_against_a_much_finer_march() -> None:
+    own = predict(replace(LIFTED, quality=Quality(target_error=0.005))).contacts[0]
+    fine = predict(replace(LIFTED, quality=Quality(target_error=0.0002))).contacts[0]
+    finer = np.column_stack([np.interp(own.times, fine.times, fine.force[:, d]) for d in range(3)])
+    assert own.force_error is not None
+    assert np.mean(sizes(own.force - finer) <= own.force_error) > 0.9
+    assert own.force_error.mean() < 0.1 * WEIGHT
+
+
+def test_a_start_that_is_pressed_in_is_pressed_out_by_as_much_as_the_law_says() -> None:
+    """At rest and without motion the first state tells: a straight cable, in a ball by half the depth it is allowed."""
+    depth = 2e-5
+    ball = Sphere(center=(0.5, 0.0, -0.05 - 0.0025 + depth), radius=0.05)
+    hold = [Grasp(u=0.0), Grasp(u=1.0)]
+    shape = ControlPoints(control_points=[(0.0, 0.0, 0.0), (0.4, 0.0, 0.0), (0.6, 0.0, 0.0), (1.0, 0.0, 0.0)])
+    scene = Scene(
+        cable=CABLE, shape=shape, grasps=hold, horizon=0.01, environment=Environment(obstacles=[ball]),
+        effects={"obstacles": "on"},
+    )  # fmt: skip
+    prediction = predict(scene)
+    contact = prediction.contacts[-1]
+    assert contact.name == "obstacles[0]"
+    assert contact.force[0, 2] > 0.0
+    assert contact.pressed[0] == pytest.approx(contact.force[0, 2], rel=1e-3)
+
+
+def test_contacts_are_pickled_and_taken_on_by_a_motion_like_it() -> None:
+    like = predict(LIFTED)
+    sent = pickle.loads(pickle.dumps(like)).contacts[0]
+    again = predict(LIFTED, like=like)
+    assert again.judged is like
+    for other in (sent, again.contacts[0]):
+        np.testing.assert_array_equal(other.force, like.contacts[0].force)
+        np.testing.assert_array_equal(other.force_error, like.contacts[0].force_error)
+
+
+def test_the_reference_and_a_cable_that_nothing_touches_have_none() -> None:
+    side = Grasp(u=0.0, path=Move(displacement=(0.0, 0.2, 0.0), duration=1.0))
+    free = Scene(cable=CABLE, shape=Straight(), grasps=[side], environment=Environment(drag=0.1, gravity=(0, 0, 0)))
+    assert predict(free).contacts == ()
+    assert predict(replace(free, quality=Quality(method="reference", target_error=0.02))).contacts == ()
