@@ -149,7 +149,7 @@ class Prediction:
         return self.report_stretch()
 
     def __getstate__(self) -> dict[str, Any]:
-        return state_with(
+        state = state_with(
             self,
             grasps="report_grasps",
             contacts="report_contacts",
@@ -159,6 +159,9 @@ class Prediction:
             start_energy="find_start_energy",
             _objections="find_objections",
         )
+        if self.level is not None:
+            state["level"] = self.level.alone  # what those beside it were for is known now
+        return state
 
     def shape_at(self, t: float | None = None) -> ControlPoints:
         """Return the cable at time `t` [s], its last by default, as the start of another motion.

@@ -130,7 +130,7 @@ def forces_list(prediction: Prediction) -> str:
     for name, times, force, error in given:
         size = np.linalg.norm(force, axis=1)
         k = int(np.argmax(size))
-        known = "" if error is None else f" ± {error[k]:.1g}"
+        known = f" ± {error[k]:.1g}" if error is not None and error[k] > 0.0 else ""
         rows.append(f"<div>{name}: at most {size[k]:.2g}{known} N, at {times[k]:.2f} s</div>")
     return f'<div style="margin: 0.4rem 0.75rem; font-size: 0.78rem; line-height: 1.5;">{"".join(rows)}</div>'
 

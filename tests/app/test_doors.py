@@ -103,6 +103,27 @@ def test_the_errors_of_what_a_gripper_gives_are_those_at_the_times_of_the_surfac
         )
 
 
+def test_what_table_and_obstacles_give_is_what_python_finds(client: TestClient) -> None:
+    peg = {"kind": "cylinder", "center": [0.6, 0.08, 0.0], "radius": 0.02, "height": 0.1}
+    scene = put(paper_scene(output={"samples_u": 2, "samples_t": 17}), "environment.obstacles", [peg])
+    found = predict(to_scene(PredictionRequest.model_validate(scene), nothing_stored)).contacts
+    answer = client.post("/v1/predictions?store=false", json=scene).json()
+    assert [contact["name"] for contact in answer["contacts"]] == ["table", "obstacles[0]"]
+    t, npz = answer["surface"]["t"], arrays(surface_npz(answer, None))
+    assert npz["contact"].tolist() == ["table", "obstacles[0]"]
+    for k, (own, shown) in enumerate(zip(found, answer["contacts"], strict=True)):
+        assert own.force_error is not None
+        force = np.column_stack([np.interp(t, own.times, own.force[:, d]) for d in range(3)])
+        for name, values in (
+            ("force", force),
+            ("pressed", np.interp(t, own.times, own.pressed)),
+            ("force_error", np.interp(t, own.times, own.force_error)),
+        ):
+            np.testing.assert_allclose(shown[name], values, **SAME)
+            np.testing.assert_array_equal(npz[f"contact_{name}"][k], shown[name])
+    assert np.array(answer["contacts"][1]["pressed"]).max() > 1e-3  # N: it was met, so equal forces mean something
+
+
 def test_where_no_error_was_estimated_there_is_none_of_the_forces(client: TestClient) -> None:
     scene = paper_scene(quality={"n_u": 7, "n_t": 9, "method": "paper"})
     answer = client.post("/v1/predictions?store=false", json=scene).json()
@@ -117,6 +138,8 @@ def test_a_run_that_was_stored_before_peaks_were_noted_still_gives_its_arrays(an
     np.testing.assert_array_equal(npz["peak_force"], [np.nan])
     assert npz["moment_error"].shape == (1, len(answer["surface"]["t"]))
     assert np.isnan(npz["moment_error"]).all()
+    without = {name: value for name, value in answer.items() if name != "contacts"}
+    assert arrays(surface_npz(without, None))["contact_force"].shape == (0, len(answer["surface"]["t"]), 3)
 
 
 def test_a_prediction_can_be_asked_for_as_npz(client: TestClient, answer: dict[str, Any]) -> None:

@@ -174,6 +174,9 @@ def test_energies_and_reactions_are_plotted_over_the_motion(
     for bound, limit in (("least", np.maximum(expected - error, 0.0)), ("most", expected + error)):
         _, found = rows(chunks, f"/over_time/reaction/0/{bound}", "scalars", "motion")
         np.testing.assert_allclose([value for (value,) in found], limit, rtol=1e-12)
+    assert answer["contacts"][0]["name"] == "table"
+    _, borne = rows(chunks, "/over_time/reaction/contact_0", "scalars", "motion")
+    np.testing.assert_allclose([size for (size,) in borne], answer["contacts"][0]["pressed"], rtol=1e-12)
 
 
 def test_the_log_has_a_line_for_every_iteration(chunks: list[Any], answer: dict[str, Any]) -> None:

@@ -138,3 +138,13 @@ def test_the_present_solve_is_a_dot_among_what_the_machine_was_calibrated_to():
 
 def test_nothing_to_plot_is_no_plot():
     assert plots.plot("x", "y", [plots.Series(name="", points=[], colour="red")], log_x=False, mark="a") == ""
+
+
+def test_the_largest_forces_have_their_errors_and_the_table_is_among_them():
+    prediction = predict(start_draft().scene(NOTHING_STORED))
+    text = "".join(ET.fromstring(report.forces_list(prediction)).itertext())
+    (grasp,), (table,) = prediction.grasps, prediction.contacts
+    k = int(np.linalg.norm(grasp.reaction, axis=1).argmax())
+    assert f"u = {grasp.u:.2f} m: at most {np.linalg.norm(grasp.reaction[k]):.2g}" in text
+    assert f" ± {grasp.reaction_error[k]:.1g} N, at {grasp.times[k]:.2f} s" in text
+    assert f"table: at most {table.pressed[0]:.2g}" in text
