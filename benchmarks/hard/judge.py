@@ -11,7 +11,6 @@ import numpy as np
 
 from benchmarks.hard.generator import Drawn
 from benchmarks.hard.laws import measure
-from benchmarks.hard.taut import words_if_too_short
 from dlocore import Prediction, Scene, SceneError, predict
 from dlocore.accuracy.companion import TOO_LATE, UNKNOWN
 from dlocore.levels.driven import driven, words
@@ -38,7 +37,6 @@ OPEN = ("does not determine its motion", "mirror image", UNSEEN)  # words of an 
 MIDWAY = (0.25, 0.5, 0.75)  # of the time of a motion
 
 DRIVEN = "impossible: a gripper drives what it holds into something"
-TOO_SHORT = "impossible: the cable is too short for what is in its way"
 
 Whose = Literal["checked", "failed", "all"]
 
@@ -67,10 +65,9 @@ def run(
         record["laws"] = asdict(measure(prediction))
         if checked:
             record |= compare(prediction, scene, patience)
-        for why, find in ((DRIVEN, driven_into), (TOO_SHORT, words_if_too_short)):
-            how = find(prediction, scene, patience) if "shown" not in record else ""
-            if how:
-                record |= {"possible": False, "shown": how, "families": (why, *drawn.families)}
+        how = driven_into(prediction, scene, patience)
+        if how:
+            record |= {"possible": False, "shown": how, "families": (DRIVEN, *drawn.families)}
         failed = measured != "checked" and prediction.status != "converged" and record["possible"]
         if failed or measured == "all" or checked:
             record["disturbed"] = disturbed(prediction, scene, patience)

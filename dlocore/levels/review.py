@@ -20,6 +20,7 @@ from dlocore.kernels.banded import solve_free
 from dlocore.kernels.twisted_rows import TWIST_RATE
 from dlocore.levels.level import CREDIBLE_STRAIN, Level
 from dlocore.levels.spin import bends_sharply, spin_forces
+from dlocore.levels.taut import taut_notes
 from dlocore.problem.buckling import BOW, UNSTABLE, side_notes
 from dlocore.problem.events import closed_grasps, moments
 from dlocore.problem.notes import start_notes
@@ -113,11 +114,12 @@ def _strands(level: Level) -> dict[str, str]:
 def objections(level: Level) -> list[str]:
     """Return what is to be known of a motion beside its status, in words.
 
-    That is what the effects that the scene switches off would have done, where it matters, and a strain along the cable
-    that few bear.
+    That is what the effects that the scene switches off would have done, where it matters, a strain along the cable
+    that few bear, and one that is pulled taut.
     """
     problem, found = level.problem, []
     found += _strained(level)
+    found += taut_notes(level)
     found += _stretched(level)
     found += _twisted(level)
     found += start_notes(problem.scene, problem.start)

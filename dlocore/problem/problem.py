@@ -439,9 +439,10 @@ def stiff_as_taut(problem: Problem) -> Problem | None:
     """Return the problem with contact that holds a cable pulled taut around something, None where it has that, or none.
 
     By how much it is pulled is given: what it sinks in, it is stretched less. Contact of k = EA/(L D) takes about half
-    of that in an edge, less in anything round; a softer one takes it all, however much of it there is.
+    of that in an edge, less in anything round; a softer one takes it all, however much of it there is. So it is with a
+    loop that is pulled tight around itself.
     """
-    cable, contact = problem.scene.cable, problem.contact
+    cable, contact = problem.scene.cable, problem.self_contact or problem.contact
     if contact is None:
         return None
     ratio = cast(float, cable.axial_stiffness) / (cable.length * cable.diameter * contact.stiffness)

@@ -91,7 +91,7 @@ def test_a_grid_that_errs_in_one_direction_is_compared_with_those_of_both() -> N
     """A grid that was refined in time alone says nothing of what space has left."""
     answer = predict(replace(WAITS, quality=Quality()))
     assert answer.level is not None
-    sizes = [(b.grid.n_u, b.steps) for b in answer.level.beside]
+    sizes = [(other.motion.grid.n_u, other.motion.steps) for other in answer.level.beside]
     assert len(sizes) == 2
     assert len({n_u for n_u, _ in [*sizes, (answer.level.motion.grid.n_u, 0)]}) > 1
     assert len({steps for _, steps in [*sizes, (0, answer.level.motion.steps)]}) > 1

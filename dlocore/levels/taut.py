@@ -1,0 +1,54 @@
+"""Whether the grippers pull the cable taut, farther than the way that it has is long."""
+
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.kernels.assembly import largest_curvature
+from dlocore.levels.level import Level
+from dlocore.problem.discretisation import axial_strain
+
+Floats = NDArray[np.float64]
+
+TAUT = 10.0  # times what all other forces on the cable add up to: mean tension of one that is pulled taut
+_LOOKS = 65  # at states of a motion
+
+
+def taut_notes(level: Level) -> list[str]:
+    """Return what is told of a motion whose grippers pull the cable taut, as they are stiffer than anything.
+
+    Then its mean tension along the cable, at two looks in succession at least, is far above what weight, inertia, drag,
+    bending and loads on it add up to. Waves of stretch pass in between.
+    """
+    problem, motion = level.problem, level.motion
+    scene, cable = problem.scene, problem.scene.cable
+    if not scene.grasps or problem.stretch_memory is not None or motion.reached < _LOOKS:
+        return []
+    at = np.unique(np.linspace(0, motion.reached, _LOOKS).round().astype(int))
+    states, times, tables = motion.states[at], motion.times[at], motion.grid.tables
+    strain = axial_strain(tables, states[..., : problem.plane.dimensions]) @ tables.axial.w / cable.length
+    tension, others = cast(float, cable.axial_stiffness) * strain, _others(level, states, times)
+    taut = np.flatnonzero(tension > TAUT * others)
+    if not (np.diff(taut) == 1).any():
+        return []
+    worst = int(tension.argmax())
+    return [
+        f"the grippers pull the cable taut: at {times[worst]:.3g} s with {tension[worst]:.2g} N in the mean, where all "
+        f"other forces on it add up to {others:.2g} N: bring them no farther apart than the cable between them reaches"
+    ]
+
+
+def _others(level: Level, states: Floats, times: Floats) -> float:
+    """Return what all forces on a cable but those of its grippers come to at most [N], about."""
+    problem = level.problem
+    scene, cable, around, grid = problem.scene, problem.scene.cable, problem.scene.environment, level.motion.grid
+    velocity = np.diff(states[..., : problem.plane.dimensions], axis=0) / np.diff(times)[:, None, None]
+    acceleration = np.diff(velocity, axis=0) / np.diff(times)[1:, None, None]
+    speed, change = (float(np.linalg.norm(x, axis=2).max()) for x in (velocity, acceleration))
+    gravity = float(np.linalg.norm(cast(Floats, around.gravity)))
+    spread = cable.linear_density * (gravity + change) + (around.drag + around.drag_quadratic * speed) * speed
+    bend = float(largest_curvature(problem.axes, states, grid.tables.curvature, grid.history.memory)) + 1 / cable.length
+    loads = sum(float(np.linalg.norm(np.atleast_2d(load.force), axis=1).max()) for load in scene.loads)
+    stiff = cast(float, cable.bending_stiffness) * bend**2
+    return cable.length * spread + cable.linear_density * speed**2 + stiff + loads
