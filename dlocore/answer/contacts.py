@@ -42,8 +42,9 @@ def contact_forces(problem: Problem, grid: Grid, windows: Windows) -> tuple[Cont
         return tuple(found)
     nodes = grid.tables.contact
     met = [] if nodes.table_nodes == 0 else [("table", slice(0, nodes.table_nodes), TABLE)]
+    numbered = enumerate(problem.scene.environment.obstacles)  # of which those that are simulated are some, in order
     for i, obstacle in enumerate(problem.obstacles):
-        number = problem.scene.environment.obstacles.index(obstacle)
+        number = next(number for number, other in numbered if other is obstacle)
         met.append((f"obstacles[{number}]", slice(nodes.table_nodes, len(nodes.u)), COUNT + i))
     for name, part, row in met:
         forces, pressed = zip(
@@ -104,7 +105,7 @@ def _kept(lengths: Sequence[int]) -> list[Indices]:
 
 def _weight_on_table(scene: Scene) -> float:
     """Return the weight [N] with which a cable lies on the table."""
-    return -scene.cable.linear_density * scene.cable.length * float(cast(Floats, scene.environment.gravity)[2])
+    return scene.cable.linear_density * scene.cable.length * abs(float(cast(Floats, scene.environment.gravity)[2]))
 
 
 def _pressed(

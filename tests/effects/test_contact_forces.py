@@ -138,6 +138,17 @@ def test_what_is_not_touched_gives_nothing_and_what_is_out_of_reach_is_not_named
         assert not contact.pressed.any()
 
 
+def test_an_obstacle_that_is_given_twice_is_named_twice() -> None:
+    peg = Cylinder(center=(0.6, 0.08, 0.0), radius=0.02, height=0.1)
+    side = Grasp(u=0.25, path=Move(displacement=(0.0, 0.3, 0.0), duration=1.0))
+    around = Environment(drag=0.1, table=Table(), obstacles=[peg, peg])
+    prediction = predict(Scene(cable=CABLE, shape=Straight(), grasps=[side], environment=around))
+    _, first, second = prediction.contacts
+    assert (first.name, second.name) == ("obstacles[0]", "obstacles[1]")
+    assert first.pressed.max() > 1e-3  # N
+    np.testing.assert_array_equal(first.force, second.force)
+
+
 def test_the_force_of_a_box_on_a_cable_pulled_over_its_edge_bears_what_grippers_do_not() -> None:
     prediction = predict(waiting(SCENES["pulled over the edge of a box"], 1.5))
     assert prediction.status == "converged", prediction.message
