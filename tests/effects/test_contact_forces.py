@@ -11,6 +11,7 @@ from benchmarks.catalogue import catalogue
 from dlocore import (
     Box,
     Cable,
+    ContactForce,
     ControlPoints,
     Cylinder,
     Environment,
@@ -167,21 +168,31 @@ def test_the_error_of_a_force_holds_against_a_much_finer_march() -> None:
     assert own.force_error.mean() < 0.1 * WEIGHT
 
 
-def test_a_start_that_is_pressed_in_is_pressed_out_by_as_much_as_the_law_says() -> None:
-    """At rest and without motion the first state tells: a straight cable, in a ball by half the depth it is allowed."""
-    depth = 2e-5
-    ball = Sphere(center=(0.5, 0.0, -0.05 - 0.0025 + depth), radius=0.05)
-    hold = [Grasp(u=0.0), Grasp(u=1.0)]
-    shape = ControlPoints(control_points=[(0.0, 0.0, 0.0), (0.4, 0.0, 0.0), (0.6, 0.0, 0.0), (1.0, 0.0, 0.0)])
+def pressed_into_a_ball(velocity: float) -> ContactForce:
+    """Return what a ball gives to a straight cable that begins 20 um deep in it, and is moved there with a velocity."""
+    ball = Sphere(center=(0.5, 0.0, -0.05 - 0.0025 + 2e-5), radius=0.05)
+    shape = ControlPoints(
+        control_points=[(x, 0.0, 0.0) for x in (0.0, 1 / 9, 1 / 3, 2 / 3, 8 / 9, 1.0)],
+        velocity=[(0.0, 0.0, 0.0, 0.0)] * 2 + [(0.0, 0.0, velocity, 0.0)] * 2 + [(0.0, 0.0, 0.0, 0.0)] * 2,
+    )
     scene = Scene(
-        cable=CABLE, shape=shape, grasps=hold, horizon=0.01, environment=Environment(obstacles=[ball]),
+        cable=CABLE,
+        shape=shape,
+        grasps=[Grasp(u=0.0), Grasp(u=1.0)],
+        horizon=0.01,
+        environment=Environment(obstacles=[ball]),
         effects={"obstacles": "on"},
-    )  # fmt: skip
-    prediction = predict(scene)
-    contact = prediction.contacts[-1]
+    )
+    contact = predict(scene).contacts[-1]
     assert contact.name == "obstacles[0]"
-    assert contact.force[0, 2] > 0.0
-    assert contact.pressed[0] == pytest.approx(contact.force[0, 2], rel=1e-3)
+    return contact
+
+
+def test_what_is_pressed_in_is_pressed_out_and_more_so_as_it_comes_in() -> None:
+    still, coming = (pressed_into_a_ball(velocity) for velocity in (0.0, -0.02))
+    assert still.force[0, 2] > 0.0
+    assert still.pressed[0] == pytest.approx(still.force[0, 2], rel=1e-3)
+    assert coming.force[0, 2] > 1.2 * still.force[0, 2]
 
 
 def test_contacts_are_pickled_and_taken_on_by_a_motion_like_it() -> None:

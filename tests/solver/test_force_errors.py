@@ -9,8 +9,9 @@ import pytest
 from benchmarks.catalogue import catalogue
 from benchmarks.force_errors import apart, rms
 from dlocore import Grasp, GraspReaction, Prediction, Quality, Scene, Straight, predict
+from dlocore.answer.compared import Series, errors, parts_of
 from dlocore.answer.reactions import taken_on
-from tests.solver.scenes import WEIGHTLESS, cable, march, paper_scene, refined
+from tests.solver.scenes import WEIGHTLESS, Floats, cable, march, paper_scene, refined
 
 SCENES = catalogue()
 HANGING = SCENES["clamped hanging cable with one end moved"]
@@ -95,6 +96,24 @@ def test_a_grid_that_errs_in_one_direction_is_compared_with_those_of_both() -> N
     assert len(sizes) == 2
     assert len({n_u for n_u, _ in [*sizes, (answer.level.motion.grid.n_u, 0)]}) > 1
     assert len({steps for _, steps in [*sizes, (0, answer.level.motion.steps)]}) > 1
+
+
+def test_the_error_is_that_to_the_farthest_grid_between_the_same_events() -> None:
+    """Forces that are 1 and 2 N off, and jump at an event that the grids step to in different ways."""
+    times, other = np.array([0.0, 1.0, 2.0, 2.0, 3.0, 4.0]), np.array([0.0, 2.0, 2.0, 4.0])
+    jump, across = np.array([0.0, 0.0, 0.0, 9.0, 9.0, 9.0]), np.array([0.0, 0.0, 9.0, 9.0])
+
+    def series(t: Floats, values: Floats, off: float) -> Series:
+        parts = parts_of([len(t) // 2, len(t) - len(t) // 2])
+        return Series(t, parts, np.outer(values + off, [0.6, 0.8, 0.0]))
+
+    own, near, far = series(times, jump, 0.0), series(other, across, 1.0), series(other, across, -2.0)
+    one, both = errors(own, [near]), errors(own, [near, far])
+    assert one is not None
+    assert both is not None
+    np.testing.assert_allclose(one, 1.5)
+    np.testing.assert_allclose(both, 3.0)
+    assert errors(own, [Series(other, parts_of([4]), near.values)]) is None  # of another number of events
 
 
 def test_a_motion_that_goes_on_from_one_like_it_takes_on_the_errors_of_its_forces() -> None:
