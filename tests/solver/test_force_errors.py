@@ -108,9 +108,11 @@ def test_the_error_is_that_to_the_farthest_grid_between_the_same_events() -> Non
         return Series(t, parts, np.outer(values + off, [0.6, 0.8, 0.0]))
 
     own, near, far = series(times, jump, 0.0), series(other, across, 1.0), series(other, across, -2.0)
-    one, both = errors(own, [near]), errors(own, [near, far])
+    one, both, other_way = errors(own, [near]), errors(own, [near, far]), errors(own, [far, near])
     assert one is not None
     assert both is not None
+    assert other_way is not None
+    np.testing.assert_array_equal(both, other_way)
     np.testing.assert_allclose(one, 1.5)
     np.testing.assert_allclose(both, 3.0)
     assert errors(own, [Series(other, parts_of([4]), near.values)]) is None  # of another number of events
