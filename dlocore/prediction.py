@@ -91,7 +91,7 @@ class Prediction:
 
     def _of_unsure_forces(self) -> list[str]:
         """Return which forces of grippers are hardly known, for half of the time, though the motion is."""
-        if self.status != "converged":
+        if self.status != "converged" or self.accuracy.error_estimate is None:
             return []
         cable, told = self.scene.cable, []
         gravity = float(np.linalg.norm(cast(Floats, self.scene.environment.gravity)))
