@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 from dlocore.kernels.assembly import largest_curvature
 from dlocore.levels.level import Level
 from dlocore.problem.discretisation import axial_strain
+from dlocore.scene.scene import Scene
 
 Floats = NDArray[np.float64]
 
 TAUT = 10.0  # times what all other forces on the cable add up to: mean tension of one that is pulled taut
-_LOOKS = 65  # at states of a motion
+_LOOKS = 65  # at states of a motion, at most
 
 
 def taut_notes(level: Level) -> list[str]:
@@ -23,8 +24,11 @@ def taut_notes(level: Level) -> list[str]:
     """
     problem, motion = level.problem, level.motion
     scene, cable = problem.scene, problem.scene.cable
-    if not scene.grasps or problem.stretch_memory is not None or motion.reached < _LOOKS:
+    if not scene.grasps or problem.stretch_memory is not None or motion.reached < 2:
         return []
+    most = cast(float, cable.axial_stiffness) * motion.largest_strain
+    if most <= TAUT * (_weight(scene) + cast(float, cable.bending_stiffness) / cable.length**2):
+        return []  # most motions
     at = np.unique(np.linspace(0, motion.reached, _LOOKS).round().astype(int))
     states, times, tables = motion.states[at], motion.times[at], motion.grid.tables
     strain = axial_strain(tables, states[..., : problem.plane.dimensions]) @ tables.axial.w / cable.length
@@ -39,6 +43,12 @@ def taut_notes(level: Level) -> list[str]:
     ]
 
 
+def _weight(scene: Scene) -> float:
+    """Return what the cable of a scene weighs [N]."""
+    gravity = float(np.linalg.norm(cast(Floats, scene.environment.gravity)))
+    return scene.cable.linear_density * scene.cable.length * gravity
+
+
 def _others(level: Level, states: Floats, times: Floats) -> float:
     """Return what all forces on a cable but those of its grippers come to at most [N], about."""
     problem = level.problem
@@ -46,9 +56,8 @@ def _others(level: Level, states: Floats, times: Floats) -> float:
     velocity = np.diff(states[..., : problem.plane.dimensions], axis=0) / np.diff(times)[:, None, None]
     acceleration = np.diff(velocity, axis=0) / np.diff(times)[1:, None, None]
     speed, change = (float(np.linalg.norm(x, axis=2).max()) for x in (velocity, acceleration))
-    gravity = float(np.linalg.norm(cast(Floats, around.gravity)))
-    spread = cable.linear_density * (gravity + change) + (around.drag + around.drag_quadratic * speed) * speed
+    spread = cable.linear_density * change + (around.drag + around.drag_quadratic * speed) * speed
     bend = float(largest_curvature(problem.axes, states, grid.tables.curvature, grid.history.memory)) + 1 / cable.length
     loads = sum(float(np.linalg.norm(np.atleast_2d(load.force), axis=1).max()) for load in scene.loads)
     stiff = cast(float, cable.bending_stiffness) * bend**2
-    return cable.length * spread + cable.linear_density * speed**2 + stiff + loads
+    return _weight(scene) + cable.length * spread + cable.linear_density * speed**2 + stiff + loads

@@ -108,7 +108,7 @@ def test_a_start_that_is_stretched_for_an_instant_is_not_told_of() -> None:
 def test_a_straight_cable_that_is_pulled_along_itself_is_told_of_on_a_given_grid_too() -> None:
     along = Grasp(u=1.0, path=Move(displacement=(0.003, 0.0, 0.0), duration=1.0))
     scene = Scene(cable=cable(), shape=Straight(), grasps=[Grasp(u=0.0), along], environment=WEIGHTLESS)
-    for quality in (Quality(), march(13, 41)):
+    for quality in (Quality(), march(13, 41), march(7, 7)):
         (note,) = told(predict(replace(scene, quality=quality)))
         assert number_after("with", note) == pytest.approx(640.0 * 0.003, rel=0.02)
 
