@@ -18,9 +18,10 @@ os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS
 import argparse
 import json
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Protocol, TypeVar
 
 import numpy as np
 from tqdm import tqdm
@@ -37,6 +38,16 @@ SURER = 5.0  # times as accurate as an answer, at least, is the truth that judge
 LOW, HIGH = 0.5, 5.0  # bounds of an honest ratio estimate/true
 PATIENCE = 8.0  # [s] for the marches that make a truth, before the last
 DEADLINE = 30.0  # [s] for one answer
+
+
+class Answered(Protocol):
+    """What was found, and the setting that was asked for."""
+
+    @property
+    def setting(self) -> str: ...
+
+
+Asked = TypeVar("Asked", bound=Answered)
 
 
 @dataclass(frozen=True)
@@ -127,25 +138,34 @@ def rows(name: str, scene: Scene, given: Truth) -> Iterable[Row]:
         )
 
 
+def by_setting(found: list[Asked]) -> Iterator[tuple[str, list[Asked]]]:
+    """Yield every setting and what was found with it, and at last all of it."""
+    for setting in [*dict.fromkeys(row.setting for row in found), "all"]:
+        yield setting, [row for row in found if setting in ("all", row.setting)]
+
+
+def honesty(ratios: list[float]) -> str:
+    """Return cells of a table: quantiles of ratios estimate/true, their share in LOW to HIGH, and that below LOW."""
+    values = np.array(ratios)
+    low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
+    shares = f"{np.mean((values >= LOW) & (values <= HIGH)):.0%} | {np.mean(values < LOW):.1%}"
+    return f"{low:.2f} | {middle:.2f} | {high:.2f} | {shares}"
+
+
 def summary(found: list[Row]) -> str:
     """Return a Markdown table with a row for each setting, and one for all."""
     lines = [
         "| setting | answers | judged | ratio 5 % | 50 % | 95 % | in 0.5-5 | true > 2 x estimate | estimate's time |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
-    for setting in [*dict.fromkeys(row.setting for row in found), "all"]:
-        group = [row for row in found if setting in ("all", row.setting)]
+    for setting, group in by_setting(found):
         judged = [row for row in group if row.judged]
         if not judged:
             continue
-        ratios = np.array([row.ratio for row in judged])
-        low, middle, high = np.quantile(ratios, [0.05, 0.5, 0.95])
         shares = [row.estimate_time / row.time for row in group if row.estimate_time]
         part = f"{np.median(shares):.0%}" if shares else "-"
-        lines.append(
-            f"| {setting} | {len(group)} | {len(judged)} | {low:.2f} | {middle:.2f} | {high:.2f} | "
-            f"{np.mean((ratios >= LOW) & (ratios <= HIGH)):.0%} | {np.mean(ratios < 0.5):.1%} | {part} |"
-        )
+        honest = honesty([row.ratio for row in judged])
+        lines.append(f"| {setting} | {len(group)} | {len(judged)} | {honest} | {part} |")
     return "\n".join(lines)
 
 

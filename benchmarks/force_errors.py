@@ -18,17 +18,19 @@ import argparse
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 from benchmarks.catalogue import catalogue
-from benchmarks.estimate import HIGH, LOW
+from benchmarks.estimate import HIGH, LOW, by_setting, honesty
+from benchmarks.hard.laws import windows_of
 from benchmarks.machine import machine_line
 from benchmarks.robot_scenes import random_scene
 from dlocore import GraspReaction, Prediction, Quality, Scene, SceneError, predict, warm_up
+from dlocore.answer import compared
+from dlocore.answer.compared import Series, parts_of
 
 Floats = NDArray[np.float64]
 
@@ -75,25 +77,17 @@ def side(answer: Prediction) -> bool:
     return answer.level is not None and "side" in answer.level.posed.called_for
 
 
-def events(times: Floats) -> list[slice]:
-    """Return where the times between each two events are: at an event there are two."""
-    ends = [0, *(np.flatnonzero(np.diff(times) <= 0.0) + 1), len(times)]
-    return [slice(int(a), int(b)) for a, b in pairwise(ends)]
+def series(reaction: GraspReaction) -> Series:
+    """Return a force over time, with what is between each two events."""
+    return Series(reaction.times, parts_of([len(part) for part in windows_of(reaction.times)]), reaction.reaction)
 
 
 def apart(own: GraspReaction, true: GraspReaction) -> tuple[Floats, Floats] | None:
     """Return how far two forces are apart and the estimate of the true one's error, at the times of the first (k,)."""
-    pieces, others = events(own.times), events(true.times)
-    if len(pieces) != len(others) or true.reaction_error is None:
+    error = compared.apart(series(own), series(true))
+    if error is None or true.reaction_error is None:
         return None
-    found = []
-    for here, there in zip(pieces, others, strict=True):
-        t, times = own.times[here], true.times[there]
-        force = np.column_stack([np.interp(t, times, true.reaction[there, d]) for d in range(3)])
-        unsure = np.interp(t, times, true.reaction_error[there])
-        found.append((np.linalg.norm(own.reaction[here] - force, axis=1), unsure))
-    error, unsure = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    return error, unsure
+    return error, np.interp(own.times, true.times, true.reaction_error)
 
 
 def rms(values: Floats) -> float:
@@ -110,10 +104,10 @@ def rows(name: str, scene: Scene) -> Iterator[Row]:
         if answer is None or side(answer) != side(truth):
             continue
         for own, true in zip(answer.grasps, truth.grasps, strict=True):
-            compared = apart(own, true)
-            if compared is None or own.reaction_error is None:
+            distance = apart(own, true)
+            if distance is None or own.reaction_error is None:
                 continue
-            error, unsure = compared
+            error, unsure = distance
             if rms(error) > rms(unsure):
                 force = rms(np.linalg.norm(own.reaction, axis=1))
                 within = float(np.mean(error <= own.reaction_error))
@@ -126,14 +120,9 @@ def summary(found: list[Row]) -> str:
         "| setting | forces | within | ratio 5 % | 50 % | 95 % | in 0.5-5 | true > 2 x estimate |",
         "|---|---|---|---|---|---|---|---|",
     ]
-    for setting in [*dict.fromkeys(row.setting for row in found), "all"]:
-        group = [row for row in found if setting in ("all", row.setting)]
-        ratios = np.array([row.ratio for row in group])
-        low, middle, high = np.quantile(ratios, [0.05, 0.5, 0.95])
-        lines.append(
-            f"| {setting} | {len(group)} | {np.mean([row.within for row in group]):.0%} | {low:.2f} | {middle:.2f} | "
-            f"{high:.2f} | {np.mean((ratios >= LOW) & (ratios <= HIGH)):.0%} | {np.mean(ratios < LOW):.1%} |"
-        )
+    for setting, group in by_setting(found):
+        within = np.mean([row.within for row in group])
+        lines.append(f"| {setting} | {len(group)} | {within:.0%} | {honesty([row.ratio for row in group])} |")
     return "\n".join(lines)
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -295,6 +295,7 @@ def _answer(
     grid = level.motion.grid
     surface = surface_at(problem, level, level.control)
     left_out = neglected(level)
+    find_once: FindForces = partial(getattr, level.motion, "forces") if find_forces is None else cache(find_forces)
     stretch = partial(stretch_of, problem, grid, level.motion.times, level.motion.states)
     errors: dict[str, float] = {}
     if outcome.errors is not None:
@@ -305,8 +306,8 @@ def _answer(
         status=outcome.status,
         said=outcome.message,
         surface=surface,
-        report_grasps=partial(_reactions, level, find_forces, judged),
-        report_contacts=partial(_contacts, level, find_forces, judged),
+        report_grasps=partial(_reactions, level, find_once, judged),
+        report_contacts=partial(_contacts, level, find_once, judged),
         report_effects=partial(effect_reports, problem, partial(_material, problem, level), stretch),
         report_material=partial(_material, problem, level),
         report_stretch=stretch,
@@ -333,16 +334,16 @@ def _answer(
     )
 
 
-def _reactions(level: Level, find_forces: FindForces | None, judged: Prediction | None) -> tuple[GraspReaction, ...]:
-    windows = level.motion.forces if find_forces is None else find_forces()
+def _reactions(level: Level, find_forces: FindForces, judged: Prediction | None) -> tuple[GraspReaction, ...]:
+    windows = find_forces()
     found = reactions(level.problem, level.motion.grid, windows)
     if judged is not None:
         return taken_on(found, judged.grasps)
     return with_reaction_errors(found, windows, _beside(level))
 
 
-def _contacts(level: Level, find_forces: FindForces | None, judged: Prediction | None) -> tuple[ContactForce, ...]:
-    windows = level.motion.forces if find_forces is None else find_forces()
+def _contacts(level: Level, find_forces: FindForces, judged: Prediction | None) -> tuple[ContactForce, ...]:
+    windows = find_forces()
     found = contact_forces(level.problem, level.motion.grid, windows)
     if judged is not None:
         return contacts_taken_on(found, judged.contacts)

@@ -23,7 +23,7 @@ from dlocore.errors import number
 from dlocore.pickling import state_with
 from dlocore.scene.scene import MAX_STRAIN, ControlPoints, Scene
 from dlocore.spline import SplineSurface, greville
-from dlocore.words import in_mm
+from dlocore.words import in_mm, in_newtons
 
 if TYPE_CHECKING:
     from dlocore.levels.level import Level
@@ -94,9 +94,7 @@ class Prediction:
         if self.status != "converged" or self.accuracy.error_estimate is None:
             return []
         cable, told = self.scene.cable, []
-        gravity = float(np.linalg.norm(cast(Floats, self.scene.environment.gravity)))
-        weight, stiffness = cable.linear_density * cable.length * gravity, cast(float, cable.bending_stiffness)
-        small = TINY * max(weight, stiffness / cable.length**2)
+        small = TINY * max(self.scene.weight, cast(float, cable.bending_stiffness) / cable.length**2)
         for grasp in self.grasps:
             sizes = np.linalg.norm(grasp.reaction, axis=1)
             if grasp.reaction_error is None or not sizes.any():
@@ -104,8 +102,8 @@ class Prediction:
             size, error = (float(np.median(values[sizes > 0.0])) for values in (sizes, grasp.reaction_error))
             if error > max(UNSURE * size, small):
                 told.append(
-                    f"the force of the gripper at u = {grasp.u:.4g} m is {size:.2g} N, give or take {error:.2g} N, as "
-                    "the median over time: give a smaller target_error where it matters"
+                    f"the force of the gripper at u = {grasp.u:.4g} m is {in_newtons(size)}, give or take "
+                    f"{in_newtons(error)}, as the median over time: give a smaller target_error where it matters"
                 )
         return told
 

@@ -11,6 +11,11 @@ def in_ms(time: float, digits: int = 3) -> str:
     return f"{_short(1e3 * time, digits)} ms"
 
 
+def in_newtons(force: float, digits: int = 2) -> str:
+    """Return a force [N] to so many digits, or to whole newtons: 264 N, not 2.6e+02 N."""
+    return f"{_short(force, digits)} N"
+
+
 def counted(count: int, what: str) -> str:
     """Return how many there are of what is called so in the singular: 1 iteration, 2 iterations."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"

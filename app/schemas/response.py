@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from dlocore import Prediction
+from dlocore.answer.compared import at_times
 from dlocore.answer.parts import ContactForce, GraspReaction, Iteration, Status
 from dlocore.spline import DEGREE
 
@@ -366,8 +367,8 @@ def _grasp_document(grasp: GraspReaction, t: Floats) -> dict[str, Any]:
     """Return what a gripper must give: at the times `t` (k,) [s], and at most."""
     document: dict[str, Any] = {
         "u": grasp.u,
-        "reaction": _at(t, grasp.times, grasp.reaction),
-        "moment": _at(t, grasp.times, grasp.moment),
+        "reaction": at_times(t, grasp.times, grasp.reaction),
+        "moment": at_times(t, grasp.times, grasp.moment),
     }
     for name, errors in (("reaction_error", grasp.reaction_error), ("moment_error", grasp.moment_error)):
         document[name] = None if errors is None else np.interp(t, grasp.times, errors)
@@ -382,12 +383,7 @@ def _contact_document(contact: ContactForce, t: Floats) -> dict[str, Any]:
     """Return how hard the table or an obstacle presses at the times `t` (k,) [s]."""
     return {
         "name": contact.name,
-        "force": _at(t, contact.times, contact.force),
+        "force": at_times(t, contact.times, contact.force),
         "pressed": np.interp(t, contact.times, contact.pressed),
         "force_error": None if contact.force_error is None else np.interp(t, contact.times, contact.force_error),
     }
-
-
-def _at(t: Floats, times: Floats, values: Floats) -> Floats:
-    """Return `values` (k, 3) at `times` (k,), interpolated at `t`; (len(t), 3)."""
-    return np.column_stack([np.interp(t, times, values[:, d]) for d in range(3)])

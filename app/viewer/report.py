@@ -12,7 +12,7 @@ from app.viewer.palette import ColourScale, css_ramp
 from dlocore import EffectReport, Prediction
 from dlocore.accuracy.fallback import errs
 from dlocore.calibration import Measured, front_of
-from dlocore.words import counted, in_mm, in_ms
+from dlocore.words import counted, in_mm, in_ms, in_newtons
 
 _CARD = (
     "margin: 0 0.75rem 0.6rem; padding: 0.55rem 0.7rem; border-radius: 0.5rem; font-size: 0.8rem; line-height: 1.35;"
@@ -130,8 +130,8 @@ def forces_list(prediction: Prediction) -> str:
     for name, times, force, error in given:
         size = np.linalg.norm(force, axis=1)
         k = int(np.argmax(size))
-        known = f" ± {error[k]:.1g}" if error is not None and error[k] > 0.0 else ""
-        rows.append(f"<div>{name}: at most {size[k]:.2g}{known} N, at {times[k]:.2f} s</div>")
+        known = f" ± {in_newtons(error[k], 1)}" if error is not None and error[k] > 0.0 else ""
+        rows.append(f"<div>{name}: at most {in_newtons(size[k])}{known}, at {times[k]:.2f} s</div>")
     return f'<div style="margin: 0.4rem 0.75rem; font-size: 0.78rem; line-height: 1.5;">{"".join(rows)}</div>'
 
 

@@ -32,22 +32,30 @@ def parts_of(lengths: Sequence[int]) -> list[slice]:
     return [slice(int(end) - length, int(end)) for end, length in zip(ends[1:], lengths, strict=True)]
 
 
+def at_times(t: Floats, times: Floats, values: Floats) -> Floats:
+    """Return vectors (m, 3) at times (m,), linear between, at the times `t` (k,); (k, 3)."""
+    return np.column_stack([np.interp(t, times, values[:, d]) for d in range(3)])
+
+
+def apart(own: Series, other: Series) -> Floats | None:
+    """Return the distance (k,) of vectors over time to others, between each same two events, None without the same."""
+    if len(own.parts) != len(other.parts):
+        return None
+    met = [
+        at_times(own.times[here], other.times[there], other.values[there])
+        for here, there in zip(own.parts, other.parts, strict=True)
+    ]
+    return np.asarray(np.linalg.norm(own.values - np.concatenate(met), axis=1))
+
+
 def errors(own: Series, others: Sequence[Series]) -> Floats | None:
     """Return the estimated errors (k,) of vectors over time, None where no other series has as many parts.
 
-    It is _LEFT times the largest distance to another series within a _NEARBYth of the motion, each compared between the
-    same two events (docs/model.md, grids and error estimate).
+    It is _LEFT times the largest distance to another series within a _NEARBYth of the motion (docs/model.md, grids and
+    error estimate).
     """
-    others = [other for other in others if len(other.parts) == len(own.parts)]
-    if not others:
-        return None
-    apart = np.zeros(len(own.times))
-    for other in others:
-        for here, there in zip(own.parts, other.parts, strict=True):
-            t, times, values = own.times[here], other.times[there], other.values[there]
-            met = np.column_stack([np.interp(t, times, values[:, d]) for d in range(3)])
-            apart[here] = np.maximum(apart[here], np.linalg.norm(own.values[here] - met, axis=1))
-    return _LEFT * _largest_nearby(apart)
+    known = [distance for other in others if (distance := apart(own, other)) is not None]
+    return _LEFT * _largest_nearby(np.max(known, axis=0)) if known else None
 
 
 def _largest_nearby(values: Floats) -> Floats:

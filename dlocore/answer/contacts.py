@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from dlocore.answer.compared import Series, errors, parts_of
 from dlocore.answer.parts import ContactForce
 from dlocore.answer.reactions import WindowForces, Windows
+from dlocore.effects.contact import normal_forces
 from dlocore.effects.distance import distances
 from dlocore.effects.laws import CONTACT, COUNT, TABLE
 from dlocore.problem.grid import Grid
@@ -148,9 +149,7 @@ def _pressed(
     normal = np.stack([gaps(now[k, n] + way) + depth for way in _SIDE * width * np.eye(3)], axis=-1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     leaving = np.einsum("nd,nd->n", speed[k, n], normal)
-    soft = np.minimum(depth / width, 1.0)  # of the stiffness
-    elastic = stiffness * np.where(depth < width, 0.5 * depth * soft, depth - 0.5 * width)
-    pressure = np.maximum(elastic - damping * soft * leaving, 0.0) * nodes.w[part][n]
+    pressure = normal_forces(stiffness, width, damping, depth, leaving) * nodes.w[part][n]
     force, pressed = np.zeros((len(at), 3)), np.zeros(len(at))
     np.add.at(force, k, pressure[:, None] * normal)
     np.add.at(pressed, k, pressure)

@@ -50,7 +50,7 @@ def effect_reports(
     tau = surface.twist_rate(u, t)
     mu, EI = cable.linear_density, cast(float, cable.bending_stiffness)
     drag = environment.drag * speed + environment.drag_quadratic * speed**2
-    weight = float(mu * cable.length * np.linalg.norm(cast(Floats, environment.gravity)))
+    weight = problem.scene.weight
     sizes: dict[str, tuple[float, str]] = {
         "inertia": (float(mu * np.trapezoid(acceleration, u, axis=1).max()), "N"),
         "drag": (float(np.trapezoid(drag, u, axis=1).max()), "N"),

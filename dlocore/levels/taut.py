@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from dlocore.kernels.assembly import largest_curvature
 from dlocore.levels.level import Level
 from dlocore.problem.discretisation import axial_strain
-from dlocore.scene.scene import Scene
+from dlocore.words import in_newtons
 
 Floats = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ def taut_notes(level: Level) -> list[str]:
     if not scene.grasps or problem.stretch_memory is not None or motion.reached < 2:
         return []
     most = cast(float, cable.axial_stiffness) * motion.largest_strain
-    if most <= TAUT * (_weight(scene) + cast(float, cable.bending_stiffness) / cable.length**2):
+    if most <= TAUT * (scene.weight + cast(float, cable.bending_stiffness) / cable.length**2):
         return []  # most motions
     at = np.unique(np.linspace(0, motion.reached, _LOOKS).round().astype(int))
     states, times, tables = motion.states[at], motion.times[at], motion.grid.tables
@@ -37,16 +37,11 @@ def taut_notes(level: Level) -> list[str]:
     if not (np.diff(taut) == 1).any():
         return []
     worst = int(tension.argmax())
+    pull, rest = in_newtons(tension[worst]), in_newtons(others)
     return [
-        f"the grippers pull the cable taut: at {times[worst]:.3g} s with {tension[worst]:.2g} N in the mean, where all "
-        f"other forces on it add up to {others:.2g} N: bring them no farther apart than the cable between them reaches"
+        f"the grippers pull the cable taut: at {times[worst]:.3g} s with {pull} in the mean, where all other forces "
+        f"on it add up to {rest}: bring them no farther apart than the cable between them reaches"
     ]
-
-
-def _weight(scene: Scene) -> float:
-    """Return what the cable of a scene weighs [N]."""
-    gravity = float(np.linalg.norm(cast(Floats, scene.environment.gravity)))
-    return scene.cable.linear_density * scene.cable.length * gravity
 
 
 def _others(level: Level, states: Floats, times: Floats) -> float:
@@ -60,4 +55,4 @@ def _others(level: Level, states: Floats, times: Floats) -> float:
     bend = float(largest_curvature(problem.axes, states, grid.tables.curvature, grid.history.memory)) + 1 / cable.length
     loads = sum(float(np.linalg.norm(np.atleast_2d(load.force), axis=1).max()) for load in scene.loads)
     stiff = cast(float, cable.bending_stiffness) * bend**2
-    return _weight(scene) + cable.length * spread + cable.linear_density * speed**2 + stiff + loads
+    return scene.weight + cable.length * spread + cable.linear_density * speed**2 + stiff + loads

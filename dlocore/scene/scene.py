@@ -446,6 +446,12 @@ class Scene:
                 field = f"primitives[{i}].path.{name}"
                 raise SceneError(field, f"a way of {far:g} m", f"at most {most:g} [m] for this cable", MILLIMETRES)
 
+    @property
+    def weight(self) -> float:
+        """What the cable weighs [N]."""
+        gravity = float(np.linalg.norm(cast(Floats, self.environment.gravity)))
+        return self.cable.linear_density * self.cable.length * gravity
+
     def _check_horizon(self) -> None:
         if self.horizon is not None:
             object.__setattr__(self, "horizon", number("horizon", self.horizon, above=1e-4, at_most=1e4, unit="s"))

@@ -26,6 +26,7 @@ from dlocore import (
     Table,
     predict,
 )
+from dlocore.effects.contact import normal_force, normal_forces
 
 G = 9.81  # [m/s^2]
 CABLE = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-3)
@@ -210,3 +211,12 @@ def test_the_reference_and_a_cable_that_nothing_touches_have_none() -> None:
     free = Scene(cable=CABLE, shape=Straight(), grasps=[side], environment=Environment(drag=0.1, gravity=(0, 0, 0)))
     assert predict(free).contacts == ()
     assert predict(replace(free, quality=Quality(method="reference", target_error=0.02))).contacts == ()
+
+
+def test_the_law_of_nodes_that_touch_at_once_is_that_of_one() -> None:
+    random = np.random.default_rng(1)
+    k, w, c = 6e4, 2.5e-5, 110.0
+    depth, leaving = random.uniform(0.0, 3.0 * w, 50), random.uniform(-0.02, 0.02, 50)
+    alone = [normal_force.py_func(k, w, c, d, v)[0] for d, v in zip(depth, leaving, strict=True)]
+    assert min(alone) == 0.0 < max(alone)
+    np.testing.assert_allclose(normal_forces(k, w, c, depth, leaving), alone, rtol=1e-12)
