@@ -5,7 +5,7 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from dlocore.errors import SceneError
 from dlocore.identify.identification import Estimated, Fit, Identification
@@ -54,7 +54,7 @@ def assess(search: Search, state: State, seconds: float) -> Identification:
     pull, unrefined = _refined(search, state, w / deviation**2)
     refined = inverse @ pull
     variance = np.maximum(plain, np.diag(clustered)) + np.diag(shaken) + refined**2
-    quantile = float(student.ppf(0.975, max(len(blocks) - len(x), 2)))
+    quantile = float(stdtrit(max(len(blocks) - len(x), 2), 0.975))
     share = np.array([_information(D, residual, deviation) for D, residual in
                       zip(derivatives, state.residuals, strict=True)])  # fmt: skip
     parts = share / np.maximum(share.sum(axis=0), 1e-300)
