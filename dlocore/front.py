@@ -307,7 +307,7 @@ def _answer(
         said=outcome.message,
         surface=surface,
         report_grasps=partial(_reactions, level, find_once, judged),
-        report_contacts=partial(_contacts, level, find_once, judged),
+        report_contacts=partial(_contacts, level, find_once, judged, find_forces is None),
         report_effects=partial(effect_reports, problem, partial(_material, problem, level), stretch),
         report_material=partial(_material, problem, level),
         report_stretch=stretch,
@@ -342,9 +342,11 @@ def _reactions(level: Level, find_forces: FindForces, judged: Prediction | None)
     return with_reaction_errors(found, windows, _beside(level))
 
 
-def _contacts(level: Level, find_forces: FindForces, judged: Prediction | None) -> tuple[ContactForce, ...]:
+def _contacts(
+    level: Level, find_forces: FindForces, judged: Prediction | None, marched: bool
+) -> tuple[ContactForce, ...]:
     windows = find_forces()
-    found = contact_forces(level.problem, level.motion.grid, windows)
+    found = contact_forces(level.problem, level.motion.grid, windows, marched)
     if judged is not None:
         return contacts_taken_on(found, judged.contacts)
     return with_contact_errors(found, windows, _beside(level))

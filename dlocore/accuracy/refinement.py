@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from dlocore.accuracy.budget import Means, first_level
-from dlocore.accuracy.changes import DIRECTIONS, MISSED_COUNTS, Changes, weighed
+from dlocore.accuracy.changes import DIRECTIONS, MISSED_COUNTS, MORE, Changes, refined, weighed
 from dlocore.accuracy.cost import Cost
 from dlocore.answer.parts import Status
 from dlocore.errors import SceneError
@@ -76,7 +76,7 @@ class _Climb:
         target: error that is aimed at [m].
         enough: estimated error that is success where no finer grid is left [m].
         number: of the grids that refine space and time together, this one included.
-        direction: in which the grid at hand is finer than the best one: "both", "space" or "time".
+        direction: in which the grid at hand is meant to be finer than the best one: "both", "space" or "time".
         best: the finest march so far that is to be believed.
         changes: how far refinements moved the surface.
         estimate: error of the best one [m].
@@ -197,7 +197,7 @@ class _Climb:
         )
         if before is not None and level.posed is self.problem:
             change = distance(before, level, self.problem)
-            beside = (before.alone, *(() if self.direction == "both" else before.beside[:1]))
+            beside = (before.alone, *(() if self._refined(level, before) == "both" else before.beside[:1]))
             level = replace(level, change=change, turned=turned(before, level, self.problem), beside=beside)
             if not self._is_rough(level):  # so strands do not meet because of the grid
                 level = march_level(self.problem, size, self.monitor, rho, free_knots=True, known=level, whole=True)
@@ -205,6 +205,13 @@ class _Climb:
             self._forget()  # another motion
         self.problem = level.posed  # a rough grid may have needed contact that is too stiff for a fine one
         return level
+
+    def _refined(self, level: Level, best: Level) -> str:
+        """Return in which direction a grid is finer than the best one, as it turned out.
+
+        Where one had to have more control points than were meant, so as to be believed, the next may have no more.
+        """
+        return refined(level, best) if self.direction == "both" else self.direction
 
     def _forget(self) -> None:
         """Forget the grids before."""
@@ -228,7 +235,7 @@ class _Climb:
         if best.motion.stopped:  # its surface stands still from there on: how far that is from another tells nothing
             self.changes, self.estimate = Changes(), np.inf
             return
-        self.changes.note(self.direction, level, best)
+        self.changes.note(self._refined(level, best), level, best)
         self.estimate = self.changes.estimate(level)
         rough = self._is_rough(level)
         if self.number < len(LEVELS) or (rough and self.problem.self_contact is not None):
@@ -274,9 +281,11 @@ class _Climb:
     def _next(self, level: Level, size: Size, unfolds: Size | None) -> Size | None:
         """Return the next size, None where no finer grid is worth its time; `unfolds` is for a motion that folds."""
         self.number += 1
-        if self.number < len(LEVELS):
-            finer = stretched(self.problem, self.number)  # more may have been needed
-            return finer._replace(n_u=max(finer.n_u, size.n_u), steps=max(finer.steps, size.steps))
+        while self.number < len(LEVELS):
+            finer = stretched(self.problem, self.number)
+            if finer.n_u > MORE * size.n_u or finer.steps > MORE * size.steps:  # more may have been needed
+                return finer._replace(n_u=max(finer.n_u, size.n_u), steps=max(finer.steps, size.steps))
+            self.number += 1
         if unfolds is not None:
             self.direction = "space"
             if "both" in self.changes.last:  # of space, grids that agree on a fold tell nothing

@@ -13,6 +13,7 @@ from dlocore.answer.reactions import WindowForces, Windows
 from dlocore.effects.contact import normal_forces
 from dlocore.effects.distance import distances
 from dlocore.effects.laws import CONTACT, COUNT, TABLE
+from dlocore.kernels.entry import remember_start
 from dlocore.problem.grid import Grid
 from dlocore.problem.problem import Problem
 from dlocore.scene.scene import Scene
@@ -27,11 +28,12 @@ _LONGER = 1.1  # times as long as it is the cable may be strained
 _SIDE = 0.01  # of the depth at which contact is as stiff as it gets: way by which a normal is found
 
 
-def contact_forces(problem: Problem, grid: Grid, windows: Windows) -> tuple[ContactForce, ...]:
+def contact_forces(problem: Problem, grid: Grid, windows: Windows, marched: bool = True) -> tuple[ContactForce, ...]:
     """Return the forces of the table and of every obstacle that was simulated on the cable, without friction.
 
     They are the sums of N n ds over the nodes of contact, with N of docs/model.md eq. 21, and the speed of a node over
     the step that ends with a state. A cable that is solved in the plane of the table is carried by it, whatever moves.
+    Where the states are those of a least squares, not `marched`, all nodes act.
     """
     kept = _kept([len(window.times) for window in windows])
     times = np.concatenate([window.times[at] for window, at in zip(windows, kept, strict=True)])
@@ -41,7 +43,7 @@ def contact_forces(problem: Problem, grid: Grid, windows: Windows) -> tuple[Cont
         found.append(ContactForce("table", times, np.tile(carried, (len(times), 1)), np.full(len(times), carried[2])))
     if problem.contact is None:
         return tuple(found)
-    nodes = grid.tables.contact
+    nodes, weigh = grid.tables.contact, _acting if marched else _all
     met = [] if nodes.table_nodes == 0 else [("table", slice(0, nodes.table_nodes), TABLE)]
     numbered = enumerate(problem.scene.environment.obstacles)  # of which those that are simulated are some, in order
     for i, obstacle in enumerate(problem.obstacles):
@@ -50,7 +52,7 @@ def contact_forces(problem: Problem, grid: Grid, windows: Windows) -> tuple[Cont
     for name, part, row in met:
         forces, pressed = zip(
             *[
-                _pressed(problem, grid, window, some, part, row)
+                _pressed(problem, grid, window, some, part, row, weigh(problem, grid, window, some)[:, part])
                 for window, at in zip(windows, kept, strict=True)
                 for some in np.array_split(at, -(-len(at) * (part.stop - part.start) // _AT_ONCE))
             ],
@@ -109,8 +111,29 @@ def _weight_on_table(scene: Scene) -> float:
     return scene.cable.linear_density * scene.cable.length * abs(float(cast(Floats, scene.environment.gravity)[2]))
 
 
+def _all(problem: Problem, grid: Grid, window: WindowForces, at: Indices) -> Floats:
+    """Return the weights (k, nodes) [m] of nodes that all act, as they do where no march is."""
+    w = grid.tables.contact.w
+    return np.broadcast_to(w, (len(at), len(w)))
+
+
+def _acting(problem: Problem, grid: Grid, window: WindowForces, at: Indices) -> Floats:
+    """Return the weights (k, nodes) [m] that nodes have in the steps that end with some states of a march.
+
+    One of a cell may stand for all of it, as the cable lay at the beginning of the step.
+    """
+    nodes = grid.tables.contact
+    if nodes.cell == 1:
+        return _all(problem, grid, window, at)
+    history, weights = grid.past(), np.empty((len(at), len(nodes.w)))
+    for k, before in enumerate(np.maximum(at - 1, 0)):
+        remember_start(problem.axes, window.states[before], grid.tables, *problem.laws, history)
+        weights[k] = history.pressing
+    return weights
+
+
 def _pressed(
-    problem: Problem, grid: Grid, window: WindowForces, at: Indices, part: slice, row: int
+    problem: Problem, grid: Grid, window: WindowForces, at: Indices, part: slice, row: int, weights: Floats
 ) -> tuple[Floats, Floats]:
     """Return the force (k, 3) [N] of one thing on some nodes, in the world, and the sum of its sizes (k,) [N].
 
@@ -121,6 +144,7 @@ def _pressed(
         at: (k,) of them.
         part: the nodes that may meet it.
         row: of the parameters of the laws that are its.
+        weights: (k, of the part) [m] of the nodes.
     """
     nodes, parameters, d = grid.tables.contact, problem.laws[1], min(3, problem.nc)
     radius, stiffness, width, damping = parameters[CONTACT, :4]
@@ -149,7 +173,7 @@ def _pressed(
     normal = np.stack([gaps(now[k, n] + way) + depth for way in _SIDE * width * np.eye(3)], axis=-1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     leaving = np.einsum("nd,nd->n", speed[k, n], normal)
-    pressure = normal_forces(stiffness, width, damping, depth, leaving) * nodes.w[part][n]
+    pressure = normal_forces(stiffness, width, damping, depth, leaving) * weights[k, n]
     force, pressed = np.zeros((len(at), 3)), np.zeros(len(at))
     np.add.at(force, k, pressure[:, None] * normal)
     np.add.at(pressed, k, pressure)

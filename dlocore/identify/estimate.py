@@ -29,6 +29,10 @@ _COARSE = 13  # control points that they are replayed with at most
 _STIFFNESSES = 0.1, 0.3, 3.0, 10.0  # times the given one, that are tried first
 _BEGINNING = 4  # iterations on them
 _DENSITY = 0.04  # [kg/m] of a cable whose recordings tell none
+_UNTWISTED = (
+    "Replayed without twist, which damping between two clamps makes too stiff if it is strong: look at what comes of "
+    "torsional_stiffness as one more parameter."
+)
 
 
 def identify(
@@ -80,13 +84,28 @@ def identify(
     if len(markers) > 1 and any(p.name.startswith("marker_offsets") for p in chosen):
         raise SceneError("recordings", f"{markers} markers", "recordings of the same markers, for marker_offsets")
     candidate = prepared(given, tuple(p.name for p in chosen), clamps, markers[-1])
+    _check_clamps(windows, chosen, candidate)
     if start is None:
         candidate = _begun(recordings, candidate, chosen, resolution, cancelled)
     search = Search(windows, chosen, resolution, cancelled)
     state = search.run(candidate, iterations, on_progress)
     found = assess(search, state, perf_counter() - began)
     told = _assumed(recordings, given, names, cable is None and start is None, environment is None and start is None)
+    if clamps > 1 and "bending_damping" in names and not candidate.twist:
+        told.append(_UNTWISTED)
     return replace(found, message=" ".join([found.message, *told]))
+
+
+def _check_clamps(recordings: Sequence[Recording], chosen: Sequence[Parameter], candidate: Candidate) -> None:
+    """Refuse what needs to know how the sections lie where a recording has no clamp, which alone shows that."""
+    turning = ("torsional_stiffness", "turn", "yield_strain", "rest_curvature", "marker_offsets")
+    sought = {p.name.partition("[")[0] for p in chosen}
+    needing = [name for name in turning if name in sought] or (["a cable that yields"] if candidate.twist else [])
+    for recording in recordings:
+        if needing and not any(h.towards is not None for h in recording.holds):
+            reason = f"Without one nothing shows how the sections lie, which {needing[0]} needs"
+            allowed = "recordings in which a gripper holds two neighbouring markers, as a clamp"
+            raise SceneError("recordings", f"{recording.name!r} without a clamp", allowed, reason)
 
 
 def _assumed(

@@ -293,8 +293,6 @@ class Replay:
     @cached_property
     def _directors(self) -> Floats:
         """Direction (steps + 1, 3) across the first clamp that turns with it."""
-        if not self.clamps:
-            raise SceneError("parameters", "marker_offsets", "a recording with a clamp", "No frame is known without")
         directions = cast(Floats, self.paths[self.holds.index(self.clamps[0])].directions)
         return np.asarray(turned_from(self.references[0], directions).apply(across(self.references[0])))
 

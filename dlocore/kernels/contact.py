@@ -28,6 +28,7 @@ _SLACK = 0.9  # of the distance that is skipped: a strained cable is longer
 _THROUGH = 0.5  # of the way to the middle of an obstacle: a node that was deeper on its way went through it
 _LEAVES = 0.05  # of it: by so much it has to have come out again
 _INSIDE = 2.0  # lengths of a cell: so far from an edge, at least, one node stands for those of a cell
+_TILT = 0.04  # of the radius: deeper than the middle of a cell, at most, may its ends be
 _PASSED = 2.0  # times as far as it slides are the nodes from a node that were where it comes to, at most
 _SEARCH = 24  # times that the deepest place of such a way is looked for, each in two thirds of the last part
 
@@ -304,6 +305,22 @@ def _drag(p: Any, stick: Any, n: int, x: Vector, depth: float, normal: Vector) -
         stick[n, d] = x[d] - kept * s[d]
 
 
+@law
+def _lies_along(nc: int, q: Any, nodes: Any, p: Any, n: int, cell: int, gap: float) -> bool:
+    """Tell whether the ends of the cell of nodes from n on come hardly nearer to anything than its middle at `gap` [m].
+
+    Where the cable stands on a face with its end, or is bent around, the middle tells nothing of what touches.
+    """
+    least = gap - _TILT * p[CONTACT, 0]
+    for m in (n, n + cell - 1):
+        x = _point(nc, q, nodes.first[m], row_of(nodes.b0, m))
+        begin, end = _met_at(nodes, p, m)
+        for i in range(begin, end):
+            if _gap(p, i, x)[0] < least:
+                return False
+    return True
+
+
 @leaf
 def remember(nc: int, q: Any, nodes: Any, p: Any, stick: Any, pressing: Any, loose: bool) -> float:
     """Drag the anchors of the friction behind q, note where few nodes will do, and return the largest depth [m].
@@ -325,6 +342,7 @@ def remember(nc: int, q: Any, nodes: Any, p: Any, stick: Any, pressing: Any, loo
             near = 0.5 * _INSIDE * long
             nearest, depth, normal, inside = _met(nodes, p, middle, x, near)
             few = nearest < near and inside > _INSIDE * long
+            few = few and _lies_along(nc, q, nodes, p, n, cell, nearest)
             if few:
                 deepest = max(deepest, -nearest)
                 _drag(p, stick, middle, x, 0.0 if loose else depth, normal)

@@ -25,7 +25,7 @@ from dlocore.problem.problem import Problem
 from dlocore.scene.paths import Waypoints
 from dlocore.scene.scene import Material, Points
 from dlocore.shape.shape import SplineCurve, fit_to_knots, spin_to_knots, start_curve, velocity_to_knots
-from dlocore.spline import spline_at
+from dlocore.spline import DEGREE, spline_at
 
 Floats = NDArray[np.float64]
 
@@ -90,7 +90,7 @@ def grid_on(problem: Problem, knots: Floats) -> Grid:
 
 def _tables_of(problem: Problem, knots: Floats) -> Tables:
     rules = (*GAUSS_2, *GAUSS_3, *GAUSS_4)
-    nodes = problem.table_spacing(), problem.contact_spacing(), problem.contact_cell()
+    nodes = problem.table_spacing(len(knots) - DEGREE - 1), problem.contact_spacing(), problem.contact_cell()
     return cast(Tables, build_tables(knots, *free_ends(problem.scene), *rules, *nodes, problem.strand_spacing()))
 
 

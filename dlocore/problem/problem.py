@@ -35,6 +35,7 @@ from dlocore.problem.selection import Choice, choose, reached
 from dlocore.scene.obstacles import Box, Cylinder, Obstacle
 from dlocore.scene.scene import Scene
 from dlocore.shape.shape import StartCurve, start_curve
+from dlocore.spline import DEGREE
 
 Floats = NDArray[np.float64]
 
@@ -44,7 +45,7 @@ _SAG = 0.005  # of the diameter: by how much a cable comes nearer to something r
 _SEGMENTS = 800  # of the cable that its contact with itself looks at, where they are shorter than it is thick
 _STIFFENING = 10.0  # times that contact is made stiffer at once, at most
 _EDGES = 16.0  # of them on a diameter, where obstacles have edges
-_ON_TABLE = 64.0  # of them on the cable, for a table
+_ON_TABLE, _OF_SPAN = 64.0, 4.0  # of them on the cable at least, and on a span of its spline, for a table
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,15 +239,16 @@ class Problem:
             parameters[laws.TABLE, 0] += self.contact.depth_under(max(0.0, -float(self.weight()[2])))
         return active, parameters
 
-    def table_spacing(self) -> float:
-        """Return how close the nodes of contact with the table lie [m]: there is nothing to fall between.
+    def table_spacing(self, n_u: int) -> float:
+        """Return how close the nodes of contact with the table lie for `n_u` control points [m].
 
-        With twist beside obstacles they are as close as those for obstacles: how evenly a bent cable is borne decides
-        on when its sections turn over (scene 102:21).
+        There is nothing to fall between, but where a cable strikes the table and unrolls on it each node comes down by
+        itself, which takes the more energy the farther they are apart. With twist beside obstacles they are as close as
+        those for obstacles: how evenly a bent cable is borne decides on when its sections turn over (scene 102:21).
         """
         if self.contact is None or self.table is None:
             return np.inf
-        apart = self.scene.cable.length / _ON_TABLE
+        apart = self.scene.cable.length / max(_ON_TABLE, _OF_SPAN * (n_u - DEGREE))
         return apart if self.twist is None else min(apart, self.contact_spacing())
 
     def contact_spacing(self) -> float:

@@ -437,7 +437,7 @@ class _Walk:
 
 def chunk_of(problem: Problem, grid: Grid) -> int:
     """Return how many steps on a grid are taken between looks at the clock."""
-    spacings = problem.table_spacing(), problem.contact_spacing(), problem.strand_spacing()
+    spacings = problem.table_spacing(grid.n_u), problem.contact_spacing(), problem.strand_spacing()
     nodes = problem.scene.cable.length * sum(1.0 / spacing for spacing in spacings)
     return min(CHUNK, max(1, int(_WORK / (grid.n_u * problem.nc**2 + _NODE * nodes))))
 

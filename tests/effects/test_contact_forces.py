@@ -220,3 +220,29 @@ def test_the_law_of_nodes_that_touch_at_once_is_that_of_one() -> None:
     alone = [normal_force.py_func(k, w, c, d, v)[0] for d, v in zip(depth, leaving, strict=True)]
     assert min(alone) == 0.0 < max(alone)
     np.testing.assert_allclose(normal_forces(k, w, c, depth, leaving), alone, rtol=1e-12)
+
+
+def test_a_wall_presses_on_the_end_that_is_pushed_against_it_as_the_gripper_does() -> None:
+    # the force was 250 times too large, the tip a fifth of D inside, and no error told of it
+    length, across = 0.3, np.sqrt(0.5)
+    tip = length * across
+    push = Grasp(u=0.0, hold="tangent", path=Move(displacement=(0.04, 0.0, 0.0), duration=1.0))
+    cable = Cable(length=length, diameter=0.005, linear_density=0.04, bending_stiffness=5e-3, bending_damping=2e-4)
+    found = predict(
+        Scene(
+            cable=cable,
+            shape=Straight(direction=(across, across, 0.0)),
+            grasps=(push,),
+            environment=Environment(
+                drag=0.05, table=Table(), obstacles=(Box(center=(tip + 0.0535, 0.0, 0.0), size=(0.1, 2.0, 0.2)),)
+            ),
+            horizon=1.5,
+            quality=Quality(target_error=3e-4),
+        )
+    )
+    assert found.status == "converged"
+    reached = found.surface([length], [1.5])[0, 0, 0]
+    assert reached == pytest.approx(tip + 0.0535 - 0.05 - 0.0025, abs=0.03 * 0.005)
+    held, wall = found.grasps[0], found.contacts[-1]
+    assert wall.force[-1, 0] == pytest.approx(-held.reaction[-1, 0], rel=0.02)
+    assert wall.force[-1, 1] == pytest.approx(0.0, abs=1e-3)

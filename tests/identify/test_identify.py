@@ -340,6 +340,18 @@ def test_offsets_of_markers_need_the_same_markers_in_every_recording() -> None:
         identify([seen, fewer], names=("marker_offsets",))
 
 
+@pytest.mark.parametrize(
+    "name", ["torsional_stiffness", "turn", "yield_strain", "rest_curvature", "marker_offsets", "a cable that yields"]
+)
+def test_what_needs_to_know_how_the_sections_lie_needs_a_clamp(name: str) -> None:
+    names = ("drag",) if name.startswith("a cable") else ("drag", name)
+    yields: Any = {"yield_strain": 0.02, "memory_rate": 100.0}
+    guess = Cable(length=0.5, diameter=5e-3, linear_density=0.05, bending_stiffness=1e-3, **yields)
+    with pytest.raises(SceneError, match=f"^recordings: got 'still' without a clamp.*which {name} needs") as told:
+        identify([still()], guess if len(names) == 1 else None, names=names)
+    assert "two neighbouring markers" in str(told.value)
+
+
 def test_a_cable_that_yields_gives_back_its_yield_strain() -> None:
     recording = simulated(21, 1.5, cable=CABLE, environment=DRAG)
     replay = Replay(recording, Resolution(n_u=9))
