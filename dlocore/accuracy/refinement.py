@@ -287,6 +287,10 @@ class _Climb:
                 return finer._replace(n_u=max(finer.n_u, size.n_u), steps=max(finer.steps, size.steps))
             self.number += 1
         if unfolds is not None:
+            longer = self._affordable(_finer(size, "time", False))
+            if longer is not None and self.changes.worst() == "time" and "space" in self.changes.last:
+                self.direction = "time"  # grids that had to have more points than were meant tell nothing of it
+                return longer
             self.direction = "space"
             if "both" in self.changes.last:  # of space, grids that agree on a fold tell nothing
                 self.changes.last.setdefault("time", self.changes.last["both"])
