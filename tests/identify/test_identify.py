@@ -340,6 +340,14 @@ def test_offsets_of_markers_need_the_same_markers_in_every_recording() -> None:
         identify([seen, fewer], names=("marker_offsets",))
 
 
+@pytest.mark.parametrize(("names", "told"), [(("bending_damping",), True), (("bending_damping", "turn"), False)])
+def test_damping_between_two_clamps_that_is_sought_without_twist_is_told_of(names: tuple[str, ...], told: bool) -> None:
+    recording = simulated(3, 1.0, cable=CABLE, environment=DRAG)
+    assert sum(h.towards is not None for h in recording.holds) == 2
+    found = identify([recording], CABLE, DRAG, names=names, iterations=1)
+    assert ("Replayed without twist" in found.message) is told
+
+
 @pytest.mark.parametrize(
     "name", ["torsional_stiffness", "turn", "yield_strain", "rest_curvature", "marker_offsets", "a cable that yields"]
 )
