@@ -20,10 +20,11 @@ from dlocore.levels.level import (
     turned,
 )
 from dlocore.levels.progress import record_level
+from dlocore.levels.review import turns_unsurely
 from dlocore.levels.whole_march import Outcome, is_folded, is_uneven, march_level, march_status
 from dlocore.problem.problem import Problem
 from dlocore.scene.scene import AUTO_TARGET, Quality
-from dlocore.solvers.march import RHO, STRONGLY_DAMPED
+from dlocore.solvers.march import RHO, STRONGLY_DAMPED, march
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.stability.determined import DOUBTFUL, UNDETERMINED, UNSEEN, bend_in_words, goes_astray, in_words
 from dlocore.statics.statics import RESTLESS, settles_elsewhere
@@ -330,7 +331,12 @@ class _Climb:
         """
         monitor = self.monitor.within(self.means.left) if self._timed else self.monitor
         try:
-            moved = goes_astray(level.problem, level.motion, monitor, self.number >= len(LEVELS))
+            hard = self.number >= len(LEVELS)
+            moved = goes_astray(level.problem, level.motion, monitor, hard)
+            if moved > 0.0 and turns_unsurely(level):  # coarse steps damp what turns sections over, and how it grows
+                steps, rho = 2 * level.motion.asked, level.motion.rho
+                slower = march(level.problem, level.motion.grid, steps, monitor, rho=rho, whole=True)
+                moved = max(moved, goes_astray(level.problem, slower, monitor, hard))
             moved = max(moved, settles_elsewhere(level.problem, level.motion.grid, monitor))
             self.unseen = False
         except TimeIsUp:

@@ -173,13 +173,17 @@ def _undetermined(level: Level) -> list[str]:
     return [f"on this grid {in_words(problem, moved)}"] if moved > UNDETERMINED * problem.scene.cable.length else []
 
 
-def _twisted(level: Level) -> list[str]:
-    """Return what is told of a motion whose twist two grids do not agree on, which no distance between them shows."""
+def turns_unsurely(level: Level) -> bool:
+    """Tell whether two grids do not agree on the angles of the sections, which no distance between them shows."""
     if level.turned <= TURNED:
-        return []
+        return False
     twist = level.problem.twist
     assert twist is not None
-    if level.turned <= OF_TURN * float(np.abs(level.samples[..., 3]).max()) / twist.radius:
+    return level.turned > OF_TURN * float(np.abs(level.samples[..., 3]).max()) / twist.radius
+
+
+def _twisted(level: Level) -> list[str]:
+    if not turns_unsurely(level):
         return []
     return [
         "the angle of its sections, and the torque with it, is not as sure as its positions, as two grids differ by up "

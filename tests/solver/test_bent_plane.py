@@ -251,9 +251,11 @@ def test_scene_40_148_lifts_off_the_table_as_it_snaps_through():
     # the reference, asked for 0.5 % of the length: its rods of 42 and 84 elements agree to 0.7 mm, lift by 4.78 mm, and
     # end up to 9.7 mm elsewhere where they are bent by a millionth of the length
     assert found.surface.positions(u, t)[..., 2].max() == pytest.approx(4.78e-3, rel=0.1)
-    level = march_level(cast(Level, found.level).posed, Size(41, 100, 1280), Monitor(), free_knots=True)
-    moved = goes_astray(level.problem, level.motion, Monitor(), True)
-    assert moved == pytest.approx(9.7e-3, rel=0.1)
+    # in the 640 steps on which grids agree that does not show, but their sections lie 1.3 rad apart
+    assert found.status == "stalled"
+    assert found.accuracy.error_parts["start"] == pytest.approx(9.7e-3, rel=0.1)
+    coarse = march_level(cast(Level, found.level).posed, Size(41, 100, 640), Monitor(), free_knots=True)
+    assert 0.0 < goes_astray(coarse.problem, coarse.motion, Monitor(), True) < 1e-3
 
 
 def test_a_loop_on_a_table_whose_sections_turn_over_lies_over_itself_as_before():
