@@ -290,7 +290,8 @@ class _Climb:
         if unfolds is not None:
             longer = self._affordable(_finer(size, "time", False))
             if longer is not None and self.changes.worst() == "time" and "space" in self.changes.last:
-                self.direction = "time"  # grids that had to have more points than were meant tell nothing of it
+                # where grids had to have more points than were meant, what steps err by is not known, or is more
+                self.direction = "time"
                 return longer
             self.direction = "space"
             if "both" in self.changes.last:  # of space, grids that agree on a fold tell nothing

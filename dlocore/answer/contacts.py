@@ -44,6 +44,7 @@ def contact_forces(problem: Problem, grid: Grid, windows: Windows, marched: bool
     if problem.contact is None:
         return tuple(found)
     nodes, weigh = grid.tables.contact, _acting if marched else _all
+    weights = [weigh(problem, grid, window, at) for window, at in zip(windows, kept, strict=True)]
     met = [] if nodes.table_nodes == 0 else [("table", slice(0, nodes.table_nodes), TABLE)]
     numbered = enumerate(problem.scene.environment.obstacles)  # of which those that are simulated are some, in order
     for i, obstacle in enumerate(problem.obstacles):
@@ -52,9 +53,9 @@ def contact_forces(problem: Problem, grid: Grid, windows: Windows, marched: bool
     for name, part, row in met:
         forces, pressed = zip(
             *[
-                _pressed(problem, grid, window, some, part, row, weigh(problem, grid, window, some)[:, part])
-                for window, at in zip(windows, kept, strict=True)
-                for some in np.array_split(at, -(-len(at) * (part.stop - part.start) // _AT_ONCE))
+                _pressed(problem, grid, window, at[some], part, row, of_nodes[some, part])
+                for window, at, of_nodes in zip(windows, kept, weights, strict=True)
+                for some in np.array_split(np.arange(len(at)), -(-len(at) * (part.stop - part.start) // _AT_ONCE))
             ],
             strict=True,
         )

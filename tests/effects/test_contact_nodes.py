@@ -87,7 +87,7 @@ def test_a_table_has_nodes_of_its_own_however_fine_those_for_obstacles_are() -> 
 
 def test_a_cell_that_the_cable_stands_on_with_its_end_has_all_its_nodes() -> None:
     # its middle is above the face where its end is in it: a tip went 22 % of D into a wall, unseen
-    down = Straight(start=(0.5, 0.0, D), direction=(np.sqrt(0.5), 0.0, np.sqrt(0.5)))
+    down = Straight(start=(0.5, 0.0, 0.2 * D), direction=(np.sqrt(0.5), 0.0, np.sqrt(0.5)))
     cable = Cable(length=0.1, diameter=D, linear_density=0.05, bending_stiffness=1e-3)
     scene = Scene(
         cable=cable, shape=down, grasps=(Grasp(u=0.1),), environment=Environment(obstacles=(block(2.0),)),
