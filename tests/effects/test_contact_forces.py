@@ -246,3 +246,16 @@ def test_a_wall_presses_on_the_end_that_is_pushed_against_it_as_the_gripper_does
     held, wall = found.grasps[0], found.contacts[-1]
     assert wall.force[-1, 0] == pytest.approx(-held.reaction[-1, 0], rel=0.02)
     assert wall.force[-1, 1] == pytest.approx(0.0, abs=1e-3)
+
+
+def test_the_top_of_a_box_presses_with_the_nodes_that_the_march_had() -> None:
+    # where one node stood for a diameter of them, all of them together bear a thousandth more than the weight
+    block = Box(center=(0.5, 0.0, -0.1), size=(2.0, 1.0, 0.2), friction=0.0)
+    lifted = Scene(
+        cable=replace(CABLE, bending_damping=2e-5),
+        shape=Straight(start=(0.0, 0.0, 0.0025)),
+        grasps=(Grasp(u=0.5, path=Move(displacement=(0.0, 0.0, 0.05), duration=1.0)),),
+        environment=Environment(drag=0.3, obstacles=(block,)),
+        horizon=3.0,
+    )
+    np.testing.assert_allclose(at_end(predict(lifted)), [0.0, 0.0, WEIGHT], atol=1e-5 * WEIGHT)
