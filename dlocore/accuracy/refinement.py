@@ -36,6 +36,8 @@ _FINER = {"space": 1.5, "time": 2.0}
 _FINE_IN_TIME = 0.3  # of the target: a time spline that misses its march by less keeps its knots as the steps halve
 _AT_BEST = 0.2  # of an error, is left by one refinement: what is still too much after all of them is not begun
 _EVENED = 3  # refinements in space, at most, of a grid that agrees with the one before on strain within a span
+_TEARS = 0.5  # axial strain that no finer grid is expected to take back, where ...
+_TORN = 3  # ... so many in a row have it
 _FAILURES = 2  # refinements in time of a march that found no equilibrium
 
 
@@ -46,11 +48,12 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
     them: a cable that is let go vibrates faster than it is curved, a loop that tightens is curved more than it is fast.
     So from there on each grid is finer in one direction, that whose last refinement moved the surface most, and the
     error is the sum of both. A cable that folds between its control points gets more of them, whatever grids agree on.
-    The error is at least what the time spline misses of its march: a cable that trembles faster than
-    two grids can show looks alike on both. A motion that its scene does not determine is none to agree on: where two
-    grids say so in turn that is the answer. A march that finds no equilibrium is tried with more steps before it is
-    given up. Within a time budget the first grid is the one that what solves cost on this machine allows. Who gives a
-    time, as a budget or a deadline, is given more grids within it than who doesn't, who would wait for minutes.
+    The error is at least what the time spline misses of its march: a cable that trembles faster than two grids can show
+    looks alike on both. A motion that its scene does not determine is none to agree on: where two grids say so in turn
+    that is the answer. A march that finds no equilibrium is tried with more steps before it is given up, and one whose
+    motion tears the cable on grid after grid ends there. Within a time budget the first grid is the one that what
+    solves cost on this machine allows. Who gives a time, as a budget or a deadline, is given more grids within it than
+    who doesn't, who would wait for minutes.
 
     A target that was asked for has to be met. Quality "auto" aims at AUTO_TARGET with a share of that work, and where
     it reaches no closer with it, an estimate of AUTO_ENOUGH is success, for which it does all of the work that a target
@@ -86,6 +89,7 @@ class _Climb:
         astray: how far a start that is hardly another goes elsewhere, as the last grid that agreed has it [m], 0 where
             that does not matter.
         unseen: whether no time was left to see how far it goes.
+        torn: marches in a row that strained the cable by more than `_TEARS`.
         evened: how often more control points were taken as the cable was strained between the points that watch it.
         wanting: effects that a finer grid called for, and that no time was left to march with, in words.
     """
@@ -103,6 +107,7 @@ class _Climb:
     failures: int = 0
     astray: float = 0.0
     unseen: bool = False
+    torn: int = 0
     evened: int = 0
     wanting: str = ""
 
@@ -158,6 +163,9 @@ class _Climb:
             status, message = march_status(self.problem, level)
             if level.motion.stopped == "time" or self.failures > len(LEVELS):
                 return Outcome(level, status, message, None)
+            self.torn = self.torn + 1 if level.motion.largest_strain > _TEARS else 0
+            if self.torn == _TORN:
+                return Outcome(level, status, message, self.changes.parts(level))
             agrees = self.estimate <= ACCEPT * self.target and not self._timed
             uneven = agrees and is_uneven(level) and self.evened < _EVENED
             self.evened += uneven
@@ -217,7 +225,7 @@ class _Climb:
     def _forget(self) -> None:
         """Forget the grids before."""
         self.best, self.changes, self.estimate, self.evened = None, Changes(), np.inf, 0
-        self.astray, self.unseen = 0.0, False
+        self.astray, self.unseen, self.torn = 0.0, False, 0
 
     def _is_rough(self, level: Level) -> bool:
         return not level.change <= ROUGH * self.problem.scene.cable.length
