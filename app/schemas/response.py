@@ -132,8 +132,8 @@ class AccuracyModel(BaseModel):
     )
     error_parts: dict[str, float] = Field(
         description='What it adds up from [m]: "grid" (or "space" and "time", where they are known apart), '
-        '"iteration" and "neglected", and "start" where the scene does not determine its motion; empty where it is '
-        "unknown.",
+        '"iteration" and "neglected", "start" where the scene does not determine its motion, and "contact" where how '
+        "stiff contact is decides on it; empty where it is unknown.",
         examples=[{"grid": 8.8e-4, "iteration": 1e-8, "neglected": 0.0}],
     )
     wall_time: float = Field(description="Time of the solve [s].", examples=[0.004])

@@ -27,6 +27,7 @@ from dlocore.scene.scene import AUTO_TARGET, Quality
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED, march
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.stability.determined import DOUBTFUL, UNDETERMINED, UNSEEN, bend_in_words, goes_astray, in_words
+from dlocore.stability.firmness import firmness_in_words, gives_way
 from dlocore.statics.statics import RESTLESS, settles_elsewhere
 from dlocore.words import in_mm, in_ms
 
@@ -38,6 +39,7 @@ _AT_BEST = 0.2  # of an error, is left by one refinement: what is still too much
 _EVENED = 3  # refinements in space, at most, of a grid that agrees with the one before on strain within a span
 _TEARS = 0.5  # axial strain that no finer grid is expected to take back, where ...
 _TORN = 3  # ... so many in a row have it
+_ALLOW = "Allow a larger target_error, more time or a shorter motion."
 _FAILURES = 2  # refinements in time of a march that found no equilibrium
 
 
@@ -88,6 +90,8 @@ class _Climb:
         failures: marches in a row that found less than the best one, or no equilibrium as that.
         astray: how far a start that is hardly another goes elsewhere, as the last grid that agreed has it [m], 0 where
             that does not matter.
+        by_contact: how far contact that is stiffer takes it elsewhere, alike [m].
+        looked: the level that was looked at for both.
         unseen: whether no time was left to see how far it goes.
         torn: marches in a row that strained the cable by more than `_TEARS`.
         evened: how often more control points were taken as the cable was strained between the points that watch it.
@@ -106,6 +110,8 @@ class _Climb:
     rho: float = RHO
     failures: int = 0
     astray: float = 0.0
+    by_contact: float = 0.0
+    looked: Level | None = None
     unseen: bool = False
     torn: int = 0
     evened: int = 0
@@ -187,6 +193,10 @@ class _Climb:
                     return unfolded
                 self._look_back(level, size)
                 finer = self._next(level, size, unfolds)
+                if finer is None and status == "converged" and self.estimate <= self.enough:
+                    self.astray = self._find_astray(level)
+                    # what contact leaves unsure has to be made up for by the grid
+                    finer = self._next(level, size, unfolds) if self.by_contact and not self.astray else None
             if finer is not None and not self.means.next_fits(self.problem, size, finer, spent):
                 return self._within_budget(level)
             size = finer
@@ -225,7 +235,7 @@ class _Climb:
     def _forget(self) -> None:
         """Forget the grids before."""
         self.best, self.changes, self.estimate, self.evened = None, Changes(), np.inf, 0
-        self.astray, self.unseen, self.torn = 0.0, False, 0
+        self.astray, self.by_contact, self.unseen, self.torn = 0.0, 0.0, False, 0
 
     def _is_rough(self, level: Level) -> bool:
         return not level.change <= ROUGH * self.problem.scene.cable.length
@@ -322,7 +332,7 @@ class _Climb:
     def _affordable(self, size: Size) -> Size | None:
         """Return a size, or None where a march of it takes too long."""
         success = self.best is None or not is_folded(self.best)
-        content = self.enough > self.target and self.estimate <= self.enough and success
+        content = self.enough > self.target and self.estimate + self.by_contact <= self.enough and success
         return self.means.affordable(self.problem, size, content)
 
     def _left(self, size: Size | None) -> int:
@@ -338,6 +348,8 @@ class _Climb:
 
         Where there is no time left to look, what the grid before says counts.
         """
+        if level is self.looked:
+            return self.astray
         monitor = self.monitor.within(self.means.left) if self._timed else self.monitor
         try:
             hard = self.number >= len(LEVELS)
@@ -347,38 +359,54 @@ class _Climb:
                 slower = march(level.problem, level.motion.grid, steps, monitor, rho=rho, whole=True)
                 moved = max(moved, goes_astray(level.problem, slower, monitor, hard))
             moved = max(moved, settles_elsewhere(level.problem, level.motion.grid, monitor))
-            self.unseen = False
+            lost = moved > UNDETERMINED * self.problem.scene.cable.length
+            self.by_contact = 0.0 if lost else self._doubtful(gives_way(level.problem, level.motion, monitor))
+            self.looked, self.unseen = level, False
         except TimeIsUp:
             self.unseen = True
             return self.astray
         finally:
             self.monitor.phase("estimate")
+        return self._doubtful(moved)
+
+    def _doubtful(self, moved: float) -> float:
+        """Return how far something takes a motion [m] if that counts, else 0."""
         return moved if moved > DOUBTFUL * self.problem.scene.cable.length else 0.0
 
     @property
     def _undetermined(self) -> bool:
-        """Whether its start may take a motion so far elsewhere that no grid tells of it what was asked for."""
+        """Whether start or contact may take a motion so far elsewhere that no grid tells of it what was asked for."""
+        return self._loses(self.astray + self.by_contact)
+
+    def _loses(self, unsure: float) -> bool:
         lost = self.astray > UNDETERMINED * self.problem.scene.cable.length
-        return lost or (self.astray > 0.0 and self.estimate + self.astray > self.enough)
+        return unsure > 0.0 and (lost or self.estimate + unsure > self.enough)
 
     def _agreeing(self, level: Level) -> Outcome:
         return self._answer(level, "converged", self._agreed(level))
 
     def _answer(self, level: Level, status: Status, message: str, advice: str = "") -> Outcome:
-        """Return an answer, which is no success where its start may take it astray."""
+        """Return an answer, which is no success where its start or contact may take it astray."""
         message, parts = self._doubted(level, message)
-        if self._undetermined:
+        if self._loses(self.astray) or self.by_contact > self.enough:
             status, advice = "stalled", " Make the motion slower, damp it, or hold the cable in more places."
+        elif self._undetermined:
+            status, advice = "max_iterations", f" {_ALLOW}"
         return Outcome(level, status, message + advice, parts)
 
     def _doubted(self, level: Level, message: str) -> tuple[str, dict[str, float] | None]:
-        """Return a message and the parts of the error [m], with what is known of where its start may take a motion."""
-        parts = self.changes.parts(level)
-        if not self.astray:
-            return message + (f" {UNSEEN}" if self.unseen else ""), parts
-        told = in_words if self._undetermined else bend_in_words
-        said = f"But {told(self.problem, self.astray)}."
-        return f"{message} {said}", {**(parts or {}), "start": self.astray}
+        """Return a message and the parts of the error [m], with how far start and contact may take a motion."""
+        parts, said = dict(self.changes.parts(level) or {}), []
+        if self.astray:
+            parts["start"] = self.astray
+            told = in_words if self._loses(self.astray) else bend_in_words
+            said.append(told(self.problem, self.astray))
+        if self.by_contact:
+            parts["contact"] = self.by_contact
+            said.append(firmness_in_words(self.by_contact))
+        if said:
+            return f"{message} But {', and '.join(said)}.", parts
+        return message + (f" {UNSEEN}" if self.unseen else ""), parts or None
 
     def _agreed(self, level: Level) -> str:
         return f"Two grids agree to {in_mm(level.change)}; {self._left_over()}."
@@ -453,19 +481,18 @@ class _Climb:
             return self._within_budget(best)
         status, message = march_status(self.problem, best)
         left = self._left_over()
-        advice = "Allow a larger target_error, more time or a shorter motion."
         if status == "converged" and self.estimate <= self.enough:
             self.astray = self.astray or self._find_astray(best)
             outcome = self._agreeing(best)
             finest = " No finer one was tried." if self.estimate > self.target else ""
             return outcome._replace(message=outcome.message + finest)
         elif status == "converged" and self.monitor.remaining() <= 0:
-            status, message = "time_limit", f"The time limit passed; {left}. {advice}"
+            status, message = "time_limit", f"The time limit passed; {left}. {_ALLOW}"
         elif status == "converged":
             self.astray = self.astray or self._find_astray(best)
             finest = f"{best.motion.grid.n_u} control points along the cable and {best.motion.steps} steps"
             spent = f"From {finest} on no finer grid is expected to reach the target in what may be spent"
-            return self._answer(best, "max_iterations", f"{spent}; {left}.", f" {advice}")
+            return self._answer(best, "max_iterations", f"{spent}; {left}.", f" {_ALLOW}")
         return Outcome(best, status, message, self.changes.parts(best))
 
 

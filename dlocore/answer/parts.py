@@ -213,8 +213,9 @@ class Accuracy:
             computed that tells.
         error_parts: what it adds up from [m]: "grid", of the discretisation, or "space" and "time" where they are known
             apart; "iteration", what the last iteration left; "neglected", effects that "auto" left out; "start",
-            where the scene does not determine its motion, how far a start that is hardly another ends elsewhere. Empty
-            where there is no estimate.
+            where the scene does not determine its motion, how far a start that is hardly another ends elsewhere;
+            "contact", how far contact twice as stiff takes a motion that strikes something. Empty where there is no
+            estimate.
         neglected: the part of it that effects left out by "auto" may have, about [m].
         wall_time: time of the whole solve [s].
         n_u, n_t: size of the net of control points.

@@ -387,7 +387,7 @@ def test_a_finer_grid_may_still_look_where_a_coarse_one_had_no_time(monkeypatch:
     level = march_level(climb.problem, refinement.stretched(climb.problem, 0), climb.monitor)
     monkeypatch.setattr(refinement, "goes_astray", astray)
     for unseen in (False, True, False):
-        climb._find_astray(level)
+        climb._find_astray(dataclasses.replace(level))
         assert climb.unseen is unseen
 
 

@@ -1,0 +1,36 @@
+"""How far a motion hangs on the stiffness of contact, which is numerical: what strikes sinks in for an instant."""
+
+import numpy as np
+
+from dlocore.problem.problem import Problem, stiffer
+from dlocore.solvers.march import March, march
+from dlocore.solvers.monitor import Monitor
+from dlocore.words import in_mm
+
+FIRMER = 2.0  # times as stiff
+
+
+def gives_way(problem: Problem, motion: March, monitor: Monitor) -> float:
+    """Return how far a motion that strikes something goes elsewhere with contact FIRMER times as stiff [m].
+
+    What strikes is stopped within a time sqrt(mu/k) (docs/model.md eq. 21), however fine the grid is, so no grid tells
+    of it; a wave that follows may enlarge what that changes. 0 where no step was divided for a strike, and where that
+    march finds no equilibrium.
+
+    Raises:
+        Cancelled: the caller asked to stop.
+        TimeIsUp: the deadline passed.
+    """
+    strikes = motion.split and (problem.contact is not None or problem.self_contact is not None)
+    if motion.stopped or not strikes:
+        return 0.0
+    firm = march(stiffer(problem, FIRMER), motion.grid, motion.asked, monitor, rho=motion.rho, whole=True)
+    if firm.stopped:
+        return 0.0
+    apart = (firm.states - motion.states)[..., : problem.plane.dimensions]
+    return float(np.linalg.norm(apart, axis=-1).max())
+
+
+def firmness_in_words(moved: float) -> str:
+    """Return in words that contact which is stiffer takes a motion elsewhere by so much [m]."""
+    return f"contact that is twice as stiff takes the cable elsewhere by up to {in_mm(moved)}"
