@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from dlocore import Cable, Environment, Quality, Scene, Straight, Table, predict
-from dlocore.accuracy import refinement
+from dlocore.accuracy import budget, refinement
 from dlocore.levels.level import Size, run_level
 from dlocore.problem.problem import pose, stiffer
-from dlocore.solvers.march import march
+from dlocore.solvers.march import March, march
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.stability.determined import DOUBTFUL, UNSEEN
 from dlocore.stability.firmness import FIRMER, gives_way
@@ -102,3 +102,24 @@ def test_where_no_time_is_left_to_look_the_answer_says_so(monkeypatch: pytest.Mo
 
     monkeypatch.setattr(refinement, "gives_way", late)
     assert UNSEEN in predict(dropped(0.0, target_error=0.01)).message
+
+
+def test_grids_that_would_do_without_it_are_refined_further(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(refinement, "AUTO_TARGET", 1e-4)  # so that the finest grids agree to what is enough only
+    monkeypatch.setattr(budget, "MOST_WORK", 0.1 * budget.MOST_WORK)
+    looked: list[Size] = []
+    contact = 0.0
+
+    def asked(_: object, motion: March, __: object) -> float:
+        looked.append(Size(motion.grid.n_u, 0, motion.asked))
+        return contact
+
+    monkeypatch.setattr(refinement, "gives_way", asked)
+    scene = dataclasses.replace(dropped(0.6), horizon=0.2)
+    plain = predict(scene)
+    assert "No finer one was tried" in plain.message
+    assert len(looked) == 1
+    contact = 0.01 * LENGTH - 0.5 * plain.accuracy.error_estimate
+    found = predict(scene)
+    assert found.accuracy.n_u * found.accuracy.steps > plain.accuracy.n_u * plain.accuracy.steps
+    assert len(set(looked)) == len(looked) - 1  # each grid once, the first of them twice
