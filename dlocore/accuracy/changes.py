@@ -113,8 +113,11 @@ class Changes:
         return self.last["both"].error if "both" in self.last else np.inf
 
     def estimate(self, level: Level) -> float:
-        """Return the error [m] of the last level; what its time spline misses is told by no other grid."""
-        return max(self.error, MISSED_COUNTS * level.missed)
+        """Return the error [m] of the last level.
+
+        What its time spline misses, and what its steps do not see of paths that tremble, is told by no other grid.
+        """
+        return max(self.error, MISSED_COUNTS * level.missed, level.unseen)
 
     def parts(self, level: Level) -> dict[str, float] | None:
         """Return the parts of that error [m], space and time as far as they are known apart, or None."""
@@ -122,7 +125,9 @@ class Changes:
             return None
         known = DIRECTIONS if self._apart else ("both",)
         parts = {"grid" if direction == "both" else direction: self.last[direction].error for direction in known}
-        return with_missed(parts, level)
+        parts = with_missed(parts, level)
+        parts[list(parts)[-1]] += max(0.0, level.unseen - sum(parts.values()))
+        return parts
 
     def worst(self) -> str:
         """Return the direction to refine: time, then space, then that which erred more."""

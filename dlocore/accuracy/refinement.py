@@ -317,7 +317,7 @@ class _Climb:
             return unfolds
         trembles = MISSED_COUNTS * level.missed > _FINE_IN_TIME * self.target
         sizes = {direction: self._affordable(_finer(size, direction, trembles)) for direction in DIRECTIONS}
-        misses = MISSED_COUNTS * level.missed > self.changes.error
+        misses = max(MISSED_COUNTS * level.missed, level.unseen) > self.changes.error
         self.direction = "time" if misses else self.changes.worst()
         change = self.changes.last.get(self.direction)
         if sizes[self.direction] is None and (change is None or change.error < self.target):

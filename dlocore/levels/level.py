@@ -16,6 +16,7 @@ from dlocore.problem.events import moments, swings
 from dlocore.problem.grid import Grid
 from dlocore.problem.problem import Problem, stiff_as_taut, stiffer, stiffer_for
 from dlocore.problem.time_grid import smallest_n_t, time_knots
+from dlocore.problem.trembling import trembles
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, march
 from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.smooth import march_smooth
@@ -90,6 +91,11 @@ class Level:
     def alone(self) -> "Level":
         """The level without those beside it."""
         return replace(self, beside=())
+
+    @cached_property
+    def unseen(self) -> float:
+        """How far the cable is taken by what the steps do not see of paths through waypoints [m], see `trembles`."""
+        return trembles(self.problem, self.problem.horizon / self.motion.steps)
 
     @cached_property
     def samples(self) -> Floats:
