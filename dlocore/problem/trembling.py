@@ -16,9 +16,12 @@ def trembles(problem: Problem, step: float) -> float:
     """Return how far a cable is taken by what steps of `step` [s] do not see of the paths of its grasps [m], at most.
 
     That is how fast a path moves beside the way that it comes in a step, root mean square, for as long as a cable of
-    that length needs to swing: a stiff one goes on with the speed of its gripper, however small the way of that was.
+    that length needs to swing: a stiff one goes on with the speed of its gripper, however small the way of that was. 0
+    where inertia is left out, as the cable only follows the way then.
     """
     scene, most = problem.scene, 0.0
+    if problem.inertia is None:
+        return 0.0
     lasts = min(problem.horizon, 2.0 * math.sqrt(scene.cable.length))
     for grasp in scene.grasps:
         path = grasp.path

@@ -50,6 +50,10 @@ def test_the_way_until_a_gripper_opens_counts_and_none_after():
     assert trembles(pose(led(calm, release_time=1.2)), 0.03) < 1e-2 * trembles(pose(led(calm)), 0.03)
 
 
+def test_without_inertia_only_the_way_counts():
+    assert trembles(pose(replace(led(waved(SIZE)), effects={"inertia": "off"})), 0.03) == 0.0
+
+
 def test_a_smooth_path_is_seen_by_coarse_steps_however_close_its_waypoints_are():
     t = np.linspace(0.0, HORIZON, 401)
     y = 0.1 * (1.0 - np.cos(np.pi * t / HORIZON))
