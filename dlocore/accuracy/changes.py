@@ -83,8 +83,18 @@ def refined(level: Level, before: Level) -> str:
 
 def with_missed(parts: Mapping[str, float], level: Level) -> dict[str, float]:
     """Return parts of an error [m], the last one larger where the time spline misses more than their sum tells of."""
+    return _raised(parts, MISSED_COUNTS * level.missed)
+
+
+def untold(level: Level) -> float:
+    """Return what no other grid tells of a level [m]: what its time spline misses, and its steps of trembling paths."""
+    return max(MISSED_COUNTS * level.missed, level.unseen)
+
+
+def _raised(parts: Mapping[str, float], least: float) -> dict[str, float]:
+    """Return parts of an error [m], the last one larger where their sum is less than `least` [m]."""
     parts = dict(parts)
-    parts[list(parts)[-1]] += max(0.0, MISSED_COUNTS * level.missed - sum(parts.values()))
+    parts[list(parts)[-1]] += max(0.0, least - sum(parts.values()))
     return parts
 
 
@@ -113,11 +123,8 @@ class Changes:
         return self.last["both"].error if "both" in self.last else np.inf
 
     def estimate(self, level: Level) -> float:
-        """Return the error [m] of the last level.
-
-        What its time spline misses, and what its steps do not see of paths that tremble, is told by no other grid.
-        """
-        return max(self.error, MISSED_COUNTS * level.missed, level.unseen)
+        """Return the error [m] of the last level."""
+        return max(self.error, untold(level))
 
     def parts(self, level: Level) -> dict[str, float] | None:
         """Return the parts of that error [m], space and time as far as they are known apart, or None."""
@@ -125,9 +132,7 @@ class Changes:
             return None
         known = DIRECTIONS if self._apart else ("both",)
         parts = {"grid" if direction == "both" else direction: self.last[direction].error for direction in known}
-        parts = with_missed(parts, level)
-        parts[list(parts)[-1]] += max(0.0, level.unseen - sum(parts.values()))
-        return parts
+        return _raised(parts, untold(level))
 
     def worst(self) -> str:
         """Return the direction to refine: time, then space, then that which erred more."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from dlocore.accuracy.budget import Means, first_level
-from dlocore.accuracy.changes import DIRECTIONS, MISSED_COUNTS, MORE, Changes, refined, weighed
+from dlocore.accuracy.changes import DIRECTIONS, MISSED_COUNTS, MORE, Changes, refined, untold, weighed
 from dlocore.accuracy.cost import Cost
 from dlocore.answer.parts import Status
 from dlocore.errors import SceneError
@@ -317,7 +317,7 @@ class _Climb:
             return unfolds
         trembles = MISSED_COUNTS * level.missed > _FINE_IN_TIME * self.target
         sizes = {direction: self._affordable(_finer(size, direction, trembles)) for direction in DIRECTIONS}
-        misses = max(MISSED_COUNTS * level.missed, level.unseen) > self.changes.error
+        misses = untold(level) > self.changes.error
         self.direction = "time" if misses else self.changes.worst()
         change = self.changes.last.get(self.direction)
         if sizes[self.direction] is None and (change is None or change.error < self.target):

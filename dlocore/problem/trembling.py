@@ -1,11 +1,11 @@
 """Paths through waypoints that tremble, as recorded ones do, faster than steps can see."""
 
-import math
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.problem.events import swing
 from dlocore.problem.problem import Problem
 from dlocore.scene.paths import Waypoints
 
@@ -22,7 +22,7 @@ def trembles(problem: Problem, step: float) -> float:
     scene, most = problem.scene, 0.0
     if problem.inertia is None:
         return 0.0
-    lasts = min(problem.horizon, 2.0 * math.sqrt(scene.cable.length))
+    lasts = min(problem.horizon, swing(scene))
     for grasp in scene.grasps:
         path = grasp.path
         if not isinstance(path, Waypoints):
