@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.accuracy.again import Again, as_solved, march_again
-from dlocore.accuracy.changes import MISSED_COUNTS
+from dlocore.accuracy.changes import with_untold
 from dlocore.accuracy.companion import Compared, by_coarser, by_finer
 from dlocore.accuracy.cost import Cost
 from dlocore.accuracy.fallback import (
@@ -253,7 +253,9 @@ def _least_squares(
         return _answer(monitor, method, Outcome(level, status, message + again.said, errors), find_forces, again.judged)
     known = quality.estimate and (method != "paper" or converged)
     compared = by_finer(problem, level, monitor) if known else Compared(None)
-    errors = None if compared.estimate is None else {"grid": compared.estimate, "iteration": left}
+    estimate = compared.estimate
+    # what the time spline of the march misses is no error of the least squares
+    errors = None if estimate is None else {"grid": max(estimate, level.unseen), "iteration": left}
     outcome = Outcome(compared.on(level), status, message + compared.doubt, errors)
     return _answer(monitor, method, outcome, find_forces)
 
@@ -279,7 +281,7 @@ def _given(problem: Problem, quality: Quality, monitor: Monitor, level: Level | 
     level = compared.on(level)
     status, message = given_status(level)
     estimate = compared.estimate
-    errors = None if estimate is None else {"grid": max(estimate, MISSED_COUNTS * level.missed)}
+    errors = None if estimate is None else with_untold({"grid": estimate}, level)
     return Outcome(level, status, message + compared.doubt, errors)
 
 

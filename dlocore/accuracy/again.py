@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.accuracy.changes import with_missed
+from dlocore.accuracy.changes import with_untold
 from dlocore.levels.given import given_status
 from dlocore.levels.level import Level, distance, hardness, run_level
 from dlocore.levels.review import called_for
@@ -104,7 +104,7 @@ def march_again(problem: Problem, like: Prediction, monitor: Monitor) -> Again |
     if calls:
         return f"It calls for {', '.join(calls)}: {'; '.join(calls.values())}."
     if errors and like.accuracy.method == "march":
-        errors = with_missed(errors, level)
+        errors = with_untold(errors, level)
     astray = _astray(level, monitor) if free_knots else 0.0
     if astray > UNDETERMINED * length:
         return f"On the grid of one like it {in_words(problem, astray)}."

@@ -81,20 +81,15 @@ def refined(level: Level, before: Level) -> str:
     return "both" if level.motion.steps > MORE * before.motion.steps else "space"
 
 
-def with_missed(parts: Mapping[str, float], level: Level) -> dict[str, float]:
-    """Return parts of an error [m], the last one larger where the time spline misses more than their sum tells of."""
-    return _raised(parts, MISSED_COUNTS * level.missed)
-
-
 def untold(level: Level) -> float:
     """Return what no other grid tells of a level [m]: what its time spline misses, and its steps of trembling paths."""
     return max(MISSED_COUNTS * level.missed, level.unseen)
 
 
-def _raised(parts: Mapping[str, float], least: float) -> dict[str, float]:
-    """Return parts of an error [m], the last one larger where their sum is less than `least` [m]."""
+def with_untold(parts: Mapping[str, float], level: Level) -> dict[str, float]:
+    """Return parts of an error [m], the last one larger where their sum is less than what is `untold`."""
     parts = dict(parts)
-    parts[list(parts)[-1]] += max(0.0, least - sum(parts.values()))
+    parts[list(parts)[-1]] += max(0.0, untold(level) - sum(parts.values()))
     return parts
 
 
@@ -132,7 +127,7 @@ class Changes:
             return None
         known = DIRECTIONS if self._apart else ("both",)
         parts = {"grid" if direction == "both" else direction: self.last[direction].error for direction in known}
-        return _raised(parts, untold(level))
+        return with_untold(parts, level)
 
     def worst(self) -> str:
         """Return the direction to refine: time, then space, then that which erred more."""
