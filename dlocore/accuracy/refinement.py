@@ -7,6 +7,7 @@ import numpy as np
 from dlocore.accuracy.budget import Means, first_level
 from dlocore.accuracy.changes import DIRECTIONS, MISSED_COUNTS, MORE, Changes, refined, untold, weighed
 from dlocore.accuracy.cost import Cost
+from dlocore.accuracy.doubts import ALLOW, Doubts
 from dlocore.answer.parts import Status
 from dlocore.errors import SceneError
 from dlocore.levels.level import (
@@ -20,15 +21,12 @@ from dlocore.levels.level import (
     turned,
 )
 from dlocore.levels.progress import record_level
-from dlocore.levels.review import turns_unsurely
 from dlocore.levels.whole_march import Outcome, is_folded, is_uneven, march_level, march_status
 from dlocore.problem.problem import Problem
 from dlocore.scene.scene import AUTO_TARGET, Quality
-from dlocore.solvers.march import RHO, STRONGLY_DAMPED, march
+from dlocore.solvers.march import RHO, STRONGLY_DAMPED
 from dlocore.solvers.monitor import Monitor, TimeIsUp
-from dlocore.stability.determined import DOUBTFUL, UNDETERMINED, UNSEEN, bend_in_words, goes_astray, in_words
-from dlocore.stability.firmness import firmness_in_words, gives_way
-from dlocore.statics.statics import RESTLESS, settles_elsewhere
+from dlocore.statics.statics import RESTLESS
 from dlocore.words import in_mm, in_ms
 
 AUTO_ENOUGH = 1e-2  # of the length: the estimated error with which it is content where the finest grids reach no closer
@@ -39,7 +37,6 @@ _AT_BEST = 0.2  # of an error, is left by one refinement: what is still too much
 _EVENED = 3  # refinements in space, at most, of a grid that agrees with the one before on strain within a span
 _TEARS = 0.5  # axial strain that no finer grid is expected to take back, where ...
 _TORN = 3  # ... so many in a row have it
-_ALLOW = "Allow a larger target_error, more time or a shorter motion."
 _FAILURES = 2  # refinements in time of a march that found no equilibrium
 
 
@@ -88,11 +85,7 @@ class _Climb:
         estimate: error of the best one [m].
         rho: spectral radius of the next march.
         failures: marches in a row that found less than the best one, or no equilibrium as that.
-        astray: how far a start that is hardly another goes elsewhere, as the last grid that agreed has it [m], 0 where
-            that does not matter.
-        by_contact: how far contact that is stiffer takes it elsewhere, alike [m].
-        looked: the level that was looked at for both.
-        unseen: whether no time was left to see how far it goes.
+        doubts: what is unsure of the last grid that agreed, as others would agree on it, too.
         torn: marches in a row that strained the cable by more than `_TEARS`.
         evened: how often more control points were taken as the cable was strained between the points that watch it.
         wanting: effects that a finer grid called for, and that no time was left to march with, in words.
@@ -109,10 +102,7 @@ class _Climb:
     estimate: float = np.inf
     rho: float = RHO
     failures: int = 0
-    astray: float = 0.0
-    by_contact: float = 0.0
-    looked: Level | None = None
-    unseen: bool = False
+    doubts: Doubts = field(default_factory=Doubts)
     torn: int = 0
     evened: int = 0
     wanting: str = ""
@@ -182,9 +172,10 @@ class _Climb:
                 if finer is None and status != "converged":
                     return Outcome(level, status, message, self.changes.parts(level))
                 if finer is None:
-                    before, self.astray = self._undetermined, self._find_astray(level)
+                    before = self._undermined
+                    self._look(level)
                     # on a coarse grid disturbances may grow that do not on a fine one
-                    finer = self._next(level, size, None) if self._undetermined and not before else None
+                    finer = self._next(level, size, None) if self._undermined and not before else None
                     if finer is None:
                         return self._agreeing(level)
             else:
@@ -194,9 +185,9 @@ class _Climb:
                 self._look_back(level, size)
                 finer = self._next(level, size, unfolds)
                 if finer is None and status == "converged" and self.estimate <= self.enough:
-                    self.astray = self._find_astray(level)
+                    self._look(level)
                     # what contact leaves unsure has to be made up for by the grid
-                    finer = self._next(level, size, unfolds) if self.by_contact and not self.astray else None
+                    finer = self._next(level, size, unfolds) if self.doubts.contact and not self.doubts.start else None
             if finer is not None and not self.means.next_fits(self.problem, size, finer, spent):
                 return self._within_budget(level)
             size = finer
@@ -234,8 +225,8 @@ class _Climb:
 
     def _forget(self) -> None:
         """Forget the grids before."""
-        self.best, self.changes, self.estimate, self.evened = None, Changes(), np.inf, 0
-        self.astray, self.by_contact, self.unseen, self.torn = 0.0, 0.0, False, 0
+        self.best, self.changes, self.estimate = None, Changes(), np.inf
+        self.evened, self.torn, self.doubts = 0, 0, Doubts()
 
     def _is_rough(self, level: Level) -> bool:
         return not level.change <= ROUGH * self.problem.scene.cable.length
@@ -332,7 +323,7 @@ class _Climb:
     def _affordable(self, size: Size) -> Size | None:
         """Return a size, or None where a march of it takes too long."""
         success = self.best is None or not is_folded(self.best)
-        content = self.enough > self.target and self.estimate + self.by_contact <= self.enough and success
+        content = self.enough > self.target and self.estimate + self.doubts.contact <= self.enough and success
         return self.means.affordable(self.problem, size, content)
 
     def _left(self, size: Size | None) -> int:
@@ -343,70 +334,31 @@ class _Climb:
             size = self._affordable(_finer(size, self.direction, False))
         return count
 
-    def _find_astray(self, level: Level) -> float:
-        """Return how far a start that is hardly another would go elsewhere [m], 0 where that does not matter.
-
-        Where there is no time left to look, what the grid before says counts.
-        """
-        if level is self.looked:
-            return self.astray
+    def _look(self, level: Level) -> None:
+        """Find what is unsure of a level, in the time that is left."""
         monitor = self.monitor.within(self.means.left) if self._timed else self.monitor
         try:
-            hard = self.number >= len(LEVELS)
-            moved = goes_astray(level.problem, level.motion, monitor, hard)
-            if moved > 0.0 and turns_unsurely(level):  # coarse steps damp what turns sections over, and how it grows
-                steps, rho = 2 * level.motion.asked, level.motion.rho
-                slower = march(level.problem, level.motion.grid, steps, monitor, rho=rho, whole=True)
-                moved = max(moved, goes_astray(level.problem, slower, monitor, hard))
-            moved = max(moved, settles_elsewhere(level.problem, level.motion.grid, monitor))
-            lost = moved > UNDETERMINED * self.problem.scene.cable.length
-            self.by_contact = 0.0 if lost else self._doubtful(gives_way(level.problem, level.motion, monitor))
-            self.looked, self.unseen = level, False
-        except TimeIsUp:
-            self.unseen = True
-            return self.astray
+            self.doubts.look(level, monitor, self.number >= len(LEVELS))
         finally:
             self.monitor.phase("estimate")
-        return self._doubtful(moved)
-
-    def _doubtful(self, moved: float) -> float:
-        """Return how far something takes a motion [m] if that counts, else 0."""
-        return moved if moved > DOUBTFUL * self.problem.scene.cable.length else 0.0
 
     @property
-    def _undetermined(self) -> bool:
+    def _undermined(self) -> bool:
         """Whether start or contact may take a motion so far elsewhere that no grid tells of it what was asked for."""
-        return self._loses(self.astray + self.by_contact)
-
-    def _loses(self, unsure: float) -> bool:
-        lost = self.astray > UNDETERMINED * self.problem.scene.cable.length
-        return unsure > 0.0 and (lost or self.estimate + unsure > self.enough)
+        return self.doubts.undermines(self.estimate, self.enough)
 
     def _agreeing(self, level: Level) -> Outcome:
         return self._answer(level, "converged", self._agreed(level))
 
     def _answer(self, level: Level, status: Status, message: str, advice: str = "") -> Outcome:
         """Return an answer, which is no success where its start or contact may take it astray."""
-        message, parts = self._doubted(level, message)
-        if self._loses(self.astray) or self.by_contact > self.enough:
-            status, advice = "stalled", " Make the motion slower, damp it, or hold the cable in more places."
-        elif self._undetermined:
-            status, advice = "max_iterations", f" {_ALLOW}"
+        message, parts = self._told(level, message)
+        status, advice = self.doubts.status(status, advice, self.estimate, self.enough)
         return Outcome(level, status, message + advice, parts)
 
-    def _doubted(self, level: Level, message: str) -> tuple[str, dict[str, float] | None]:
+    def _told(self, level: Level, message: str) -> tuple[str, dict[str, float] | None]:
         """Return a message and the parts of the error [m], with how far start and contact may take a motion."""
-        parts, said = dict(self.changes.parts(level) or {}), []
-        if self.astray:
-            parts["start"] = self.astray
-            told = in_words if self._loses(self.astray) else bend_in_words
-            said.append(told(self.problem, self.astray))
-        if self.by_contact:
-            parts["contact"] = self.by_contact
-            said.append(firmness_in_words(self.by_contact))
-        if said:
-            return f"{message} But {', and '.join(said)}.", parts
-        return message + (f" {UNSEEN}" if self.unseen else ""), parts or None
+        return self.doubts.told(message, self.changes.parts(level), self.problem, self.estimate, self.enough)
 
     def _agreed(self, level: Level) -> str:
         return f"Two grids agree to {in_mm(level.change)}; {self._left_over()}."
@@ -449,8 +401,8 @@ class _Climb:
             return Outcome(level, "time_limit", f"{allowed} allow one grid, unchecked.", None)
         status, failure = march_status(self.problem, level)
         moved = f"The best grid in {allowed}; the last refinement moved the surface by {in_mm(level.change)}."
-        self.astray = self._find_astray(level)
-        message, parts = self._doubted(level, moved)
+        self._look(level)
+        message, parts = self._told(level, moved)
         if status != "converged":
             return Outcome(level, status, f"{message} {failure}", parts)
         if parts is None or sum(parts.values()) > self.enough:
@@ -482,17 +434,19 @@ class _Climb:
         status, message = march_status(self.problem, best)
         left = self._left_over()
         if status == "converged" and self.estimate <= self.enough:
-            self.astray = self.astray or self._find_astray(best)
+            if not self.doubts.start:
+                self._look(best)
             outcome = self._agreeing(best)
             finest = " No finer one was tried." if self.estimate > self.target else ""
             return outcome._replace(message=outcome.message + finest)
         elif status == "converged" and self.monitor.remaining() <= 0:
-            status, message = "time_limit", f"The time limit passed; {left}. {_ALLOW}"
+            status, message = "time_limit", f"The time limit passed; {left}. {ALLOW}"
         elif status == "converged":
-            self.astray = self.astray or self._find_astray(best)
+            if not self.doubts.start:
+                self._look(best)
             finest = f"{best.motion.grid.n_u} control points along the cable and {best.motion.steps} steps"
             spent = f"From {finest} on no finer grid is expected to reach the target in what may be spent"
-            return self._answer(best, "max_iterations", f"{spent}; {left}.", f" {_ALLOW}")
+            return self._answer(best, "max_iterations", f"{spent}; {left}.", f" {ALLOW}")
         return Outcome(best, status, message, self.changes.parts(best))
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.hard.generator import draw
 from dlocore import Cable, Cancelled, Environment, Grasp, Move, Points, Quality, Scene, Straight, Table, predict
-from dlocore.accuracy import refinement
+from dlocore.accuracy import doubts, refinement
 from dlocore.accuracy.budget import Means
 from dlocore.kernels.growth import fastest_growth
 from dlocore.levels.whole_march import march_level
@@ -307,7 +307,7 @@ def test_a_grid_that_is_finer_decides_whether_a_motion_is_determined(monkeypatch
         seen.append((motion.grid.n_u, motion.steps))
         return 0.5 * LENGTH if len(seen) == 1 else 0.0
 
-    monkeypatch.setattr(refinement, "goes_astray", on_the_first)
+    monkeypatch.setattr(doubts, "goes_astray", on_the_first)
     answer = predict(scene)
     assert answer.status == "converged"
     assert seen[0] == (plain.accuracy.n_u, plain.accuracy.steps)
@@ -332,7 +332,7 @@ def test_what_a_grid_says_is_not_forgotten_as_the_time_ends(marches: bool, monke
             raise TimeIsUp
         return march_level(*arguments, **options)
 
-    monkeypatch.setattr(refinement, "goes_astray", astray)
+    monkeypatch.setattr(doubts, "goes_astray", astray)
     monkeypatch.setattr(refinement, "march_level", marched)
     answer = predict(dataclasses.replace(column(0.1, drag=1.0), quality=Quality(target_error=0.01)))
     assert answer.status == "stalled"
@@ -358,7 +358,7 @@ def late(*_: object) -> float:
 def test_where_no_time_is_left_to_look_the_answer_says_so(monkeypatch: pytest.MonkeyPatch):
     scene = dataclasses.replace(column(0.1, drag=1.0), quality=Quality(target_error=0.01))
     assert UNSEEN not in predict(scene).message
-    monkeypatch.setattr(refinement, "goes_astray", late)
+    monkeypatch.setattr(doubts, "goes_astray", late)
     found = predict(scene)
     assert found.status == "converged"
     assert UNSEEN in found.message
@@ -366,7 +366,7 @@ def test_where_no_time_is_left_to_look_the_answer_says_so(monkeypatch: pytest.Mo
 
 def test_where_no_time_is_left_of_a_budget_the_answer_says_so(hurried: Scene, monkeypatch: pytest.MonkeyPatch):
     assert UNSEEN not in predict(hurried).message
-    monkeypatch.setattr(refinement, "goes_astray", late)
+    monkeypatch.setattr(doubts, "goes_astray", late)
     found = predict(hurried)
     assert found.status == "converged"
     assert UNSEEN in found.message
@@ -385,10 +385,10 @@ def test_a_finer_grid_may_still_look_where_a_coarse_one_had_no_time(monkeypatch:
         problem=pose(column(0.1)), means=Means(Monitor(), None, 1.0), target=1.0, enough=1.0, number=0
     )
     level = march_level(climb.problem, refinement.stretched(climb.problem, 0), climb.monitor)
-    monkeypatch.setattr(refinement, "goes_astray", astray)
+    monkeypatch.setattr(doubts, "goes_astray", astray)
     for unseen in (False, True, False):
-        climb._find_astray(dataclasses.replace(level))
-        assert climb.unseen is unseen
+        climb.doubts.look(dataclasses.replace(level), climb.monitor, False)
+        assert climb.doubts.unseen is unseen
 
 
 def test_within_a_time_budget_the_answer_tells_what_is_not_determined(hurried: Scene, monkeypatch: pytest.MonkeyPatch):
@@ -398,7 +398,7 @@ def test_within_a_time_budget_the_answer_tells_what_is_not_determined(hurried: S
         left.append(monitor.remaining())
         return 0.3 * LENGTH
 
-    monkeypatch.setattr(refinement, "goes_astray", astray)
+    monkeypatch.setattr(doubts, "goes_astray", astray)
     found = predict(hurried)
     assert "But the scene does not determine its motion" in found.message
     assert found.accuracy.error_parts["start"] == 0.3 * LENGTH

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dlocore import Cable, Environment, Quality, Scene, Straight, Table, predict
-from dlocore.accuracy import budget, refinement
+from dlocore.accuracy import budget, doubts, refinement
 from dlocore.levels.level import Size, run_level
 from dlocore.problem.problem import pose, stiffer
 from dlocore.solvers.march import March, march
@@ -63,7 +63,7 @@ def test_a_cable_that_falls_flat_hardly_hangs_on_it_and_a_tilted_one_tells():
 def given(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """How far contact takes motions from here on [m], as often as it is asked; the last of them for ever."""
     said: list[float] = []
-    monkeypatch.setattr(refinement, "gives_way", lambda *_: said.pop(0) if len(said) > 1 else said[0])
+    monkeypatch.setattr(doubts, "gives_way", lambda *_: said.pop(0) if len(said) > 1 else said[0])
     return said
 
 
@@ -100,7 +100,7 @@ def test_where_no_time_is_left_to_look_the_answer_says_so(monkeypatch: pytest.Mo
     def late(*_: object) -> float:
         raise TimeIsUp
 
-    monkeypatch.setattr(refinement, "gives_way", late)
+    monkeypatch.setattr(doubts, "gives_way", late)
     assert UNSEEN in predict(dropped(0.0, target_error=0.01)).message
 
 
@@ -114,7 +114,7 @@ def test_grids_that_would_do_without_it_are_refined_further(monkeypatch: pytest.
         looked.append(Size(motion.grid.n_u, 0, motion.asked))
         return contact
 
-    monkeypatch.setattr(refinement, "gives_way", asked)
+    monkeypatch.setattr(doubts, "gives_way", asked)
     scene = dataclasses.replace(dropped(0.6), horizon=0.2)
     plain = predict(scene)
     assert "No finer one was tried" in plain.message

@@ -1,0 +1,88 @@
+"""What is unsure of a motion on whose grid others agree: it may hang on its start, or on how stiff contact is."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from dlocore.answer.parts import Status
+from dlocore.levels.level import Level
+from dlocore.levels.review import turns_unsurely
+from dlocore.problem.problem import Problem
+from dlocore.solvers.march import march
+from dlocore.solvers.monitor import Monitor, TimeIsUp
+from dlocore.stability.determined import DOUBTFUL, UNDETERMINED, UNSEEN, bend_in_words, goes_astray, in_words
+from dlocore.stability.firmness import firmness_in_words, gives_way
+from dlocore.statics.statics import settles_elsewhere
+
+ALLOW = "Allow a larger target_error, more time or a shorter motion."
+
+
+@dataclass
+class Doubts:
+    """What is unsure of the last level that was looked at.
+
+    Attributes:
+        start: how far a start that is hardly another goes elsewhere [m], 0 where that does not matter.
+        contact: how far contact that is stiffer takes it elsewhere, alike [m].
+        lost: whether a start goes so far that its scene does not determine the motion.
+        looked: the level that was looked at.
+        unseen: whether no time was left to look at the newest one; then what the one before says counts.
+    """
+
+    start: float = 0.0
+    contact: float = 0.0
+    lost: bool = False
+    looked: Level | None = None
+    unseen: bool = False
+
+    def look(self, level: Level, monitor: Monitor, hard: bool) -> None:
+        """Find what is unsure of a level; `hard` as in `goes_astray`.
+
+        Raises:
+            Cancelled: the caller asked to stop.
+        """
+        if level is self.looked:
+            return
+        problem, motion = level.problem, level.motion
+        length = problem.scene.cable.length
+        try:
+            moved = goes_astray(problem, motion, monitor, hard)
+            if moved > 0.0 and turns_unsurely(level):  # coarse steps damp what turns sections over, and how it grows
+                slower = march(problem, motion.grid, 2 * motion.asked, monitor, rho=motion.rho, whole=True)
+                moved = max(moved, goes_astray(problem, slower, monitor, hard))
+            moved = max(moved, settles_elsewhere(problem, motion.grid, monitor))
+            lost = moved > UNDETERMINED * length
+            gives = 0.0 if lost else gives_way(problem, motion, monitor)
+        except TimeIsUp:
+            self.unseen = True
+            return
+        self.start, self.contact = (x if x > DOUBTFUL * length else 0.0 for x in (moved, gives))
+        self.lost, self.looked, self.unseen = lost, level, False
+
+    def undermines(self, estimate: float, enough: float) -> bool:
+        """Tell whether a motion whose estimated error [m] would be enough [m] may go elsewhere by too much."""
+        return self._loses(self.start + self.contact, estimate, enough)
+
+    def status(self, status: Status, advice: str, estimate: float, enough: float) -> tuple[Status, str]:
+        """Return the status and the advice of an answer, which is no success where this undermines it."""
+        if self._loses(self.start, estimate, enough) or self.contact > enough:
+            return "stalled", " Make the motion slower, damp it, or hold the cable in more places."
+        return ("max_iterations", f" {ALLOW}") if self.undermines(estimate, enough) else (status, advice)
+
+    def told(
+        self, message: str, parts: Mapping[str, float] | None, problem: Problem, estimate: float, enough: float
+    ) -> tuple[str, dict[str, float] | None]:
+        """Return a message and the parts of the error [m], with what is unsure."""
+        parts, said = dict(parts or {}), []
+        if self.start:
+            parts["start"] = self.start
+            words = in_words if self._loses(self.start, estimate, enough) else bend_in_words
+            said.append(words(problem, self.start))
+        if self.contact:
+            parts["contact"] = self.contact
+            said.append(firmness_in_words(self.contact))
+        if said:
+            return f"{message} But {', and '.join(said)}.", parts
+        return message + (f" {UNSEEN}" if self.unseen else ""), parts or None
+
+    def _loses(self, unsure: float, estimate: float, enough: float) -> bool:
+        return unsure > 0.0 and (self.lost or estimate + unsure > enough)
