@@ -29,7 +29,8 @@ from dlocore.problem.strands import nearest_strands
 from dlocore.scene.obstacles import Obstacle
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import SplineSurface, design_matrix
-from dlocore.stability.determined import UNDETERMINED, goes_astray, in_words
+from dlocore.stability.determined import DOUBTFUL, UNDETERMINED, goes_astray, in_words
+from dlocore.stability.firmness import firmness_in_words, gives_way
 from dlocore.stability.mirrored import goes_elsewhere
 from dlocore.stability.sideways import WITH_TWIST, lacks_twist, leaves_plane, solved_in_space
 from dlocore.statics.statics import settles_elsewhere
@@ -132,7 +133,7 @@ def objections(level: Level) -> list[str]:
     ]
     if kept and leaves_plane(problem, level.motion):
         found.append(solved_in_space(kept))
-    found += _undetermined(level)
+    found += _unsure(level)
     elsewhere = goes_elsewhere(problem, level.motion)
     if elsewhere:
         lopsided = f"a cable lopsided by {in_mm(BOW * problem.scene.cable.length)}"
@@ -161,16 +162,21 @@ def objections(level: Level) -> list[str]:
     return found
 
 
-def _undetermined(level: Level) -> list[str]:
-    """Return in words that a scene does not determine its motion on a given grid; on free grids the status tells."""
-    problem = level.problem
+def _unsure(level: Level) -> list[str]:
+    """Return in words that a motion on a given grid hangs on its start, or on how stiff contact is.
+
+    On free grids status and error estimate tell.
+    """
+    problem, motion = level.problem, level.motion
+    length = problem.scene.cable.length
     if problem.scene.quality.n_u is None:
         return []
-    moved = max(
-        goes_astray(problem, level.motion, Monitor(), hard=False),
-        settles_elsewhere(problem, level.motion.grid, Monitor()),
-    )
-    return [f"on this grid {in_words(problem, moved)}"] if moved > UNDETERMINED * problem.scene.cable.length else []
+    moved = max(goes_astray(problem, motion, Monitor(), hard=False), settles_elsewhere(problem, motion.grid, Monitor()))
+    if moved > UNDETERMINED * length:
+        return [f"on this grid {in_words(problem, moved)}"]
+    gives = gives_way(problem, motion, Monitor())
+    told = f"on this grid {firmness_in_words(gives)}, which the estimated error leaves out"
+    return [told] if gives > DOUBTFUL * length else []
 
 
 def turns_unsurely(level: Level) -> bool:

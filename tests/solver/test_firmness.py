@@ -123,3 +123,15 @@ def test_grids_that_would_do_without_it_are_refined_further(monkeypatch: pytest.
     found = predict(scene)
     assert found.accuracy.n_u * found.accuracy.steps > plain.accuracy.n_u * plain.accuracy.steps
     assert len(set(looked)) == len(looked) - 1  # each grid once, the first of them twice
+
+
+def test_on_a_given_grid_a_note_tells_of_it_where_it_is_more_than_a_thousandth():
+    scenes = [
+        dataclasses.replace(dropped(tilt), quality=Quality(n_u=25, n_t=41, keep_grid=True)) for tilt in (0.0, 0.3)
+    ]
+    flat, tilted = (predict(scene) for scene in scenes)
+    assert flat.status == tilted.status == "converged"
+    assert gives_way(tilted.level.problem, tilted.level.motion, Monitor()) > DOUBTFUL * LENGTH
+    note = f"on this grid {TOLD.removeprefix('But ')}"
+    assert note in tilted.message
+    assert note not in flat.message
