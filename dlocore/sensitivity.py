@@ -23,7 +23,7 @@ from dlocore.errors import SceneError
 from dlocore.kernels.sensitivity import factor_steps, follow_steps
 from dlocore.kernels.timefit import fit_time
 from dlocore.prediction import Prediction
-from dlocore.problem.discretisation import applied_forces
+from dlocore.problem.discretisation import applied_forces, applied_in_steps
 from dlocore.problem.events import closed_grasps
 from dlocore.problem.grid import Grid
 from dlocore.problem.holding import Starts
@@ -154,7 +154,7 @@ def beside(known: KnownMotion, problem: Problem, grid: Grid) -> tuple[Floats, Fl
         h = (end - begin) / (last - first)
         entry, a, G = _enter(problem, grid, starts, times, first, last, states[first], v, history)
         v = entry.v.copy()
-        applied = applied_forces(problem, grid, times[first : last + 1])
+        applied = applied_in_steps(problem, grid, times[first : last + 1], begin, end)
         left = follow_steps(
             problem.axes, stretch.jumps, h, known.motion.rho, _FOLLOWED * length,
             known.motion.states[first : last + 1], stretch.factors, states[first : last + 1], v, a, G, density, dragged,

@@ -375,3 +375,31 @@ def applied_forces(problem: Problem, grid: Grid, t: Floats) -> Floats:
         force = problem.rates(load.at(t))
         applied[:, first : first + 4] += b[:, None] * force[:, None, :]
     return applied
+
+
+def applied_in_steps(problem: Problem, grid: Grid, times: Floats, begin: float, end: float) -> Floats:
+    """Return the applied forces (1 or k, n_u, nc) [N] with which a march steps to evenly spaced times (k,) [s].
+
+    Loads are weighed over the steps before and after each time, so that none is stepped over, however short it is: of
+    its impulse nothing is lost (docs/model.md eq. 13b). A stretch is entered with the forces at its `begin` [s]; what
+    their mean would have more comes with the next step. What comes after its `end` [s] is not known to it.
+    """
+    applied = applied_forces(problem, grid, times)
+    h = times[1] - times[0]
+    for load in problem.scene.loads:
+        if load.times is None:
+            continue
+        at, force = cast(Floats, load.times), cast(Floats, load.force)
+        slopes = np.diff(force, axis=0) / np.diff(at)[:, None]
+        turns = np.diff(slopes, axis=0, prepend=np.zeros((1, 3)), append=np.zeros((1, 3)))
+        inside = (at > times[0]) & (at < min(times[-1] + h, end))
+        at, turns = at[inside], turns[inside]
+        before = np.searchsorted(times, at, side="right") - 1
+        mean = np.zeros((len(times) + 1, 3))
+        for rows, apart in ((before, at - times[before]), (before + 1, h - (at - times[before]))):
+            np.add.at(mean, rows, turns * (np.clip(h - apart, 0.0, h) ** 3 / (6.0 * h**2))[:, None])
+        if times[0] == begin:
+            mean[1] += mean[0]
+        first, b = grid.rows(load.u)
+        applied[:, first : first + 4] += b[:, None] * problem.rates(mean[:-1])[:, None, :]
+    return applied

@@ -24,7 +24,7 @@ from dlocore.kernels.march import (
 from dlocore.kernels.tension import COLUMNS
 from dlocore.kernels.twisted_rows import PAST
 from dlocore.pickling import state_with
-from dlocore.problem.discretisation import applied_forces
+from dlocore.problem.discretisation import applied_forces, applied_in_steps
 from dlocore.problem.events import closed_grasps
 from dlocore.problem.grid import Grid
 from dlocore.problem.holding import Starts, hold
@@ -386,7 +386,8 @@ class _Walk:
 
         `times` (rows of states,) [s] are those of the states.
         """
-        applied = applied_forces(self._problem, self._grid, times)
+        begins, ends = self._times[[stretch.first, stretch.last]]
+        applied = applied_in_steps(self._problem, self._grid, times, begins, ends)
         self._info[DIVIDED_FROM] -= base
         march_steps(
             self._problem.axes, start, stop, begin, jumps, h, rho, self._tolerance, states, stretch.v, stretch.a,
