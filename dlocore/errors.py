@@ -117,6 +117,14 @@ def number(
     return x
 
 
+def whole(field: str, value: Any, *, at_least: int, at_most: int) -> int:
+    """Return `value` as an int, or raise SceneError unless it is an integer in the allowed range."""
+    integer = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not integer or not at_least <= value <= at_most:
+        raise SceneError(field, _typed(value), f"an integer, {at_least} to {at_most}")
+    return int(value)
+
+
 def array(field: str, value: ArrayLike, *, shape: tuple[int | None, ...], unit: str = "") -> NDArray[np.float64]:
     """Return `value` as a read-only float array of `shape` (None: any length), or raise SceneError."""
     sizes = " x ".join("n" if n is None else str(n) for n in shape)

@@ -83,6 +83,7 @@ def predict(
     """
     instance("scene", scene, Scene, "a Scene")
     instance("like", like, Prediction | None, "a Prediction, or None")
+    instance("cost", cost, Cost | None, "a Cost, as stored_cost returns it, or None")
     flag("keep_grid", keep_grid)
     monitor = Monitor(on_iteration, time_allowed(deadline), cancelled)
     keep_grid = keep_grid or scene.quality.keep_grid

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 from threading import Event, Lock, Thread
 from typing import cast
 
-from dlocore.errors import SceneError, number
+from dlocore.errors import SceneError, whole
 from dlocore.front import predict
 from dlocore.machine import usable_cores
 from dlocore.prediction import Prediction
@@ -43,7 +43,7 @@ def predict_many(
         SceneError: `threads` is no positive whole number, or `scenes` are none.
         Cancelled: `cancelled` returned True.
     """
-    wanted = usable_cores() if threads is None else int(number("threads", threads, at_least=1, at_most=1024))
+    wanted = usable_cores() if threads is None else whole("threads", threads, at_least=1, at_most=1024)
     if not isinstance(scenes, Iterable):
         raise SceneError("scenes", scenes, "scenes one after the other, as a list of them")
     given = list(scenes)

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.answer.report import surface_of
-from dlocore.errors import SceneError
+from dlocore.errors import SceneError, instance, instances
 from dlocore.kernels.sensitivity import factor_steps, follow_steps
 from dlocore.kernels.timefit import fit_time
 from dlocore.prediction import Prediction
@@ -34,7 +34,7 @@ from dlocore.solvers.march import March, march
 from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.stretch import Entry, enter, with_what_lasts
 from dlocore.solvers.watched import watched
-from dlocore.spline import SplineSurface
+from dlocore.spline import SplineSurface, in_range
 from dlocore.stability.sideways import pose_as_shown
 from dlocore.statics.statics import start_grid
 
@@ -42,6 +42,8 @@ Floats = NDArray[np.float64]
 
 STEP = 1e-4  # relative, of the parameter: the difference's own error is its square
 COARSE_STEP = 1e-2  # where whole marches are compared, whose tolerance would drown a smaller one
+_FITTED = ("shape.points[", "cable.rest_shape[")  # numbers that a curve is fitted through
+_FITTED_STEP = 3e-3  # of the length, of theirs: the choice of smoothness moves the curve by a millionth, at any change
 _FOLLOWED = 1e-12  # of the length, on the last update of a followed step
 _STRAYED = 1e-8  # of the length: a step left with more than this was not followed
 
@@ -136,6 +138,8 @@ def beside(known: KnownMotion, problem: Problem, grid: Grid) -> tuple[Floats, Fl
         ValueError: the motion strays too far to be followed.
     """
     states = np.empty_like(known.motion.states)
+    if problem.nc != states.shape[2]:
+        raise ValueError("the motion beside it has other effects, or leaves its plane")
     states[0] = grid.start
     times = known.motion.times.copy()
     active, parameters = problem.law_table()
@@ -144,8 +148,6 @@ def beside(known: KnownMotion, problem: Problem, grid: Grid) -> tuple[Floats, Fl
     length = problem.scene.cable.length
     velocity = v
     marks = marks_of(problem)
-    if problem.nc != states.shape[2]:
-        raise ValueError("the motion beside it has other effects")
     if len(marks) != len(known.stretches) + 1:
         raise ValueError("the parameter brings an event into the motion, or takes one out")
     for stretch, (begin, end) in zip(known.stretches, pairwise(marks), strict=True):
@@ -161,7 +163,7 @@ def beside(known: KnownMotion, problem: Problem, grid: Grid) -> tuple[Floats, Fl
             grid.tables, active, parameters, history, applied, entry.held.elimination, entry.offsets,
         )  # fmt: skip
         if not left <= _STRAYED * length:
-            raise ValueError(f"the motion beside it can't be followed: a step was left with {left:.2g} m")
+            raise ValueError("the motion beside it is too far from it to be followed, as one in another plane is")
         velocity = entry.velocity(states[0], states[1], h, times[1]) if first == 0 else velocity
     return states, times, velocity
 
@@ -213,8 +215,14 @@ class Sensitivities:
     below: tuple[SplineSurface, ...]
 
     def __call__(self, u: ArrayLike, t: ArrayLike) -> Floats:
-        """Return dr/dparameter on the grid of t (m,) [s] and u (k,) [m]; (parameters, m, k, 3) [m per its unit]."""
-        u, t = np.atleast_1d(np.asarray(u, float)), np.atleast_1d(np.asarray(t, float))
+        """Return dr/dparameter on the grid of t (m,) [s] and u (k,) [m]; (parameters, m, k, 3) [m per its unit].
+
+        Raises:
+            SceneError: a place is off the cable, or a time outside the predicted time.
+        """
+        surfaces = (*self.above, *self.below)
+        u = in_range("u", u, max((s.length for s in surfaces), default=np.inf), "m")
+        t = in_range("t", t, max((s.horizon for s in surfaces), default=np.inf), "s")
         both = zip(self.above, self.below, self.steps, strict=True)
         # beyond the end of a cable or a motion that is a little shorter, its end
         return np.array([(_at(high, u, t) - _at(low, u, t)) / (2.0 * step) for high, low, step in both])
@@ -239,8 +247,8 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     Raises:
         SceneError: a path leads to no number, or to one that can be neither less nor more.
     """
-    if isinstance(wrt, str):
-        raise SceneError("wrt", wrt, 'paths one after the other, as ["cable.bending_stiffness"]')
+    instance("prediction", prediction, Prediction, "a Prediction")
+    wrt = instances("wrt", wrt, str, 'paths such as "cable.bending_stiffness"')
     scene, accuracy = prediction.scene, prediction.accuracy
     values = [_number(scene, name) for name in wrt]
     monitor = Monitor(None, None, None)
@@ -277,15 +285,18 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     for name, value in zip(wrt, values, strict=True):
         size = abs(value) if value != 0.0 else 1.0
         surfaces: list[SplineSurface] = []
-        followed = known is not None
+        fitted = name.startswith(_FITTED)
+        followed = known is not None and not fitted
+        if fitted:
+            reason = "a fit through points chooses its smoothness anew"
         sides = around(name, value, STEP * size) if followed else []
         try:
-            if known is not None:
+            if known is not None and followed:
                 surfaces = [_surface(p, g, *beside(known, p, g), _moved(knots_t, problem, p)) for _, p, g in sides]
         except ValueError as error:
             followed, reason = False, str(error)
         if not followed:
-            sides = around(name, value, COARSE_STEP * size)
+            sides = around(name, value, _FITTED_STEP * scene.cable.length if fitted else COARSE_STEP * size)
             marched = [(p, g, march(p, g, motion.asked, monitor, rho=motion.rho)) for _, p, g in sides]
             surfaces = [
                 _surface(p, g, m.states, m.times, m.velocity, _moved(knots_t, problem, p)) for p, g, m in marched

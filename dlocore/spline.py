@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dlocore.errors import SceneError
+from dlocore.errors import SceneError, whole
 
 Floats = NDArray[np.float64]
 DEGREE = 3
-_ORDERS = tuple(range(DEGREE + 1))  # of derivatives
 _TINY = 1e-300  # the least |r'|^3 that is divided by
+_MOST_SAMPLES = 1_000_000  # evenly spaced, in either direction
 _ROUNDING = 1e-9  # of the length, or of the time: how far beyond its ends a surface is read
 
 
@@ -41,19 +41,20 @@ def spline_at(knots: Floats, control_points: Floats, x: ArrayLike, derivative: i
 
 def in_range(name: str, x: ArrayLike, end: float, unit: str) -> Floats:
     """Return `x` as an array (k,), or raise SceneError unless all of it is within 0 to `end`, but for rounding."""
-    x = np.atleast_1d(np.asarray(x, dtype=float))
-    margin = _ROUNDING * end
+    allowed, margin = f"finite numbers at least 0 at most {end:g} [{unit}]", _ROUNDING * end
+    try:
+        x = np.atleast_1d(np.asarray(x, dtype=float))
+    except (TypeError, ValueError):
+        raise SceneError(name, repr(x), allowed) from None
     for k in (x.argmin(), x.argmax()) if x.size else ():  # of what is not a number, where there is any
         if not -margin <= x.item(k) <= end + margin:
-            raise SceneError(name, x.item(k), f"finite numbers at least 0 at most {end:g} [{unit}]")
+            raise SceneError(name, x.item(k), allowed)
     return x
 
 
 def _order(name: str, order: int) -> int:
     """Return the order of a derivative, or raise SceneError unless a cubic has it."""
-    if order not in _ORDERS:
-        raise SceneError(name, order, "an order of 0 to 3, which a cubic has")
-    return order
+    return whole(name, order, at_least=0, at_most=DEGREE)  # of those that a cubic has
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,8 +113,8 @@ class SplineSurface:
 
     def sample(self, samples_u: int = 101, samples_t: int = 33) -> tuple[Floats, Floats, Floats]:
         """Return evenly spaced u (samples_u,) [m] and t (samples_t,) [s], and q there (samples_t, samples_u, 4)."""
-        u = np.linspace(0.0, self.length, samples_u)
-        t = np.linspace(0.0, self.horizon, samples_t)
+        u = np.linspace(0.0, self.length, whole("samples_u", samples_u, at_least=1, at_most=_MOST_SAMPLES))
+        t = np.linspace(0.0, self.horizon, whole("samples_t", samples_t, at_least=1, at_most=_MOST_SAMPLES))
         return u, t, self(u, t)
 
     def curvature(self, u: ArrayLike, t: ArrayLike) -> Floats:

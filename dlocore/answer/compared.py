@@ -38,18 +38,23 @@ def at_times(t: Floats, times: Floats, values: Floats) -> Floats:
 
 
 def apart(own: Series, other: Series) -> Floats | None:
-    """Return the distance (k,) of vectors over time to others, between each same two events, None without the same."""
-    if len(own.parts) != len(other.parts):
-        return None
-    met = [
-        at_times(own.times[here], other.times[there], other.values[there])
-        for here, there in zip(own.parts, other.parts, strict=True)
-    ]
+    """Return the distance (k,) of vectors over time to others, in each part to those of the same time.
+
+    None where one of the parts has no other beside it: a least squares has fewer, as it goes through events.
+    """
+    met = []
+    for here in own.parts:
+        begin, end = own.times[here][[0, -1]]
+        beside = [there for there in other.parts if other.times[there][-1] > begin and other.times[there][0] < end]
+        if not beside:
+            return None
+        there = slice(beside[0].start, beside[-1].stop)
+        met.append(at_times(own.times[here], other.times[there], other.values[there]))
     return np.asarray(np.linalg.norm(own.values - np.concatenate(met), axis=1))
 
 
 def errors(own: Series, others: Sequence[Series]) -> Floats | None:
-    """Return the estimated errors (k,) of vectors over time, None where no other series has as many parts.
+    """Return the estimated errors (k,) of vectors over time, None where no other series is beside all of them.
 
     It is _LEFT times the largest distance to another series within a _NEARBYth of the motion (docs/model.md, grids and
     error estimate).

@@ -154,7 +154,11 @@ class MaterialMotion:
     natural: Floats
 
     def at(self, t: float) -> Material:
-        """Return what the sections remember at time `t` [s], linear between the stored times."""
+        """Return what the sections remember at time `t` [s], linear between the stored times.
+
+        Raises:
+            SceneError: a time outside the predicted time.
+        """
         k, s = _bracket(self.times, t)
         director = (1 - s) * self.director[k] + s * self.director[k + 1]
         return Material(
@@ -183,7 +187,11 @@ class StretchMotion:
     strain: Floats
 
     def at(self, t: float) -> Floats:
-        """Return the axial strain (k,) at time `t` [s], linear between the stored times."""
+        """Return the axial strain (k,) at time `t` [s], linear between the stored times.
+
+        Raises:
+            SceneError: a time outside the predicted time.
+        """
         k, s = _bracket(self.times, t)
         return np.asarray((1 - s) * self.strain[k] + s * self.strain[k + 1])
 
@@ -198,7 +206,12 @@ class StretchMotion:
 
 
 def _bracket(times: Floats, t: float) -> tuple[int, float]:
-    """Return which of the times (m,) [s] is the last before `t`, and the share of the way from it to the next."""
+    """Return which of the times (m,) [s] is the last before `t`, and the share of the way from it to the next.
+
+    Raises:
+        SceneError: `t` is outside them.
+    """
+    t = float(in_range("t", t, float(times[-1]), "s")[0])
     k = int(np.clip(np.searchsorted(times, t) - 1, 0, len(times) - 2))
     return k, float(np.clip((t - times[k]) / (times[k + 1] - times[k]), 0.0, 1.0))
 

@@ -126,8 +126,7 @@ class Cable:
         Raises:
             SceneError: no such preset or field.
         """
-        if name not in PRESETS:
-            raise SceneError("preset", name, "one of " + ", ".join(PRESETS))
+        choice("preset", name, tuple(PRESETS))
         unknown = set(overrides) - {f.name for f in fields(Cable)}
         if unknown:
             raise SceneError(sorted(unknown)[0], overrides[sorted(unknown)[0]], "a field of Cable")

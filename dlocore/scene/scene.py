@@ -21,6 +21,7 @@ from dlocore.errors import (
     instances,
     number,
     points_array,
+    whole,
 )
 from dlocore.scene.cable import Cable
 from dlocore.scene.obstacles import Obstacle
@@ -342,11 +343,8 @@ class Quality:
     def __post_init__(self) -> None:
         for name, most in (("n_u", MAX_N_U), ("n_t", MAX_N_T)):
             value = getattr(self, name)
-            if value is None:
-                continue
-            if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 5 <= value <= most:
-                raise SceneError(name, value, f"an integer, 5 to {most}")
-            object.__setattr__(self, name, int(value))
+            if value is not None:
+                object.__setattr__(self, name, whole(name, value, at_least=5, at_most=most))
         if self.delta is not None:
             object.__setattr__(self, "delta", number("delta", self.delta, at_least=1e-10, at_most=1e-2, unit="m"))
         choice("method", self.method, ("auto", "march", "spacetime", "paper", "reference"))

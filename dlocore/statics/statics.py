@@ -11,7 +11,7 @@ from dlocore.answer.frames import free_of_frames
 from dlocore.answer.parts import Status, with_notes
 from dlocore.answer.reactions import reactions
 from dlocore.answer.report import elastic_energy
-from dlocore.errors import SceneError, number
+from dlocore.errors import SceneError, number, whole
 from dlocore.problem.buckling import UNSTABLE, side_notes
 from dlocore.problem.discretisation import make_grid, smallest_n_u
 from dlocore.problem.events import closed_grasps
@@ -20,7 +20,7 @@ from dlocore.problem.notes import cable_notes
 from dlocore.problem.problem import Problem, pose
 from dlocore.scene.scene import Scene
 from dlocore.solvers.monitor import Monitor, time_allowed
-from dlocore.spline import design_matrix
+from dlocore.spline import design_matrix, in_range
 from dlocore.stability.determined import UNDETERMINED, bend_in_words, bent
 from dlocore.stability.sideways import WITH_TWIST, is_unstable, lacks_twist, solved_in_space
 from dlocore.statics.regrid import begin_on, starts_folded
@@ -66,8 +66,12 @@ class Equilibrium:
     error_estimate: float | None
 
     def positions(self, u: ArrayLike) -> Floats:
-        """Return r at the material coordinates u (k,) [m]; (k, 3) [m]."""
-        return design_matrix(self.knots_u, np.atleast_1d(u)) @ self.control_points[:, :3]
+        """Return r at the material coordinates u (k,) [m]; (k, 3) [m].
+
+        Raises:
+            SceneError: a place is off the cable.
+        """
+        return design_matrix(self.knots_u, in_range("u", u, float(self.knots_u[-1]), "m")) @ self.control_points[:, :3]
 
 
 def equilibrium(
@@ -87,7 +91,7 @@ def equilibrium(
     Args:
         scene: its horizon, inertia, drag, damping and friction play no part.
         at: time of the grasps' poses and of the loads [s].
-        n_u: number of control points; None: chosen.
+        n_u: number of control points, as many as the scene needs at least, 385 at most; None: chosen.
         deadline: time allowed [s].
         cancelled: asked between relaxations; where it returns True the solve stops.
 
@@ -104,7 +108,10 @@ def equilibrium(
     monitor = Monitor(None, time_allowed(deadline), cancelled)
     target = scene.quality.target_error or 1e-4 * scene.cable.length
     least = smallest_n_u(problem)
-    sizes = [n_u] if n_u is not None else [max(n, least + 2 * i) for i, n in enumerate(LEVELS)]
+    if n_u is None:
+        sizes = [max(n, least + 2 * i) for i, n in enumerate(LEVELS)]
+    else:
+        sizes = [whole("n_u", n_u, at_least=least, at_most=max(least, LEVELS[-1]))]
     rest, notes = _refined(problem, sizes, at, target, monitor), cable_notes(scene)
     found = rest.settled
     if rest.status == "converged" and is_unstable(problem, rest.grid, found.q, at, found.history):

@@ -169,6 +169,13 @@ BAD: list[tuple[str, Callable[[], object]]] = [
     ("shape.settle", lambda: predict(scene(shape=Straight(settle=True), grasps=(), horizon=1.0))),
     ("primitives", lambda: equilibrium(scene(grasps=(), horizon=1.0))),
     ("at", lambda: equilibrium(scene(), at=NAN)),
+    ("n_u", lambda: equilibrium(scene(), n_u=9.5)),  # type: ignore[arg-type]
+    ("n_u", lambda: equilibrium(scene(), n_u="9")),  # type: ignore[arg-type]
+    ("n_u", lambda: equilibrium(scene(), n_u=3)),
+    ("n_u", lambda: equilibrium(scene(), n_u=10**6)),
+    ("u", lambda: equilibrium(scene(grasps=(SIDE,))).positions([0.5, 5.0])),
+    ("cost", lambda: predict(scene(), cost=3)),  # type: ignore[arg-type]
+    ("preset", lambda: Cable.preset(["paper"])),  # type: ignore[arg-type]
     # quality
     ("n_u", lambda: Quality(n_u=4, n_t=13)),
     ("n_u", lambda: Quality(n_u=9.0, n_t=13)),  # type: ignore[arg-type]

@@ -115,7 +115,22 @@ def test_the_error_is_that_to_the_farthest_grid_between_the_same_events() -> Non
     np.testing.assert_array_equal(both, other_way)
     np.testing.assert_allclose(one, 1.5)
     np.testing.assert_allclose(both, 3.0)
-    assert errors(own, [Series(other, parts_of([4]), near.values)]) is None  # of another number of events
+    first = slice(0, 2)
+    assert (
+        errors(own, [Series(other[first], parts_of([2]), near.values[first])]) is None
+    )  # ended before the second part
+
+
+def test_a_least_squares_has_them_though_it_goes_through_events_that_marches_stop_at() -> None:
+    waits = paper_scene(0.25, quality=Quality(n_u=9, n_t=19, method="spacetime"))
+    found = predict(replace(waits, horizon=2.5))
+    assert (found.status, found.accuracy.method) == ("converged", "spacetime")
+    fine = predict(replace(waits, horizon=2.5, quality=Quality(target_error=1e-4)))
+    ours, theirs = found.grasps[0], fine.grasps[0]
+    compared = apart(ours, theirs)
+    assert compared is not None
+    assert ours.reaction_error is not None
+    assert np.mean(compared[0] <= ours.reaction_error) > 0.9
 
 
 def test_a_motion_that_goes_on_from_one_like_it_takes_on_the_errors_of_its_forces() -> None:

@@ -108,7 +108,7 @@ def test_no_scenes_give_no_predictions():
     assert predict_many(iter([])) == []
 
 
-@pytest.mark.parametrize("threads", [0, -1, float("nan"), "2", True, 10**9])
+@pytest.mark.parametrize("threads", [0, -1, 2.5, float("nan"), "2", True, 10**9])
 def test_a_wrong_number_of_threads_is_refused_by_name(threads: object):
     with pytest.raises(SceneError) as error:
         predict_many([scene(0.2)], threads=threads)  # type: ignore[arg-type]

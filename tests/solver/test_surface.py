@@ -71,7 +71,7 @@ def test_a_time_outside_the_predicted_time_is_refused_by_its_value(t: float, tim
         assert caught.value.allowed == "finite numbers at least 0 at most 2 [s]"
 
 
-@pytest.mark.parametrize("order", [-1, 4])
+@pytest.mark.parametrize("order", [-1, 4, 1.0, "1", True])
 def test_a_derivative_that_a_cubic_does_not_have_is_refused(order: int):
     q = surface(9, 20)
     for name in ("du", "dt"):
@@ -80,6 +80,20 @@ def test_a_derivative_that_a_cubic_does_not_have_is_refused(order: int):
         assert caught.value.field == name
     with pytest.raises(SceneError, match="dt: got"):
         q.states([0.5], order)
+
+
+@pytest.mark.parametrize("u", [["a"], [None, "b"], [[0.1], [0.2, 0.3]]])
+def test_what_is_no_place_is_refused_by_its_value(u: list[object]):
+    with pytest.raises(SceneError, match="u: got "):
+        surface(9, 20)(u, [0.5])
+
+
+@pytest.mark.parametrize(
+    ("name", "count"), [("samples_u", 0), ("samples_t", -1), ("samples_u", 2.5), ("samples_t", "9")]
+)
+def test_a_number_of_samples_that_is_none_is_refused(name: str, count: object):
+    with pytest.raises(SceneError, match=f"{name}: got .* Allowed: an integer, 1 to 1000000"):
+        surface(9, 20).sample(**{name: count})
 
 
 def test_the_ends_are_read_with_their_rounding():
@@ -112,6 +126,9 @@ def test_what_reads_a_motion_refuses_other_times_places_and_cables():
     for u, t in ((2.0, 0.5), (-1.0, 0.5), (0.5, 50.0), (0.5, np.nan)):
         with pytest.raises(SceneError, match=r"[ut]: got"):
             found.stretch.along(u, t)
+    for t in (-1.0, 50.0, np.nan):
+        with pytest.raises(SceneError, match="t: got"):
+            found.stretch.at(t)
     assert found.stretch.along(0.5, 0.5) == found.stretch.along([0.5], [0.5])
 
 
