@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.answer.parts import MaterialMotion, StretchMotion
-from dlocore.answer.tension import balanced
 from dlocore.answer.transport import transported
 from dlocore.kernels.angles import angles_with
 from dlocore.kernels.basis import spline_values
@@ -21,6 +20,7 @@ from dlocore.problem.discretisation import axial_strain, start_director
 from dlocore.problem.grid import Grid
 from dlocore.problem.plane import turned_about
 from dlocore.problem.problem import Problem
+from dlocore.problem.tension import balanced
 from dlocore.spline import DEGREE, SplineSurface
 
 Floats = NDArray[np.float64]

@@ -22,6 +22,7 @@ from dlocore.problem.grid import Grid
 from dlocore.problem.holding import Starts, close_grasps, hold
 from dlocore.problem.plane import leftwards, turned_about
 from dlocore.problem.problem import Problem
+from dlocore.problem.tension import at_points
 from dlocore.scene.paths import Waypoints
 from dlocore.scene.scene import Material, Points
 from dlocore.shape.shape import SplineCurve, fit_to_knots, spin_to_knots, start_curve, velocity_to_knots
@@ -128,12 +129,20 @@ def _history_of(problem: Problem, grid: Grid) -> History:
     history.memory[:] = _memory(problem, grid, history)
     if problem.start.bow:
         strain = axial_strain(grid.tables, grid.start[:, : problem.plane.dimensions])
-        history.axial[:, 0] = strain - problem.start.strain_at(grid.tables.axial.u)
+        history.axial[:, 0] = strain - _start_strain(problem, grid)
     if problem.start.material is not None:
         _write_stretch(grid, history, problem.start.material)
     if problem.keeps_history:
         remember_start(problem.axes, grid.start, grid.tables, *problem.laws, history)
     return history
+
+
+def _start_strain(problem: Problem, grid: Grid) -> Floats:
+    """Return the axial strain of the start at the axial points (p,)."""
+    start = problem.start
+    return (
+        np.zeros(len(grid.tables.axial.u)) if start.strain is None else at_points(problem.scene, grid, start.strain_at)
+    )
 
 
 def start_director(problem: Problem) -> Floats:
@@ -354,7 +363,7 @@ def consistent_start(problem: Problem, grid: Grid, *, touches: bool = True) -> F
     active, parameters = line.law_table()
     kept = [laws.STRETCH, *([laws.CONTACT, laws.TABLE] if touches else [])]
     active[[row for row in range(laws.COUNT) if row not in kept]] = 0
-    history.axial[:, 0] = problem.start.strain_at(grid.tables.axial.u)
+    history.axial[:, 0] = _start_strain(problem, grid)
     strength = 1e-3 * parameters[0, 0] * (grid.n_u / problem.scene.cable.length) ** 2
     q = start.copy()
     relax(

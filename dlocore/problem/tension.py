@@ -1,4 +1,4 @@
-"""The axial strain that balances the forces along the cable, from that at the points of reduced integration.
+"""The axial strain that balances the forces along the cable, from that at the points of reduced integration, and back.
 
 It is the quadratic spline e on the knots of the grid with
 
@@ -8,6 +8,8 @@ of which the b_i' are combinations, so that the forces on all control points are
 selective reduced integration). Where a force acts in a point a step is added, where a direction is held, with unit
 length, a force on phi_j(u_g): both are as large as leaves e least curved.
 """
+
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +47,23 @@ def balanced(scene: Scene, grid: Grid, u: Floats) -> Floats:
     forces = -np.linalg.pinv(curved @ others) @ (curved @ own)
     jumps = np.array([np.heaviside(u - g, 0.5) for g in inside]).reshape(-1, len(u)).T
     return _basis(knots, u) @ (own + others @ forces) + jumps @ forces[len(sides) :]
+
+
+def at_points(scene: Scene, grid: Grid, strain: Callable[[Floats], Floats]) -> Floats:
+    """Return the strain at the axial points (p,) of a grid that bears what a `strain` along the cable does.
+
+    `strain` takes places (k,) [m] and returns (k,). What is returned has the forces on all control points that it has,
+    and is otherwise as near to it as it can be.
+    """
+    tables, knots, length = grid.tables, grid.knots[1:-1], float(grid.knots[-1])
+    points, weights = gauss_points(np.array(grid.knots), *GAUSS_3)
+    own = strain(tables.axial.u)
+    forces = _basis(knots, tables.axial.u).T * tables.axial.w
+    left = _basis(knots, points).T @ (weights * strain(points)) - forces @ own
+    sides = [np.nextafter(g.u, to) for g in scene.grasps if g.hold != "point" for to in (0.0, length)]
+    held = _basis(knots, np.array(sides)).T
+    found = np.linalg.lstsq(np.hstack([forces, held]), left, rcond=None)[0]
+    return own + found[: len(own)]
 
 
 def _basis(knots: Floats, u: Floats, derivative: int = 0) -> Floats:
