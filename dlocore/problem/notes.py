@@ -6,7 +6,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.scene.paths import Move
+from dlocore.scene.paths import Move, Waypoints
 from dlocore.scene.scene import Points, Scene
 from dlocore.shape.shape import StartCurve, start_curve
 from dlocore.words import in_mm
@@ -18,12 +18,15 @@ SAME_LENGTH = 5e-3  # of the cable's: lengths of points that differ by less are 
 SAME_ENDS = 1e-3  # of the length: and so are ends, as those of noisy points, which the cable's length decides about
 SAME_START = 1e-3  # of the length: a start that is moved by less was seen there
 ABOUT_ITSELF = 0.9  # of the turn of a gripper: what is about the cable that it holds, so that little else is left
+OVERSHOOTS = 0.5  # of the extent of waypoints: how far a path may swing out of the box around them without a word ...
+OUT = 1e-2  # ... and of the length
+_BETWEEN = 8  # places of a path between each two waypoints at which that is looked at
 _PLACES = 65  # of a start at which it is looked at
 
 
 def scene_notes(scene: Scene) -> list[str]:
     """Return what is to be known of a scene as it was given, in words."""
-    return [*cable_notes(scene), *_of_times(scene), *_of_turns(scene)]
+    return [*cable_notes(scene), *_of_times(scene), *_of_turns(scene), *_of_overshoots(scene)]
 
 
 def cable_notes(scene: Scene) -> list[str]:
@@ -95,5 +98,25 @@ def _of_turns(scene: Scene) -> list[str]:
             notes.append(
                 f"primitives[{i}] turns about the cable, which hold 'tangent' lets turn in the gripper: "
                 "hold 'clamp' twists it"
+            )
+    return notes
+
+
+def _of_overshoots(scene: Scene) -> list[str]:
+    """Return what is told of paths that swing far out of their waypoints, as smooth ones through uneven times do."""
+    notes = []
+    for i, grasp in enumerate(scene.grasps):
+        if not isinstance(grasp.path, Waypoints):
+            continue
+        times, given = cast(Floats, grasp.path.times), cast(Floats, grasp.path.positions)
+        between = np.linspace(0.0, 1.0, _BETWEEN, endpoint=False)
+        t = (times[:-1, None] + np.diff(times)[:, None] * between).ravel()
+        path, low, high = grasp.path.at(t, given[0]), given.min(axis=0), given.max(axis=0)
+        out = np.linalg.norm(np.maximum(0.0, np.maximum(low - path, path - high)), axis=1)
+        k = int(np.argmax(out))
+        if out[k] > max(OVERSHOOTS * float(np.linalg.norm(high - low)), OUT * scene.cable.length):
+            notes.append(
+                f"the path of primitives[{i}] swings out of its waypoints by up to {in_mm(out[k])}, at "
+                f"{grasp.start + t[k]:.3g} s, as it goes smoothly through uneven times: more even ones keep it in"
             )
     return notes

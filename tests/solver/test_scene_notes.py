@@ -13,6 +13,7 @@ from dlocore import (
     Scene,
     Straight,
     Table,
+    Waypoints,
     equilibrium,
     predict,
 )
@@ -150,3 +151,33 @@ def test_an_error_that_is_much_of_a_small_motion_is_told_of(length: float, told:
     found = predict(Scene(cable=rope, shape=Straight(), grasps=[lift], environment=Environment(table=Table())))
     assert found.status == "converged"
     assert any("the cable moves by 1000 mm, of which the estimated error is much" in n for n in found.notes) == told
+
+
+def led(times: Floats, x: Floats) -> Scene:
+    """Return a scene whose gripper goes through places along x [m] from where it closes."""
+    path = Waypoints(times=times, positions=np.outer(x, [1.0, 0.0, 0.0]))
+    return Scene(cable=cable(), shape=Straight(), grasps=[Grasp(u=0.0, path=path)])
+
+
+def test_a_path_that_swings_far_out_of_its_waypoints_is_told_of_with_how_far_and_when() -> None:
+    """Half a second between waypoints, and then 5 ms: between 0 and 30 mm the gripper goes to 0.2 m."""
+    times, x = np.array([0.0, 0.47, 0.94, 0.945, 1.4]), np.array([0.0, 0.02, 0.0, 0.01, 0.03])
+    hasty = led(times, x)
+    (note,) = scene_notes(hasty)
+    t = np.linspace(0.0, 1.4, 20001)
+    path = hasty.grasps[0].path.at(t, np.zeros(3))[:, 0]
+    out = np.maximum(-path, path - 0.03)
+    assert note.startswith("the path of primitives[0] swings out of its waypoints by up to ")
+    told, when = float(note.split("up to ")[1].split(" mm")[0]), float(note.split("at ")[1].split(" s")[0])
+    assert told == pytest.approx(1e3 * out.max(), rel=0.02)
+    assert when == pytest.approx(t[out.argmax()], abs=0.06)
+    assert not scene_notes(led(np.linspace(0.0, 1.4, 5), x))  # in even times it goes smoothly
+
+
+def test_noise_of_a_recorded_path_is_no_swing_out_of_it() -> None:
+    random = np.random.default_rng(3)
+    t = np.linspace(0.0, 2.0, 200)
+    x = 0.1 * np.sin(t) + 5e-4 * random.normal(size=t.size)
+    x[0] = 0.0
+    assert not scene_notes(led(t, x))
+    assert not scene_notes(led(t, 1e-4 * random.normal(size=t.size) * (t > 0)))  # held still
