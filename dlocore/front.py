@@ -256,7 +256,7 @@ def _least_squares(
     compared = by_finer(problem, level, monitor) if known else Compared(None)
     estimate = compared.estimate
     # what the time spline of the march misses is no error of the least squares
-    errors = None if estimate is None else {"grid": max(estimate, level.unseen), "iteration": left}
+    errors = None if estimate is None else {"grid": max(estimate, level.unseen, level.held_back), "iteration": left}
     outcome = Outcome(compared.on(level), status, message + compared.doubt, errors)
     return _answer(monitor, method, outcome, find_forces)
 

@@ -81,15 +81,19 @@ def refined(level: Level, before: Level) -> str:
     return "both" if level.motion.steps > MORE * before.motion.steps else "space"
 
 
-def untold(level: Level) -> float:
-    """Return what no other grid tells of a level [m]: what its time spline misses, and its steps of trembling paths."""
-    return max(MISSED_COUNTS * level.missed, level.unseen)
+def untold(level: Level) -> dict[str, float]:
+    """Return what no other grid tells of a level, or too little, by the direction in which a finer one mends it [m].
+
+    In time that is what its time spline misses, and its steps of trembling paths; in space how far ends whose direction
+    is held keep a stretched cable from where it would be.
+    """
+    return {"space": level.held_back, "time": max(MISSED_COUNTS * level.missed, level.unseen)}
 
 
 def with_untold(parts: Mapping[str, float], level: Level) -> dict[str, float]:
     """Return parts of an error [m], the last one larger where their sum is less than what is `untold`."""
     parts = dict(parts)
-    parts[list(parts)[-1]] += max(0.0, untold(level) - sum(parts.values()))
+    parts[list(parts)[-1]] += max(0.0, max(untold(level).values()) - sum(parts.values()))
     return parts
 
 
@@ -119,7 +123,7 @@ class Changes:
 
     def estimate(self, level: Level) -> float:
         """Return the error [m] of the last level."""
-        return max(self.error, untold(level))
+        return max(self.error, *untold(level).values())
 
     def parts(self, level: Level) -> dict[str, float] | None:
         """Return the parts of that error [m], space and time as far as they are known apart, or None."""

@@ -308,8 +308,9 @@ class _Climb:
             return unfolds
         trembles = MISSED_COUNTS * level.missed > _FINE_IN_TIME * self.target
         sizes = {direction: self._affordable(_finer(size, direction, trembles)) for direction in DIRECTIONS}
-        misses = untold(level) > self.changes.error
-        self.direction = "time" if misses else self.changes.worst()
+        least = untold(level)
+        errs = max(DIRECTIONS, key=lambda direction: least[direction])
+        self.direction = errs if least[errs] > self.changes.error else self.changes.worst()
         change = self.changes.last.get(self.direction)
         if sizes[self.direction] is None and (change is None or change.error < self.target):
             # may still bring the sum of both below it

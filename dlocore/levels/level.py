@@ -14,6 +14,7 @@ from dlocore.problem.checks import TOO_DEEP
 from dlocore.problem.discretisation import smallest_n_u
 from dlocore.problem.events import moments, swings
 from dlocore.problem.grid import Grid
+from dlocore.problem.held_ends import held_back
 from dlocore.problem.problem import Problem, stiff_as_taut, stiffer, stiffer_for
 from dlocore.problem.time_grid import smallest_n_t, time_knots
 from dlocore.problem.trembling import trembles
@@ -96,6 +97,12 @@ class Level:
     def unseen(self) -> float:
         """How far the cable is taken by what the steps do not see of paths through waypoints [m], see `trembles`."""
         return trembles(self.problem, self.problem.horizon / self.motion.steps)
+
+    @cached_property
+    def held_back(self) -> float:
+        """How far unit length at its ends keeps a stretched cable from where it would be [m], see `held_back`."""
+        motion, dimensions = self.motion, self.problem.plane.dimensions
+        return held_back(self.problem.scene, motion.grid, motion.states[..., :dimensions], motion.largest_strain)
 
     @cached_property
     def samples(self) -> Floats:
