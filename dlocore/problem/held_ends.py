@@ -9,9 +9,7 @@ from dlocore.scene.scene import Scene
 
 Floats = NDArray[np.float64]
 
-_SHORT = (
-    0.21  # of the span beside such an end, times the strain there, is what it lacks: tests/solver/test_held_ends.py
-)
+_SHORT = 0.21  # of the span beside such an end, times the strain there, is what it lacks (tests/solver/test_held_ends)
 _NEAR = 3.0  # spans beside it over which the strain is taken: that of single points is a fifth off
 _MATTERS = 1e-5  # of the length: less is not looked for
 
