@@ -66,7 +66,7 @@ def warm_up_for(scene: Scene) -> None:
     for name in TAKEN[pose(scene).nc]:
         PARTS[name]()
     if scene.quality.method == "reference":
-        PARTS["others"]()
+        PARTS["reference"]()
 
 
 def _compile_in_processes(at_once: int) -> None:
@@ -138,19 +138,23 @@ def _read_all(answer: Prediction) -> None:
     energies(answer.scene, answer.surface, [0.0])
 
 
-def _others() -> None:
-    """An equilibrium in a plane, without contact, strands that meet, the printed scheme, and the reference."""
-    hangs = Scene(cable=CABLE, shape=Straight(direction=(0.0, 0.0, -1.0)), grasps=(Grasp(u=0.0),), horizon=1.0)
-    equilibrium(hangs, n_u=9)
+def _reference() -> None:
+    """The reference, and strands that meet."""
     turned = np.linspace(0.0, 7.0, 9)
     loop = np.column_stack([np.cos(turned), np.sin(turned), 0.1 * U[:9, 0]])
     nearest_strands(uniform_knots(9, 1.0), loop[None], 3, 0.01, 0.03)
-    as_printed = Quality(n_u=6, n_t=6, method="paper", delta=0.01, keep_grid=True)
-    predict(Scene(cable=CABLE, shape=ARC, grasps=(GRASP,), environment=Environment(table=Table()), quality=as_printed))
     still = Environment(gravity=(0.0, 0.0, 0.0))
     by_reference = Quality(method="reference", target_error=1.0)
     settled = Scene(cable=CABLE, shape=replace(ARC, settle=True), environment=still, horizon=1e-3, quality=by_reference)
     _read_all(predict(settled))
+
+
+def _others() -> None:
+    """An equilibrium in a plane, without contact, and the printed scheme."""
+    hangs = Scene(cable=CABLE, shape=Straight(direction=(0.0, 0.0, -1.0)), grasps=(Grasp(u=0.0),), horizon=1.0)
+    equilibrium(hangs, n_u=9)
+    as_printed = Quality(n_u=6, n_t=6, method="paper", delta=0.01, keep_grid=True)
+    predict(Scene(cable=CABLE, shape=ARC, grasps=(GRASP,), environment=Environment(table=Table()), quality=as_printed))
 
 
 # whole smooth motions first: the code of a function that is loaded first serves all who call it, and they run faster
@@ -164,6 +168,7 @@ PARTS = {
     "derivatives in a plane": lambda: _differentiated(Table(), "auto"),
     "derivatives in space": lambda: _differentiated(None, "off"),
     "derivatives with twist": lambda: _differentiated(None, "on"),
+    "reference": _reference,
     "others": _others,
 }
 # what motions of two, three and four coordinates take
@@ -172,12 +177,13 @@ TAKEN = {
     3: ("smooth in space", "in space"),
     4: ("smooth in space", "with twist"),
 }
-# what one process compiles, the longest first
+# what one process compiles, the longest first; of the last what it has in common with the one before comes late, when
+# that has compiled it
 SHARES = (
     ("with twist", "derivatives with twist"),
     ("smooth in space", "in space", "derivatives in space"),
-    ("smooth in a plane", "in a plane", "derivatives in a plane"),
-    ("others",),
+    ("smooth in a plane", "in a plane"),
+    ("reference", "others", "derivatives in a plane"),
 )
 
 if __name__ == "__main__":
