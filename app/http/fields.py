@@ -35,9 +35,8 @@ class BadField:
     def from_scene_error(error: SceneError) -> "BadField":
         """Return the field that the solver refused."""
         reason = f"{error.reason}. " if error.reason else ""
-        return BadField(
-            error.field, error.given, error.allowed, f"{reason}Got {error.given}. Allowed: {error.allowed}."
-        )
+        given = _written(error.given)
+        return BadField(error.field, given, error.allowed, f"{reason}Got {given}. Allowed: {error.allowed}.")
 
     @staticmethod
     def unknown(field: str, value: str, allowed: str) -> "BadField":
@@ -114,8 +113,13 @@ def _text(steps: list[Any]) -> str:
 def _shown(value: Any, kind: str) -> str:
     if kind in ("too_short", "too_long") and isinstance(value, list):
         return f"{len(value)} items"
-    text = _as_json(value)
+    text = _written(_as_json(value))
     return text if len(text) <= 120 else text[:117] + "..."
+
+
+def _written(text: str) -> str:
+    """Return a text with escapes for halves of surrogate pairs, which JSON can spell but UTF-8 can't hold."""
+    return text.encode(errors="backslashreplace").decode()
 
 
 def _as_json(value: Any) -> str:
@@ -176,6 +180,8 @@ def _allowed(kind: str, context: dict[str, Any], loc: list[Any], whole: "_Schema
         return " or ".join([values, *whole.other_forms(loc)])
     if kind == "string_pattern_mismatch":
         return RUN_ID
+    if kind == "string_unicode":  # of a text, or of a name in an object
+        return "texts and names in Unicode, which has surrogates in pairs only"
     if kind in ("too_short", "too_long"):
         return _bounds(context, "min_length", "max_length", "{} items")
     text = _TYPES.get(kind, "")

@@ -28,7 +28,7 @@ class JsonRequest(Request):
             return orjson.loads(body)
         except orjson.JSONDecodeError as error:
             try:
-                return json.loads(body)
+                return json.loads(body.decode())  # bytes would be taken in UTF-16, too
             except (ValueError, RecursionError):
                 raise error from None
 

@@ -1,6 +1,7 @@
 """Every kind of wrong request is answered by a problem document that names the field."""
 
 import json
+import re
 from typing import Any
 
 import pytest
@@ -234,6 +235,40 @@ def test_a_number_that_is_not_finite_is_refused_by_the_name_of_its_field(client:
         client.post("/v1/predictions", content=body, headers={"content-type": "application/json"}), 422
     )
     assert [error["field"] for error in problem["errors"]] == ["environment.drag"]
+
+
+@pytest.mark.parametrize(
+    ("address", "body", "field"),
+    [
+        ("/v1/predictions", {**PAPER, "name": "\ud800"}, "name"),
+        ("/v1/predictions", {**PAPER, "\ud800": 1}, "body"),
+        ("/v1/predictions", put(PAPER, "cable.preset", "a\udc00"), "cable.preset"),
+        ("/v1/predictions", put(PAPER, "cable.length", {"\ud800": "\udc00"}), "cable.length"),
+        ("/v1/predictions", put(PAPER, "shape", {"kind": "prediction", "id": "\ud800"}), "shape.id"),
+        ("/v1/predictions", put(OBSTRUCTED, "environment.obstacles.2.\ud800", 1), "environment.obstacles[2]"),
+        ("/v1/scenes:explain", put(PAPER, "shape.kind", "\ud800"), "shape.kind"),
+        ("/v1/predictions:batch", {"scenes": [PAPER], "like": "\ud800"}, "like"),
+        ("/v1/shapes:fit", {"points": [[0, 0]] * 4, "outliers": "\ud800"}, "outliers"),
+        ("/v1/cables:identify", {"recordings": [{"name": "\ud800"}]}, "recordings[0].name"),
+        ("/v1/studies", {"scenes": {"a": PAPER}, "judge": "\ud800"}, "judge"),
+    ],
+    ids=range(11),
+)
+def test_half_a_surrogate_pair_is_refused_by_the_name_of_its_field(
+    client: TestClient, address: str, body: dict[str, Any], field: str
+) -> None:
+    problem = the_problem(posted(client, address, json.dumps(body)), 422)
+    (error,) = (error for error in problem["errors"] if error["field"] == field)
+    assert re.search(r"\\ud800|\\udc00", error["given"])  # by its escape
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-8-sig"])
+def test_a_body_that_a_stored_run_could_not_be_read_from_is_refused(client: TestClient, encoding: str) -> None:
+    body = json.dumps(PAPER).encode(encoding)
+    problem = the_problem(
+        client.post("/v1/predictions", content=body, headers={"content-type": "application/json"}), 422
+    )
+    assert problem["errors"][0]["field"] == "body"
 
 
 @pytest.mark.parametrize(

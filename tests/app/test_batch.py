@@ -53,6 +53,15 @@ def test_a_bad_scene_is_a_line_of_its_own_and_spoils_no_other(client: TestClient
     assert client.get("/v1/predictions").json()["total"] == before
 
 
+def test_half_a_surrogate_pair_spoils_no_other_line(client: TestClient) -> None:
+    wrong = [paper_scene(name="\ud800"), {**paper_scene(), "\ud800": 1}, "\ud800"]
+    body = json.dumps({"scenes": [paper_scene(), *wrong, paper_scene()], "store": True, "fields": []})
+    found = lines(client.post(BATCH, content=body, headers={"content-type": "application/json"}).text)
+    assert [line["status"] for line in found] == ["converged", *["failed"] * 3, "converged"]
+    fields = [error["field"] for line in found[1:4] for error in line["problem"]["errors"]]
+    assert fields == ["name", "body", "body"]
+
+
 def test_one_scene_is_moved_in_many_ways_and_stored_where_asked(client: TestClient) -> None:
     ways = [put(paper_scene(), "primitives.0.path.displacement", [0, y, 0])["primitives"] for y in (0.1, 0.2, 0.3)]
     response = client.post(BATCH, json={"scene": paper_scene(name="sweep"), "primitives": ways, "store": True})
