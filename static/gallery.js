@@ -8,6 +8,7 @@ const note = document.getElementById("gallery-note");
 const caption = document.getElementById("caption");
 const curl = document.getElementById("example-curl");
 const stage = document.getElementById("stage");
+const FIRST = "paper-25"; // the scene that is shown where the address names none
 
 function curlLine(example) {
   const origin = window.location.origin;
@@ -44,14 +45,12 @@ function card(example) {
 }
 
 export async function showGallery() {
-  const asked = new URLSearchParams(window.location.search).get("example");
   try {
     const { examples } = await read("/v1/examples");
     list.replaceChildren(...examples.map(card));
     note.hidden = true;
-    const chosen = examples.find((example) => example.name === asked);
-    if (chosen !== undefined) choose(chosen);
-    else curl.textContent = curlLine(examples[0]);
+    const named = (name) => examples.find((example) => example.name === name);
+    choose(named(new URLSearchParams(window.location.search).get("example")) ?? named(FIRST));
   } catch {
     note.textContent = "The gallery can't be read just now.";
   }

@@ -93,10 +93,14 @@ def test_an_address_with_an_example_opens_it(service, witness):
     expect(page.locator("a[aria-current]")).to_contain_text(examples()["two-grippers"].title)
 
 
-def test_an_unknown_example_opens_the_scene_as_it_is(service, witness):
-    page = open_page(witness, service, "/?example=no-such")
-    expect(page.locator("#scene")).to_have_attribute("src", re.compile(r"/scene/$"))
-    expect(page.locator("a[aria-current]")).to_have_count(0)
+@pytest.mark.parametrize("path", ["/", "/?example=no-such"], ids=["none", "unknown"])
+def test_the_scene_that_is_shown_at_first_is_the_chosen_one(service, witness, path):
+    page = open_page(witness, service, path)
+    example = examples()["paper-25"]
+    expect(page.locator("#scene")).to_have_attribute("src", re.compile(r"/scene/\?example=paper-25$"))
+    expect(page.locator("a[aria-current]")).to_contain_text(example.title)
+    expect(page.locator("#caption")).to_contain_text(example.description)
+    expect(page.locator("#example-curl")).to_contain_text("/v1/examples/paper-25 ")
 
 
 def test_every_card_has_its_picture_and_its_json(service, witness):
