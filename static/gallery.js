@@ -9,6 +9,7 @@ const caption = document.getElementById("caption");
 const curl = document.getElementById("example-curl");
 const stage = document.getElementById("stage");
 const FIRST = "paper-25"; // the scene that is shown where the address names none
+let chosen = null;
 
 function curlLine(example) {
   const origin = window.location.origin;
@@ -16,6 +17,7 @@ function curlLine(example) {
 }
 
 function choose(example) {
+  chosen = example;
   for (const card of list.querySelectorAll("a[data-example]")) {
     if (card.dataset.example === example.name) card.setAttribute("aria-current", "true");
     else card.removeAttribute("aria-current");
@@ -36,7 +38,7 @@ function card(example) {
   open.addEventListener("click", (event) => {
     if (event.ctrlKey || event.metaKey || event.shiftKey) return; // a tab of its own
     event.preventDefault();
-    window.history.replaceState(null, "", open.getAttribute("href"));
+    if (example !== chosen) window.history.pushState(null, "", open.getAttribute("href"));
     choose(example);
     stage.scrollIntoView({ block: "nearest" });
   });
@@ -50,7 +52,12 @@ export async function showGallery() {
     list.replaceChildren(...examples.map(card));
     note.hidden = true;
     const named = (name) => examples.find((example) => example.name === name);
-    choose(named(new URLSearchParams(window.location.search).get("example")) ?? named(FIRST));
+    const follow = () => {
+      const asked = named(new URLSearchParams(window.location.search).get("example")) ?? named(FIRST);
+      if (asked !== chosen) choose(asked); // else it is a step on the page: what was changed in the scene stays
+    };
+    window.addEventListener("popstate", follow);
+    follow();
   } catch {
     note.textContent = "The gallery can't be read just now.";
   }

@@ -23,7 +23,7 @@ function address(dark) {
 export function showScene(name = example) {
   example = name;
   full.href = address(isDark());
-  if (awake) scene.src = full.href;
+  if (awake) scene.contentWindow.location.replace(full.href); // another src would be a step of its own for Back
 }
 
 async function state() {

@@ -44,6 +44,13 @@ def open_page(
     return page
 
 
+def wait_for_scene(page: Page, address: str) -> None:
+    """Wait until the page shows the scene at an address, to which a running scene adds that of its websocket."""
+    frame = page.locator("#scene").element_handle().content_frame()
+    assert frame is not None
+    frame.wait_for_url(re.compile(re.escape(address) + r"(\?websocket=\S*)?$"))
+
+
 def asks_for_calibration(page: Page) -> None:
     """Let the page ask for a calibration, whether or not the service has one."""
     page.route("**/health", lambda route: route.fulfill(json={"status": "ok", "calibrated": True}))
@@ -75,7 +82,7 @@ def test_a_click_in_the_gallery_opens_the_scene_and_a_command_for_it(service, wi
     page = open_page(witness, service, with_scene=True)
     example = examples()["keeps-its-bend"]
     page.get_by_role("link", name=example.title).first.click()
-    expect(page.locator("#scene")).to_have_attribute("src", re.compile(r"/scene/\?example=keeps-its-bend$"))
+    wait_for_scene(page, "/scene/keeps-its-bend/")
     expect(page.locator("#full")).to_have_attribute("href", re.compile(r"/scene/\?example=keeps-its-bend$"))
     expect(page.locator("#caption")).to_contain_text(example.description)
     expect(page.locator("a[aria-current]")).to_have_count(1)
@@ -87,9 +94,44 @@ def test_a_click_in_the_gallery_opens_the_scene_and_a_command_for_it(service, wi
     assert json.loads(done.stdout)["status"] == "converged"
 
 
+def test_back_and_forward_lead_from_scene_to_scene(service, witness):
+    page = open_page(witness, service)
+    example_of = {name: examples()[name] for name in ("paper-25", "two-grippers", "twist-buckles")}
+
+    def is_chosen(name: str, query: str) -> None:
+        wait_for_scene(page, f"/scene/?example={name}")
+        assert urlsplit(page.url).query == query
+        expect(page.locator("a[aria-current]")).to_have_count(1)
+        expect(page.locator("a[aria-current]")).to_contain_text(example_of[name].title)
+        expect(page.locator("#caption")).to_contain_text(example_of[name].description)
+        expect(page.locator("#example-curl")).to_contain_text(f"/v1/examples/{name} ")
+
+    for name in ("two-grippers", "twist-buckles"):
+        page.get_by_role("link", name=example_of[name].title).first.click()
+        is_chosen(name, f"example={name}")
+    page.get_by_role("button", name="Dark theme").click()  # shows the scene anew: no step of its own
+    page.get_by_role("button", name="Dark theme").click()
+    page.go_back()
+    is_chosen("two-grippers", "example=two-grippers")
+    page.go_back()
+    is_chosen("paper-25", "")
+    page.go_forward()
+    is_chosen("two-grippers", "example=two-grippers")
+
+
+def test_a_step_on_the_page_leaves_the_scene_as_it_is(service, witness):
+    page = open_page(witness, service)
+    wait_for_scene(page, "/scene/?example=paper-25")
+    page.evaluate("document.getElementById('scene').contentWindow.changed = true")
+    page.get_by_role("link", name="Speed").click()
+    page.go_back()
+    page.wait_for_timeout(200)
+    assert page.evaluate("document.getElementById('scene').contentWindow.changed") is True
+
+
 def test_an_address_with_an_example_opens_it(service, witness):
     page = open_page(witness, service, "/?example=two-grippers")
-    expect(page.locator("#scene")).to_have_attribute("src", re.compile(r"/scene/\?example=two-grippers$"))
+    wait_for_scene(page, "/scene/?example=two-grippers")
     expect(page.locator("a[aria-current]")).to_contain_text(examples()["two-grippers"].title)
 
 
@@ -97,7 +139,7 @@ def test_an_address_with_an_example_opens_it(service, witness):
 def test_the_scene_that_is_shown_at_first_is_the_chosen_one(service, witness, path):
     page = open_page(witness, service, path)
     example = examples()["paper-25"]
-    expect(page.locator("#scene")).to_have_attribute("src", re.compile(r"/scene/\?example=paper-25$"))
+    wait_for_scene(page, "/scene/?example=paper-25")
     expect(page.locator("a[aria-current]")).to_contain_text(example.title)
     expect(page.locator("#caption")).to_contain_text(example.description)
     expect(page.locator("#example-curl")).to_contain_text("/v1/examples/paper-25 ")
@@ -124,7 +166,7 @@ def test_the_page_says_that_the_solver_is_compiled_and_comes_alive_by_itself(ser
     page.route("**/ready", at_first_not_ready)
     page.goto(service.address)
     expect(page.locator("#waiting")).to_contain_text("being compiled")
-    assert page.locator("#scene").get_attribute("src") is None
+    assert page.evaluate("document.getElementById('scene').contentWindow.location.href") == "about:blank"
     expect(page.frame_locator("#scene").locator(SCENE_IS_SHOWN)).to_be_visible()
     expect(page.locator("#waiting")).to_be_hidden()
 
@@ -293,7 +335,7 @@ def test_the_page_can_be_walked_through_by_keyboard(service, witness):
     assert focused() == f"{first.title}, as JSON"
     assert focused().startswith(second.title)
     page.keyboard.press("Enter")
-    expect(page.locator("#scene")).to_have_attribute("src", re.compile(second.name))
+    wait_for_scene(page, f"/scene/?example={second.name}")
 
 
 def test_what_has_the_focus_is_outlined(service, witness):
@@ -312,7 +354,7 @@ def test_the_theme_can_be_chosen_and_stays(service, witness):
     expect(button).to_have_attribute("aria-pressed", "false")
     button.click()
     expect(button).to_have_attribute("aria-pressed", "true")
-    expect(page.locator("#scene")).to_have_attribute("src", re.compile("darkMode"))
+    wait_for_scene(page, "/scene/?example=paper-25&darkMode")
     assert page.evaluate(ground) != light
     page.reload()
     expect(button).to_have_attribute("aria-pressed", "true")
