@@ -12,6 +12,7 @@ from app.http.problems import ProblemError
 from dlocore import MaterialMotion
 
 JSON = "application/json"
+HTML = "text/html"
 NPZ = "application/x-npz"
 MSGPACK = "application/vnd.msgpack"
 EVENTS = "text/event-stream"
@@ -42,6 +43,12 @@ def negotiated(accept: str | None, offers: Sequence[str]) -> str:
         detail = f"This address answers with {', '.join(offers)}; the request accepts {(accept or '')[:120]!r}."
         raise ProblemError(406, "not-acceptable", detail)
     return next(offer for quality, offer in ranked if quality == best)
+
+
+def prefers(accept: str | None, form: str, other: str) -> bool:
+    """Return whether an ``Accept`` header ranks one media type above another; absent or empty, it ranks none."""
+    ranges = _ranges(accept or "*/*")
+    return _quality(form, ranges) > _quality(other, ranges)
 
 
 def _ranges(accept: str) -> dict[str, float]:

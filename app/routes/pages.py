@@ -1,13 +1,16 @@
-"""The landing page and its files, at every address that nothing else answers."""
+"""The landing page and its files, at every address that nothing else answers; and the way to addresses with a slash."""
 
 import os
 
-from fastapi import FastAPI
+from fastapi import FastAPI, Request
 from fastapi.staticfiles import StaticFiles
-from starlette.responses import Response
+from starlette.datastructures import Headers
+from starlette.exceptions import HTTPException
+from starlette.responses import RedirectResponse, Response
 from starlette.routing import Match, Mount
 from starlette.types import Scope
 
+from app.http.formats import HTML, JSON, prefers
 from app.pages.assets import static_dir
 
 POLICY = "; ".join(
@@ -26,7 +29,19 @@ POLICY = "; ".join(
 
 
 class _Files(StaticFiles):
-    """The files with a content security policy of their own, stricter than what the API's documentation needs."""
+    """The files with a content security policy of their own, stricter than what the API's documentation needs.
+
+    Where there is no file a browser gets ``404.html``, and who prefers no page a problem document.
+    """
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        response = await super().get_response(path, scope)
+        if response.status_code == 404:
+            vary = {"Vary": "Accept"}
+            if not prefers(Headers(scope=scope).get("accept"), HTML, JSON):
+                raise HTTPException(404, headers=vary)
+            response.headers.update(vary)
+        return response
 
     def file_response(
         self, full_path: str | os.PathLike[str], stat_result: os.stat_result, scope: Scope, status_code: int = 200
@@ -46,6 +61,14 @@ class _Pages(Mount):
         return super().matches(scope)
 
 
+async def _with_slash(request: Request) -> Response:
+    """Redirect to the address that the relative links of the scene's page need."""
+    query = request.url.query
+    return RedirectResponse(f"{request.url.path}/" + (f"?{query}" if query else ""), 307)
+
+
 def add_pages(app: FastAPI) -> None:
     """Serve the pages at /; to be called after every other route is there."""
+    for path in ("/scene", "/scene/{name}"):
+        app.get(path, include_in_schema=False)(_with_slash)
     app.router.routes.append(_Pages("/", _Files(directory=static_dir(), html=True, check_dir=False), name="pages"))

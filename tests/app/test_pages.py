@@ -2,9 +2,13 @@
 
 import re
 
+import pytest
 from fastapi.testclient import TestClient
 
 from tests.app.conftest import ROOT
+from tests.app.test_bad_requests import the_problem
+
+BROWSER = "text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8"  # what one accepts of an address
 
 
 def test_pages_run_no_script_but_their_own_files(client: TestClient) -> None:
@@ -29,3 +33,36 @@ def test_every_module_that_a_script_imports_is_there(client: TestClient) -> None
             answer = client.get(f"/{name}")
             assert answer.status_code == 200, name
             assert "javascript" in answer.headers["content-type"]
+
+
+@pytest.mark.parametrize("address", ["/nope", "/a/page/that/is/none", "/gallery"])
+def test_a_browser_is_told_by_a_page_that_there_is_none(client: TestClient, address: str) -> None:
+    answer = client.get(address, headers={"Accept": BROWSER})
+    assert answer.status_code == 404
+    assert answer.headers["content-type"].startswith("text/html")
+    assert answer.headers["vary"] == "Accept"
+    assert 'href="/"' in answer.text
+
+
+@pytest.mark.parametrize("accept", ["*/*", "application/json", "image/png", "application/json, text/html"])
+def test_a_program_is_told_by_a_problem_that_there_is_no_page(client: TestClient, accept: str) -> None:
+    the_problem(client.get("/nope", headers={"Accept": accept}), 404)
+
+
+def test_a_browser_gets_the_problems_of_the_api(client: TestClient) -> None:
+    the_problem(client.get("/v1/nope", headers={"Accept": BROWSER}), 404)
+
+
+@pytest.mark.parametrize(
+    ("address", "target"),
+    [
+        ("/scene", "/scene/"),
+        ("/scene?example=paper-25&darkMode", "/scene/?example=paper-25&darkMode"),
+        ("/scene/paper-25?darkMode", "/scene/paper-25/?darkMode"),
+    ],
+)
+def test_the_scene_is_found_without_its_slash(client: TestClient, address: str, target: str) -> None:
+    answer = client.get(address, follow_redirects=False)
+    assert answer.status_code == 307
+    assert answer.headers["location"] == target
+    assert client.get(target).status_code == 200
