@@ -35,6 +35,10 @@ def test_every_module_that_a_script_imports_is_there(client: TestClient) -> None
             assert "javascript" in answer.headers["content-type"]
 
 
+def test_no_link_opens_the_viewer_of_recordings_without_one(client: TestClient) -> None:
+    assert "/rerun" not in client.get("/").text  # those of runs are `links.viewer`
+
+
 @pytest.mark.parametrize("address", ["/nope", "/a/page/that/is/none", "/gallery"])
 def test_a_browser_is_told_by_a_page_that_there_is_none(client: TestClient, address: str) -> None:
     answer = client.get(address, headers={"Accept": BROWSER})
