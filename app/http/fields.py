@@ -73,6 +73,9 @@ def _bad_field(error: Any, body: Any, schema: "_Schema") -> BadField:
         given = str(body or "")[max(0, at - 30) : at + 30]
         allowed = "JSON (RFC 8259) in UTF-8, with each name once in an object"
         return BadField(_WHOLE, given, allowed, f"The body can't be read: {context['error']}. Allowed: {allowed}.")
+    if kind == "two_forms":
+        given, allowed = context["given"], context["allowed"]
+        return BadField(_WHOLE, given, allowed, f"Got {given}. Allowed: {allowed}.")
     loc = loc[1:] if loc and loc[0] in ("body", "path", "query", "header") else loc
     tagged, steps = _steps(loc, body) if where == _WHOLE else (loc, loc)
     if kind == "union_tag_not_found":

@@ -3,7 +3,8 @@
 from typing import Annotated, Any, Literal
 
 from fastapi.openapi.models import Example
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, RootModel, Tag
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, RootModel, Tag, model_validator
+from pydantic_core import PydanticCustomError
 
 from app.schemas.base import LIKE, Flag, Model, RunId
 from app.schemas.request import PAPER, TWO_GRIPPERS
@@ -66,6 +67,14 @@ class BatchRequest(RootModel):
     root: Annotated[
         Annotated[ScenesBatch, Tag("~scenes")] | Annotated[PrimitivesBatch, Tag("~primitives")], Discriminator(_form)
     ]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_form(cls, value: Any) -> Any:
+        if isinstance(value, dict) and {"scene", "scenes"} <= value.keys():
+            context = {"given": "scene and scenes", "allowed": "one of the two: scenes, or scene with primitives"}
+            raise PydanticCustomError("two_forms", "Two forms at once", context)
+        return value
 
     def scenes(self) -> list[Any]:
         """Return the requests, as data."""

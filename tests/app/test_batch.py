@@ -112,14 +112,21 @@ def test_lines_come_as_they_finish_where_asked(client: TestClient) -> None:
         ({"scenes": [1], "store": "yes"}, "store"),
         ({"scenes": [1], "order": "any"}, "order"),
         ({"scenes": [1], "fields": ["shape"]}, "fields[0]"),
-        ({"scenes": [1], "scene": paper_scene(), "primitives": [[]]}, "scenes"),
         ([], "scenes"),
     ],
-    ids=range(10),
+    ids=range(9),
 )
 def test_a_batch_that_is_none_is_refused_as_a_whole(client: TestClient, body: Any, field: str) -> None:
     problem = the_problem(client.post(BATCH, json=body), 422)
     assert field in [error["field"] for error in problem["errors"]] or problem["errors"][0]["field"] == "body"
+
+
+@pytest.mark.parametrize("more", [{}, {"primitives": [[]]}], ids=["alone", "with-primitives"])
+def test_a_batch_of_both_forms_is_told_that_one_is_wanted(client: TestClient, more: dict[str, Any]) -> None:
+    body = {"scenes": [paper_scene()], "scene": paper_scene(), **more}
+    (error,) = the_problem(client.post(BATCH, json=body), 422)["errors"]
+    assert error["field"] == "body"
+    assert error["message"] == "Got scene and scenes. Allowed: one of the two: scenes, or scene with primitives."
 
 
 def test_a_batch_has_a_bound(tmp_path: Path) -> None:
