@@ -39,10 +39,10 @@ class BadField:
         return BadField(error.field, given, error.allowed, f"{reason}Got {given}. Allowed: {error.allowed}.")
 
     @staticmethod
-    def unknown(field: str, value: str, allowed: str) -> "BadField":
-        """Return a query parameter that there is not."""
+    def in_query(field: str, value: str | list[str], allowed: str, what: str) -> "BadField":
+        """Return a query parameter of which a sentence says what is wrong with it."""
         given = _shown(value, "")
-        return BadField(field, given, allowed, f"There is no such query parameter. Got {given}. Allowed: {allowed}.")
+        return BadField(field, given, allowed, f"{what} Got {given}. Allowed: {allowed}.")
 
 
 def bad_fields(errors: Sequence[Any], body: Any, model: type[BaseModel] = PredictionRequest) -> list[BadField]:

@@ -331,6 +331,8 @@ def test_a_wrong_address_is_a_problem_too(client: TestClient) -> None:
         ("?like=xyz", {"like": "the id of a run, 28 of the characters 0 to 9 and a to f"}),
         ("?stor=false&foo=1", {"stor": "one of store, like", "foo": "one of store, like"}),
         (":batch?store=false", {"store": "no query parameter"}),
+        ("?store=false&store=true", {"store": "one value"}),
+        ("?like=&like=&foo=1", {"foo": "one of store, like", "like": "one value"}),
     ],
 )
 def test_a_wrong_query_is_told_what_is_allowed_and_nothing_is_stored(
@@ -347,6 +349,10 @@ def test_a_wrong_query_is_told_what_is_allowed_and_nothing_is_stored(
 def test_every_address_of_the_api_refuses_an_unknown_query(client: TestClient, address: str) -> None:
     problem = the_problem(client.get(f"{address}?page=2"), 422)
     assert [error["field"] for error in problem["errors"]] == ["page"]
+
+
+def test_a_list_in_a_query_may_have_several_values(client: TestClient) -> None:
+    assert client.get("/v1/predictions?status=converged&status=stalled").status_code == 200
 
 
 @pytest.mark.parametrize("address", ["/v1/examples?token=x", "/health?now=1", "/?token=x", "/scene/?example=paper-25"])
