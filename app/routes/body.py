@@ -71,20 +71,24 @@ class JsonRoute(APIRoute):
 
         async def checked(request: Request) -> Response:
             if takes_body:
-                check_content_type(request)
+                check_content(request)
             return await handle(JsonRequest(request.scope, request.receive))
 
         return checked
 
 
-def check_content_type(request: Request) -> None:
-    """Raise a 415 problem unless the body is declared as JSON."""
+def check_content(request: Request) -> None:
+    """Raise a 415 problem unless the body is declared as JSON, and as it is."""
     given = request.headers.get("content-type", "")
     media = given.split(";")[0].strip().lower()
     if media != "application/json" and not (media.startswith("application/") and media.endswith("+json")):
         raise ProblemError(
             415, "unsupported-media-type", f"Send the body as application/json, not as {given or 'nothing'!r}."
         )
+    encoding = request.headers.get("content-encoding", "identity")
+    if encoding.strip().lower() not in ("", "identity"):
+        detail = f"Send the body as it is, not in the encoding {encoding[:120]!r}: none is accepted."
+        raise ProblemError(415, "unsupported-content-encoding", detail, headers={"Accept-Encoding": "identity"})
 
 
 @asynccontextmanager

@@ -1,5 +1,6 @@
 """Every kind of wrong request is answered by a problem document that names the field."""
 
+import gzip
 import json
 import re
 from typing import Any
@@ -299,6 +300,22 @@ def test_a_list_of_many_wrong_numbers_does_not_give_an_endless_answer(client: Te
 def test_another_content_type_is_refused(client: TestClient, media: str) -> None:
     body = json.dumps(PAPER).encode()
     the_problem(client.post("/v1/predictions", content=body, headers={"content-type": media}), 415)
+
+
+@pytest.mark.parametrize("encoding", ["gzip", "GZIP", "br", "identity, gzip"])
+@pytest.mark.parametrize("is_packed", [True, False], ids=["packed", "plain"])
+def test_a_compressed_body_is_told_that_none_is_accepted(client: TestClient, encoding: str, is_packed: bool) -> None:
+    body = json.dumps(PAPER).encode()
+    headers = {"content-type": "application/json", "content-encoding": encoding}
+    response = client.post("/v1/predictions", content=gzip.compress(body) if is_packed else body, headers=headers)
+    assert "none is accepted" in the_problem(response, 415)["detail"]
+    assert response.headers["accept-encoding"] == "identity"
+
+
+def test_a_body_that_is_declared_as_it_is_is_accepted(client: TestClient) -> None:
+    headers = {"content-type": "application/json", "content-encoding": "identity"}
+    response = client.post("/v1/predictions?store=false", content=json.dumps(PAPER), headers=headers)
+    assert response.status_code == 200
 
 
 def test_a_body_beyond_the_limit_is_refused_whether_it_says_so_or_not(client: TestClient) -> None:
