@@ -2,11 +2,19 @@
 
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag
+
+
+def _whole(value: Any) -> Any:
+    """Return a float that is whole as an integer, which JSON Schema counts it as; any other value as it is."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
 
 # strict, since a bool or a numeral in quotes would pass as a number otherwise
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Count = Annotated[int, Field(strict=True)]
+_Integer = Annotated[int, Field(strict=True)]
+Count = Annotated[_Integer, BeforeValidator(_whole)]
+CountOrNone = Annotated[_Integer | None, BeforeValidator(_whole)]
 Flag = Annotated[bool, Field(strict=True)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Point = Annotated[list[Number], Field(min_length=2, max_length=3)]

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from app.schemas.base import BY_FORM, OBJECT, TEXT, Count, Flag, Model, Number, Vector
+from app.schemas.base import BY_FORM, OBJECT, TEXT, Count, CountOrNone, Flag, Model, Number, Vector
 from dlocore.scene.scene import MAX_OBSTACLES
 
 Switch = Literal["auto", "on", "off"]
@@ -114,7 +114,7 @@ class EffectsModel(Model):
 class QualityModel(Model):
     """A grid (`n_u` with `n_t`), or a target error, or a time budget; and how to solve."""
 
-    n_u: Count | None = Field(
+    n_u: CountOrNone = Field(
         default=None,
         ge=5,
         le=129,
@@ -122,7 +122,7 @@ class QualityModel(Model):
         "it estimates, or does not come to its end, finer grids that reach 1 % are the answer. The message says so.",
         examples=[9],
     )
-    n_t: Count | None = Field(default=None, ge=5, le=513, description="Control points in time.", examples=[13])
+    n_t: CountOrNone = Field(default=None, ge=5, le=513, description="Control points in time.", examples=[13])
     keep_grid: Flag = Field(
         default=False,
         description="Whether to answer with what a given grid, and a least squares that was asked for, come to by "

@@ -53,6 +53,7 @@ CASES: list[tuple[dict[str, Any], str, Any, str]] = [
     (PAPER, "primitives.0.path.displacement", [0, "0.5", 0], "primitives[0].path.displacement[1]"),
     (PAPER, "shape.settle", "yes", "shape.settle"),
     (PAPER, "quality", {"n_u": 9.5, "n_t": 13}, "quality.n_u"),
+    (PAPER, "quality", {"n_u": "9", "n_t": 13}, "quality.n_u"),
     (PAPER, "output.samples_u", True, "output.samples_u"),
     (PAPER, "primitives", {}, "primitives"),
     (PAPER, "cable.rest_shape", 3, "cable.rest_shape"),
@@ -193,6 +194,13 @@ def test_a_wrong_field_is_named_with_what_is_allowed(
 @pytest.mark.parametrize("scene", [PAPER, HANGING, POINTS, WAYPOINTS, LOADED, OBSTRUCTED, NET], ids=range(7))
 def test_the_scenes_that_the_cases_are_made_of_are_right(client: TestClient, scene: dict[str, Any]) -> None:
     assert client.post("/v1/predictions", json=scene).status_code == 201
+
+
+def test_a_whole_number_with_a_point_is_an_integer(client: TestClient) -> None:
+    scene = {**PAPER, "quality": {"n_u": 9.0, "n_t": 1.3e1}, "output": {"samples_u": 3.0, "samples_t": 2}}
+    answer = client.post("/v1/predictions?store=false", json=scene)
+    assert answer.status_code == 200
+    assert len(answer.json()["surface"]["u"]) == 3
 
 
 def test_grasps_farther_apart_than_the_cable_between_them_are_refused_in_those_words(client: TestClient) -> None:
