@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from app.schemas.convert import OBSTACLES
+from app.schemas.request import MAX_LOADS
 from dlocore import ControlPoints, Load, Move, Points, Scene, SceneError, Still, Straight, Waypoints
 
 _KINDS: dict[type, str] = {
@@ -26,13 +27,16 @@ def from_scene(scene: Scene) -> dict[str, Any]:
 
     Raises:
         SceneError: a request can't say what a field says: `shape.material` (the service knows it of the stored
-            prediction that a shape of kind "prediction" names), or `quality.estimate` without an estimate.
+            prediction that a shape of kind "prediction" names), `quality.estimate` without an estimate, or more
+            `loads` than it may have.
     """
     if isinstance(scene.shape, ControlPoints) and scene.shape.material is not None:
         allowed = 'None; a shape of kind "prediction" goes on from a stored one with its material'
         raise SceneError("shape.material", "a material", allowed)
     if not scene.quality.estimate:
         raise SceneError("quality.estimate", False, "True: an answer of the service has an estimate")
+    if len(scene.loads) > MAX_LOADS:
+        raise SceneError("loads", f"{len(scene.loads)} loads", f"at most {MAX_LOADS}")
     return {
         "cable": _plain(scene.cable),
         "shape": _shape(scene.shape),

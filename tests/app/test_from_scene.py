@@ -10,7 +10,7 @@ from fastapi.testclient import TestClient
 
 from app.schemas import PredictionRequest, from_scene, to_scene
 from benchmarks.hard.generator import draw
-from dlocore import Grasp, Move, Quality, Scene, SceneError, Straight, continued, predict
+from dlocore import Grasp, Load, Move, Quality, Scene, SceneError, Straight, continued, predict
 from dlocore.scene.scene import EFFECTS
 from tests.solver.scenes import cable
 
@@ -91,6 +91,10 @@ def test_every_effect_can_be_switched() -> None:
 def test_what_a_request_can_not_say_is_named() -> None:
     with pytest.raises(SceneError, match=r"quality\.estimate"):
         from_scene(replace(PUSHED, quality=Quality(n_u=9, n_t=13, estimate=False)))
+    load = Load(u=0.5, force=(0.0, 0.0, 1e-6))
+    with pytest.raises(SceneError, match=r"loads: got 1001 loads\. Allowed: at most 1000\."):
+        from_scene(replace(PUSHED, loads=(load,) * 1001))
+    again(replace(PUSHED, loads=(load,) * 1000))
     prediction = predict(replace(PUSHED, effects={"twist": "on"}))
     goes_on = continued(prediction.surface, prediction.material)
     assert goes_on.material is not None
