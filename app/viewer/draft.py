@@ -109,6 +109,10 @@ class Draft:
         cable = self.cable()
         return start_curve(shape_of(self.request(), cable, stored), cable.length)
 
+    def same_but_name(self, other: "Draft") -> bool:
+        """Say whether another draft is of the same scene, whatever it is called."""
+        return self.put(("name",), None).document == other.put(("name",), None).document
+
     def shape_key(self) -> tuple[Any, ...]:
         """Return what `start` depends on, to tell whether it has changed."""
         return (self.get(("shape",)), self.get(("cable", "length")), self.get(("cable", "preset")))

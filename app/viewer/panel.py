@@ -9,6 +9,7 @@ from viser import ClientHandle, GuiEvent
 
 from app.viewer import report
 from app.viewer.draft import Draft
+from app.viewer.edits import Edits
 from app.viewer.examples import example_names
 from app.viewer.forms import CableForm, EffectsForm, GripperForm, QualityForm, SurroundingsForm, show_value
 from app.viewer.forms.recording import RecordingActions, RecordingForm
@@ -31,7 +32,6 @@ class Actions:
     """What the panel has done.
 
     Attributes:
-        edit: take over an edited draft.
         look: draw the picture in another way.
         seek: draw the time at which the playback stands.
         keep: store the run.
@@ -46,7 +46,6 @@ class Actions:
         reset_camera: look at the whole scene again.
     """
 
-    edit: Callable[[Draft], None]
     look: Callable[[Look], None]
     seek: Callable[[], None]
     keep: Callable[[], Awaitable[None]]
@@ -70,7 +69,8 @@ class Panel:
         start: its start curve.
         playback: the clock of the animation.
         address: of the service, for the shell line.
-        actions: what its controls do.
+        edits: makes the changes of the draft.
+        actions: what its controls do otherwise.
         ready: whether the solver is compiled.
         recording: what the tab of recordings does.
         cables: that were kept as presets.
@@ -83,6 +83,7 @@ class Panel:
         start: StartCurve,
         playback: Playback,
         address: str,
+        edits: Edits,
         actions: Actions,
         *,
         ready: bool,
@@ -91,6 +92,7 @@ class Panel:
     ) -> None:
         self._gui = client.gui
         self._playback = playback
+        self._edits = edits
         self._actions = actions
         self._address = address
         self._earlier: list[tuple[float, float]] = []
@@ -99,14 +101,14 @@ class Panel:
         self._legend = self._gui.add_html("")
         tabs = self._gui.add_tab_group()
         with tabs.add_tab("Scene"):
-            self._gripper = GripperForm(self._gui, draft, start, actions.edit)
+            self._gripper = GripperForm(self._gui, draft, start, edits)
             self._add_start()
-            self._cable = CableForm(self._gui, draft, actions.edit, cables)
-            self._surroundings = SurroundingsForm(self._gui, draft, actions.edit)
+            self._cable = CableForm(self._gui, draft, edits, cables)
+            self._surroundings = SurroundingsForm(self._gui, draft, edits)
         with tabs.add_tab("Effects"):
             self._add_effects(draft)
         with tabs.add_tab("Quality"):
-            self._quality = QualityForm(self._gui, draft, actions.edit)
+            self._quality = QualityForm(self._gui, draft, edits)
             self._add_result()
         with tabs.add_tab("View"):
             self._add_view()
@@ -115,7 +117,6 @@ class Panel:
             with self._gui.add_folder("Tracked cable"):
                 self.recording = RecordingForm(self._gui, recording)
         self._forms = (self._gripper, self._cable, self._surroundings, self._effects, self._quality)
-        self._draft = draft
 
     def _add_timeline(self) -> None:
         self._slider = self._gui.add_slider(
@@ -198,7 +199,7 @@ class Panel:
         @self._settle.on_update
         async def _settled(event: GuiEvent[Any]) -> None:
             if event.client is not None:
-                self._actions.edit(with_settling(self._draft, self._settle.value))
+                self._edits.by(self._settle, lambda d: with_settling(d, self._settle.value))
 
         @straighten.on_click
         async def _straight(_event: GuiEvent[Any]) -> None:
@@ -215,7 +216,7 @@ class Panel:
         measure = self._gui.add_button(
             "Measure what each costs", icon=viser.Icon.CLOCK, hint="Solves again with each effect switched"
         )
-        self._effects = EffectsForm(self._gui, draft, self._actions.edit)
+        self._effects = EffectsForm(self._gui, draft, self._edits)
 
         @measure.on_click
         async def _measure(_event: GuiEvent[Any]) -> None:
@@ -284,7 +285,7 @@ class Panel:
         @self._name.on_update
         async def _named(event: GuiEvent[Any]) -> None:
             if event.client is not None:
-                actions.edit(self._draft.put(("name",), self._name.value[:200] or None))
+                self._edits.by(self._name, lambda d: d.put(("name",), self._name.value[:200] or None))
 
         @self._keep.on_click
         async def _kept(_event: GuiEvent[Any]) -> None:
@@ -316,7 +317,6 @@ class Panel:
 
     def take_draft(self, draft: Draft) -> None:
         """Show the numbers of an edited draft in all controls."""
-        self._draft = draft
         for form in self._forms:
             form.take(draft)
         show_value(self._settle, bool(draft.get(("shape", "settle"))))

@@ -10,6 +10,7 @@ from viser import ClientHandle, SceneClickEvent
 from app.viewer import grips, uploads
 from app.viewer.camera import FIELD_OF_VIEW, PHONE, extent, start_pose
 from app.viewer.draft import Draft, start_draft
+from app.viewer.edits import Edits
 from app.viewer.examples import example
 from app.viewer.forms.recording import RecordingActions
 from app.viewer.gizmo import Gizmo
@@ -81,12 +82,14 @@ class Session:
         client.scene.on_click()(self._clicked)  # type: ignore[arg-type]
         self._gizmo = Gizmo(client.scene, self._begin_drag, self._drag, self._end_drag)
         self._shape = ShapeEditor(client, self._shape_dragged)
+        self._edits = Edits(lambda: self._draft, self.edit)
         self._panel = Panel(
             client,
             self._draft,
             self._start,
             self._playback,
             address,
+            self._edits,
             self._actions(),
             ready=shared.solver.ready,
             recording=RecordingActions(
@@ -102,7 +105,7 @@ class Session:
             self._panel.recording,
             shared.cables,
             TrackingActions(
-                show=self._show_recorded, draft=lambda: self._draft, flush=client.flush, kept=self._panel.offer_cables
+                show=self._show_recorded, draft=self._current, flush=client.flush, kept=self._panel.offer_cables
             ),
         )
         self._take_draft()
@@ -112,7 +115,6 @@ class Session:
 
     def _actions(self) -> Actions:
         return Actions(
-            edit=self.edit,
             look=self._restyle,
             seek=self._draw_time,
             keep=self._keep,
@@ -132,6 +134,7 @@ class Session:
         self._solver.close()
         self._tracking.close()
         self._animation.cancel()
+        self._edits.close()
         for timer in (self._refine_timer, self._busy_timer):
             if timer is not None:
                 timer.cancel()
@@ -160,6 +163,7 @@ class Session:
 
     def _begin_drag(self) -> None:
         """Show where the motion ends while the hand is on the target."""
+        self._edits.finish()
         self._dragging = True
         self._playback.pause()
         self._playback.seek(self._playback.horizon)
@@ -188,7 +192,7 @@ class Session:
         if self._dragging or self._shape.active or self._loop.time() - self._released_at < AFTER_DRAG:
             return
         found = self._picture.picked(np.array(event.ray_origin), np.array(event.ray_direction))
-        draft = self._draft
+        draft = self._current()
         if isinstance(found, GripperClick):
             self.edit(grips.selected(draft, found.number))
         elif found is not None:
@@ -198,6 +202,7 @@ class Session:
 
     def _edit_shape(self, wanted: bool) -> None:
         """Show the beads of the start shape, or take them away."""
+        self._edits.finish()
         with self._client.atomic():
             if wanted:
                 self._playback.pause()
@@ -211,12 +216,18 @@ class Session:
 
     def _shape_dragged(self, points: np.ndarray, held: bool) -> None:
         self._dragging = held
-        self.edit(with_points(self._draft, points))
+        self.edit(with_points(self._current(), points))
         if not held:
             self._refine()
 
     def _straighten(self) -> None:
-        self.edit(straightened(self._draft, self._start))
+        draft = self._current()
+        self.edit(straightened(draft, self._start))
+
+    def _current(self) -> Draft:
+        """Return the draft with what was typed until now."""
+        self._edits.finish()
+        return self._draft
 
     def edit(self, draft: Draft) -> None:
         """Take over an edited draft: a preview at once, the asked quality as soon as the hand is still."""
@@ -272,6 +283,7 @@ class Session:
 
     def _measure_costs(self) -> None:
         """Have the costs of the effects measured; an edit ends it."""
+        self._edits.finish()
         self._ask("costs")
 
     def _ask(self, kind: Kind) -> None:
@@ -353,6 +365,7 @@ class Session:
 
     def _replace(self, draft: Draft) -> None:
         """Show another scene from the beginning."""
+        self._edits.finish()  # it would be typed into the other one
         self._shape.hide()
         self._panel.show_editing(False)
         self.edit(draft)
@@ -362,7 +375,7 @@ class Session:
 
     async def _open_file(self, name: str, content: bytes) -> None:
         try:
-            draft = await asyncio.to_thread(uploads.opened, self._draft, name, content)
+            draft = await asyncio.to_thread(uploads.opened, self._current(), name, content)
         except SceneError as error:
             self._client.add_notification(f"{name} was not opened", str(error), color="red", auto_close_seconds=12.0)
             self._panel.say_file(f"{name} was not opened: {error}", good=False)
@@ -388,7 +401,7 @@ class Session:
             self._replace(Draft.of(document))
 
     def _download(self) -> None:
-        self._outbox.scene(self._draft)
+        self._outbox.scene(self._current())
 
     async def _save_playback(self) -> None:
         if self._latest is not None:
@@ -399,7 +412,10 @@ class Session:
 
     async def _keep(self) -> None:
         """Store the last refined prediction with its scene, and link to it, unless the scene was edited since."""
-        if self._shown is not None and self._shown[0].document == self._draft.document:
-            run_id = await self._outbox.keep(*self._shown)
-            if run_id is not None:
-                self._panel.show_kept(run_id)
+        draft = self._current()
+        if self._shown is None or not self._shown[0].same_but_name(draft):
+            self._client.add_notification("Not kept", "This scene is not solved yet.", auto_close_seconds=6.0)
+            return
+        run_id = await self._outbox.keep(draft, self._shown[1])
+        if run_id is not None:
+            self._panel.show_kept(run_id)

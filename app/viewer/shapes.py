@@ -10,6 +10,7 @@ from dlocore.shape.shape import StartCurve
 
 Floats = NDArray[np.float64]
 HANDLES = 13  # points that can be dragged
+SHORTEST, LONGEST = 0.01, 1000.0  # m, of a cable
 STEP = 1e-5  # m, to which points are written into the document
 
 
@@ -69,8 +70,10 @@ def scaled(draft: Draft, length: float) -> Draft:
     """Give the cable another length [m].
 
     A straight one grows at its far end, with what holds it there; another shape grows in proportion about its first
-    point.
+    point. A length that no cable may have changes nothing: from 0 nothing would grow back in proportion.
     """
+    if not SHORTEST <= length <= LONGEST:
+        return draft
     before = draft.length
     share = length / before
     edited = draft.put(("cable", "length"), length)

@@ -2,6 +2,7 @@
 
 import itertools
 
+import httpx
 import numpy as np
 import pytest
 from protocol_client import NOTHING_STORED, SceneClient, connected
@@ -86,6 +87,72 @@ def test_every_scene_control_changes_the_scene(service, changes, path, expected)
             client.set(label, value)
         document = client.wait_for(lambda: _reached(checked(client), path, expected))
         assert _reached(document, path, expected)
+
+
+def typed(client: SceneClient, label: str, texts: list[str], pause: float = 0.1) -> None:
+    """Type into a number field, which sends what it holds after every keystroke."""
+    for text in texts:
+        client.set(label, float(text))
+        client.listen(pause)
+
+
+def test_what_is_typed_counts_when_the_typing_rests(service):
+    with connected(service) as client:
+        client.refined()
+        typed(client, "Length [m]", ["10"])
+        client.wait_for(lambda: '"length": 10.0' in client.markdown("```json"))
+        typed(client, "Length [m]", ["1", "15"])  # 1 is shorter than where the gripper may hold it in proportion
+        client.wait_for(lambda: '"length": 15.0' in client.markdown("```json"))
+        assert client.document["primitives"][0]["u"] == 0.25
+
+
+def test_what_nobody_means_is_neither_solved_nor_called_impossible(service):
+    with connected(service) as client:
+        client.refined()
+        cards = set()
+        for text in ("0", "0.0", "0.02"):
+            typed(client, "Diameter [mm]", [text], pause=0.2)
+            cards.add(client.card)
+        assert len(cards) == 1
+        client.wait_for(lambda: '"diameter": 2e-05' in client.markdown("```json"))
+
+
+def test_a_length_of_nothing_leaves_the_scene_alive(service, caplog):
+    with connected(service) as client:
+        before = client.document
+        typed(client, "Length [m]", ["0"], pause=1.0)
+        assert client.document == before
+        typed(client, "Length [m]", ["0.5"])
+        assert client.document["cable"]["length"] == 0.5
+        client.wait_for(lambda: '"length": 0.5' in client.markdown("```json"))
+    assert not [record for record in caplog.records if record.levelname == "ERROR"]
+
+
+def test_a_button_finds_what_was_typed_before_it(service):
+    with connected(service) as client:
+        client.set("Diameter [mm]", 3.0)
+        client.set("Table friction", 0.4)
+        client.set("Add", "Box")
+        client.set("Centre [m]", [0.6, -0.3, 0.03])
+        client.set("Add", "Sphere")
+        client.set("Radius [mm]", 20.0)
+        client.set("Obstacle", "1: box")
+        document = checked(client)
+        assert document["cable"]["diameter"] == 0.003
+        assert document["environment"]["table"]["friction"] == 0.4
+        box, sphere = document["environment"]["obstacles"]
+        assert box["center"] == [0.6, -0.3, 0.03]
+        assert sphere["radius"] == 0.02
+        client.wait_for(lambda: client.control("Size [mm]")[1]["visible"])
+
+
+def test_a_run_is_kept_under_the_name_typed_just_before(service):
+    with connected(service) as client:
+        client.refined()
+        client.set("Name", "my run")
+        client.press("Keep this run")
+        run_id = client.wait_for(lambda: client.html("data-run")).split('data-run="')[1].split('"')[0]
+        assert httpx.get(f"{service.address}/v1/predictions/{run_id}/scene.json").json()["name"] == "my run"
 
 
 def _reached(document, path, expected):

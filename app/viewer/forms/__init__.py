@@ -1,6 +1,6 @@
 """The controls that edit a draft, in the units people use: mm, g/m, 10⁻³ N m², degrees."""
 
-from app.viewer.forms.base import OnEdit, ShowsDraft, show_if, show_value
+from app.viewer.forms.base import ShowsDraft, show_if, show_value
 from app.viewer.forms.cable import CableForm
 from app.viewer.forms.effects import EffectsForm
 from app.viewer.forms.gripper import GripperForm
@@ -11,7 +11,6 @@ __all__ = [
     "CableForm",
     "EffectsForm",
     "GripperForm",
-    "OnEdit",
     "QualityForm",
     "ShowsDraft",
     "SurroundingsForm",

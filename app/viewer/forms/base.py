@@ -1,13 +1,11 @@
 """What all forms share: controls that show a draft and change it."""
 
-from collections.abc import Callable
 from typing import Any, Protocol
 
 from viser import GuiEvent
 
 from app.viewer.draft import Draft
-
-OnEdit = Callable[[Draft], None]
+from app.viewer.edits import Change, Edits
 
 
 def show_value(control: Any, value: Any) -> None:
@@ -25,20 +23,21 @@ def show_if(control: Any, visible: bool) -> None:
 class Form:
     """Controls that show a draft and change it; a change by the program is not taken for one by a person."""
 
-    def __init__(self, draft: Draft, on_edit: OnEdit) -> None:
+    def __init__(self, draft: Draft, edits: Edits) -> None:
         self._draft = draft
-        self._on_edit = on_edit
+        self._edits = edits
 
-    def _bind(self, control: Any, change: Callable[[Draft], Draft]) -> None:
+    def _bind(self, control: Any, change: Change) -> None:
         @control.on_update
         async def _edited(event: GuiEvent[Any]) -> None:
             if event.client is not None:
-                self._on_edit(change(self._draft))
+                self._edits.by(control, change)
 
-    def _on_click(self, button: Any, change: Callable[[Draft], Draft]) -> None:
+    def _on_click(self, button: Any, change: Change) -> None:
         @button.on_click
         async def _clicked(_event: GuiEvent[Any]) -> None:
-            self._on_edit(change(self._draft))
+            self._edits.finish()
+            self._edits.make(change)
 
 
 class ShowsDraft(Protocol):

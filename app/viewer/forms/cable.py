@@ -5,9 +5,10 @@ from typing import Any, Literal
 from viser import GuiApi
 
 from app.viewer.draft import Draft
-from app.viewer.forms.base import Form, OnEdit, show_if, show_value
+from app.viewer.edits import Edits
+from app.viewer.forms.base import Form, show_if, show_value
 from app.viewer.kept import KeptCables
-from app.viewer.shapes import scaled
+from app.viewer.shapes import LONGEST, SHORTEST, scaled
 from dlocore import PRESETS, Cable, SceneError
 
 CUSTOM = "own values"
@@ -18,13 +19,13 @@ PLASTIC_RATE = 50.0  # 1/s, of the memory, where a yield strain is set and no ra
 class CableForm(Form):
     """Edits the cable."""
 
-    def __init__(self, gui: GuiApi, draft: Draft, on_edit: OnEdit, cables: KeptCables) -> None:
-        super().__init__(draft, on_edit)
+    def __init__(self, gui: GuiApi, draft: Draft, edits: Edits, cables: KeptCables) -> None:
+        super().__init__(draft, edits)
         self._cables = cables
         self._kept = cables.all()
         with gui.add_folder("Cable"):
             self._preset = gui.add_dropdown("Preset", (*PRESETS, *self._kept, CUSTOM))
-            self._length = gui.add_number("Length [m]", 1.0, min=0.05, max=1000.0, step=0.05)
+            self._length = gui.add_number("Length [m]", 1.0, min=SHORTEST, max=LONGEST, step=0.05)
             self._diameter = gui.add_number("Diameter [mm]", 1.0, min=0.01, max=1e4, step=0.1)
             self._density = gui.add_number("Density [g/m]", 1.0, min=0.01, max=1e7, step=0.1)
             self._bending = gui.add_number("EI [10⁻³ N m²]", 1.0, min=1e-6, max=1e9, step=0.01)

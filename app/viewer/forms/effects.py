@@ -8,7 +8,8 @@ from viser import GuiApi
 
 from app.viewer import report
 from app.viewer.draft import Draft
-from app.viewer.forms.base import Form, OnEdit, show_value
+from app.viewer.edits import Edits
+from app.viewer.forms.base import Form, show_value
 from dlocore import EffectReport
 from dlocore.scene.scene import EFFECTS, Switch
 
@@ -19,8 +20,8 @@ NEEDED = ("stretch",)  # can't be switched off: without it a cable has no length
 class EffectsForm(Form):
     """Edits the switches of the effects, and shows what became of them."""
 
-    def __init__(self, gui: GuiApi, draft: Draft, on_edit: OnEdit) -> None:
-        super().__init__(draft, on_edit)
+    def __init__(self, gui: GuiApi, draft: Draft, edits: Edits) -> None:
+        super().__init__(draft, edits)
         self._switches: dict[str, Any] = {}
         self._notes: dict[str, Any] = {}
         for name in EFFECTS:

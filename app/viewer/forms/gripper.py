@@ -4,11 +4,12 @@ from dataclasses import replace
 from typing import Any, get_args
 
 import numpy as np
-from viser import GuiApi, GuiEvent
+from viser import GuiApi
 
 from app.viewer import grips
 from app.viewer.draft import Draft
-from app.viewer.forms.base import Form, OnEdit, show_if, show_value
+from app.viewer.edits import Edits
+from app.viewer.forms.base import Form, show_if, show_value
 from dlocore import SplineSurface
 from dlocore.shape.shape import StartCurve
 
@@ -24,11 +25,11 @@ class GripperForm(Form):
         gui: where the controls go.
         draft: the scene to start with.
         start: its start curve.
-        on_edit: called with the edited draft.
+        edits: makes the changes of the draft.
     """
 
-    def __init__(self, gui: GuiApi, draft: Draft, start: StartCurve, on_edit: OnEdit) -> None:
-        super().__init__(draft, on_edit)
+    def __init__(self, gui: GuiApi, draft: Draft, start: StartCurve, edits: Edits) -> None:
+        super().__init__(draft, edits)
         self._start = start
         self._shown: SplineSurface | None = None
         self._which = gui.add_dropdown("Gripper", self._names(draft), hint="Or click on a gripper in the picture")
@@ -54,12 +55,10 @@ class GripperForm(Form):
         self._bind_controls()
 
     def _bind_controls(self) -> None:
-        @self._buttons.on_click
-        async def _pressed(_event: GuiEvent[Any]) -> None:
-            draft = self._draft
-            self._on_edit(grips.added(draft, self._start) if self._buttons.value == "Add" else grips.removed(draft))
-
-        self._bind(self._which, lambda d: grips.selected(d, self._names(d).index(self._which.value)))
+        self._on_click(
+            self._buttons, lambda d: grips.added(d, self._start) if self._buttons.value == "Add" else grips.removed(d)
+        )
+        self._bind(self._which, lambda d: grips.selected(d, self._which.options.index(self._which.value)))
         self._bind(self._u, lambda d: grips.changed(d, "u", float(self._u.value)))
         self._bind(self._hold, lambda d: grips.with_hold(d, HOLDS[self._hold.value]))
         self._bind(self._motion, lambda d: grips.with_motion(d, self._motion.value))

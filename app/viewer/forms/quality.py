@@ -5,7 +5,8 @@ from typing import Any, Literal, get_args
 from viser import GuiApi
 
 from app.viewer.draft import Draft
-from app.viewer.forms.base import Form, OnEdit, show_if, show_value
+from app.viewer.edits import Edits
+from app.viewer.forms.base import Form, show_if, show_value
 
 Mode = Literal["automatic", "target error", "time budget", "grid"]
 QUALITY = ("quality",)
@@ -17,8 +18,8 @@ DELTAS = {"10⁻⁴ m": 1e-4, "10⁻⁵ m": 1e-5, "10⁻⁶ m": 1e-6, "10⁻⁷ 
 class QualityForm(Form):
     """Edits the asked quality."""
 
-    def __init__(self, gui: GuiApi, draft: Draft, on_edit: OnEdit) -> None:
-        super().__init__(draft, on_edit)
+    def __init__(self, gui: GuiApi, draft: Draft, edits: Edits) -> None:
+        super().__init__(draft, edits)
         self._mode = gui.add_dropdown("Ask for", get_args(Mode))
         self._error = gui.add_number("Target error [mm]", 2.0, min=0.001, max=1e4, step=0.1)
         self._budget = gui.add_number("Time budget [ms]", 20.0, min=0.1, max=60_000.0, step=1.0)

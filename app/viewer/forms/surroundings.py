@@ -5,9 +5,10 @@ from typing import Any
 import numpy as np
 from viser import GuiApi, GuiEvent
 
-from app.viewer import obstacle_edits as edits
+from app.viewer import obstacle_edits
 from app.viewer.draft import Draft
-from app.viewer.forms.base import Form, OnEdit, show_if, show_value
+from app.viewer.edits import Edits
+from app.viewer.forms.base import Form, show_if, show_value
 
 NONE = "no obstacle"
 ADDED = {"Cylinder": "cylinder", "Box": "box", "Sphere": "sphere", "Capsule": "capsule"}
@@ -19,8 +20,8 @@ TABLE = ("environment", "table")
 class SurroundingsForm(Form):
     """Edits the environment."""
 
-    def __init__(self, gui: GuiApi, draft: Draft, on_edit: OnEdit) -> None:
-        super().__init__(draft, on_edit)
+    def __init__(self, gui: GuiApi, draft: Draft, edits: Edits) -> None:
+        super().__init__(draft, edits)
         self._chosen = 0
         with gui.add_folder("Surroundings"):
             self._table = gui.add_checkbox("Table", initial_value=True)
@@ -48,28 +49,29 @@ class SurroundingsForm(Form):
         self._bind(self._drag, lambda d: d.put((*ENVIRONMENT, "drag"), float(self._drag.value)))
         self._bind(self._quadratic, lambda d: d.put((*ENVIRONMENT, "drag_quadratic"), float(self._quadratic.value)))
         self._bind(self._gravity, lambda d: d.put((*ENVIRONMENT, "gravity"), [float(x) for x in self._gravity.value]))
-        self._bind(self._centre, lambda d: edits.moved(d, self._chosen, np.array(self._centre.value)))
-        self._bind(self._radius, lambda d: edits.changed(d, self._chosen, "radius", 1e-3 * self._radius.value))
+        self._bind(self._centre, lambda d: obstacle_edits.moved(d, self._chosen, np.array(self._centre.value)))
+        self._bind(self._radius, lambda d: obstacle_edits.changed(d, self._chosen, "radius", 1e-3 * self._radius.value))
         self._bind(
-            self._size, lambda d: edits.changed(d, self._chosen, "size", [1e-3 * float(x) for x in self._size.value])
+            self._size,
+            lambda d: obstacle_edits.changed(d, self._chosen, "size", [1e-3 * float(x) for x in self._size.value]),
         )
-        self._bind(self._long, lambda d: edits.lengthened(d, self._chosen, 1e-3 * self._long.value))
-        self._bind(self._rough, lambda d: edits.changed(d, self._chosen, "friction", float(self._rough.value)))
+        self._bind(self._long, lambda d: obstacle_edits.lengthened(d, self._chosen, 1e-3 * self._long.value))
+        self._bind(self._rough, lambda d: obstacle_edits.changed(d, self._chosen, "friction", float(self._rough.value)))
 
-        @self._add.on_click
-        async def _added(_event: GuiEvent[Any]) -> None:
-            self._chosen = len(edits.obstacles(self._draft))
-            self._on_edit(edits.added(self._draft, ADDED[self._add.value]))
-
-        @self._remove.on_click
-        async def _removed(_event: GuiEvent[Any]) -> None:
-            self._on_edit(edits.removed(self._draft, self._chosen))
+        self._on_click(self._add, self._with_new)
+        self._on_click(self._remove, lambda d: obstacle_edits.removed(d, self._chosen))
 
         @self._which.on_update
         async def _chosen(event: GuiEvent[Any]) -> None:
             if event.client is not None and self._which.value in self._names(self._draft):
-                self._chosen = self._names(self._draft).index(self._which.value)
+                chosen = self._names(self._draft).index(self._which.value)
+                self._edits.finish()  # what was typed is of the obstacle before
+                self._chosen = chosen
                 self.take(self._draft)
+
+    def _with_new(self, draft: Draft) -> Draft:
+        self._chosen = len(obstacle_edits.obstacles(draft))
+        return obstacle_edits.added(draft, ADDED[self._add.value])
 
     @staticmethod
     def _with_table(draft: Draft, wanted: bool) -> Draft:
@@ -77,7 +79,7 @@ class SurroundingsForm(Form):
 
     @staticmethod
     def _names(draft: Draft) -> tuple[str, ...]:
-        return tuple(f"{k + 1}: {body['kind']}" for k, body in enumerate(edits.obstacles(draft))) or (NONE,)
+        return tuple(f"{k + 1}: {body['kind']}" for k, body in enumerate(obstacle_edits.obstacles(draft))) or (NONE,)
 
     def take(self, draft: Draft) -> None:
         """Show `draft`."""
@@ -95,7 +97,7 @@ class SurroundingsForm(Form):
         self._take_obstacle(draft)
 
     def _take_obstacle(self, draft: Draft) -> None:
-        bodies, names = edits.obstacles(draft), self._names(draft)
+        bodies, names = obstacle_edits.obstacles(draft), self._names(draft)
         self._chosen = max(0, min(self._chosen, len(bodies) - 1))
         if tuple(self._which.options) != names:
             self._which.options = names
@@ -108,11 +110,11 @@ class SurroundingsForm(Form):
         show_if(self._long, body.get("kind") in ("cylinder", "capsule"))
         if not bodies:
             return
-        show_value(self._centre, tuple(round(float(x), 4) for x in edits.centre(body)))
+        show_value(self._centre, tuple(round(float(x), 4) for x in obstacle_edits.centre(body)))
         show_value(self._rough, float(body.get("friction", 0.0)))
         if "radius" in body:
             show_value(self._radius, round(1e3 * body["radius"], 4))
         if "size" in body:
             show_value(self._size, tuple(round(1e3 * float(x), 4) for x in body["size"]))
         if body["kind"] in ("cylinder", "capsule"):
-            show_value(self._long, round(1e3 * edits.length(body), 4))
+            show_value(self._long, round(1e3 * obstacle_edits.length(body), 4))
