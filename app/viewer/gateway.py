@@ -24,6 +24,24 @@ from websockets.typing import Subprotocol
 from app.viewer.examples import example, example_names
 
 CLIENT_PAGE = Path(viser.__file__).parent / "client" / "build" / "index.html"
+# The client ignores what Number.isFinite calls no number, as "-", but takes "-0" for one and draws the field again, as
+# 0, before the rest of -0.2 is typed. Here that is no number while it is typed; who leaves the field at it means 0.
+NEGATIVE_NUMBERS = rb"""<script>
+{
+  const begun = (field) => field.inputMode === "decimal" && /^-\.?0[.0]*$/.test(field.value);
+  const isFinite = Number.isFinite;
+  let typing = false;
+  Number.isFinite = (number) => isFinite(number) && !(typing && number === 0);
+  addEventListener("input", ({ target }) => { typing = begun(target); }, true);
+  addEventListener("input", () => { typing = false; });
+  addEventListener("focusout", ({ target }) => {
+    if (!begun(target)) return;
+    target.setRangeText("0", 0, target.value.length);
+    target.dispatchEvent(new InputEvent("input", { bubbles: true }));
+  }, true);
+}
+</script>
+"""
 CONTENT_SECURITY_POLICY = "; ".join(
     [
         "default-src 'self'",
@@ -105,7 +123,7 @@ def add_gateway(app: FastAPI) -> None:
     goes into the path, and `?example=` leads there. Without a viser server, and where as many scenes are open as may
     be, the pages say so.
     """
-    client = CLIENT_PAGE.read_bytes()
+    client = CLIENT_PAGE.read_bytes().replace(b"</head>", NEGATIVE_NUMBERS + b"</head>")
 
     def page(request: Request) -> Response:
         upstream = _upstream(request.app)

@@ -1,0 +1,45 @@
+"""What is typed into the panel of the 3D scene, key by key."""
+
+import json
+
+import pytest
+from playwright.sync_api import Page, expect
+from test_browser import open_scene
+from test_scene import downloaded
+
+pytestmark = pytest.mark.browser
+BETWEEN_KEYS = 150  # ms: that of a person, who sees the field drawn again between two
+
+
+def typed(page: Page, label: str, number: int, text: str):
+    """Type into one field of those beside a label, instead of what it holds; return it."""
+    beside = page.get_by_text(label, exact=True).locator("xpath=ancestor::*[.//input][1]")
+    field = beside.locator("input").nth(number)
+    field.click()
+    field.press("Control+a")
+    field.press_sequentially(text, delay=BETWEEN_KEYS)
+    return field
+
+
+def solved_target(page: Page) -> list[float]:
+    """Return by how much the gripper of the scene moves, as it was solved."""
+    page.wait_for_timeout(1000)
+    page.wait_for_selector('[data-status="converged"]:not(:has-text("Preview"))')
+    page.get_by_role("tab", name="Files").click()
+    scene = json.loads(downloaded(page, "Download scene.json").read_bytes())
+    page.get_by_role("tab", name="Scene").click()
+    return scene["primitives"][0]["path"]["displacement"]
+
+
+def test_negative_fractions_are_typed_into_the_target(service, witness):
+    page = open_scene(witness, service)
+    for text in ("-0.2", "-0.05", "-.3"):
+        target = typed(page, "Target [m]", 1, text)
+        expect(target).to_have_value(f"{float(text)}")
+        assert solved_target(page) == [0.0, float(text), 0.0]
+        expect(target).to_have_value(f"{float(text)}")
+    target = typed(page, "Target [m]", 1, "-0.")
+    target.press("Tab")
+    expect(target).to_have_value("0")
+    assert solved_target(page) == [0.0, 0.0, 0.0]
+    assert witness.errors == []
