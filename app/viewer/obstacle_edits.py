@@ -74,8 +74,11 @@ def length(body: dict[str, Any]) -> float:
 
 
 def lengthened(draft: Draft, number: int, wanted: float) -> Draft:
-    """Give a cylinder, or the segment of a capsule, another length [m] about its centre."""
-    if number >= len(obstacles(draft)):
+    """Give a cylinder, or the segment of a capsule, another length [m] about its centre.
+
+    One that is not positive changes nothing: a capsule without length has lost its direction.
+    """
+    if number >= len(obstacles(draft)) or wanted <= 0.0:
         return draft
     body = obstacles(draft)[number]
     if body["kind"] != "capsule":

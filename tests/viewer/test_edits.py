@@ -8,7 +8,7 @@ from protocol_client import NOTHING_STORED
 from scipy.spatial.transform import Rotation
 
 from app.schemas.request import EXAMPLES
-from app.viewer import grips, plots, report
+from app.viewer import grips, obstacle_edits, plots, report
 from app.viewer.draft import Draft, start_draft
 from app.viewer.forms.cable import CUSTOM, preset_of
 from app.viewer.palette import ramp
@@ -80,6 +80,16 @@ def test_a_point_that_is_held_without_its_direction_does_not_turn():
     again = grips.with_hold(draft, "point")
     assert "rotation" not in again.primitives[0]["path"]
     again.scene(NOTHING_STORED)
+
+
+@pytest.mark.parametrize("kind", ["capsule", "cylinder"])
+def test_a_round_obstacle_keeps_its_direction_when_its_length_passes_through_nothing(kind):
+    draft = obstacle_edits.added(start_draft(), kind)
+    for wanted in (0.0, -0.1, 0.3):
+        draft = obstacle_edits.lengthened(draft, 0, wanted)
+    (body,) = obstacle_edits.obstacles(draft)
+    assert obstacle_edits.length(body) == pytest.approx(0.3, rel=1e-12)
+    draft.scene(NOTHING_STORED)
 
 
 def test_a_number_that_is_not_allowed_is_named_with_what_is():
