@@ -1,6 +1,7 @@
 """Every control of the panel changes what it names, and the scene stays one that the API takes."""
 
 import itertools
+import json
 
 import httpx
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from protocol_client import NOTHING_STORED, SceneClient, connected
 
 from app.schemas import PredictionRequest, to_scene
+from app.viewer.draft import start_draft
 from dlocore.scene.scene import EFFECTS
 
 
@@ -71,6 +73,11 @@ GRIPPER = ("primitives", 0)
         ({"Threshold δ": "10⁻⁶ m"}, ("quality", "delta"), 1e-6),
         ({"Threshold δ": "none"}, ("quality",), {"n_u": 9, "n_t": 13}),
         ({"Method": "march"}, ("quality", "method"), "march"),
+        (
+            {"Ask for": "target error", "Method": "reference"},
+            ("quality",),
+            {"target_error": 0.002, "method": "reference"},
+        ),
         ({"Keep this grid": True}, ("quality",), {"n_u": 9, "n_t": 13, "delta": 1e-5, "keep_grid": True}),
         ({"Name": "my run"}, ("name",), "my run"),
         ({"Let it settle first": True}, ("shape", "settle"), True),
@@ -87,6 +94,19 @@ def test_every_scene_control_changes_the_scene(service, changes, path, expected)
             client.set(label, value)
         document = client.wait_for(lambda: _reached(checked(client), path, expected))
         assert _reached(document, path, expected)
+
+
+def test_an_edited_target_error_leaves_the_rest_of_the_asked_quality_as_it_was_given(service):
+    draft = start_draft().put(("quality",), {"target_error": 0.02, "method": "reference", "delta": 1e-6})
+    with connected(service) as client:
+        client.upload("Open a file …", "scene.json", json.dumps(draft.document).encode())
+        client.wait_for(lambda: client.control("Method")[1]["value"] == "reference")
+        client.set("Target error [mm]", 30.0)
+        assert client.document["quality"] == {"target_error": 0.03, "method": "reference", "delta": 1e-6}
+        client.wait_for(lambda: "reference," in client.card, timeout=60)
+        client.set("Ask for", "grid")  # which no reference takes
+        assert "method" not in client.document["quality"]
+        client.wait_for(lambda: "reference" not in client.control("Method")[1]["options"])
 
 
 def typed(client: SceneClient, label: str, texts: list[str], pause: float = 0.1) -> None:

@@ -10,7 +10,12 @@ from app.viewer.forms.base import Form, show_if, show_value
 
 Mode = Literal["automatic", "target error", "time budget", "grid"]
 QUALITY = ("quality",)
-METHODS = ("auto", "march", "spacetime", "paper")
+METHODS: dict[Mode, tuple[str, ...]] = {  # that each way of asking allows
+    "automatic": ("auto", "march", "reference"),
+    "target error": ("auto", "march", "reference"),
+    "time budget": ("auto", "march"),
+    "grid": ("auto", "march", "spacetime", "paper"),
+}
 NONE = "none"  # that of the method, and no reason to take one that has a threshold
 DELTAS = {"10⁻⁴ m": 1e-4, "10⁻⁵ m": 1e-5, "10⁻⁶ m": 1e-6, "10⁻⁷ m": 1e-7, "10⁻⁸ m": 1e-8}
 
@@ -26,56 +31,58 @@ class QualityForm(Form):
         self._n_u = gui.add_slider("Points along n_u", min=5, max=65, step=1, initial_value=9)
         self._n_t = gui.add_slider("Points in time n_t", min=5, max=129, step=1, initial_value=13)
         self._delta = gui.add_dropdown("Threshold δ", (NONE, *DELTAS))
-        self._method = gui.add_dropdown("Method", METHODS)
+        self._method = gui.add_dropdown("Method", METHODS["grid"])
         self._keep = gui.add_checkbox(
             "Keep this grid", False, hint="Also where it errs by more than 1 % of the length, or does not converge"
         )
         self._bind(self._mode, self._asked)
-        for control in (self._error, self._budget, *self._of_grid):
+        for control in (self._error, self._budget, self._method, *self._of_grid):
             self._bind(control, self._asked)
 
     @property
     def _of_grid(self) -> tuple[Any, ...]:
-        return self._n_u, self._n_t, self._delta, self._method, self._keep
+        return self._n_u, self._n_t, self._delta, self._keep
 
     def _asked(self, draft: Draft) -> Draft:
         mode: Mode = self._mode.value
-        wanted: Any = "auto"
+        given = _given(draft)
+        wanted: dict[str, Any] = given if mode == _mode(given) else {}  # with what has no control here
         if mode == "target error":
-            wanted = {"target_error": float(f"{1e-3 * self._error.value:.9g}")}
+            wanted["target_error"] = float(f"{1e-3 * self._error.value:.9g}")
         elif mode == "time budget":
-            wanted = {"time_budget": float(f"{1e-3 * self._budget.value:.9g}")}
+            wanted["time_budget"] = float(f"{1e-3 * self._budget.value:.9g}")
         elif mode == "grid":
-            wanted = {"n_u": int(self._n_u.value), "n_t": int(self._n_t.value)}
+            wanted["n_u"], wanted["n_t"] = int(self._n_u.value), int(self._n_t.value)
             words = self._delta.value
-            if words != NONE:
-                wanted["delta"] = DELTAS.get(words) or float(words.removesuffix(" m"))
-            if self._method.value != "auto":
-                wanted["method"] = self._method.value
-            if self._keep.value:
-                wanted["keep_grid"] = True
-        return draft.put(QUALITY, wanted)
+            wanted["delta"] = None if words == NONE else DELTAS.get(words) or float(words.removesuffix(" m"))
+            wanted["keep_grid"] = self._keep.value or None
+        method = self._method.value
+        wanted["method"] = method if method in METHODS[mode] and method != "auto" else None
+        return draft.put(QUALITY, {name: x for name, x in wanted.items() if x is not None} or "auto")
 
     def take(self, draft: Draft) -> None:
         """Show `draft`."""
         self._draft = draft
-        asked = draft.get(QUALITY, "auto")
-        given = {} if isinstance(asked, str) else {name: x for name, x in asked.items() if x is not None}
-        mode: Mode = "automatic"
-        if "target_error" in given:
-            mode = "target error"
+        given = _given(draft)
+        mode = _mode(given)
+        if mode == "target error":
             show_value(self._error, float(f"{1e3 * given['target_error']:.7g}"))
-        elif "time_budget" in given:
-            mode = "time budget"
+        elif mode == "time budget":
             show_value(self._budget, float(f"{1e3 * given['time_budget']:.7g}"))
-        elif "n_u" in given and "n_t" in given:
-            mode = "grid"
+        elif mode == "grid":
             self._take_grid(given)
+        self._take_method(given.get("method", "auto"), METHODS[mode])
         show_value(self._mode, mode)
         show_if(self._error, mode == "target error")
         show_if(self._budget, mode == "time budget")
         for control in self._of_grid:
             show_if(control, mode == "grid")
+
+    def _take_method(self, method: str, allowed: tuple[str, ...]) -> None:
+        options = allowed if method in allowed else (*allowed, method)
+        if tuple(self._method.options) != options:
+            self._method.options = options
+        show_value(self._method, method)
 
     def _take_grid(self, given: dict[str, Any]) -> None:
         for control, name in ((self._n_u, "n_u"), (self._n_t, "n_t")):
@@ -87,5 +94,17 @@ class QualityForm(Form):
         if words not in self._delta.options:
             self._delta.options = (NONE, *DELTAS, words)
         show_value(self._delta, words)
-        show_value(self._method, given.get("method", "auto"))
         show_value(self._keep, bool(given.get("keep_grid", False)))
+
+
+def _given(draft: Draft) -> dict[str, Any]:
+    asked = draft.get(QUALITY, "auto")
+    return {} if isinstance(asked, str) else {name: x for name, x in asked.items() if x is not None}
+
+
+def _mode(given: dict[str, Any]) -> Mode:
+    if "target_error" in given:
+        return "target error"
+    if "time_budget" in given:
+        return "time budget"
+    return "grid" if "n_u" in given and "n_t" in given else "automatic"
