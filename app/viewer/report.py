@@ -2,6 +2,7 @@
 
 import json
 import shlex
+import textwrap
 from html import escape
 from typing import Any
 
@@ -21,6 +22,7 @@ _GOOD = "rgba(46, 107, 214, 0.10)"
 _DOUBT = "rgba(235, 150, 30, 0.16)"
 SMALLEST_ERROR = 1e-9  # m: a smaller one is none, and has no place on a logarithmic axis
 EARLIER = 30  # solves that are shown beside the present one
+LABEL_WIDTH, LABEL_LINES = 48, 6  # of characters, and of lines, of a label in the picture
 _BAD = "rgba(222, 72, 50, 0.16)"
 _WORDS = {
     "converged": "Converged",
@@ -83,6 +85,17 @@ def problem_card(problem: str, details: str) -> str:
         f"{escape(problem)}.<div style='opacity: 0.75; margin-top: 0.3rem;'>{escape(details)} "
         "The picture shows the last good prediction.</div></div>"
     )
+
+
+def problem_label(problem: str, details: str) -> str:
+    """Return why there is no prediction, with value and what is allowed, in a few short lines for the picture."""
+    words = details if details.startswith(f"{problem}:") else f"{problem}. {details}"  # which name the field, too
+    return textwrap.fill(f"Not possible. {words}", LABEL_WIDTH, max_lines=LABEL_LINES, placeholder=" …")
+
+
+def status_label(prediction: Prediction) -> str:
+    """Return in a short line that an answer is no success; "" where it is one."""
+    return "" if prediction.status == "converged" else f"{_WORDS[prediction.status]}: see the panel."
 
 
 def waiting_card(*, ready: bool) -> str:

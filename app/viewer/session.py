@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from viser import ClientHandle, SceneClickEvent
 
-from app.viewer import grips, uploads
+from app.viewer import grips, report, uploads
 from app.viewer.camera import FIELD_OF_VIEW, PHONE, extent, start_pose
 from app.viewer.draft import Draft, start_draft
 from app.viewer.edits import Edits
@@ -308,7 +308,7 @@ class Session:
         with self._client.atomic():
             if outcome.prediction is None:
                 self._panel.take_problem(outcome.problem, outcome.details)
-                self._gizmo.warn(f"Not possible. {outcome.problem}.")
+                self._gizmo.warn(report.problem_label(outcome.problem, outcome.details))
             else:
                 self._take_prediction(outcome, outcome.prediction)
         self._client.flush()
@@ -324,7 +324,7 @@ class Session:
             self._playback.seek(self._playback.horizon)
         scale = self._picture.show(prediction, self._playback.time, self._draft.selected)
         self._panel.take_prediction(outcome.job.draft, prediction, scale, outcome.measured, preview=preview)
-        self._gizmo.warn("")
+        self._gizmo.warn("" if preview else report.status_label(prediction))
         if not preview:
             self._tracking.take_prediction(prediction)
             self._panel.show_error(self._tracking.card(self._playback.time))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from protocol_client import NOTHING_STORED, connected
 
+from app.viewer import report
 from app.viewer.draft import start_draft
 from dlocore import predict
 
@@ -103,7 +104,9 @@ def test_an_impossible_target_is_said_and_the_last_good_prediction_stays(service
         client.wait_for(lambda: 'data-status="impossible"' in client.card)
         assert "farther apart than the cable between them" in client.card
         client.wait_for(lambda: client.visible.get("/warning"))
-        assert "Not possible" in client.nodes["/warning"]["text"]
+        label = " ".join(client.nodes["/warning"]["text"].split())
+        assert label.startswith("Not possible. No cable can follow: the two grasps are farther apart")
+        assert "got 1.172 m from primitives[0] at 1.6 s, allowed: at most 0.75 m" in label
         assert np.array_equal(client.final_shape, good)
         client.drag("update", 0.5, 0.2)
         client.drag("end")
@@ -111,6 +114,23 @@ def test_an_impossible_target_is_said_and_the_last_good_prediction_stays(service
         assert client.visible["/warning"] is False
         assert not np.array_equal(client.final_shape, good)
     assert not [record for record in caplog.records if record.levelname == "ERROR"]
+
+
+def test_the_label_in_the_picture_tells_the_value_and_what_is_allowed():
+    label = report.problem_label("quality.n_u", "quality.n_u: got 900, allowed: an integer, 5 to 129.")
+    assert " ".join(label.split()) == "Not possible. quality.n_u: got 900, allowed: an integer, 5 to 129."
+    assert max(len(line) for line in label.splitlines()) <= report.LABEL_WIDTH
+
+
+def test_an_answer_that_is_no_success_is_told_in_the_picture(service):
+    with connected(service) as client:
+        client.refined()
+        assert not client.visible.get("/warning")
+        client.set("Ask for", "time budget")
+        client.set("Time budget [ms]", 0.1)  # in which no grid is solved to 1 %
+        client.wait_for(lambda: 'data-status="time_limit"' in client.card and "Preview" not in client.card)
+        client.wait_for(lambda: client.visible.get("/warning"))
+        assert client.nodes["/warning"]["text"] == "Out of time: see the panel."
 
 
 def test_the_timeline_moves_the_cable(service):
