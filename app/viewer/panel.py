@@ -2,6 +2,7 @@
 
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import viser
@@ -25,6 +26,7 @@ from dlocore.shape.shape import StartCurve
 SPEEDS = {"¼×": 0.25, "½×": 0.5, "1×": 1.0, "2×": 2.0}
 SLIDER_STEPS = 160  # of the timeline
 CHOOSE = "choose …"
+TO_READ = 12.0  # s, for which a notification stays
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,7 +103,9 @@ class Panel:
         self._legend = self._gui.add_html("")
         tabs = self._gui.add_tab_group()
         with tabs.add_tab("Scene"):
-            self._gripper = GripperForm(self._gui, draft, start, edits)
+            self._gripper = GripperForm(
+                self._gui, draft, start, edits, partial(client.add_notification, auto_close_seconds=TO_READ)
+            )
             self._add_start()
             self._cable = CableForm(self._gui, draft, edits, cables)
             self._surroundings = SurroundingsForm(self._gui, draft, edits)

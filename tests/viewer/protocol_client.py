@@ -50,6 +50,7 @@ class SceneClient:
         self.visible: dict[str, bool] = {}
         self.owners: dict[str, str] = {}
         self.controls: dict[str, dict[str, Any]] = {}
+        self.notifications: list[str] = []
         self.downloads: dict[str, bytes] = {}
         self._transfers: dict[str, tuple[str, int]] = {}
         self._parts: dict[str, dict[int, bytes]] = {}
@@ -117,6 +118,8 @@ class SceneClient:
                 self.positions[name] = message["position"]
             elif kind == "SetSceneNodeVisibilityMessage":
                 self.visible[name] = message["visible"]
+            elif kind == "NotificationShowMessage":
+                self.notifications.append(message["props"]["title"])
             elif kind == "FileTransferStartDownload":
                 self._transfers[message["transfer_uuid"]] = (message["filename"], message["part_count"])
             elif kind == "FileTransferPart":

@@ -250,6 +250,7 @@ def test_grippers_are_added_selected_and_removed(service):
         client.set("Ask for", "automatic")
         client.set("Grippers", "Add")
         client.wait_for(lambda: "/gripper/1" in client.nodes)
+        client.wait_for(lambda: client.notifications == ["Target of gripper 1 brought within reach"])
         assert client.control("Gripper")[1]["value"] == "2 at 1 m"
         assert [p["u"] for p in client.document["primitives"]] == [0.25, 1.0]
         client.press("Pause")

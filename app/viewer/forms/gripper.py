@@ -1,5 +1,6 @@
 """The grippers: which one is in hand, where and how it holds the cable, and where it goes."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, get_args
 
@@ -15,6 +16,7 @@ from dlocore.shape.shape import StartCurve
 
 NONE = "no gripper"
 HOLDS = {"its place": "point", "place and direction": "tangent", "place, direction and twist": "clamp"}
+Notify = Callable[[str, str], object]
 FARTHEST = 1000.0  # m, of a target's coordinates
 
 
@@ -26,10 +28,12 @@ class GripperForm(Form):
         draft: the scene to start with.
         start: its start curve.
         edits: makes the changes of the draft.
+        notify: shows a notification of this title and text.
     """
 
-    def __init__(self, gui: GuiApi, draft: Draft, start: StartCurve, edits: Edits) -> None:
+    def __init__(self, gui: GuiApi, draft: Draft, start: StartCurve, edits: Edits, notify: Notify) -> None:
         super().__init__(draft, edits)
+        self._notify = notify
         self._start = start
         self._shown: SplineSurface | None = None
         self._which = gui.add_dropdown("Gripper", self._names(draft), hint="Or click on a gripper in the picture")
@@ -55,9 +59,7 @@ class GripperForm(Form):
         self._bind_controls()
 
     def _bind_controls(self) -> None:
-        self._on_click(
-            self._buttons, lambda d: grips.added(d, self._start) if self._buttons.value == "Add" else grips.removed(d)
-        )
+        self._on_click(self._buttons, lambda d: self._with_new(d) if self._buttons.value == "Add" else grips.removed(d))
         self._bind(self._which, lambda d: grips.selected(d, self._which.options.index(self._which.value)))
         self._bind(self._u, lambda d: grips.changed(d, "u", float(self._u.value)))
         self._bind(self._hold, lambda d: grips.with_hold(d, HOLDS[self._hold.value]))
@@ -70,6 +72,16 @@ class GripperForm(Form):
         self._bind(self._closes, lambda d: grips.changed(d, "grasp_time", float(self._closes.value) or None))
         self._bind(self._opens, lambda d: grips.changed(d, "release_time", float(self._opens.value) or None))
         self._bind(self._horizon, lambda d: d.put(("horizon",), float(self._horizon.value) or None))
+
+    def _with_new(self, draft: Draft) -> Draft:
+        """Add a gripper, and say which targets that has changed."""
+        edited = grips.added(draft, self._start)
+        pairs = zip(draft.primitives, edited.primitives, strict=False)  # the new one is the last
+        for number, (before, after) in enumerate(pairs, 1):
+            if before != after:
+                words = "The cable would be too short between it and the new gripper."
+                self._notify(f"Target of gripper {number} brought within reach", words)
+        return edited
 
     @staticmethod
     def _names(draft: Draft) -> tuple[str, ...]:
