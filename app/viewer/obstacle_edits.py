@@ -10,6 +10,7 @@ from app.viewer.draft import Draft
 Floats = NDArray[np.float64]
 PATH = ("environment", "obstacles")
 PLACE = (0.55, 0.2)  # of a cable of 1 m that lies along x from the origin: where a new obstacle stands
+GAP = 0.02  # of the cable's length, at least, between a new obstacle and those beside it
 
 
 def obstacles(draft: Draft) -> list[dict[str, Any]]:
@@ -19,7 +20,7 @@ def obstacles(draft: Draft) -> list[dict[str, Any]]:
 
 
 def added(draft: Draft, kind: str) -> Draft:
-    """Add an obstacle of a size that suits the cable, standing on the table where there is one.
+    """Add an obstacle of a size that suits the cable, standing on the table where there is one, beside all others.
 
     Round ones are sunk to half their height, so that the cable meets them where they are widest. Few fixed grids
     resolve a contact: a new obstacle asks for automatic quality.
@@ -32,8 +33,37 @@ def added(draft: Draft, kind: str) -> Draft:
         "sphere": {"center": [x, y, z], "radius": 0.04 * size},
         "capsule": {"start": [x - 0.08 * size, y, z], "end": [x + 0.08 * size, y, z], "radius": 0.025 * size},
     }
-    edited = draft.put(PATH, [*obstacles(draft), {"kind": kind, **bodies[kind]}])
+    body = {"kind": kind, **bodies[kind]}
+    count = len(obstacles(draft))
+    edited = draft.put(PATH, [*obstacles(draft), body])
+    edited = moved(edited, count, _beside(obstacles(draft), body, GAP * size))
     return edited.put(("quality",), "auto") if "n_u" in (draft.get(("quality",)) or {}) else edited
+
+
+def _beside(others: list[dict[str, Any]], body: dict[str, Any], gap: float) -> Floats:
+    """Return the centre (3,) [m] nearest to that of `body` along y that leaves a gap [m] to all others."""
+    place = centre(body)
+    while True:
+        ends = []
+        for other in others:
+            away = place - centre(other)
+            apart = _reach(body) + _reach(other) + gap
+            if float(np.linalg.norm(away)) < apart * (1.0 - 1e-9):
+                ends.append(centre(other)[1] + np.sqrt(apart**2 - away[0] ** 2 - away[2] ** 2))
+        if not ends:
+            return place
+        place[1] = np.ceil(1e3 * max(ends)) / 1e3  # a whole millimetre, for who reads the document
+
+
+def _reach(body: dict[str, Any]) -> float:
+    """Return the radius of the sphere about the centre of an obstacle that has it inside [m]."""
+    if body["kind"] == "box":
+        return 0.5 * float(np.linalg.norm(body["size"]))
+    if body["kind"] == "sphere":
+        return float(body["radius"])
+    if body["kind"] == "capsule":
+        return 0.5 * length(body) + float(body["radius"])
+    return float(np.hypot(0.5 * length(body), body["radius"]))
 
 
 def removed(draft: Draft, number: int) -> Draft:

@@ -82,6 +82,23 @@ def test_a_point_that_is_held_without_its_direction_does_not_turn():
     again.scene(NOTHING_STORED)
 
 
+def test_new_obstacles_stand_beside_each_other():
+    draft = start_draft()
+    kinds = ("cylinder", "cylinder", "box", "capsule", "sphere", "box")
+    for kind in kinds:
+        draft = obstacle_edits.added(draft, kind)
+    bodies = obstacle_edits.obstacles(draft)
+    middles = np.array([obstacle_edits.centre(body) for body in bodies])
+    # half of what the largest of each kind measures across the table, [m]: round ones lie along x or stand
+    half = np.array([{"cylinder": 0.03, "box": 0.03, "capsule": 0.025, "sphere": 0.04}[kind] for kind in kinds])
+    order = np.argsort(middles[:, 1])
+    gaps = np.diff(middles[order, 1]) - half[order][1:] - half[order][:-1]
+    assert gaps.min() > 0.0
+    assert gaps.max() < 0.25
+    assert middles[0] == pytest.approx([0.55, 0.2, 0.05])
+    draft.scene(NOTHING_STORED)
+
+
 @pytest.mark.parametrize("kind", ["capsule", "cylinder"])
 def test_a_round_obstacle_keeps_its_direction_when_its_length_passes_through_nothing(kind):
     draft = obstacle_edits.added(start_draft(), kind)
