@@ -3,6 +3,7 @@
 import asyncio
 import json
 import logging
+import re
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,8 +16,15 @@ from app.viewer.picture import Look
 from dlocore import Prediction
 
 PICTURE_SIZE = (1080, 1920)  # px, height and width of a saved picture
+LONGEST_NAME = 60  # characters of a scene's name in that of a file
 PICTURE_WAIT = 20.0  # s, for the browser to draw it
 _log = logging.getLogger(__name__)
+
+
+def file_name(draft: Draft, ending: str) -> str:
+    """Return what a file of a scene is called: `ending`, after the scene's name where it has one."""
+    name = re.sub(r"\W+", "-", draft.get(("name",), "")).strip("-_")[:LONGEST_NAME]
+    return f"{name}-{ending}" if name else ending
 
 
 class Runs(Protocol):
@@ -43,16 +51,16 @@ class Outbox:
 
     def scene(self, draft: Draft) -> None:
         """Send the scene as the file that the API and the command line read."""
-        self._send("scene.json", json.dumps(draft.document, indent=2).encode())
+        self._send(file_name(draft, "scene.json"), json.dumps(draft.document, indent=2).encode())
 
-    async def playback(self, prediction: Prediction, look: Look, speed: float) -> None:
+    async def playback(self, draft: Draft, prediction: Prediction, look: Look, speed: float) -> None:
         """Send a playback as a page that opens offline, seen as the client sees it now."""
         camera = self._client.camera
         pose = (np.array(camera.position), np.array(camera.look_at))
         page = await asyncio.to_thread(playback_page, prediction, look, pose, fov=camera.fov, speed=speed)
-        self._send("cable.html", page)
+        self._send(file_name(draft, "playback.html"), page)
 
-    async def picture(self) -> None:
+    async def picture(self, draft: Draft) -> None:
         """Have the browser draw the scene larger than it is on the screen, without the panel, and send that."""
         height, width = PICTURE_SIZE
         try:
@@ -62,7 +70,7 @@ class Outbox:
         except (TimeoutError, RuntimeError) as error:
             self._client.add_notification("No picture", str(error), color="red")
             return
-        self._send("cable.png", await asyncio.to_thread(png, picture))
+        self._send(file_name(draft, "picture.png"), await asyncio.to_thread(png, picture))
 
     async def keep(self, draft: Draft, prediction: Prediction) -> str | None:
         """Store a run and return its id; None where it can't be, which is said to the client and in the log."""

@@ -405,10 +405,10 @@ class Session:
 
     async def _save_playback(self) -> None:
         if self._latest is not None:
-            await self._outbox.playback(self._latest, self._look, self._playback.speed)
+            await self._outbox.playback(self._current(), self._latest, self._look, self._playback.speed)
 
     async def _save_picture(self) -> None:
-        await self._outbox.picture()
+        await self._outbox.picture(self._current())
 
     async def _keep(self) -> None:
         """Store the last refined prediction with its scene, and link to it, unless the scene was edited since."""

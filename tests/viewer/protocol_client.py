@@ -170,7 +170,8 @@ class SceneClient:
         """The scene as it would be downloaded now."""
         self.downloads.clear()
         self.press("Download scene.json")
-        return json.loads(self.wait_for(lambda: self.downloads.get("scene.json")))
+        names = self.wait_for(lambda: [name for name in self.downloads if name.endswith("scene.json")])
+        return json.loads(self.downloads[names[0]])
 
     def refined(self) -> None:
         """Wait until the picture shows a prediction at the asked quality."""

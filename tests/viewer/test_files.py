@@ -11,6 +11,7 @@ from app.schemas import PredictionRequest, to_scene
 from app.schemas.request import EXAMPLES, TWO_GRIPPERS
 from app.viewer import shapes, uploads
 from app.viewer.draft import Draft, start_draft
+from app.viewer.outbox import file_name
 from dlocore import SceneError
 
 ROUNDING = 1e-6  # m: shapes are drawn in single precision
@@ -151,9 +152,23 @@ def test_the_shell_line_asks_for_the_scene_on_show(service):
         assert json.loads(body) == client.document
 
 
+def test_files_are_called_after_the_scene(service):
+    with connected(service) as client:
+        client.set("Name", "../An arc, 2 m")
+        client.press("Download scene.json")
+        client.wait_for(lambda: "An-arc-2-m-scene.json" in client.downloads)
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"), [(None, "picture.png"), ("Schleife_3", "Schleife_3-picture.png"), ("/..", "picture.png")]
+)
+def test_a_name_makes_a_file_name_that_every_system_takes(name, expected):
+    assert file_name(start_draft().put(("name",), name), "picture.png") == expected
+
+
 def test_a_playback_is_saved_as_one_page_that_names_no_other_host(service):
     with connected(service) as client:
         client.press("Save playback.html")
-        page = client.wait_for(lambda: client.downloads.get("cable.html"), timeout=60)
+        page = client.wait_for(lambda: client.downloads.get("playback.html"), timeout=60)
         assert page.startswith(b"<!")
         assert b"__VISER_EMBED_DATA__" in page
