@@ -365,9 +365,9 @@ class Panel:
         self._curl.content = report.curl_block(self._address, draft.document)
         self._keep.disabled = False
 
-    def take_wait(self) -> None:
-        """Say that a solve is under way."""
-        self._status.content = report.waiting_card(ready=True)
+    def take_wait(self, elapsed: float, longest: float) -> None:
+        """Say that a solve is under way since `elapsed` [s], which takes `longest` [s] at most."""
+        self._status.content = report.solving_card(elapsed, longest)
 
     def take_costs(self, prediction: Prediction, costs: Mapping[str, float]) -> None:
         """Show what the effects cost [s]."""

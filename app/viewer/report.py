@@ -99,9 +99,17 @@ def status_label(prediction: Prediction) -> str:
 
 
 def waiting_card(*, ready: bool) -> str:
-    """Return what to show while a prediction is awaited, from a solver that is `ready` or being compiled."""
-    words = "Solving …" if ready else "The solver is being compiled, once …"
-    more = "The first scene with other effects than before takes some seconds more."
+    """Return what to show before the first prediction, from a solver that is `ready` or being compiled."""
+    return _waiting("Solving …" if ready else "The solver is being compiled, once …", "")
+
+
+def solving_card(elapsed: float, longest: float) -> str:
+    """Return what to show while a prediction is awaited since `elapsed` [s], of a solve that takes `longest` [s]."""
+    return _waiting(f"Solving, {elapsed:.0f} s …", f"A solve takes at most {longest:g} s. ")
+
+
+def _waiting(words: str, limit: str) -> str:
+    more = f"{limit}The first scene with other effects than before takes some seconds more."
     return (
         f'<div style="{_CARD} background: {_GOOD};" data-status="waiting"><b>{words}</b>'
         f'<div style="opacity: 0.75; margin-top: 0.3rem;">{more}</div></div>'

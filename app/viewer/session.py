@@ -30,6 +30,7 @@ from dlocore import Prediction, SceneError
 FRAME = 1 / 40  # s
 PANEL_FRAMES = 3  # pictures for one update of the timeline: redrawing the panel is what costs the browser most
 PATIENCE = 0.8  # s without an answer, after which the panel says that one is under way
+TICK = 1.0  # s between two signs of life while one is under way
 AFTER_DRAG = 0.4  # s, in which a click is the end of a drag
 QUIET = 0.2  # s without an edit, after which the hand counts as still
 
@@ -76,7 +77,7 @@ class Session:
         self._set_up()
         self._outbox = Outbox(client, shared.runs)
         self._picture = Picture(client.scene)
-        self._released_at = -np.inf
+        self._released_at = self._asked_at = -np.inf
 
         # the type asks for a plain function, which viser would call on another thread
         client.scene.on_click()(self._clicked)  # type: ignore[arg-type]
@@ -289,12 +290,14 @@ class Session:
     def _ask(self, kind: Kind) -> None:
         """Have the draft solved; where that takes longer than a blink, say that it is under way."""
         self._solver.ask(self._draft, kind)
+        self._asked_at = self._loop.time()
         if self._busy_timer is None:
             self._busy_timer = self._loop.call_later(PATIENCE, self._say_busy)
 
     def _say_busy(self) -> None:
-        self._panel.take_wait()
+        self._panel.take_wait(self._loop.time() - self._asked_at, self._shared.solver.longest)
         self._client.flush()
+        self._busy_timer = self._loop.call_later(TICK, self._say_busy)
 
     def _deliver(self, outcome: Outcome) -> None:
         """Hand an outcome from the solver thread to the event loop."""

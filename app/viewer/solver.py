@@ -37,6 +37,11 @@ class ServiceSolver:
         """Whether the solver is compiled."""
         return self._service.ready
 
+    @property
+    def longest(self) -> float:
+        """How long a refined solve takes at most [s]."""
+        return self._service.settings.time_limit
+
     def make(self, draft: Draft) -> Scene:
         """Return the scene of a draft, or raise SceneError."""
         return draft.scene(self._service.runs.motion)

@@ -24,6 +24,10 @@ class Solver(Protocol):
     def ready(self) -> bool:
         """Whether the solver is compiled."""
 
+    @property
+    def longest(self) -> float:
+        """How long a refined solve takes at most [s]."""
+
     def make(self, draft: Draft) -> Scene:
         """Return the scene of a draft, or raise SceneError."""
 

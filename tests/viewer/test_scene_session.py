@@ -133,6 +133,17 @@ def test_an_answer_that_is_no_success_is_told_in_the_picture(service):
         assert client.nodes["/warning"]["text"] == "Out of time: see the panel."
 
 
+def test_a_long_solve_tells_how_long_it_has_taken(service):
+    with connected(service) as client:
+        client.refined()
+        client.set("Ask for", "target error")
+        client.set("Method", "reference")
+        client.set("Target error [mm]", 0.001)
+        for seconds in (2, 3):
+            client.wait_for(lambda seconds=seconds: f"Solving, {seconds} s" in client.card)
+        assert "at most 60 s" in client.card
+
+
 def test_the_timeline_moves_the_cable(service):
     with connected(service) as client:
         client.press("Pause")
