@@ -121,9 +121,10 @@ def test_what_is_typed_counts_when_the_typing_rests(service):
         client.refined()
         typed(client, "Length [m]", ["10"])
         client.wait_for(lambda: '"length": 10.0' in client.markdown("```json"))
-        typed(client, "Length [m]", ["1", "15"])  # 1 is shorter than where the gripper may hold it in proportion
+        client.set("Grasp u [m]", 2.5)
+        typed(client, "Length [m]", ["1", "15"])  # a cable of 1 m would have the gripper at 0.25 m from then on
         client.wait_for(lambda: '"length": 15.0' in client.markdown("```json"))
-        assert client.document["primitives"][0]["u"] == 0.25
+        assert client.document["primitives"][0]["u"] == 2.5
 
 
 def test_what_nobody_means_is_neither_solved_nor_called_impossible(service):
