@@ -36,10 +36,15 @@ class Edits:
         if isinstance(control, TYPED):
             if change not in self._typed:
                 self._typed.append(change)
-            self._cancel()
-            self._timer = self._loop.call_later(REST, self.finish)
+            self.go_on()
         else:
             self.make(change)
+
+    def go_on(self) -> None:
+        """Wait anew where something is being typed: a keystroke came, which may leave the number as it was."""
+        if self._typed:
+            self._cancel()
+            self._timer = self._loop.call_later(REST, self.finish)
 
     def make(self, change: Change) -> None:
         """Make a change at once, after what was typed before it.

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from viser import ClientHandle, SceneClickEvent
+from viser._messages import GuiUpdateMessage
 
 from app.viewer import grips, report, uploads
 from app.viewer.camera import FIELD_OF_VIEW, PHONE, extent, start_pose
@@ -84,6 +85,8 @@ class Session:
         self._gizmo = Gizmo(client.scene, self._begin_drag, self._drag, self._end_drag)
         self._shape = ShapeEditor(client, self._shape_dragged)
         self._edits = Edits(lambda: self._draft, self.edit)
+        # controls are not told of "0.0" after "0", on the way to 0.02
+        client._websock_connection.register_handler(GuiUpdateMessage, lambda *_: self._edits.go_on())
         self._panel = Panel(
             client,
             self._draft,
