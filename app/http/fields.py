@@ -192,7 +192,7 @@ def _allowed(kind: str, context: dict[str, Any], loc: list[Any], whole: "_Schema
         text = _bounds(context, "min_length", "max_length", "{} characters")
     if kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
         text = _range(schema) or _bounds(context, "ge", "le", "{}")
-    description = schema.get("description", "").split("\n")[0].rstrip(".")
+    description = schema.get("description", "").split("\n")[0].split(". ")[0].rstrip(".")
     return f"{text} ({description})" if text and description else text or description or "a field of the contract"
 
 

@@ -80,17 +80,23 @@ def status_card(prediction: Prediction, *, preview: bool) -> str:
 def problem_card(problem: str, details: str) -> str:
     """Return why there is no prediction, in words."""
     headline = "This is not possible." if details else "No prediction."
+    why, more = (details, "") if _name_the_field(problem, details) else (f"{problem}.", f"{details} ")
     return (
         f'<div style="{_CARD} background: {_BAD};" data-status="impossible" role="alert"><b>{headline}</b> '
-        f"{escape(problem)}.<div style='opacity: 0.75; margin-top: 0.3rem;'>{escape(details)} "
+        f"{escape(why)}<div style='opacity: 0.75; margin-top: 0.3rem;'>{escape(more)}"
         "The picture shows the last good prediction.</div></div>"
     )
 
 
 def problem_label(problem: str, details: str) -> str:
     """Return why there is no prediction, with value and what is allowed, in a few short lines for the picture."""
-    words = details if details.startswith(f"{problem}:") else f"{problem}. {details}"  # which name the field, too
+    words = details if _name_the_field(problem, details) else f"{problem}. {details}"
     return textwrap.fill(f"Not possible. {words}", LABEL_WIDTH, max_lines=LABEL_LINES, placeholder=" …")
+
+
+def _name_the_field(problem: str, details: str) -> bool:
+    """Return whether a problem is but the field that its details begin with."""
+    return details.startswith(f"{problem}:")
 
 
 def status_label(prediction: Prediction) -> str:

@@ -196,6 +196,11 @@ def test_the_scenes_that_the_cases_are_made_of_are_right(client: TestClient, sce
     assert client.post("/v1/predictions", json=scene).status_code == 201
 
 
+def test_what_is_allowed_is_said_with_what_the_field_is_and_no_more(client: TestClient) -> None:
+    problem = the_problem(client.post("/v1/predictions", json=put(PAPER, "quality", {"n_u": 500, "n_t": 13})), 422)
+    assert problem["errors"][0]["allowed"] == "an integer at least 5 at most 129 (Control points along the cable)"
+
+
 def test_a_whole_number_with_a_point_is_an_integer(client: TestClient) -> None:
     scene = {**PAPER, "quality": {"n_u": 9.0, "n_t": 1.3e1}, "output": {"samples_u": 3.0, "samples_t": 2}}
     answer = client.post("/v1/predictions?store=false", json=scene)

@@ -122,6 +122,15 @@ def test_the_label_in_the_picture_tells_the_value_and_what_is_allowed():
     assert max(len(line) for line in label.splitlines()) <= report.LABEL_WIDTH
 
 
+def test_the_card_names_a_field_once():
+    details = "cable.diameter: got 10.0, allowed: at most 0.5 [m]."
+    card = report.problem_card("cable.diameter", details)
+    assert card.count("cable.diameter") == 1
+    assert f"</b> {details}<div" in card
+    assert "</b> Two grasps meet.<div" in (card := report.problem_card("Two grasps meet", details))
+    assert details in card
+
+
 def test_an_answer_that_is_no_success_is_told_in_the_picture(service):
     with connected(service) as client:
         client.refined()

@@ -26,7 +26,7 @@ class CableForm(Form):
         with gui.add_folder("Cable"):
             self._preset = gui.add_dropdown("Preset", (*PRESETS, *self._kept, CUSTOM))
             self._length = gui.add_number("Length [m]", 1.0, min=SHORTEST, max=LONGEST, step=0.05)
-            self._diameter = gui.add_number("Diameter [mm]", 1.0, min=0.01, max=1e4, step=0.1)
+            self._diameter = gui.add_number("Diameter [mm]", 1.0, min=0.01, max=500.0, step=0.1)
             self._density = gui.add_number("Density [g/m]", 1.0, min=0.01, max=1e7, step=0.1)
             self._bending = gui.add_number("EI [10⁻³ N m²]", 1.0, min=1e-6, max=1e9, step=0.01)
             with gui.add_folder("More of the cable", expand_by_default=False):
