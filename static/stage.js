@@ -11,19 +11,37 @@ const SAID = {
 const scene = document.getElementById("scene");
 const waiting = document.getElementById("waiting");
 const full = document.getElementById("full");
+const note = document.getElementById("stage-note");
 let example = null;
 let awake = false;
+let dark = false; // the theme that the scene is shown in
+let touched = false; // whether someone was at work in the scene: to load it anew would undo that
 
-function address(dark) {
-  const query = [example === null ? "" : `example=${encodeURIComponent(example)}`, dark ? "darkMode" : ""];
+scene.addEventListener("load", () => {
+  touched = false;
+  note.hidden = true;
+  for (const kind of ["pointerdown", "keydown"])
+    scene.contentWindow.addEventListener(kind, () => { touched = true; }, { capture: true, once: true });
+});
+
+function address() {
+  const query = [example === null ? "" : `example=${encodeURIComponent(example)}`, isDark() ? "darkMode" : ""];
   const asked = query.filter((part) => part !== "").join("&");
   return asked === "" ? "/scene/" : `/scene/?${asked}`;
 }
 
 export function showScene(name = example) {
   example = name;
-  full.href = address(isDark());
+  dark = isDark();
+  full.href = address();
   if (awake) scene.contentWindow.location.replace(full.href); // another src would be a step of its own for Back
+}
+
+/** Show the scene in the theme of the page, if nobody was at work in it. */
+export function showTheme() {
+  if (!touched) return showScene();
+  full.href = address();
+  note.hidden = isDark() === dark;
 }
 
 async function state() {

@@ -363,6 +363,25 @@ def test_the_theme_can_be_chosen_and_stays(service, witness):
     assert page.evaluate(ground) == light
 
 
+def test_another_theme_leaves_a_scene_that_was_changed_as_it_is(service, witness):
+    page = open_page(witness, service)
+    wait_for_scene(page, "/scene/?example=paper-25")
+    page.evaluate("document.getElementById('scene').contentWindow.changed = true")
+    page.locator("#scene").click(position={"x": 200, "y": 200})
+    button, note = page.get_by_role("button", name="Dark theme"), page.locator("#stage-note")
+    button.click()
+    expect(note).to_be_visible()
+    expect(page.locator("#full")).to_have_attribute("href", re.compile("darkMode"))
+    page.wait_for_timeout(300)
+    assert page.evaluate("document.getElementById('scene').contentWindow.changed") is True
+    button.click()
+    expect(note).to_be_hidden()
+    button.click()
+    page.get_by_role("link", name=examples()["two-grippers"].title).first.click()
+    wait_for_scene(page, "/scene/?example=two-grippers&darkMode")
+    expect(note).to_be_hidden()
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_every_text_has_the_contrast_of_wcag_aa(service, witness, scheme):
     page = open_page(witness, service, scheme=scheme)
