@@ -12,7 +12,7 @@ from dlocore.kernels.growth import LOOKS
 from dlocore.kernels.timefit import farthest, sampled
 from dlocore.problem.checks import TOO_DEEP
 from dlocore.problem.discretisation import smallest_n_u
-from dlocore.problem.events import moments, swings
+from dlocore.problem.events import JUMP, moments, swings
 from dlocore.problem.grid import Grid
 from dlocore.problem.held_ends import held_back
 from dlocore.problem.problem import Problem, stiff_as_taut, stiffer, stiffer_for
@@ -23,6 +23,7 @@ from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.smooth import march_smooth
 from dlocore.solvers.timefit import fit, largest, missed, refined
 from dlocore.solvers.watched import watched
+from dlocore.spline import design_matrix, spline_at
 from dlocore.statics.statics import start_grid
 
 Floats = NDArray[np.float64]
@@ -42,6 +43,8 @@ TEARS = 1.5  # times the strain of another march: what strains a cable so much m
 _STIFFER = 5  # times that contact is made stiffer on one grid
 _MISSED = 0.01  # of the diameter: what the time spline may miss of a motion with contact
 _SAMPLES = 33  # along the cable, and in time while it swings once, at which surfaces are compared
+_AT_ONCE = 1e-2  # of the length: what moves by more from one of these times to the next is compared in between, at ...
+_SOONER = 0.5 ** np.arange(1.0, 7.0)  # ... these parts of it, where it sets out at once
 _YIELDING = 0.8  # of the depth, at most, is left by a stiffer contact where it is one of stiffness
 ACCEPT = 0.75  # of the target: an answer with a smaller estimated error is believed
 
@@ -109,6 +112,27 @@ class Level:
         """The surface at evenly spaced times and 33 places along the cable (moments, 33, nc) [m]."""
         times = moments(self.problem.scene, _SAMPLES)
         return np.asarray(sampled(self.knots_t, self.motion.grid.knots, self.control, times, _SAMPLES))
+
+    @cached_property
+    def sudden(self) -> list[float]:
+        """When it sets out so fast that the next of the evenly spaced times may come too late to tell [s]."""
+        problem, motion, dimensions = self.problem, self.motion, self.problem.plane.dimensions
+        far = _AT_ONCE * problem.scene.cable.length
+        found = [0.0] if farthest(self.samples[:1], self.samples[1:2], dimensions) > far else []
+        jumps = np.array([event.time for event in problem.events if event.multiplicity == JUMP])
+        if len(jumps):
+            step = problem.horizon / (len(self.samples) - 1)
+            last = len(motion.times) - 1
+            before, after = (np.minimum(np.searchsorted(motion.times, t), last) for t in (jumps, jumps + step))
+            moved = (motion.states[after] - motion.states[before])[..., :dimensions]
+            found += jumps[np.linalg.norm(moved, axis=2).max(axis=1) > far].tolist()
+        return found
+
+    def at(self, times: Floats) -> Floats:
+        """Return the surface at times (k,) [s] and 33 places along the cable (k, 33, nc) [m]."""
+        knots = self.motion.grid.knots
+        over = design_matrix(knots, np.linspace(0.0, knots[-1], _SAMPLES))
+        return np.ascontiguousarray(over @ spline_at(self.knots_t, self.control, times))
 
 
 def stretched(problem: Problem, level: int) -> Size:
@@ -283,8 +307,15 @@ def credible_after(level: Level) -> float:
 
 
 def distance(a: Level, b: Level, problem: Problem) -> float:
-    """Return the largest distance between the surfaces of two levels [m]."""
-    return float(farthest(a.samples, b.samples, problem.plane.dimensions))
+    """Return the largest distance between the surfaces of two levels [m], also soon after they set out at once."""
+    dimensions = problem.plane.dimensions
+    most = float(farthest(a.samples, b.samples, dimensions))
+    begins = np.array(sorted({*a.sudden, *b.sudden}))
+    if len(begins) == 0:
+        return most
+    times = (begins[:, None] + problem.horizon / (len(a.samples) - 1) * _SOONER).ravel()
+    times = times[times < problem.horizon]
+    return max(most, float(farthest(a.at(times), b.at(times), dimensions)))
 
 
 def turned(a: Level, b: Level, problem: Problem) -> float:

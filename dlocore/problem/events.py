@@ -13,6 +13,7 @@ from dlocore.scene.scene import Grasp, Scene
 Floats = NDArray[np.float64]
 
 
+JUMP = 3  # multiplicity of the knot where the velocity jumps
 _LONGEST = 64.0  # times that a cable swings, for as many of which grids and comparisons grow
 
 
@@ -54,9 +55,9 @@ def find_events(scene: Scene) -> tuple[Event, ...]:
             found[time] = max(found.get(time, 0), multiplicity)
 
     for g in scene.grasps:
-        add(g.start, 3)
+        add(g.start, JUMP)
         if g.release_time is not None:
-            add(g.release_time, 3)
+            add(g.release_time, JUMP)
         released = np.inf if g.release_time is None else g.release_time
         end = g.start + g.path.duration
         if g.path.duration and end < released:
@@ -68,8 +69,8 @@ def find_events(scene: Scene) -> tuple[Event, ...]:
 
 def _smoothness(grasp: Grasp, end: float) -> int:
     if isinstance(grasp.path, Move):
-        return {"minimum_jerk": 1, "cubic": 2, "linear": 3}[grasp.path.profile]
-    return 3
+        return {"minimum_jerk": 1, "cubic": 2, "linear": JUMP}[grasp.path.profile]
+    return JUMP
 
 
 def closed_grasps(scene: Scene, begin: float, end: float) -> list[Grasp]:
