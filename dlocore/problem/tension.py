@@ -26,17 +26,16 @@ def balanced(scene: Scene, grid: Grid, u: Floats) -> Floats:
     """Return the matrix (k, p) that makes the axial strain at u (k,) [m] of that at the axial points (p,) of a grid."""
     tables, knots, length = grid.tables, grid.knots[1:-1], float(grid.knots[-1])
     points, weights = gauss_points(np.array(grid.knots), *GAUSS_3)
-    at_points = _basis(knots, points)
-    mass = at_points.T @ (weights[:, None] * at_points)
-    held = sorted({g.u for g in scene.grasps if g.hold != "point"})
+    over = _basis(knots, points)
+    mass = over.T @ (weights[:, None] * over)
+    sides = _held_sides(scene)
     inside = sorted({u for u in (*(g.u for g in scene.grasps), *(f.u for f in scene.loads)) if 0.0 < u < length})
-    sides = [np.nextafter(g, to) for g in held for to in (0.0, length)]  # not the same where the knot is triple
     steps = np.array([np.heaviside(points - g, 0.5) for g in inside]).reshape(-1, len(points))
     given = np.hstack(
         [
             _basis(knots, tables.axial.u).T * tables.axial.w,
             _basis(knots, np.array(sides)).T,
-            -at_points.T @ (weights * steps).T,
+            -over.T @ (weights * steps).T,
         ]
     )
     found = np.linalg.solve(mass, given)
@@ -55,15 +54,20 @@ def at_points(scene: Scene, grid: Grid, strain: Callable[[Floats], Floats]) -> F
     `strain` takes places (k,) [m] and returns (k,). What is returned has the forces on all control points that it has,
     and is otherwise as near to it as it can be.
     """
-    tables, knots, length = grid.tables, grid.knots[1:-1], float(grid.knots[-1])
+    tables, knots = grid.tables, grid.knots[1:-1]
     points, weights = gauss_points(np.array(grid.knots), *GAUSS_3)
     own = strain(tables.axial.u)
     forces = _basis(knots, tables.axial.u).T * tables.axial.w
     left = _basis(knots, points).T @ (weights * strain(points)) - forces @ own
-    sides = [np.nextafter(g.u, to) for g in scene.grasps if g.hold != "point" for to in (0.0, length)]
-    held = _basis(knots, np.array(sides)).T
+    held = _basis(knots, np.array(_held_sides(scene))).T
     found = np.linalg.lstsq(np.hstack([forces, held]), left, rcond=None)[0]
     return own + found[: len(own)]
+
+
+def _held_sides(scene: Scene) -> list[float]:
+    """Return both sides of each place whose direction is held [m]: not the same where the knot is triple."""
+    held = sorted({g.u for g in scene.grasps if g.hold != "point"})
+    return [float(np.nextafter(u, to)) for u in held for to in (0.0, scene.cable.length)]
 
 
 def _basis(knots: Floats, u: Floats, derivative: int = 0) -> Floats:
