@@ -14,10 +14,11 @@ from pydantic import ValidationError
 
 from app.http.fields import bad_fields
 from app.schemas import PredictionRequest, to_scene
-from app.schemas.convert import StoredMotion, cable_of, shape_of
+from app.schemas.convert import StoredMotion, cable_of, environment_of, shape_of
 from app.schemas.request import PAPER
 from dlocore import Cable, Scene, SceneError
 from dlocore.errors import within
+from dlocore.scene.obstacles import Obstacle
 from dlocore.shape.shape import StartCurve, start_curve
 
 Floats = NDArray[np.float64]
@@ -103,6 +104,13 @@ class Draft:
         """Return the cable for the solver, or raise SceneError."""
         with within("cable"):
             return cable_of(self.request().cable)
+
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """Return the obstacles for the solver; none where the document makes none, or is no request."""
+        try:
+            return environment_of(self.request().environment).obstacles
+        except SceneError:
+            return ()
 
     def start(self, stored: StoredMotion) -> StartCurve:
         """Return the curve along which the cable lies at first, or raise SceneError."""

@@ -5,11 +5,12 @@ from viser import SceneApi, SceneNodeHandle
 
 from app.solids import pose
 from app.viewer import geometry
-from app.viewer.palette import OBSTACLE
+from app.viewer.palette import OBSTACLE, WARNING
 from dlocore import Box, Capsule, Cylinder, Sphere
 from dlocore.scene.obstacles import Obstacle
 
 SIDES, RINGS = 48, 12  # of round ones
+REFUSED_OPACITY = 0.5  # through which the cable is seen that an obstacle stands in the way of
 
 
 class ObstaclesPicture:
@@ -17,24 +18,25 @@ class ObstaclesPicture:
 
     def __init__(self, scene: SceneApi) -> None:
         self._scene = scene
-        self._rows: list[list[float]] = []
+        self._drawn: tuple[list[list[float]], frozenset[int]] = ([], frozenset())
         self._nodes: list[SceneNodeHandle] = []
 
-    def show(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Draw `obstacles`, unless they are those that stand there."""
-        rows = [obstacle.row().tolist() for obstacle in obstacles]
-        if rows == self._rows:
+    def show(self, obstacles: tuple[Obstacle, ...], refused: frozenset[int] = frozenset()) -> None:
+        """Draw `obstacles`, unless they are those that stand there; the `refused` ones so that one sees it."""
+        drawn = ([obstacle.row().tolist() for obstacle in obstacles], refused)
+        if drawn == self._drawn:
             return
-        self._rows = rows
+        self._drawn = drawn
         for node in self._nodes:
             node.remove()
-        self._nodes = [self._added(k, obstacle) for k, obstacle in enumerate(obstacles)]
+        self._nodes = [self._added(k, obstacle, refused=k in refused) for k, obstacle in enumerate(obstacles)]
 
-    def _added(self, number: int, obstacle: Obstacle) -> SceneNodeHandle:
+    def _added(self, number: int, obstacle: Obstacle, *, refused: bool) -> SceneNodeHandle:
         vertices, faces = mesh(obstacle)
         centre, wxyz = pose(obstacle)
+        colour, opacity = (WARNING, REFUSED_OPACITY) if refused else (OBSTACLE, None)
         return self._scene.add_mesh_simple(
-            f"/obstacle/{number}", vertices, faces, color=OBSTACLE, position=centre, wxyz=wxyz
+            f"/obstacle/{number}", vertices, faces, color=colour, opacity=opacity, position=centre, wxyz=wxyz
         )
 
 

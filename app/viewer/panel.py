@@ -19,6 +19,8 @@ from app.viewer.palette import QUANTITIES, ColourScale
 from app.viewer.picture import SURFACE_STYLES, Look
 from app.viewer.playback import Playback
 from app.viewer.shapes import with_settling
+from app.viewer.solve_card import SolveCard
+from app.viewer.step_buttons import StepButtons
 from dlocore import Prediction, SplineSurface
 from dlocore.calibration import Measured
 from dlocore.shape.shape import StartCurve
@@ -43,6 +45,10 @@ class Actions:
         save_playback: send the playback as a page.
         save_picture: send a picture.
         measure_costs: measure what the effects cost.
+        stop: end the solve that is under way.
+        solve: solve at the asked quality.
+        step_back: go back to the scene of before.
+        step_forward: and forward again.
         edit_shape: show the beads of the start shape, or not.
         straighten: start straight.
         reset_camera: look at the whole scene again.
@@ -57,6 +63,10 @@ class Actions:
     save_playback: Callable[[], Awaitable[None]]
     save_picture: Callable[[], Awaitable[None]]
     measure_costs: Callable[[], None]
+    stop: Callable[[], None]
+    solve: Callable[[], None]
+    step_back: Callable[[], None]
+    step_forward: Callable[[], None]
     edit_shape: Callable[[bool], None]
     straighten: Callable[[], None]
     reset_camera: Callable[[], None]
@@ -98,8 +108,10 @@ class Panel:
         self._actions = actions
         self._address = address
         self._earlier: list[tuple[float, float]] = []
-        self._status = self._gui.add_html(report.waiting_card(ready=ready))
+        self._stale = False  # whether the results are of a scene before
+        self._solve = SolveCard(self._gui, report.waiting_card(ready=ready), actions.stop, actions.solve)
         self._add_timeline()
+        self.steps = StepButtons(self._gui, actions.step_back, actions.step_forward)
         self._legend = self._gui.add_html("")
         tabs = self._gui.add_tab_group()
         with tabs.add_tab("Scene"):
@@ -348,13 +360,14 @@ class Panel:
             measured: what this machine was calibrated to.
             preview: whether it is one.
         """
-        self._status.content = report.status_card(prediction, preview=preview)
+        self._solve.show(report.status_card(prediction, preview=preview))
         if self._slider.max != self._playback.horizon:
             self._slider.max = self._playback.horizon
             self._slider.step = self._playback.horizon / SLIDER_STEPS
         self.show_time()
         if preview:
             return
+        self._stale = False
         self.take_scale(scale)
         self._effects.show(prediction.effects, {})
         self._forces.content = report.forces_list(prediction)
@@ -367,7 +380,19 @@ class Panel:
 
     def take_wait(self, elapsed: float, longest: float) -> None:
         """Say that a solve is under way since `elapsed` [s], which takes `longest` [s] at most."""
-        self._status.content = report.solving_card(elapsed, longest)
+        self._solve.show(report.solving_card(elapsed, longest), offer="stop")
+        self._mark_stale()
+
+    def take_stop(self) -> None:
+        """Say that the solve was ended by hand."""
+        self._solve.show(report.stopped_card(), offer="solve")
+
+    def _mark_stale(self) -> None:
+        """Show the results so that nobody takes them for those of the scene on the panel."""
+        if not self._stale:
+            self._stale = True
+            for part in (self._accuracy, self._convergence, self._message, self._forces):
+                part.content = report.stale(part.content)
 
     def take_costs(self, prediction: Prediction, costs: Mapping[str, float]) -> None:
         """Show what the effects cost [s]."""
@@ -375,7 +400,8 @@ class Panel:
 
     def take_problem(self, problem: str, details: str) -> None:
         """Say why there is no prediction of the edited scene."""
-        self._status.content = report.problem_card(problem, details)
+        self._solve.show(report.problem_card(problem, details))
+        self._mark_stale()
         self._keep.disabled = True
 
     def take_scale(self, scale: ColourScale) -> None:

@@ -15,6 +15,7 @@ from app.viewer.obstacles import ObstaclesPicture
 from app.viewer.palette import CONTACT, QUANTITIES, STEEL, ColourScale, Quantity, colour
 from app.viewer.picking import CableClick, GripperClick, picked
 from dlocore import Prediction
+from dlocore.scene.obstacles import Obstacle
 
 Floats = NDArray[np.float64]
 SurfaceStyle = Literal["where it moved", "raised with time", "hidden"]
@@ -95,6 +96,10 @@ class Picture:
         self._draw_ghosts()
         self.pose(time)
         return self._scale
+
+    def refuse(self, obstacles: tuple[Obstacle, ...], refused: frozenset[int]) -> None:
+        """Draw the obstacles of a scene that is not possible, beside the last prediction, and mark the `refused`."""
+        self._obstacles.show(obstacles, refused)
 
     def select(self, number: int | None) -> None:
         """Mark the gripper in hand, if any."""

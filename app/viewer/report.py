@@ -1,6 +1,7 @@
 """A prediction in plain words and small pieces of HTML for the panel; every inserted text is escaped."""
 
 import json
+import re
 import shlex
 import textwrap
 from html import escape
@@ -94,6 +95,11 @@ def problem_label(problem: str, details: str) -> str:
     return textwrap.fill(f"Not possible. {words}", LABEL_WIDTH, max_lines=LABEL_LINES, placeholder=" …")
 
 
+def named_obstacles(problem: str, details: str) -> frozenset[int]:
+    """Return the numbers of the obstacles that a problem is about."""
+    return frozenset(int(number) for number in re.findall(r"\bobstacles\[(\d+)\]", f"{problem} {details}"))
+
+
 def _name_the_field(problem: str, details: str) -> bool:
     """Return whether a problem is but the field that its details begin with."""
     return details.startswith(f"{problem}:")
@@ -115,9 +121,25 @@ def solving_card(elapsed: float, longest: float) -> str:
 
 
 def _waiting(words: str, limit: str) -> str:
-    more = f"{limit}The first scene with other effects than before takes some seconds more."
+    return _plain_card(
+        "waiting", words, f"{limit}The first scene with other effects than before takes some seconds more."
+    )
+
+
+def stopped_card() -> str:
+    """Return what to show where a solve was ended by hand."""
+    return _plain_card("stopped", "Stopped.", "This scene is not solved: the picture shows what was predicted before.")
+
+
+def stale(html: str) -> str:
+    """Return results, so that nobody takes them for those of a scene that has none yet."""
+    words = '<div style="margin: 0.2rem 0.75rem; font-size: 0.78rem;"><b>Of the scene before:</b></div>'
+    return f'<div data-stale="" style="opacity: 0.45;">{words}{html}</div>' if html else ""
+
+
+def _plain_card(status: str, words: str, more: str) -> str:
     return (
-        f'<div style="{_CARD} background: {_GOOD};" data-status="waiting"><b>{words}</b>'
+        f'<div style="{_CARD} background: {_GOOD};" data-status="{status}"><b>{words}</b>'
         f'<div style="opacity: 0.75; margin-top: 0.3rem;">{more}</div></div>'
     )
 

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from app.viewer.edits import Edits
 from app.viewer.examples import example
 from app.viewer.forms.recording import RecordingActions
 from app.viewer.gizmo import Gizmo
+from app.viewer.history import History
 from app.viewer.kept import KeptCables
 from app.viewer.outbox import Outbox, Runs
 from app.viewer.palette import BRAND
@@ -33,6 +35,7 @@ PANEL_FRAMES = 3  # pictures for one update of the timeline: redrawing the panel
 PATIENCE = 0.8  # s without an answer, after which the panel says that one is under way
 TICK = 1.0  # s between two signs of life while one is under way
 AFTER_DRAG = 0.4  # s, in which a click is the end of a drag
+SEEN = 2.0  # a cable that many times as long or as short as the one before asks for another place of the camera
 QUIET = 0.2  # s without an edit, after which the hand counts as still
 
 
@@ -75,6 +78,8 @@ class Session:
         self._refine_timer: asyncio.TimerHandle | None = None
         self._busy_timer: asyncio.TimerHandle | None = None
         self._playback = Playback()
+        self._history = History()
+        self._seen_length = 0.0  # m, of the cable that the camera was placed for
         self._set_up()
         self._outbox = Outbox(client, shared.runs)
         self._picture = Picture(client.scene)
@@ -128,6 +133,10 @@ class Session:
             save_playback=self._save_playback,
             save_picture=self._save_picture,
             measure_costs=self._measure_costs,
+            stop=self._stop,
+            solve=self._solve_again,
+            step_back=lambda: self._step(self._history.back),
+            step_forward=lambda: self._step(self._history.forward),
             edit_shape=self._edit_shape,
             straighten=self._straighten,
             reset_camera=self._reset_camera,
@@ -164,6 +173,7 @@ class Session:
         camera = self._client.camera
         camera.position, camera.look_at = self._camera()
         camera.max_orbit_distance = 20.0 * self._draft.length
+        self._seen_length = self._draft.length
 
     def _begin_drag(self) -> None:
         """Show where the motion ends while the hand is on the target."""
@@ -237,6 +247,18 @@ class Session:
         """Take over an edited draft: a preview at once, the asked quality as soon as the hand is still."""
         if draft == self._draft:
             return
+        if draft.document != self._draft.document:
+            self._history.changed(self._draft, self._loop.time())
+        self._change(draft)
+
+    def _step(self, step: Callable[[Draft], Draft]) -> None:
+        """Go a step back or forward to a scene of before."""
+        self._edits.finish()
+        draft = step(self._draft)
+        if draft != self._draft:
+            self._change(draft)
+
+    def _change(self, draft: Draft) -> None:
         solved_for = self._draft.document
         moved = draft.shape_key() != self._draft.shape_key()
         self._draft = draft
@@ -256,12 +278,15 @@ class Session:
         with contextlib.suppress(SceneError):
             self._start = self._draft.start(self._shared.runs.motion)
             self._shape.follow(self._start, self._draft.length)
+            if not 1 / SEEN <= self._draft.length / self._seen_length <= SEEN:
+                self._reset_camera()
 
     def _take_draft(self) -> None:
         draft = self._draft
         with self._client.atomic():
             self._panel.follow(self._start, None if self._latest is None else self._latest.surface)
             self._panel.take_draft(draft)
+            self._panel.steps.offer(*self._history.steps)
             self._panel.clear_kept()
             self._picture.select(draft.selected)
             self._shape.in_space = draft.in_space
@@ -297,6 +322,25 @@ class Session:
         if self._busy_timer is None:
             self._busy_timer = self._loop.call_later(PATIENCE, self._say_busy)
 
+    def _stop(self) -> None:
+        """End the solve that is under way; the picture stays as it is."""
+        self._solver.stop()
+        self._end_wait()
+        with self._client.atomic():
+            self._panel.take_stop()
+        self._client.flush()
+
+    def _solve_again(self) -> None:
+        self._edits.finish()
+        self._refine()
+        self._end_wait()
+        self._say_busy()
+
+    def _end_wait(self) -> None:
+        if self._busy_timer is not None:
+            self._busy_timer.cancel()
+            self._busy_timer = None
+
     def _say_busy(self) -> None:
         self._panel.take_wait(self._loop.time() - self._asked_at, self._shared.solver.longest)
         self._client.flush()
@@ -308,13 +352,18 @@ class Session:
             self._loop.call_soon_threadsafe(self._take, outcome)
 
     def _take(self, outcome: Outcome) -> None:
-        if self._busy_timer is not None:
-            self._busy_timer.cancel()
-            self._busy_timer = None
+        if outcome.job.stopped.is_set():  # it was on its way here
+            return
+        self._end_wait()
+        if self._solver.waiting:
+            self._busy_timer = self._loop.call_later(PATIENCE, self._say_busy)
         with self._client.atomic():
             if outcome.prediction is None:
                 self._panel.take_problem(outcome.problem, outcome.details)
                 self._gizmo.warn(report.problem_label(outcome.problem, outcome.details))
+                self._picture.refuse(
+                    outcome.job.draft.obstacles(), report.named_obstacles(outcome.problem, outcome.details)
+                )
             else:
                 self._take_prediction(outcome, outcome.prediction)
         self._client.flush()
@@ -372,9 +421,11 @@ class Session:
     def _replace(self, draft: Draft) -> None:
         """Show another scene from the beginning."""
         self._edits.finish()  # it would be typed into the other one
+        self._history.close_step()
         self._shape.hide()
         self._panel.show_editing(False)
         self.edit(draft)
+        self._history.close_step()
         self._reset_camera()
         self._playback.seek(0.0)
         self._playback.play()

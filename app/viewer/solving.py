@@ -43,11 +43,15 @@ class Solver(Protocol):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Job:
-    """A draft to solve as a quick preview or at the asked quality, or whose effects' costs are to be measured."""
+    """A draft to solve as a quick preview or at the asked quality, or whose effects' costs are to be measured.
+
+    `superseded` ends its solve, and the service sets it itself when that has ended; `stopped`: nobody waits for it.
+    """
 
     draft: Draft
     kind: Kind
     superseded: threading.Event = field(default_factory=threading.Event)
+    stopped: threading.Event = field(default_factory=threading.Event)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,6 +99,20 @@ class SolverThread:
                 self._running.superseded.set()
             self._changed.notify()
 
+    @property
+    def waiting(self) -> bool:
+        """Whether a job waits for the running one."""
+        return self._newest is not None
+
+    def stop(self) -> None:
+        """End the running solve at the solver's next check, and forget what was waiting."""
+        with self._changed:
+            for job in (self._newest, self._running):
+                if job is not None:
+                    job.stopped.set()
+                    job.superseded.set()
+            self._newest = None
+
     def close(self) -> None:
         """Stop the thread at the solver's next check; outcomes of a running solve are dropped."""
         with self._changed:
@@ -126,14 +144,18 @@ class SolverThread:
             if not self._closed:
                 self._deliver(Outcome(job=job, prediction=prediction, costs=dict(costs)))
 
-        # not `superseded`: the service sets that event itself when its solve has ended
-        measure_costs(prediction, lambda: self._closed or self._newest is not None, on_cost)
+        def ended() -> bool:  # not `superseded`, which is set by now
+            return self._closed or self._newest is not None or job.stopped.is_set()
+
+        measure_costs(prediction, ended, on_cost)
 
     def _solve(self, job: Job) -> Outcome | None:
         try:
             scene = self._solver.make(job.draft)
             if job.kind == "preview":
-                prediction = self._solver.preview(replace(scene, quality=PREVIEW), lambda: self._closed)
+                prediction = self._solver.preview(
+                    replace(scene, quality=PREVIEW), lambda: self._closed or job.stopped.is_set()
+                )
                 return Outcome(job=job, prediction=prediction)
             prediction = self._solver.refine(scene, job.superseded)
             measured = self._solver.measured(prediction.accuracy.dimensions)

@@ -54,6 +54,7 @@ class SceneClient:
         self.downloads: dict[str, bytes] = {}
         self._transfers: dict[str, tuple[str, int]] = {}
         self._parts: dict[str, dict[int, bytes]] = {}
+        self.camera: list[float] = []  # its position [m]
         self.frames = 0
         self.send(
             type="ViewerCameraMessage",
@@ -116,6 +117,8 @@ class SceneClient:
                 self.nodes.pop(name, None)
             elif kind == "SetPositionMessage":
                 self.positions[name] = message["position"]
+            elif kind == "SetCameraPositionMessage":
+                self.camera = message["position"]
             elif kind == "SetSceneNodeVisibilityMessage":
                 self.visible[name] = message["visible"]
             elif kind == "NotificationShowMessage":

@@ -1,0 +1,42 @@
+"""Undo and redo, by button and by key."""
+
+from collections.abc import Callable
+from typing import Any
+
+from viser import GuiApi, GuiEvent
+
+UNDO, REDO = "Undo", "Redo"
+
+
+class StepButtons:
+    """Two buttons beside each other, once there is a change, and the keys that everybody knows for them.
+
+    Args:
+        gui: of the client.
+        back: goes back to the scene before.
+        forward: goes forward again.
+    """
+
+    def __init__(self, gui: GuiApi, back: Callable[[], None], forward: Callable[[], None]) -> None:
+        self._group = gui.add_button_group(
+            "Changes", (UNDO, REDO), visible=False, hint="Ctrl+Z: the scene before; Ctrl+Shift+Z: forward again"
+        )
+        by_key = (
+            (gui.add_command(f"{UNDO} the last change", hotkey="Z", modifier="cmd/ctrl"), back),
+            (gui.add_command(f"{REDO} the last change", hotkey="Z", modifier="cmd/ctrl+shift"), forward),
+        )
+
+        @self._group.on_click
+        async def _stepped(_event: GuiEvent[Any]) -> None:
+            (back if self._group.value == UNDO else forward)()
+
+        for command, step in by_key:
+
+            @command.on_trigger
+            async def _pressed(_event: Any, step: Callable[[], None] = step) -> None:
+                step()
+
+    def offer(self, back: bool, forward: bool) -> None:
+        """Be there as soon as there is a scene to go back or forward to."""
+        if self._group.visible != (back or forward):
+            self._group.visible = back or forward
