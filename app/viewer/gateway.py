@@ -7,11 +7,12 @@ are refused: viser itself checks none.
 import asyncio
 import contextlib
 import re
+import secrets
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from urllib.parse import urlencode, urlsplit
+from urllib.parse import quote, urlencode, urlsplit
 
 import viser
 from fastapi import FastAPI, Request, Response, WebSocket
@@ -71,6 +72,8 @@ GOING_AWAY = 1001
 KEY_HEADER = "X-Scene-Key"
 ADDRESS_HEADER = "X-Scene-Address"
 EXAMPLE_HEADER = "X-Scene-Example"
+TAB_HEADER = "X-Scene-Tab"
+PLAIN = "new"  # in the place of a ready scene's name: none
 _HOST = re.compile(r"[A-Za-z0-9.\-_]+(:[0-9]{1,5})?|\[[0-9a-fA-F:.]+\](:[0-9]{1,5})?")
 
 
@@ -117,51 +120,55 @@ def address(socket: WebSocket) -> str:
 
 
 def add_gateway(app: FastAPI) -> None:
-    """Add `GET /scene/` and the websocket `/scene`, alone and followed by the name of a ready scene.
+    """Add `GET /scene/` and the websocket `/scene`, alone and followed by the name of a ready scene and of a tab.
 
     The client takes the address of its websocket from that of its page, without the query: so the name of the scene
-    goes into the path, and `?example=` leads there. Without a viser server, and where as many scenes are open as may
-    be, the pages say so.
+    goes into the path, and with it one of the tab, by which a page that is loaded again, or connects anew, finds its
+    scene. `/scene/` and `?example=` lead there. Without a viser server, and where as many scenes are open as may be,
+    the pages say so.
     """
     client = CLIENT_PAGE.read_bytes().replace(b"</head>", NEGATIVE_NUMBERS + b"</head>")
 
-    def page(request: Request) -> Response:
+    def hindrance(request: Request, name: str) -> Response | None:
         upstream = _upstream(request.app)
+        if name != PLAIN and example(name) is None:
+            return _unknown()
         if upstream is None:
             return _notice("The scene is not running", "The service is stopping, or has not started yet.", 503)
         if upstream.is_full:
             words = "As many scenes are open as this service allows. Close another tab, or try again later."
             return _notice("All scenes are taken", words, 503)
-        return Response(client, media_type="text/html; charset=utf-8", headers=PAGE_HEADERS)
+        return None
+
+    def new_tab(request: Request, name: str, query: dict[str, str]) -> Response:
+        path = f"/scene/{name}/{secrets.token_urlsafe(12)}/"
+        return hindrance(request, name) or RedirectResponse(path + (f"?{urlencode(query)}" if query else ""))
 
     @app.get("/scene/", include_in_schema=False)
     async def scene_page(request: Request) -> Response:
         query = dict(request.query_params)
-        name = query.pop("example", None)
-        if name is None:
-            return page(request)
-        if example(name) is None:
-            return _unknown()
-        path = f"/scene/{name}/"
-        return RedirectResponse(path + (f"?{urlencode(query)}" if query else ""))
+        return new_tab(request, query.pop("example", PLAIN), query)
 
     @app.get("/scene/{name}/", include_in_schema=False)
     async def example_page(name: str, request: Request) -> Response:
-        if example(name) is None:
-            return _unknown()
-        return page(request)
+        return new_tab(request, name, dict(request.query_params))
+
+    @app.get("/scene/{name}/{tab}/", include_in_schema=False)
+    async def tab_page(name: str, tab: str, request: Request) -> Response:
+        page = Response(client, media_type="text/html; charset=utf-8", headers=PAGE_HEADERS)
+        return hindrance(request, name) or page
 
     @app.websocket("/scene")
     async def scene_socket(socket: WebSocket) -> None:
-        await serve(socket, "")
+        await serve(socket, PLAIN, "")
 
-    @app.websocket("/scene/{name}")
-    async def example_socket(socket: WebSocket, name: str) -> None:
-        await serve(socket, name)
+    @app.websocket("/scene/{name}/{tab}")
+    async def tab_socket(socket: WebSocket, name: str, tab: str) -> None:
+        await serve(socket, name, tab)
 
-    async def serve(socket: WebSocket, name: str) -> None:
+    async def serve(socket: WebSocket, name: str, tab: str) -> None:
         upstream = _upstream(socket.app)
-        if upstream is None or upstream.is_full or (name and example(name) is None):
+        if upstream is None or upstream.is_full or (name != PLAIN and example(name) is None):
             await socket.close(TRY_AGAIN_LATER)
             return
         if not origin_is_allowed(
@@ -169,7 +176,7 @@ def add_gateway(app: FastAPI) -> None:
         ):
             await socket.close(POLICY_VIOLATION)
             return
-        await _pass_on(socket, upstream, name)
+        await _pass_on(socket, upstream, {EXAMPLE_HEADER: "" if name == PLAIN else name, TAB_HEADER: quote(tab)})
 
 
 def _unknown() -> Response:
@@ -191,14 +198,14 @@ def _upstream(app: FastAPI) -> Upstream | None:
     return getattr(app.state, "viewer_upstream", None)
 
 
-async def _pass_on(socket: WebSocket, upstream: Upstream, name: str) -> None:
-    """Connect `socket` with the viser server, to open the ready scene `name`, until either side closes."""
+async def _pass_on(socket: WebSocket, upstream: Upstream, asked: dict[str, str]) -> None:
+    """Connect `socket` with the viser server, for the scene that headers ask for, until either side closes."""
     protocols = [Subprotocol(name) for name in socket.scope.get("subprotocols", [])]
     try:
         inner = await connect(
             f"ws://127.0.0.1:{upstream.port}",
             subprotocols=protocols or None,
-            additional_headers={KEY_HEADER: upstream.key, ADDRESS_HEADER: address(socket), EXAMPLE_HEADER: name},
+            additional_headers={KEY_HEADER: upstream.key, ADDRESS_HEADER: address(socket), **asked},
             compression=None,
             max_size=None,
             proxy=None,

@@ -19,6 +19,12 @@ class History:
         """Whether there is a step back, and one forward."""
         return bool(self._past), bool(self._future)
 
+    def copy(self) -> "History":
+        """Return the same steps, to be gone by another."""
+        other = History()
+        other._past, other._future = [*self._past], [*self._future]
+        return other
+
     def changed(self, before: Draft, now: float) -> None:
         """Keep what a draft was before a change at the time `now` [s], unless it goes on with the change before."""
         if not self._past or now - self._changed_at >= JOINED:

@@ -13,11 +13,13 @@ from fastapi import FastAPI
 from viser import ClientHandle, _messages
 
 from app.service.service import Service
-from app.viewer.gateway import ADDRESS_HEADER, EXAMPLE_HEADER, KEY_HEADER, Upstream
+from app.viewer.gateway import ADDRESS_HEADER, EXAMPLE_HEADER, KEY_HEADER, TAB_HEADER, Upstream
 from app.viewer.kept import KeptCables
 from app.viewer.quiet import quiet_console
-from app.viewer.session import Session, Shared
+from app.viewer.session import Session, Shared, Work
 from app.viewer.solver import ServiceSolver
+
+MOST_LEFT = 64  # closed tabs whose scenes are kept
 
 
 class SceneHost:
@@ -33,6 +35,7 @@ class SceneHost:
         self._most = most
         self.key = secrets.token_urlsafe(32)
         self.sessions: dict[int, Session] = {}
+        self._left: dict[str, Work] = {}  # of tabs that are closed, by their names, the newest last
         with quiet_console():
             self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         # any client could otherwise ask viser to publish itself on the internet
@@ -66,14 +69,26 @@ class SceneHost:
         if len(self.sessions) >= self._most:
             await connection.close()  # two came in at once for the last place
             return
-        self.sessions[client.client_id] = Session(
-            client, self._shared, headers.get(ADDRESS_HEADER, ""), headers.get(EXAMPLE_HEADER, "")
-        )
+        tab = headers.get(TAB_HEADER, "")
+        work = self._found(tab) or Work.of_example(headers.get(EXAMPLE_HEADER, ""))
+        self.sessions[client.client_id] = Session(client, self._shared, headers.get(ADDRESS_HEADER, ""), tab, work)
+
+    def _found(self, tab: str) -> Work | None:
+        """Return what was being done in a tab: it is loaded again, or another is a copy of it."""
+        for session in self.sessions.values():
+            if tab and session.tab == tab:
+                return session.work()
+        return self._left.pop(tab, None)
 
     async def _close(self, client: ClientHandle) -> None:
         session = self.sessions.pop(client.client_id, None)
         if session is not None:
             session.close()
+            if session.tab:
+                self._left.pop(session.tab, None)
+                self._left[session.tab] = session.work()
+                for oldest in list(self._left)[:-MOST_LEFT]:
+                    del self._left[oldest]
 
 
 @contextlib.asynccontextmanager

@@ -54,6 +54,20 @@ class Shared:
     cables: KeptCables
 
 
+@dataclass(frozen=True)
+class Work:
+    """What a tab is at work on: its scene, and those before and after it."""
+
+    draft: Draft
+    history: History
+
+    @staticmethod
+    def of_example(name: str) -> "Work":
+        """Return the beginning with a ready scene; with the paper's case where there is none of this name."""
+        document = example(name)
+        return Work(start_draft() if document is None else Draft.of(document), History())
+
+
 class Session:
     """The state of one client. Everything but the solve runs on the viewer's event loop, so nothing is locked.
 
@@ -61,15 +75,16 @@ class Session:
         client: the client.
         shared: what all tabs share.
         address: at which the client sees the service.
-        opened: name of the ready scene to open; "": the paper's case.
+        tab: its name, by which a page that is loaded again finds its scene; "" for none.
+        work: what to begin with.
     """
 
-    def __init__(self, client: ClientHandle, shared: Shared, address: str, opened: str) -> None:
+    def __init__(self, client: ClientHandle, shared: Shared, address: str, tab: str, work: Work) -> None:
+        self.tab = tab
         self._client = client
         self._shared = shared
         self._loop = asyncio.get_running_loop()
-        document = example(opened)
-        self._draft = start_draft() if document is None else Draft.of(document)
+        self._draft = work.draft
         self._start = self._draft.start(shared.runs.motion)
         self._shown: tuple[Draft, Prediction] | None = None  # the last refined prediction
         self._latest: Prediction | None = None
@@ -78,7 +93,7 @@ class Session:
         self._refine_timer: asyncio.TimerHandle | None = None
         self._busy_timer: asyncio.TimerHandle | None = None
         self._playback = Playback()
-        self._history = History()
+        self._history = work.history
         self._seen_length = 0.0  # m, of the cable that the camera was placed for
         self._set_up()
         self._outbox = Outbox(client, shared.runs)
@@ -141,6 +156,10 @@ class Session:
             straighten=self._straighten,
             reset_camera=self._reset_camera,
         )
+
+    def work(self) -> Work:
+        """Return the scene at hand, and those before, as a tab of its own may go on with them."""
+        return Work(self._draft, self._history.copy())
 
     def close(self) -> None:
         """Free the solver thread and the animation."""

@@ -45,10 +45,13 @@ def open_page(
 
 
 def wait_for_scene(page: Page, address: str) -> None:
-    """Wait until the page shows the scene at an address, to which a running scene adds that of its websocket."""
+    """Wait until the page shows the scene at an address; a running one leads from there to a tab of its own."""
     frame = page.locator("#scene").element_handle().content_frame()
     assert frame is not None
-    frame.wait_for_url(re.compile(re.escape(address) + r"(\?websocket=\S*)?$"))
+    name = re.search(r"example=([\w-]+)", address)
+    dark = r"\?darkMode" if "darkMode" in address else r"(\?(?!darkMode)|$)"
+    running = rf"/scene/{'new' if name is None else name[1]}/[\w-]+/{dark}"
+    frame.wait_for_url(re.compile(rf"({re.escape(address)}$|{running})"))
 
 
 def asks_for_calibration(page: Page) -> None:
@@ -82,7 +85,7 @@ def test_a_click_in_the_gallery_opens_the_scene_and_a_command_for_it(service, wi
     page = open_page(witness, service, with_scene=True)
     example = examples()["keeps-its-bend"]
     page.get_by_role("link", name=example.title).first.click()
-    wait_for_scene(page, "/scene/keeps-its-bend/")
+    wait_for_scene(page, "/scene/?example=keeps-its-bend")
     expect(page.locator("#full")).to_have_attribute("href", re.compile(r"/scene/\?example=keeps-its-bend$"))
     expect(page.locator("#caption")).to_contain_text(example.description)
     expect(page.locator("a[aria-current]")).to_have_count(1)

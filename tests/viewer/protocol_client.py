@@ -245,9 +245,9 @@ class SceneClient:
         return self.nodes["/cable"]["batched_positions"].reshape(-1, 3)
 
 
-def connected(service: Any, example: str = "", **options: Any) -> SceneClient:
-    """Return a client that sees its first prediction, of a ready scene or of the paper's case."""
-    client = SceneClient(f"{service.socket}/{example}" if example else service.socket, **options)
+def connected(service: Any, example: str = "new", tab: str = "", **options: Any) -> SceneClient:
+    """Return a client that sees its first prediction, of a ready scene or of the paper's case, or goes on in a tab."""
+    client = SceneClient(f"{service.socket}/{example}/{tab or uuid4().hex}", **options)
     client.wait_for(lambda: "control points" in client.card and "/cable" in client.nodes)
     return client
 

@@ -1,5 +1,6 @@
 """Who is let into the scene, how many at once, and what its page may do."""
 
+import re
 import time
 
 import httpx
@@ -42,7 +43,8 @@ def test_nobody_can_make_the_scene_publish_itself(service):
 
 
 def test_the_page_allows_nothing_from_other_hosts(service):
-    page = httpx.get(f"{service.address}/scene/")
+    page = httpx.get(f"{service.address}/scene/", follow_redirects=True)
+    assert page.status_code == 200
     policy = page.headers["content-security-policy"]
     assert "default-src 'self'" in policy
     assert "http" not in policy
@@ -72,17 +74,18 @@ def test_no_more_scenes_are_opened_than_allowed_and_a_page_says_so(service):
         for client in clients:
             client.socket.close()
     give_up = time.monotonic() + 30
-    while httpx.get(f"{service.address}/scene/").status_code != 200:
+    while httpx.get(f"{service.address}/scene/", follow_redirects=True).status_code != 200:
         assert time.monotonic() < give_up, "closed tabs still take places"
         time.sleep(0.02)
 
 
 def test_the_address_of_an_example_leads_to_it(service):
     for name in example_names():
-        answer = httpx.get(f"{service.address}/scene/", params={"example": name, "darkMode": ""})
-        assert answer.status_code == 307
-        assert answer.headers["location"] == f"/scene/{name}/?darkMode="
-        assert httpx.get(f"{service.address}/scene/{name}/").status_code == 200
+        for address, query in (("/scene/", {"example": name}), (f"/scene/{name}/", {})):
+            answer = httpx.get(service.address + address, params={**query, "darkMode": ""})
+            assert answer.status_code == 307
+            assert re.fullmatch(rf"/scene/{name}/[\w-]+/\?darkMode=", answer.headers["location"])
+            assert httpx.get(service.address + answer.headers["location"]).status_code == 200
 
 
 @pytest.mark.parametrize("name", ["nothing", "..", "%2e%2e", "a<b>", "paper-25.json"])

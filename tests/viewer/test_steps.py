@@ -147,3 +147,28 @@ def test_the_camera_goes_to_where_a_longer_cable_is_seen(service):
         assert np.linalg.norm(client.camera) == near  # as a person has placed it
         client.set("Length [m]", 300.0)
         client.wait_for(lambda: np.linalg.norm(client.camera) > 100.0 * near)
+
+
+def test_a_page_that_is_loaded_again_finds_its_scene_and_the_steps_before(service):
+    with connected(service, tab="mine") as client:
+        client.refined()
+        before = drag_of(client)
+        client.set("Drag [N s/m²]", 0.2)
+        client.wait_for(lambda: drag_of(client) == 0.2)
+    with connected(service, tab="another") as client:
+        assert drag_of(client) == before
+    with connected(service, tab="mine") as client:
+        assert drag_of(client) == 0.2
+        client.set("Changes", "Undo")
+        client.wait_for(lambda: drag_of(client) == before)
+
+
+def test_a_tab_that_is_opened_beside_another_is_a_copy_of_it(service):
+    with connected(service, tab="twice") as one:
+        one.set("Drag [N s/m²]", 0.3)
+        one.wait_for(lambda: drag_of(one) == 0.3)
+        with connected(service, tab="twice") as other:
+            assert drag_of(other) == 0.3
+            other.set("Drag [N s/m²]", 0.4)
+            other.wait_for(lambda: drag_of(other) == 0.4)
+        assert drag_of(one) == 0.3
