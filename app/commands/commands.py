@@ -294,6 +294,6 @@ def _record(rrd: str, *, request_json: dict[str, Any], document: dict[str, Any],
     try:
         with whole(path) as unfinished:
             write_recording(run, unfinished)
-    except (OSError, RuntimeError) as error:
+    except OSError as error:
         raise CommandError(f"can't write {rrd}: {error}", FAILED) from None
     write_output(str(_layout_of(rrd)), layout())

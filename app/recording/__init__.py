@@ -17,9 +17,16 @@ __all__ = ["APPLICATION", "layout", "write_recording"]
 
 
 def write_recording(run: Run, path: Path) -> None:
-    """Write the recording of `run` to `path` (.rrd)."""
+    """Write the recording of `run` to `path` (.rrd).
+
+    Raises:
+        OSError: it can't be written there.
+    """
     import rerun as rr
 
     chunks = [axes_chunk(), *solve_chunks(run), *motion_chunks(run), *page_chunks(run)]
     stream = rr.chunk.LazyChunkStream.from_iter(chunks)
-    stream.write_rrd(path, application_id=APPLICATION, recording_id=run.document["id"])
+    try:
+        stream.write_rrd(path, application_id=APPLICATION, recording_id=run.document["id"])
+    except RuntimeError as error:  # as rerun tells of a file that can't be written
+        raise OSError(str(error)) from error

@@ -45,6 +45,7 @@ _FAILURES = {
     429: "Too many solves are waiting; `Retry-After` says when to try again.",
     503: "The solver is not ready yet, the service stops, or the solve was cancelled.",
     504: "The time limit has passed; `prediction` is the address of the best iterate.",
+    507: "The recording can't be written.",
 }
 
 
@@ -60,7 +61,7 @@ def _location(what: str) -> dict[str, Any]:
 _FORMS = {JSON: {"schema": _PREDICTION}, NPZ: _BINARY, MSGPACK: _BINARY}
 PREDICT: Responses = {
     200: {
-        "description": "The prediction, not stored (`store=false`); or its course as server-sent events.",
+        "description": "The prediction, not stored (`store=false`, or it can't be); or its course as events.",
         "content": {**_FORMS, EVENTS: _EVENTS},
     },
     201: {

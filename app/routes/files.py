@@ -5,6 +5,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import RedirectResponse, Response
 
 from app.http.formats import JSON, NPZ, as_npz
+from app.http.problems import ProblemError
 from app.routes import described
 from app.routes.predictions import part
 from app.service.service import TheService
@@ -33,11 +34,16 @@ async def surface(id: str, service: TheService) -> Response:
     "/recording.rrd",
     response_class=Response,
     summary="The recording for rerun",
-    responses=described.a_file("How the solve went and the motion.", _ANY),
+    responses={**described.a_file("How the solve went and the motion.", _ANY), **described.failures(507)},
 )
 async def recording(id: str, service: TheService) -> Response:
     """Return the recording; it is written when first asked for."""
-    return _file(await part(service, service.runs.recording, id), _ANY, f"{id}.rrd")
+    try:
+        content = await part(service, service.runs.recording, id)
+    except OSError as error:
+        detail = f"The recording can't be written: {error.strerror or error}."
+        raise ProblemError(507, "not-written", detail) from None
+    return _file(content, _ANY, f"{id}.rrd")
 
 
 @router.get(

@@ -199,7 +199,9 @@ class PredictionResponse(BaseModel):
     iterations: list[IterationModel] = Field(description="How the solve went.")
     accuracy: AccuracyModel = Field(description="What the answer is worth and what it cost.")
     start: StartModel = Field(description="The start shape as the solver took it.")
-    links: LinksModel | None = Field(description="Addresses of its parts; null where the run is not stored.")
+    links: LinksModel | None = Field(
+        description="Addresses of its parts; null where the run is not stored or can't be."
+    )
 
 
 class JobLinksModel(BaseModel):

@@ -82,10 +82,10 @@ async def _line(service: Service, index: int, data: Any, store: bool, like: str,
         request, scene = await anyio.to_thread.run_sync(_scene, service, data)
         prediction = await service.solve(scene, Event(), like=like, on_start=lambda: None, on_iteration=_pass)
 
-        def keep() -> bytes:
+        def keep() -> tuple[bytes, bool]:
             return service.keep(prediction, request, orjson.dumps(data), id, store, fields)
 
-        document = await anyio.to_thread.run_sync(keep)
+        document, _ = await anyio.to_thread.run_sync(keep)
         head = orjson.dumps({"index": index, "status": prediction.status})
         return head[:-1] + b',"result":' + document + b"}\n"
     except Exception as error:

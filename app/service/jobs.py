@@ -24,7 +24,7 @@ class Job:
     """One prediction from the request to its end. Use it from the event loop; only `cancelled` crosses threads.
 
     Attributes:
-        store: whether the run is to be stored.
+        store: whether the run is to be stored; at the end, whether it is.
         id: that of the run.
         created: when it was asked for, ISO 8601 in UTC.
         state: how far it is.

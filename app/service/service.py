@@ -134,7 +134,9 @@ class Service:
                 prediction = await self._solved(job, scene, like)
                 limit = self.settings.time_limit
                 job.beyond_limit = prediction.status == "time_limit" and prediction.accuracy.wall_time >= limit
-                document = await anyio.to_thread.run_sync(self.keep, prediction, request, raw, job.id, job.store)
+                document, job.store = await anyio.to_thread.run_sync(
+                    self.keep, prediction, request, raw, job.id, job.store
+                )
                 if job.store:
                     self.jobs.forget(job.id)  # the stored run stands for it
                 else:
@@ -221,28 +223,37 @@ class Service:
         id: str,
         store: bool,
         fields: Collection[str] = OPTIONAL_FIELDS,
-    ) -> bytes:
-        """Return the answer as JSON, store it where that is asked for, and remember it; for any thread.
+    ) -> tuple[bytes, bool]:
+        """Return the answer as JSON and whether it is stored, and remember it; for any thread.
+
+        What can't be stored is answered all the same: its message says why it is not stored.
 
         Args:
             prediction: what was solved.
             request: the valid request.
             raw: the same as it was sent.
             id: of the run.
-            store: whether to keep it.
+            store: whether to store it.
             fields: which of `OPTIONAL_FIELDS` the answer has; what is stored has all.
         """
         self.recent.add(id, prediction)
         u, t = request.output.samples_u, request.output.samples_t
+        if store:
+            try:
+                self.runs.save(raw, prediction, samples_u=u, samples_t=t, id=id, name=request.name)
+            except OSError as error:
+                _log.error("the run is not stored: %s", error)
+                prediction = replace(prediction, said=f"{prediction.said} It is not stored: {error.strerror or error}.")
+                store = False
         if not store:
             document = {**from_prediction(prediction, id, u, t, fields), "links": None}
-            return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
-        self.runs.save(raw, prediction, samples_u=u, samples_t=t, id=id, name=request.name)
+            return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY), False
         stored = self.runs.document(id) or b""
         left_out = set(OPTIONAL_FIELDS).difference(fields)
         if not left_out:
-            return stored
-        return orjson.dumps({name: part for name, part in orjson.loads(stored).items() if name not in left_out})
+            return stored, True
+        asked = {name: part for name, part in orjson.loads(stored).items() if name not in left_out}
+        return orjson.dumps(asked), True
 
     def document(self, id: str, job: Job | None = None) -> bytes | None:
         """Return the answer `id` as JSON, or None where there is none; for any thread.

@@ -1,5 +1,6 @@
 """Stored runs: one directory each, written whole or not at all, capped in number and bytes."""
 
+import contextlib
 import os
 import re
 import secrets
@@ -79,6 +80,9 @@ class RunStore:
             samples_t: samples in time.
             id: that of the run, of `new_id`; absent: a new one.
             name: what the run is called in lists.
+
+        Raises:
+            OSError: it can't be written.
         """
         id = id or new_id()
         request = scene_json if isinstance(scene_json, bytes) else orjson.dumps(scene_json)
@@ -136,7 +140,8 @@ class RunStore:
     def _forget(self, id: str) -> Path:
         del self._entries[id]
         doomed = self._root / f".old-{id}"
-        (self._root / id).rename(doomed)
+        with contextlib.suppress(FileNotFoundError, NotADirectoryError):  # removed by another hand
+            (self._root / id).rename(doomed)
         return doomed
 
     def delete(self, id: str) -> bool:
@@ -187,7 +192,7 @@ class RunStore:
             return None
         try:
             return (self._root / id / name).read_bytes()
-        except FileNotFoundError:  # removed since
+        except (FileNotFoundError, NotADirectoryError):  # removed since
             return None
 
     def load(self, id: str) -> Run | None:
@@ -204,7 +209,11 @@ class RunStore:
         return None if nets is None else unpack_motion(nets)
 
     def recording(self, id: str) -> bytes | None:
-        """Return the recording (.rrd) of a run, written when first asked for; None where there is no such run."""
+        """Return the recording (.rrd) of a run, written when first asked for; None where there is no such run.
+
+        Raises:
+            OSError: it can't be written.
+        """
         content = self._read(id, RECORDING)
         if content is not None or id not in self:
             return content
