@@ -27,6 +27,8 @@ from dlocore.files import whole
 from dlocore.scene.scene import Method
 from dlocore.words import in_mm, in_ms
 
+_TO_ANSWER = 3  # s beyond the grace in which what was cancelled is answered
+
 
 def serve(host: str | None, port: int | None) -> int:
     """Run the service until it is stopped."""
@@ -46,7 +48,7 @@ def serve(host: str | None, port: int | None) -> int:
         log_config=logs.configuration(settings.log_format),
         access_log=False,
         ws_per_message_deflate=False,
-        timeout_graceful_shutdown=math.ceil(settings.shutdown_grace),
+        timeout_graceful_shutdown=math.ceil(settings.shutdown_grace) + _TO_ANSWER,
     )
     where = f"[{settings.host}]" if ":" in settings.host else settings.host
     address = f"http://{where}:{listening.getsockname()[1]}"

@@ -22,6 +22,7 @@ from app.routes import described
 from app.routes.body import JsonRoute, calling_when_gone
 from app.schemas.identify import IdentifyRequest, IdentifyResponse
 from app.service.service import Service
+from app.service.worker import Worker
 from dlocore import Cancelled
 from dlocore.errors import SceneError, within
 from dlocore.recordings import Recording, recording_of
@@ -53,7 +54,7 @@ async def identify(request: Request, asked: Annotated[IdentifyRequest, Body()]) 
     service: Service = request.app.state.service
     if _one_at_a_time.statistics().tasks_waiting >= _WAITING:
         raise ProblemError(429, "queue-full", "Too many identifications are waiting.", headers={"Retry-After": "30"})
-    search = _Search(asked, recordings, service.settings.time_limit)
+    search = _Search(asked, recordings, service.worker)
     if form == EVENTS:
         return Streamed(search.course, EVENTS, {"Cache-Control": "no-store", "X-Accel-Buffering": "no"})
     async with calling_when_gone(request, search.cancelled.set):
@@ -63,8 +64,8 @@ async def identify(request: Request, asked: Annotated[IdentifyRequest, Body()]) 
 class _Search:
     """One identification, run in a thread."""
 
-    def __init__(self, asked: IdentifyRequest, recordings: list[Recording], limit: float) -> None:
-        self.asked, self.recordings, self.limit = asked, recordings, limit
+    def __init__(self, asked: IdentifyRequest, recordings: list[Recording], worker: Worker) -> None:
+        self.asked, self.recordings, self.worker = asked, recordings, worker
         self.cancelled = Event()
         self.ends = math.inf
 
@@ -82,24 +83,25 @@ class _Search:
             await emit(b"event: done\ndata: " + answer + b"\n\n")
         except (ProblemError, SceneError) as error:
             await emit(b"event: error\ndata: " + orjson.dumps(document_of(problem_of(error))) + b"\n\n")
-        finally:
-            self.cancelled.set()
 
     async def result(self, show: Show | None = None) -> bytes:
         """Return the answer as JSON."""
         try:
-            return await anyio.to_thread.run_sync(self._run, show, abandon_on_cancel=True, limiter=_one_at_a_time)
+            with self.worker.stoppable(self.cancelled):
+                return await anyio.to_thread.run_sync(self._run, show, abandon_on_cancel=True, limiter=_one_at_a_time)
         except Cancelled:
             if time.monotonic() < self.ends:
                 raise ProblemError(503, "cancelled", "The identification was cancelled.") from None
-            detail = f"The identification took longer than the limit of {self.limit:g} s. Send fewer windows."
+            detail = (
+                f"The identification took longer than the limit of {self.worker.time_limit:g} s. Send fewer windows."
+            )
             raise ProblemError(504, "time-limit", detail) from None
 
     def _run(self, show: Show | None) -> bytes:
         from dlocore.identify import Progress, Resolution
         from dlocore.identify import identify as find
 
-        self.ends = time.monotonic() + self.limit
+        self.ends = time.monotonic() + self.worker.time_limit
 
         def on_progress(progress: Progress) -> None:
             if show is not None:

@@ -87,11 +87,11 @@ class Measurements:
         """Return those of a kind that run or wait."""
         return [kept for kept in self._kept.values() if kept.kind == kind and not kept.finished.is_set()]
 
-    def cancel_all(self) -> None:
-        """Cancel what is under way."""
+    def give_up(self) -> None:
+        """End what is under way as cancelled, without waiting for its thread to notice."""
         for measurement in self._kept.values():
-            if not measurement.finished.is_set():
-                measurement.cancel()
+            measurement.cancelled.set()
+            measurement.scope.cancel()
 
     async def run(self, measurement: Measurement, work: Work, busy: Callable[[], bool]) -> None:
         """Measure when it is its turn, and note the progress and the end.

@@ -18,9 +18,10 @@ from app.http.problems import ProblemError, problem_of
 from app.logs import RUN
 from app.schemas import PredictionRequest, from_prediction, to_scene
 from app.schemas.response import OPTIONAL_FIELDS, iteration_document
-from app.service.jobs import Job, Jobs
+from app.service.jobs import CANCEL_TIME, Job, Jobs
 from app.service.measurements import Measurement, Measurements, Work
 from app.service.metrics import Metrics
+from app.service.stopping import when_stopped
 from app.service.worker import Worker
 from app.settings import Settings
 from app.store.recent import Recent
@@ -54,6 +55,7 @@ class Service:
     measurements: Measurements = field(default_factory=Measurements)
     ready: bool = field(default=False)
     _tasks: TaskGroup | None = field(init=False, default=None)
+    _closed: anyio.Event = field(init=False, default_factory=anyio.Event)
 
     @staticmethod
     def of(settings: Settings) -> "Service":
@@ -63,14 +65,16 @@ class Service:
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
-        """Compile the solver and work at jobs while the context lasts; then finish them or, at last, cancel them."""
+        """Compile the solver and work at jobs while the context lasts, or until `stop`; then finish or cancel them."""
         async with anyio.create_task_group() as self._tasks:
             self._tasks.start_soon(self._warm_up)
             try:
-                yield
+                with when_stopped(self.stop):
+                    yield
             finally:
                 with anyio.CancelScope(shield=True):
-                    await self._close()
+                    self.stop()
+                    await self._closed.wait()
                 self._tasks.cancel_scope.cancel()
 
     async def _warm_up(self) -> None:
@@ -78,17 +82,27 @@ class Service:
         self.ready = True
         _log.info("ready", extra={"workers": self.worker.workers})
 
+    def stop(self) -> None:
+        """Begin to close: refuse what is new, let what is under way finish within the grace, and then cancel it."""
+        if not self.worker.closed:
+            assert self._tasks is not None
+            self.worker.close()
+            self._tasks.start_soon(self._close)
+
     async def _close(self) -> None:
-        self.worker.close()
-        with anyio.move_on_after(self.settings.shutdown_grace):
-            await self.worker.idle()
-        if self.worker.admitted:
-            _log.warning("cancelling what is still under way", extra={"requests": self.worker.admitted})
-        self.jobs.cancel_all()
-        self.measurements.cancel_all()
-        self.worker.cancel_all()
-        with anyio.move_on_after(1.0):  # of the 0.1 s that a solve takes to notice
-            await self.worker.idle()
+        try:
+            with anyio.CancelScope(shield=True):
+                with anyio.move_on_after(self.settings.shutdown_grace):
+                    await self.worker.idle()
+                if self.worker.busy:
+                    _log.warning("cancelling what is still under way", extra={"requests": self.worker.admitted})
+                self.jobs.cancel_all()
+                self.measurements.give_up()
+                self.worker.cancel_all()
+                with anyio.move_on_after(CANCEL_TIME):
+                    await self.worker.idle()
+        finally:
+            self._closed.set()
 
     def check_ready(self) -> None:
         """Raise a 503 problem while the solver is being compiled, and when the service stops."""

@@ -2,7 +2,8 @@
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Event
@@ -50,7 +51,8 @@ class Worker:
     admitted: int = field(init=False, default=0)
     closed: bool = field(init=False, default=False)
     _limiter: anyio.CapacityLimiter = field(init=False)
-    _solves: set[Event] = field(init=False, default_factory=set)
+    _under_way: set[Event] = field(init=False, default_factory=set)
+    _stopped: bool = field(init=False, default=False)
     _mean_time: float = field(init=False, default=0.1)
 
     def __post_init__(self) -> None:
@@ -106,8 +108,7 @@ class Worker:
             SceneError: the scene can't be solved as it was given.
             ProblemError: 503 when cancelled, 504 where the solve went on past the time limit without an answer.
         """
-        self._solves.add(cancelled)
-        try:
+        with self.stoppable(cancelled):
             async with self._limiter:
                 on_start()
                 self.running += 1
@@ -124,9 +125,22 @@ class Worker:
                     )
                 finally:
                     self.running -= 1
+
+    @contextmanager
+    def stoppable(self, cancelled: Event) -> Iterator[None]:
+        """Have `cancel_all` set the event while the context lasts. At its end it is set: a thread left behind stops.
+
+        Raises:
+            ProblemError: 503, everything has been cancelled.
+        """
+        if self._stopped:
+            raise ProblemError(503, "cancelled", "The service is shutting down.")
+        self._under_way.add(cancelled)
+        try:
+            yield
         finally:
-            cancelled.set()  # a thread left behind stops at its next step
-            self._solves.discard(cancelled)
+            cancelled.set()
+            self._under_way.discard(cancelled)
 
     def _cost(self, scene: Scene) -> Cost | None:
         if self.calibration_file is None or scene.quality.time_budget is None:
@@ -151,11 +165,17 @@ class Worker:
         self.closed = True
 
     def cancel_all(self) -> None:
-        """Stop every solve that runs or waits."""
-        for event in self._solves:
+        """Stop everything that runs or waits, and what comes."""
+        self._stopped = True
+        for event in self._under_way:
             event.set()
+
+    @property
+    def busy(self) -> bool:
+        """Whether anything runs or waits."""
+        return self.admitted > 0 or bool(self._under_way)
 
     async def idle(self) -> None:
         """Wait until nothing runs or waits."""
-        while self.admitted:
+        while self.busy:
             await anyio.sleep(0.02)

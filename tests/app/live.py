@@ -5,7 +5,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,8 +24,11 @@ class Live:
     log: Path
 
 
+SERVE = ("app.cli", "serve")
+
+
 @contextmanager
-def serving(directory: Path, **settings: str) -> Iterator[Live]:
+def serving(directory: Path, command: Sequence[str] = SERVE, **settings: str) -> Iterator[Live]:
     """Serve on a free port with the given ``DLO_`` settings; killed at the end unless it has stopped."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -34,7 +37,7 @@ def serving(directory: Path, **settings: str) -> Iterator[Live]:
     variables = {f"DLO_{name.upper()}": value for name, value in settings.items()}
     with log.open("w") as errors:
         process = subprocess.Popen(
-            [sys.executable, "-m", "app.cli", "serve", "--port", str(port)],
+            [sys.executable, "-m", *command, "--port", str(port)],
             env={**os.environ, "DLO_DATA_DIR": str(directory / "data"), **variables},
             cwd=ROOT,
             stdout=subprocess.DEVNULL,

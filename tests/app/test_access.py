@@ -4,6 +4,7 @@ import json
 import signal
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,9 @@ from starlette.websockets import WebSocketDisconnect
 from app.main import create_app
 from app.settings import Settings
 from tests.app.conftest import SLOW, paper_scene, put, start
-from tests.app.live import serving
+from tests.app.live import SERVE, serving
 from tests.app.test_bad_requests import the_problem
+from tests.app.test_jobs import parsed
 
 TOKEN = "a token that is hard to guess"
 BEARER = {"authorization": f"Bearer {TOKEN}"}
@@ -145,3 +147,32 @@ def test_a_stop_without_grace_cancels(tmp_path: Path) -> None:
         live.process.wait(timeout=10)
     assert any("cancelling" in line["message"] for line in logged(live.log))
     assert not any(line["message"] == "solved" for line in logged(live.log))
+
+
+@pytest.mark.parametrize("command", [SERVE, ("uvicorn", "app.main:app")], ids=["dlo", "uvicorn"])
+def test_a_stop_answers_everyone_whose_solve_it_cancels(tmp_path: Path, command: tuple[str, ...]) -> None:
+    slower = put(SLOW, "quality.n_t", 513)
+    studies: dict[str, Any] = {"repeats": 100}
+    limits = {"shutdown_grace": "0.2", "workers": "1"}
+    with (
+        serving(tmp_path, command, **limits) as live,
+        httpx.Client(base_url=live.url, timeout=60) as http,
+        ThreadPoolExecutor() as clients,
+    ):
+        direct = clients.submit(http.post, "/v1/predictions", json=slower)
+        batch = clients.submit(http.post, "/v1/predictions:batch", json={"scenes": [slower] * 20})
+        events = {"accept": "text/event-stream"}
+        followed = clients.submit(http.post, "/v1/predictions", json=slower, headers=events)
+        measured = clients.submit(http.post, "/v1/studies", json=studies, headers=events)
+        while samples(http.get("/metrics").text)["dlo_queue_depth"] < 2:
+            time.sleep(0.01)
+        time.sleep(0.1)  # until the study is taken up
+        live.process.send_signal(signal.SIGTERM)
+        the_problem(direct.result(), 503)
+        for answer in (followed.result(), measured.result()):
+            assert parsed(answer.text)[-1][0] == "error"
+            assert parsed(answer.text)[-1][2]["type"] == "urn:dlo:problem:cancelled"
+        problems = [json.loads(line)["problem"] for line in batch.result().text.splitlines()]
+        assert [problem["status"] for problem in problems] == [503] * 20
+        live.process.wait(timeout=20)
+    assert "Traceback" not in live.log.read_text()
