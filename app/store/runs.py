@@ -35,14 +35,16 @@ def new_id() -> str:
 @dataclass
 class _Entry:
     summary: dict[str, Any]
-    size: int
+    size: int  # bytes of its files
+    recording: int = 0  # those of them that are its recording
 
 
 class RunStore:
     """The stored runs of a data directory; safe to call from any thread.
 
     A run is written to a temporary directory, synced and renamed, so that a crash leaves a whole run or none. The
-    oldest runs go first when there are more than `max_runs` of them, or more than `max_run_bytes` bytes.
+    oldest runs go first when there are more than `max_runs` of them, or more than `max_run_bytes` bytes; but before
+    any run goes for its bytes, the recordings go, which can be written again.
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -56,7 +58,9 @@ class RunStore:
         weakref.finalize(self, os.close, claim(settings.data_dir))
         for path in sorted(self._root.iterdir()):
             if _ID.fullmatch(path.name) and (path / SUMMARY).is_file():
-                self._entries[path.name] = _Entry(orjson.loads((path / SUMMARY).read_bytes()), _size(path))
+                recording = (path / RECORDING).stat().st_size if (path / RECORDING).is_file() else 0
+                summary = orjson.loads((path / SUMMARY).read_bytes())
+                self._entries[path.name] = _Entry(summary, _size(path), recording)
         with self._lock:
             removed = self._evict()
         _delete(removed)
@@ -128,14 +132,28 @@ class RunStore:
 
     def _evict(self) -> list[Path]:
         """Forget the oldest runs beyond the caps and return their directories, out of the way of new readers."""
-        removed = []
         ids = sorted(self._entries)
+        beyond = ids[: max(0, len(ids) - self._max_runs)]
+        removed = [self._forget(id) for id in beyond]
+        ids = ids[len(beyond) :]
         total = sum(entry.size for entry in self._entries.values())
-        while len(ids) > 1 and (len(ids) > self._max_runs or total > self._max_bytes):
+        for id in ids:
+            if total > self._max_bytes:
+                total -= self._drop_recording(id)
+        while len(ids) > 1 and total > self._max_bytes:
             oldest = ids.pop(0)
             total -= self._entries[oldest].size
             removed.append(self._forget(oldest))
         return removed
+
+    def _drop_recording(self, id: str) -> int:
+        """Remove the recording of a run, if it has one, and return its bytes."""
+        entry = self._entries[id]
+        dropped, entry.recording = entry.recording, 0
+        entry.size -= dropped
+        with contextlib.suppress(OSError):  # then it goes with its run
+            (self._root / id / RECORDING).unlink(missing_ok=True)
+        return dropped
 
     def _forget(self, id: str) -> Path:
         del self._entries[id]
@@ -239,7 +257,8 @@ class RunStore:
             if entry is None:
                 return False
             recording.replace(self._root / id / RECORDING)
-            entry.size += size
+            entry.size += size - entry.recording
+            entry.recording = size
             removed = self._evict()
         _delete(removed)
         return True

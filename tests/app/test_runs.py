@@ -196,6 +196,29 @@ def test_recordings_count_as_bytes(tmp_path: Path, prediction: Prediction) -> No
     assert store(tmp_path)._entries[id].size == on_disk
 
 
+def test_recordings_go_before_runs_do(tmp_path: Path, prediction: Prediction, monkeypatch: pytest.MonkeyPatch) -> None:
+    large = 2_000_000  # bytes of a recording
+    monkeypatch.setattr(runs, "write_recording", lambda run, path: path.write_bytes(bytes(large)))
+    one, _ = fill(tmp_path / "one", prediction, 1)
+    size = one.size[1]  # of a run
+    data = tmp_path / "many"
+    target, ids = fill(data, prediction, 3, max_run_bytes=large + 3 * size + size // 2)
+
+    def recorded() -> list[str]:
+        return [path.parent.name for path in (data / "runs").glob(f"*/{runs.RECORDING}")]
+
+    assert len(target.recording(ids[0]) or b"") == large
+    assert recorded() == [ids[0]]
+    assert len(target.recording(ids[1]) or b"") == large
+    assert recorded() == [ids[1]]  # the older one makes room
+    assert len(target.recording(ids[0]) or b"") == large  # it is written again, though not kept
+    assert listed(target) == ids[::-1]
+    assert target.size == store(data).size == (3, sum(file.stat().st_size for file in (data / "runs").glob("*/*")))
+    target.save(paper_scene(), prediction)
+    assert recorded() == []
+    assert len(listed(target)) == 4
+
+
 def test_a_lower_cap_evicts_at_the_next_start(tmp_path: Path, prediction: Prediction) -> None:
     _, ids = fill(tmp_path, prediction, 4)
     assert listed(store(tmp_path, max_runs=2)) == ids[:1:-1]
