@@ -1,6 +1,7 @@
 """Stored runs: one directory each, written whole or not at all, capped in number and bytes."""
 
 import contextlib
+import logging
 import os
 import re
 import secrets
@@ -23,6 +24,7 @@ from app.settings import Settings
 from app.store.leftovers import claim
 from dlocore import Prediction
 
+_log = logging.getLogger("dlo")
 _ID = re.compile(r"[0-9a-f]{28}")
 REQUEST, DOCUMENT, NETS, SUMMARY, RECORDING = "scene.json", "prediction.json", "nets.npz", "summary.json", "run.rrd"
 
@@ -57,9 +59,9 @@ class RunStore:
         self._root.mkdir(parents=True, exist_ok=True)
         weakref.finalize(self, os.close, claim(settings.data_dir))
         for path in sorted(self._root.iterdir()):
-            if _ID.fullmatch(path.name) and (path / SUMMARY).is_file():
+            summary = _summary(path) if _ID.fullmatch(path.name) else None
+            if summary is not None:
                 recording = (path / RECORDING).stat().st_size if (path / RECORDING).is_file() else 0
-                summary = orjson.loads((path / SUMMARY).read_bytes())
                 self._entries[path.name] = _Entry(summary, _size(path), recording)
         with self._lock:
             removed = self._evict()
@@ -209,7 +211,7 @@ class RunStore:
         if id not in self._entries:
             return None
         try:
-            return (self._root / id / name).read_bytes()
+            return (self._root / id / name).read_bytes() or None  # a file that was emptied is as good as none
         except (FileNotFoundError, NotADirectoryError):  # removed since
             return None
 
@@ -262,6 +264,18 @@ class RunStore:
             removed = self._evict()
         _delete(removed)
         return True
+
+
+def _summary(directory: Path) -> dict[str, Any] | None:
+    """Return the summary of a run, or None where there is none that can be read."""
+    try:
+        found: dict[str, Any] = orjson.loads((directory / SUMMARY).read_bytes())
+    except FileNotFoundError:
+        return None
+    except (OSError, orjson.JSONDecodeError) as error:
+        _log.warning("the run is not listed: its %s can't be read: %s", SUMMARY, error, extra={"run": directory.name})
+        return None
+    return found
 
 
 def _sync(directory: Path) -> None:

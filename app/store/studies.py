@@ -31,7 +31,7 @@ class StudyStore:
         if not _ID.fullmatch(id):
             return None
         try:
-            return self._file(id).read_bytes()
+            return self._file(id).read_bytes() or None  # a file that was emptied is as good as none
         except FileNotFoundError:
             return None
 

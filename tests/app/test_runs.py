@@ -17,6 +17,7 @@ from app.store import runs
 from app.store.runs import RunStore
 from dlocore import ControlPoints, MaterialMotion, Prediction, predict
 from tests.app.conftest import paper_scene, start
+from tests.app.test_bad_requests import the_problem
 
 
 @pytest.fixture(scope="module")
@@ -250,6 +251,21 @@ def test_a_removed_run_is_gone(client: TestClient, tmp_path: Path) -> None:
     for link in ("self", "recording", "surface", "scene", "viewer"):
         assert client.get(document["links"][link], follow_redirects=False).status_code == 404
     assert client.delete(document["links"]["self"]).status_code == 404
+
+
+def test_a_run_whose_answer_was_emptied_is_not_found(client: TestClient) -> None:
+    document = client.post("/v1/predictions", json=paper_scene()).json()
+    settings: Settings = client.app.state.settings  # type: ignore[attr-defined]
+    (settings.data_dir / "runs" / document["id"] / runs.DOCUMENT).write_bytes(b"")
+    for link in ("self", "surface", "recording", "viewer", "events"):
+        the_problem(client.get(document["links"][link], follow_redirects=False), 404)
+    assert client.delete(document["links"]["self"]).status_code == 204
+
+
+def test_a_run_whose_summary_is_damaged_is_not_listed(tmp_path: Path, prediction: Prediction) -> None:
+    _, ids = fill(tmp_path, prediction, 2)
+    (tmp_path / "runs" / ids[0] / runs.SUMMARY).write_bytes(b"")
+    assert listed(store(tmp_path)) == ids[1:]
 
 
 def test_ids_differ_and_sort_by_time() -> None:
