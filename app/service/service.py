@@ -250,7 +250,19 @@ class Service:
             store: whether to store it.
             fields: which of `OPTIONAL_FIELDS` the answer has; what is stored has all.
         """
-        self.recent.add(id, prediction)
+        answer = self._kept(prediction, request, raw, id, store, fields)
+        self.recent.add(id, prediction)  # with what the answer has found of it, which takes memory, too
+        return answer
+
+    def _kept(
+        self,
+        prediction: Prediction,
+        request: PredictionRequest,
+        raw: bytes,
+        id: str,
+        store: bool,
+        fields: Collection[str],
+    ) -> tuple[bytes, bool]:
         u, t = request.output.samples_u, request.output.samples_t
         if store:
             try:

@@ -1,11 +1,17 @@
 """The last predictions, kept in memory so that others much like them can go on from their grids."""
 
+import gc
+import sys
 from collections import OrderedDict
 from threading import Lock
+from types import BuiltinFunctionType, FunctionType, ModuleType
+
+import numpy as np
 
 from dlocore import Prediction
 
-MOST_BYTES = 256_000_000  # of their motions
+MOST_BYTES = 256_000_000  # of memory, within a tenth
+_OF_ALL = (type, ModuleType, BuiltinFunctionType)  # what all predictions have in common
 
 
 class Recent:
@@ -13,26 +19,27 @@ class Recent:
 
     def __init__(self, most: int = MOST_BYTES) -> None:
         self._most = most
-        self._kept: OrderedDict[str, Prediction] = OrderedDict()
+        self._kept: OrderedDict[str, tuple[Prediction, int]] = OrderedDict()  # each with its bytes
         self._bytes = 0
         self._lock = Lock()
 
     def add(self, id: str, prediction: Prediction) -> None:
-        """Keep a prediction; forget those that were not asked for the longest."""
+        """Keep a prediction, of which all that is wanted has been read; forget those not asked for the longest."""
+        size = size_of(prediction)
         with self._lock:
             self._remove(id)
-            self._kept[id] = prediction
-            self._bytes += _size(prediction)
+            self._kept[id] = (prediction, size)
+            self._bytes += size
             while self._bytes > self._most and len(self._kept) > 1:
                 self._remove(next(iter(self._kept)))
 
     def get(self, id: str) -> Prediction | None:
         """Return the prediction `id`, or None where it is not kept."""
         with self._lock:
-            found = self._kept.get(id)
-            if found is not None:
-                self._kept.move_to_end(id)
-            return found
+            if id not in self._kept:
+                return None
+            self._kept.move_to_end(id)
+            return self._kept[id][0]
 
     def forget(self, id: str) -> None:
         """Forget the prediction `id`, if it is kept."""
@@ -41,15 +48,30 @@ class Recent:
 
     def _remove(self, id: str) -> None:
         if id in self._kept:
-            self._bytes -= _size(self._kept.pop(id))
+            self._bytes -= self._kept.pop(id)[1]
 
 
-def _size(prediction: Prediction) -> int:
-    """Return about how many bytes a prediction holds; that whose error estimate it took on counts with each."""
-    others = 0 if prediction.judged is None else _size(prediction.judged)
-    if prediction.level is None:
-        return others + prediction.surface.control_points.nbytes
-    motion = prediction.level.motion
-    forces = sum(window.forces.nbytes for window in motion.forces)
-    iterates = len(prediction.iterations) * prediction.level.control.nbytes
-    return others + motion.states.nbytes + motion.log.nbytes + forces + iterates
+def size_of(prediction: Prediction) -> int:
+    """Return how many bytes a prediction holds: its arrays, its other objects, and those it goes on from.
+
+    Found by following what each part refers to, but for code: it grows with whatever a prediction comes to hold.
+    """
+    seen: set[int] = set()
+    total = 0
+    waiting: list[object] = [prediction]
+    while waiting:
+        part = waiting.pop()
+        if id(part) in seen or isinstance(part, _OF_ALL) or type(part).__module__.startswith("numba"):
+            continue
+        seen.add(id(part))
+        total += sys.getsizeof(part)
+        if isinstance(part, np.ndarray):
+            if isinstance(part.base, np.ndarray):
+                waiting.append(part.base)
+            elif part.base is not None:  # memory of compiled code
+                total += part.nbytes
+        elif isinstance(part, FunctionType):
+            waiting.extend(part.__closure__ or ())
+        else:
+            waiting.extend(gc.get_referents(part))
+    return total
