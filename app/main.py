@@ -10,7 +10,7 @@ from fastapi_offline import FastAPIOffline
 from app import viewer
 from app.http import openapi, problems
 from app.http.access import Access
-from app.http.middleware import AccessLog, BodyLimit, PageHeaders
+from app.http.middleware import AccessLog, BodyLimit, Heads, PageHeaders
 from app.http.query import check_query
 from app.routes import (
     batch,
@@ -56,6 +56,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.state.settings = settings
     problems.install(app)
     openapi.install(app)
+    app.add_middleware(Heads)
     app.add_middleware(BodyLimit, limit=settings.max_body_bytes)
     if settings.token is not None:
         app.add_middleware(Access, token=settings.token.get_secret_value())

@@ -7,7 +7,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.http.problems import ProblemError, problem_response
+from app.http.problems import API, ProblemError, problem_response
 
 POLICY = "; ".join(
     [
@@ -83,6 +83,24 @@ class BodyLimit:
             return message
 
         await self.app(scope, counted, send)
+
+
+class Heads:
+    """Answer HEAD as GET without its body, as those who watch a service ask; not within the API, which has no HEAD."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass the request on, a HEAD as a GET."""
+        if scope["type"] != "http" or scope["method"] != "HEAD" or scope["path"].startswith(API):
+            await self.app(scope, receive, send)
+            return
+
+        async def without_body(message: Message) -> None:
+            await send({**message, "body": b""} if message["type"] == "http.response.body" else message)
+
+        await self.app({**scope, "method": "GET"}, receive, without_body)
 
 
 class PageHeaders:

@@ -5,6 +5,7 @@ from typing import Any
 from fastapi import FastAPI
 from pydantic import BaseModel
 
+from app.http.problems import API
 from app.schemas.batch import BatchLine
 from app.schemas.calibration import MeasurementResponse
 from app.schemas.response import JobResponse, PredictionResponse, ProblemDocument, problem_document
@@ -45,5 +46,5 @@ def _describe_bad_request(address: str, responses: dict[str, Any]) -> None:
     FastAPI's own description, which it adds wherever something is validated, is replaced.
     """
     content = responses.get("422", {}).get("content", {})
-    if "application/json" in content or ("422" not in responses and address.startswith("/v1/")):
+    if "application/json" in content or ("422" not in responses and address.startswith(API)):
         responses["422"] = problem_document("The request is wrong: `errors` names each field.")

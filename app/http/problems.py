@@ -17,6 +17,7 @@ from app.schemas.request import PredictionRequest
 from dlocore import SceneError
 
 MEDIA_TYPE = "application/problem+json"
+API = "/v1/"  # what the addresses of the API begin with
 _log = logging.getLogger("dlo")
 
 _DEFECT = "The service failed; this is a defect. Its log says where."
@@ -104,13 +105,16 @@ async def _on_http_error(request: Request, error: Exception) -> Response:
 
 
 def _allowed(request: Request) -> str:
-    """Return the methods of this address: those that a route takes there, and without a route those of files."""
+    """Return the methods of this address: those that a route takes there, GET for files, and HEAD as `Heads` has it."""
     routes = [route for route in request.app.routes if not isinstance(route, Mount)]
 
     def taken(method: str) -> bool:
         return any(route.matches({**request.scope, "method": method})[0] is Match.FULL for route in routes)
 
-    return ", ".join(sorted(filter(taken, HTTPMethod)) or ["GET", "HEAD"])
+    methods = list(filter(taken, HTTPMethod)) or [HTTPMethod.GET]
+    if HTTPMethod.GET in methods and not request.url.path.startswith(API):
+        methods.append(HTTPMethod.HEAD)
+    return ", ".join(sorted(methods))
 
 
 async def _on_crash(request: Request, error: Exception) -> Response:

@@ -11,6 +11,7 @@ from starlette.routing import Match, Mount
 from starlette.types import Scope
 
 from app.http.formats import HTML, JSON, prefers
+from app.http.problems import API
 from app.pages.assets import static_dir
 
 POLICY = "; ".join(
@@ -56,7 +57,7 @@ class _Pages(Mount):
     """A mount at / that leaves the API's addresses alone, so that a wrong method there is answered with 405."""
 
     def matches(self, scope: Scope) -> tuple[Match, Scope]:
-        if scope["type"] != "http" or scope["path"].startswith("/v1/"):
+        if scope["type"] != "http" or scope["path"].startswith(API):
             return Match.NONE, {}
         return super().matches(scope)
 

@@ -70,3 +70,20 @@ def test_the_scene_is_found_without_its_slash(client: TestClient, address: str, 
     assert answer.status_code == 307
     assert answer.headers["location"] == target
     assert client.get(target).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "address", ["/", "/health", "/ready", "/metrics", "/docs", "/scene", "/scene/", "/rerun/", "/openapi.json", "/no"]
+)
+def test_head_is_answered_as_get_without_its_body(client: TestClient, address: str) -> None:
+    whole = client.get(address, follow_redirects=False)
+    head = client.head(address, follow_redirects=False)
+    assert head.status_code == whole.status_code
+    assert head.content == b""
+    assert "content-length" in head.headers
+    assert head.headers.get("content-type") == whole.headers.get("content-type")
+
+
+def test_a_head_of_the_api_is_refused_with_the_methods_there_are(client: TestClient) -> None:
+    assert client.head("/v1/predictions").headers["allow"] == "GET, POST"
+    assert client.post("/health").headers["allow"] == "GET, HEAD"
