@@ -1,5 +1,6 @@
 """``/v1/studies``: measure what accuracy costs in time, follow it, read it, stop it."""
 
+import logging
 from collections.abc import Callable
 from typing import Annotated, Any, cast
 
@@ -28,6 +29,7 @@ from dlocore.study.record import to_document
 from dlocore.study.running import run_study
 
 router = APIRouter(prefix="/v1/studies", tags=["studies"], route_class=JsonRoute)
+_log = logging.getLogger("dlo")
 KIND = "studies"
 MOST_WAITING = 4  # studies that run or wait: each may take minutes
 
@@ -56,8 +58,11 @@ async def study(
 
     def work(tell: Tell, cancelled: Callable[[], bool]) -> bytes:
         measured = run_study(plan, on_progress=tell, cancelled=cancelled, deadline=service.settings.time_limit)
-        document = orjson.dumps({"id": id, **to_document(measured)})
-        store.save(id, document)
+        document = orjson.dumps({"id": id, "state": "done", "created": job.created, **to_document(measured)})
+        try:
+            store.save(id, document)
+        except OSError as error:  # it can be read until the service stops
+            _log.error("the study %s is not stored: %s", id, error)
         return document
 
     job = service.measure(KIND, id, work)

@@ -128,6 +128,14 @@ class StudyResponse(BaseModel):
     """What a study measured."""
 
     id: str = Field(description="Its id.", examples=["019b1f5a2c07f3e9d1c5b6a7e8f0"])
+    state: Literal["done"] | None = Field(
+        default=None,
+        description="There is a result; absent, like `created`, of a study that was stored before they were noted.",
+        examples=["done"],
+    )
+    created: str | None = Field(
+        default=None, description="When it was asked for, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000000Z"]
+    )
     format: int = Field(description="Version of this form; a file of it can be compared by `dlo study`.", examples=[1])
     machine: dict[str, str] = Field(description="Processor, cores, system and versions.", examples=[{"cores": "2"}])
     source: str = Field(description="A mark of the program text that was measured.", examples=["0123456789ab"])

@@ -10,6 +10,7 @@ from typing import Any, Literal, TypeVar
 from dlocore.errors import DloError
 
 FORMAT = 1
+_BESIDE = ("format", "id", "state", "created")  # what a document has besides the fields of `Study`
 Part = Literal["runs", "scaling", "effects"]
 PARTS: tuple[Part, ...] = ("runs", "scaling", "effects")
 
@@ -147,7 +148,7 @@ def from_document(document: Any) -> Study:
     try:
         if document["format"] != FORMAT:
             raise StudyError(f"format: got {document['format']!r}. Allowed: {FORMAT}.")
-        parts = {name: value for name, value in document.items() if name not in ("format", "id")}
+        parts = {name: value for name, value in document.items() if name not in _BESIDE}
         parts["runs"] = tuple(_run(run) for run in parts["runs"])
         parts["refused"] = tuple(parts["refused"])
         parts["scaling"] = tuple(_plain(Scaled, row) for row in parts["scaling"])

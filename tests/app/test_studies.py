@@ -1,6 +1,8 @@
 """Studies over HTTP: taken up, followed, stopped, stored, read; and on the command line."""
 
+import errno
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,7 @@ from fastapi.testclient import TestClient
 from app import cli
 from app.schemas.calibration import MeasurementResponse
 from app.schemas.study import StudyResponse
+from app.store import studies
 from dlocore.study import record
 from tests.app.conftest import SCENES, paper_scene
 from tests.app.test_bad_requests import the_problem
@@ -36,6 +39,8 @@ def test_a_study_is_followed_to_its_end_and_then_read(client: TestClient) -> Non
     document = client.get(address).json()
     assert document == events[-1][2]
     StudyResponse.model_validate(document, strict=True)
+    assert document["state"] == "done"
+    assert document["created"][:19] <= document["measured_at"][:19]
     assert [(run["n_u"], run["method"]) for run in document["runs"]] == [(9, "march"), (13, "march")]
     assert document["runs"][0]["error"] > document["runs"][1]["error"] > 0
     assert {"id": document["id"], "self": address}.items() <= client.get(ADDRESS).json()["studies"][0].items()
@@ -43,6 +48,18 @@ def test_a_study_is_followed_to_its_end_and_then_read(client: TestClient) -> Non
     the_problem(client.get(address), 404)
     the_problem(client.delete(address), 404)
     the_problem(client.get(f"{address}/events"), 404)
+
+
+def test_a_study_that_cant_be_stored_can_be_read(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(studies, "write_whole", full)
+    response = client.post(ADDRESS, json=QUICK, headers={"accept": "text/event-stream"})
+    (*_, (kind, _, document)) = parsed(response.text)
+    assert kind == "done"
+    assert client.get(response.headers["location"]).json() == document
+    assert client.delete(response.headers["location"]).status_code == 204
 
 
 def test_a_study_under_way_is_read_as_its_state_and_can_be_stopped(client: TestClient) -> None:
