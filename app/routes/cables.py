@@ -3,6 +3,7 @@
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
+from app.routes import described
 from dlocore import PRESETS, Cable
 
 router = APIRouter(prefix="/v1/cables", tags=["cables"])
@@ -29,7 +30,7 @@ class CablePresets(BaseModel):
     cables: list[CablePreset] = Field(description="The presets.")
 
 
-@router.get("", summary="List the cable presets")
+@router.get("", summary="List the cable presets", responses=described.failures(401))
 async def presets() -> CablePresets:
     """Return the presets with their sources; `cable.preset` in a request names one, fields beside it override it."""
     return CablePresets(

@@ -111,7 +111,7 @@ def _state(job: Job, status: int = 200) -> Response:
     "",
     response_model=PredictionList,
     summary="List the stored runs, newest first",
-    responses=described.failures(406, 422),
+    responses=described.failures(401, 406, 422),
 )
 async def listed(
     request: Request,

@@ -149,6 +149,10 @@ def test_openapi_describes_every_field_with_an_example(client: TestClient) -> No
             for status, response in operation["responses"].items():
                 if int(status) >= 400:
                     assert list(response["content"]) == ["application/problem+json"]
+    open_to_all = {"/health", "/ready"}
+    for address, path in document["paths"].items():
+        for operation in path.values():
+            assert ("401" in operation["responses"]) == (address not in open_to_all), address
     references = set(_references(document))
     assert {reference.rsplit("/", 1)[1] for reference in references} <= set(schemas)
 
