@@ -78,13 +78,18 @@ class JsonRoute(APIRoute):
 
 
 def check_content(request: Request) -> None:
-    """Raise a 415 problem unless the body is declared as JSON, and as it is."""
+    """Raise a 415 problem unless the body is declared as JSON in UTF-8, and as it is."""
     given = request.headers.get("content-type", "")
-    media = given.split(";")[0].strip().lower()
+    media, *parameters = (part.strip().lower() for part in given.split(";"))
     if media != "application/json" and not (media.startswith("application/") and media.endswith("+json")):
         raise ProblemError(
             415, "unsupported-media-type", f"Send the body as application/json, not as {given or 'nothing'!r}."
         )
+    charsets = [text.removeprefix("charset=").strip('"') for text in parameters if text.startswith("charset=")]
+    for charset in charsets:
+        if charset != "utf-8":
+            detail = f"Send the body in the charset utf-8, as JSON has it, not in {charset[:120]!r}."
+            raise ProblemError(415, "unsupported-media-type", detail)
     encoding = request.headers.get("content-encoding", "identity")
     if encoding.strip().lower() not in ("", "identity"):
         detail = f"Send the body as it is, not in the encoding {encoding[:120]!r}: none is accepted."

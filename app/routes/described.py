@@ -40,7 +40,7 @@ _FAILURES = {
     406: "None of the accepted media types is there.",
     409: "The prediction has no answer (yet), or is not stored.",
     413: "The body is too large.",
-    415: "The body is not declared as JSON, or is compressed.",
+    415: "The body is not declared as JSON, is in another charset than UTF-8, or is compressed.",
     422: "The request is wrong: `errors` names each field, what was given, and what is allowed.",
     429: "Too many solves are waiting; `Retry-After` says when to try again.",
     503: "The solver is not ready yet, the service stops, or the solve was cancelled.",

@@ -52,7 +52,7 @@ async def predict(
     scene: Annotated[PredictionRequest, Body(openapi_examples=EXAMPLES)],
     service: TheService,
     store: Annotated[bool, Query(description="Whether to keep the run.", examples=[True])] = True,
-    like: Annotated[RunId, Query(description=LIKE, examples=[""])] = "",
+    like: Annotated[RunId | None, Query(description=LIKE)] = None,
     prefer: Annotated[
         str | None,
         Header(description=described.PREFER, examples=["respond-async", "respond-async, wait=5"]),
@@ -119,9 +119,9 @@ async def listed(
     limit: Annotated[int, Query(ge=1, le=1000, description="At most so many.", examples=[20])] = 20,
     offset: Annotated[int, Query(ge=0, le=10**9, description="Pass over so many newer ones.", examples=[0])] = 0,
     cursor: Annotated[
-        RunId,
+        RunId | None,
         Query(description="Only runs older than the one with this id, as in `next`."),
-    ] = "",
+    ] = None,
     status: Annotated[list[Status] | None, Query(description="Only runs with one of these.")] = None,
     method: Annotated[
         Literal["march", "spacetime", "paper", "reference"] | None, Query(description="Only runs solved by it.")

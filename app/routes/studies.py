@@ -74,12 +74,12 @@ async def study(
 def _plan(wanted: StudyRequest, service: Service) -> Plan:
     asked: dict[str, Any] = {
         "grids": tuple((grid.n_u, grid.n_t) for grid in wanted.grids),
-        "methods": tuple(dict.fromkeys(wanted.methods)),
-        "deltas": tuple(dict.fromkeys(wanted.deltas)),
+        "methods": tuple(wanted.methods),
+        "deltas": tuple(wanted.deltas),
         "repeats": wanted.repeats,
         "estimate": wanted.estimate,
         "judge": wanted.judge,
-        "parts": tuple(dict.fromkeys(wanted.parts)),
+        "parts": tuple(wanted.parts),
     }
     if wanted.scenes is not None:
         scenes: dict[str, Scene] = {}

@@ -18,7 +18,7 @@ CountOrNone = Annotated[_Integer | None, BeforeValidator(_whole)]
 Flag = Annotated[bool, Field(strict=True)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Point = Annotated[list[Number], Field(min_length=2, max_length=3)]
-RunId = Annotated[str, Field(pattern="^[0-9a-f]{28}$|^$")]  # or "", for none
+RunId = Annotated[str, Field(pattern="^[0-9a-f]{28}$")]
 RUN_ID = "the id of a run, 28 of the characters 0 to 9 and a to f"  # the one pattern of a text, in words
 MAX_REPORTED = 50  # faults of a request that an answer names at most
 LIKE = (

@@ -15,7 +15,7 @@ _MOST = 100_000  # a service may allow less: DLO_MAX_BATCH
 
 class _Batch(Model):
     store: Flag = Field(default=False, description="Whether to keep the runs.", examples=[False])
-    like: RunId = Field(default="", description=LIKE, examples=[""])
+    like: RunId | None = Field(default=None, description=LIKE, examples=[None])
     order: Literal["index", "finished"] = Field(
         default="index",
         description="Lines in the order of the scenes, each as soon as all before it are done; or as they finish.",

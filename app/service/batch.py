@@ -29,7 +29,7 @@ async def predict_all(
     emit: Emit,
     *,
     store: bool,
-    like: str,
+    like: str | None,
     order: Literal["index", "finished"],
     fields: Collection[str],
 ) -> None:
@@ -40,7 +40,7 @@ async def predict_all(
         scenes: requests as data, right or wrong.
         emit: takes a line; it is waited for, so that a slow client slows the batch down.
         store: whether to keep the runs.
-        like: id of a run that all go on from; "": none.
+        like: id of a run that all go on from, if any.
         order: in that of the scenes, or as they finish.
         fields: which of `OPTIONAL_FIELDS` each answer has.
     """
@@ -75,7 +75,9 @@ async def predict_all(
             tasks.start_soon(work)
 
 
-async def _line(service: Service, index: int, data: Any, store: bool, like: str, fields: Collection[str]) -> bytes:
+async def _line(
+    service: Service, index: int, data: Any, store: bool, like: str | None, fields: Collection[str]
+) -> bytes:
     id = new_id()
     RUN.set(id)
     try:

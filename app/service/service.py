@@ -112,14 +112,14 @@ class Service:
         if self.worker.closed:
             raise ProblemError(503, "shutting-down", "The service is shutting down.", headers={"Retry-After": "5"})
 
-    async def submit(self, request: PredictionRequest, raw: bytes, *, store: bool, like: str = "") -> Job:
+    async def submit(self, request: PredictionRequest, raw: bytes, *, store: bool, like: str | None = None) -> Job:
         """Take up a prediction and return it as it is waiting.
 
         Args:
             request: the valid request.
             raw: the same as it was sent.
             store: whether to keep the run.
-            like: id of a run to go on from; "": none.
+            like: id of a run to go on from, if any.
 
         Raises:
             SceneError: the scene is impossible.
@@ -136,13 +136,14 @@ class Service:
         self._tasks.start_soon(self._work, job, scene, request, raw, like)
         return job
 
-    async def check_known(self, like: str) -> None:
-        """Raise a 404 problem where `like` is neither "" nor the id of a run."""
-        known = not like or self.recent.get(like) is not None
-        if not known and await anyio.to_thread.run_sync(self.runs.document, like) is None:
+    async def check_known(self, like: str | None) -> None:
+        """Raise a 404 problem where `like` is given, but not the id of a run."""
+        if like is None or self.recent.get(like) is not None:
+            return
+        if await anyio.to_thread.run_sync(self.runs.document, like) is None:
             raise ProblemError(404, "no-such-run", f"like: There is no run {like[:64]!r}; it may have been removed.")
 
-    async def _work(self, job: Job, scene: Scene, request: PredictionRequest, raw: bytes, like: str) -> None:
+    async def _work(self, job: Job, scene: Scene, request: PredictionRequest, raw: bytes, like: str | None) -> None:
         try:
             with job.scope:
                 prediction = await self._solved(job, scene, like)
@@ -185,7 +186,7 @@ class Service:
         self._tasks.start_soon(self.measurements.run, measurement, work, lambda: self.worker.admitted > 0)
         return measurement
 
-    async def _solved(self, job: Job, scene: Scene, like: str) -> Prediction:
+    async def _solved(self, job: Job, scene: Scene, like: str | None) -> Prediction:
         loop = asyncio.get_running_loop()
 
         def report(iteration: Iteration) -> None:
@@ -198,7 +199,7 @@ class Service:
         scene: Scene,
         cancelled: Event,
         *,
-        like: str = "",
+        like: str | None = None,
         on_start: Callable[[], None],
         on_iteration: Callable[[Iteration], None],
     ) -> Prediction:

@@ -177,7 +177,12 @@ class RunStore:
         return id in self._entries
 
     def page(
-        self, limit: int, offset: int = 0, *, cursor: str = "", where: Callable[[dict[str, Any]], bool] | None = None
+        self,
+        limit: int,
+        offset: int = 0,
+        *,
+        cursor: str | None = None,
+        where: Callable[[dict[str, Any]], bool] | None = None,
     ) -> tuple[list[dict[str, Any]], int]:
         """Return the summaries of runs, newest first, and how many match in all.
 

@@ -315,6 +315,17 @@ def test_another_content_type_is_refused(client: TestClient, media: str) -> None
     the_problem(client.post("/v1/predictions", content=body, headers={"content-type": media}), 415)
 
 
+@pytest.mark.parametrize(
+    ("charset", "status"), [("utf-8", 200), ('"UTF-8"', 200), ("utf-16", 415), ("latin-1", 415), ("", 415)]
+)
+def test_a_body_in_another_charset_is_refused(client: TestClient, charset: str, status: int) -> None:
+    headers = {"content-type": f"application/json; charset={charset}"}
+    response = client.post("/v1/predictions?store=false", content=json.dumps(PAPER).encode(), headers=headers)
+    assert response.status_code == status
+    if status == 415:
+        assert the_problem(response, 415)["detail"].startswith("Send the body in the charset utf-8")
+
+
 @pytest.mark.parametrize("encoding", ["gzip", "GZIP", "br", "identity, gzip"])
 @pytest.mark.parametrize("is_packed", [True, False], ids=["packed", "plain"])
 def test_a_compressed_body_is_told_that_none_is_accepted(client: TestClient, encoding: str, is_packed: bool) -> None:

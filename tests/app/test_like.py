@@ -57,7 +57,7 @@ def test_what_is_forgotten_is_solved_from_the_beginning_and_says_so(client: Test
 def test_an_id_that_is_none_is_refused(client: TestClient) -> None:
     gone = client.post("/v1/predictions", json=moved(0.0)).json()["id"]
     assert client.delete(f"/v1/predictions/{gone}").status_code == 204
-    for like, status in ((gone, 404), ("0" * 28, 404), ("../../etc", 422), ("x" * 28, 422)):
+    for like, status in ((gone, 404), ("0" * 28, 404), ("", 422), ("../../etc", 422), ("x" * 28, 422)):
         the_problem(client.post("/v1/predictions", params={"like": like}, json=moved(0.0)), status)
         body = {"scenes": [moved(0.0)], "like": like}
         the_problem(client.post("/v1/predictions:batch", json=body), status)

@@ -75,6 +75,7 @@ def test_pages_are_not_shifted_by_runs_that_come_or_go(stored: Any) -> None:
         ("since=2026-01-31T12:00:00", "since"),
         ("before=2026-02-31T12:00:00Z", "before"),
         ("cursor=../x", "cursor"),
+        ("cursor=", "cursor"),
         ("limit=1001", "limit"),
         (f"name={'x' * 201}", "name"),
     ],

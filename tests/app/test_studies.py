@@ -92,6 +92,20 @@ def test_a_wrong_study_is_refused(client: TestClient, wrong: dict[str, Any]) -> 
     the_problem(client.post(ADDRESS, json=wrong), 422)
 
 
+@pytest.mark.parametrize(
+    ("field", "values"),
+    [
+        ("methods", ["march", "march"]),
+        ("parts", ["runs", "runs"]),
+        ("deltas", [1e-5, 1e-5]),
+        ("grids", [{"n_u": 9, "n_t": 13}] * 2),
+    ],
+)
+def test_what_is_to_be_measured_twice_is_refused(client: TestClient, field: str, values: list[Any]) -> None:
+    problem = the_problem(client.post(ADDRESS, json={**QUICK, field: values}), 422)
+    assert [(error["field"], error["allowed"]) for error in problem["errors"]] == [(field, "each once")]
+
+
 @pytest.mark.parametrize("id", ["0" * 28, "..", "x"])
 def test_an_id_that_is_none_is_not_found(client: TestClient, id: str) -> None:
     assert client.get(f"{ADDRESS}/{id}").status_code == 404
