@@ -265,6 +265,8 @@ class _Schema:
             return node["properties"][item]
         if isinstance(item, int) and "items" in node:
             return node["items"]
+        if isinstance(item, str) and isinstance(node.get("additionalProperties"), dict):
+            return node["additionalProperties"]
         for option in _options(node):
             found = self._child(self._resolved(option), item)
             if found:

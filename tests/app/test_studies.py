@@ -92,6 +92,16 @@ def test_a_wrong_study_is_refused(client: TestClient, wrong: dict[str, Any]) -> 
     the_problem(client.post(ADDRESS, json=wrong), 422)
 
 
+def test_what_is_wrong_under_a_name_is_told_what_is_allowed(client: TestClient) -> None:
+    alone = the_problem(client.post("/v1/predictions", json=paper_scene(effects={"foo": "on"})), 422)["errors"][0]
+    asked = {"effects": {"x": {"foo": "on"}}, "scenes": {"a": paper_scene(effects={"foo": "on"}, horizon=-1)}}
+    problem = the_problem(client.post(ADDRESS, json=asked), 422)
+    allowed = {error["field"]: error["allowed"] for error in problem["errors"]}
+    assert "self_contact" in alone["allowed"]
+    assert allowed["effects.x.foo"] == allowed["scenes.a.effects.foo"] == alone["allowed"]
+    assert allowed["scenes.a.horizon"].startswith("a finite number above 0")
+
+
 @pytest.mark.parametrize(
     ("field", "values"),
     [
