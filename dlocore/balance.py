@@ -5,6 +5,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dlocore.answer.frames import directors
 from dlocore.answer.parts import MaterialMotion
+from dlocore.compiling.interrupts import interruptible
 from dlocore.effects import laws
 from dlocore.errors import SceneError, instance
 from dlocore.kernels.assembly import NO_RATES, History, assemble, multiply_scalar_band, stored_energy
@@ -28,6 +29,7 @@ _LAWS = {
 }
 
 
+@interruptible
 def energies(
     scene: Scene, surface: SplineSurface, times: ArrayLike, material: MaterialMotion | None = None
 ) -> dict[str, Floats]:
@@ -59,6 +61,7 @@ def energies(
     return found
 
 
+@interruptible
 def effect_forces(
     scene: Scene, surface: SplineSurface, times: ArrayLike, material: MaterialMotion | None = None
 ) -> dict[str, float]:

@@ -27,6 +27,7 @@ from dlocore.answer.frames import material_of, stretch_of
 from dlocore.answer.parts import Accuracy, ContactForce, GraspReaction, MaterialMotion, OnIteration, Status
 from dlocore.answer.reactions import Windows, reactions, taken_on, with_reaction_errors
 from dlocore.answer.report import effect_reports, elastic_energy
+from dlocore.compiling.interrupts import interruptible
 from dlocore.errors import SceneError, flag, instance
 from dlocore.levels.given import evenly_fitted, given_status, march_given
 from dlocore.levels.level import Level
@@ -47,6 +48,7 @@ Floats = NDArray[np.float64]
 FindForces = Callable[[], Windows]
 
 
+@interruptible
 def predict(
     scene: Scene,
     *,

@@ -7,6 +7,7 @@ import numpy as np
 from dlocore.accuracy.companion import coarser, finer
 from dlocore.answer.parts import EffectReport
 from dlocore.answer.report import planned_effects
+from dlocore.compiling.interrupts import interruptible
 from dlocore.front import automatic_method, check_n_t
 from dlocore.levels.level import Size, given_steps, stretched
 from dlocore.problem.discretisation import smallest_n_u, too_few
@@ -54,6 +55,7 @@ class Plan:
     expected_time: float
 
 
+@interruptible
 def plan(scene: Scene) -> Plan:
     """Tell what a scene calls for, without solving it.
 

@@ -19,6 +19,7 @@ from dlocore.answer.parts import (
     StretchMotion,
     with_notes,
 )
+from dlocore.compiling.interrupts import interruptible
 from dlocore.errors import number
 from dlocore.pickling import state_with
 from dlocore.scene.scene import MAX_STRAIN, ControlPoints, Scene
@@ -75,6 +76,7 @@ class Prediction:
     judged: "Prediction | None" = field(default=None, repr=False)
 
     @cached_property
+    @interruptible
     def notes(self) -> tuple[str, ...]:
         """What is to be known beside the status: of the scene as given, strains, instabilities, effects left out."""
         from dlocore.problem.notes import scene_notes  # it needs the compiler, which to make a scene does not
@@ -108,6 +110,7 @@ class Prediction:
         return told
 
     @cached_property
+    @interruptible
     def _objections(self) -> list[str]:
         return self.find_objections()
 
@@ -117,31 +120,37 @@ class Prediction:
         return with_notes(self.said, self.notes)
 
     @cached_property
+    @interruptible
     def grasps(self) -> tuple[GraspReaction, ...]:
         """Reaction of each grasp, in the scene's order."""
         return self.report_grasps()
 
     @cached_property
+    @interruptible
     def contacts(self) -> tuple[ContactForce, ...]:
         """Force of the table, and of each obstacle that was simulated, on the cable."""
         return self.report_contacts()
 
     @cached_property
+    @interruptible
     def effects(self) -> tuple[EffectReport, ...]:
         """What was simulated and why."""
         return self.report_effects(self.surface)
 
     @cached_property
+    @interruptible
     def start_energy(self) -> float:
         """Elastic energy stored in the start shape [J]."""
         return self.find_start_energy()
 
     @cached_property
+    @interruptible
     def material(self) -> MaterialMotion | None:
         """What the sections remember over time; None where they are elastic, and straight whatever the start."""
         return self.report_material()
 
     @cached_property
+    @interruptible
     def stretch(self) -> StretchMotion:
         """How far the cable is stretched over time, to the accuracy of a tension."""
         return self.report_stretch()

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.answer.report import surface_of
+from dlocore.compiling.interrupts import interruptible
 from dlocore.errors import SceneError, instance, instances
 from dlocore.kernels.sensitivity import factor_steps, follow_steps
 from dlocore.kernels.timefit import fit_time
@@ -228,6 +229,7 @@ class Sensitivities:
         return np.array([(_at(high, u, t) - _at(low, u, t)) / (2.0 * step) for high, low, step in both])
 
 
+@interruptible
 def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     """Return the derivatives of a predicted motion by parameters of its scene.
 

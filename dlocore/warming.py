@@ -12,6 +12,7 @@ import numpy as np
 
 from dlocore.balance import energies
 from dlocore.compiling.caching import is_kept
+from dlocore.compiling.interrupts import interruptible
 from dlocore.front import predict
 from dlocore.kernels.march import march_steps
 from dlocore.prediction import Prediction
@@ -33,6 +34,7 @@ GRASP = Grasp(u=0.3, hold="clamp", path=MOVE)
 CABLE = Cable.preset("paper", bending_damping=1e-4, yield_strain=0.1, memory_rate=1.0)
 
 
+@interruptible
 def warm_up(processes: int | None = None) -> None:
     """Compile, or load from the cache, every kernel, so that the first prediction is as fast as the next.
 
@@ -52,6 +54,7 @@ def warm_up(processes: int | None = None) -> None:
         part()
 
 
+@interruptible
 def warm_up_for(scene: Scene) -> None:
     """Load what a prediction of one scene takes, of all that is compiled; where nothing is, compile all of it.
 

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dlocore.compiling.interrupts import interruptible
 from dlocore.pickling import state_with
 from dlocore.scene.scene import Material
 from dlocore.spline import SplineSurface, in_range
@@ -74,11 +75,13 @@ class Iteration:
     note: str = ""
 
     @cached_property
+    @interruptible
     def surface(self) -> SplineSurface:
         """The iterate itself."""
         return self.find_surface()
 
     @cached_property
+    @interruptible
     def energy(self) -> float:
         """Elastic energy at the end of the motion [J]."""
         return self.find_energy()

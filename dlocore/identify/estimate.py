@@ -8,6 +8,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.compiling.interrupts import interruptible
 from dlocore.errors import SceneError, within
 from dlocore.identify.candidate import Candidate
 from dlocore.identify.identification import Identification, Progress
@@ -35,6 +36,7 @@ _UNTWISTED = (
 )
 
 
+@interruptible
 def identify(
     recordings: Sequence[Recording],
     cable: Cable | None = None,

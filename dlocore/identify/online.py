@@ -7,6 +7,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dlocore.compiling.interrupts import interruptible
 from dlocore.errors import SceneError, array
 from dlocore.identify.candidate import Candidate
 from dlocore.identify.parameters import DEFAULT, parameters, prepared
@@ -128,6 +129,7 @@ class Identifier:
             out[..., j] = (moved - played.predicted) / _ASIDE
         return out
 
+    @interruptible
     def update(self) -> Update | None:
         """Improve the estimate by the latest frames; None while there are too few, or they tell nothing.
 

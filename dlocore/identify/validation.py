@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.compiling.interrupts import interruptible
 from dlocore.identify.candidate import Candidate
 from dlocore.identify.datasets import HangingWire, MovedCable
 from dlocore.identify.estimate import identify
@@ -98,6 +99,7 @@ def validate_cable(
     return CableValidation(name=cable.name, model=model, found=found, windows=windows, seconds=fitted)
 
 
+@interruptible
 def predicted(recording: Recording, candidate: Candidate, references: Floats | None) -> PredictedWindow:
     """Predict a window open loop, from its first two frames."""
     replay = Replay(recording, PROTOCOL, references)

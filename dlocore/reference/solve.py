@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.answer.parts import Accuracy, EffectReport, GraspReaction, Iteration, Status
+from dlocore.compiling.interrupts import interruptible
 from dlocore.errors import SceneError
 from dlocore.levels.driven import beside
 from dlocore.levels.whole_march import sided
@@ -56,6 +57,7 @@ class Converged:
     tolerance_met: bool
 
 
+@interruptible
 def converged(scene: Scene, tolerance: float, *, times: ArrayLike | None = None) -> Converged:
     """Return the motion of a scene at the nodes of a rod, refined until its error is about `tolerance` [m].
 

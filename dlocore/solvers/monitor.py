@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable
 
 from dlocore.answer.parts import Iteration, OnIteration
+from dlocore.compiling.interrupts import let_in
 from dlocore.errors import Cancelled, number
 
 
@@ -55,7 +56,8 @@ class Monitor:
             self._end = end if self._end is None else min(end, self._end)
 
     def check(self) -> None:
-        """Raise Cancelled where the caller asked to stop, TimeIsUp where the deadline has passed."""
+        """Raise Cancelled where the caller asked to stop, TimeIsUp where the deadline has passed; let interrupts in."""
+        let_in()
         if self._cancelled is not None and self._cancelled():
             raise Cancelled("the solve was cancelled")
         if self._end is not None and time.perf_counter() > self._end:

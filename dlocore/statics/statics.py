@@ -11,6 +11,7 @@ from dlocore.answer.frames import free_of_frames
 from dlocore.answer.parts import Status, with_notes
 from dlocore.answer.reactions import reactions
 from dlocore.answer.report import elastic_energy
+from dlocore.compiling.interrupts import interruptible
 from dlocore.errors import SceneError, number, whole
 from dlocore.problem.buckling import UNSTABLE, side_notes
 from dlocore.problem.discretisation import make_grid, smallest_n_u
@@ -74,6 +75,7 @@ class Equilibrium:
         return design_matrix(self.knots_u, in_range("u", u, float(self.knots_u[-1]), "m")) @ self.control_points[:, :3]
 
 
+@interruptible
 def equilibrium(
     scene: Scene,
     *,

@@ -1,12 +1,18 @@
 """Cancelling, deadlines, and what a prediction says about itself."""
 
+import signal
+import subprocess
+import sys
+import threading
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from dlocore import Cancelled, Grasp, Iteration, Load, Move, Quality, Scene, Straight, equilibrium, predict
+from dlocore.compiling.interrupts import interruptible, let_in
 from tests.solver.scenes import cable, march, paper_scene
 
 METHODS = {
@@ -110,3 +116,78 @@ def test_effects_are_reported_with_reasons_and_sizes():
     assert all(e.reason for e in effects.values())
     off = replace(paper_scene(0.25), effects={"drag": "off"})
     assert not {e.name: e for e in predict(off).effects}["drag"].active
+
+
+INTERRUPTED = """
+import os, signal, threading
+from dlocore import Quality, predict
+from tests.solver.scenes import paper_scene
+scene = paper_scene(0.25, quality=Quality(n_u=25, n_t=37, method="march", estimate=False))
+predict(scene)
+for k in range(20):
+    timer = threading.Timer(0.01 + 1e-3 * k, os.kill, (os.getpid(), signal.SIGINT))
+    try:
+        timer.start()
+        while True:
+            predict(scene)
+    except KeyboardInterrupt:
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        print("interrupted")
+"""
+
+
+def test_interrupts_between_and_within_predictions_are_errors_of_python():
+    ended = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED], cwd=Path(__file__).parents[2], capture_output=True, text=True, check=False
+    )
+    assert (ended.returncode, ended.stdout.count("interrupted")) == (0, 20), ended.stderr
+
+
+def test_a_long_solve_is_interrupted_soon():
+    scene = paper_scene(0.25, quality=Quality(target_error=1e-6))
+    predict(scene, deadline=0.1)
+    began, timer = time.thread_time(), threading.Timer(0.2, signal.raise_signal, (signal.SIGINT,))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        predict(scene, deadline=20.0)
+    assert time.thread_time() - began < 1.2
+
+
+def in_a_constructor(call):
+    """Call from within the globals of a named tuple, as compiled code calls constructors of named tuples."""
+    exec("call()", {"__name__": "namedtuple_Tables", "call": call})
+
+
+def test_an_interrupt_of_compiled_code_comes_at_the_next_look_or_at_the_end():
+    came: list[str] = []
+
+    @interruptible
+    def solve(look):
+        in_a_constructor(lambda: signal.raise_signal(signal.SIGINT))
+        came.append("held")
+        look()
+        came.append("end")
+
+    before = signal.signal(signal.SIGINT, lambda *_: came.append("handled"))
+    try:
+        solve(let_in)
+        assert came == ["held", "handled", "end"]
+        came.clear()
+        solve(lambda: None)
+        assert came == ["held", "end", "handled"]
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_other_threads_and_processes_that_ignore_interrupts_are_left_alone():
+    handlers = []
+    note = interruptible(lambda: handlers.append(signal.getsignal(signal.SIGINT)))
+    thread = threading.Thread(target=note)
+    thread.start()
+    thread.join()
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        note()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert handlers == [before, signal.SIG_IGN]
