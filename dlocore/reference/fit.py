@@ -14,6 +14,7 @@ Floats = NDArray[np.float64]
 FIRST_SPANS = 12  # in time
 MOST_SPANS = 400
 LEAST_TIMES, MOST_TIMES = 257, 2000  # at which a motion is fitted
+WITHIN_STEPS = 3  # of them at most within each step
 FIRM = 1e4  # weight of what the spline keeps: what grasps hold, and the first and the last instant
 MARGINS = 2  # samples that each span needs
 

@@ -18,7 +18,7 @@ from dlocore.problem.notes import start_notes
 from dlocore.problem.problem import Problem, pose
 from dlocore.reference.chain import chain, grip
 from dlocore.reference.energy import energies
-from dlocore.reference.fit import LEAST_TIMES, MOST_TIMES, Fit, fit
+from dlocore.reference.fit import LEAST_TIMES, MOST_TIMES, WITHIN_STEPS, Fit, fit
 from dlocore.reference.refine import Level, Refined, goes_astray, refine
 from dlocore.reference.sampling import between, material_of, stretch_of
 from dlocore.reference.strands import refuse_meeting
@@ -32,7 +32,7 @@ from dlocore.words import in_mm
 Floats = NDArray[np.float64]
 
 TARGET = 1e-3  # of the length, where no target error is asked for
-FITTED = 0.05  # of the target: by how much the spline may miss the rods
+FITTED = 0.05  # of the target: by how much the spline may miss the rods, which are to agree to the rest
 UNSEEN = "The time was up before it was seen whether the scene determines its motion."
 
 
@@ -130,7 +130,7 @@ def reference(problem: Problem, monitor: Monitor) -> Prediction:
             )
         )
 
-    refined = refine(problem, target, monitor, on_level)
+    refined = refine(problem, (1.0 - FITTED) * target, monitor, on_level)
     refuse_meeting(refined)
     refined = replace(refined, astray=goes_astray(refined, target, monitor))
     monitor.phase("simulation")
@@ -144,7 +144,9 @@ def _surface(problem: Problem, refined: Refined, tolerance: float) -> Fit:
     last = refined.levels[-1]
     taken = last.taken
     steps, first = np.unique(taken.times, return_index=True)
-    times = steps if len(steps) <= MOST_TIMES else np.union1d(steps[:: -(-len(steps) // MOST_TIMES)], steps[-1:])
+    # several within each step, unless that is too many: the spans of the spline are no shorter than a few of them
+    last_step, parts = len(steps) - 1, min(WITHIN_STEPS, MOST_TIMES / len(steps))
+    times = np.interp(np.append(np.arange(0.0, last_step, 1.0 / parts), last_step), np.arange(len(steps)), steps)
     # between long steps too, and to the horizon, where it stands still if it could not go on
     times = np.union1d(times, np.linspace(0.0, problem.horizon, LEAST_TIMES))
     q = np.empty((len(times), len(refined.u), 4))
@@ -170,7 +172,7 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
     problem, last = refined.problem, refined.levels[-1]
     motion = last.motion
     estimate = sum(_parts(refined, fitted).values())
-    status, message = _status(refined, target)
+    status, message = _status(refined, fitted, target)
     off = beside(problem.scene, lambda g: fitted.surface.positions(g.u, g.start)[0, 0])
     if off and not motion.stopped:
         status, message = "stalled", off
@@ -219,7 +221,7 @@ def _parts(refined: Refined, fitted: Fit) -> dict[str, float]:
     return {**parts, "start": refined.astray} if refined.astray > 0.0 else parts
 
 
-def _status(refined: Refined, target: float) -> tuple[Status, str]:
+def _status(refined: Refined, fitted: Fit, target: float) -> tuple[Status, str]:
     last = refined.levels[-1]
     motion = last.motion
     count = len(motion.rod.u) - 1
@@ -232,6 +234,9 @@ def _status(refined: Refined, target: float) -> tuple[Status, str]:
         agreed = f"Rods of up to {count} elements agree to {in_mm(refined.estimate)}, target {in_mm(target)}."
         if refined.astray > 0.0:  # by a bend alone: no sections of its rods are turned
             return "stalled", f"{agreed} But {in_words(refined.problem.line, refined.astray)}."
+        if refined.estimate + fitted.missed > target:
+            missed = f"The spline through them misses them by {in_mm(fitted.missed)}"
+            return "max_iterations", f"{agreed} {missed}. Allow a larger target_error, or predict less time."
         return "converged", agreed + (f" {UNSEEN}" if np.isnan(refined.astray) else "")
     if refined.ended == "time":
         return "time_limit", f"The time limit passed; {moved}. Allow more time or a larger target_error."

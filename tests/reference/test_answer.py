@@ -13,6 +13,7 @@ from dlocore import (
     Cable,
     Environment,
     Grasp,
+    Load,
     Move,
     Points,
     Prediction,
@@ -26,6 +27,7 @@ from dlocore import (
 from dlocore.errors import Cancelled
 from dlocore.problem.problem import pose
 from dlocore.reference import refine
+from dlocore.reference.fit import fit
 from dlocore.reference.motion import Motion, Watch
 from dlocore.reference.refine import left
 from dlocore.reference.rod import Rod, build
@@ -290,3 +292,26 @@ def test_a_bend_leaves_what_holds_it(pushed: Scene):
     assert not bend[[0, -1]].any()
     assert not bend[:, 2].any()
     assert np.abs(bend[:, 0]).max() < 1e-10
+
+
+def test_a_spline_that_misses_the_rods_by_more_than_the_target_is_not_called_converged(monkeypatch):
+    monkeypatch.setattr("dlocore.reference.solve.fit", lambda *given: replace(fit(*given), missed=2e-3))
+    found = predict(target(2e-3))
+    assert found.status == "max_iterations"
+    assert "misses them by 2 mm" in found.message
+
+
+def test_a_tap_early_in_a_long_time_is_shown_within_the_target():
+    tap = Load(u=1.0, force=[(0, 0, 0), (0, 0, 0), (0, 1, 0), (0, 0, 0)], times=[0, 0.3, 0.35, 0.4])
+    scene = Scene(
+        cable=Cable.preset("paper"),
+        shape=Straight(),
+        grasps=(Grasp(u=0.0),),
+        loads=(tap,),
+        environment=Environment(drag=0.3, table=Table()),
+        horizon=20.0,
+        quality=Quality(method="reference", target_error=6e-3),
+    )
+    found = predict(scene)
+    assert found.status == "converged", found.message
+    assert found.accuracy.error_parts["time"] < 1e-3
