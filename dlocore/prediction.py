@@ -146,7 +146,11 @@ class Prediction:
     @cached_property
     @interruptible
     def material(self) -> MaterialMotion | None:
-        """What the sections remember over time; None where they are elastic, and straight whatever the start."""
+        """What the sections remember over time, and how they are turned.
+
+        None where they are elastic, and straight whatever the start. But for method "reference" there is the director
+        of those that twist, too, and all else is zero where they remember nothing.
+        """
         return self.report_material()
 
     @cached_property
@@ -174,7 +178,8 @@ class Prediction:
         """Return the cable at time `t` [s], its last by default, as the start of another motion.
 
         Shape, velocity, stretch, twist, spin and memory go on, so that primitives chain: grasp, move, release, grasp
-        elsewhere.
+        elsewhere. Where the sections remember nothing, but twist, the motion is the same without `material`, which is
+        then but their director.
 
         Raises:
             SceneError: `t` is outside the predicted time.
