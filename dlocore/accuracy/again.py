@@ -22,6 +22,7 @@ from dlocore.problem.problem import Problem
 from dlocore.scene.paths import Waypoints
 from dlocore.scene.scene import Grasp, Scene
 from dlocore.solvers.monitor import Monitor, TimeIsUp
+from dlocore.solvers.timefit import fit
 from dlocore.stability.determined import DOUBTFUL, UNDETERMINED, UNSEEN, bend_in_words, goes_astray, in_words, may_grow
 from dlocore.words import in_mm
 
@@ -89,7 +90,7 @@ def march_again(problem: Problem, like: Prediction, monitor: Monitor) -> Again |
         hardness=hardness(judged.level), grid=grid, knots_t=judged.level.knots_t,
     )  # fmt: skip
     errors = {n: error for n, error in judged.accuracy.error_parts.items() if n not in _NOT_OF_THE_GRID}
-    change = distance(judged.level, level, problem) if errors else np.inf
+    change = distance(_as_marched(judged), level, problem) if errors else np.inf
     level = replace(level, change=change, turned=judged.level.turned, note="on the grid of a motion like it")
     if level.motion.stopped == "time":
         return Again(level, judged, None)
@@ -114,6 +115,15 @@ def march_again(problem: Problem, like: Prediction, monitor: Monitor) -> Again |
     if target is not None and sum(errors.values()) > target:
         return f"Its estimated error of {in_mm(sum(errors.values()))} is above the target."
     return Again(level, judged, errors or None, unseen=np.isnan(astray))
+
+
+def _as_marched(found: Prediction) -> Level:
+    """Return the march of a prediction: in the place of a least squares, the surface that it started from."""
+    level = found.level
+    assert level is not None
+    if found.accuracy.method == "march":
+        return level
+    return replace(level, control=fit(level.motion, level.knots_t)[0])
 
 
 def _astray(level: Level, monitor: Monitor) -> float:

@@ -72,6 +72,14 @@ def test_a_target_moved_a_little_is_solved_on_the_grid_before(scene):
     assert [g.reaction[-1] for g in again.grasps] == [pytest.approx(g.reaction[-1], abs=1e-5) for g in fresh.grasps]
 
 
+def test_a_least_squares_is_as_far_from_another_as_their_marches_are():
+    before = predict(paper_scene(0.25))
+    again = predict(before.scene, like=before)
+    assert before.accuracy.method == again.accuracy.method == "spacetime"
+    assert same(before, again)
+    assert again.level.change < 1e-9
+
+
 def test_the_least_squares_goes_on_without_a_companion():
     before = predict(paper_scene(0.25))
     again = predict(moved(before.scene, 0.0, 0.01, 0.0), like=before)
