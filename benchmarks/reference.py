@@ -10,7 +10,7 @@ import os
 
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
 
-import sys
+import argparse
 import time
 from dataclasses import replace
 from typing import Any
@@ -102,4 +102,10 @@ def main(names: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="*", metavar="SCENE", help="absent: those named in this file")
+    scenes = parser.parse_args().scenes
+    unknown = set(scenes) - set(examples() | catalogue())
+    if unknown:
+        parser.error(f"no such scene: {', '.join(sorted(unknown))}")
+    main(scenes)

@@ -78,7 +78,7 @@ class Recording:
 
         times = array("times", self.times, shape=(None,), unit="s")
         if not (np.diff(times) > 0).all():
-            k = int(np.argmin(np.diff(times)))
+            k = int(np.argmin(np.diff(times) > 0))
             raise SceneError(f"times[{k + 1}]", float(times[k + 1]), "rising times [s]")
         for name, kind, allowed in (("static", bool | np.bool_, "true or false"), ("name", str, "text")):
             if not isinstance(getattr(self, name), kind):

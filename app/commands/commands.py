@@ -251,8 +251,9 @@ def _words(fields: list[BadField]) -> str:
 
 def read_scene(file: str) -> Scene:
     """Return the scene of a JSON file, "-" for standard input; what is wrong with it is said with its name."""
+    raw = read_input(file)
     try:
-        return to_scene(_request(read_input(file)), _stored)
+        return to_scene(_request(raw), _stored)
     except SceneError as error:
         raise CommandError(f"{file}: {_words([BadField.from_scene_error(error)])}") from None
     except CommandError as error:

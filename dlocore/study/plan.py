@@ -73,7 +73,10 @@ class Plan:
         if len(self.deltas) > 1 and set(self.methods) == {"march"}:
             raise SceneError("deltas", self.deltas, "one: a march has no threshold, and is measured once")
         for n_u, n_t in self.grids:
-            Quality(n_u=n_u, n_t=n_t)
+            try:
+                Quality(n_u=n_u, n_t=n_t)
+            except SceneError as error:
+                raise SceneError("grids", f"{n_u}x{n_t}", f"for {error.field} {error.allowed}") from None
         for delta in self.deltas:
             Quality(delta=delta)
         for switches in self.effects.values():

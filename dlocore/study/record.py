@@ -145,6 +145,8 @@ def from_document(document: Any) -> Study:
     Raises:
         StudyError: it is no study, or one of another form.
     """
+    if not isinstance(document, dict) or "format" not in document:
+        raise StudyError("This is no study, as `dlo study -o` writes it.")
     try:
         if document["format"] != FORMAT:
             raise StudyError(f"format: got {document['format']!r}. Allowed: {FORMAT}.")
@@ -157,7 +159,9 @@ def from_document(document: Any) -> Study:
         return _plain(Study, parts)
     except StudyError:
         raise
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except KeyError as error:
+        raise StudyError(f"This is no study: {error} is missing.") from None
+    except (TypeError, ValueError, AttributeError) as error:
         raise StudyError(f"This is no study: {error}.") from None
 
 

@@ -293,6 +293,20 @@ def test_an_unknown_model_is_refused(models: str, tmp_path: Path, capsys: pytest
     assert f"--models: got {models!r}. Allowed: scalars or bends" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["nope.json"], "dlo: can't read nope.json: No such file or directory"),
+        (["--grids", "9x999999"], "dlo: grids: got 9x999999. Allowed: for n_t an integer, 5 to 513."),
+    ],
+)
+def test_what_a_study_refuses_is_named_once(
+    arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["study", *arguments]) == 2
+    assert capsys.readouterr().err.strip() == told
+
+
 def test_a_comparison_with_nothing_in_common_is_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene, before = written(tmp_path, paper_scene()), str(tmp_path / "before.json")
     quick = ["--methods", "march", "--parts", "runs", "--repeats", "1"]

@@ -197,6 +197,13 @@ def test_whether_it_rests_may_be_a_boolean_of_numpy() -> None:
     assert recording(static=np.bool_(True)).static is True
 
 
+def test_the_first_of_times_that_do_not_rise_is_named() -> None:
+    times = TIMES.copy()
+    times[[3, 7]] = 0.01
+    with pytest.raises(SceneError, match=r"times\[3\]: got 0\.01\."):
+        recording(times=times)
+
+
 def test_times_that_do_not_rise_are_shown_as_numbers() -> None:
     with pytest.raises(SceneError, match=r"times\[4\]: got 0\.02\."):
         recording(times=[*TIMES[:4], 0.02, *TIMES[5:]])
