@@ -39,6 +39,11 @@ def test_the_tension_of_a_hanging_cable_is_the_weight_below() -> None:
     assert not names["touches"].any()
 
 
+def test_there_may_be_no_obstacle() -> None:
+    names = found(shape=dlo.Straight(), grasps=[dlo.Grasp(u=0.0)], horizon=0.2, obstacles=())
+    assert names["touches"].shape == (33, 101, 0)
+
+
 def test_a_cable_that_is_drawn_over_a_bar_touches_it_in_the_middle_and_bends_there() -> None:
     bar = dlo.Cylinder(center=(0.5, 0.0, -0.0425), axis=(0, 1, 0), radius=0.04, height=0.4)  # just below the cable
     ends = [
