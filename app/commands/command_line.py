@@ -35,7 +35,9 @@ _STUDY = """examples:
   dlo study -o now.json --compare before.json     what became slower or less accurate since
   dlo study scene.json --n-u 9 13 --n-t 13 19 25  one scene on six grids
 
-exit codes: 0 done; 2 bad input; 4 with --compare: something changed for the worse"""
+exit codes: 0 done; 1 an output can't be written or drawn; 2 bad input, or --compare with nothing in common;
+4 with --compare: something changed for the worse"""
+_DONE = "exit codes: 0 done; 1 an output can't be written; 2 bad input, named on stderr"
 
 
 def parser() -> argparse.ArgumentParser:
@@ -77,6 +79,7 @@ def parser() -> argparse.ArgumentParser:
         "calibrate",
         help="measure what accuracy costs in time on this machine",
         description="Measure errors and times of both methods on this machine and keep them in the data directory.",
+        epilog=_DONE,
     )
     calibrate.add_argument("--repeats", type=int, default=5, help="timed calls of each solve, at most (default 5)")
     calibrate.add_argument("--json", metavar="OUT.json", help="write them to this file instead")
@@ -111,6 +114,7 @@ def parser() -> argparse.ArgumentParser:
         "validate",
         help="compare with published measurements",
         description="Fit cables on some windows of published motion capture and predict the others; fit hanging wires.",
+        epilog=_DONE,
     )
     check.add_argument("datasets", nargs="+", metavar="DATASET", help="files, or folders of files (docs/validation.md)")
     check.add_argument("--fit", type=int, default=4, help="windows of each cable to fit on (default 4)")

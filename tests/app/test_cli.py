@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -379,3 +380,11 @@ def test_an_unknown_command_exits_with_2() -> None:
     with pytest.raises(SystemExit) as done:
         main(["conquer"])
     assert done.value.code == 2
+
+
+@pytest.mark.parametrize("command", ["predict", "identify", "calibrate", "study", "validate"])
+def test_the_help_of_a_command_lists_its_exit_codes(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    told = " ".join(capsys.readouterr().out.split())
+    assert re.search(r"exit codes: 0 \w+; 1 an output can't be written", told)
