@@ -2,7 +2,7 @@
 
 Where a compiled function hands back arrays and tuples, it calls Python, for their types. There the handler of a signal
 that came meanwhile is run, and an error that it raises, as Python's own does, is one that numba does not look for: the
-process ends by a segmentation fault.
+process ends by a segmentation fault. LLVM, as it loads a function, calls Python, too, and the error is forgotten.
 """
 
 import _signal  # what `signal` wraps: its enumerations take longer than all else here
@@ -16,8 +16,8 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 _SIGINT = cast(int, _signal.SIGINT)
-_UNPICKLED = "numba.core.serialize"  # the module by which types are found
-_NAMED = "namedtuple_"  # what the globals of the constructors of named tuples are called, before the tuple's name
+# what the globals are called, to begin with, of what finds types, makes named tuples, and is told of by LLVM
+_CALLED = ("numba.core.serialize", "namedtuple_", "llvmlite.binding.executionengine")
 
 
 class _Deferring:
@@ -41,10 +41,9 @@ class _Deferring:
 
 
 def _is_compiled(frame: FrameType | None) -> bool:
-    """Tell whether what is run was called by compiled code."""
+    """Tell whether what is run was called by compiled code, or by what loads it."""
     while frame is not None:
-        name = frame.f_globals.get("__name__", "")
-        if name == _UNPICKLED or name.startswith(_NAMED):
+        if str(frame.f_globals.get("__name__")).startswith(_CALLED):
             return True
         frame = frame.f_back
     return False

@@ -153,17 +153,18 @@ def test_a_long_solve_is_interrupted_soon():
     assert time.thread_time() - began < 1.2
 
 
-def in_a_constructor(call):
-    """Call from within the globals of a named tuple, as compiled code calls constructors of named tuples."""
-    exec("call()", {"__name__": "namedtuple_Tables", "call": call})
+def called_in(module, call):
+    """Call something within the globals of a module, as compiled code does."""
+    exec("call()", {"__name__": module, "call": call})
 
 
-def test_an_interrupt_of_compiled_code_comes_at_the_next_look_or_at_the_end():
+@pytest.mark.parametrize("module", ["numba.core.serialize", "namedtuple_Tables", "llvmlite.binding.executionengine"])
+def test_an_interrupt_of_compiled_code_comes_at_the_next_look_or_at_the_end(module):
     came: list[str] = []
 
     @interruptible
     def solve(look):
-        in_a_constructor(lambda: signal.raise_signal(signal.SIGINT))
+        called_in(module, lambda: signal.raise_signal(signal.SIGINT))
         came.append("held")
         look()
         came.append("end")
