@@ -63,7 +63,7 @@ def stretch_points(rule: tuple[Any, Any]) -> Callable[..., Any]:
 
     def build(knots: Any, *arguments: Any) -> Any:
         u, w, first, table = gauss_rows(knots, rule, 1)
-        points = AxialPoints(u, first, np.ascontiguousarray(table[:, 1]), w)
+        points = AxialPoints(u, first, np.ascontiguousarray(table[:, 1]), w, np.ones(len(w)))
         return build_tables(knots, *arguments)._replace(axial=points)
 
     return build

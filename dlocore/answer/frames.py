@@ -144,7 +144,7 @@ def material_of(
         directors = carried(_first_director(problem, grid, tangents[0]), tangents)[kept]
         sections, natural = memory[kept], grid.history.memory[:, 3:]
     u = np.array(grid.tables.curvature.u)
-    stretch = np.array([np.interp(u, grid.tables.axial.u, row) for row in axial[kept]])
+    stretch = np.array([np.interp(u, grid.tables.axial.u, row / grid.tables.axial.share) for row in axial[kept]])
     return MaterialMotion(
         times=times[kept], director=directors, u=u, memory=sections,
         stretch=stretch, natural=np.array(natural),

@@ -83,22 +83,28 @@ def _origin(memory: float, natural: float, soft: float) -> float:
 
 
 @law
-def axial_memory(active: Any, p: Any, strain: float, memory: float, last: float, h: float) -> tuple[float, float]:
-    """Return the stress-free axial strain after a step h, and its derivative by the strain."""
+def axial_memory(
+    active: Any, p: Any, strain: float, memory: float, last: float, h: float, share: float
+) -> tuple[float, float]:
+    """Return the stress-free axial strain after a step h, and its derivative by the strain.
+
+    At a point with `share` times the strain that the tension calls for it yields at as many times the threshold.
+    """
     if not active[STRETCH_MEMORY] or h == 0.0:
         return memory, 0.0
     soft = p[STRETCH_MEMORY, 2]
     z = _origin(memory, 0.0, soft)
-    e, De = yielded((strain, 0.0, 0.0), (last, 0.0, 0.0), (z, 0.0, 0.0), h, p[STRETCH_MEMORY, 0], p[STRETCH_MEMORY, 1])
+    threshold = share * p[STRETCH_MEMORY, 0]
+    e, De = yielded((strain, 0.0, 0.0), (last, 0.0, 0.0), (z, 0.0, 0.0), h, threshold, p[STRETCH_MEMORY, 1])
     return soft * (strain - e[0]), soft * (1.0 - De[0])
 
 
 @law
 def axial_stress(
-    active: Any, p: Any, strain: float, rate: float, memory: float, last: float, h: float
+    active: Any, p: Any, strain: float, rate: float, memory: float, last: float, h: float, share: float
 ) -> tuple[float, float, float]:
     """Return the tension [N] of the active laws and its derivatives by the strain [N] and by its rate [N s]."""
-    free, change = axial_memory(active, p, strain, memory, last, h)
+    free, change = axial_memory(active, p, strain, memory, last, h, share)
     N, modulus = tension(p[STRETCH, 0], strain - free)
     viscosity = p[STRETCH_DAMPING, 0] if active[STRETCH_DAMPING] else 0.0
     return N + viscosity * rate, modulus * (1.0 - change), viscosity

@@ -137,7 +137,8 @@ def remember(axes: Any, q: Any, tables: Any, active: Any, p: Any, history: Any, 
         for n in range(len(tables.axial.w)):
             slope = squared_slope(q, tables.axial.first[n], row_of(tables.axial.b1, n), min(len(axes), 3))
             strain = np.sqrt(slope) - 1.0
-            free, _ = axial_memory(active, p, strain, history.axial[n, 0], history.axial[n, 1], h)
+            kept, share = history.axial[n, 0], tables.axial.share[n]
+            free, _ = axial_memory(active, p, strain, kept, history.axial[n, 1], h, share)
             history.axial[n, 0] = free
             history.axial[n, 2] = history.axial[n, 1]
             history.axial[n, 1] = strain

@@ -188,12 +188,14 @@ class AxialPoints(NamedTuple):
         first: (p,) index of the first of the four control points at each.
         b1: (p, 4) first derivatives of their basis functions [1/m].
         w: (p,) weights [m].
+        share: (p,) of the strain of a cable that is strained alike everywhere, see `shares`.
     """
 
     u: Any
     first: Any
     b1: Any
     w: Any
+    share: Any
 
 
 class CurvaturePoints(NamedTuple):
@@ -335,6 +337,49 @@ def _axial_points(knots: Any, free_start: bool, free_end: bool, rule: Any, weigh
     return u[:p], w[:p]
 
 
+@brief
+def shares(knots: Any, first: Any, b1: Any, w: Any, free_start: bool, free_end: bool) -> Any:
+    """Return the strain (p,) at the axial points of a cable whose tension strains it by one, whatever its sign.
+
+    It is r with sum_p w_p r_p phi_j(u_p) = int phi_j du for the quadratic basis functions phi_j, of which the b_i' are
+    combinations (docs/model.md, selective reduced integration): without the first where the direction of the start is
+    held, which bears what it lacks, without the last where that of the end is, and with the sum of the two that end
+    and begin at a triple knot, which are held together. Splines at increasing places are totally positive: nothing is
+    to be exchanged as they are eliminated.
+    """
+    count = len(w)
+    begin, end = 0 if free_start else 1, len(knots) - 5 if free_end else len(knots) - 6
+    row = np.empty(len(knots) - 5, np.int64)  # of each function; -1 for none
+    r = np.zeros(count)
+    rows = 0
+    for j in range(len(row)):
+        row[j] = -1
+        if begin <= j < end:
+            joins = j > begin and knots[3] < knots[j + 1] and knots[j + 1] == knots[j + 3]
+            rows += 0 if joins else 1
+            row[j] = rows - 1
+            r[rows - 1] += (knots[j + 4] - knots[j + 1]) / 3.0
+    A = np.zeros((count, 5))  # two diagonals to both sides
+    for p in range(count):
+        phi = 0.0
+        for i in range(3):
+            phi -= b1[p, i]
+            j = first[p] + i
+            if row[j] >= 0:
+                A[row[j], 2 + p - row[j]] += w[p] * phi * (knots[j + 4] - knots[j + 1]) / 3.0
+    for k in range(count):
+        for i in range(k + 1, min(k + 3, count)):
+            factor = A[i, 2 + k - i] / A[k, 2]
+            r[i] -= factor * r[k]
+            for p in range(k, min(k + 3, count)):
+                A[i, 2 + p - i] -= factor * A[k, 2 + p - k]
+    for k in range(count - 1, -1, -1):
+        for p in range(k + 1, min(k + 3, count)):
+            r[k] -= A[k, 2 + p - k] * r[p]
+        r[k] /= A[k, 2]
+    return np.abs(r)
+
+
 @kernel
 def _nodes(knots: Any, spacing: float) -> Any:
     """Return nodes u (k,) [m] at most `spacing` apart, the knots among them, and their trapezoidal weights [m]."""
@@ -408,7 +453,8 @@ def build_tables(
             weight[f + i] += weights4[p] * table4[p, 0, i]
             for j in range(i, 4):
                 mass[f + i, j - i] += weights4[p] * table4[p, 0, i] * table4[p, 0, j]
-    axial = AxialPoints(u, axial_first, axial_b1, axial_w)
+    axial_share = shares(knots, axial_first, axial_b1, axial_w, free_start, free_end)
+    axial = AxialPoints(u, axial_first, axial_b1, axial_w, axial_share)
     lanes = side_by_side(curvature_first, curvature_u, curvature_w, b0, b1, b2)
     curvature = CurvaturePoints(curvature_u, curvature_first, b0, b1, b2, curvature_w, pair_products(b1, b2), lanes)
     contact = ContactNodes(contact_u, contact_first, contact_b0, contact_w, len(u_above), cell)

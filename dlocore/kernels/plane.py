@@ -68,7 +68,9 @@ def axial(
         elif active[STRETCH_DAMPING]:
             vx, vy = _combine(v, k, b)
             rate = (x * vx + y * vy) * inverse
-        tension, modulus, viscosity = axial_stress(active, p, strain, rate, past[n, 0], past[n, 1], rates[3])
+        tension, modulus, viscosity = axial_stress(
+            active, p, strain, rate, past[n, 0], past[n, 1], rates[3], points.share[n]
+        )
         if len(kept) > 0:
             kept[n, AT_HAND], kept[n, MODULUS] = tension, modulus + rates[0] * viscosity
         g = w * tension * inverse

@@ -22,6 +22,7 @@ from dlocore.levels.level import CREDIBLE_STRAIN, Level
 from dlocore.levels.spin import bends_sharply, spin_forces
 from dlocore.levels.taut import taut_notes
 from dlocore.problem.buckling import BOW, UNSTABLE, side_notes
+from dlocore.problem.discretisation import axial_strain
 from dlocore.problem.events import closed_grasps, moments
 from dlocore.problem.notes import start_notes
 from dlocore.problem.problem import Problem
@@ -267,11 +268,13 @@ def _yields(level: Level) -> dict[str, str]:
         threshold = 2.0 * cable.yield_twist / cable.diameter
         if most > threshold:
             return {"plasticity": f"the motion twists it by {most:.3g} rad/m, and it yields at {threshold:.3g} rad/m"}
-    if cable.yield_stretch is not None and level.motion.largest_strain > cable.yield_stretch:
-        strain = level.motion.largest_strain
-        return {
-            "plasticity": f"the motion strains the cable by {strain:.2g}, and it yields at {cable.yield_stretch:.2g}"
-        }
+    if cable.yield_stretch is not None:
+        strain = axial_strain(grid.tables, states[..., : problem.plane.dimensions]) / grid.tables.axial.share
+        most = float(np.abs(strain).max())
+        if most > cable.yield_stretch:
+            return {
+                "plasticity": f"the motion strains the cable by {most:.2g}, and it yields at {cable.yield_stretch:.2g}"
+            }
     return {}
 
 

@@ -292,7 +292,8 @@ def write_material(problem: Problem, grid: Grid, q: Floats, history: History, ma
 
 def _write_stretch(grid: Grid, history: History, material: Material) -> None:
     if material.stretch is not None:
-        history.axial[:, 0] = np.interp(grid.tables.axial.u, cast(Floats, material.u), cast(Floats, material.stretch))
+        axial = grid.tables.axial
+        history.axial[:, 0] = axial.share * np.interp(axial.u, cast(Floats, material.u), cast(Floats, material.stretch))
 
 
 def _remembered(problem: Problem, grid: Grid, material: Material, tangent: Floats, knots: Floats) -> Floats:

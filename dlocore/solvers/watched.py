@@ -31,6 +31,7 @@ def watched(grid: Grid) -> Grid:
         first=merged(tables.axial.first, first),
         b1=merged(tables.axial.b1, rows[:, 1]),
         w=merged((1.0 - _SHARE) * tables.axial.w, _SHARE * (half * weights).ravel()),
+        share=np.ones(len(u)),
     )
     finer: Tables = tables._replace(axial=points)
     behind = [np.interp(finer.axial.u, tables.axial.u, column) for column in grid.history.axial.T]
