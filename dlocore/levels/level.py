@@ -12,12 +12,13 @@ from dlocore.kernels.growth import LOOKS
 from dlocore.kernels.timefit import farthest, sampled
 from dlocore.problem.checks import TOO_DEEP
 from dlocore.problem.discretisation import smallest_n_u
-from dlocore.problem.events import JUMP, moments, swings
+from dlocore.problem.events import JUMP, moments, swing, swings
 from dlocore.problem.grid import Grid
 from dlocore.problem.held_ends import held_back
 from dlocore.problem.problem import Problem, stiff_as_taut, stiffer, stiffer_for
 from dlocore.problem.time_grid import smallest_n_t, time_knots
 from dlocore.problem.trembling import trembles
+from dlocore.scene.scene import AUTO_TARGET
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED, March, march
 from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.smooth import march_smooth
@@ -42,9 +43,13 @@ CREDIBLE_STRAIN = 0.02  # axial: a march that stretches the cable more is tried 
 TEARS = 1.5  # times the strain of another march: what strains a cable so much more does it for want of steps
 _STIFFER = 5  # times that contact is made stiffer on one grid
 _MISSED = 0.01  # of the diameter: what the time spline may miss of a motion with contact
+_LONG = 4.0  # times that a cable swings: in so long a motion what is fast may be a small part of it, which ...
+_FITTED = 0.1  # ... has more time knots where the spline misses it by more than this share of the target
+_ROUNDING = 1e-9
 _SAMPLES = 33  # along the cable, and in time while it swings once, at which surfaces are compared
 _AT_ONCE = 1e-2  # of the length: what moves by more from one of these times to the next is compared in between, at ...
-_SOONER = 0.5 ** np.arange(1.0, 7.0)  # ... these parts of it, where it sets out at once
+_SOONER = 0.5 ** np.arange(1.0, 7.0)  # ... these parts of it, where it sets out at once, and ...
+_EVENLY = np.arange(1.0, 8.0) / 8.0  # ... these, in motions so long that these times are far apart
 _YIELDING = 0.8  # of the depth, at most, is left by a stiffer contact where it is one of stiffness
 ACCEPT = 0.75  # of the target: an answer with a smaller estimated error is believed
 
@@ -68,7 +73,7 @@ class Level:
         motion: the march.
         knots_t: (n_t + 4,) [s].
         control: (n_t, n_u, nc) [m].
-        missed: what the time spline misses of the march [m], but for moments such as a start that springs away.
+        missed: what the time spline misses of the march [m], see `largest`.
         change: largest distance to the level before [m], infinite at the first.
         turned: largest angle of the sections from those of the level before, or of the march that its error was
             estimated with [rad]; 0 without twist.
@@ -114,6 +119,23 @@ class Level:
         return np.asarray(sampled(self.knots_t, self.motion.grid.knots, self.control, times, _SAMPLES))
 
     @cached_property
+    def between(self) -> Floats:
+        """Other times (k,) [s] to compare it at: what the evenly spaced ones would not tell."""
+        step = self.problem.horizon / (len(self.samples) - 1)
+        found = [begin + step * _SOONER for begin in self.sudden]
+        if step * (_SAMPLES - 1) > (1.0 + _ROUNDING) * swing(self.problem.scene):
+            found += [begin + step * _EVENLY for begin in self._lively(step)]
+        times = np.unique(np.concatenate([[], *found]))
+        return np.asarray(times[times < self.problem.horizon])
+
+    def _lively(self, step: float) -> Floats:
+        """Return from which times (k,) [s] on the cable goes a long way within `step` [s]."""
+        states = self.motion.states[..., : self.problem.plane.dimensions]
+        way = np.linalg.norm(np.diff(states, axis=0), axis=2).max(axis=1)
+        number = np.minimum(self.motion.times[1:] / step - _ROUNDING, len(self.samples) - 2).astype(int)
+        return np.asarray(step * np.flatnonzero(np.bincount(number, way) > _AT_ONCE * self.problem.scene.cable.length))
+
+    @property
     def sudden(self) -> list[float]:
         """When it sets out so fast that the next of the evenly spaced times may come too late to tell [s]."""
         problem, motion, dimensions = self.problem, self.motion, self.problem.plane.dimensions
@@ -238,9 +260,13 @@ def run_level(
     if booked:
         monitor.phase("march")
     smooth = motion
+    period = swing(problem.scene)
     if free_knots and (problem.contact is not None or motion.deepest > 0.0):
-        knots_t, smooth = refined(motion, knots_t, _MISSED * problem.scene.cable.diameter)
-    if plain is not None and motion is plain[0]:
+        knots_t, smooth = refined(motion, knots_t, _MISSED * problem.scene.cable.diameter, True)
+    elif free_knots and problem.horizon > _LONG * period:
+        target = problem.scene.quality.target_error or AUTO_TARGET * problem.scene.cable.length
+        knots_t, _ = refined(motion, knots_t, _FITTED * target, False)
+    if plain is not None and motion is plain[0] and len(knots_t) == len(plain[1]) + 4:
         _, control, off = plain
     else:
         control, off = fit(smooth, knots_t)
@@ -248,7 +274,9 @@ def run_level(
         off = missed(motion, knots_t, control)
     if booked:
         monitor.phase("fit")
-    return Level(Size(n_u, n_t, steps), posed, problem, motion, knots_t, control, largest(off), np.inf)
+    return Level(
+        Size(n_u, n_t, steps), posed, problem, motion, knots_t, control, largest(motion.times, off, period), np.inf
+    )
 
 
 def _fastest(motion: March) -> float:
@@ -310,12 +338,8 @@ def distance(a: Level, b: Level, problem: Problem) -> float:
     """Return the largest distance between the surfaces of two levels [m], also soon after they set out at once."""
     dimensions = problem.plane.dimensions
     most = float(farthest(a.samples, b.samples, dimensions))
-    begins = np.array(sorted({*a.sudden, *b.sudden}))
-    if len(begins) == 0:
-        return most
-    times = (begins[:, None] + problem.horizon / (len(a.samples) - 1) * _SOONER).ravel()
-    times = times[times < problem.horizon]
-    return max(most, float(farthest(a.at(times), b.at(times), dimensions)))
+    times = np.union1d(a.between, b.between)
+    return max(most, float(farthest(a.at(times), b.at(times), dimensions))) if len(times) else most
 
 
 def turned(a: Level, b: Level, problem: Problem) -> float:

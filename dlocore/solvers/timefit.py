@@ -12,21 +12,22 @@ Floats = NDArray[np.float64]
 
 _REFINEMENTS = 8  # of the time knots: each halves spans
 _MOST_OF_THE_TIME = 0.95
+MOMENTS = 3.0
 _EVENINGS = 12  # of the time knots
 _MOST_NUMBERS = 10**7  # of all states: with more of them, none are added between
 _STATES = 2  # of the march in a span of the time spline, at least
 _QUIET = 1e-3  # of the largest miss: what a span misses at least, so that none grows without bounds
 
 
-def refined(motion: March, knots_t: Floats, tolerance: float) -> tuple[Floats, March]:
+def refined(motion: March, knots_t: Floats, tolerance: float, strikes: bool) -> tuple[Floats, March]:
     """Return time knots, more where the time spline misses the motion by more than `tolerance` [m], and what to fit.
 
-    Where a cable strikes something its velocity jumps, and a spline without knots there goes on into the obstacle, or
+    Where a cable `strikes` something its velocity jumps, and a spline without knots there goes on into the obstacle, or
     swings past its states. There the states half-way through the steps are added to the motion, and knots beside them.
     """
     for _ in range(_REFINEMENTS):
         control, off = fit(motion, knots_t)
-        between = _halved(motion, knots_t, control, tolerance)
+        between = _halved(motion, knots_t, control, tolerance) if strikes else motion
         breaks = np.unique(knots_t)
         span = np.clip(np.searchsorted(breaks, motion.times, side="right") - 1, 0, len(breaks) - 2)
         new = []
@@ -46,17 +47,30 @@ def missed(motion: March, knots_t: Floats, control: Floats) -> Floats:
     return _missed(knots_t, motion.times, motion.states, control)
 
 
-def largest(off: Floats) -> float:
-    """Return what a spline misses its march by [m] but for moments such as a start that springs away."""
-    return float(np.sort(off)[int(_MOST_OF_THE_TIME * (len(off) - 1))])
+def largest(times: Floats, off: Floats, swing: float) -> float:
+    """Return what a spline misses its march by [m], at moments such as a start that springs away by `MOMENTS` times it.
+
+    Such moments are a share of each `swing` [s], however long the motion is.
+
+    Args:
+        times: of the states (k,) [s], increasing.
+        off: by how much the spline misses each (k,) [m].
+        swing: about how long the cable needs to swing once [s].
+    """
+    window = np.minimum((times - times[0]) / swing, max(np.ceil((times[-1] - times[0]) / swing) - 1.0, 0.0)).astype(int)
+    begins = np.flatnonzero(np.diff(window, prepend=-1))
+    counts = np.diff(begins, append=len(off))
+    ordered = off[np.lexsort((off, window))]
+    return float(max(ordered[begins + (_MOST_OF_THE_TIME * (counts - 1)).astype(int)].max(), off.max() / MOMENTS))
 
 
-def evened(motion: March, knots_t: Floats, events: Floats) -> Floats:
+def evened(motion: March, knots_t: Floats, events: Floats, swing: float) -> Floats:
     """Return as many time knots, closer where the motion is fast, so that the time spline misses it evenly.
 
     The miss of a span goes with the fourth power of its length. Each round shares the spans out so that they would miss
     as much as each other, and the best knots of all rounds are kept. Knots at the times of events (k,) [s] stay. A span
-    without states could go anywhere: where spans would be that short, the motion is too fast for so few steps.
+    without states could go anywhere: where spans would be that short, the motion is too fast for so few steps. For
+    `swing` see `largest`.
     """
     best = found = knots_t
     least = np.inf
@@ -64,8 +78,9 @@ def evened(motion: March, knots_t: Floats, events: Floats) -> Floats:
         if np.histogram(motion.times, np.unique(found))[0].min() < _STATES:
             break
         off = fit(motion, found)[1]
-        if largest(off) < least:
-            best, least = found, largest(off)
+        most_times = largest(motion.times, off, swing)
+        if most_times < least:
+            best, least = found, most_times
         breaks = np.unique(found)
         span = np.clip(np.searchsorted(breaks, motion.times, side="right") - 1, 0, len(breaks) - 2)
         most = np.zeros(len(breaks) - 1)

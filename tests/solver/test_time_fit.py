@@ -36,7 +36,7 @@ def jerk() -> tuple[March, np.ndarray]:
 
 def test_knots_and_states_are_added_until_the_spline_follows_the_march() -> None:
     motion, knots_t = jerk()
-    more, dense = refined(motion, knots_t, TOLERANCE)
+    more, dense = refined(motion, knots_t, TOLERANCE, True)
     assert len(more) > len(knots_t)
     assert len(dense.times) > len(motion.times)
     assert set(motion.times) <= set(dense.times)
@@ -46,7 +46,7 @@ def test_knots_and_states_are_added_until_the_spline_follows_the_march() -> None
 def test_no_states_are_added_to_so_many_that_they_fill_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     motion, knots_t = jerk()
     monkeypatch.setattr(timefit, "_MOST_NUMBERS", motion.states.size - 1)
-    more, same = refined(motion, knots_t, TOLERANCE)
+    more, same = refined(motion, knots_t, TOLERANCE, True)
     assert same is motion
     assert len(more) > len(knots_t)
 
@@ -111,3 +111,11 @@ def test_time_knots_stay_even_where_waypoints_would_crowd_them(times: list[float
     followed, even = (time_knots(pose(led(times, quality)), 19) for quality in (Quality(), least_squares))
     assert followed is not None
     np.testing.assert_array_equal(followed, even)
+
+
+def test_where_nothing_strikes_knots_are_added_and_no_states() -> None:
+    motion, knots_t = jerk()
+    more, same = refined(motion, knots_t, 1e-4, False)
+    assert same is motion
+    assert len(more) > len(knots_t)
+    assert fit(motion, more)[1].max() < 0.1 * fit(motion, knots_t)[1].max()
