@@ -5,6 +5,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -122,6 +123,7 @@ INTERRUPTED = """
 import os, signal, threading
 from dlocore import Quality, predict
 from tests.solver.scenes import paper_scene
+signal.signal(signal.SIGINT, signal.default_int_handler)  # which a process in the background ignores
 scene = paper_scene(0.25, quality=Quality(n_u=25, n_t=37, method="march", estimate=False))
 predict(scene)
 for k in range(20):
@@ -138,11 +140,25 @@ for k in range(20):
 
 def test_interrupts_between_and_within_predictions_are_errors_of_python():
     ended = subprocess.run(
-        [sys.executable, "-c", INTERRUPTED], cwd=Path(__file__).parents[2], capture_output=True, text=True, check=False
+        [sys.executable, "-c", INTERRUPTED],
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
     )
     assert (ended.returncode, ended.stdout.count("interrupted")) == (0, 20), ended.stderr
 
 
+@pytest.fixture
+def heeded() -> Iterator[None]:
+    """Let interrupts be errors of Python, also where this process was begun in the background, and ignores them."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("heeded")
 def test_a_long_solve_is_interrupted_soon():
     scene = paper_scene(0.25, quality=Quality(target_error=1e-6))
     predict(scene, deadline=0.1)
@@ -180,6 +196,7 @@ def test_an_interrupt_of_compiled_code_comes_at_the_next_look_or_at_the_end(modu
         signal.signal(signal.SIGINT, before)
 
 
+@pytest.mark.usefixtures("heeded")
 def test_other_threads_and_processes_that_ignore_interrupts_are_left_alone():
     handlers = []
     note = interruptible(lambda: handlers.append(signal.getsignal(signal.SIGINT)))
