@@ -73,7 +73,7 @@ def test_a_corner_beside_its_grasp_falls_as_the_reference_says():
         effects={"self_contact": "off"},
     )
     found = predict(scene)
-    known = predict(replace(scene, quality=Quality(method="reference", target_error=8e-3)))
+    known = predict(replace(scene, quality=Quality(method="reference", target_error=12e-3)))  # a third is of the spline
     assert found.status == known.status == "converged"
     assert found.accuracy.error_estimate is not None
     assert known.accuracy.error_estimate is not None
