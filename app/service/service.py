@@ -251,36 +251,22 @@ class Service:
             store: whether to store it.
             fields: which of `OPTIONAL_FIELDS` the answer has; what is stored has all.
         """
-        answer = self._kept(prediction, request, raw, id, store, fields)
-        self.recent.add(id, prediction)  # with what the answer has found of it, which takes memory, too
-        return answer
-
-    def _kept(
-        self,
-        prediction: Prediction,
-        request: PredictionRequest,
-        raw: bytes,
-        id: str,
-        store: bool,
-        fields: Collection[str],
-    ) -> tuple[bytes, bool]:
         u, t = request.output.samples_u, request.output.samples_t
+        told = prediction
         if store:
             try:
                 self.runs.save(raw, prediction, samples_u=u, samples_t=t, id=id, name=request.name)
             except OSError as error:
                 _log.error("the run is not stored: %s", error)
-                prediction = replace(prediction, said=f"{prediction.said} It is not stored: {error.strerror or error}.")
+                told = replace(prediction, said=f"{prediction.said} It is not stored: {error.strerror or error}.")
                 store = False
-        if not store:
-            document = {**from_prediction(prediction, id, u, t, fields), "links": None}
-            return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY), False
-        stored = self.runs.document(id) or b""
-        left_out = set(OPTIONAL_FIELDS).difference(fields)
-        if not left_out:
-            return stored, True
-        asked = {name: part for name, part in orjson.loads(stored).items() if name not in left_out}
-        return orjson.dumps(asked), True
+        if store:
+            answer = _with_fields(self.runs.document(id) or b"", fields)
+        else:
+            document = {**from_prediction(told, id, u, t, fields), "links": None}
+            answer = orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
+        self.recent.add(id, prediction)  # with what the answer has found of it, which takes memory, too
+        return answer, store
 
     def document(self, id: str, job: Job | None = None) -> bytes | None:
         """Return the answer `id` as JSON, or None where there is none; for any thread.
@@ -304,6 +290,14 @@ class Service:
             return job.material
         motion = self.runs.motion(id)
         return None if motion is None else motion.material
+
+
+def _with_fields(stored: bytes, fields: Collection[str]) -> bytes:
+    """Return a stored answer without those of `OPTIONAL_FIELDS` that are not asked for."""
+    left_out = set(OPTIONAL_FIELDS).difference(fields)
+    if not left_out:
+        return stored
+    return orjson.dumps({name: part for name, part in orjson.loads(stored).items() if name not in left_out})
 
 
 def service_of(request: Request) -> Service:

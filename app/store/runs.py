@@ -140,7 +140,7 @@ class RunStore:
         ids = ids[len(beyond) :]
         total = sum(entry.size for entry in self._entries.values())
         for id in ids:
-            if total > self._max_bytes:
+            if total > self._max_bytes and self._entries[id].recording:
                 total -= self._drop_recording(id)
         while len(ids) > 1 and total > self._max_bytes:
             oldest = ids.pop(0)
@@ -149,7 +149,7 @@ class RunStore:
         return removed
 
     def _drop_recording(self, id: str) -> int:
-        """Remove the recording of a run, if it has one, and return its bytes."""
+        """Remove the recording of a run, and return its bytes."""
         entry = self._entries[id]
         dropped, entry.recording = entry.recording, 0
         entry.size -= dropped

@@ -7,7 +7,7 @@ import numpy as np
 
 from dlocore.levels.level import Level
 from dlocore.solvers.march import STRONGLY_DAMPED
-from dlocore.solvers.timefit import MOMENTS
+from dlocore.solvers.timefit import MISSED_COUNTS
 
 _LEFT = 0.45  # of what twice as many steps moved the surface by, is left; 1/3 in theory: benchmarks.estimate
 _LEFT_KINKED = 0.9  # the same of a `kinked` march; 1 were its steps of first order
@@ -19,7 +19,6 @@ _MOST_FALL_DAMPED = 8.0
 MORE = 1.1  # times as many steps, or control points: fewer are as many
 _STALE = 4.0  # times what a refinement in one direction moved the surface by: once those in the other moved it by more,
 # what the first has left is measured again
-MISSED_COUNTS = MOMENTS  # what the time spline misses of its march, times this, is the least that the error may be
 DIRECTIONS = "space", "time"
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from dlocore.accuracy.budget import Means, first_level
-from dlocore.accuracy.changes import DIRECTIONS, MISSED_COUNTS, MORE, Changes, refined, untold, weighed
+from dlocore.accuracy.changes import DIRECTIONS, MORE, Changes, refined, untold, weighed
 from dlocore.accuracy.cost import Cost
 from dlocore.accuracy.doubts import ALLOW, Doubts
 from dlocore.answer.parts import Status
@@ -26,6 +26,7 @@ from dlocore.problem.problem import Problem
 from dlocore.scene.scene import AUTO_TARGET, Quality
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED
 from dlocore.solvers.monitor import Monitor, TimeIsUp
+from dlocore.solvers.timefit import MISSED_COUNTS
 from dlocore.statics.statics import RESTLESS
 from dlocore.words import in_mm, in_ms
 

@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 
 _REFINEMENTS = 8  # of the time knots: each halves spans
 _MOST_OF_THE_TIME = 0.95
-MOMENTS = 3.0
+MISSED_COUNTS = 3.0  # what the time spline misses of its march, times this, is the least that the error may be
 _EVENINGS = 12  # of the time knots
 _MOST_NUMBERS = 10**7  # of all states: with more of them, none are added between
 _STATES = 2  # of the march in a span of the time spline, at least
@@ -48,9 +48,9 @@ def missed(motion: March, knots_t: Floats, control: Floats) -> Floats:
 
 
 def largest(times: Floats, off: Floats, swing: float) -> float:
-    """Return what a spline misses its march by [m], at moments such as a start that springs away by `MOMENTS` times it.
+    """Return what a spline misses its march by [m]; at moments such as a start that springs away, a third of that.
 
-    Such moments are a share of each `swing` [s], however long the motion is.
+    Such moments are a share of each `swing` [s], however long the motion is; the third, times MISSED_COUNTS, is all.
 
     Args:
         times: of the states (k,) [s], increasing.
@@ -61,7 +61,7 @@ def largest(times: Floats, off: Floats, swing: float) -> float:
     begins = np.flatnonzero(np.diff(window, prepend=-1))
     counts = np.diff(begins, append=len(off))
     ordered = off[np.lexsort((off, window))]
-    return float(max(ordered[begins + (_MOST_OF_THE_TIME * (counts - 1)).astype(int)].max(), off.max() / MOMENTS))
+    return float(max(ordered[begins + (_MOST_OF_THE_TIME * (counts - 1)).astype(int)].max(), off.max() / MISSED_COUNTS))
 
 
 def evened(motion: March, knots_t: Floats, events: Floats, swing: float) -> Floats:

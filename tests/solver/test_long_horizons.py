@@ -10,7 +10,7 @@ from dlocore import Cable, Environment, Grasp, Load, Move, Quality, Scene, Strai
 from dlocore.levels.level import run_level
 from dlocore.problem.problem import pose
 from dlocore.solvers.monitor import Monitor
-from dlocore.solvers.timefit import MOMENTS, largest
+from dlocore.solvers.timefit import MISSED_COUNTS, largest
 
 AIR = Environment(drag=0.3)
 DAMPED = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-3, bending_damping=1e-4)
@@ -59,7 +59,7 @@ def test_a_moment_counts_as_much_in_a_long_time_as_in_a_short_one():
     off[153:] = 0.0  # 0.03 s
     for longest in (2.0, 10.0, 40.0):
         some = times <= longest
-        assert largest(times[some], off[some], 2.0) == 1.0 / MOMENTS
+        assert largest(times[some], off[some], 2.0) == 1.0 / MISSED_COUNTS
 
 
 def test_what_a_spline_misses_in_less_than_a_swing_is_told():
