@@ -73,5 +73,13 @@ def test_grids_are_compared_while_it_is_lively_however_far_apart_the_even_times_
     step = 1000.0 / (len(level.samples) - 1)
     assert step == pytest.approx(0.488, abs=1e-3)
     inside = level.between[level.between < step]
-    assert len(inside) >= 6
+    assert len(inside) == 10  # at seven even parts of the time, and at three shorter ones, as it sets out at once
     assert not np.any(level.between > 100.0)  # where it hangs still
+
+
+def test_the_spline_of_a_free_grid_has_more_knots_where_it_is_lively_and_nowhere_else():
+    fixed, free = (run_level(pose(sagging(60.0)), 13, 390, 1200, Monitor(), free_knots=free) for free in (False, True))
+    more = np.setdiff1d(free.knots_t, fixed.knots_t)
+    assert 0 < len(more) < 20
+    assert more.max() < 2.5
+    assert free.missed < 0.5 * fixed.missed
