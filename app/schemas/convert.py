@@ -174,7 +174,10 @@ def _path(model: StillPath | MovePath | WaypointsPath) -> Path:
         return Move(
             displacement=model.displacement, duration=model.duration, rotation=model.rotation, profile=model.profile
         )
-    return Waypoints(times=model.times, positions=model.positions, orientations=model.orientations, start=model.start)
+    return Waypoints(
+        times=model.times, positions=model.positions, orientations=model.orientations, start=model.start,
+        profile=model.profile,
+    )  # fmt: skip
 
 
 def load_of(i: int, model: LoadModel) -> Load:

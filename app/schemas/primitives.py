@@ -35,7 +35,7 @@ class MovePath(Model):
 
 
 class WaypointsPath(Model):
-    """Pass through positions at given times, along a C2 spline."""
+    """Pass through positions at given times, along a C2 spline, or stop at each."""
 
     kind: Literal["waypoints"]
     times: list[Instant] = Field(
@@ -53,6 +53,12 @@ class WaypointsPath(Model):
         default="rest",
         description="`rest`: it starts at rest; `moving`: as fast as the first positions tell, as of a recorded path.",
         examples=["rest"],
+    )
+    profile: Literal["spline", "minimum_jerk", "linear", "cubic"] = Field(
+        default="spline",
+        description="`spline`: smoothly through all positions. Else straight from one to the next, as a `move` of that "
+        "profile: a program of moves, with pauses where two positions are the same; at most 1,000 of them.",
+        examples=["spline"],
     )
 
 

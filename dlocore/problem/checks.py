@@ -30,7 +30,10 @@ def check_reach(scene: Scene, start: StartCurve) -> None:
     """Refuse two grasps that are at some time farther apart than the cable between them."""
     if len(scene.grasps) < 2:
         return
-    t = np.linspace(0.0, cast(float, scene.horizon), 257)
+    moments = [np.linspace(0.0, cast(float, scene.horizon), 257)]
+    moments += [g.start + cast(Floats, g.path.times) for g in scene.grasps if isinstance(g.path, Waypoints)]
+    t = np.unique(np.concatenate(moments))
+    t = t[t <= cast(float, scene.horizon)]
     begin = [start(g.u)[0] for g in scene.grasps]
     for j, b in enumerate(scene.grasps):
         for i, a in enumerate(scene.grasps[:j]):

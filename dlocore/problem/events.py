@@ -7,7 +7,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.scene.paths import Move, Waypoints
+from dlocore.scene.paths import Path, Still, Waypoints
 from dlocore.scene.scene import Grasp, Scene
 
 Floats = NDArray[np.float64]
@@ -61,16 +61,20 @@ def find_events(scene: Scene) -> tuple[Event, ...]:
         released = np.inf if g.release_time is None else g.release_time
         end = g.start + g.path.duration
         if g.path.duration and end < released:
-            add(end, _smoothness(g, g.path.duration))
+            add(end, _smoothness(g.path))
         if isinstance(g.path, Waypoints):
-            add(g.start + float(np.asarray(g.path.times)[0]), 2)
+            first = g.start + float(cast(Floats, g.path.times)[0])
+            add(first, 2 if g.path.profile == "spline" else _smoothness(g.path))
+            for time in g.start + g.path.stops:
+                if time < released:
+                    add(float(time), _smoothness(g.path))
     return tuple(Event(t, found[t]) for t in sorted(found))
 
 
-def _smoothness(grasp: Grasp, end: float) -> int:
-    if isinstance(grasp.path, Move):
-        return {"minimum_jerk": 1, "cubic": 2, "linear": JUMP}[grasp.path.profile]
-    return JUMP
+def _smoothness(path: Path) -> int:
+    """Return the multiplicity of the knot where a path ends, or one of its moves."""
+    profile = "" if isinstance(path, Still) else path.profile
+    return {"minimum_jerk": 1, "cubic": 2}.get(profile, JUMP)
 
 
 def closed_grasps(scene: Scene, begin: float, end: float) -> list[Grasp]:

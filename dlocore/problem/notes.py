@@ -117,6 +117,7 @@ def _of_overshoots(scene: Scene) -> list[str]:
         if out[k] > max(OVERSHOOTS * float(np.linalg.norm(high - low)), OUT * scene.cable.length):
             notes.append(
                 f"the path of primitives[{i}] swings out of its waypoints by up to {in_mm(out[k])}, at "
-                f"{grasp.start + t[k]:.3g} s, as it goes smoothly through uneven times: more even ones keep it in"
+                f"{grasp.start + t[k]:.3g} s, as it goes smoothly through uneven times: more even ones "
+                "keep it in, or a profile that stops at each"
             )
     return notes

@@ -25,7 +25,7 @@ def trembles(problem: Problem, step: float) -> float:
     lasts = min(problem.horizon, swing(scene))
     for grasp in scene.grasps:
         path = grasp.path
-        if not isinstance(path, Waypoints):
+        if not isinstance(path, Waypoints) or path.profile != "spline":  # a program is no record
             continue
         end = min(grasp.release_time or problem.horizon, problem.horizon) - grasp.start
         times = cast(Floats, path.times)[1:-1]

@@ -108,7 +108,7 @@ def events_of(problem: Problem) -> list[float]:
         found |= {g.start, g.start + g.path.duration}
         found |= set() if g.release_time is None else {g.release_time}
         if isinstance(g.path, Waypoints):
-            found.add(g.start + float(np.asarray(g.path.times)[0]))
+            found |= {g.start + float(t) for t in (np.asarray(g.path.times)[0], *g.path.stops)}
     for load in problem.scene.loads:
         found |= set() if load.times is None else {float(t) for t in np.asarray(load.times)}
     inside = sorted(t for t in found if 1e-9 * horizon < t < (1.0 - 1e-9) * horizon)

@@ -6,7 +6,7 @@ its last a path stands still.
 
 import math
 from dataclasses import dataclass
-from typing import Literal, cast
+from typing import Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +15,7 @@ from dlocore.errors import SceneError, array, choice, number
 
 Floats = NDArray[np.float64]
 Profile = Literal["minimum_jerk", "linear", "cubic"]
+Through = Literal["spline", "minimum_jerk", "linear", "cubic"]
 
 # coefficients of x to x^5 of the position s(x) on 0 <= x <= 1
 _PROFILES: dict[str, tuple[float, ...]] = {
@@ -23,6 +24,7 @@ _PROFILES: dict[str, tuple[float, ...]] = {
     "cubic": (0.0, 3.0, -2.0, 0.0, 0.0),
 }
 MAX_WAYPOINTS = 100_000
+MAX_STOPS = 1000  # waypoints at which a gripper stops: each is an event
 DRAWN = 0.2  # [s]: in which a gripper that closes beside the cable draws it on to its waypoints
 STAYS = (1.0, *_PROFILES["linear"], 0.0, 0.0, 0.0)  # a straight move, or a turn about one axis, that is none
 
@@ -124,9 +126,12 @@ class Move:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Waypoints:
-    """Pass through `positions` (n, 3) [m] at `times` (n,) [s] along a C2 cubic spline.
+    """Pass through `positions` (n, 3) [m] at `times` (n,) [s] along a C2 cubic spline, or stop at each.
 
     It starts at rest; with `start` "moving" at the velocity that the first waypoints tell, as a recorded path does.
+    With a `profile` other than "spline" it goes straight from each waypoint to the next as a `Move` with that profile
+    does, and turns about one axis: a robot's program of moves, and pauses where two waypoints are the same. A "linear"
+    one goes on at once, with another velocity.
     `orientations` (n, 4), unit quaternions (w, x, y, z), turn the grasp by their rotation since the first. The first
     position must be that of the cable at the grasped point as the grasp closes, within GRASP_TOLERANCE of
     `dlocore.problem.brought`; the start shape is brought to it, and a cable in motion drawn to it within DRAWN.
@@ -136,12 +141,18 @@ class Waypoints:
     positions: ArrayLike
     orientations: ArrayLike | None = None
     start: Literal["rest", "moving"] = "rest"
+    profile: Through = "spline"
 
     def __post_init__(self) -> None:
         choice("start", self.start, ("rest", "moving"))
+        choice("profile", self.profile, get_args(Through))
+        smooth = self.profile == "spline"
+        if self.start == "moving" and not smooth:
+            raise SceneError("start", self.start, f'"rest" with profile "{self.profile}"')
         times = array("times", self.times, shape=(None,), unit="s")
-        if not 2 <= len(times) <= MAX_WAYPOINTS:
-            raise SceneError("times", f"{len(times)} times", f"2 to {MAX_WAYPOINTS} times")
+        most = MAX_WAYPOINTS if smooth else MAX_STOPS
+        if not 2 <= len(times) <= most:
+            raise SceneError("times", f"{len(times)} times", f'2 to {most} times with profile "{self.profile}"')
         if not (np.diff(times) > 1e-6).all():
             k = int(np.argmin(np.diff(times)))
             raise SceneError(f"times[{k + 1}]", times[k + 1], "times that rise by more than 1e-6 s")
@@ -153,10 +164,11 @@ class Waypoints:
             raise SceneError("positions", f"{len(positions)} positions", f"as many as times ({len(times)})")
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "positions", positions)
-        from scipy.interpolate import CubicSpline  # slow to import, as the rotations below
+        from scipy.interpolate import CubicSpline, make_interp_spline  # slow to import, as the rotations below
 
         boundary = "not-a-knot" if self.start == "moving" else ((1, np.zeros(3)), (2, np.zeros(3)))
-        object.__setattr__(self, "_spline", CubicSpline(times, positions, bc_type=boundary))  # type: ignore[arg-type]
+        spline = CubicSpline(times, positions, bc_type=boundary) if smooth else make_interp_spline(times, positions, 1)  # type: ignore[arg-type]
+        object.__setattr__(self, "_spline", spline)
         if self.orientations is not None:
             quaternions = array("orientations", self.orientations, shape=(None, 4))
             if len(quaternions) != len(times):
@@ -178,24 +190,35 @@ class Waypoints:
 
     @property
     def line(self) -> None:
-        """None: no straight move."""
+        """None: no one straight move."""
+
+    @property
+    def stops(self) -> Floats:
+        """Times (k,) [s] at which one move ends and the next begins; none along a spline."""
+        return np.zeros(0) if self.profile == "spline" else cast(Floats, self.times)[1:-1]
 
     @property
     def turn(self) -> tuple[float, ...] | None:
         """None where the grasp turns: about no one axis."""
         return STAYS if self.orientations is None else None
 
-    def _clip(self, t: Floats) -> Floats:
+    def _evenly(self, t: Floats) -> Floats:
+        """Return when it would be where it is at times t (k,) [s], were it as fast as the spline or chords are."""
         times = cast(Floats, self.times)
-        return np.clip(t, times[0], times[-1])
+        t = np.clip(t, times[0], times[-1])
+        if self.profile == "spline":
+            return t
+        k = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 2)
+        lasts = times[k + 1] - times[k]
+        return np.asarray(times[k] + lasts * _share(self.profile, (t - times[k]) / lasts))
 
     def at(self, t: Floats, start: Floats) -> Floats:
         """Positions at times `t` (k,) [s]; (k, 3) [m]. `start` is not used: waypoints are absolute."""
-        return self._spline(self._clip(t))  # type: ignore[attr-defined]
+        return self._spline(self._evenly(t))  # type: ignore[attr-defined]
 
     def rotation_at(self, t: Floats) -> Floats | None:
         """Rotations since the grasp began at times `t`; (k, 3, 3), or None where it never turns."""
-        return None if self.orientations is None else self._slerp(self._clip(t)).as_matrix()  # type: ignore[attr-defined]
+        return None if self.orientations is None else self._slerp(self._evenly(t)).as_matrix()  # type: ignore[attr-defined]
 
     def spin(self, t: Floats, tangents: Floats) -> Floats:
         """Turn about the `tangents` (k, 3) between each two of the times `t` (k,) [s]; (k - 1,) [rad].
@@ -205,7 +228,7 @@ class Waypoints:
         if self.orientations is None:
             return np.zeros(len(t) - 1)
         fine = np.unique(np.concatenate([t, cast(Floats, self.times)]))
-        turns = self._slerp(self._clip(fine))  # type: ignore[attr-defined]
+        turns = self._slerp(self._evenly(fine))  # type: ignore[attr-defined]
         steps = (turns[1:] * turns[:-1].inv()).as_rotvec()
         at = np.clip(np.searchsorted(t, fine[:-1], side="right") - 1, 0, len(t) - 2)
         inside = (fine[:-1] >= t[0]) & (fine[1:] <= t[-1])
@@ -229,7 +252,7 @@ def held_at(path: Path, t: Floats, start: Floats) -> Floats:
     return at + (1.0 - drawn)[:, None] * (start - cast(Floats, path.positions)[0])
 
 
-def _share(profile: Profile, x: Floats) -> Floats:
+def _share(profile: str, x: Floats) -> Floats:
     """Return the share of the way that is done by a profile at x (k,), 0 at its begin and 1 at its end."""
     x = np.clip(x, 0.0, 1.0)
     a, b, c, d, e = _PROFILES[profile]
