@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from app.viewer import programs
 from app.viewer.draft import Draft
+from app.viewer.programs import listed
 from dlocore import SplineSurface
 from dlocore.scene.paths import Profile
 from dlocore.scene.scene import Hold
@@ -41,7 +43,9 @@ def path_changed(draft: Draft, name: str, value: Any) -> Draft:
 def motion(draft: Draft) -> Motion:
     """Return what the gripper in hand does."""
     held = gripper(draft)
-    return "stays" if held is None else _KINDS[held["path"]["kind"]]
+    if held is None:
+        return "stays"
+    return "moves" if programs.is_program(held["path"]) else _KINDS[held["path"]["kind"]]
 
 
 def with_motion(draft: Draft, wanted: Motion) -> Draft:
@@ -103,7 +107,7 @@ def _in_reach(draft: Draft, k: int, u: float, start: StartCurve) -> Draft:
     if distance <= reach:
         return draft
     near = fixed + (target - fixed) * reach / distance
-    return draft.put(("primitives", k, "path", "displacement"), _rounded(near - begin))
+    return draft.put(("primitives", k, "path", "displacement"), listed(near - begin))
 
 
 def removed(draft: Draft) -> Draft:
@@ -147,18 +151,83 @@ def with_target(draft: Draft, begin: Floats, point: Floats) -> Draft:
         return draft
     if held["path"]["kind"] == "waypoints":
         last = len(held["path"]["positions"]) - 1
-        return draft.put(("primitives", draft.selected, "path", "positions", last), _rounded(point))
-    return path_changed(with_motion(draft, "moves"), "displacement", _rounded(np.asarray(point) - begin))
+        return draft.put(("primitives", draft.selected, "path", "positions", last), listed(point))
+    return path_changed(with_motion(draft, "moves"), "displacement", listed(np.asarray(point) - begin))
+
+
+def with_next_move(draft: Draft, begin: Floats) -> Draft:
+    """Let the gripper in hand go on with another move, from its target on; its path begins at `begin` (3,) [m]."""
+    held = gripper(draft)
+    if held is None or not programs.can_go_on(held["path"]):
+        return draft
+    return changed(draft, "path", programs.longer(held["path"], begin))
+
+
+def without_last_move(draft: Draft) -> Draft:
+    """Take the last of several moves of the gripper in hand away."""
+    held = gripper(draft)
+    if held is None or not programs.is_program(held["path"]):
+        return draft
+    return changed(draft, "path", programs.shorter(held["path"]))
+
+
+def moves(draft: Draft) -> int:
+    """Return how many moves the gripper in hand makes."""
+    held = gripper(draft)
+    path = {"kind": "still"} if held is None else held["path"]
+    return len(path["times"]) - 1 if programs.is_program(path) else int(path["kind"] == "move")
+
+
+def duration(draft: Draft) -> float:
+    """Return how long the last move of the gripper in hand takes [s]."""
+    held = gripper(draft)
+    path = {} if held is None else held["path"]
+    return programs.lasts(path) if moves(draft) > 1 else float(path.get("duration", DURATION))
+
+
+def with_duration(draft: Draft, value: float) -> Draft:
+    """Let the last move of the gripper in hand take `value` [s]."""
+    held = gripper(draft)
+    if held is not None and programs.is_program(held["path"]):
+        return changed(draft, "path", programs.lasting(held["path"], value))
+    return path_changed(draft, "duration", value)
+
+
+def have_programs(draft: Draft) -> bool:
+    """Say whether a gripper makes several moves."""
+    return any(programs.is_program(primitive["path"]) for primitive in draft.primitives)
+
+
+def carried(draft: Draft, start: StartCurve, before: Draft, start_before: StartCurve) -> Draft:
+    """Return an edited draft whose programs begin where what their grippers hold is now.
+
+    Args:
+        draft: the draft.
+        start: its start curve.
+        before: the draft before the edit.
+        start_before: its start curve.
+    """
+    for k, (now, then) in enumerate(zip(draft.primitives, before.primitives, strict=False)):
+        late = now.get("grasp_time") or then.get("grasp_time")
+        if late or not programs.is_program(now["path"]) or now["path"] != then["path"]:
+            continue
+        way = start(now["u"])[0] - start_before(then["u"])[0]
+        if np.any(way):
+            draft = draft.put(("primitives", k, "path"), programs.carried(now["path"], way))
+    return draft
 
 
 def can_turn(draft: Draft) -> bool:
     """Say whether the gripper in hand holds a direction that its path can turn."""
     held = gripper(draft)
-    return held is not None and held.get("hold", "point") != "point" and held["path"]["kind"] != "waypoints"
+    return held is not None and held.get("hold", "point") != "point" and motion(draft) != "follows waypoints"
 
 
 def turn(draft: Draft) -> Floats:
     """Return the rotation vector of the gripper in hand (3,) [rad]."""
+    held = gripper(draft)
+    if held is not None and programs.is_program(held["path"]):
+        return programs.turned(held["path"])
     return np.array(draft.get(("primitives", draft.selected, "path", "rotation"), (0.0, 0.0, 0.0)), dtype=float)
 
 
@@ -166,7 +235,10 @@ def with_turn(draft: Draft, rotation: Floats) -> Draft:
     """Turn the gripper in hand by a rotation vector (3,) [rad]."""
     if not can_turn(draft):
         return draft
-    value = None if float(np.linalg.norm(rotation)) < 1e-9 else _rounded(rotation)
+    path = draft.primitives[draft.selected]["path"]
+    if programs.is_program(path):
+        return changed(draft, "path", programs.turning(path, rotation))
+    value = None if float(np.linalg.norm(rotation)) < 1e-9 else listed(rotation)
     return path_changed(with_motion(draft, "moves"), "rotation", value)
 
 
@@ -186,8 +258,3 @@ def nearest_turn(wxyz: Floats, before: Floats) -> Floats:
     full = 2.0 * math.pi * np.arange(-8, 9)[:, None]
     choices = (angle + full) * axis
     return cast(Floats, choices[int(np.argmin(np.linalg.norm(choices - before, axis=1)))])
-
-
-def _rounded(vector: Floats) -> list[float]:
-    """Return numbers for the document, to the micrometre or microradian: finer digits mean nothing to a reader."""
-    return [round(float(x), 6) + 0.0 for x in vector]

@@ -104,7 +104,7 @@ class Session:
         client.scene.on_click()(self._clicked)  # type: ignore[arg-type]
         self._gizmo = Gizmo(client.scene, self._begin_drag, self._drag, self._end_drag)
         self._shape = ShapeEditor(client, self._shape_dragged)
-        self._edits = Edits(lambda: self._draft, self.edit)
+        self._edits = Edits(lambda: self._draft, self._edited)
         # controls are not told of "0.0" after "0", on the way to 0.02
         client._websock_connection.register_handler(GuiUpdateMessage, lambda *_: self._edits.go_on())
         self._panel = Panel(
@@ -231,7 +231,7 @@ class Session:
         elif found is not None:
             if grips.gripper(draft) is None:
                 draft = grips.added(draft, self._start)
-            self.edit(grips.changed(draft, "u", round(found.u, 4)))
+            self._edited(grips.changed(draft, "u", round(found.u, 4)))
 
     def _edit_shape(self, wanted: bool) -> None:
         """Show the beads of the start shape, or take them away."""
@@ -249,13 +249,13 @@ class Session:
 
     def _shape_dragged(self, points: np.ndarray, held: bool) -> None:
         self._dragging = held
-        self.edit(with_points(self._current(), points))
+        self._edited(with_points(self._current(), points))
         if not held:
             self._refine()
 
     def _straighten(self) -> None:
         draft = self._current()
-        self.edit(straightened(draft, self._start))
+        self._edited(straightened(draft, self._start))
 
     def _current(self) -> Draft:
         """Return the draft with what was typed until now."""
@@ -269,6 +269,14 @@ class Session:
         if draft.document != self._draft.document:
             self._history.changed(self._draft, self._loop.time())
         self._change(draft)
+
+    def _edited(self, draft: Draft) -> None:
+        """Take over a draft that was edited by hand: programs of moves go with what their grippers hold."""
+        if grips.have_programs(draft):
+            with contextlib.suppress(SceneError):  # of an impossible start
+                start = draft.start(self._shared.runs.motion)
+                draft = grips.carried(draft, start, self._draft, self._start)
+        self.edit(draft)
 
     def _step(self, step: Callable[[Draft], Draft]) -> None:
         """Go a step back or forward to a scene of before."""

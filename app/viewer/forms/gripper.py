@@ -17,6 +17,7 @@ from dlocore.shape.shape import StartCurve
 NONE = "no gripper"
 HOLDS = {"its place": "point", "place and direction": "tangent", "place, direction and twist": "clamp"}
 Notify = Callable[[str, str], object]
+ANOTHER, LAST = "Add", "Remove last"
 FARTHEST = 1000.0  # m, of a target's coordinates
 
 
@@ -49,6 +50,11 @@ class GripperForm(Form):
         self._turn = gui.add_vector3("Turn [°]", (0.0, 0.0, 0.0), step=5.0, hint="Rotation vector, in the world's axes")
         self._in_space = gui.add_checkbox("Drag in height too", initial_value=False)
         self._duration = gui.add_slider("Duration [s]", min=0.1, max=10.0, step=0.05, initial_value=1.0)
+        self._moves = gui.add_button_group(
+            "Moves",
+            (ANOTHER, LAST),
+            hint="One after another; target and duration are those of the last, a pause goes nowhere",
+        )
         with gui.add_folder("Timing", expand_by_default=False) as self._timing:
             self._profile = gui.add_dropdown("Speed profile", grips.PROFILES)
             self._closes = gui.add_number("Closes at [s]", 0.0, min=0.0, max=1e4, step=0.1)
@@ -67,7 +73,8 @@ class GripperForm(Form):
         self._bind(self._target, lambda d: grips.with_target(d, self._begin(d), np.array(self._target.value)))
         self._bind(self._turn, lambda d: grips.with_turn(d, np.radians(self._turn.value)))
         self._bind(self._in_space, lambda d: replace(d, in_space=self._in_space.value))
-        self._bind(self._duration, lambda d: grips.path_changed(d, "duration", float(self._duration.value)))
+        self._bind(self._duration, lambda d: grips.with_duration(d, float(self._duration.value)))
+        self._on_click(self._moves, self._with_moves)
         self._bind(self._profile, lambda d: grips.path_changed(d, "profile", self._profile.value))
         self._bind(self._closes, lambda d: grips.changed(d, "grasp_time", float(self._closes.value) or None))
         self._bind(self._opens, lambda d: grips.changed(d, "release_time", float(self._opens.value) or None))
@@ -82,6 +89,17 @@ class GripperForm(Form):
                 words = "The cable would be too short between it and the new gripper."
                 self._notify(f"Target of gripper {number} brought within reach", words)
         return edited
+
+    def _with_moves(self, draft: Draft) -> Draft:
+        """Add a move after the last one, or take that away; say where that is not possible."""
+        if self._moves.value == LAST:
+            if grips.moves(draft) < 2:
+                self._notify("One move is left", "To have none, choose that the gripper stays.")
+            return grips.without_last_move(draft)
+        longer = grips.with_next_move(draft, self._begin(draft))
+        if longer == draft:
+            self._notify("No move is added", "The last one turns by more than half a turn: make it two moves.")
+        return longer
 
     @staticmethod
     def _names(draft: Draft) -> tuple[str, ...]:
@@ -104,11 +122,13 @@ class GripperForm(Form):
         show_value(self._which, names[min(draft.selected, len(names) - 1)])
         held = grips.gripper(draft)
         path = {} if held is None else held["path"]
-        moves = path.get("kind") == "move"
+        moves = grips.moves(draft)
         for control in (self._u, self._hold, self._motion, self._closes, self._opens):
             show_if(control, held is not None)
-        show_if(self._duration, moves)
-        show_if(self._profile, moves)
+        show_if(self._duration, moves > 0)
+        show_if(self._profile, moves > 0)
+        show_if(self._moves, moves > 0)
+        self._moves.label = f"Moves: {moves}"
         show_if(self._target, path.get("kind") in ("move", "waypoints"))
         show_if(self._in_space, held is not None)
         show_if(self._turn, grips.can_turn(draft))
@@ -131,7 +151,7 @@ class GripperForm(Form):
         show_value(self._target, tuple(round(float(x), 4) for x in grips.target(draft, self._begin(draft))))
         show_value(self._turn, tuple(round(float(x), 2) for x in np.degrees(grips.turn(draft))))
         show_value(self._in_space, draft.in_space)
-        duration = float(held["path"].get("duration", 1.0))
+        duration = grips.duration(draft)
         if duration > self._duration.max:
             self._duration.max = duration
         show_value(self._duration, duration)
