@@ -1,5 +1,6 @@
 """The time spline of a march: fitted to its states, with more knots where the cable strikes something."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -57,11 +58,15 @@ def largest(times: Floats, off: Floats, swing: float) -> float:
         off: by how much the spline misses each (k,) [m].
         swing: about how long the cable needs to swing once [s].
     """
-    window = np.minimum((times - times[0]) / swing, max(np.ceil((times[-1] - times[0]) / swing) - 1.0, 0.0)).astype(int)
+    at_all = float(off.max()) / MISSED_COUNTS
+    last = math.ceil((times[-1] - times[0]) / swing) - 1
+    if last <= 0:  # one swing, as most motions: without what it takes to tell several
+        return max(float(np.sort(off)[int(_MOST_OF_THE_TIME * (len(off) - 1))]), at_all)
+    window = np.minimum((times - times[0]) / swing, last).astype(int)
     begins = np.flatnonzero(np.diff(window, prepend=-1))
     counts = np.diff(begins, append=len(off))
     ordered = off[np.lexsort((off, window))]
-    return float(max(ordered[begins + (_MOST_OF_THE_TIME * (counts - 1)).astype(int)].max(), off.max() / MISSED_COUNTS))
+    return max(float(ordered[begins + (_MOST_OF_THE_TIME * (counts - 1)).astype(int)].max()), at_all)
 
 
 def evened(motion: March, knots_t: Floats, events: Floats, swing: float) -> Floats:
