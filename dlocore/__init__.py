@@ -105,7 +105,9 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(name)
     import importlib
 
-    return getattr(importlib.import_module(f"dlocore.{homes[name]}"), name)
+    found = getattr(importlib.import_module(f"dlocore.{homes[name]}"), name)
+    globals()[name] = found  # so that it is asked for once
+    return found
 
 
 def __dir__() -> list[str]:
