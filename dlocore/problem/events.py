@@ -46,12 +46,12 @@ def moments(scene: Scene, in_a_swing: int) -> int:
 
 
 def find_events(scene: Scene) -> tuple[Event, ...]:
-    """Return the events inside the horizon of a scene, by time."""
+    """Return the events inside the horizon of a scene, by time; those no farther apart than a `moment` are one."""
     found: dict[float, int] = {}
-    latest = cast(float, scene.horizon) * (1 - 1e-9)
+    horizon, nearest = cast(float, scene.horizon), scene.moment
 
     def add(time: float, multiplicity: int) -> None:
-        if 0.0 < time < latest:
+        if nearest < time < horizon - nearest:
             found[time] = max(found.get(time, 0), multiplicity)
 
     for g in scene.grasps:
@@ -68,7 +68,13 @@ def find_events(scene: Scene) -> tuple[Event, ...]:
             for time in g.start + g.path.stops:
                 if time < released:
                     add(float(time), _smoothness(g.path))
-    return tuple(Event(t, found[t]) for t in sorted(found))
+    merged: list[Event] = []
+    for time in sorted(found):
+        if merged and time - merged[-1].time <= nearest:
+            merged[-1] = Event(merged[-1].time, max(merged[-1].multiplicity, found[time]))
+        else:
+            merged.append(Event(time, found[time]))
+    return tuple(merged)
 
 
 def _smoothness(path: Path) -> int:

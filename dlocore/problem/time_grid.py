@@ -12,6 +12,9 @@ from dlocore.scene.paths import Waypoints
 
 Floats = NDArray[np.float64]
 
+_LEAST = 8  # steps of a stretch
+_SHORTER = 64.0  # times, at most, where that makes more of them
+
 
 def time_knots(problem: Problem, n_t: int) -> Floats | None:
     """Return the time knots (n_t + 4,) [s] with a knot at every event, or None where n_t is too small for them.
@@ -59,10 +62,15 @@ def marks_of(problem: Problem) -> list[float]:
 
 
 def step_counts(marks: list[float], steps: int) -> list[int]:
-    """Return the time steps of each stretch between the marks, about `steps` in all, more where marks lie close."""
+    """Return the time steps of each stretch between the marks, about `steps` in all, more where marks lie close.
+
+    In a short stretch steps are up to `_SHORTER` times shorter than others, or it has `_LEAST`: still shorter ones
+    would leave of accelerations, and of forces with them, nothing but noise.
+    """
     if len(marks) == 2:
         return [steps]
-    return [max(8, steps // (2 * len(marks)), round(steps * (b - a) / marks[-1])) for a, b in pairwise(marks)]
+    shares = [steps * (b - a) / marks[-1] for a, b in pairwise(marks)]
+    return [max(_LEAST, min(steps // (2 * len(marks)), int(_SHORTER * share)), round(share)) for share in shares]
 
 
 def step_times(marks: list[float], counts: list[int]) -> Floats:

@@ -3,6 +3,7 @@
 Frozen data in SI units, world frame right-handed with z up. Everything is validated once, here.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, cast
@@ -445,6 +446,11 @@ class Scene:
                 raise SceneError(field, f"a way of {far:g} m", f"at most {most:g} [m] for this cable", MILLIMETRES)
 
     @property
+    def moment(self) -> float:
+        """What is no farther apart in time is at once [s]: the same time comes of two sums but for rounding."""
+        return AT_ONCE * min(cast(float, self.horizon), 2.0 * math.sqrt(self.cable.length))
+
+    @property
     def weight(self) -> float:
         """What the cable weighs [N]."""
         gravity = float(np.linalg.norm(cast(Floats, self.environment.gravity)))
@@ -475,7 +481,8 @@ class Scene:
             for i, a in enumerate(self.grasps[:j]):
                 a_end = np.inf if a.release_time is None else a.release_time
                 b_end = np.inf if b.release_time is None else b.release_time
-                if a.start < b_end and b.start < a_end and abs(a.u - b.u) < MIN_GRASP_DISTANCE * self.cable.length:
+                together = min(a_end, b_end) - max(a.start, b.start) > self.moment
+                if together and abs(a.u - b.u) < MIN_GRASP_DISTANCE * self.cable.length:
                     nearest = MIN_GRASP_DISTANCE * self.cable.length
                     reason = f"primitives[{i}] holds it at {a.u:g} m at the same time"
                     raise SceneError(f"primitives[{j}].u", b.u, f"at least {nearest:g} m from it", reason)
@@ -492,4 +499,5 @@ def _farthest(path: Path) -> tuple[str, float]:
 
 
 FARTHEST, FAR = 100.0, 50.0  # of the length, and [m]: a gripper that goes farther than both has another unit
+AT_ONCE = 1e-5  # of the horizon, or of about how long a cable of that length needs to swing once
 MIN_GRASP_DISTANCE = 1e-4  # of the length, between two grasps that hold at the same time

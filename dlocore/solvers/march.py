@@ -250,7 +250,7 @@ class _Walk:
         self._lag = 0.0 if at_ends else rho / (1.0 + rho)  # of the times at which steps balance forces, in steps
         self._laws = problem.laws
         self._mass = grid.tables.mass * problem.mass_density()
-        self._tolerance = tolerance_of(problem, grid, problem.horizon / len(times))
+        self._step = problem.horizon / len(times)
         self._kept = Kept(grid.start, counts, _frames(problem), _columns(problem, grid))
         self._v = grid.velocity.copy()
         self._beginning: tuple[Entry, float]  # of the motion, and its time step [s]
@@ -388,9 +388,10 @@ class _Walk:
         """
         begins, ends = self._times[[stretch.first, stretch.last]]
         applied = applied_in_steps(self._problem, self._grid, times, begins, ends)
+        tolerance = tolerance_of(self._problem, self._grid, min(self._step, stretch.h))  # between events that are close
         self._info[DIVIDED_FROM] -= base
         march_steps(
-            self._problem.axes, start, stop, begin, jumps, h, rho, self._tolerance, states, stretch.v, stretch.a,
+            self._problem.axes, start, stop, begin, jumps, h, rho, tolerance, states, stretch.v, stretch.a,
             stretch.G, self._problem.mass_density(), self._problem.drag_coefficient(), self._grid.tables, *self._laws,
             self._history, applied, stretch.entry.held.elimination, offsets, reactions, log, self._info,
         )  # fmt: skip
