@@ -21,6 +21,7 @@ from dlocore.levels.level import (
     turned,
 )
 from dlocore.levels.progress import record_level
+from dlocore.levels.review import neglected
 from dlocore.levels.whole_march import Outcome, is_folded, is_uneven, march_level, march_status
 from dlocore.problem.problem import Problem
 from dlocore.scene.scene import AUTO_TARGET, Quality
@@ -365,10 +366,15 @@ class _Climb:
     def _agreed(self, level: Level) -> str:
         return f"Two grids agree to {in_mm(level.change)}; {self._left_over()}."
 
+    @property
+    def _in_all(self) -> float:
+        """The estimated error of the best one, with the effects that are left out [m]."""
+        return self.estimate + (0.0 if self.best is None else neglected(self.best))
+
     def _left_over(self) -> str:
         """Return the estimated error and the target, in words."""
         finite = np.isfinite(self.estimate)
-        known = f"the estimated error is {in_mm(self.estimate, 3)}" if finite else "its error is not known"
+        known = f"the estimated error is {in_mm(self._in_all, 3)}" if finite else "its error is not known"
         return f"{known}, target {in_mm(self.target, 3)}"
 
     def _unfolded(self, level: Level, size: Size) -> Outcome | None:
@@ -435,7 +441,7 @@ class _Climb:
             return self._within_budget(best)
         status, message = march_status(self.problem, best)
         left = self._left_over()
-        if status == "converged" and self.estimate <= self.enough:
+        if status == "converged" and self._in_all <= self.enough:
             if not self.doubts.start:
                 self._look(best)
             outcome = self._agreeing(best)

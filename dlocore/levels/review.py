@@ -43,6 +43,7 @@ Floats = NDArray[np.float64]
 
 CLOSE = 0.01  # of the length: a cable that comes this near to an obstacle left out calls for it
 MATTERS = 0.001  # of the length: what a neglected effect may move the cable before it is worth a word
+_SHARE = 0.2  # of a target that was asked for: what the inertia that is left out may move it
 _TURNS = 0.1  # of that, and of the target: what the sections' spin may move it, which a motion that snaps enlarges
 STRAINED = 0.05  # axial strain: few cables bear more
 RUBBER = 0.01  # axial strain: few cables bear more without harm, of one whose axial stiffness is assumed
@@ -61,7 +62,8 @@ def called_for(level: Level, fine: bool = True) -> dict[str, str]:
     Where the grid is not `fine` it is left open what only such a grid tells.
     """
     problem, found = level.problem, {}
-    switch = problem.scene.effects.get
+    switch, length = problem.scene.effects.get, problem.scene.cable.length
+    asked = problem.scene.quality.target_error or np.inf
     if not problem.choices["plasticity"].active and switch("plasticity", "auto") == "auto":
         found.update(_yields(level))
     if switch("obstacles", "auto") == "auto":
@@ -71,13 +73,12 @@ def called_for(level: Level, fine: bool = True) -> dict[str, str]:
         if level.motion.stopped == "step":
             reached = level.motion.times[level.motion.reached]
             found["inertia"] = f"without it the cable has no equilibrium to go on to at {reached:.3g} s"
-        elif moved > MATTERS * problem.scene.cable.length:
-            most = min(moved, problem.scene.cable.length)  # where the cable is about to give way it tells no distance
+        elif moved > min(MATTERS * length, _SHARE * asked):
+            most = min(moved, length)  # where the cable is about to give way it tells no distance
             found["inertia"] = f"without it a first solve is {in_mm(most)} off"
     if switch("twist", "auto") == "auto":
         moved = _spun(level)
-        allowed = min(MATTERS * problem.scene.cable.length, problem.scene.quality.target_error or np.inf)
-        if moved > _TURNS * allowed:
+        if moved > _TURNS * min(MATTERS * length, asked):
             found["twist"] = (
                 f"sections that turn at sharp bends resist, which moves the cable by {in_mm(moved)} or more"
             )

@@ -21,6 +21,8 @@ from dlocore.spline import DEGREE
 
 Floats = NDArray[np.float64]
 
+_SAME = 1e-9  # of the largest singular value: what two sides of a place differ by where they are one
+
 
 def balanced(scene: Scene, grid: Grid, u: Floats) -> Floats:
     """Return the matrix (k, p) that makes the axial strain at u (k,) [m] of that at the axial points (p,) of a grid."""
@@ -43,7 +45,9 @@ def balanced(scene: Scene, grid: Grid, u: Floats) -> Floats:
     own, others = found[:, :count], found[:, count:]
     begins, ends = np.unique(knots)[:-1], np.unique(knots)[1:]
     curved = (ends - begins)[:, None] ** 2 * _basis(knots, 0.5 * (begins + ends), 2)
-    forces = -np.linalg.pinv(curved @ others) @ (curved @ own)
+    forces = -np.linalg.pinv(curved @ others, rcond=_SAME) @ (
+        curved @ own
+    )  # both sides may be the same but for rounding
     jumps = np.array([np.heaviside(u - g, 0.5) for g in inside]).reshape(-1, len(u)).T
     return _basis(knots, u) @ (own + others @ forces) + jumps @ forces[len(sides) :]
 

@@ -51,3 +51,12 @@ def test_an_unknown_error_has_no_parts():
     accuracy = predict(replace(SCENE, quality=Quality(n_u=9, n_t=13, method="spacetime", estimate=False))).accuracy
     assert accuracy.error_estimate is None
     assert accuracy.error_parts == {}
+
+
+@pytest.mark.parametrize(("duration", "target"), [(1000.0, 1e-5), (600.0, 5e-5), (400.0, 1e-3), (1000.0, 1e-3)])
+def test_a_target_is_met_with_the_inertia_that_is_left_out_or_it_is_not_left_out(duration, target):
+    way = Move(displacement=(0.0, 0.3, 0.0), duration=duration)
+    found = predict(replace(SCENE, grasps=(Grasp(u=0.0, path=way),), quality=Quality(target_error=target)))
+    assert found.status == "converged"
+    assert found.accuracy.error_estimate <= target
+    assert f"the estimated error is {found.accuracy.error_estimate * 1e3:.3g} mm" in found.message

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dlocore import Cable, Environment, Grasp, Load, Move, Prediction, Quality, Scene, Straight, predict
+from dlocore import Cable, Environment, Grasp, Load, Move, Points, Prediction, Quality, Scene, Straight, predict
 from tests.solver.scenes import Floats, G
 
 CABLE = Cable.preset("black-electric-cable")  # of 1 m and 1 kg
@@ -94,3 +94,26 @@ def test_the_strain_is_read_linearly_between_places_and_times() -> None:
     assert found.shape == (2, len(stretch.u) - 1)
     row = stretch.at(t)
     np.testing.assert_allclose(found[1], 0.5 * (row[1:] + row[:-1]), rtol=1e-12)
+
+
+@pytest.mark.parametrize("n_u", [19, 34, 41, 62, 90, 129])
+@pytest.mark.parametrize("inside", [False, True])
+def test_beside_a_held_direction_the_tension_is_what_its_gripper_pulls_with(n_u: int, inside: bool) -> None:
+    """On fine grids what the two sides of an end differ by, which is rounding, had been taken for a force."""
+    s = np.linspace(0.0, 1.0, 81)
+    bow = np.stack([0.8 * s, 0.0 * s, -0.25 * np.sin(np.pi * s)], axis=1)
+    bow /= np.linalg.norm(np.diff(bow, axis=0), axis=1).sum()
+    grasps = [Grasp(u=0.0), Grasp(u=1.0, hold="tangent"), *([Grasp(u=0.3, hold="tangent")] if inside else [])]
+    found = predict(
+        Scene(
+            cable=Cable.preset("paper"), shape=Points(points=bow, settle=True), grasps=grasps, horizon=0.05,
+            quality=Quality(n_u=n_u, n_t=13, keep_grid=True),
+        )
+    )  # fmt: skip
+    along = found.surface([1.0], [0.05], du=1)[0, 0, :3]
+    pulls = float(found.grasps[1].reaction[-1] @ along / np.linalg.norm(along))
+    tells = found.scene.cable.axial_stiffness * found.stretch.along([1.0], [0.05])[0, 0]  # type: ignore[operator]
+    assert tells == pytest.approx(pulls, rel=0.012)  # 0.003 of 0.295 N on 19 control points, less on more
+    if inside:
+        middle = found.scene.cable.axial_stiffness * found.stretch.along([0.28, 0.3, 0.32], [0.05])[0]
+        assert middle[1] == pytest.approx(0.5 * (middle[0] + middle[2]), abs=0.01)
