@@ -34,6 +34,12 @@ _UNTWISTED = (
     "Replayed without twist, which damping between two clamps makes too stiff if it is strong: look at what comes of "
     "torsional_stiffness as one more parameter."
 )
+_UNTWISTED_FREE = (
+    "Replayed without twist: of a cable in space whose internal damping is strong, as of this one, EI may be found "
+    "far too large, and its interval leaves that out. Only a recording in which grippers hold it as clamps tells."
+)
+_STRONG = 0.08  # [s] bending damping over EI, from which twist matters to a cable that may turn at its ends
+_FLAT = 0.02  # of the extent of markers across what they lie in: a motion in a plane twists nothing
 
 
 @interruptible
@@ -95,7 +101,18 @@ def identify(
     told = _assumed(recordings, given, names, cable is None and start is None, environment is None and start is None)
     if clamps > 1 and "bending_damping" in names and not candidate.twist:
         told.append(_UNTWISTED)
+    elif _twists(recordings, found.cable) and not candidate.twist:
+        told.append(_UNTWISTED_FREE)
     return replace(found, message=" ".join([found.message, *told]))
+
+
+def _twists(recordings: Sequence[Recording], cable: Cable) -> bool:
+    """Tell whether a cable is damped so strongly, and moves so far out of a plane, that its twist may matter."""
+    lasts = cable.bending_damping / cast(float, cable.bending_stiffness)
+    moving = [cast(Floats, r.markers).reshape(-1, 3) for r in recordings if not r.static]
+    seen = [points[np.isfinite(points).all(axis=1)] for points in moving]
+    extents = [np.linalg.svd(points - points.mean(axis=0), compute_uv=False) for points in seen if len(points) > 2]
+    return lasts > _STRONG and any(across > _FLAT * along for along, _, across in extents)
 
 
 def _check_clamps(recordings: Sequence[Recording], chosen: Sequence[Parameter], candidate: Candidate) -> None:

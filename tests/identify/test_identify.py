@@ -450,3 +450,13 @@ def test_what_is_given_is_not_told_of_as_assumed(given: dict[str, Any], kept: st
     message = identify([still()], names=("drag",), **given).message
     assert message.endswith(kept)
     assert ("Neither given nor sought" in message) is bool(kept)
+
+
+@pytest.mark.parametrize(("damping", "told"), [(3e-4, False), (1e-3, True)])
+def test_strong_damping_of_a_cable_that_may_turn_at_its_ends_is_told_of(damping: float, told: bool) -> None:
+    """It twists as it swings in space, which the replays leave out."""
+    recording = swung(1.0, 0.05, 1e-2, noise=5e-4)
+    assert not any(h.towards is not None for h in recording.holds)
+    cable = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=4.905e-3, bending_damping=damping)
+    found = identify([recording], cable, Environment(drag=0.0125), names=("drag",), iterations=1)
+    assert ("EI may be found far too large" in found.message) is told
