@@ -16,6 +16,7 @@ _MOST_LEFT = 1.5  # times the last change: what is believed of changes that hard
 _MOST_FALL = 20.0  # times less than the refinement before, at most, is believed of one: more is chance
 # ... where strong damping begins with it, whose errors are about those of half as many steps without: 6 in theory
 _MOST_FALL_DAMPED = 8.0
+_MOST_FALL_YIELDING = 4.0  # ... where the cable yields: it is bent for good within a span, which coarse grids lack
 MORE = 1.1  # times as many steps, or control points: fewer are as many
 _STALE = 4.0  # times what a refinement in one direction moved the surface by: once those in the other moved it by more,
 # what the first has left is measured again
@@ -64,12 +65,13 @@ def weighed(level: Level, before: Level, last: Change | None, first: bool = Fals
     """
     moved_before = np.inf if last is None else last.moved
     more = level.motion.steps / before.motion.steps
+    yields = level.problem.choices["plasticity"].active
     if more <= MORE:
-        return Change(level.change, moved_before, _LEFT_ALONG)
+        return Change(level.change, moved_before, _LEFT_ALONG, _MOST_FALL_YIELDING if yields else _MOST_FALL)
     # the errors of the steps are of second order: what twice as many take away is three times what they leave
     counts = max(1.0, 3.0 / (more**2 - 1.0))
     damped, was_damped = (x.motion.rho == STRONGLY_DAMPED for x in (level, before))
-    fall = _MOST_FALL_DAMPED if damped and not was_damped else _MOST_FALL
+    fall = _MOST_FALL_YIELDING if yields else _MOST_FALL_DAMPED if damped and not was_damped else _MOST_FALL
     left = _MOST_LEFT if first else _LEFT_KINKED
     return Change(counts * level.change, moved_before, left if level.motion.kinked else _LEFT, fall)
 
