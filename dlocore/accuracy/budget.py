@@ -10,7 +10,6 @@ from dlocore.problem.problem import Problem
 from dlocore.solvers.march import MOST_FRAMES
 from dlocore.solvers.monitor import Monitor
 
-GROWTH = 3.0  # of the time from one grid to the next, where nothing is known of this machine
 _KEPT = 0.8  # of the budget: what the model may be sure of, as it knows nothing of the motion
 MOST_WORK = 3.2e7  # control points times steps of one march in the plane
 _COSTS = {2: 1.0, 3: 2.0, 4: 2.9}  # times the time, by coordinates: in space, and with twist, 1.4 times that
@@ -18,6 +17,7 @@ _FRAMES = 3  # a control point in time, at least, that are kept of a motion with
 PATIENT = 64.0  # times as much, of a march that will end before a deadline or within a time budget, ...
 MOST_STEPS = 1_000_000  # ... and has no more steps: what holds the cable is kept of all of them, see `Kept`
 _DEAR = 0.25  # of the time left: a march that takes more is not done only to tell what steps err by
+_MAY_BE = 2.0  # times as long as is left: a march that is expected to take that may be done by then
 _SLOWER = 1.3  # times as long as its work tells, a march may take
 CONTACT_COSTS = 2  # times as much work counts with contact, which takes more of the time of a step
 AUTO_SHARE = 1 / 32  # of it for who asked for no target, once the estimated error is what is enough
@@ -68,9 +68,13 @@ class Means:
         points = _MOST_POINTS * (_PATIENT_POINTS if in_time and not content else 1)
         return size if fits and size.n_u <= points and work <= most else None
 
-    def next_fits(self, problem: Problem, size: Size, finer: Size, spent: float) -> bool:
-        """Tell whether the next grid is done within the budget, if one of `size` took a time `spent` [s]."""
-        return not growth(problem, self.cost, size, finer) * spent > self.budget - self.monitor.elapsed()
+    def next_fits(self, problem: Problem, size: Size, finer: Size, spent: float, checked: bool) -> bool:
+        """Tell whether the next grid is done within the budget, if one of `size` took a time `spent` [s].
+
+        One that was not `checked` by another yet is no answer: the next one is tried if it may be done.
+        """
+        left = self.budget - self.monitor.elapsed()
+        return not growth(problem, self.cost, size, finer) * spent > (left if checked else _MAY_BE * left)
 
 
 def _work(problem: Problem, size: Size) -> float:
@@ -99,7 +103,7 @@ def first_level(problem: Problem, cost: Cost | None, budget: float) -> int:
 
 
 def growth(problem: Problem, cost: Cost | None, size: Size, next_size: Size) -> float:
-    """Return how many times as long a march on the next grid will take as on this one."""
+    """Return how many times as long a march on the next grid will take as on this one; by its work, if that is all."""
     if cost is None or problem.nc not in cost.rates:
-        return GROWTH
+        return _work(problem, next_size) / _work(problem, size)
     return march_time(problem, cost, next_size) / march_time(problem, cost, size)

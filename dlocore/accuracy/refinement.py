@@ -124,7 +124,7 @@ class _Climb:
         size: Size | None = stretched(self.problem, self.number)
         shown: Level | None = None  # the best one on grids whose start rests, where on finer ones it does not
         while size is not None:
-            began = self.monitor.elapsed()
+            began, marches = self.monitor.elapsed(), len(self.monitor.iterations)
             try:
                 level = self._march(size)
             except TimeIsUp as up:
@@ -145,7 +145,8 @@ class _Climb:
                 self._forget()
                 size = stretched(self.problem, self.number)
                 continue
-            spent = self.monitor.elapsed() - began
+            others = self.monitor.iterations[marches:]  # of the grid, which called for another effect
+            spent = self.monitor.elapsed() - (others[-1].wall_time if others else began)
             self.means.took(self.problem, size, spent)
             if self.best is not None:
                 more = self._after_failure(level, self.best, size)
@@ -190,7 +191,8 @@ class _Climb:
                     self._look(level)
                     # what contact leaves unsure has to be made up for by the grid
                     finer = self._next(level, size, unfolds) if self.doubts.contact and not self.doubts.start else None
-            if finer is not None and not self.means.next_fits(self.problem, size, finer, spent):
+            checked = bool(np.isfinite(level.change))
+            if finer is not None and not self.means.next_fits(self.problem, size, finer, spent, checked):
                 return self._within_budget(level)
             size = finer
         return self._ended()

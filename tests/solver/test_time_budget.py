@@ -9,7 +9,7 @@ from dlocore import Quality, predict
 from dlocore.accuracy import refinement
 from dlocore.accuracy.budget import Means
 from dlocore.levels import whole_march
-from dlocore.levels.level import Level, run_level
+from dlocore.levels.level import Level, run_level, stretched
 from dlocore.levels.whole_march import march_level
 from dlocore.problem.problem import pose
 from dlocore.solvers.monitor import Monitor, TimeIsUp
@@ -102,3 +102,34 @@ def test_within_a_time_budget_an_error_of_more_than_a_hundredth_is_no_success():
     assert sum(outcome.errors.values()) > climb.enough
     assert outcome.status == "time_limit"
     assert "Its estimated error is more than 1% of the length: allow more time." in outcome.message
+
+
+def test_a_march_that_called_for_another_effect_does_not_count_in_what_the_next_grid_takes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    spent: list[float] = []
+
+    def fits(means: Means, problem: object, size: object, finer: object, took: float, checked: bool) -> bool:
+        spent.append(took)
+        assert checked is (len(spent) > 1)
+        return True
+
+    clock = iter(range(100_000))
+    monkeypatch.setattr(Means, "next_fits", fits)
+    monkeypatch.setattr(Monitor, "elapsed", lambda monitor: 1e-3 * next(clock))  # each look at the clock takes 1 ms
+    scene = replace(paper_scene(0.25), quality=Quality(time_budget=600.0))
+    yielding = replace(scene, cable=replace(scene.cable, yield_strain=1e-3, memory_rate=100.0))
+    predict(scene)
+    plain = spent.copy()
+    spent.clear()
+    found = predict(yielding)
+    assert "calls for plasticity" in found.iterations[0].note
+    assert spent[0] < 1.5 * plain[0]  # and not two marches
+
+
+def test_a_grid_that_no_other_has_checked_is_followed_by_one_that_may_be_done_in_time() -> None:
+    problem = pose(paper_scene(0.25))
+    size, finer = stretched(problem, 0), stretched(problem, 1)
+    for budget, checked, fits in ((2.0, True, False), (2.0, False, True), (1.0, False, False), (4.0, True, True)):
+        means = Means(Monitor(None, None, None), None, budget)
+        assert means.next_fits(problem, size, finer, 1.0, checked) is fits

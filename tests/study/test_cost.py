@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from dlocore import Quality, Scene, predict
-from dlocore.accuracy.budget import GROWTH, first_level, growth, march_time
+from dlocore.accuracy.budget import first_level, growth, march_time
 from dlocore.accuracy.cost import Cost, Rates, Sample, exponent, fitted_rates, pareto_front
-from dlocore.levels.level import LEVELS, given_steps, stretched
+from dlocore.levels.level import LEVELS, Size, given_steps, stretched
 from dlocore.problem.problem import pose
 from dlocore.study.scenes import hanging, paper_case
 
@@ -84,7 +84,8 @@ def test_effects_that_cost_time_begin_coarser() -> None:
 def test_without_a_calibration_a_budget_begins_with_the_coarsest_grid() -> None:
     problem = pose(paper_case(0.25))
     assert first_level(problem, None, 10.0) == 0
-    assert growth(problem, None, stretched(problem, 0), stretched(problem, 1)) == GROWTH
+    assert growth(problem, None, stretched(problem, 0), stretched(problem, 1)) == pytest.approx(2 * 13 / 9)
+    assert growth(problem, None, Size(20, 30, 160), Size(30, 30, 160)) == 1.5
     assert first_level(pose(hanging()), Cost(rates={2: PLANE}), 10.0) == 0  # calibrated in the plane only
     assert growth(problem, COST, stretched(problem, 0), stretched(problem, 4)) > 2.0
 
