@@ -414,6 +414,7 @@ class Scene:
         instance("environment", self.environment, Environment, "an Environment")
         instance("effects", self.effects, Mapping, 'a dict of "on", "off" or "auto" by effect name')
         instance("quality", self.quality, Quality, "a Quality")
+        object.__setattr__(self, "effects", dict(self.effects))  # the caller's may change
         object.__setattr__(self, "grasps", instances("grasps", self.grasps, Grasp, "Grasp"))
         object.__setattr__(self, "loads", instances("loads", self.loads, Load, "Load"))
         length = self.cable.length

@@ -1,7 +1,9 @@
 # ruff: noqa: E501
 """Bad scenes: an error that names the field, in Python."""
 
+import pickle
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -241,6 +243,14 @@ def test_grasps_loads_and_obstacles_may_come_from_any_iterable():
     balls = (Sphere(center=(0.0, 9.0, i), radius=0.1) for i in range(2))
     found = scene(grasps=iter([SIDE]), loads=iter([]), environment=Environment(obstacles=balls))  # type: ignore[arg-type]
     assert (found.grasps, found.loads, len(found.environment.obstacles)) == ((SIDE,), (), 2)
+
+
+def test_a_scene_keeps_its_effects_whatever_becomes_of_what_was_given():
+    given: dict[str, Any] = {"twist": "off"}
+    kept = scene(effects=given)
+    given["twist"] = "sideways"
+    for same in (kept, pickle.loads(pickle.dumps(kept)), replace(kept, horizon=1.0)):
+        assert same.effects == {"twist": "off"}
 
 
 def test_two_grasps_pulled_exactly_taut_are_no_bad_scene():
