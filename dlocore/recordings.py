@@ -211,7 +211,14 @@ def load_recording(path: str | Path) -> Recording:
 
 
 def save_recording(recording: Recording, path: str | Path) -> None:
-    """Write a recording as one `.npz` that `load_recording` reads."""
+    """Write a recording as one `.npz` that `load_recording` reads.
+
+    Raises:
+        SceneError: `path` has another ending.
+        OSError: it can't be written.
+    """
+    if Path(path).suffix != ".npz":
+        raise SceneError("recording", Path(path).name, "a .npz")
     np.savez_compressed(
         path,
         times=cast(Floats, recording.times),

@@ -40,12 +40,18 @@ def spline_at(knots: Floats, control_points: Floats, x: ArrayLike, derivative: i
 
 
 def in_range(name: str, x: ArrayLike, end: float, unit: str) -> Floats:
-    """Return `x` as an array (k,), or raise SceneError unless all of it is within 0 to `end`, but for rounding."""
+    """Return `x`, a number or a row of them, as an array (k,), all within 0 to `end`, but for rounding.
+
+    Raises:
+        SceneError: it is not.
+    """
     allowed, margin = f"finite numbers at least 0 at most {end:g} [{unit}]", _ROUNDING * end
     try:
         x = np.atleast_1d(np.asarray(x, dtype=float))
     except (TypeError, ValueError):
         raise SceneError(name, repr(x), allowed) from None
+    if x.ndim > 1:
+        raise SceneError(name, f"shape {x.shape}", f"one row of {allowed}")
     for k in (x.argmin(), x.argmax()) if x.size else ():  # of what is not a number, where there is any
         if not -margin <= x.item(k) <= end + margin:
             raise SceneError(name, x.item(k), allowed)
@@ -150,4 +156,4 @@ class SplineSurface:
         u, breaks = in_range("u", u, self.length, "m"), np.unique(self.knots_u)
         middles = 0.5 * (breaks[:-1] + breaks[1:])
         strain = np.linalg.norm(self(middles, t, du=1)[..., :3], axis=-1) - 1.0
-        return np.array([np.interp(u, middles, row) for row in strain])
+        return np.array([np.interp(u, middles, row) for row in strain]).reshape(len(strain), len(u))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.compiling.interrupts import interruptible
+from dlocore.errors import SceneError
 from dlocore.pickling import state_with
 from dlocore.scene.scene import Material
 from dlocore.spline import SplineSurface, in_range
@@ -205,16 +206,19 @@ class StretchMotion:
             SceneError: a place is off the cable, or a time outside the predicted time.
         """
         u, t = in_range("u", u, float(self.u[-1]), "m"), in_range("t", t, float(self.times[-1]), "s")
-        return np.array([np.interp(u, self.u, self.at(s)) for s in t])
+        return np.array([np.interp(u, self.u, self.at(s)) for s in t]).reshape(len(t), len(u))
 
 
 def _bracket(times: Floats, t: float) -> tuple[int, float]:
     """Return which of the times (m,) [s] is the last before `t`, and the share of the way from it to the next.
 
     Raises:
-        SceneError: `t` is outside them.
+        SceneError: `t` is outside them, or no single time.
     """
-    t = float(in_range("t", t, float(times[-1]), "s")[0])
+    given = in_range("t", t, float(times[-1]), "s")
+    if given.size != 1:
+        raise SceneError("t", f"{given.size} times", "one")
+    t = float(given[0])
     k = int(np.clip(np.searchsorted(times, t) - 1, 0, len(times) - 2))
     return k, float(np.clip((t - times[k]) / (times[k + 1] - times[k]), 0.0, 1.0))
 

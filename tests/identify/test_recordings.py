@@ -33,6 +33,13 @@ def test_an_npz_is_read_as_it_was_written(tmp_path: Path) -> None:
     assert (again.held, again.linear_density, again.name, again.length) == ((0, 4), 0.03, "shaken", first.length)
 
 
+@pytest.mark.parametrize("name", ["a.rec", "a", "a.csv"])
+def test_it_is_written_under_a_name_that_is_read(tmp_path: Path, name: str) -> None:
+    with pytest.raises(SceneError, match=rf"^recording: got {name}\. Allowed: a \.npz\.$"):
+        save_recording(recording(), tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_csv_with_its_json_gives_the_same_recording(tmp_path: Path) -> None:
     x = markers(columns=2)
     rows = ["t," + ",".join(f"x{i},y{i}" for i in range(5))]

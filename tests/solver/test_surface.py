@@ -126,10 +126,20 @@ def test_what_reads_a_motion_refuses_other_times_places_and_cables():
     for u, t in ((2.0, 0.5), (-1.0, 0.5), (0.5, 50.0), (0.5, np.nan)):
         with pytest.raises(SceneError, match=r"[ut]: got"):
             found.stretch.along(u, t)
-    for t in (-1.0, 50.0, np.nan):
+    for t in (-1.0, 50.0, np.nan, [], [0.1, 0.2]):
         with pytest.raises(SceneError, match="t: got"):
             found.stretch.at(t)
     assert found.stretch.along(0.5, 0.5) == found.stretch.along([0.5], [0.5])
+    for strain in (found.stretch.along, found.surface.axial_strain):
+        assert strain([0.1, 0.2], []).shape == found.surface([0.1, 0.2], [])[..., 0].shape == (0, 2)
+        assert strain([], [0.1]).shape == (1, 0)
+    for read in (found.surface, found.surface.axial_strain, found.stretch.along):
+        for u, t, name in (([[0.1, 0.2]], [0.5], "u"), ([0.1], [[0.5]], "t")):
+            with pytest.raises(SceneError, match=rf"^{name}: got shape .*Allowed: one row of finite numbers"):
+                read(u, t)
+    for read in (energies, effect_forces):
+        with pytest.raises(SceneError, match=r"^times: got shape \(1, 2\)"):
+            read(found.scene, found.surface, [[0.1, 0.2]])
 
 
 def test_completion_knows_what_is_imported_on_first_use():
