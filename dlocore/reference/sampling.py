@@ -91,11 +91,16 @@ def samples(motion: Motion) -> Samples:
 
 
 def stretch_of(motion: Motion) -> StretchMotion:
-    """Return how far the rod is stretched over a motion."""
+    """Return how far the rod is stretched over a motion: its edges in their middles, and both ends as these go on."""
     u = motion.rod.u
     at = _kept(motion)
-    strain = [np.linalg.norm(np.diff(motion.states[k].x, axis=0), axis=1) / np.diff(u) - 1.0 for k in at]
-    return StretchMotion(times=motion.times[at], u=0.5 * (u[1:] + u[:-1]), strain=np.array(strain))
+    edges = np.array([np.linalg.norm(np.diff(motion.states[k].x, axis=0), axis=1) / np.diff(u) - 1.0 for k in at])
+    first, last = (1.5 * edges[:, i] - 0.5 * edges[:, j] for i, j in ((0, 1), (-1, -2)))  # no force acts between
+    return StretchMotion(
+        times=motion.times[at],
+        u=np.concatenate([u[:1], 0.5 * (u[1:] + u[:-1]), u[-1:]]),
+        strain=np.column_stack([first, edges, last]),
+    )
 
 
 def _kept(motion: Motion) -> NDArray[np.int64]:

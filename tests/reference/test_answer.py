@@ -112,6 +112,25 @@ def test_the_surface_is_the_motion_of_the_rods():
     assert force.reaction.shape == (len(force.times), 3)
 
 
+@pytest.mark.parametrize("u", [0.0, 1.0])
+def test_the_stretch_goes_to_both_ends_as_the_gripper_pulls(u: float):
+    sideways = Move(displacement=(0.2, 0.0, 0.0), duration=0.8)
+    hangs = Straight(direction=(0.0, 0.0, 2.0 * u - 1.0), settle=True)
+    around, undamped = Environment(drag=0.1), cable(axial_damping=0.0)
+    held = Grasp(u=u, path=sideways)
+    found = predict(replace(SCENE, cable=undamped, shape=hangs, grasps=(held,), environment=around))
+    t = found.stretch.times
+    assert found.stretch.u[0] == 0.0
+    assert found.stretch.u[-1] == 1.0
+    tension = found.scene.cable.axial_stiffness * found.stretch.along([u, 1.0 - u], t)
+    tangents = found.surface([u], t, du=1)[:, 0, :3]
+    outward = (2.0 * u - 1.0) * tangents / np.linalg.norm(tangents, axis=1)[:, None]
+    (gripper,) = found.grasps
+    pull = np.column_stack([np.interp(t, gripper.times, gripper.reaction[:, d]) for d in range(3)])
+    np.testing.assert_allclose(tension[:, 0], (pull * outward).sum(axis=1), rtol=1e-3)
+    np.testing.assert_allclose(tension[:, 1], 0.0, atol=1e-3)
+
+
 def test_the_surface_keeps_what_a_gripper_holds_at_both_ends():
     surface = predict(target(5e-3)).surface
     held = surface.positions([GRASP.u], [0.0, surface.horizon])[:, 0]
