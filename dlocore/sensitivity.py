@@ -6,7 +6,8 @@ the parameter a little larger and smaller, are followed to rounding with the fac
 their difference is taken. This differentiates the converged discrete system directly: what depends on the parameter
 (knots under a grasp that moves, the start, weights, the past of the strain) is covered alike, and the noise of a
 solver's tolerance is not in it. The error that is left is that of a central difference of a smooth function over a
-relative step of 1e-4: about 1e-7 of the derivative.
+relative step of 1e-4: about 1e-7 of the derivative. A number that may be 0 is changed by 1e-5 of its natural scale at
+least, such as the length of the cable: a share of one that is 1e-12 by chance would be lost in rounding.
 """
 
 import re
@@ -25,7 +26,7 @@ from dlocore.kernels.sensitivity import factor_steps, follow_steps
 from dlocore.kernels.timefit import fit_time
 from dlocore.prediction import Prediction
 from dlocore.problem.discretisation import applied_forces, applied_in_steps
-from dlocore.problem.events import closed_grasps
+from dlocore.problem.events import closed_grasps, swing
 from dlocore.problem.grid import Grid
 from dlocore.problem.holding import Starts
 from dlocore.problem.problem import Problem, pose, stiffer
@@ -43,6 +44,8 @@ Floats = NDArray[np.float64]
 
 STEP = 1e-4  # relative, of the parameter: the difference's own error is its square
 COARSE_STEP = 1e-2  # where whole marches are compared, whose tolerance would drown a smaller one
+LEAST = 0.1  # of the natural scale of a number that may be 0: a smaller one is changed as if it were that
+SLIGHT = 0.01  # the natural scale of a strain
 _FITTED = ("shape.points[", "cable.rest_shape[")  # numbers that a curve is fitted through
 _FITTED_STEP = 3e-3  # of the length, of theirs: the choice of smoothness moves the curve by a millionth, at any change
 _FOLLOWED = 1e-12  # of the length, on the last update of a followed step
@@ -218,6 +221,9 @@ class Sensitivities:
     def __call__(self, u: ArrayLike, t: ArrayLike) -> Floats:
         """Return dr/dparameter on the grid of t (m,) [s] and u (k,) [m]; (parameters, m, k, 3) [m per its unit].
 
+        By the length of the cable, or the horizon, it is read where the motions of both lengths are: at the very end it
+        is that a step before it.
+
         Raises:
             SceneError: a place is off the cable, or a time outside the predicted time.
         """
@@ -225,8 +231,8 @@ class Sensitivities:
         u = in_range("u", u, max((s.length for s in surfaces), default=np.inf), "m")
         t = in_range("t", t, max((s.horizon for s in surfaces), default=np.inf), "s")
         both = zip(self.above, self.below, self.steps, strict=True)
-        # beyond the end of a cable or a motion that is a little shorter, its end
-        return np.array([(_at(high, u, t) - _at(low, u, t)) / (2.0 * step) for high, low, step in both])
+        found = [_difference(high, low, u, t) / (2.0 * step) for high, low, step in both]
+        return np.array(found).reshape(len(self.names), len(t), len(u), 3)
 
 
 @interruptible
@@ -238,7 +244,8 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     differentiated (contact, friction, strands that touch, steps that had to be split) whole marches are compared
     instead, and `exact` and `reason` say so.
     A parameter that can't be less, or more, as a drag of zero or the place of a grasp at an end, is changed to the
-    other side only: the derivative then errs by about the relative change of it over a change of 1e-4.
+    other side only: the derivative then errs by about the relative change of it over that of the parameter, a
+    hundred-thousandth of its natural scale.
 
     Args:
         prediction: of the scene.
@@ -285,7 +292,7 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
 
     above, below, exact, widths = [], [], [], []
     for name, value in zip(wrt, values, strict=True):
-        size = abs(value) if value != 0.0 else 1.0
+        size = max(abs(value), LEAST * _scale(scene, name))
         surfaces: list[SplineSurface] = []
         fitted = name.startswith(_FITTED)
         followed = known is not None and not fitted
@@ -354,10 +361,10 @@ def _surface(
     return surface_of(problem, grid.knots, knots_t, flat.reshape(len(knots_t) - 4, n_u, nc))
 
 
-def _at(surface: SplineSurface, u: Floats, t: Floats) -> Floats:
-    """Return positions (m, k, 3) at u (k,) and t (m,) within the surface."""
-    inside = surface(np.minimum(u, surface.knots_u[-1]), np.minimum(t, surface.horizon))
-    return np.asarray(inside[..., :3])
+def _difference(high: SplineSurface, low: SplineSurface, u: Floats, t: Floats) -> Floats:
+    """Return by what positions differ (m, k, 3) [m] at u (k,) [m] and t (m,) [s] on both surfaces."""
+    u, t = np.minimum(u, min(high.length, low.length)), np.minimum(t, min(high.horizon, low.horizon))
+    return high.positions(u, t) - low.positions(u, t)
 
 
 _STEP_OF_PATH = re.compile(r"([A-Za-z_]\w*)|\[(\d+)\]")
@@ -369,17 +376,62 @@ def _steps_of(path: str) -> list[str | int]:
     return [int(index) if index else name for name, index in _STEP_OF_PATH.findall(path)]
 
 
-def _number(scene: Scene, path: str) -> float:
-    """Return the number at a path of the scene."""
+def _part(scene: Scene, path: str) -> Any:
+    """Return what is at a path of the scene."""
     value: Any = scene
     for step in _steps_of(path):
         try:
             value = value[step] if isinstance(step, int) else _field(value, step)
         except (AttributeError, IndexError, TypeError):
             raise SceneError("wrt", path, "the path of a number of the scene") from None
+    return value
+
+
+def _number(scene: Scene, path: str) -> float:
+    """Return the number at a path of the scene."""
+    value = _part(scene, path)
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         raise SceneError("wrt", path, "the path of a number of the scene")
     return float(value)
+
+
+def _scale(scene: Scene, path: str) -> float:
+    """Return what the number at a path of the scene is small against, in its unit.
+
+    It is 0 for a number that can't be 0, as a stiffness: that is small against nothing but itself.
+    """
+    *before, last = _steps_of(path)
+    field = next(step for step in (last, *reversed(before)) if isinstance(step, str))
+    cable, time = scene.cable, min(cast(float, scene.horizon), swing(scene))
+    length, mass = cable.length, cable.linear_density * cable.length
+    match field:
+        case "control_points" | "velocity" if last == 3:
+            return 1.0 if field == "control_points" else 1.0 / time
+        case "u" | "start" | "end" | "center" | "height" | "control_points" | "knots" | "displacement" | "positions":
+            return length
+        case "times" | "grasp_time" | "release_time":
+            return time
+        case "velocity":
+            return length / time
+        case "gravity":
+            return length / time**2
+        case "force":
+            return mass * length / time**2
+        case "drag":
+            return mass / length / time
+        case "drag_quadratic":
+            return mass / length**2
+        case "bending_damping" | "torsional_damping" | "axial_damping":
+            return float(getattr(cable, field.replace("damping", "stiffness"))) * time
+        case "memory" | "natural":
+            return 1.0 / length
+        case "stretch" | "strain":
+            return SLIGHT
+        case "direction" | "axis" | "director" | "orientation" | "orientations":
+            return float(np.linalg.norm(_part(scene, path.rpartition("[")[0])))
+        case "hardening" | "friction" | "rotation":
+            return 1.0
+    return 0.0
 
 
 def _field(part: Any, name: str) -> Any:

@@ -1,5 +1,6 @@
 """Derivatives of a prediction: those of closed forms, and those of marches whose tolerance is far below the change."""
 
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -7,20 +8,28 @@ import pytest
 
 from benchmarks.hard.generator import draw
 from dlocore import (
+    Box,
     Cable,
+    Capsule,
     ControlPoints,
+    Cylinder,
     Environment,
     Grasp,
+    Load,
+    Material,
     Move,
     Quality,
     Scene,
     SceneError,
+    Sphere,
     Straight,
+    Table,
+    Waypoints,
     predict,
     sensitivity,
 )
 from dlocore.problem.problem import pose
-from dlocore.sensitivity import STEP, _with, beside, factored, sensitivities
+from dlocore.sensitivity import LEAST, STEP, _scale, _with, beside, factored, sensitivities
 from dlocore.solvers import march as marching
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import greville, uniform_knots
@@ -135,8 +144,6 @@ def test_the_motion_between_both_is_the_predicted_one(seed: int, index: int) -> 
 
 
 def test_contact_is_differentiated_by_whole_marches_and_said_so() -> None:
-    from dlocore import Sphere
-
     ball = Sphere(center=(0.6, 0.1, 0.0), radius=0.05)
     touched = scene(environment=Environment(gravity=(0, 0, 0), drag=0.1, obstacles=(ball,)))
     sensed = sensitivities(predict(touched), ["grasps[0].path.displacement[1]"])
@@ -172,8 +179,8 @@ def test_one_path_in_place_of_a_list_of_them_is_refused() -> None:
         sensitivities(predict(scene()), "cable.diameter")
 
 
-@pytest.mark.parametrize("name", ["environment.drag", "grasps[0].u"])
-def test_a_number_at_its_bound_is_changed_to_the_other_side(name: str) -> None:
+@pytest.mark.parametrize(("name", "scale"), [("environment.drag", 0.05 / 1.7), ("grasps[0].u", 1.0)])
+def test_a_number_at_its_bound_is_changed_to_the_other_side(name: str, scale: float) -> None:
     """As a drag of zero, or the grasp at an end: the derivative is that of the motion with a little more of it."""
     bare = scene(
         environment=Environment(gravity=(0, 0, 0)),
@@ -181,10 +188,97 @@ def test_a_number_at_its_bound_is_changed_to_the_other_side(name: str) -> None:
     )
     sensed = sensitivities(predict(bare), [name])
     assert sensed.exact == (True,)
-    assert sensed.steps == (0.5 * STEP,)
+    assert sensed.steps == pytest.approx((0.5 * STEP * LEAST * scale,))
     start, more, most = (predict(_with(bare, name, k * 1e-3)).surface(U, T)[..., :3] for k in range(3))
     expected = (4.0 * more - 3.0 * start - most) / 2e-3
     assert np.abs(sensed(U, T)[0] - expected).max() < 2e-3 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("name", ["grasps[0].path.displacement[0]", "shape.start[0]", "environment.drag_quadratic"])
+def test_a_number_that_is_tiny_by_chance_is_changed_as_zero_is(name: str) -> None:
+    """As 0.5 cos(pi/2) is 3e-17, by a share of which nothing moves: derivatives were 0, or rounding."""
+    calm = scene(environment=Environment(gravity=(0, 0, 0), drag=0.1))
+    sensed = [sensitivities(predict(_with(calm, name, value)), [name]) for value in (0.0, 3e-17, 1e-12)]
+    assert [s.exact for s in sensed] == [(True,)] * 3
+    zero, *tiny = (s(U, T) for s in sensed)
+    assert np.abs(zero).max() > 0.01
+    for found in tiny:
+        np.testing.assert_allclose(found, zero, atol=1e-6 * np.abs(zero).max())
+
+
+def test_the_velocity_of_a_motion_that_goes_on_is_changed_by_more_than_rounding() -> None:
+    begun = predict(scene())
+    on = scene(shape=begun.shape_at(0.8), grasps=(Grasp(u=0.3),))
+    names = [f"shape.velocity[8][{axis}]" for axis in (0, 1)]
+    slow = sensitivities(predict(_with(on, names[0], 1e-12)), names)
+    assert slow.exact == (True, True)
+    still = sensitivities(predict(_with(on, names[0], 0.0)), names)
+    np.testing.assert_allclose(slow(U, T), still(U, T), atol=1e-6)
+    assert np.abs(still(U, T)).max(axis=(1, 2, 3)).min() > 1e-3
+
+
+def test_each_number_that_may_be_zero_is_changed_and_each_that_may_not_by_a_share_of_itself() -> None:
+    """Whatever a scene holds: what has no scale of its own is above 0 by the checks of the scene."""
+    length, ball = 2.0, Sphere(center=(9.0, 0.0, 0.0), radius=1e-9)
+    stick = Capsule(start=(9.0, 0.0, 0.0), end=(9.0, 0.0, 1.0), radius=1e-9)
+    drum = Cylinder(center=(9.0, 0.0, 0.0), radius=1e-9, height=1e-9)
+    crate = Box(center=(9.0, 0.0, 0.0), size=(1e-9, 1e-9, 1e-9), orientation=(1.0, 0.0, 0.0, 0.0))
+    places = np.linspace(0.0, length, 9)
+    remembered = Material(
+        director=(0.0, 0.0, 1.0), u=(0.0, length), memory=np.zeros((2, 3)), stretch=(0.0, 0.0), natural=np.zeros((2, 3))
+    )
+    along = ControlPoints(
+        control_points=np.column_stack([places, 0.0 * places, 0.0 * places]), knots=uniform_knots(9, length),
+        velocity=np.zeros((9, 4)), material=remembered, strain=np.zeros(9),
+    )  # fmt: skip
+    turned = np.tile((1.0, 0.0, 0.0, 0.0), (4, 1))
+    led = Waypoints(times=(0.0, 0.1, 0.2, 0.3), positions=np.zeros((4, 3)), orientations=turned)
+    moved = Move(displacement=(0.0, 0.0, 0.0), duration=0.01, rotation=(0.0, 0.0, 0.0))
+    grasps = (
+        Grasp(u=0.0, hold="clamp", path=led, grasp_time=0.0, release_time=0.5),
+        Grasp(u=length, hold="clamp", path=moved, grasp_time=0.0),
+    )
+    cable = Cable.preset(
+        "paper", length=length, axial_damping=0.0, yield_strain=1e-9, yield_twist=1e-9, yield_stretch=1e-9,
+        memory_rate=1e-9, hardening=0.0,
+    )  # fmt: skip
+    full = Scene(
+        cable=cable, shape=along, grasps=grasps, loads=(Load(u=0.0, force=np.zeros((2, 3)), times=(0.0, 1.0)),),
+        environment=Environment(gravity=(0, 0, 0), table=Table(), obstacles=(ball, stick, drum, crate)), horizon=1.0,
+    )  # fmt: skip
+
+    def numbers(part: Any, path: str) -> list[tuple[str, float]]:
+        if is_dataclass(part):
+            return [n for f in fields(part) for n in numbers(getattr(part, f.name), f"{path}.{f.name}".lstrip("."))]
+        if isinstance(part, tuple | np.ndarray):
+            return [n for i, x in enumerate(part) for n in numbers(x, f"{path}[{i}]")]
+        return [(path, float(part))] if isinstance(part, float) else []
+
+    found = numbers(full, "")
+    assert len(found) > 200
+    without = {path for path, _ in found if _scale(full, path) == 0.0}
+    assert not [path for path, value in found if value == 0.0 and path in without]
+    assert {"cable.bending_stiffness", "cable.diameter", "horizon", "grasps[1].path.duration"} <= without
+    assert _scale(full, "shape.control_points[3][3]") == 1.0
+    assert _scale(full, "shape.control_points[3][1]") == length
+    assert _scale(full, "shape.velocity[3][3]") == 1.0
+
+
+def test_it_is_read_at_the_very_ends_of_the_cable_and_of_the_motion() -> None:
+    """There it was half of one derivative and half of another: 0.5 m per metre of a straight cable before it moves."""
+    names, given = ["cable.length", "horizon"], predict(scene())
+    sensed = sensitivities(given, names)
+    at = ([0.5, 0.99, 1.0], [0.0, 1.5, 1.7])
+    found = sensed(*at)
+    np.testing.assert_allclose(found[0, 0], 0.0, atol=1e-9)
+    for derivative, name, end in zip(found, names, (1.0, 1.7), strict=True):
+        longer = predict(_with(scene(), name, end * 1.001)).surface.positions(*at)
+        expected = (longer - given.surface.positions(*at)) / (1e-3 * end)
+        np.testing.assert_allclose(derivative, expected, atol=0.02)
+
+
+def test_by_no_parameter_there_are_no_derivatives() -> None:
+    assert sensitivities(predict(scene()), [])(U, T).shape == (0, len(T), len(U), 3)
 
 
 def test_a_number_that_can_not_change_at_all_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
