@@ -6,10 +6,11 @@ the parameter a little larger and smaller, are followed to rounding with the fac
 their difference is taken. This differentiates the converged discrete system directly: what depends on the parameter
 (knots under a grasp that moves, the start, weights, the past of the strain) is covered alike, and the noise of a
 solver's tolerance is not in it. The error that is left is that of a central difference of a smooth function over a
-relative step of 1e-4: about 1e-7 of the derivative. A number that may be 0 is changed by 1e-5 of its natural scale at
+relative step of 1e-4: about 1e-7 of the derivative. A number that may be 0 is changed by 1e-6 of its natural scale at
 least, such as the length of the cable: a share of one that is 1e-12 by chance would be lost in rounding.
 """
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
@@ -44,8 +45,8 @@ Floats = NDArray[np.float64]
 
 STEP = 1e-4  # relative, of the parameter: the difference's own error is its square
 COARSE_STEP = 1e-2  # where whole marches are compared, whose tolerance would drown a smaller one
-LEAST = 0.1  # of the natural scale of a number that may be 0: a smaller one is changed as if it were that
-SLIGHT = 0.01  # the natural scale of a strain
+LEAST = 0.01  # of the natural scale of a number that may be 0: a smaller one is changed as if it were that
+SLIGHT = 0.1  # the natural scale of a strain
 _FITTED = ("shape.points[", "cable.rest_shape[")  # numbers that a curve is fitted through
 _FITTED_STEP = 3e-3  # of the length, of theirs: the choice of smoothness moves the curve by a millionth, at any change
 _FOLLOWED = 1e-12  # of the length, on the last update of a followed step
@@ -244,8 +245,8 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     differentiated (contact, friction, strands that touch, steps that had to be split) whole marches are compared
     instead, and `exact` and `reason` say so.
     A parameter that can't be less, or more, as a drag of zero or the place of a grasp at an end, is changed to the
-    other side only: the derivative then errs by about the relative change of it over that of the parameter, a
-    hundred-thousandth of its natural scale.
+    other side only: the derivative then errs by about the relative change of it over that of the parameter, a millionth
+    of its natural scale.
 
     Args:
         prediction: of the scene.
@@ -421,7 +422,9 @@ def _scale(scene: Scene, path: str) -> float:
             return mass / length / time
         case "drag_quadratic":
             return mass / length**2
-        case "bending_damping" | "torsional_damping" | "axial_damping":
+        case "axial_damping":  # of which its slowest wave hardly rings
+            return math.sqrt(mass * length * cast(float, cable.axial_stiffness))
+        case "bending_damping" | "torsional_damping":
             return float(getattr(cable, field.replace("damping", "stiffness"))) * time
         case "memory" | "natural":
             return 1.0 / length
