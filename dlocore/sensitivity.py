@@ -417,7 +417,7 @@ def _scale(scene: Scene, path: str) -> float:
         case "gravity":
             return length / time**2
         case "force":
-            return mass * length / time**2
+            return max(mass * length / time**2, cast(float, cable.bending_stiffness) / length**2)
         case "drag":
             return mass / length / time
         case "drag_quadratic":
