@@ -45,9 +45,8 @@ def balanced(scene: Scene, grid: Grid, u: Floats) -> Floats:
     own, others = found[:, :count], found[:, count:]
     begins, ends = np.unique(knots)[:-1], np.unique(knots)[1:]
     curved = (ends - begins)[:, None] ** 2 * _basis(knots, 0.5 * (begins + ends), 2)
-    forces = -np.linalg.pinv(curved @ others, rcond=_SAME) @ (
-        curved @ own
-    )  # both sides may be the same but for rounding
+    # the two sides of a held place may be the same but for rounding, of which no force is to be made
+    forces = -np.linalg.pinv(curved @ others, rcond=_SAME) @ (curved @ own)
     jumps = np.array([np.heaviside(u - g, 0.5) for g in inside]).reshape(-1, len(u)).T
     return _basis(knots, u) @ (own + others @ forces) + jumps @ forces[len(sides) :]
 
