@@ -24,6 +24,10 @@ _MIDDLE = 0.5  # of the diameter: what was seen of a cable may lie so deep in an
 _PLACES = 101  # of a curve, at first, at which it is looked at for what it goes into
 _FINE = 0.1  # of the radius: no finer
 _LONGER = 1.1  # times the straight way between two places of a curve is its way, at most
+_SWINGS = (
+    ", where a smooth path swings out between its waypoints: a profile that stops at each, as minimum_jerk, goes "
+    "straight from one to the next, and more waypoints there, or more even times, keep it in"
+)
 
 
 def check_reach(scene: Scene, start: StartCurve) -> None:
@@ -44,15 +48,18 @@ def check_reach(scene: Scene, start: StartCurve) -> None:
             late = max(a.start, b.start) > 0 and not all(isinstance(g.path, Waypoints) for g in (a, b) if g.start > 0)
             if late or not together.any():
                 continue  # a later grasp begins where the cable is then, which only the solve can tell
-            paths = b.path.at(t - b.start, begin[j]) - a.path.at(t - a.start, begin[i])
-            apart = np.where(together, np.linalg.norm(paths, axis=1), 0.0)
+            most = between * (1.0 + MAX_PRESCRIBED_STRAIN) + 1e-6
+            at = t[together]
+            apart = np.linalg.norm(b.path.at(at - b.start, begin[j]) - a.path.at(at - a.start, begin[i]), axis=1)
             k = int(np.argmax(apart))
-            if not apart[k] <= between * (1.0 + MAX_PRESCRIBED_STRAIN) + 1e-6:
+            if not apart[k] <= most:
+                chords = _straight(b.path, at - b.start, begin[j]) - _straight(a.path, at - a.start, begin[i])
+                swings = _SWINGS if np.linalg.norm(chords, axis=1).max() <= most else ""
                 raise SceneError(
                     f"primitives[{j}].path",
-                    f"{apart[k]:.4g} m from primitives[{i}] at {t[k]:.3g} s",
+                    f"{apart[k]:.4g} m from primitives[{i}] at {at[k]:.3g} s",
                     f"at most {between:.4g} m, and {MAX_PRESCRIBED_STRAIN:.1%} more",
-                    "No cable can follow: the two grasps are farther apart than the cable between them",
+                    f"No cable can follow: the two grasps are farther apart than the cable between them{swings}",
                 )
 
 
@@ -83,10 +90,13 @@ def check_above(scene: Scene, start: StartCurve) -> None:
             continue
         if isinstance(grasp.path, Move) and cast(Floats, grasp.path.displacement)[2] >= 0:
             continue
-        path = grasp.path.at(np.linspace(0.0, grasp.path.duration, 65), start(grasp.u)[0])
-        below = table.height - float(path[:, 2].min())
-        if not below <= _borne(scene):
-            reason = f"It takes the cable {below:.3g} m into the table"
+        t, begin, borne = _moments(grasp.path), start(grasp.u)[0], _borne(scene)
+        depths = table.height - grasp.path.at(t, begin)[:, 2]
+        k = int(np.argmax(depths))
+        below = float(depths[k])
+        if not below <= borne:
+            swings = _SWINGS if table.height - _straight(grasp.path, t, begin)[:, 2].min() <= borne else ""
+            reason = f"It takes the cable {below:.3g} m into the table at {grasp.start + t[k]:.3g} s{swings}"
             raise SceneError(
                 f"primitives[{i}].path", f"{below:.3g} m below", f"a path above {table.height:g} m", reason
             )
@@ -118,26 +128,27 @@ def check_outside(scene: Scene, start: StartCurve, met: tuple[int, ...]) -> None
     rows = np.array([scene.environment.obstacles[i].row() for i in met])
     diameter = scene.cable.diameter
     seen = min(table_tolerance(scene), _MIDDLE * diameter)
-    inside, i = _deepest(rows, 0.5 * diameter, start, np.linspace(0.0, scene.cable.length, _PLACES), seen)
+    inside, i, u = _deepest(rows, 0.5 * diameter, start, np.linspace(0.0, scene.cable.length, _PLACES), seen)
     allowed = "the cable outside all obstacles, or effects.obstacles off"
     if inside > seen:
-        reason = f"The cable starts up to {inside:.3g} m inside it"
+        reason = f"The cable starts up to {inside:.3g} m inside it, at u = {u:.4g} m"
         raise SceneError(f"environment.obstacles[{met[i]}]", f"{inside:.3g} m inside", allowed, reason)
     for k, grasp in enumerate(scene.grasps):
         if grasp.start > 0.0:
             continue  # from where the cable is by then
-        path = partial(grasp.path.at, start=start(grasp.u)[0])
-        borne = _borne(scene)
-        inside, i = _deepest(rows, 0.5 * diameter, path, _moments(grasp.path), borne)
+        begin, borne = start(grasp.u)[0], _borne(scene)
+        deepest = partial(_deepest, rows, 0.5 * diameter, s=_moments(grasp.path), borne=borne)
+        inside, i, t = deepest(partial(grasp.path.at, start=begin))
         if inside > borne:
-            reason = f"It takes the cable {inside:.3g} m into obstacles[{met[i]}]"
+            swings = _SWINGS if deepest(partial(_straight, grasp.path, start=begin))[0] <= borne else ""
+            reason = f"It takes the cable {inside:.3g} m into obstacles[{met[i]}] at {t:.3g} s{swings}"
             raise SceneError(f"primitives[{k}].path", f"{inside:.3g} m inside", allowed, reason)
 
 
 def _deepest(
     rows: Floats, radius: float, curve: Callable[[Floats], Floats], s: Floats, borne: float
-) -> tuple[float, int]:
-    """Return how deep a cable of a radius is inside the obstacles of `rows` on a curve r(s) [m], and in which.
+) -> tuple[float, int, float]:
+    """Return how deep a cable of a radius is inside the obstacles of `rows` on a curve r(s) [m], in which, and where s.
 
     It is looked at s (k,), and where two of these leave room between them for what is inside by more than `borne`,
     however thin, half-way, again and again: no point is farther from an obstacle than its neighbour and the way there.
@@ -146,10 +157,11 @@ def _deepest(
     def looked(at: Floats) -> tuple[Floats, Floats]:
         points = np.ascontiguousarray(curve(at))
         gaps = distances(rows, points) - radius
-        found.append((-float(gaps.min()), int(gaps.min(axis=0).argmin())))
+        where, which = np.unravel_index(gaps.argmin(), gaps.shape)
+        found.append((-float(gaps[where, which]), int(which), float(at[where])))
         return points, gaps.min(axis=1)
 
-    found: list[tuple[float, int]] = []
+    found: list[tuple[float, int, float]] = []
     points, gaps = looked(s)
     ends, at, gap = (np.stack([x[:-1], x[1:]]) for x in (s, points, gaps))
     while True:
@@ -169,3 +181,10 @@ def _moments(path: Path) -> Floats:
     """Return times (k,) [s] of a path that miss no turn of it."""
     times = np.linspace(0.0, path.duration, _PLACES)
     return np.union1d(times, cast(Floats, path.times)) if isinstance(path, Waypoints) else times
+
+
+def _straight(path: Path, t: Floats, start: Floats) -> Floats:
+    """Return positions (k, 3) [m] of a path at times t (k,) [s], straight between waypoints where it is a spline."""
+    if not isinstance(path, Waypoints) or path.profile != "spline":
+        return path.at(t, start)
+    return np.column_stack([np.interp(t, cast(Floats, path.times), x) for x in cast(Floats, path.positions).T])
