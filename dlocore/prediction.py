@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 PART, TINY = 0.2, 1e-4  # of how far the cable moves, and of its length: up to which an error is not worth a word
+NOTHING = 1e-6  # of the length of the cable: what moves by less stands still but for what a solve leaves
 UNSURE = 0.5  # of a force: from which on its error is worth one, where it is more than TINY of what weighs or bends it
 
 
@@ -86,8 +87,10 @@ class Prediction:
     def _of_a_small_motion(self) -> list[str]:
         """Return what is told of an answer that is good for the length of the cable, but not for so small a motion."""
         control, error = self.surface.control_points[..., :3], self.accuracy.error_estimate
-        moved = float(np.linalg.norm(control - control[0], axis=-1).max())
-        if self.status != "converged" or error is None or not error > max(PART * moved, TINY * self.surface.length):
+        length, moved = self.surface.length, float(np.linalg.norm(control - control[0], axis=-1).max())
+        if self.status != "converged" or error is None or not error > max(PART * moved, TINY * length):
+            return []
+        if not moved > NOTHING * length:
             return []
         return [f"the cable moves by {in_mm(moved)}, of which the estimated error is much: give a smaller target_error"]
 
