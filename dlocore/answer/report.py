@@ -12,6 +12,7 @@ from dlocore.answer.parts import EffectReport, MaterialMotion, StretchMotion
 from dlocore.kernels.assembly import History, stored_energy
 from dlocore.problem.grid import Grid
 from dlocore.problem.problem import Problem
+from dlocore.problem.standing import obstacle_rows
 from dlocore.spline import SplineSurface
 
 Floats = NDArray[np.float64]
@@ -68,7 +69,7 @@ def effect_reports(
     if problem.friction is not None and environment.table is not None:
         sizes["friction"] = (environment.table.friction * weight, "N")
     if problem.obstacles:
-        rows = np.array([obstacle.row() for obstacle in problem.obstacles])
+        rows = obstacle_rows(problem.scene, problem.obstacles)
         gap = least_distance(surface, rows, _NEAR * cable.diameter) - 0.5 * cable.diameter
         sizes["obstacles"] = (gap, "m, the smallest gap")
     if problem.choices["plasticity"].active:

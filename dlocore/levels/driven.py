@@ -18,6 +18,7 @@ from dlocore.effects.selfcontact import APART
 from dlocore.problem.brought import GRASP_TOLERANCE
 from dlocore.problem.checks import TOO_DEEP
 from dlocore.problem.problem import Problem
+from dlocore.problem.standing import obstacle_rows
 from dlocore.scene.paths import Waypoints, held_at
 from dlocore.scene.scene import Grasp, Scene
 from dlocore.solvers.march import March
@@ -119,7 +120,7 @@ def _into_surroundings(problem: Problem, begins: list[Floats | None]) -> Iterato
     """Return how deep each grasp that closes late goes into each obstacle, and into the table."""
     scene, radius = problem.scene, 0.5 * problem.scene.cable.diameter
     names = [f"obstacles[{scene.environment.obstacles.index(o)}]" for o in problem.obstacles]
-    rows = np.array([o.row() for o in problem.obstacles])
+    rows = obstacle_rows(scene, problem.obstacles)
     table = scene.environment.table if problem.table is not None else None
     for k, (grasp, begin) in enumerate(zip(scene.grasps, begins, strict=True)):
         t = _held(scene, [grasp])

@@ -24,8 +24,9 @@ from dlocore.levels.taut import taut_notes
 from dlocore.problem.buckling import BOW, UNSTABLE, side_notes
 from dlocore.problem.discretisation import axial_strain
 from dlocore.problem.events import closed_grasps, moments
-from dlocore.problem.notes import start_notes
+from dlocore.problem.notes import edge_notes, start_notes
 from dlocore.problem.problem import Problem
+from dlocore.problem.standing import obstacle_rows
 from dlocore.problem.strands import nearest_strands
 from dlocore.scene.obstacles import Obstacle
 from dlocore.solvers.monitor import Monitor
@@ -126,6 +127,7 @@ def objections(level: Level) -> list[str]:
     found += _stretched(level)
     found += _twisted(level)
     found += start_notes(problem.scene, problem.start)
+    found += edge_notes(problem.scene, problem.obstacles)
     found += side_notes(problem.start)
     found += turn_notes(problem, level.motion.grid)
     found += tip_notes(level.motion.grid.tipped, problem.scene.cable.length)
@@ -302,7 +304,7 @@ def _gaps(level: Level, obstacles: list[Obstacle], part: slice) -> tuple[Floats,
     world = problem.plane.world(points[..., : problem.plane.dimensions])
     way = np.linalg.norm(np.diff(world, axis=0), axis=2)
     between = 0.5 * np.maximum(np.vstack([way, way[-1:]]), np.vstack([way[:1], way]))
-    rows = np.array([o.row() for o in obstacles])
+    rows = obstacle_rows(problem.scene, obstacles)
     return distances(rows, world.reshape(-1, 3)).min(axis=1) - 0.5 * problem.scene.cable.diameter, between.ravel()
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from dlocore.effects.distance import distances
 from dlocore.problem.events import closed_grasps
 from dlocore.problem.plane import FLATNESS, is_straight, leftwards, lies_on, natural_points, off_line, turns_of
+from dlocore.problem.standing import obstacle_rows
 from dlocore.problem.straightening import straightened
 from dlocore.scene.paths import Move, Path, Still
 from dlocore.scene.scene import Grasp, Scene
@@ -355,7 +356,7 @@ def _depth(scene: Scene, start: StartCurve, along: Floats, part: _Part, way: Flo
         if environment.table is not None and "table" in on:
             deepest = np.maximum(deepest, environment.table.height - end[:, 2])
         if environment.obstacles and "obstacles" in on:
-            rows = np.array([obstacle.row() for obstacle in environment.obstacles])
+            rows = obstacle_rows(scene, environment.obstacles)
             deepest = np.maximum(deepest, radius - distances(rows, end).min(axis=1))
     return deepest
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from dlocore.effects.distance import distances
 from dlocore.errors import SceneError
 from dlocore.problem.plane import table_tolerance
+from dlocore.problem.standing import obstacle_rows
 from dlocore.problem.strands import nearest_strands
 from dlocore.scene.paths import Move, Path, Still, Waypoints
 from dlocore.scene.scene import MAX_PRESCRIBED_STRAIN, Scene
@@ -125,7 +126,7 @@ def check_outside(scene: Scene, start: StartCurve, met: tuple[int, ...]) -> None
     """Refuse a start or a grasp's path inside an obstacle."""
     if not met:
         return
-    rows = np.array([scene.environment.obstacles[i].row() for i in met])
+    rows = obstacle_rows(scene, [scene.environment.obstacles[i] for i in met])
     diameter = scene.cable.diameter
     seen = min(table_tolerance(scene), _MIDDLE * diameter)
     inside, i, u = _deepest(rows, 0.5 * diameter, start, np.linspace(0.0, scene.cable.length, _PLACES), seen)

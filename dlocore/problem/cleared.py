@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from dlocore.effects.contact import DEEPEST
 from dlocore.effects.distance import distances
 from dlocore.problem.brought import finer
+from dlocore.problem.standing import obstacle_rows
 from dlocore.scene.paths import Waypoints
 from dlocore.scene.scene import Scene
 from dlocore.shape.shape import StartCurve, fit_to_knots
@@ -36,7 +37,7 @@ def cleared(scene: Scene, start: StartCurve, met: tuple[int, ...], with_table: b
     low = start.heights[0] < floor - DEEPEST * diameter
     if start.material is not None or start.velocity is not None or not (met or low):
         return start
-    rows = [environment.obstacles[i].row()[None] for i in met]
+    rows = [row[None] for row in obstacle_rows(scene, [environment.obstacles[i] for i in met])]
     held = np.array([g.u for g in scene.grasps if g.start == 0.0 and isinstance(g.path, Waypoints)])
     u = np.linspace(0.0, length, _PLACES)
     moved = start

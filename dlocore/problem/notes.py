@@ -6,6 +6,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.scene.obstacles import Box, Cylinder, Obstacle
 from dlocore.scene.paths import Move, Waypoints
 from dlocore.scene.scene import Points, Scene
 from dlocore.shape.shape import StartCurve, start_curve
@@ -45,6 +46,32 @@ def start_notes(scene: Scene, start: StartCurve) -> list[str]:
         return []
     why = "to the first waypoints of its grippers, on to the table, or out of what it was in"
     return [f"the start is moved by up to {in_mm(moved)} from where it was given, {why}"]
+
+
+def edge_notes(scene: Scene, obstacles: tuple[Obstacle, ...]) -> list[str]:
+    """Return what is told of `obstacles` of a scene under whose walls a cable on its table can slip, in words.
+
+    That is where they begin above the middle of the cable and below its top.
+    """
+    table, diameter = scene.environment.table, scene.cable.diameter
+    if table is None or scene.effects.get("table", "auto") == "off":
+        return []
+    notes = []
+    for obstacle in obstacles:
+        if not isinstance(obstacle, Box | Cylinder):
+            continue
+        row = obstacle.row()
+        base = float(row[3] - np.abs(row[4:13].reshape(3, 3)[:, 2]) @ row[13:16])  # where walls are upright
+        above = base - table.height
+        stands = obstacle.upright_at(table.height, 0.5 * diameter) or not obstacle.upright_at(base, diameter)
+        if 0.0 < above < 0.5 * diameter and not stands:
+            i = scene.environment.obstacles.index(obstacle)
+            notes.append(
+                f"obstacles[{i}] begins {in_mm(above + 0.5 * diameter)} above the surface of the table, which is half "
+                "a diameter below table.height: the cable can slip under its edge. Let it begin at "
+                f"z = {table.height:g} m or below"
+            )
+    return notes
 
 
 def _of_units(scene: Scene) -> list[str]:

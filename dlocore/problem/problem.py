@@ -32,6 +32,7 @@ from dlocore.problem.events import Event, find_events
 from dlocore.problem.features import Features, find_features
 from dlocore.problem.plane import Plane, find_plane, is_straight, lay_on_table, off_the_table, rest_plane
 from dlocore.problem.selection import Choice, choose, reached
+from dlocore.problem.standing import obstacle_rows
 from dlocore.scene.obstacles import Box, Cylinder, Obstacle
 from dlocore.scene.scene import Scene
 from dlocore.shape.shape import StartCurve, start_curve
@@ -210,9 +211,9 @@ class Problem:
         """What `law_table` returns, for those who only read it."""
         active = np.zeros(laws.COUNT, np.int64)
         parameters = np.zeros((laws.COUNT + len(self.obstacles), laws.PARAMETERS))
-        for i, obstacle in enumerate(self.obstacles):
-            parameters[laws.COUNT + i] = obstacle.row()
-            parameters[laws.COUNT + i, 1:4] -= self.plane.origin
+        if self.obstacles:
+            parameters[laws.COUNT :] = obstacle_rows(self.scene, self.obstacles)
+            parameters[laws.COUNT :, 1:4] -= self.plane.origin
         effects: tuple[tuple[int, Effect | None], ...] = (
             (laws.STRETCH, self.stretch),
             (laws.BEND, self.bend),

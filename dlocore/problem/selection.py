@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from dlocore.effects.distance import distances
 from dlocore.effects.selfcontact import NEAR_START
+from dlocore.problem.standing import obstacle_rows
 from dlocore.problem.strands import nearest_strands
 from dlocore.scene.paths import Move, Waypoints
 from dlocore.scene.scene import EFFECTS, Grasp, Scene
@@ -162,7 +163,7 @@ def reached(scene: Scene, start: StartCurve, called_for: Mapping[str, str]) -> t
         t = np.linspace(0.0, grasp.path.duration, 17)
         shifts.append(grasp.path.at(t, start(grasp.u)[0]) - start(grasp.u)[0])
     moved = (points[:, None] + np.concatenate(shifts)[None]).reshape(-1, 3)
-    rows = np.array([o.row() for o in obstacles])
+    rows = obstacle_rows(scene, obstacles)
     radius = 0.5 * scene.cable.diameter
     near = distances(rows, np.ascontiguousarray(moved)).min(axis=0) - radius < NEAR * scene.cable.length
     holding = [g.u for g in scene.grasps if g.start == 0.0]

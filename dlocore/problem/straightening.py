@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from dlocore.effects.distance import distances
 from dlocore.problem.plane import lies_on, off_line
+from dlocore.problem.standing import obstacle_rows
 from dlocore.scene.scene import Scene
 from dlocore.shape.shape import StartCurve
 from dlocore.spline import greville
@@ -105,5 +106,5 @@ def _is_free(scene: Scene, start: StartCurve, straight: StartCurve, at: Floats, 
             return False
     if not environment.obstacles or switch("obstacles", "auto") == "off":
         return True
-    rows = np.array([obstacle.row() for obstacle in environment.obstacles])
+    rows = obstacle_rows(scene, environment.obstacles)
     return bool(distances(rows, places.reshape(-1, 3)).min() > radius + goes)

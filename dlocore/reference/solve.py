@@ -14,7 +14,7 @@ from dlocore.levels.whole_march import sided
 from dlocore.prediction import Prediction
 from dlocore.problem.buckling import side_notes
 from dlocore.problem.events import closed_grasps
-from dlocore.problem.notes import start_notes
+from dlocore.problem.notes import edge_notes, start_notes
 from dlocore.problem.problem import Problem, pose
 from dlocore.reference.chain import chain, grip
 from dlocore.reference.energy import energies
@@ -209,6 +209,7 @@ def _prediction(refined: Refined, fitted: Fit, target: float, monitor: Monitor) 
         report_stretch=lambda: stretch_of(motion),
         find_objections=lambda: [
             *start_notes(problem.scene, problem.start),
+            *edge_notes(problem.scene, problem.obstacles),
             *side_notes(problem.start),
             *tip_notes(motion.tipped, problem.scene.cable.length),
         ],

@@ -33,8 +33,13 @@ def _vertical(axis: Floats) -> bool:
 
 
 def _covers(center: float, half: float, height: float, reach: float) -> bool:
-    """Tell whether center -+ half holds height -+ reach; a body that stands on the table ends at height - reach."""
-    return bool(abs(height - center) + reach <= half + _ROUNDING * reach)
+    """Tell whether center -+ half holds height to height + reach.
+
+    Walls that begin at the middle of a cable on a table, a radius above its surface, push it sideways only: it can't
+    get below them, as what stands at z = 0 where that is the middle's height.
+    """
+    rounding = _ROUNDING * reach
+    return bool(center - half <= height + rounding and height + reach <= center + half + rounding)
 
 
 def _level(z: float, height: float, size: float) -> bool:
@@ -70,7 +75,7 @@ class Sphere:
         object.__setattr__(self, "friction", _friction(self.friction))
 
     def upright_at(self, height: float, reach: float) -> bool:
-        """Tell whether a cable at `height` [m] touches the ball only sideways.
+        """Tell whether a cable that lies on a table, its middle at `height` [m], touches the ball only sideways.
 
         A ball has no vertical walls: it is so by symmetry, and only if the centre lies exactly at `height`.
         """
@@ -101,9 +106,9 @@ class Capsule:
         object.__setattr__(self, "friction", _friction(self.friction))
 
     def upright_at(self, height: float, reach: float) -> bool:
-        """Tell whether a cable at `height` [m] touches the capsule only sideways.
+        """Tell whether a cable that lies on a table, its middle at `height` [m], touches the capsule only sideways.
 
-        So it is if the axis is vertical and the part between the round ends covers height - reach to height + reach,
+        So it is if the axis is vertical and the part between the round ends covers height to height + reach,
         or, by symmetry, if the axis is horizontal and lies exactly at `height`.
         """
         start, end = cast(Floats, self.start), cast(Floats, self.end)
@@ -139,10 +144,10 @@ class Cylinder:
         object.__setattr__(self, "friction", _friction(self.friction))
 
     def upright_at(self, height: float, reach: float) -> bool:
-        """Tell whether a cable at `height` [m] touches the cylinder only sideways.
+        """Tell whether a cable that lies on a table, its middle at `height` [m], touches the cylinder only sideways.
 
-        So it is if the axis is vertical and the mantle covers height - reach to height + reach, or, by symmetry, if the
-        axis is horizontal and lies exactly at `height`.
+        So it is if the axis is vertical and the mantle covers height to height + reach, or, by symmetry, if the axis is
+        horizontal and lies exactly at `height`.
         """
         center, axis = cast(Floats, self.center), cast(Floats, self.axis)
         if _vertical(axis):
@@ -178,9 +183,9 @@ class Box:
         object.__setattr__(self, "friction", _friction(self.friction))
 
     def upright_at(self, height: float, reach: float) -> bool:
-        """Tell whether four walls are vertical and cover height - reach to height + reach [m].
+        """Tell whether four walls are vertical and cover height to height + reach [m].
 
-        Then a cable at `height` touches the box only sideways.
+        Then a cable that lies on a table, its middle at `height`, touches the box only sideways.
         """
         z, sizes = cast(Floats, self.center)[2], cast(Floats, self.size)
         return any(

@@ -312,9 +312,9 @@ def test_frames_of_special_axes_are_rotations(axis):
 
 
 def test_a_body_that_stands_on_the_table_is_upright_there():
-    # a cable of radius 1.5 mm, its centreline at 0.3: the table's surface is at 0.2985
+    # a cable of radius 1.5 mm, its centreline at 0.3, from which on walls push it sideways
     height, radius = 0.3, 0.0015
-    middle = height - radius + 0.05
+    middle = height + 0.05
     quarter = Rotation.from_euler("y", 90, degrees=True).as_quat()[[3, 0, 1, 2]]
     for body in (
         Cylinder(center=(0.0, 0.0, middle), radius=0.02, height=0.1),
@@ -325,7 +325,8 @@ def test_a_body_that_stands_on_the_table_is_upright_there():
         assert body.upright_at(height, radius)
         assert body.upright_at(middle, radius)
         assert not body.upright_at(height - 1e-5, radius)
-        assert not body.upright_at(height, radius + 1e-5)
+        assert body.upright_at(middle + 0.05 - radius, radius)
+        assert not body.upright_at(middle + 0.05 - radius, radius + 1e-5)
         assert not body.upright_at(middle + 0.05, radius)
 
 
@@ -334,8 +335,8 @@ def test_a_capsule_is_upright_between_its_round_ends():
         start, end = [(0.2, 0.3, z) for z in ends]
         body = Capsule(start=start, end=end, radius=0.02)
         assert body.upright_at(0.05, 0.01)
-        assert body.upright_at(0.01, 0.01)
-        assert not body.upright_at(0.005, 0.01)
+        assert body.upright_at(0.0, 0.01)
+        assert not body.upright_at(-0.005, 0.01)
         assert not body.upright_at(0.11, 0.01)
 
 
