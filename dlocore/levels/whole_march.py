@@ -16,6 +16,7 @@ from dlocore.levels.level import (
     run_level,
     stretched,
 )
+from dlocore.levels.pressed import pressed_into
 from dlocore.levels.progress import record_level
 from dlocore.levels.review import FAR_MORE, STRAINED, called_for, called_for_by_fine
 from dlocore.problem.discretisation import smallest_n_u
@@ -121,8 +122,8 @@ def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
             return "stalled", words(problem, inside)
     deep = motion.deepest / problem.scene.cable.diameter
     if not motion.stopped and deep > TOO_DEEP:
-        pushed = f"The cable is pressed {deep:.0%} of its diameter into the table, an obstacle or itself."
-        return "stalled", f"{pushed} Take finer grids, or a motion that does not jam it."
+        pushed = f"The cable is pressed {deep:.0%} of its diameter into {pressed_into(problem, motion)}."
+        return "stalled", f"{pushed} Move it less far against that, or less fast."
     if not motion.stopped:
         split = f", {motion.split} of them in smaller steps" if motion.split else ""
         return "converged", f"Every time step found its equilibrium{split}.{level.mended}"

@@ -1,0 +1,80 @@
+"""Into what a motion presses the cable deepest, where along it and when: of one that jams."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dlocore.effects.distance import distances
+from dlocore.effects.selfcontact import APART
+from dlocore.problem.problem import Problem
+from dlocore.problem.standing import obstacle_rows
+from dlocore.problem.strands import nearest_strands
+from dlocore.solvers.march import March
+from dlocore.spline import design_matrix
+
+Floats = NDArray[np.float64]
+
+_AT_ONCE = 1_000_000  # nodes that are looked at together, over all times
+_MOST_PARTS = 1000  # of a cable between which two that meet are looked for
+_ROUNDING = 1e-9  # of a distance
+
+
+def pressed_into(problem: Problem, motion: March) -> str:
+    """Return in words what the states of a motion are deepest in, where and when; of no more where none is in any."""
+    found = [*_into_surroundings(problem, motion), *_into_itself(problem, motion)]
+    depth, words = max(found, default=(0.0, ""))
+    return words if depth > 0.0 else "the table, an obstacle or itself"
+
+
+def _into_surroundings(problem: Problem, motion: March) -> Iterator[tuple[float, str]]:
+    """Yield how deep the cable is in each obstacle and in the table [m], at most, and its words."""
+    if problem.contact is None:
+        return
+    scene, u = problem.scene, np.unique(motion.grid.tables.contact.u)
+    names = [f"obstacles[{scene.environment.obstacles.index(o)}]" for o in problem.obstacles]
+    rows = obstacle_rows(scene, problem.obstacles)
+    table = scene.environment.table if problem.table is not None else None
+    states = np.arange(motion.reached + 1)
+    for some in np.array_split(states, -(-len(states) * len(u) // _AT_ONCE)):
+        points = _places(problem, motion, u, some)
+        depths = [0.5 * scene.cable.diameter - distances(rows, points).T] if names else []
+        depths += [] if table is None else [(table.height - points[:, 2])[None]]
+        for name, depth in zip([*names, "the table"], np.concatenate(depths), strict=False):
+            k, i = divmod(int(np.argmax(depth)), len(u))
+            yield float(depth.max()), f"{name}, at u = {u[i]:.4g} m and {motion.times[some[k]]:.3g} s"
+
+
+def _into_itself(problem: Problem, motion: March) -> Iterator[tuple[float, str]]:
+    """Yield how far two strands are within a diameter [m], at most, and its words, where they may not cross."""
+    if problem.self_contact is None:
+        return
+    diameter, dimensions, knots = problem.scene.cable.diameter, problem.plane.dimensions, motion.grid.knots
+
+    def apart(first: int, last: int) -> float:
+        return nearest_strands(knots, motion.states[first:last], dimensions, diameter, diameter)
+
+    first, last = 0, motion.reached + 1
+    least = apart(first, last)
+    if not least < diameter:
+        return
+    while last - first > 1:
+        middle = (first + last) // 2
+        if apart(first, middle) <= least * (1.0 + _ROUNDING):
+            last = middle
+        else:
+            first = middle
+    length = problem.scene.cable.length
+    u = np.linspace(0.0, length, 1 + min(_MOST_PARTS, round(2.0 * length / diameter)))
+    x = _places(problem, motion, u, np.array([first]))
+    ways = np.linalg.norm(x[:, None] - x[None], axis=2)
+    ways[np.abs(u[:, None] - u) < APART * diameter] = np.inf
+    i, j = divmod(int(np.argmin(ways)), len(u))
+    yield diameter - least, f"itself, u = {u[i]:.4g} m into u = {u[j]:.4g} m, at {motion.times[first]:.3g} s"
+
+
+def _places(problem: Problem, motion: March, u: Floats, states: NDArray[np.int64]) -> Floats:
+    """Return the points (states u, 3) [m] of the cable at the places u [m] in some states of a motion."""
+    plane = problem.plane
+    at = design_matrix(motion.grid.knots, u) @ motion.states[states][..., : plane.dimensions]
+    return np.ascontiguousarray(plane.world(at).reshape(-1, 3))
