@@ -21,13 +21,22 @@ SAME_START = 1e-3  # of the length: a start that is moved by less was seen there
 ABOUT_ITSELF = 0.9  # of the turn of a gripper: what is about the cable that it holds, so that little else is left
 OVERSHOOTS = 0.5  # of the extent of waypoints: how far a path may swing out of the box around them without a word ...
 OUT = 1e-2  # ... and of the length
+CLOSE = 0.1  # of the median time between waypoints: what is less is no time in which a smooth path can follow noise ...
+THROWN = 1e-3  # ... and may throw it off, by so much of the length or more, and ...
+_MORE = 10.0  # ... by so many times as what is this close is off a path without it, which is less than that: no move
 _BETWEEN = 8  # places of a path between each two waypoints at which that is looked at
 _PLACES = 65  # of a start at which it is looked at
 
 
 def scene_notes(scene: Scene) -> list[str]:
     """Return what is to be known of a scene as it was given, in words."""
-    return [*cable_notes(scene), *_of_times(scene), *_of_turns(scene), *_of_overshoots(scene)]
+    return [
+        *cable_notes(scene),
+        *_of_times(scene),
+        *_of_turns(scene),
+        *_of_overshoots(scene),
+        *_of_close_times(scene),
+    ]
 
 
 def cable_notes(scene: Scene) -> list[str]:
@@ -136,8 +145,7 @@ def _of_overshoots(scene: Scene) -> list[str]:
         if not isinstance(grasp.path, Waypoints):
             continue
         times, given = cast(Floats, grasp.path.times), cast(Floats, grasp.path.positions)
-        between = np.linspace(0.0, 1.0, _BETWEEN, endpoint=False)
-        t = (times[:-1, None] + np.diff(times)[:, None] * between).ravel()
+        t = _along(times)
         path, low, high = grasp.path.at(t, given[0]), given.min(axis=0), given.max(axis=0)
         out = np.linalg.norm(np.maximum(0.0, np.maximum(low - path, path - high)), axis=1)
         k = int(np.argmax(out))
@@ -148,3 +156,38 @@ def _of_overshoots(scene: Scene) -> list[str]:
                 "keep it in, or a profile that stops at each"
             )
     return notes
+
+
+def _of_close_times(scene: Scene) -> list[str]:
+    """Return what is told of waypoints whose times are so close that noise between them throws a smooth path off."""
+    notes = []
+    for i, grasp in enumerate(scene.grasps):
+        path = grasp.path
+        if not isinstance(path, Waypoints) or path.profile != "spline":
+            continue
+        times, given = cast(Floats, path.times), cast(Floats, path.positions)
+        usual = float(np.median(np.diff(times)))
+        close = np.append(False, np.diff(times) < CLOSE * usual)
+        if not close.any() or (~close).sum() < 2:
+            continue
+        without = Waypoints(times=times[~close], positions=given[~close], start=path.start)
+        t = _along(times[times <= without.duration])
+        thrown = np.linalg.norm(path.at(t, given[0]) - without.at(t, given[0]), axis=1)
+        off = np.linalg.norm(given[close] - without.at(times[close], given[0]), axis=1)
+        k = int(np.argmax(thrown))
+        much = THROWN * scene.cable.length
+        if off.max() < much and thrown[k] > max(much, _MORE * off.max()):
+            j = int(np.flatnonzero(close)[np.argmin(np.abs(times[close] - t[k]))])
+            gap = times[j] - times[j - 1]
+            notes.append(
+                f"primitives[{i}].path.times[{j}] is {gap:.2g} s after the one before it, others are {usual:.2g} s "
+                f"apart: noise between the two throws the smooth path off by up to {in_mm(thrown[k])}, at "
+                f"{grasp.start + t[k]:.4g} s. Leave it out"
+            )
+    return notes
+
+
+def _along(times: Floats) -> Floats:
+    """Return times [s] at and between those of waypoints (n,) at which a path is looked at."""
+    between = np.linspace(0.0, 1.0, _BETWEEN, endpoint=False)
+    return np.asarray((times[:-1, None] + np.diff(times)[:, None] * between).ravel())
