@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from dlocore.scene.obstacles import Box, Cylinder, Obstacle
 from dlocore.scene.paths import Move, Waypoints
-from dlocore.scene.scene import Points, Scene
+from dlocore.scene.scene import Grasp, Points, Scene
 from dlocore.shape.shape import StartCurve, start_curve
 from dlocore.words import in_mm
 
@@ -19,6 +19,10 @@ SAME_LENGTH = 5e-3  # of the cable's: lengths of points that differ by less are 
 SAME_ENDS = 1e-3  # of the length: and so are ends, as those of noisy points, which the cable's length decides about
 SAME_START = 1e-3  # of the length: a start that is moved by less was seen there
 ABOUT_ITSELF = 0.9  # of the turn of a gripper: what is about the cable that it holds, so that little else is left
+MANY_TURNS = 3.0  # of a gripper in one move: by more it is asked whether degrees were meant, where they are ...
+_DEGREES = 5.0  # ... multiples of this
+NO_TURN = 1e-4  # by which the last of four is less than 1 in a quaternion that would be no turn, were it w
+_SAME_TIME = 1e-9  # relative
 OVERSHOOTS = 0.5  # of the extent of waypoints: how far a path may swing out of the box around them without a word ...
 OUT = 1e-2  # ... and of the length
 CLOSE = 0.1  # of the median time between waypoints: what is less is no time in which a smooth path can follow noise ...
@@ -36,6 +40,7 @@ def scene_notes(scene: Scene) -> list[str]:
         *_of_turns(scene),
         *_of_overshoots(scene),
         *_of_close_times(scene),
+        *_of_conventions(scene),
     ]
 
 
@@ -136,6 +141,49 @@ def _of_turns(scene: Scene) -> list[str]:
                 "hold 'clamp' twists it"
             )
     return notes
+
+
+def _of_conventions(scene: Scene) -> list[str]:
+    """Return what is asked of paths that seem to be in degrees, in (x, y, z, w), or by the clock of the scene."""
+    return [
+        f"primitives[{i}]{asked}"
+        for i, grasp in enumerate(scene.grasps)
+        for asked in (_in_degrees(grasp), _scalar_last(grasp), _by_another_clock(grasp))
+        if asked
+    ]
+
+
+def _in_degrees(grasp: Grasp) -> str:
+    if not isinstance(grasp.path, Move) or grasp.path.rotation is None:
+        return ""
+    rotation = cast(Floats, grasp.path.rotation)
+    angle = float(np.linalg.norm(rotation))
+    if not angle > MANY_TURNS * 2.0 * math.pi or np.any(rotation % _DEGREES):
+        return ""
+    meant = ", ".join(f"{x:.4g}" for x in np.radians(rotation))
+    around = f"turns by {angle:.4g} rad, {angle / (2.0 * math.pi):.3g} times around"
+    return f" {around}: rotation is in radians; if degrees were meant, give ({meant})"
+
+
+def _scalar_last(grasp: Grasp) -> str:
+    if not isinstance(grasp.path, Waypoints) or grasp.path.orientations is None:
+        return ""
+    turns = np.abs(cast(Floats, grasp.path.orientations))
+    least = math.sqrt(0.5)  # of cos(angle/2): a quarter turn from none
+    if not (turns[0, 3] > 1.0 - NO_TURN and turns[:, 3].min() > least and np.ptp(turns, axis=0).any()):
+        return ""
+    begins = ".path.orientations begin at a half turn about z, (0, 0, 0, 1) as (w, x, y, z)"
+    return f"{begins}: if they are (x, y, z, w), where that is no turn, put w first"
+
+
+def _by_another_clock(grasp: Grasp) -> str:
+    if not isinstance(grasp.path, Waypoints) or grasp.start == 0.0:
+        return ""
+    first = float(cast(Floats, grasp.path.times)[0])
+    if not math.isclose(first, grasp.start, rel_tol=_SAME_TIME):
+        return ""
+    begins = f".path.times begin at {first:.4g} s, as grasp_time: they are since then, and it waits until"
+    return f"{begins} {grasp.start + first:.4g} s. Let them begin at 0 to go at once"
 
 
 def _of_overshoots(scene: Scene) -> list[str]:

@@ -1,0 +1,72 @@
+"""Paths that seem to be in another unit, order or clock than they are read in are asked about, others are not."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from dlocore import Grasp, Move, Scene, Straight, Waypoints
+from dlocore.problem.notes import scene_notes
+from dlocore.scene.paths import Path
+from tests.solver.scenes import Floats, cable
+
+PLACE = [(0.0, 0.0, 0.0)] * 5
+
+
+def notes(path: Path, grasp_time: float | None = None) -> list[str]:
+    grasps = [Grasp(u=1.0), Grasp(u=0.0, hold="clamp", path=path, grasp_time=grasp_time)]
+    return scene_notes(Scene(cable=cable(), shape=Straight(), grasps=grasps, horizon=4.0))
+
+
+def turned(rotation: tuple[float, float, float]) -> list[str]:
+    return notes(Move(displacement=(0.0, 0.0, 0.0), rotation=rotation, duration=1.0))
+
+
+def test_a_turn_by_what_looks_like_degrees_is_asked_about() -> None:
+    (note,) = turned((90.0, 0.0, 0.0))
+    assert note.startswith("primitives[1] turns by 90 rad, 14.3 times around")
+    assert note.endswith("if degrees were meant, give (1.571, 0, 0)")
+    assert turned((0.0, -180.0, 45.0))
+
+
+@pytest.mark.parametrize("about", [5.0, 15.0, 10.0 * np.pi, 25.3], ids=["5", "15", "ten half turns", "no degrees"])
+def test_a_turn_by_radians_is_not_asked_about(about: float) -> None:
+    assert turned((0.0, 0.0, about)) == []
+
+
+def oriented(quaternions: Floats) -> list[str]:
+    path = Waypoints(times=np.arange(5) * 0.25, positions=PLACE, orientations=quaternions, profile="minimum_jerk")
+    return notes(path)
+
+
+def quaternions(*, last: bool, first: Rotation | None = None) -> Floats:
+    """Return five quaternions of a turn by 1 rad from a `first` one, w last or first."""
+    turns = Rotation.from_rotvec(np.outer(np.linspace(0.0, 1.0, 5), [0.0, 0.6, 0.8])) * (first or Rotation.identity())
+    found = np.asarray(turns.as_quat())
+    return found if last else found[:, [3, 0, 1, 2]]
+
+
+def test_quaternions_that_begin_at_no_turn_in_the_other_order_are_asked_about() -> None:
+    (note,) = oriented(quaternions(last=True))
+    assert note.startswith("primitives[1].path.orientations begin at a half turn about z")
+    assert note.endswith("put w first")
+    (again,) = oriented(-quaternions(last=True))  # which are the same turns
+    assert again == note
+
+
+@pytest.mark.parametrize("first", [(0.0, 0.0, 0.0), (np.pi, 0.0, 0.0), (0.0, 0.0, 1.0)])
+def test_quaternions_in_order_are_not_asked_about(first: tuple[float, float, float]) -> None:
+    assert oriented(quaternions(last=False, first=Rotation.from_rotvec(first))) == []
+    assert oriented(np.tile([0.0, 0.0, 0.0, 1.0], (5, 1))) == []  # it does not turn
+
+
+def test_a_late_path_whose_times_begin_at_its_grasp_time_is_asked_about() -> None:
+    path = Waypoints(times=[1.0, 2.0], positions=PLACE[:2])
+    (note,) = notes(path, grasp_time=1.0)
+    assert note.startswith("primitives[1].path.times begin at 1 s, as grasp_time")
+    assert "it waits until 2 s" in note
+
+
+def test_one_that_begins_at_once_or_waits_for_another_time_is_not() -> None:
+    for times in ([0.0, 1.0], [0.5, 2.0]):
+        assert notes(Waypoints(times=times, positions=PLACE[:2]), grasp_time=1.0) == []
+    assert notes(Waypoints(times=[1.0, 2.0], positions=PLACE[:2])) == []
