@@ -47,7 +47,10 @@ class WaypointsPath(Model):
         examples=[[[0.25, 0, 0], [0.25, 0.1, 0], [0.25, 0.3, 0]]],
     )
     orientations: list[Quaternion] | None = Field(
-        default=None, description="One unit quaternion (w, x, y, z) for each time.", examples=[[[1, 0, 0, 0]] * 3]
+        default=None,
+        description="One unit quaternion (w, x, y, z) for each time; it turns the shorter way to the next, with "
+        "profile `spline` as smoothly as it goes.",
+        examples=[[[1, 0, 0, 0]] * 3],
     )
     start: Literal["rest", "moving"] = Field(
         default="rest",

@@ -6,12 +6,16 @@ its last a path stands still.
 
 import math
 from dataclasses import dataclass
-from typing import Literal, cast, get_args
+from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.errors import SceneError, array, choice, number
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+    from scipy.spatial.transform import Rotation
 
 Floats = NDArray[np.float64]
 Profile = Literal["minimum_jerk", "linear", "cubic"]
@@ -132,7 +136,8 @@ class Waypoints:
     With a `profile` other than "spline" it goes straight from each waypoint to the next as a `Move` with that profile
     does, and turns about one axis: a robot's program of moves, and pauses where two waypoints are the same. A "linear"
     one goes on at once, with another velocity.
-    `orientations` (n, 4), unit quaternions (w, x, y, z), turn the grasp by their rotation since the first. The first
+    `orientations` (n, 4), unit quaternions (w, x, y, z), turn the grasp by their rotation since the first, the shorter
+    way from each to the next; along a spline they do so as smoothly as positions go, and start at rest, too. The first
     position must be that of the cable at the grasped point as the grasp closes, within GRASP_TOLERANCE of
     `dlocore.problem.brought`; the start shape is brought to it, and a cable in motion drawn to it within DRAWN.
     """
@@ -164,10 +169,9 @@ class Waypoints:
             raise SceneError("positions", f"{len(positions)} positions", f"as many as times ({len(times)})")
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "positions", positions)
-        from scipy.interpolate import CubicSpline, make_interp_spline  # slow to import, as the rotations below
+        from scipy.interpolate import make_interp_spline  # slow to import, as the rotations below
 
-        boundary = "not-a-knot" if self.start == "moving" else ((1, np.zeros(3)), (2, np.zeros(3)))
-        spline = CubicSpline(times, positions, bc_type=boundary) if smooth else make_interp_spline(times, positions, 1)  # type: ignore[arg-type]
+        spline = self._smoothly(positions) if smooth else make_interp_spline(times, positions, 1)
         object.__setattr__(self, "_spline", spline)
         if self.orientations is not None:
             quaternions = array("orientations", self.orientations, shape=(None, 4))
@@ -180,8 +184,17 @@ class Waypoints:
             object.__setattr__(self, "orientations", quaternions)
             from scipy.spatial.transform import Rotation, Slerp
 
-            turns = Rotation.from_quat(quaternions[:, [1, 2, 3, 0]])
-            object.__setattr__(self, "_slerp", Slerp(times, turns * turns[0].inv()))
+            given = Rotation.from_quat(quaternions[:, [1, 2, 3, 0]])
+            turns = given * given[0].inv()
+            object.__setattr__(self, "_turns", self._smoothly(_nearest(turns)) if smooth else Slerp(times, turns))
+
+    def _smoothly(self, values: Floats) -> "CubicSpline":
+        """Return the C2 cubic spline through values (n, k) at the times, that starts at rest if the path does."""
+        from scipy.interpolate import CubicSpline
+
+        zero = np.zeros(values.shape[1])
+        boundary: Any = "not-a-knot" if self.start == "moving" else ((1, zero), (2, zero))
+        return CubicSpline(cast(Floats, self.times), values, bc_type=boundary)
 
     @property
     def duration(self) -> float:
@@ -218,7 +231,14 @@ class Waypoints:
 
     def rotation_at(self, t: Floats) -> Floats | None:
         """Rotations since the grasp began at times `t`; (k, 3, 3), or None where it never turns."""
-        return None if self.orientations is None else self._slerp(self._evenly(t)).as_matrix()  # type: ignore[attr-defined]
+        return None if self.orientations is None else self._turned(t).as_matrix()
+
+    def _turned(self, t: Floats) -> "Rotation":
+        """Return the rotations (k,) since the first waypoint at times `t` (k,) [s], of a path that turns."""
+        from scipy.spatial.transform import Rotation
+
+        turns = self._turns(self._evenly(t))  # type: ignore[attr-defined]
+        return Rotation.from_quat(turns) if self.profile == "spline" else turns
 
     def spin(self, t: Floats, tangents: Floats) -> Floats:
         """Turn about the `tangents` (k, 3) between each two of the times `t` (k,) [s]; (k - 1,) [rad].
@@ -228,7 +248,7 @@ class Waypoints:
         if self.orientations is None:
             return np.zeros(len(t) - 1)
         fine = np.unique(np.concatenate([t, cast(Floats, self.times)]))
-        turns = self._slerp(self._evenly(fine))  # type: ignore[attr-defined]
+        turns = self._turned(fine)
         steps = (turns[1:] * turns[:-1].inv()).as_rotvec()
         at = np.clip(np.searchsorted(t, fine[:-1], side="right") - 1, 0, len(t) - 2)
         inside = (fine[:-1] >= t[0]) & (fine[1:] <= t[-1])
@@ -237,6 +257,13 @@ class Waypoints:
 
 
 Path = Still | Move | Waypoints
+
+
+def _nearest(turns: "Rotation") -> Floats:
+    """Return a quaternion (x, y, z, w) of each of some rotations: of its two that which is nearer to the one before."""
+    quaternions = turns.as_quat()
+    signs = np.where((quaternions[1:] * quaternions[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
+    return np.asarray(quaternions * np.cumprod(np.append(1.0, signs))[:, None])
 
 
 def held_at(path: Path, t: Floats, start: Floats) -> Floats:
