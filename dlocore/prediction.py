@@ -1,7 +1,7 @@
 """What a solve returns."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
 
@@ -24,7 +24,7 @@ from dlocore.errors import number
 from dlocore.pickling import state_with
 from dlocore.scene.scene import MAX_STRAIN, ControlPoints, Scene
 from dlocore.spline import SplineSurface, greville
-from dlocore.words import in_mm, in_newtons
+from dlocore.words import in_mm, in_ms, in_newtons
 
 if TYPE_CHECKING:
     from dlocore.levels.level import Level
@@ -66,15 +66,21 @@ class Prediction:
     iterations: tuple[Iteration, ...]
     accuracy: Accuracy
     start_fit: float
-    report_grasps: Callable[[], tuple[GraspReaction, ...]] = field(repr=False)
-    report_contacts: Callable[[], tuple[ContactForce, ...]] = field(repr=False)
-    report_effects: Callable[[SplineSurface], tuple[EffectReport, ...]] = field(repr=False)
-    report_material: Callable[[], MaterialMotion | None] = field(repr=False)
-    report_stretch: Callable[[], StretchMotion] = field(repr=False)
-    find_objections: Callable[[], list[str]] = field(repr=False)
-    find_start_energy: Callable[[], float] = field(repr=False)
-    level: "Level | None" = field(default=None, repr=False)
-    judged: "Prediction | None" = field(default=None, repr=False)
+    report_grasps: Callable[[], tuple[GraspReaction, ...]]
+    report_contacts: Callable[[], tuple[ContactForce, ...]]
+    report_effects: Callable[[SplineSurface], tuple[EffectReport, ...]]
+    report_material: Callable[[], MaterialMotion | None]
+    report_stretch: Callable[[], StretchMotion]
+    find_objections: Callable[[], list[str]]
+    find_start_energy: Callable[[], float]
+    level: "Level | None" = None
+    judged: "Prediction | None" = None
+
+    def __repr__(self) -> str:
+        accuracy = self.accuracy
+        error = "not known" if accuracy.error_estimate is None else in_mm(accuracy.error_estimate)
+        by = f"{accuracy.method} on {accuracy.n_u} x {accuracy.n_t} control points"
+        return f"<Prediction: {self.status} by {by}, estimated error {error}, in {in_ms(accuracy.wall_time)}>"
 
     @cached_property
     @interruptible

@@ -219,6 +219,9 @@ class Sensitivities:
     above: tuple[SplineSurface, ...]
     below: tuple[SplineSurface, ...]
 
+    def __repr__(self) -> str:
+        return f"<Sensitivities by {', '.join(self.names) or 'nothing'}>"
+
     def __call__(self, u: ArrayLike, t: ArrayLike) -> Floats:
         """Return dr/dparameter on the grid of t (m,) [s] and u (k,) [m]; (parameters, m, k, 3) [m per its unit].
 

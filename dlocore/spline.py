@@ -77,6 +77,10 @@ class SplineSurface:
     knots_u: Floats
     knots_t: Floats
 
+    def __repr__(self) -> str:
+        n_t, n_u = self.control_points.shape[:2]
+        return f"<SplineSurface: {n_u} x {n_t} control points, {self.length:g} m, {self.horizon:g} s>"
+
     @property
     def length(self) -> float:
         """Length of the cable [m]."""
