@@ -121,7 +121,7 @@ def test_what_reads_a_motion_refuses_other_times_places_and_cables():
                 read(found.scene, found.surface, [t])
         with pytest.raises(SceneError, match="surface: got that of a cable of 1 m"):
             read(scene(2.0), found.surface, [0.0])
-    with pytest.raises(SceneError, match="surface: got Prediction"):
+    with pytest.raises(SceneError, match="surface: got <Prediction"):
         energies(found.scene, found, [0.0])
     for u, t in ((2.0, 0.5), (-1.0, 0.5), (0.5, 50.0), (0.5, np.nan)):
         with pytest.raises(SceneError, match=r"[ut]: got"):
