@@ -27,7 +27,7 @@ from dlocore.kernels.sensitivity import factor_steps, follow_steps
 from dlocore.kernels.timefit import fit_time
 from dlocore.prediction import Prediction
 from dlocore.problem.discretisation import applied_forces, applied_in_steps
-from dlocore.problem.events import closed_grasps, swing
+from dlocore.problem.events import closed_grasps
 from dlocore.problem.grid import Grid
 from dlocore.problem.holding import Starts
 from dlocore.problem.problem import Problem, pose, stiffer
@@ -406,7 +406,7 @@ def _scale(scene: Scene, path: str) -> float:
     """
     *before, last = _steps_of(path)
     field = next(step for step in (last, *reversed(before)) if isinstance(step, str))
-    cable, time = scene.cable, min(cast(float, scene.horizon), swing(scene))
+    cable, time = scene.cable, min(cast(float, scene.horizon), scene.swing)
     length, mass = cable.length, cable.linear_density * cable.length
     match field:
         case "control_points" | "velocity" if last == 3:

@@ -8,7 +8,6 @@ from dlocore.answer.parts import Status
 from dlocore.levels.level import Level, Size, given_steps
 from dlocore.levels.progress import record_level
 from dlocore.levels.whole_march import is_folded, march_level, march_status
-from dlocore.problem.events import swing
 from dlocore.problem.problem import Problem
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.timefit import evened, fit, largest
@@ -58,7 +57,7 @@ def evenly_fitted(level: Level) -> Level:
     motion, problem = level.motion, level.problem
     if motion.stopped or not level.missed > MISSED * problem.scene.cable.length:
         return level
-    period = swing(problem.scene)
+    period = problem.scene.swing
     knots_t = evened(motion, level.knots_t, np.array([event.time for event in problem.events]), period)
     control, off = fit(motion, knots_t)
     return replace(level, knots_t=knots_t, control=control, missed=largest(motion.times, off, period))

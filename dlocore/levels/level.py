@@ -12,7 +12,7 @@ from dlocore.kernels.growth import LOOKS
 from dlocore.kernels.timefit import farthest, sampled
 from dlocore.problem.checks import TOO_DEEP
 from dlocore.problem.discretisation import smallest_n_u
-from dlocore.problem.events import JUMP, moments, swing, swings
+from dlocore.problem.events import JUMP, moments, swings
 from dlocore.problem.grid import Grid
 from dlocore.problem.held_ends import held_back
 from dlocore.problem.problem import Problem, stiff_as_taut, stiffer, stiffer_for
@@ -123,7 +123,7 @@ class Level:
         """Other times (k,) [s] to compare it at: what the evenly spaced ones would not tell."""
         step = self.problem.horizon / (len(self.samples) - 1)
         found = [begin + step * _SOONER for begin in self.sudden]
-        if step * (_SAMPLES - 1) > (1.0 + _ROUNDING) * swing(self.problem.scene):
+        if step * (_SAMPLES - 1) > (1.0 + _ROUNDING) * self.problem.scene.swing:
             found += [begin + step * _EVENLY for begin in self._lively(step)]
         times = np.unique(np.concatenate([[], *found]))
         return np.asarray(times[times < self.problem.horizon])
@@ -260,7 +260,7 @@ def run_level(
     if booked:
         monitor.phase("march")
     smooth = motion
-    period = swing(problem.scene)
+    period = problem.scene.swing
     if free_knots and (problem.contact is not None or motion.deepest > 0.0):
         knots_t, smooth = refined(motion, knots_t, _MISSED * problem.scene.cable.diameter, True)
     elif free_knots and problem.horizon > _LONG * period:

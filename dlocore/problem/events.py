@@ -1,6 +1,5 @@
 """When a motion is not smooth, how long it is, and what holds the cable meanwhile."""
 
-import math
 from dataclasses import dataclass
 from typing import cast
 
@@ -30,14 +29,9 @@ class Event:
     multiplicity: int
 
 
-def swing(scene: Scene) -> float:
-    """Return about how long a cable of that length needs to swing once [s]."""
-    return 2.0 * math.sqrt(scene.cable.length)
-
-
 def swings(scene: Scene) -> float:
     """Return how many times as long a motion is as a cable of that length needs to swing, about; 1 to _LONGEST."""
-    return min(max(cast(float, scene.horizon) / swing(scene), 1.0), _LONGEST)
+    return min(max(cast(float, scene.horizon) / scene.swing, 1.0), _LONGEST)
 
 
 def moments(scene: Scene, in_a_swing: int) -> int:

@@ -5,7 +5,6 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.problem.events import swing
 from dlocore.problem.problem import Problem
 from dlocore.scene.paths import Waypoints
 
@@ -22,7 +21,7 @@ def trembles(problem: Problem, step: float) -> float:
     scene, most = problem.scene, 0.0
     if problem.inertia is None:
         return 0.0
-    lasts = min(problem.horizon, swing(scene))
+    lasts = min(problem.horizon, scene.swing)
     for grasp in scene.grasps:
         path = grasp.path
         if not isinstance(path, Waypoints) or path.profile != "spline":  # a program is no record

@@ -447,9 +447,14 @@ class Scene:
                 raise SceneError(field, f"a way of {far:g} m", f"at most {most:g} [m] for this cable", MILLIMETRES)
 
     @property
+    def swing(self) -> float:
+        """About how long a cable of that length needs to swing once [s]."""
+        return 2.0 * math.sqrt(self.cable.length)
+
+    @property
     def moment(self) -> float:
         """What is no farther apart in time is at once [s]: the same time comes of two sums but for rounding."""
-        return AT_ONCE * min(cast(float, self.horizon), 2.0 * math.sqrt(self.cable.length))
+        return AT_ONCE * min(cast(float, self.horizon), self.swing)
 
     @property
     def weight(self) -> float:
@@ -500,5 +505,5 @@ def _farthest(path: Path) -> tuple[str, float]:
 
 
 FARTHEST, FAR = 100.0, 50.0  # of the length, and [m]: a gripper that goes farther than both has another unit
-AT_ONCE = 1e-5  # of the horizon, or of about how long a cable of that length needs to swing once
+AT_ONCE = 1e-5  # of the horizon, or of a swing
 MIN_GRASP_DISTANCE = 1e-4  # of the length, between two grasps that hold at the same time

@@ -458,7 +458,7 @@ def tolerance_of(problem: Problem, grid: Grid, step: float) -> float:
     """
     cable = problem.scene.cable
     length = cable.length
-    of_coarse = step / (COARSE * 2.0 * math.sqrt(length))
+    of_coarse = step / (COARSE * problem.scene.swing)
     spans = [b - a for a, b in pairwise(grid.knots.tolist()) if b > a]
     short = min(1.0, _SHORT * len(spans) * min(spans) / length)
     stiff = cast(float, cable.axial_stiffness) * length**2 / cast(float, cable.bending_stiffness)
