@@ -56,7 +56,9 @@ def test_an_unknown_error_has_no_parts():
 @pytest.mark.parametrize(("duration", "target"), [(1000.0, 1e-5), (600.0, 5e-5), (400.0, 1e-3), (1000.0, 1e-3)])
 def test_a_target_is_met_with_the_inertia_that_is_left_out_or_it_is_not_left_out(duration, target):
     way = Move(displacement=(0.0, 0.3, 0.0), duration=duration)
-    found = predict(replace(SCENE, grasps=(Grasp(u=0.0, path=way),), quality=Quality(target_error=target)))
+    slow = replace(SCENE, grasps=(Grasp(u=0.0, path=way),), horizon=duration, quality=Quality(target_error=target))
+    found = predict(slow)
     assert found.status == "converged"
     assert found.accuracy.error_estimate <= target
-    assert f"the estimated error is {found.accuracy.error_estimate * 1e3:.3g} mm" in found.message
+    told = found.accuracy.error_estimate - found.accuracy.error_parts["iteration"]  # of the grids, and what is left out
+    assert f"the estimated error is {told * 1e3:.3g} mm" in found.message
