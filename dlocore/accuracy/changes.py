@@ -14,8 +14,9 @@ _LEFT_KINKED = 0.9  # the same of a `kinked` march; 1 were its steps of first or
 _LEFT_ALONG = 0.75  # the same of half as many control points again
 _MOST_LEFT = 1.5  # times the last change: what is believed of changes that hardly shrink
 _MOST_FALL = 20.0  # times less than the refinement before, at most, is believed of one: more is chance
-# ... where strong damping begins with it, whose errors are about those of half as many steps without: 6 in theory
-_MOST_FALL_DAMPED = 8.0
+# ... where strong damping begins with it: its errors are about those of half as many steps without, which the grid
+# before has, so that these two may agree as they err alike. A third of what that was moved by is left in both.
+_MOST_FALL_DAMPED = 3.0 * _LEFT_KINKED
 _MOST_FALL_YIELDING = 4.0  # ... where the cable yields: it is bent for good within a span, which coarse grids lack
 MORE = 1.1  # times as many steps, or control points: fewer are as many
 _STALE = 4.0  # times what a refinement in one direction moved the surface by: once those in the other moved it by more,
