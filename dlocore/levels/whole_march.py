@@ -90,7 +90,10 @@ def march_level(
 
 def sided(problem: Problem, monitor: Monitor) -> Problem:
     """Return the problem, with a side to go to where a march says that its motion leaves its plane."""
-    if not may_leave_plane(problem):
+    cable = problem.scene.cable
+    yields = any(x is not None for x in (cable.yield_strain, cable.yield_twist, cable.yield_stretch))
+    bends = yields and problem.scene.effects.get("plasticity", "auto") != "off"  # what is bent for good may turn over
+    if not (may_leave_plane(problem) or bends):
         return problem
     for number in _LOOKS:
         called = march_level(problem, stretched(problem, number), monitor).posed.called_for

@@ -25,6 +25,7 @@ from dlocore import (
     predict,
 )
 from dlocore.errors import Cancelled
+from dlocore.levels.whole_march import sided
 from dlocore.problem.problem import pose
 from dlocore.reference import refine
 from dlocore.reference.fit import fit
@@ -334,3 +335,16 @@ def test_a_tap_early_in_a_long_time_is_shown_within_the_target():
     found = predict(scene)
     assert found.status == "converged", found.message
     assert found.accuracy.error_parts["time"] < 1e-3
+
+
+def test_a_motion_that_bends_a_cable_for_good_is_looked_at_for_whether_it_leaves_its_plane():
+    # its bends turn over with the sections: planar rods were `converged`, 64 mm from where a cable on its side goes
+    scene = Scene(
+        cable=cable(bending_stiffness=1e-2, yield_strain=0.005, memory_rate=50.0),
+        shape=Straight(),
+        grasps=(Grasp(u=0.5, path=Move(displacement=(0.0, 0.4, 0.0), duration=0.6)),),
+        environment=Environment(drag=0.1, table=Table()),
+        horizon=1.2,
+    )
+    assert "side" in sided(pose(scene), Monitor()).called_for
+    assert "side" not in sided(pose(replace(scene, effects={"plasticity": "off"})), Monitor()).called_for
