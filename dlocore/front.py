@@ -39,8 +39,8 @@ from dlocore.problem.grid import Grid
 from dlocore.problem.problem import Problem, pose
 from dlocore.problem.time_grid import smallest_n_t
 from dlocore.scene.scene import Method, Quality, Scene
+from dlocore.solvers import paper
 from dlocore.solvers.monitor import Monitor, TimeIsUp, time_allowed
-from dlocore.solvers.paper import BEYOND, solve_as_printed
 from dlocore.solvers.spacetime import solve
 from dlocore.words import counted, in_ms
 
@@ -185,6 +185,8 @@ def _least_squares(
     """Solve on the given grid by the weighted least squares from a march, or by the printed scheme from rest."""
     assert quality.n_u is not None
     assert quality.n_t is not None
+    if method == "paper":
+        paper.refuse(problem, quality.n_u, quality.n_t)
     if again is None:
         check_n_t(problem, quality.n_t)
         level = march_given(problem, quality.n_u, quality.n_t, monitor)
@@ -207,7 +209,7 @@ def _least_squares(
             control, converged, update = solved.control, solved.converged, solved.update
             find_forces = solved.find_forces
         else:
-            control, converged, update = solve_as_printed(
+            control, converged, update = paper.solve_as_printed(
                 problem, level.motion, knots_t, quality.threshold, monitor, on_step
             )
     except TimeIsUp:
@@ -246,7 +248,7 @@ def _least_squares(
             )
         else:
             message += " The surface is that of the march it started from."
-    elif not np.abs(control).max() <= BEYOND * problem.scene.cable.length:
+    elif not np.abs(control).max() <= paper.BEYOND * problem.scene.cable.length:
         status = "stalled"
         message += " The iterates grew beyond all bounds; the surface is that of a march."
         control, left = level.control, level.motion.update

@@ -13,6 +13,8 @@ from dlocore.levels.level import Size, given_steps, stretched
 from dlocore.problem.discretisation import smallest_n_u, too_few
 from dlocore.problem.problem import Problem, pose
 from dlocore.scene.scene import Scene
+from dlocore.shape.shape import rest_curve
+from dlocore.solvers import paper
 
 # Medians measured on one 2-core cloud machine of 2026; they tell the order of the time it takes
 # (benchmarks/expected_times.py).
@@ -67,6 +69,9 @@ def plan(scene: Scene) -> Plan:
     method = quality.method
     if method == "auto":
         method = automatic_method(problem)
+    rest = problem.rest_shape
+    if not isinstance(rest, str) and problem.start.material is None:
+        rest_curve(rest, scene.cable.length)
     if quality.n_u is None or quality.n_t is None:
         n_u, n_t, steps = stretched(problem, _LEVEL)
         marches = [stretched(problem, i) for i in range(_LEVEL + 1)]
@@ -80,8 +85,13 @@ def plan(scene: Scene) -> Plan:
         if quality.estimate:
             coarse = coarser(problem, marches[0]) if method == "march" else None
             marches.append(coarse or finer(problem, marches[0]))
+    if method == "paper":
+        paper.refuse(problem, n_u, n_t)
     dimensions = problem.plane.dimensions
     if method == "reference":
+        from dlocore.reference.solve import refuse  # its compiled code is for those who ask for it
+
+        refuse(problem)
         n_u, n_t, steps = _RODS[-1][0] + 1, _RODS[-1][1] + 1, _RODS[-1][1]
         marches = []
     expected = _SETUP + factor * sum(_MARCH[problem.nc] * size * count for size, _, count in marches)

@@ -24,8 +24,8 @@ from dlocore.problem.plane import leftwards, turned_about
 from dlocore.problem.problem import Problem
 from dlocore.problem.tension import at_points
 from dlocore.scene.paths import Waypoints
-from dlocore.scene.scene import Material, Points
-from dlocore.shape.shape import SplineCurve, fit_to_knots, spin_to_knots, start_curve, velocity_to_knots
+from dlocore.scene.scene import Material
+from dlocore.shape.shape import SplineCurve, fit_to_knots, rest_curve, spin_to_knots, velocity_to_knots
 from dlocore.spline import DEGREE, spline_at
 
 Floats = NDArray[np.float64]
@@ -214,13 +214,7 @@ def _memory(problem: Problem, grid: Grid, history: History) -> Floats:
         return remembered if _has_yielded(material) else _as_stressed(problem, grid, remembered)
     if problem.rests_straight:
         return history.memory
-    if isinstance(rest, str):
-        curve: SplineCurve = problem.start
-    else:
-        try:
-            curve = start_curve(Points(points=rest), problem.scene.cable.length)
-        except SceneError as error:  # of points, whose field is another
-            raise SceneError("cable.rest_shape", error.given, error.allowed, error.reason) from None
+    curve: SplineCurve = problem.start if isinstance(rest, str) else rest_curve(rest, problem.scene.cable.length)
     own = _untouched(problem, grid) if curve is problem.start else problem.coordinates(fit_to_knots(curve, grid.knots))
     if nc == 2:
         kappa = plane_curvature_of(grid.tables, own)

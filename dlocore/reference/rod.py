@@ -12,8 +12,7 @@ from dlocore.problem.problem import Problem
 from dlocore.reference import body as places
 from dlocore.reference.surface import BOX, CYLINDER, FRICTION, PLANE, ROUNDING, ROW
 from dlocore.scene.obstacles import Box, Capsule, Cylinder, Obstacle, Sphere
-from dlocore.scene.scene import Points
-from dlocore.shape.shape import SplineCurve, start_curve
+from dlocore.shape.shape import SplineCurve, rest_curve
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -329,7 +328,7 @@ def _with_start(rod: Rod) -> Rod:
     a, at_nodes = _along(tangents, between, director, angle)
     natural = np.zeros((len(u), 3))
     if material is None and not isinstance(problem.rest_shape, str):
-        natural = _bends(rod, start_curve(Points(points=problem.rest_shape), cable.length))
+        natural = _bends(rod, rest_curve(problem.rest_shape, cable.length))
     elif material is None and problem.rest_shape == "initial":
         natural = _bends(rod, start, between)
     remembered = natural

@@ -6,7 +6,8 @@ from typing import Any, cast
 
 from numpy.typing import ArrayLike
 
-from dlocore.errors import SceneError, choice, number, points_array
+from dlocore.errors import SceneError, choice, number
+from dlocore.scene.points import points_along
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,10 +42,11 @@ class Cable:
         yield_stretch: eps_M of the axial strain.
         memory_rate: the paper's k_eps [1/s], how fast what yields is remembered; needed with any yield strain.
         hardening: what of the remembered strain resists as a back stress, 0 (the paper's law) to 1.
-        rest_shape: the stress-free shape: "straight", "initial" (that of the start shape) or points (n, 2 or 3) [m].
+        rest_shape: the stress-free shape: "straight", "initial" (that of the start shape) or points (n, 2 or 3) [m],
+            4 to 100,000.
 
     Raises:
-        SceneError: a value is missing, not finite or not positive.
+        SceneError: a value is missing, not finite or not positive; the points of a shape are too few or all the same.
     """
 
     length: float
@@ -112,7 +114,7 @@ class Cable:
         if isinstance(self.rest_shape, str):
             choice("rest_shape", self.rest_shape, ("straight", "initial"))
         else:
-            put("rest_shape", points_array("rest_shape", self.rest_shape))
+            put("rest_shape", points_along("rest_shape", self.rest_shape))
 
     @property
     def solid_axial_stiffness(self) -> float:

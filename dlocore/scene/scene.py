@@ -21,12 +21,12 @@ from dlocore.errors import (
     instance,
     instances,
     number,
-    points_array,
     whole,
 )
 from dlocore.scene.cable import Cable
 from dlocore.scene.obstacles import Obstacle
 from dlocore.scene.paths import Move, Path, Still, Waypoints
+from dlocore.scene.points import points_along
 
 Floats = NDArray[np.float64]
 Hold = Literal["point", "tangent", "clamp"]
@@ -52,9 +52,11 @@ MAX_N_U, MAX_N_T = 129, 513  # of a given grid: memory and time
 DELTA = 1e-5  # [m]: threshold of a least squares
 MAX_OBSTACLES = 100
 AUTO_TARGET = 2e-3  # of the length: the error that quality "auto" aims at
-MAX_POINTS = 100_000
 MAX_STRAIN = 0.5  # axial, that a start may have
 MAX_PRESCRIBED_STRAIN = 0.005  # of the chord between two grasps: beyond it no cable of this kind can follow
+FARTHEST, FAR = 100.0, 50.0  # of the length, and [m]: a gripper that goes farther than both has another unit
+AT_ONCE = 1e-5  # of the horizon, or of a swing
+MIN_GRASP_DISTANCE = 1e-4  # of the length, between two grasps that hold at the same time
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -96,7 +98,7 @@ class Points:
     velocity: ArrayLike | None = None
 
     def __post_init__(self) -> None:
-        points = _points("points", self.points, at_least=4)
+        points = points_along("points", self.points)
         object.__setattr__(self, "points", points)
         flag("settle", self.settle)
         object.__setattr__(self, "velocity", _velocity(self.velocity, len(points)))
@@ -181,15 +183,6 @@ class ControlPoints:
 
 
 Shape = Straight | Points | ControlPoints
-
-
-def _points(name: str, value: ArrayLike, *, at_least: int) -> Floats:
-    points = points_array(name, value)
-    if not at_least <= len(points) <= MAX_POINTS:
-        raise SceneError(name, f"{len(points)} points", f"{at_least} to {MAX_POINTS} points")
-    if not np.ptp(points, axis=0).max() > 1e-9:
-        raise SceneError(name, points, "points that are not all the same")
-    return points
 
 
 def _velocity(value: ArrayLike | None, count: int | None, columns: int = 3) -> Floats | None:
@@ -502,8 +495,3 @@ def _farthest(path: Path) -> tuple[str, float]:
         positions = cast(Floats, path.positions)
         return "positions", float(np.linalg.norm(positions - positions[0], axis=1).max())
     return "", 0.0
-
-
-FARTHEST, FAR = 100.0, 50.0  # of the length, and [m]: a gripper that goes farther than both has another unit
-AT_ONCE = 1e-5  # of the horizon, or of a swing
-MIN_GRASP_DISTANCE = 1e-4  # of the length, between two grasps that hold at the same time

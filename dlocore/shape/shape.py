@@ -141,6 +141,18 @@ def start_curve(shape: Shape, length: float) -> StartCurve:
     return _fitted(shape, length)
 
 
+def rest_curve(points: Floats, length: float) -> SplineCurve:
+    """Return the stress-free curve through points (n, 3) [m] of a cable of a length [m].
+
+    Raises:
+        SceneError: the points do not lie along a curve of about that length.
+    """
+    try:
+        return start_curve(Points(points=points), length)
+    except SceneError as error:  # of the start's points, whose field is another
+        raise SceneError("cable.rest_shape", error.given, error.allowed, error.reason) from None
+
+
 def _straight(shape: Straight, length: float) -> StartCurve:
     start, direction = cast(Floats, shape.start), cast(Floats, shape.direction)
     control = start + length * _THIRDS * (direction / math.sqrt(direction @ direction))

@@ -29,6 +29,20 @@ LARGEST_NET = 600  # control points: the least squares is dense, as printed
 BEYOND = 1e6  # times the length: iterates that went so far do not come back
 
 
+def refuse(problem: Problem, n_u: int, n_t: int) -> None:
+    """Refuse what the printed scheme can't solve on a grid of so many control points along the cable and in time.
+
+    Raises:
+        SceneError: the motion has jumps inside, or the net is too large for a dense least squares.
+    """
+    if any(event.multiplicity > 1 for event in problem.events):
+        allowed = '"march" or "spacetime" where grasps open, close or jump in mid-motion'
+        raise SceneError("quality.method", "paper", allowed, "The printed scheme has one smooth motion")
+    if n_u * n_t > LARGEST_NET:
+        allowed = f"at most {LARGEST_NET} control points with the printed scheme, which is dense"
+        raise SceneError("quality.n_u", f"n_u n_t = {n_u * n_t}", allowed)
+
+
 def solve_as_printed(
     problem: Problem,
     motion: March,
@@ -39,29 +53,23 @@ def solve_as_printed(
 ) -> tuple[Floats, bool, float]:
     """Iterate the printed scheme; return control points (n_t, n_u, nc) [m], whether it converged, the last update [m].
 
+    The problem is one that `refuse` lets pass.
+
     Args:
         on_step: called with (control, update [m], residual [N]) after every iteration.
 
     Raises:
-        SceneError: the motion has jumps inside, or the net is too large for a dense least squares.
         Cancelled: the caller asked to stop.
     """
     grid = motion.grid
-    windows = windows_of(problem, knots_t)
-    if len(windows) > 1:
-        allowed = '"march" or "spacetime" where grasps open, close or jump in mid-motion'
-        raise SceneError("quality.method", "paper", allowed, "The printed scheme has one smooth motion")
     n_t, n_u = len(knots_t) - 4, grid.n_u
-    if n_u * n_t > LARGEST_NET:
-        allowed = f"at most {LARGEST_NET} control points with the printed scheme, which is dense"
-        raise SceneError("quality.n_u", f"n_u n_t = {n_u * n_t}", allowed)
     grasps = closed_grasps(problem.scene, 0.0, problem.horizon)
     starts: Starts = {}
     close_grasps(problem, grid, grasps, starts, None)
     window = WindowSolver(
         problem,
         grid,
-        windows[0],
+        windows_of(problem, knots_t)[0],
         grasps,
         starts,
         grid.start,

@@ -108,7 +108,7 @@ def test_a_cable_that_is_curved_at_rest_stays_as_it_starts():
         {"shape": Points(points=np.linspace((0, 0, 0), (1, 0, 0), 5))},
         {"environment": Environment(table=Table())},
         {"effects": {"inertia": "off"}},
-        {"cable": Cable.preset("paper", rest_shape=np.zeros((4, 3)))},
+        {"cable": Cable.preset("paper", rest_shape=np.linspace((0, 0, 0), (1, 0, 0), 4))},
     ],
     ids=["points", "table", "no inertia", "rest shape"],
 )

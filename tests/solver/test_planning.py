@@ -1,7 +1,9 @@
 """What a plan expects of a solve before it is done, and what it refuses."""
 
 from dataclasses import replace
+from typing import Any
 
+import numpy as np
 import pytest
 
 from dlocore import (
@@ -21,6 +23,7 @@ from dlocore import (
 
 PATH = Move(displacement=(0.0, 0.3, 0.0), duration=1.0)
 BALL = Sphere(center=(0.6, 0.15, 0.0), radius=0.05)
+RESTS_LONG = Cable.preset("paper", rest_shape=np.linspace((0.0, 0.0), (17.0, 0.0), 50))
 
 
 def scene(*obstacles: Sphere, friction: float = 0.0, release: float | None = None) -> Scene:
@@ -61,3 +64,26 @@ def test_a_grid_that_is_too_small_is_refused_in_the_words_of_the_prediction(n_u:
     with pytest.raises(SceneError) as predicted:
         predict(small)
     assert str(planned.value) == str(predicted.value)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        pytest.param({"cable": RESTS_LONG}, id="rests too long"),
+        pytest.param({"cable": RESTS_LONG, "quality": Quality(method="reference")}, id="for the reference, too"),
+        pytest.param({"quality": Quality(n_u=65, n_t=65, method="paper")}, id="too large for the paper"),
+        pytest.param({"effects": {"inertia": "off"}, "quality": Quality(method="reference")}, id="no reference"),
+    ],
+)
+def test_what_a_method_can_not_solve_is_refused_in_the_words_of_the_prediction(change: dict[str, Any]) -> None:
+    impossible = replace(scene(), **change)
+    with pytest.raises(SceneError) as planned:
+        plan(impossible)
+    with pytest.raises(SceneError) as predicted:
+        predict(impossible)
+    assert str(planned.value) == str(predicted.value)
+
+
+def test_a_jump_inside_is_refused_for_the_paper_before_it_is_solved() -> None:
+    with pytest.raises(SceneError, match="one smooth motion"):
+        plan(replace(scene(release=0.5), quality=Quality(n_u=17, n_t=33, method="paper")))
