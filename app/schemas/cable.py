@@ -6,8 +6,10 @@ from pydantic import Field
 
 from app.schemas.base import BY_FORM, LIST, TEXT, Model, Number, Point
 from dlocore import PRESETS
+from dlocore.scene.cable import MAX_LENGTH, MIN_LENGTH
+from dlocore.scene.points import MAX_POINTS, MIN_POINTS
 
-RestPoints = Annotated[list[Point], Field(min_length=4, max_length=100_000)]
+RestPoints = Annotated[list[Point], Field(min_length=MIN_POINTS, max_length=MAX_POINTS)]
 RestShape = Annotated[
     Annotated[Literal["straight", "initial"], TEXT] | Annotated[RestPoints, LIST],
     BY_FORM,
@@ -35,7 +37,9 @@ class CableModel(Model):
         description="Name of a preset (`GET /v1/cables`); fields given beside it override its values.",
         examples=list(PRESETS)[:2],
     )
-    length: Number | None = Field(default=None, ge=0.01, le=1000.0, description="Length L [m].", examples=[1.0])
+    length: Number | None = Field(
+        default=None, ge=MIN_LENGTH, le=MAX_LENGTH, description="Length L [m].", examples=[1.0]
+    )
     diameter: Number | None = _positive("Diameter D, at most half the length", "m", 0.005, 500.0)
     linear_density: Number | None = _positive("Mass per length", "kg/m", 0.05, 1e4)
     bending_stiffness: Number | None = _positive("EI", "N m^2", 1e-3)

@@ -6,6 +6,7 @@ from fastapi.openapi.models import Example
 from pydantic import BaseModel, Field
 
 from app.schemas.base import Flag, Model, Number
+from dlocore.scene.cable import MAX_LENGTH, MIN_LENGTH
 
 Coordinate = Annotated[Number, Field(ge=-1e5, le=1e5)]  # [m]
 Seen = Annotated[list[Coordinate], Field(min_length=2, max_length=3)]
@@ -23,8 +24,8 @@ class FitRequest(Model):
     ordered: Flag = Field(default=True, description="Whether they are in order along the cable.", examples=[True])
     length: Number | None = Field(
         default=None,
-        ge=0.01,
-        le=1000.0,
+        ge=MIN_LENGTH,
+        le=MAX_LENGTH,
         description="Length of the cable [m], which the curve gets; absent: as it is measured.",
         examples=[0.8],
     )

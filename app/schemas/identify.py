@@ -6,6 +6,7 @@ from pydantic import BaseModel, Field
 
 from app.schemas.base import Count, Flag, Model, Number, Vector
 from app.schemas.fit import Coordinate
+from dlocore.scene.cable import MAX_LENGTH
 
 Marker = Annotated[list[Coordinate], Field(min_length=2, max_length=3)]
 Frame = Annotated[list[Marker | None], Field(min_length=3, max_length=200)]
@@ -36,7 +37,7 @@ class RecordingModel(Model):
         description="Numbers of the markers that grippers hold, negative from the end; close neighbours are a clamp.",
         examples=[[0, 1, -2, -1]],
     )
-    length: Number | None = Field(default=None, gt=0.0, le=1000.0, description="Of the cable [m].", examples=[1.0])
+    length: Number | None = Field(default=None, gt=0.0, le=MAX_LENGTH, description="Of the cable [m].", examples=[1.0])
     diameter: Number | None = Field(default=None, gt=0.0, le=1.0, description="Of the cable [m].", examples=[0.005])
     linear_density: Number | None = Field(
         default=None,

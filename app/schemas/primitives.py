@@ -5,11 +5,14 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from app.schemas.base import BY_FORM, LIST, OBJECT, Model, Number, Vector
+from dlocore.scene.cable import MAX_LENGTH
+from dlocore.scene.paths import MAX_STOPS, MAX_WAYPOINTS, Profile, Start, Through
+from dlocore.scene.scene import Hold
 
 Quaternion = Annotated[list[Number], Field(min_length=4, max_length=4)]
 Coordinate = Annotated[
     Number,
-    Field(ge=0.0, le=1000.0, description="Material coordinate [m], 0 to the cable's length.", examples=[0.25]),
+    Field(ge=0.0, le=MAX_LENGTH, description="Material coordinate [m], 0 to the cable's length.", examples=[0.25]),
 ]
 Instant = Annotated[Number, Field(ge=0.0, le=1e4)]
 
@@ -29,9 +32,7 @@ class MovePath(Model):
         default=None, description="Final rotation vector [rad]; holds other than `point` only.", examples=[[0, 0, 0.8]]
     )
     duration: Number = Field(gt=1e-4, le=1e4, description="Duration [s].", examples=[1.6])
-    profile: Literal["minimum_jerk", "linear", "cubic"] = Field(
-        default="minimum_jerk", description="Position law in time.", examples=["minimum_jerk"]
-    )
+    profile: Profile = Field(default="minimum_jerk", description="Position law in time.", examples=["minimum_jerk"])
 
 
 class WaypointsPath(Model):
@@ -39,7 +40,7 @@ class WaypointsPath(Model):
 
     kind: Literal["waypoints"]
     times: list[Instant] = Field(
-        min_length=2, max_length=100_000, description="Rising times since the grasp [s].", examples=[[0, 0.5, 1]]
+        min_length=2, max_length=MAX_WAYPOINTS, description="Rising times since the grasp [s].", examples=[[0, 0.5, 1]]
     )
     positions: list[Vector] = Field(
         min_length=2,
@@ -52,15 +53,15 @@ class WaypointsPath(Model):
         "profile `spline` as smoothly as it goes.",
         examples=[[[1, 0, 0, 0]] * 3],
     )
-    start: Literal["rest", "moving"] = Field(
+    start: Start = Field(
         default="rest",
         description="`rest`: it starts at rest; `moving`: as fast as the first positions tell, as of a recorded path.",
         examples=["rest"],
     )
-    profile: Literal["spline", "minimum_jerk", "linear", "cubic"] = Field(
+    profile: Through = Field(
         default="spline",
         description="`spline`: smoothly through all positions. Else straight from one to the next, as a `move` of that "
-        "profile: a program of moves, with pauses where two positions are the same; at most 1,000 of them.",
+        f"profile: a program of moves, with pauses where two positions are the same; at most {MAX_STOPS:,} of them.",
         examples=["spline"],
     )
 
@@ -72,7 +73,7 @@ class PrimitiveModel(Model):
     """A gripper that holds the cable and moves it."""
 
     u: Coordinate
-    hold: Literal["point", "tangent", "clamp"] = Field(
+    hold: Hold = Field(
         default="point",
         description="`point` holds the position, `tangent` the direction too, `clamp` the twist as well.",
         examples=["point"],

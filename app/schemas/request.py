@@ -10,6 +10,7 @@ from app.schemas.cable import CableModel
 from app.schemas.primitives import LoadModel, PrimitiveModel
 from app.schemas.shape import ShapeModel
 from app.schemas.surroundings import Effects, EnvironmentModel, OutputModel, Quality
+from dlocore.scene.scene import MAX_GRASPS
 
 MAX_LOADS = 1000
 
@@ -25,7 +26,7 @@ class PredictionRequest(Model):
     )
     cable: CableModel = Field(description="The cable.")
     shape: ShapeModel = Field(description="Where the cable is at t = 0.")
-    primitives: list[PrimitiveModel] = Field(default=[], max_length=32, description="One for each grasp.")
+    primitives: list[PrimitiveModel] = Field(default=[], max_length=MAX_GRASPS, description="One for each grasp.")
     loads: list[LoadModel] = Field(default=[], max_length=MAX_LOADS, description="Known forces.")
     environment: EnvironmentModel = Field(default=EnvironmentModel(), description="Gravity, drag, table, obstacles.")
     horizon: Number | None = Field(

@@ -5,7 +5,8 @@ from typing import Annotated, Literal
 from pydantic import Discriminator, Field, Tag
 
 from app.schemas.base import Flag, Model, Number, Point, Vector
-from dlocore.scene.scene import MAX_STRAIN
+from dlocore.scene.points import MAX_POINTS, MIN_POINTS
+from dlocore.scene.scene import MAX_CONTROL_POINTS, MAX_STRAIN
 
 ControlPoint = Annotated[list[Number], Field(min_length=3, max_length=4)]
 Settle = Annotated[
@@ -76,8 +77,8 @@ class PointsShape(Model):
 
     kind: Literal["points"]
     points: list[Point] = Field(
-        min_length=4,
-        max_length=100_000,
+        min_length=MIN_POINTS,
+        max_length=MAX_POINTS,
         description="Points [m], all 2D (z = 0) or all 3D.",
         examples=[[[0.02, 0.01], [0.24, 0.05], [0.47, -0.03], [0.74, 0.13]]],
     )
@@ -91,7 +92,7 @@ class ControlPointsShape(Model):
     kind: Literal["control_points"]
     control_points: list[ControlPoint] = Field(
         min_length=4,
-        max_length=2000,
+        max_length=MAX_CONTROL_POINTS,
         description=(
             "Control points [m, m, m] or [m, m, m, rad]; the fourth is the angle of the sections against a frame "
             "without twist."

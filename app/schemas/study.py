@@ -8,7 +8,9 @@ from pydantic import BaseModel, Field
 from app.schemas.base import Count, Flag, Model, Number
 from app.schemas.request import PAPER, PredictionRequest
 from app.schemas.surroundings import EffectsModel
-from dlocore.study.plan import GRIDS, MAX_REPEATS
+from dlocore.scene.scene import MAX_N_T, MAX_N_U
+from dlocore.study.plan import GRIDS, MAX_REPEATS, Judge
+from dlocore.study.record import Part
 
 NAME = Annotated[str, Field(min_length=1, max_length=200)]
 
@@ -16,8 +18,8 @@ NAME = Annotated[str, Field(min_length=1, max_length=200)]
 class GridModel(Model):
     """Control points along the cable and in time."""
 
-    n_u: Count = Field(ge=5, le=129, description="Control points along the cable.", examples=[9])
-    n_t: Count = Field(ge=5, le=513, description="Control points in time.", examples=[13])
+    n_u: Count = Field(ge=5, le=MAX_N_U, description="Control points along the cable.", examples=[9])
+    n_t: Count = Field(ge=5, le=MAX_N_T, description="Control points in time.", examples=[13])
 
 
 class StudyRequest(Model):
@@ -59,13 +61,13 @@ class StudyRequest(Model):
         default=5, ge=1, le=MAX_REPEATS, description="Timed calls of each solve, at most.", examples=[5]
     )
     estimate: Flag = Field(default=False, description="Whether the solves estimate their error.", examples=[False])
-    judge: Literal["march", "reference"] = Field(
+    judge: Judge = Field(
         default="march",
         description="What errors are distances to: the own march refined until it stands still, or the independent "
         "step-by-step simulation, which takes from a second to minutes a scene.",
         examples=["march"],
     )
-    parts: list[Literal["runs", "scaling", "effects"]] = Field(
+    parts: list[Part] = Field(
         default=["runs"],
         min_length=1,
         max_length=3,

@@ -5,9 +5,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from app.schemas.base import BY_FORM, OBJECT, TEXT, Count, CountOrNone, Flag, Model, Number, Vector
-from dlocore.scene.scene import MAX_OBSTACLES
+from dlocore.scene.scene import MAX_N_T, MAX_N_U, MAX_OBSTACLES, Method, Switch
 
-Switch = Literal["auto", "on", "off"]
 Length = Annotated[Number, Field(gt=0.0, le=1e4)]
 Friction = Annotated[
     Number, Field(ge=0.0, le=10.0, description="Coefficient of Coulomb friction; absent: none.", examples=[0.3])
@@ -117,12 +116,12 @@ class QualityModel(Model):
     n_u: CountOrNone = Field(
         default=None,
         ge=5,
-        le=129,
+        le=MAX_N_U,
         description="Control points along the cable. Where a solve on the grid errs by more than 1 % of the length, as "
         "it estimates, or does not come to its end, finer grids that reach 1 % are the answer. The message says so.",
         examples=[9],
     )
-    n_t: CountOrNone = Field(default=None, ge=5, le=513, description="Control points in time.", examples=[13])
+    n_t: CountOrNone = Field(default=None, ge=5, le=MAX_N_T, description="Control points in time.", examples=[13])
     keep_grid: Flag = Field(
         default=False,
         description="Whether to answer with what a given grid, and a least squares that was asked for, come to by "
@@ -147,7 +146,7 @@ class QualityModel(Model):
         "`converged` then says that the estimated error is within 1 % of the length.",
         examples=[0.02],
     )
-    method: Literal["auto", "march", "spacetime", "paper", "reference"] = Field(
+    method: Method = Field(
         default="auto",
         description="How to solve; the answer names the method used. `auto` is `march`, but `spacetime` where a grid "
         "is given with a `delta` and nothing touches, slips or yields. A `spacetime` that does not converge leaves the "

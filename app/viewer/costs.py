@@ -8,11 +8,10 @@ from statistics import median
 import dlocore
 from dlocore import DloError, Prediction, Quality, Scene
 from dlocore.errors import Cancelled
-from dlocore.scene.scene import Switch
+from dlocore.scene.scene import NEEDED, Switch
 
 REPEATS = 5  # of each march; the median counts
 LONGEST = 10.0  # s, of one march
-NEEDED = "stretch"  # it keeps the cable's length, and can't be switched off
 
 
 def measure_costs(prediction: Prediction, cancelled: Callable[[], bool], on_cost: Callable[[str, float], None]) -> None:
@@ -35,7 +34,7 @@ def measure_costs(prediction: Prediction, cancelled: Callable[[], bool], on_cost
     scene = replace(prediction.scene, quality=grid, effects=chosen)
     usual = _time(scene, cancelled)
     for effect in effects:
-        if usual is None or not effect.active or effect.name == NEEDED:
+        if usual is None or not effect.active or effect.name in NEEDED:
             continue
         without = _time(replace(scene, effects={**chosen, effect.name: "off"}), cancelled)
         if without is not None:

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.viewer.draft import Draft
+from dlocore.scene.cable import MAX_LENGTH, MIN_LENGTH
 from dlocore.shape.shape import StartCurve
 
 Floats = NDArray[np.float64]
 HANDLES = 13  # points that can be dragged
-SHORTEST, LONGEST = 0.01, 1000.0  # m, of a cable
 STEP = 1e-5  # m, to which points are written into the document
 
 
@@ -72,7 +72,7 @@ def scaled(draft: Draft, length: float) -> Draft:
     A straight one grows at its far end, with what holds it there; another shape grows in proportion about its first
     point. A length that no cable may have changes nothing: from 0 nothing would grow back in proportion.
     """
-    if not SHORTEST <= length <= LONGEST:
+    if not MIN_LENGTH <= length <= MAX_LENGTH:
         return draft
     before = draft.length
     share = length / before

@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike
 from dlocore.errors import SceneError, choice, number
 from dlocore.scene.points import points_along
 
+MIN_LENGTH, MAX_LENGTH = 0.01, 1000.0  # [m]
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cable:
@@ -71,7 +73,7 @@ class Cable:
         def put(name: str, value: Any) -> None:
             object.__setattr__(self, name, value)
 
-        length = number("length", self.length, at_least=0.01, at_most=1000.0, unit="m")
+        length = number("length", self.length, at_least=MIN_LENGTH, at_most=MAX_LENGTH, unit="m")
         diameter = number("diameter", self.diameter, above=0.0, at_most=length / 2, unit="m")
         put("length", length)
         put("diameter", diameter)

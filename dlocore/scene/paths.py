@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Profile = Literal["minimum_jerk", "linear", "cubic"]
 Through = Literal["spline", "minimum_jerk", "linear", "cubic"]
+Start = Literal["rest", "moving"]
 
 # coefficients of x to x^5 of the position s(x) on 0 <= x <= 1
 _PROFILES: dict[str, tuple[float, ...]] = {
@@ -83,7 +84,7 @@ class Move:
         object.__setattr__(self, "duration", number("duration", self.duration, above=1e-4, at_most=1e4, unit="s"))
         if self.rotation is not None:
             object.__setattr__(self, "rotation", array("rotation", self.rotation, shape=(3,), unit="rad"))
-        choice("profile", self.profile, tuple(_PROFILES))
+        choice("profile", self.profile, get_args(Profile))
 
     @property
     def line(self) -> tuple[float, ...]:
@@ -145,11 +146,11 @@ class Waypoints:
     times: ArrayLike
     positions: ArrayLike
     orientations: ArrayLike | None = None
-    start: Literal["rest", "moving"] = "rest"
+    start: Start = "rest"
     profile: Through = "spline"
 
     def __post_init__(self) -> None:
-        choice("start", self.start, ("rest", "moving"))
+        choice("start", self.start, get_args(Start))
         choice("profile", self.profile, get_args(Through))
         smooth = self.profile == "spline"
         if self.start == "moving" and not smooth:

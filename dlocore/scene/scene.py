@@ -6,7 +6,7 @@ Frozen data in SI units, world frame right-handed with z up. Everything is valid
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, cast
+from typing import Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,7 +23,7 @@ from dlocore.errors import (
     number,
     whole,
 )
-from dlocore.scene.cable import Cable
+from dlocore.scene.cable import MAX_LENGTH, Cable
 from dlocore.scene.obstacles import Obstacle
 from dlocore.scene.paths import Move, Path, Still, Waypoints
 from dlocore.scene.points import points_along
@@ -47,10 +47,12 @@ EFFECTS = (
     "obstacles",
     "self_contact",
 )
+NEEDED = ("stretch",)  # effects that can't be switched off
 MAX_GRASPS = 32
 MAX_N_U, MAX_N_T = 129, 513  # of a given grid: memory and time
 DELTA = 1e-5  # [m]: threshold of a least squares
 MAX_OBSTACLES = 100
+MAX_CONTROL_POINTS = 2000  # of a start
 AUTO_TARGET = 2e-3  # of the length: the error that quality "auto" aims at
 MAX_STRAIN = 0.5  # axial, that a start may have
 MAX_PRESCRIBED_STRAIN = 0.005  # of the chord between two grasps: beyond it no cable of this kind can follow
@@ -159,8 +161,8 @@ class ControlPoints:
     def __post_init__(self) -> None:
         columns = 3 if columns_of(self.control_points) == 3 else 4
         points = array("control_points", self.control_points, shape=(None, columns), unit="m")
-        if not 4 <= len(points) <= 2000:
-            raise SceneError("control_points", f"{len(points)} control points", "4 to 2000")
+        if not 4 <= len(points) <= MAX_CONTROL_POINTS:
+            raise SceneError("control_points", f"{len(points)} control points", f"4 to {MAX_CONTROL_POINTS}")
         if columns == 3:
             points = np.column_stack([points, np.zeros(len(points))])
             points.setflags(write=False)
@@ -216,8 +218,8 @@ class Grasp:
     release_time: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "u", number("u", self.u, at_least=0.0, at_most=1000.0, unit="m"))
-        choice("hold", self.hold, ("point", "tangent", "clamp"))
+        object.__setattr__(self, "u", number("u", self.u, at_least=0.0, at_most=MAX_LENGTH, unit="m"))
+        choice("hold", self.hold, get_args(Hold))
         instance("path", self.path, Path, "Still, Move or Waypoints")
         if self.hold == "point":
             turns = any(getattr(self.path, name, None) is not None for name in ("rotation", "orientations"))
@@ -245,7 +247,7 @@ class Load:
     times: ArrayLike | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "u", number("u", self.u, at_least=0.0, at_most=1000.0, unit="m"))
+        object.__setattr__(self, "u", number("u", self.u, at_least=0.0, at_most=MAX_LENGTH, unit="m"))
         if self.times is None:
             object.__setattr__(self, "force", array("force", self.force, shape=(3,), unit="N"))
             return
@@ -341,7 +343,7 @@ class Quality:
                 object.__setattr__(self, name, whole(name, value, at_least=5, at_most=most))
         if self.delta is not None:
             object.__setattr__(self, "delta", number("delta", self.delta, at_least=1e-10, at_most=1e-2, unit="m"))
-        choice("method", self.method, ("auto", "march", "spacetime", "paper", "reference"))
+        choice("method", self.method, get_args(Method))
         flag("estimate", self.estimate)
         flag("keep_grid", self.keep_grid)
         if (self.n_u is None) != (self.n_t is None):
@@ -470,10 +472,10 @@ class Scene:
     def _check_effects(self) -> None:
         for name, value in self.effects.items():
             choice("effects", name, EFFECTS)
-            choice(f"effects.{name}", value, ("auto", "on", "off"))
-            if name == "stretch" and value == "off":
+            choice(f"effects.{name}", value, get_args(Switch))
+            if name in NEEDED and value == "off":
                 reason = "Without axial stiffness a cable has no length"
-                raise SceneError("effects.stretch", "off", '"on" or "auto"', reason)
+                raise SceneError(f"effects.{name}", "off", '"on" or "auto"', reason)
 
     def _check_overlap(self) -> None:
         for j, b in enumerate(self.grasps):

@@ -8,8 +8,9 @@ from app.viewer.draft import Draft
 from app.viewer.edits import Edits
 from app.viewer.forms.base import Form, show_if, show_value
 from app.viewer.kept import KeptCables
-from app.viewer.shapes import LONGEST, SHORTEST, scaled
+from app.viewer.shapes import scaled
 from dlocore import PRESETS, Cable, SceneError
+from dlocore.scene.cable import MAX_LENGTH, MIN_LENGTH
 
 CUSTOM = "own values"
 Rest = Literal["straight", "initial", "as loaded"]
@@ -25,7 +26,7 @@ class CableForm(Form):
         self._kept = cables.all()
         with gui.add_folder("Cable"):
             self._preset = gui.add_dropdown("Preset", (*PRESETS, *self._kept, CUSTOM))
-            self._length = gui.add_number("Length [m]", 1.0, min=SHORTEST, max=LONGEST, step=0.05)
+            self._length = gui.add_number("Length [m]", 1.0, min=MIN_LENGTH, max=MAX_LENGTH, step=0.05)
             self._diameter = gui.add_number("Diameter [mm]", 1.0, min=0.01, max=500.0, step=0.1)
             self._density = gui.add_number("Density [g/m]", 1.0, min=0.01, max=1e7, step=0.1)
             self._bending = gui.add_number("EI [10⁻³ N m²]", 1.0, min=1e-6, max=1e9, step=0.01)

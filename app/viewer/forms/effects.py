@@ -11,10 +11,9 @@ from app.viewer.draft import Draft
 from app.viewer.edits import Edits
 from app.viewer.forms.base import Form, show_value
 from dlocore import EffectReport
-from dlocore.scene.scene import EFFECTS, Switch
+from dlocore.scene.scene import EFFECTS, NEEDED, Switch
 
 SWITCHES: tuple[Switch, ...] = get_args(Switch)
-NEEDED = ("stretch",)  # can't be switched off: without it a cable has no length
 
 
 class EffectsForm(Form):

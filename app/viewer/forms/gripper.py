@@ -12,6 +12,7 @@ from app.viewer.draft import Draft
 from app.viewer.edits import Edits
 from app.viewer.forms.base import Form, show_if, show_value
 from dlocore import SplineSurface
+from dlocore.scene.scene import MAX_GRASPS
 from dlocore.shape.shape import StartCurve
 
 NONE = "no gripper"
@@ -38,7 +39,7 @@ class GripperForm(Form):
         self._start = start
         self._shown: SplineSurface | None = None
         self._which = gui.add_dropdown("Gripper", self._names(draft), hint="Or click on a gripper in the picture")
-        self._buttons = gui.add_button_group("Grippers", ("Add", "Remove"), hint="A cable can have up to 32")
+        self._buttons = gui.add_button_group("Grippers", ("Add", "Remove"), hint=f"A cable can have up to {MAX_GRASPS}")
         self._u = gui.add_slider(
             "Grasp u [m]", min=0.0, max=1.0, step=0.005, initial_value=0.0, hint="Or click on the cable"
         )
