@@ -5,8 +5,8 @@ import { make, short } from "./dom.js";
 const SVG = "http://www.w3.org/2000/svg";
 const MARGIN = { left: 58, right: 18, top: 16, bottom: 50 };
 const REACH = 40; // px from a point within which the pointer means it
-const SHAPES = ["circle", "square", "triangle", "diamond"]; // a second sign beside the colour
-export const METHODS = ["march", "spacetime", "paper", "reference"];
+const SHAPES = ["circle", "square"]; // a second sign beside the colour
+export const METHODS = ["march", "spacetime"]; // that a calibration measures
 
 function svg(tag, attributes, ...children) {
   const element = document.createElementNS(SVG, tag);
@@ -16,12 +16,8 @@ function svg(tag, attributes, ...children) {
 }
 
 function outline(shape, x, y, r) {
-  switch (shape) {
-    case "square": return `M${x - r} ${y - r}h${2 * r}v${2 * r}h${-2 * r}z`;
-    case "triangle": return `M${x} ${y - 1.2 * r}l${1.15 * r} ${2 * r}h${-2.3 * r}z`;
-    case "diamond": return `M${x} ${y - 1.35 * r}l${1.35 * r} ${1.35 * r}l${-1.35 * r} ${1.35 * r}l${-1.35 * r} ${-1.35 * r}z`;
-    default: return `M${x - r} ${y}a${r} ${r} 0 1 1 ${2 * r} 0a${r} ${r} 0 1 1 ${-2 * r} 0z`;
-  }
+  if (shape === "square") return `M${x - r} ${y - r}h${2 * r}v${2 * r}h${-2 * r}z`;
+  return `M${x - r} ${y}a${r} ${r} 0 1 1 ${2 * r} 0a${r} ${r} 0 1 1 ${-2 * r} 0z`;
 }
 
 /** The sign of a method, `r` px in radius about (x, y). */

@@ -99,9 +99,9 @@ def parser() -> argparse.ArgumentParser:
     find.add_argument(
         "--parameters",
         metavar="NAMES",
-        default="bending_stiffness,drag,drag_quadratic,bending_damping",
-        help="which, by commas (default %(default)s); also torsional_stiffness, linear_density, length_ratio, "
-        "turn, yield_strain, clamp_angles, marker_offsets, rest_curvature",
+        help="which, by commas (default: bending_stiffness, drag, drag_quadratic and bending_damping); also "
+        "torsional_stiffness, linear_density, length_ratio, turn, yield_strain, clamp_angles, marker_offsets, "
+        "rest_curvature",
     )
     find.add_argument("--n-u", type=int, default=13, help="control points along the cable (default 13)")
     find.set_defaults(
@@ -117,7 +117,7 @@ def parser() -> argparse.ArgumentParser:
         epilog=_DONE,
     )
     check.add_argument("datasets", nargs="+", metavar="DATASET", help="files, or folders of files (docs/validation.md)")
-    check.add_argument("--fit", type=int, default=4, help="windows of each cable to fit on (default 4)")
+    check.add_argument("--fit", type=int, help="windows of each cable to fit on (default 4)")
     check.add_argument(
         "--models", default="scalars,bends", help="scalars (four numbers), bends (and rest shape and clamps), or both"
     )

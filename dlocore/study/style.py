@@ -9,7 +9,7 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator
 
-# Okabe-Ito, one colour a method everywhere
+# Okabe-Ito, one colour a method in all plots of a study; static/style.css has those of the landing page's methods
 COLOURS = {"march": "#0072B2", "spacetime": "#D55E00", "paper": "#CC79A7", "reference": "#009E73"}
 MARKS = {"march": "o", "spacetime": "s", "paper": "^", "reference": "D"}
 _LEAST = 3  # numbers at an axis

@@ -9,6 +9,7 @@ import pytest
 from playwright.sync_api import Page, Route, expect
 
 from app.pages.gallery import examples
+from dlocore.study.style import COLOURS
 
 pytestmark = pytest.mark.browser
 DESKTOP, PHONE, NARROW = (1400, 900), (390, 844), (320, 640)
@@ -22,12 +23,11 @@ CALIBRATION = {
         {"method": "march", "n_u": 9, "n_t": 13, "wall_time": 0.001, "error": 3e-3},
         {"method": "march", "n_u": 17, "n_t": 25, "wall_time": 0.01, "error": 3e-4},
         {"method": "spacetime", "n_u": 9, "n_t": 13, "wall_time": 0.01, "error": 3e-3},
-        {"method": "paper", "n_u": 9, "n_t": 13, "wall_time": 0.1, "error": 3e-3},
+        {"method": "spacetime", "n_u": 17, "n_t": 25, "wall_time": 0.1, "error": 3e-3},
     ],
     "front": [1, 2, 0],
 }
 CALIBRATED = re.compile(r"/v1/calibration\?")
-BLUE = "rgb(0, 114, 178)"  # Okabe-Ito's, of the march
 
 
 def open_page(
@@ -246,7 +246,9 @@ def test_the_plot_is_logarithmic_in_both_directions_and_has_every_point(service,
     assert y0 < y1 < y2  # down the picture: the slower, the better
     assert abs((x1 - x0) - (x2 - x1)) < 1e-6  # a factor of ten each, so the same way [px]; rounding alone
     assert abs((y1 - y0) - (y2 - y1)) < 1e-6
-    expect(page.locator("#plot .sign.march").first).to_have_css("fill", BLUE)
+    for method in ("march", "spacetime"):
+        colour = ", ".join(str(int(COLOURS[method][k : k + 2], 16)) for k in (1, 3, 5))
+        expect(page.locator(f"#plot .sign.{method}").first).to_have_css("fill", f"rgb({colour})")
     expect(page.locator("#plot-finding")).to_have_text("Within 1 mm in 10 ms, within 0.1 mm in 100 ms")
     expect(page.locator("#plot-machine")).to_contain_text("Test processor")
 
@@ -261,23 +263,23 @@ def test_the_table_tells_the_same_as_the_plot(service, witness):
         ["march", "17", "25", "10", "0.3", "yes"],
         ["spacetime", "9", "13", "10", "3", ""],
         ["march", "33", "65", "100", "0.03", "yes"],
-        ["paper", "9", "13", "100", "3", ""],
+        ["spacetime", "17", "25", "100", "3", ""],
     ]
 
 
 def test_pointing_at_a_point_and_walking_by_arrow_keys_tell_its_values(service, witness):
     with_calibration(witness.page)
     page = open_page(witness, service)
-    page.locator("#plot .sign.paper").hover()
-    expect(page.locator("#plot .tip")).to_have_text("paper, 9 × 13: 100 ms, 3 mm")
+    page.locator("#plot .sign.spacetime").last.hover()
+    expect(page.locator("#plot .tip")).to_have_text("spacetime, 17 × 25: 100 ms, 3 mm")
     page.mouse.move(0, 0)
     expect(page.locator("#plot .tip")).to_be_hidden()
     plot = page.get_by_role("slider", name="Measured solves")
     plot.focus()
     expect(plot).to_have_attribute("aria-valuetext", "march, 9 × 13: 1 ms, 3 mm, none is better in its time")
     page.keyboard.press("End")
-    expect(plot).to_have_attribute("aria-valuetext", "paper, 9 × 13: 100 ms, 3 mm")
-    expect(page.locator("#plot .tip")).to_have_text("paper, 9 × 13: 100 ms, 3 mm")
+    expect(plot).to_have_attribute("aria-valuetext", "spacetime, 17 × 25: 100 ms, 3 mm")
+    expect(page.locator("#plot .tip")).to_have_text("spacetime, 17 × 25: 100 ms, 3 mm")
     page.keyboard.press("Home")
     page.keyboard.press("ArrowRight")
     expect(page.locator("#plot .tip")).to_have_text("march, 17 × 25: 10 ms, 0.3 mm")
