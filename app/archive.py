@@ -59,7 +59,11 @@ class Run:
 
     @cached_property
     def scene(self) -> Scene:
-        """The scene that was solved; it needs no other run, even where it continued from one."""
+        """The scene that was solved; it needs no other run, even where it continued from one.
+
+        Raises:
+            ValueError: it continued from one, and was stored without the shape that it took from there.
+        """
         if self.request["shape"]["kind"] != "prediction":
             return to_scene(PredictionRequest.model_validate(self.request), lambda id: None)
         if self.start is None:

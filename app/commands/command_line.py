@@ -99,6 +99,7 @@ def parser() -> argparse.ArgumentParser:
     find.add_argument(
         "--parameters",
         metavar="NAMES",
+        type=_listed,
         help="which, by commas (default: bending_stiffness, drag, drag_quadratic and bending_damping); also "
         "torsional_stiffness, linear_density, length_ratio, turn, yield_strain, clamp_angles, marker_offsets, "
         "rest_curvature",
@@ -106,7 +107,7 @@ def parser() -> argparse.ArgumentParser:
     find.add_argument("--n-u", type=int, default=13, help="control points along the cable (default 13)")
     find.set_defaults(
         run=lambda o: identify_commands.identify(
-            o.recordings, names=_listed(o.parameters), output=o.output, report=o.report, n_u=o.n_u
+            o.recordings, names=o.parameters, output=o.output, report=o.report, n_u=o.n_u
         )
     )
 
@@ -119,14 +120,15 @@ def parser() -> argparse.ArgumentParser:
     check.add_argument("datasets", nargs="+", metavar="DATASET", help="files, or folders of files (docs/validation.md)")
     check.add_argument("--fit", type=int, help="windows of each cable to fit on (default 4)")
     check.add_argument(
-        "--models", default="scalars,bends", help="scalars (four numbers), bends (and rest shape and clamps), or both"
+        "--models",
+        type=_listed,
+        default="scalars,bends",
+        help="scalars (four numbers), bends (and rest shape and clamps), or both",
     )
     check.add_argument("--json", metavar="OUT.json", help="write all numbers")
     check.add_argument("--plots", metavar="FOLDER", help="write the plots of docs/validation.md, as SVG")
     check.set_defaults(
-        run=lambda o: identify_commands.validate(
-            o.datasets, fit=o.fit, models=_listed(o.models), json=o.json, plots=o.plots
-        )
+        run=lambda o: identify_commands.validate(o.datasets, fit=o.fit, models=o.models, json=o.json, plots=o.plots)
     )
 
     warmup = subcommands.add_parser(

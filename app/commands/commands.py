@@ -15,6 +15,7 @@ import orjson
 from pydantic import ValidationError
 from pydantic_settings import SettingsError
 
+from app.commands.bar import progress_bar
 from app.commands.errors import FAILED, NOT_CONVERGED, CommandError
 from app.commands.files import STANDARD, check_outputs, for_people, is_device, read_input, write_output
 from app.http.fields import BadField, bad_fields
@@ -98,7 +99,11 @@ def predict(
     method: Method | None = None,
     deadline: float | None = None,
 ) -> int:
-    """Predict one scene, write what is asked for, and say how it went on stderr; within a deadline [s] of the solve."""
+    """Predict one scene, write what is asked for, and say how it went on stderr; within a deadline [s] of the solve.
+
+    Raises:
+        CommandError: the scene, an output or the deadline is not possible.
+    """
     if deadline is not None and not 0.0 < deadline < math.inf:
         raise CommandError(f"--deadline: got {deadline:g}. Allowed: a finite number above 0 [s].")
     _check_predict(scene, npz=npz, json=json, rrd=rrd)
@@ -138,9 +143,11 @@ def _layout_of(rrd: str) -> Path:
 
 
 def calibrate(*, repeats: int, json: str | None) -> int:
-    """Measure this machine, keep the result, and print it."""
-    from tqdm import tqdm
+    """Measure this machine, keep the result, and print it.
 
+    Raises:
+        CommandError: `repeats` is out of range, or the result can't be written.
+    """
     from dlocore import calibration
     from dlocore.study.calibrating import measure
     from dlocore.study.plan import MAX_REPEATS
@@ -151,13 +158,7 @@ def calibrate(*, repeats: int, json: str | None) -> int:
     kept = _settings().calibration_file if json is None else None
     if kept is not None:
         _check_data_dir(kept.parent)
-    with tqdm(desc="calibrating", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
-
-        def show(done: int, total: int, what: str) -> None:
-            bar.total = total
-            bar.set_postfix_str(what)
-            bar.update(done - bar.n)
-
+    with progress_bar("calibrating") as show:
         found = measure(repeats=repeats, on_progress=show)
     if json is not None:
         write_output(json, found.as_json())
@@ -250,7 +251,11 @@ def _words(fields: list[BadField]) -> str:
 
 
 def read_scene(file: str) -> Scene:
-    """Return the scene of a JSON file, "-" for standard input; what is wrong with it is said with its name."""
+    """Return the scene of a JSON file, "-" for standard input.
+
+    Raises:
+        CommandError: it can't be read, or is no scene that can be solved; what is wrong is said with the file's name.
+    """
     raw = read_input(file)
     try:
         return to_scene(_request(raw), _stored)

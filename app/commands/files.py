@@ -13,7 +13,11 @@ STANDARD = "-"
 
 
 def read_input(path: str) -> bytes:
-    """Read a file, "-" for standard input."""
+    """Read a file, "-" for standard input.
+
+    Raises:
+        CommandError: it can't be read.
+    """
     if path == STANDARD:
         if sys.stdin is None:
             raise CommandError("standard input is closed")
@@ -33,6 +37,9 @@ def check_outputs(
         outputs: files by the option that asks for them, None where it does not.
         inputs: files that are read.
         folders: likewise, folders that are made where they are missing.
+
+    Raises:
+        CommandError: an output can't be written, or is the input or another output.
     """
     taken = {str(Path(path).resolve()): "the input" for path in inputs if path != STANDARD}
     for option, path in outputs.items():
@@ -92,7 +99,12 @@ def _unwritable(path: str, reason: str | None) -> CommandError:
 
 
 def write_output(path: str, content: bytes) -> None:
-    """Write a file, whole or not at all; "-" for standard output."""
+    """Write a file, whole or not at all; "-" for standard output.
+
+    Raises:
+        CommandError: it can't be written.
+        BrokenPipeError: who read standard output has left.
+    """
     try:
         if path == STANDARD:
             sys.stdout.buffer.write(content)

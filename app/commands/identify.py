@@ -18,16 +18,29 @@ if TYPE_CHECKING:
     from dlocore.identify.validation import CableValidation, WireValidation
 
 
-def identify(recordings: list[str], *, names: list[str], output: str, report: str | None, n_u: int) -> int:
-    """Identify a cable from recordings, write it as JSON, and a report where one is asked for."""
+def identify(recordings: list[str], *, names: list[str] | None, output: str, report: str | None, n_u: int) -> int:
+    """Identify a cable from recordings, write it as JSON, and a report where one is asked for.
+
+    Args:
+        recordings: files.
+        names: of the parameters; None: the usual ones.
+        output: file for the cable, "-" for standard output.
+        report: file for the report, None for none.
+        n_u: control points along the cable.
+
+    Raises:
+        CommandError: a recording can't be read or used, or an output can't be written.
+    """
     from app.reports.identification import document_of_identification, report_of
     from dlocore.identify import Resolution
     from dlocore.identify import identify as find
+    from dlocore.identify.parameters import DEFAULT
 
     check_outputs({"--output": output, "--report": report}, recordings)
     try:
         loaded = [_load(path) for path in recordings]
-        found = find(loaded, names=tuple(names), resolution=Resolution(n_u=n_u), on_progress=_show)
+        wanted = DEFAULT if names is None else tuple(names)
+        found = find(loaded, names=wanted, resolution=Resolution(n_u=n_u), on_progress=_show)
     except SceneError as error:
         raise CommandError(str(error)) from None
     document = document_of_identification(found)
@@ -53,10 +66,21 @@ def _show(progress: "Progress") -> None:
     print(f"{progress.iteration:>3}  median {1e3 * progress.distance:6.2f} mm  {values}", file=sys.stderr, flush=True)
 
 
-def validate(datasets: list[str], *, fit: int, models: list[str], json: str | None, plots: str | None) -> int:
-    """Run the published protocols on data sets and print the table."""
+def validate(datasets: list[str], *, fit: int | None, models: list[str], json: str | None, plots: str | None) -> int:
+    """Run the published protocols on data sets and print the table.
+
+    Args:
+        datasets: files, or folders of files.
+        fit: windows of each cable to fit on; None: as many as usual.
+        models: which of "scalars" and "bends".
+        json: file for all numbers, "-" for standard output, None for none.
+        plots: folder for the plots, None for none.
+
+    Raises:
+        CommandError: a data set can't be read or used, or an output can't be written.
+    """
     from app.reports.validation_plots import plots_of
-    from dlocore.identify.datasets import PUBLISHED, PUBLISHED_BY, load_datasets
+    from dlocore.identify.datasets import FIT, PUBLISHED, PUBLISHED_BY, load_datasets
     from dlocore.identify.validation import Model, each_repeat, validate_cable, validate_wire
     from dlocore.machine import machine_line
 
@@ -66,7 +90,7 @@ def validate(datasets: list[str], *, fit: int, models: list[str], json: str | No
         raise CommandError(f"--models: got {','.join(models)!r}. Allowed: {' or '.join(allowed)}, or both, by a comma.")
     table = partial(print, file=for_people(json), flush=True)
     try:
-        cables, wires = load_datasets([Path(d) for d in datasets], fit)
+        cables, wires = load_datasets([Path(d) for d in datasets], FIT if fit is None else fit)
         table(machine_line())
         out: list[dict[str, Any]] = []
         if cables:

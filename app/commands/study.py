@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
+from app.commands.bar import progress_bar
 from app.commands.commands import read_scene
 from app.commands.errors import FAILED, CommandError
 from app.commands.files import check_outputs, for_people, write_output
@@ -21,8 +22,6 @@ _GRID = re.compile(r"(\d+)[x×](\d+)")
 def study(options: argparse.Namespace) -> int:
     """Run a study, write and draw it, compare it with an earlier one, and say what came out."""
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # threads of a linear algebra library would blur the times
-    from tqdm import tqdm
-
     from dlocore.study import record
     from dlocore.study.compare import compare, words
     from dlocore.study.plan import Plan
@@ -37,13 +36,7 @@ def study(options: argparse.Namespace) -> int:
         plan = Plan(**_asked(options))
     except SceneError as error:
         raise CommandError(str(error)) from None
-    with tqdm(desc="measuring", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
-
-        def show(done: int, total: int, what: str) -> None:
-            bar.total = total
-            bar.set_postfix_str(what)
-            bar.update(done - bar.n)
-
+    with progress_bar("measuring") as show:
         measured = run_study(plan, on_progress=show)
     table = for_people(options.output)
     print(_table(measured), file=table)
@@ -78,7 +71,7 @@ def _check_matplotlib() -> None:
     try:
         import matplotlib  # noqa: F401
     except ImportError:
-        raise CommandError("--plots needs matplotlib: pip install 'dlo[plots]'", FAILED) from None
+        raise CommandError("--plots needs matplotlib: pip install -e '.[plots]'", FAILED) from None
 
 
 def _asked(options: argparse.Namespace) -> dict[str, Any]:

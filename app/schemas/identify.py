@@ -6,12 +6,12 @@ from pydantic import BaseModel, Field
 
 from app.schemas.base import Count, Flag, Model, Number, Vector
 from app.schemas.fit import Coordinate
+from dlocore.identify.parameters import DEFAULT
 from dlocore.scene.cable import MAX_LENGTH
 
 Marker = Annotated[list[Coordinate], Field(min_length=2, max_length=3)]
 Frame = Annotated[list[Marker | None], Field(min_length=3, max_length=200)]
 Name = Annotated[str, Field(max_length=40)]
-DEFAULT = ["bending_stiffness", "drag", "drag_quadratic", "bending_damping"]
 
 
 class RecordingModel(Model):
@@ -58,11 +58,11 @@ class IdentifyRequest(Model):
 
     recordings: list[RecordingModel] = Field(min_length=1, max_length=16, description="Of one cable.")
     parameters: list[Name] = Field(
-        default=DEFAULT,
+        default=list(DEFAULT),
         min_length=1,
         max_length=40,
         description="What to find (docs/identification.md).",
-        examples=[DEFAULT],
+        examples=[list(DEFAULT)],
     )
     n_u: Count = Field(default=13, ge=7, le=65, description="Control points along the cable.", examples=[13])
 

@@ -115,7 +115,9 @@ class IterationModel(BaseModel):
     energy: float | None = Field(description="Elastic energy at the end of the motion [J].", examples=[2.9e-5])
     wall_time: float = Field(description="Since the solve began [s].", examples=[0.002])
     damping: float | None = Field(
-        description="Levenberg-Marquardt damping of the step, 0 for a plain one.", examples=[0.0]
+        description="Share by which the diagonal of the normal equations of a `spacetime` step was raised, where they "
+        "had lost their positive factors to rounding; else 0.",
+        examples=[0.0],
     )
     step_length: float | None = Field(description="Fraction of the full step taken.", examples=[1.0])
     n_u: int = Field(description="Control points along the cable.", examples=[13])

@@ -14,14 +14,14 @@ from dlocore.shape.shape import SplineCurve, fit_to_knots
 
 Floats = NDArray[np.float64]
 
-_FOLDED = 0.4  # of |r'| - 1 between the points that watch over the length: of a shape that finer grids do not have
+_UNEVEN = 0.4  # of |r'| - 1 between the points that watch over the length: of a shape that finer grids do not have
 _ASTRAY = 0.3  # [rad]: a held section that turns out farther from where it was has been turned on the way
 
 
 def starts_folded(grid: Grid) -> bool:
     """Tell whether the start of a grid is folded within a span."""
     least, most = slopes(grid.start[None], 1, grid.tables.curvature.first, grid.tables.curvature.b1)
-    return not (least >= 1.0 - _FOLDED and most <= 1.0 + _FOLDED)
+    return not (least >= 1.0 - _UNEVEN and most <= 1.0 + _UNEVEN)
 
 
 def begin_on(problem: Problem, grid: Grid, settled: Grid) -> tuple[Floats, History] | None:

@@ -16,6 +16,8 @@ import pytest
 from app.cli import main
 from app.commands.files import write_output
 from dlocore.files import whole
+from dlocore.identify.datasets import FIT
+from dlocore.identify.parameters import DEFAULT
 from tests.app.conftest import paper_scene, put
 
 ROOT = Path(__file__).parents[2]
@@ -380,6 +382,16 @@ def test_an_unknown_command_exits_with_2() -> None:
     with pytest.raises(SystemExit) as done:
         main(["conquer"])
     assert done.value.code == 2
+
+
+def test_the_help_tells_the_defaults_of_identification(capsys: pytest.CaptureFixture[str]) -> None:
+    told = {}
+    for command in ("identify", "validate"):
+        with pytest.raises(SystemExit):
+            main([command, "--help"])
+        told[command] = " ".join(capsys.readouterr().out.split())
+    assert f"(default: {', '.join(DEFAULT[:-1])} and {DEFAULT[-1]})" in told["identify"]
+    assert f"windows of each cable to fit on (default {FIT})" in told["validate"]
 
 
 @pytest.mark.parametrize("command", ["predict", "identify", "calibrate", "study", "validate"])
