@@ -73,11 +73,11 @@ def corner(length: float, angle: float, at: float, room: Room) -> Floats:
     return turning(np.where(_middles() < at, 0.0, angle), room, length)
 
 
-def as_seen(r: Rng, d: Draft, points: Floats, *, exact: bool = False) -> Points:
-    """Return points as the start, sometimes with the faults of given points; none where it must be `exact`."""
+def as_seen(r: Rng, d: Draft, points: Floats) -> Points:
+    """Return points as the start, sometimes with the faults of given points."""
     length = d.length
     fault = pick(r, {"none": 6, "stretched": 1, "repeated": 1, "uneven": 1, "noise": 1, "tiny": 1})
-    if exact or fault == "none":
+    if fault == "none":
         return Points(points=points)
     d.families.append(f"geometry: {fault} points")
     if fault == "stretched":

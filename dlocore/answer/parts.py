@@ -54,13 +54,14 @@ class Iteration:
             [m] (docs/model.md eq. 16); for `paper` a force [N]; for a level of `march` the largest error left
             by Newton's iterations [m].
         wall_time: since the solve began [s].
-        damping: Levenberg-Marquardt damping of the step, 0 for a plain one.
+        damping: share by which the diagonal of a `spacetime` step's normal equations was raised, where they had lost
+            their positive factors to rounding; else 0.
         step_length: fraction of the full step that was taken.
         n_u: control points along the cable at this iteration.
         n_t: control points in time.
         find_surface: finds the iterate itself, which `surface` keeps.
         find_energy: finds the elastic energy at the end of the motion [J], which `energy` keeps.
-        note: what happened, in words, e.g. "Gauss-Newton tangent"; empty for a plain iteration.
+        note: what it was: `spacetime`, `paper`, `march` with what was found on it, or `rod of` so many elements.
     """
 
     number: int
@@ -243,8 +244,8 @@ class Accuracy:
         steps: time steps of the march.
         dimensions: 2 where the motion is planar, else 3.
         dimensions_reason: why, in words.
-        phases: time by phase [s]: "setup", "march", "fit", "spacetime", "estimate", "report"; "march" has the fit of a
-            smooth motion without twist, which is one compiled call with it.
+        phases: time by phase [s]: "setup", "march", "fit", "spacetime", "paper", "estimate"; "march" has the fit of a
+            smooth motion without twist, which is one compiled call with it. Of method "reference": "simulation", "fit".
     """
 
     method: str

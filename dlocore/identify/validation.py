@@ -1,6 +1,6 @@
 """Validation against measurements: parameters fitted on some windows of a set, and the others predicted."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from time import process_time
 from typing import Literal
@@ -12,7 +12,7 @@ from dlocore.compiling.interrupts import interruptible
 from dlocore.identify.candidate import Candidate
 from dlocore.identify.datasets import HangingWire, MovedCable
 from dlocore.identify.estimate import identify
-from dlocore.identify.identification import Identification, Progress
+from dlocore.identify.identification import Identification
 from dlocore.identify.replay import Replay, Resolution, common_references
 from dlocore.recordings import Recording
 from dlocore.scene.scene import Environment
@@ -79,7 +79,6 @@ def validate_cable(
     cable: MovedCable,
     model: Model = "scalars",
     start: Candidate | None = None,
-    on_progress: Callable[[Progress], None] | None = None,
 ) -> CableValidation:
     """Fit a cable on its windows to fit on, and predict the others.
 
@@ -88,11 +87,10 @@ def validate_cable(
         model: "scalars": EI, drag, bending damping, length; "bends": and how the cable leaves its clamps, where the
             markers sit beside it, its rest curvature, and the twist that those need.
         start: a candidate to begin with.
-        on_progress: called after every iteration.
     """
     began = process_time()
     names = SCALARS if model == "scalars" else BENDS
-    found = identify(cable.fit, names=names, start=start, resolution=PROTOCOL, on_progress=on_progress)
+    found = identify(cable.fit, names=names, start=start, resolution=PROTOCOL)
     fitted = process_time() - began
     references = common_references(cable.fit)
     windows = tuple(predicted(w, found.candidate, references) for w in cable.test)
@@ -119,7 +117,7 @@ def predicted(recording: Recording, candidate: Candidate, references: Floats | N
     )
 
 
-def validate_wire(wire: HangingWire, names: Sequence[str] = ("bending_stiffness", "clamp_angles")) -> WireValidation:
+def validate_wire(wire: HangingWire, names: Sequence[str]) -> WireValidation:
     """Fit the hanging shapes of a wire."""
     found = identify(
         [wire.recording], environment=Environment(), names=tuple(names), resolution=Resolution(n_u=WIRE_GRID)
@@ -128,11 +126,16 @@ def validate_wire(wire: HangingWire, names: Sequence[str] = ("bending_stiffness"
     return WireValidation(name=wire.name, names=tuple(names), found=found, rms=np.sqrt((distances**2).mean(axis=1)))
 
 
-def each_repeat(wire: HangingWire, names: Sequence[str] = ("bending_stiffness", "clamp_angles")) -> Floats:
-    """Return the rms distance (k,) [m] of each repeat when it is fitted alone."""
+def each_repeat(wire: HangingWire) -> Floats:
+    """Return the rms distance (k,) [m] of each repeat when stiffness and clamps are fitted on it alone."""
     whole, out = wire.recording, []
     for shape in np.asarray(whole.markers):
         alone = replace(whole, times=[0.0], markers=shape[None])
-        found = identify([alone], environment=Environment(), names=tuple(names), resolution=Resolution(n_u=WIRE_GRID))
+        found = identify(
+            [alone],
+            environment=Environment(),
+            names=("bending_stiffness", "clamp_angles"),
+            resolution=Resolution(n_u=WIRE_GRID),
+        )
         out.append(np.sqrt((found.fits[0].distances ** 2).mean()))
     return np.array(out)

@@ -19,7 +19,6 @@ _PHASES = {
     "spacetime": "#D55E00",
     "paper": "#CC79A7",
     "estimate": "#009E73",
-    "report": "#F0E442",
 }
 _WORK = {"march": "its steps", "spacetime": "its iterations", "paper": "its iterations", "setup": "the setup"}
 

@@ -16,13 +16,12 @@ _PER_INCH = 17  # letters of the caption
 _LINE = 0.12  # [in] of its lines
 
 
-def draw_all(study: Study, folder: Path, command: str = "dlo study") -> list[Path]:
+def draw_all(study: Study, folder: Path) -> list[Path]:
     """Draw every plot that a study has the measurements for, and return the files.
 
     Args:
         study: what was measured.
         folder: where the pictures go; made where it does not exist.
-        command: what the captions name as the command.
     """
     folder.mkdir(parents=True, exist_ok=True)
     plots: dict[str, tuple[Callable[[Study], Figure], bool]] = {
@@ -38,18 +37,18 @@ def draw_all(study: Study, folder: Path, command: str = "dlo study") -> list[Pat
             if not possible:
                 continue
             figure = draw(study)
-            _caption(figure, study, command)
+            _caption(figure, study)
             file = folder / f"{name}.png"
             figure.savefig(file, dpi=_DPI)
             files.append(file)
     return files
 
 
-def _caption(figure: Figure, study: Study, command: str) -> None:
+def _caption(figure: Figure, study: Study) -> None:
     """Write below a figure what was measured where, in as many lines as its width asks for."""
     machine = ", ".join([study.machine["processor"], f"Python {study.machine.get('Python', '?')}"])
     day = study.measured_at.replace("T", " ").replace("Z", " UTC")
-    text = f"{command}; {machine}; {day}; program {study.source}; one thread, time on a core of its own"
+    text = f"dlo study; {machine}; {day}; program {study.source}; one thread, time on a core of its own"
     width, height = figure.get_size_inches()
     lines = wrap(text, int(_PER_INCH * width))
     below = (_LINE * len(lines) + 0.04) / height

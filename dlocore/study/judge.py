@@ -79,19 +79,18 @@ def finest_march(
     return Truth(positions=positions, moved=moved, n_u=n_u, n_t=n_t, status=prediction.status)
 
 
-def step_by_step(scene: Scene, *, tolerance: float = TOLERANCE, cancelled: Callable[[], bool] | None = None) -> Truth:
-    """Simulate a scene step by step, refined until the reference's own estimated error is below a tolerance.
+def step_by_step(scene: Scene, *, cancelled: Callable[[], bool] | None = None) -> Truth:
+    """Simulate a scene step by step, refined until the reference's own estimated error is below TOLERANCE.
 
     Args:
         scene: whose motion; its quality is not regarded.
-        tolerance: of the estimated error, as a part of the cable's length.
         cancelled: asked within the solve; where it returns True it stops.
 
     Raises:
         SceneError: the scene can't be solved, or has an effect that the reference does not cover.
         Cancelled: `cancelled` returned True.
     """
-    quality = Quality(method="reference", target_error=max(tolerance * scene.cable.length, 1e-6))
+    quality = Quality(method="reference", target_error=max(TOLERANCE * scene.cable.length, 1e-6))
     return as_truth(predict(replace(scene, quality=quality), cancelled=cancelled))
 
 

@@ -435,9 +435,3 @@ def test_a_wrong_method_is_told_which_ones_are_right(
     response = client.request(method, address)
     the_problem(response, 405)
     assert response.headers["allow"] == allowed
-
-
-@pytest.mark.parametrize(("query", "field"), [("limit=0", "limit"), ("limit=x", "limit"), ("offset=-1", "offset")])
-def test_a_wrong_query_parameter_is_named(client: TestClient, query: str, field: str) -> None:
-    problem = the_problem(client.get(f"/v1/predictions?{query}"), 422)
-    assert [error["field"] for error in problem["errors"]] == [field]

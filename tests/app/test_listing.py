@@ -76,11 +76,14 @@ def test_pages_are_not_shifted_by_runs_that_come_or_go(stored: Any) -> None:
         ("before=2026-02-31T12:00:00Z", "before"),
         ("cursor=../x", "cursor"),
         ("cursor=", "cursor"),
+        ("limit=0", "limit"),
         ("limit=1001", "limit"),
+        ("limit=x", "limit"),
+        ("offset=-1", "offset"),
         (f"name={'x' * 201}", "name"),
     ],
 )
-def test_a_filter_that_is_none_is_named(client: TestClient, query: str, field: str) -> None:
+def test_a_wrong_query_parameter_is_named(client: TestClient, query: str, field: str) -> None:
     problem = the_problem(client.get(f"/v1/predictions?{query}"), 422)
     assert [error["field"] for error in problem["errors"]] == [field]
 

@@ -32,7 +32,6 @@ G = 9.81  # [m/s^2]
 CABLE = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-3)
 WEIGHT = 0.05 * G  # [N]
 SCENES = catalogue()
-OVER_BAR = SCENES["lowered over a bar"]
 LIFTED = SCENES["middle lifted from the table"]
 
 

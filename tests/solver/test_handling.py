@@ -8,7 +8,6 @@ import pytest
 from benchmarks.rod import converged
 from dlocore import (
     Cable,
-    ControlPoints,
     Environment,
     Grasp,
     Load,
@@ -218,12 +217,6 @@ def test_a_cable_that_may_turn_about_itself_settles_and_stays_at_rest(build):
     r = predict(scene).surface.positions(*samples(scene))
     # a force of 1e-6 of the weight moves it by 5e-6 m in a second
     np.testing.assert_allclose(r, np.broadcast_to(r[0], r.shape), atol=5e-6)
-
-
-def bent_start() -> ControlPoints:
-    knots = np.concatenate([np.zeros(3), np.linspace(0, 1, 11), np.ones(3)])
-    x = (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3
-    return ControlPoints(control_points=np.column_stack([x, 0.1 * np.sin(4 * x), 0 * x]), knots=knots)
 
 
 @pytest.mark.parametrize("n_u", [9, 13, 25])

@@ -108,7 +108,7 @@ def test_effects_that_make_it_faster_have_numbers_too() -> None:
 def test_the_caption_stays_within_a_narrow_figure_and_below_its_axes() -> None:
     named = study(machine={"processor": "a processor with a long name at so many GHz " * 3, "Python": "3.11"})
     figure = accuracy_plots.work_precision(named)
-    drawing._caption(figure, named, "dlo study")
+    drawing._caption(figure, named)
     figure.draw_without_rendering()
     (caption,) = figure.texts
     box = caption.get_window_extent()
