@@ -5,15 +5,13 @@ Needs a running service, Playwright and a Chromium (`DLO_CHROMIUM` names another
 
 import argparse
 import json
-import os
-import shutil
 from pathlib import Path
 from urllib.request import Request, urlopen
 
+from browser import FLAGS, chromium
 from playwright.sync_api import sync_playwright
 
 HERE = Path(__file__).parent
-FLAGS = ["--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 LOADED = 60_000  # ms
 DRAWN = 8_000  # ms, for a software renderer to catch up
 SCENE = {
@@ -34,15 +32,6 @@ SCENE = {
     "environment": {"drag": 0.05, "table": {"height": 0.0, "friction": 0.0}},
     "quality": {"n_u": 9, "n_t": 13, "delta": 1e-5},
 }
-
-
-def chromium() -> str:
-    """Return the path of a Chromium."""
-    names = [os.environ.get("DLO_CHROMIUM", ""), "chromium", "chromium-browser", "google-chrome"]
-    path = next((found for name in names if name and (found := shutil.which(name))), None)
-    if path is None:
-        raise SystemExit("No Chromium found: install one, or name it in DLO_CHROMIUM.")
-    return path
 
 
 def solved(address: str) -> str:

@@ -4,25 +4,14 @@ Needs Playwright and a Chromium (`DLO_CHROMIUM` names another one than the first
 """
 
 import argparse
-import os
-import shutil
 from pathlib import Path
 
+from browser import FLAGS, chromium
 from playwright.sync_api import Browser, Page, sync_playwright
 
 HERE = Path(__file__).parent
-FLAGS = ["--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 FIRST_SOLVE = 120_000  # ms; the solver may have to be compiled
 WAIT = 2500  # ms, for a software renderer to catch up
-
-
-def chromium() -> str:
-    """Return the path of a Chromium."""
-    names = [os.environ.get("DLO_CHROMIUM", ""), "chromium", "chromium-browser", "google-chrome"]
-    path = next((found for name in names if name and (found := shutil.which(name))), None)
-    if path is None:
-        raise SystemExit("No Chromium found: install one, or name it in DLO_CHROMIUM.")
-    return path
 
 
 def scene(browser: Browser, address: str) -> None:

@@ -48,9 +48,8 @@ def viewer_files(data_dir: Path) -> Path:
 
 
 def _program() -> Path:
-    names = ("rerun_cli/rerun", "rerun_cli/rerun.exe")
     for file in files("rerun-sdk") or ():
-        if str(file) in names:
+        if str(file) == "rerun_cli/rerun":
             return Path(str(file.locate()))
     raise RuntimeError("The installed rerun-sdk has no program of its own, so no web viewer either")
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 # folders, and the files beside them, from the ground up
 LAYERS = {
     "dlocore": [
