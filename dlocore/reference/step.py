@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from dlocore.reference.banded import factor, solve
-from dlocore.reference.body import CLAMP, GYRATION, REAL, State
+from dlocore.reference.body import CLAMP, GYRATION, REAL
 from dlocore.reference.compile import compiled
 from dlocore.reference.forces import add_contact, add_drag, add_edges, add_hinges, frames
 
@@ -21,16 +21,6 @@ ITERATIONS = 12
 DOWNHILL = 40  # of a long step downhill, each with its own factors
 SHRINKS = 0.3  # of an update by the next: else the factors are too old
 DONE, FAILED = 0, 1
-
-
-@compiled
-def empty_state(body: Any) -> Any:
-    """Return room for a state of the chain."""
-    n, p = len(body.rest) + 1, len(body.point_edge)
-    return State(
-        np.zeros((n, 4)), np.zeros((n, 4)), np.zeros((n - 1, 3)), np.zeros((n - 1, 3)), np.zeros(n - 2),
-        np.zeros((n - 2, 3)), np.zeros(n - 1), np.zeros((p, 3)),
-    )  # fmt: skip
 
 
 @compiled
