@@ -24,12 +24,13 @@ from dlocore.accuracy.fallback import (
 from dlocore.accuracy.refinement import climb
 from dlocore.answer.contacts import contact_forces, contacts_taken_on, with_contact_errors
 from dlocore.answer.frames import material_of, stretch_of
-from dlocore.answer.parts import Accuracy, ContactForce, GraspReaction, MaterialMotion, OnIteration, Status
+from dlocore.answer.parts import Accuracy, ContactForce, GraspReaction, MaterialMotion, OnIteration
 from dlocore.answer.reactions import Windows, reactions, taken_on, with_reaction_errors
 from dlocore.answer.report import effect_reports, elastic_energy
 from dlocore.compiling.interrupts import interruptible
 from dlocore.errors import SceneError, flag, instance
 from dlocore.levels.given import evenly_fitted, given_status, march_given
+from dlocore.levels.iterated import ended, out_of_time
 from dlocore.levels.level import Level
 from dlocore.levels.progress import record, record_level, surface_at
 from dlocore.levels.review import neglected, objections
@@ -41,11 +42,9 @@ from dlocore.problem.time_grid import smallest_n_t
 from dlocore.scene.scene import Method, Quality, Scene
 from dlocore.solvers import paper
 from dlocore.solvers.monitor import Monitor, TimeIsUp, time_allowed
-from dlocore.solvers.spacetime import solve
-from dlocore.words import counted, in_ms
+from dlocore.solvers.spacetime import FindForces, solve
 
 Floats = NDArray[np.float64]
-FindForces = Callable[[], Windows]
 
 
 @interruptible
@@ -195,74 +194,33 @@ def _least_squares(
     problem = level.problem
     if level.motion.stopped or level.motion.largest_strain > TORN:
         return _answer(monitor, "march", Outcome(level, *march_status(problem, level), None))
-    knots_t, before = level.knots_t, len(monitor.iterations)
+    before = len(monitor.iterations)
     last = [level.control]
 
     def on_step(control: Floats, update: float, residual: float, damping: float = 0.0, length: float = 1.0) -> None:
         last[0] = control
         record(problem, level, control, update, residual, monitor, damping, length, method)
 
-    find_forces: FindForces | None = None
+    solver = solve if method == "spacetime" else paper.solve_as_printed
     try:
-        if method == "spacetime":
-            solved = solve(problem, level.motion, knots_t, quality.threshold, monitor, on_step)
-            control, converged, update = solved.control, solved.converged, solved.update
-            find_forces = solved.find_forces
-        else:
-            control, converged, update = paper.solve_as_printed(
-                problem, level.motion, knots_t, quality.threshold, monitor, on_step
-            )
+        solved = solver(problem, level.motion, level.knots_t, quality.threshold, monitor, on_step)
     except TimeIsUp:
         monitor.phase(method)
-        message = "The time limit passed; this is the last iterate. Allow more time or a coarser grid."
-        if method == "spacetime":  # iterates that don't come near may be anything
-            level = evenly_fitted(level)
-            done = counted(len(monitor.iterations) - before, "iteration")
-            message = (
-                f"The time limit passed after {done} of the least squares. "
-                "Allow more time or a coarser grid. The surface is that of the march it started from."
-            )
-        else:
-            level = replace(level, control=last[0])
-        return _answer(monitor, method, Outcome(level, "time_limit", message, None))
+        return _answer(monitor, method, out_of_time(level, method, last[0], len(monitor.iterations) - before))
     monitor.phase(method)
-    iterations, left = counted(len(monitor.iterations) - before, "iteration"), update
-    status: Status = "converged" if converged else "max_iterations"
-    message = f"The update fell below delta = {quality.threshold:g} m in {iterations}."
-    if not converged:
-        message = (
-            f"The update fell to {update:.2g} m in {iterations}, not below delta = {quality.threshold:g} m. "
-            "Raise n_u and n_t, allow a larger delta, or take method march."
-        )
-    if problem.self_contact is not None:
-        message += " The least squares does not know of contact of the cable with itself; method march does."
-    if not converged and method == "spacetime":
-        level = evenly_fitted(level)
-        control, find_forces, left = level.control, None, level.motion.update
-        if quality.method == "auto":
-            method, status, found = "march", *given_status(level)
-            spent = monitor.phases["spacetime"]
-            message = (
-                f"{found} The least squares did not converge in {iterations}, which took {in_ms(spent)}: "
-                "the surface is that of the march it started from."
-            )
-        else:
-            message += " The surface is that of the march it started from."
-    elif not np.abs(control).max() <= paper.BEYOND * problem.scene.cable.length:
-        status = "stalled"
-        message += " The iterates grew beyond all bounds; the surface is that of a march."
-        control, left = level.control, level.motion.update
-    level = replace(level, control=control)
+    end = ended(level, quality, method, solved, len(monitor.iterations) - before, monitor)
+    level, method = end.level, end.method
     if again is not None:
-        errors = None if again.errors is None else {**again.errors, "iteration": left}
-        return _answer(monitor, method, Outcome(level, status, message + again.said, errors), find_forces, again.judged)
-    known = quality.estimate and (method != "paper" or converged)
+        errors = None if again.errors is None else {**again.errors, "iteration": end.left}
+        outcome = Outcome(level, end.status, end.message + again.said, errors)
+        return _answer(monitor, method, outcome, end.find_forces, again.judged)
+    known = quality.estimate and (method != "paper" or solved.converged)
     compared = by_finer(problem, level, monitor) if known else Compared(None)
     estimate = compared.estimate
     # what the time spline of the march misses is no error of the least squares
-    errors = None if estimate is None else {"grid": max(estimate, level.unseen, level.held_back), "iteration": left}
-    outcome = Outcome(compared.on(level), status, message + compared.doubt, errors)
-    return _answer(monitor, method, outcome, find_forces)
+    errors = None if estimate is None else {"grid": max(estimate, level.unseen, level.held_back), "iteration": end.left}
+    outcome = Outcome(compared.on(level), end.status, end.message + compared.doubt, errors)
+    return _answer(monitor, method, outcome, end.find_forces)
 
 
 def check_n_t(problem: Problem, n_t: int) -> None:

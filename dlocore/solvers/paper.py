@@ -20,7 +20,7 @@ from dlocore.problem.problem import Problem
 from dlocore.solvers.bands import dense_of
 from dlocore.solvers.march import March
 from dlocore.solvers.monitor import Monitor
-from dlocore.solvers.spacetime import WindowSolver, windows_of
+from dlocore.solvers.spacetime import Solved, WindowSolver, windows_of
 
 Floats = NDArray[np.float64]
 
@@ -50,8 +50,8 @@ def solve_as_printed(
     delta: float,
     monitor: Monitor,
     on_step: Callable[[Floats, float, float], None],
-) -> tuple[Floats, bool, float]:
-    """Iterate the printed scheme; return control points (n_t, n_u, nc) [m], whether it converged, the last update [m].
+) -> Solved:
+    """Iterate the printed scheme.
 
     The problem is one that `refuse` lets pass.
 
@@ -97,7 +97,7 @@ def solve_as_printed(
         on_step(control, update, float(np.sqrt(np.mean(R * R))))
         if not update <= BEYOND * problem.scene.cable.length or update < delta:
             break
-    return control, update < delta, update
+    return Solved(control, update < delta, update, None)
 
 
 def _equations(

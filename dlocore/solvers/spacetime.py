@@ -224,22 +224,26 @@ def _window_forces(
     return WindowForces(held, times, *holding_forces(equations, control))
 
 
+FindForces = Callable[[], tuple[WindowForces, ...]]
+
+
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """A space-time solution.
+    """A solution in space and time, by this least squares or by the printed scheme.
 
     Attributes:
         control: (n_t, n_u, nc) [m]; that of the march from the first window on that did not converge.
         converged: the update fell below delta in every window.
         update: the last update norm [m], the largest over the windows that were solved; the least of one that did not
             converge.
-        find_forces: finds what holds the cable in each window that was solved, at its collocation points.
+        find_forces: finds what holds the cable in each window that was solved, at its collocation points; None of the
+            printed scheme.
     """
 
     control: Floats
     converged: bool
     update: float
-    find_forces: Callable[[], tuple[WindowForces, ...]]
+    find_forces: FindForces | None
 
 
 OnStep = Callable[[Floats, float, float, float, float], None]
