@@ -232,6 +232,32 @@ def run_level(
     if hardness > 1.0 and motion.stopped == "step":  # too stiff for this grid
         problem = posed
         motion = march(problem, grid, steps, monitor, rho=rho, whole=whole)
+    problem, motion = _stiffened(problem, motion, grid, steps, monitor, rho, whole)
+    doubtful = motion.stopped == "step" or motion.largest_strain > credible
+    if doubtful and motion is not damped and (rho > STRONGLY_DAMPED or motion.stopped == "step"):
+        other_rho = RHO if rho == STRONGLY_DAMPED else STRONGLY_DAMPED
+        again = damped or march(problem, grid, steps, monitor, rho=other_rho, whole=whole)
+        less = TEARS * again.largest_strain < motion.largest_strain
+        if again.reached > motion.reached or (again.reached == motion.reached and less):
+            motion = again
+    if booked:
+        monitor.phase("march")
+    known = None if plain is None or motion is not plain[0] else (plain[1], plain[2])
+    knots_t, control, off = _splined(problem, motion, knots_t, known, free_knots)
+    if booked:
+        monitor.phase("fit")
+    worst = largest(motion.times, off, problem.scene.swing)
+    return Level(Size(n_u, n_t, steps), posed, problem, motion, knots_t, control, worst, np.inf)
+
+
+def _stiffened(
+    problem: Problem, motion: March, grid: Grid, steps: int, monitor: Monitor, rho: float, whole: bool
+) -> tuple[Problem, March]:
+    """Return what was solved and its march, again with stiffer contact where the cable is pressed into it too deep.
+
+    A stiffer one counts where the motion goes farther with it, or as far and is pressed in less. Against what is pulled
+    in it is of no use.
+    """
     allowed, tried = DEEPEST * problem.scene.cable.diameter, problem
     for _ in range(_STIFFER):
         if motion.stopped == "time" or motion.deepest <= allowed:
@@ -250,15 +276,21 @@ def run_level(
             tried = harder  # strands that strike each other harder by chance are tried once more
         else:
             problem, motion, tried = harder, again, harder
-    doubtful = motion.stopped == "step" or motion.largest_strain > credible
-    if doubtful and motion is not damped and (rho > STRONGLY_DAMPED or motion.stopped == "step"):
-        other_rho = RHO if rho == STRONGLY_DAMPED else STRONGLY_DAMPED
-        again = damped or march(problem, grid, steps, monitor, rho=other_rho, whole=whole)
-        less = TEARS * again.largest_strain < motion.largest_strain
-        if again.reached > motion.reached or (again.reached == motion.reached and less):
-            motion = again
-    if booked:
-        monitor.phase("march")
+    return problem, motion
+
+
+def _splined(
+    problem: Problem, motion: March, knots_t: Floats, known: tuple[Floats, Floats] | None, free_knots: bool
+) -> tuple[Floats, Floats, Floats]:
+    """Return time knots (n_t + 4,) [s] and control points (n_t, n_u, nc) [m] of a march, and what they miss [m].
+
+    Args:
+        problem: that was solved.
+        motion: its march.
+        knots_t: those to begin with.
+        known: control points on these, and what each state (steps + 1,) is missed by [m], where that is known.
+        free_knots: whether knots are added where the cable strikes something, or is fast within a long time.
+    """
     smooth = motion
     period = problem.scene.swing
     if free_knots and (problem.contact is not None or motion.deepest > 0.0):
@@ -266,17 +298,13 @@ def run_level(
     elif free_knots and problem.horizon > _LONG * period:
         target = problem.scene.quality.target_error or AUTO_TARGET * problem.scene.cable.length
         knots_t, _ = refined(motion, knots_t, _FITTED * target, False)
-    if plain is not None and motion is plain[0] and len(knots_t) == len(plain[1]) + 4:
-        _, control, off = plain
+    if known is not None and len(knots_t) == len(known[0]) + 4:
+        control, off = known
     else:
         control, off = fit(smooth, knots_t)
     if smooth is not motion:
         off = missed(motion, knots_t, control)
-    if booked:
-        monitor.phase("fit")
-    return Level(
-        Size(n_u, n_t, steps), posed, problem, motion, knots_t, control, largest(motion.times, off, period), np.inf
-    )
+    return knots_t, control, off
 
 
 def _fastest(motion: March) -> float:
