@@ -184,13 +184,11 @@ def _least_squares(
     """Solve on the given grid by the weighted least squares from a march, or by the printed scheme from rest."""
     assert quality.n_u is not None
     assert quality.n_t is not None
-    if method == "paper":
-        paper.refuse(problem, quality.n_u, quality.n_t)
     if again is None:
         check_n_t(problem, quality.n_t)
-        level = march_given(problem, quality.n_u, quality.n_t, monitor)
-    else:
-        level = again.level
+    if method == "paper":
+        paper.refuse(problem, quality.n_u, quality.n_t)
+    level = march_given(problem, quality.n_u, quality.n_t, monitor) if again is None else again.level
     problem = level.problem
     if level.motion.stopped or level.motion.largest_strain > TORN:
         return _answer(monitor, "march", Outcome(level, *march_status(problem, level), None))
