@@ -67,7 +67,7 @@ async def read(
 
 @router.post("", status_code=202, response_class=Response, summary="Calibrate", responses=described.MEASURE)
 async def measure(request: Request, service: TheService) -> Response:
-    """Measure this machine in the background, some tens of seconds; predictions go first.
+    """Measure this machine in the background, about 10 to 20 seconds; predictions go first.
 
     Where a calibration is under way already, that one is answered. With `Accept: text/event-stream` the answer is its
     progress; closing the connection does not stop it, `DELETE` does.
