@@ -83,7 +83,7 @@ async def measure(request: Request, service: TheService) -> Response:
         return orjson.dumps(document_of(found, 2))
 
     job = running[0] if running else service.measure(KIND, new_id(), work)
-    response = events.of_job(job, service) if form == EVENTS else _state(job.summary(), 202)
+    response = events.of_job(job) if form == EVENTS else _state(job.summary(), 202)
     response.headers["Location"] = job.address
     return response
 
@@ -110,7 +110,7 @@ async def follow(
     job = service.measurements.last(KIND)
     if job is None:
         raise ProblemError(404, "not-calibrating", "No calibration is under way.")
-    return events.of_job(job, service, events.seen_before(last_event_id))
+    return events.of_job(job, events.seen_before(last_event_id))
 
 
 def _state(document: dict[str, Any], status: int) -> Response:

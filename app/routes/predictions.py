@@ -67,7 +67,7 @@ async def predict(
     wishes = preferences(prefer)
     job = await service.submit(scene, await request.body(), store=store, like=like)
     if form == EVENTS:
-        response = events.of_job(job, service, cancel=not wishes.respond_async)
+        response = events.of_job(job, cancel=not wishes.respond_async)
     elif wishes.respond_async:
         with anyio.move_on_after(wishes.wait):
             await job.finished.wait()
@@ -90,16 +90,13 @@ async def _answer(job: Job, service: Service, form: str) -> Response:
     if job.problem is not None:
         raise job.problem
     address = f"/v1/predictions/{job.id}"
-    document = await anyio.to_thread.run_sync(service.document, job.id, job)
-    if document is None:
-        raise no_run(job.id)
+    document, material = job.document or b"", job.material
     if job.beyond_limit:
         message = orjson.loads(document)["message"]
         limit = service.settings.time_limit
         detail = f"The solve reached the limit of {limit:g} s; the best iterate so far is kept. {message}"
         raise ProblemError(504, "time-limit", detail, prediction=address)
-    material = partial(service.material, job.id, job)
-    return await prediction_response(document, form, material, 201 if job.store else 200)
+    return await prediction_response(document, form, lambda: material, 201 if job.store else 200)
 
 
 def _state(job: Job, status: int = 200) -> Response:
@@ -217,7 +214,7 @@ async def follow(
     job = service.jobs.get(id)
     if job is not None:
         over = job.finished.is_set() and seen > len(job.iterations)
-        return Response(status_code=204) if over else events.of_job(job, service, seen)
+        return Response(status_code=204) if over else events.of_job(job, seen)
     document = await anyio.to_thread.run_sync(service.document, id)
     if document is None:
         raise no_run(id)

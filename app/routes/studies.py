@@ -66,7 +66,7 @@ async def study(
         return document
 
     job = service.measure(KIND, id, work)
-    response = events.of_job(job, service) if form == EVENTS else _state(job.summary(), 202)
+    response = events.of_job(job) if form == EVENTS else _state(job.summary(), 202)
     response.headers["Location"] = job.address
     return response
 
@@ -150,7 +150,7 @@ async def follow(
     negotiated(request.headers.get("accept"), (EVENTS,))
     job = service.measurements.get(id)
     if job is not None and job.kind == KIND:
-        return events.of_job(job, service, events.seen_before(last_event_id))
+        return events.of_job(job, events.seen_before(last_event_id))
     document = await anyio.to_thread.run_sync(store_of(service).document, id)
     if document is None:
         raise _no_study(id)

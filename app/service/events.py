@@ -2,15 +2,13 @@
 
 from typing import Annotated
 
-import anyio.to_thread
 import orjson
 from fastapi import Header, Response
 
 from app.http.formats import EVENTS
-from app.http.problems import ProblemError, document_of
+from app.http.problems import document_of
 from app.http.streamed import Emit, Streamed
 from app.service.jobs import Job
-from app.service.service import Service
 
 LastEventId = Annotated[
     str | None, Header(description="Number of the last event seen, to go on after it.", examples=["3"])
@@ -29,19 +27,18 @@ def _state(id: str, state: str) -> bytes:
     return _event("state", orjson.dumps({"id": id, "state": state}))
 
 
-def of_job(job: Job, service: Service, seen: int = 0, *, cancel: bool = False) -> Response:
+def of_job(job: Job, seen: int = 0, *, cancel: bool = False) -> Response:
     """Return the events of a job: states, the iterations after the first `seen`, and `done` or `error`.
 
     Args:
         job: the job.
-        service: where its answer is.
         seen: how many iterations the client knows.
         cancel: whether the job ends when the client goes.
     """
 
     async def produce(emit: Emit) -> None:
         try:
-            await _follow(job, service, seen, emit)
+            await _follow(job, seen, emit)
         except BaseException:
             if cancel:
                 job.cancel()
@@ -50,7 +47,7 @@ def of_job(job: Job, service: Service, seen: int = 0, *, cancel: bool = False) -
     return Streamed(produce, EVENTS, _HEADERS)
 
 
-async def _follow(job: Job, service: Service, seen: int, emit: Emit) -> None:
+async def _follow(job: Job, seen: int, emit: Emit) -> None:
     async for news in job.progress(seen):
         if news is None:
             await emit(b": still here\n\n")
@@ -58,12 +55,10 @@ async def _follow(job: Job, service: Service, seen: int, emit: Emit) -> None:
             await emit(_state(job.id, news))
         else:
             await emit(_event(job.EVENT, orjson.dumps(news), news["number"]))
-    document = await anyio.to_thread.run_sync(service.document, job.id, job) if job.state == "done" else None
-    if document is not None:
-        await emit(_event("done", document, len(job.iterations)))
+    if job.problem is None:
+        await emit(_event("done", job.document or b"", len(job.iterations)))
     else:
-        problem = job.problem or ProblemError(404, "no-such-run", "The run has been removed.")
-        await emit(_event("error", orjson.dumps(document_of(problem)), len(job.iterations)))
+        await emit(_event("error", orjson.dumps(document_of(job.problem)), len(job.iterations)))
 
 
 def of_document(document: bytes, seen: int = 0) -> Response:

@@ -29,8 +29,8 @@ class Job:
         created: when it was asked for, ISO 8601 in UTC.
         state: how far it is.
         iterations: the documents of the iterations so far.
-        document: the answer as JSON, where it was not stored.
-        material: what the sections of the cable remember, where it was not stored.
+        document: the answer as JSON.
+        material: what the sections of the cable remember.
         problem: why there is none.
         beyond_limit: whether the answer is the best iterate within the time limit of the service.
         cancelled: set by `cancel`.

@@ -152,11 +152,10 @@ class Service:
                 document, job.store = await anyio.to_thread.run_sync(
                     self.keep, prediction, request, raw, job.id, job.store
                 )
+                job.material = await anyio.to_thread.run_sync(lambda: prediction.material)
+                job.document = document
                 if job.store:
                     self.jobs.forget(job.id)  # the stored run stands for it
-                else:
-                    job.material = await anyio.to_thread.run_sync(lambda: prediction.material)
-                    job.document = document
                 job.end("done")
         except Exception as error:
             problem = problem_of(error)
@@ -252,40 +251,30 @@ class Service:
             fields: which of `OPTIONAL_FIELDS` the answer has; what is stored has all.
         """
         u, t = request.output.samples_u, request.output.samples_t
-        told = prediction
+        told, stored = prediction, b""
         if store:
             try:
-                self.runs.save(raw, prediction, samples_u=u, samples_t=t, id=id, name=request.name)
+                _, stored = self.runs.save(raw, prediction, samples_u=u, samples_t=t, id=id, name=request.name)
             except OSError as error:
                 _log.error("the run is not stored: %s", error)
                 told = replace(prediction, said=f"{prediction.said} It is not stored: {error.strerror or error}.")
                 store = False
         if store:
-            answer = _with_fields(self.runs.document(id) or b"", fields)
+            answer = _with_fields(stored, fields)
         else:
             document = {**from_prediction(told, id, u, t, fields), "links": None}
             answer = orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
         self.recent.add(id, prediction)  # with what the answer has found of it, which takes memory, too
         return answer, store
 
-    def document(self, id: str, job: Job | None = None) -> bytes | None:
-        """Return the answer `id` as JSON, or None where there is none; for any thread.
-
-        Args:
-            id: of a run, stored or not.
-            job: that of the run, where it is known.
-        """
-        job = job or self.jobs.get(id)
+    def document(self, id: str) -> bytes | None:
+        """Return the answer of the run `id`, stored or not, as JSON, or None where there is none; for any thread."""
+        job = self.jobs.get(id)
         return job.document if job is not None and job.document is not None else self.runs.document(id)
 
-    def material(self, id: str, job: Job | None = None) -> MaterialMotion | None:
-        """Return what the sections of the cable remember in the answer `id`, if anything; for any thread.
-
-        Args:
-            id: of a run, stored or not.
-            job: that of the run, where it is known.
-        """
-        job = job or self.jobs.get(id)
+    def material(self, id: str) -> MaterialMotion | None:
+        """Return what the sections of the cable remember in the run `id`, stored or not, or None; for any thread."""
+        job = self.jobs.get(id)
         if job is not None and job.document is not None:
             return job.material
         motion = self.runs.motion(id)

@@ -76,8 +76,8 @@ class RunStore:
         samples_t: int = 33,
         id: str | None = None,
         name: str = "",
-    ) -> str:
-        """Store a prediction and return its id.
+    ) -> tuple[str, bytes]:
+        """Store a prediction and return its id and its document, which are known even where the run is soon removed.
 
         Args:
             scene_json: the request, as data or as the bytes that were sent.
@@ -114,7 +114,7 @@ class RunStore:
             self._entries[id] = _Entry(summary, sum(map(len, files.values())))
             removed = self._evict()
         _delete(removed)
-        return id
+        return id, files[DOCUMENT]
 
     def _write(self, id: str, files: dict[str, bytes]) -> None:
         temporary = self._root / f".new-{id}"

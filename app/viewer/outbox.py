@@ -30,8 +30,8 @@ def file_name(draft: Draft, ending: str) -> str:
 class Runs(Protocol):
     """Where runs are stored."""
 
-    def save(self, scene_json: dict[str, Any], prediction: Prediction, *, name: str = "") -> str:
-        """Store a run; return its id."""
+    def save(self, scene_json: dict[str, Any], prediction: Prediction, *, name: str = "") -> tuple[str, bytes]:
+        """Store a run; return its id and its document."""
 
     def motion(self, id: str) -> Motion | None:
         """Return the motion of a stored run."""
@@ -76,11 +76,12 @@ class Outbox:
         """Store a run and return its id; None where it can't be, which is said to the client and in the log."""
         name = draft.get(("name",), "")
         try:
-            return await asyncio.to_thread(self._runs.save, draft.document, prediction, name=name)
+            id, _ = await asyncio.to_thread(self._runs.save, draft.document, prediction, name=name)
         except Exception:
             _log.exception("the run could not be stored")
             self._client.add_notification("Not kept", "The run could not be stored; the log says why.", color="red")
             return None
+        return id
 
     def _send(self, name: str, content: bytes) -> None:
         self._client.send_file_download(name, content, save_immediately=True)

@@ -48,7 +48,7 @@ prediction = predict(to_scene(PredictionRequest.model_validate(scene), lambda id
 
 def write(store, notes):
     while True:
-        id = store.save(scene, prediction)
+        id, _ = store.save(scene, prediction)
         os.write(notes, (id + chr(10)).encode())  # in one piece, whatever other threads write
         store.recording(id)
 
@@ -268,7 +268,7 @@ def test_the_oldest_go_first_across_restarts(tmp_path: Path, cap: str) -> None:
         before = sorted(summary["id"] for summary in store.page(10_000, 0)[0])
         assert before == ids[len(ids) - len(before) :]  # what the last process kept
         for _ in range(8 if cap == "number" else 1_000_000 // size):
-            ids.append(store.save(paper_scene(), prediction))
+            ids.append(store.save(paper_scene(), prediction)[0])
             time.sleep(0.002)  # ids sort by the millisecond
         kept = sorted(summary["id"] for summary in store.page(10_000, 0)[0])
         assert kept == ids[len(ids) - len(kept) :]

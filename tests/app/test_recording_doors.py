@@ -58,7 +58,7 @@ def test_a_stored_run_gives_the_recording_of_the_solve_itself(tmp_path: Path) ->
     scene = paper_scene(quality={"n_u": 9, "n_t": 13, "delta": 1e-5})
     kept = RunStore(Settings(data_dir=tmp_path))
     prediction = solved(scene, kept)
-    id = kept.save(scene, prediction)
+    id, _ = kept.save(scene, prediction)
     stored, fresh = tmp_path / "stored.rrd", tmp_path / "fresh.rrd"
     stored.write_bytes(kept.recording(id) or b"")
     document = json.loads(kept.document(id) or b"")
@@ -81,10 +81,10 @@ def test_the_command_line_gives_the_recording_of_the_service(
 
 def test_a_run_that_continues_another_keeps_its_recording_without_it(tmp_path: Path) -> None:
     kept = RunStore(Settings(data_dir=tmp_path))
-    first = kept.save(paper_scene(), solved(paper_scene(), kept))
+    first, _ = kept.save(paper_scene(), solved(paper_scene(), kept))
     scene = paper_scene(shape={"kind": "prediction", "id": first, "t": 0.8})
     prediction = solved(scene, kept)
-    second = kept.save(scene, prediction)
+    second, _ = kept.save(scene, prediction)
     assert kept.delete(first)
     run = kept.load(second)
     assert run is not None
@@ -102,7 +102,7 @@ def test_an_iterate_that_grew_beyond_all_bounds_is_not_drawn(tmp_path: Path, los
     surface = replace(first.surface, control_points=np.full_like(first.surface.control_points, lost))
     broken = replace(first, find_surface=lambda: surface, residual=lost, find_energy=lambda: lost)
     path = tmp_path / "run.rrd"
-    id = kept.save(paper_scene(), replace(prediction, iterations=(broken, *others)))
+    id, _ = kept.save(paper_scene(), replace(prediction, iterations=(broken, *others)))
     path.write_bytes(kept.recording(id) or b"")
     chunks = list(rr.chunk.RrdReader(path).stream().to_chunks())
     for entity, component in (("/iterate/shape", "strips"), ("/forces/bend", "scalars"), ("/energy/bend", "scalars")):
@@ -112,7 +112,7 @@ def test_an_iterate_that_grew_beyond_all_bounds_is_not_drawn(tmp_path: Path, los
 
 def test_writing_recordings_leaves_no_threads(tmp_path: Path) -> None:
     kept = RunStore(Settings(data_dir=tmp_path))
-    run = kept.load(kept.save(paper_scene(), solved(paper_scene(), kept)))
+    run = kept.load(kept.save(paper_scene(), solved(paper_scene(), kept))[0])
     assert run is not None
     write_recording(run, tmp_path / "0.rrd")
     before = native_threads()

@@ -37,7 +37,7 @@ def fill(directory: Path, prediction: Prediction, count: int, **limits: Any) -> 
     target = store(directory, **limits)
     ids = []
     for _ in range(count):
-        ids.append(target.save(paper_scene(), prediction))
+        ids.append(target.save(paper_scene(), prediction)[0])
         time.sleep(0.002)  # ids sort by the millisecond
     return target, ids
 
@@ -111,7 +111,7 @@ def test_a_run_that_went_on_knows_its_scene_without_the_one_before(tmp_path: Pat
     target, (first,) = fill(tmp_path, remembering(prediction), 1)
     request = paper_scene(shape={"kind": "prediction", "id": first, "t": 0.7, "settle": True})
     scene = to_scene(PredictionRequest.model_validate(request), target.motion)
-    second = target.save(request, replace(prediction, scene=scene))
+    second, _ = target.save(request, replace(prediction, scene=scene))
     assert target.delete(first)
     run = target.load(second)
     assert run is not None
@@ -276,5 +276,24 @@ def test_ids_differ_and_sort_by_time() -> None:
 
 def test_a_run_may_be_saved_as_data_or_as_sent(tmp_path: Path, prediction: Prediction) -> None:
     target = store(tmp_path)
-    data, sent = target.save(paper_scene(), prediction), target.save(orjson.dumps(paper_scene()), prediction)
+    (data, _), (sent, _) = (target.save(given, prediction) for given in (paper_scene(), orjson.dumps(paper_scene())))
     assert target.request(data) == target.request(sent)
+
+
+def test_a_run_that_is_removed_as_soon_as_it_is_stored_is_answered(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with TestClient(create_app(Settings(data_dir=tmp_path))) as client:
+        start(client)
+        monkeypatch.setattr(client.app.state.service.runs, "_max_runs", 0)  # as if others had been stored meanwhile
+        for accept, status in (("application/json", 201), ("application/x-npz", 201), ("text/event-stream", 200)):
+            response = client.post("/v1/predictions", json=paper_scene(), headers={"accept": accept})
+            assert response.status_code == status
+            assert response.content
+            assert b"event: error" not in response.content
+        for fields in (["grasps"], ["surface"]):
+            batch = {"scenes": [paper_scene()], "store": True, "fields": fields}
+            line = orjson.loads(client.post("/v1/predictions:batch", json=batch).content)
+            assert line["status"] == "converged"
+            assert ("grasps" in line["result"]) is (fields == ["grasps"])
+        assert client.get("/v1/predictions").json()["total"] == 0
