@@ -13,7 +13,6 @@ from app.routes import described
 from app.routes.body import JsonRoute
 from app.schemas.convert import check_columns
 from app.schemas.fit import FIT_EXAMPLES, FitRequest, FitResponse
-from dlocore import SceneError
 from dlocore.shape.cloud import fit_cloud
 from dlocore.spline import DEGREE
 
@@ -38,19 +37,13 @@ async def fit(request: Request, seen: Annotated[FitRequest, Body(openapi_example
 
 def _fitted(seen: FitRequest) -> bytes:
     check_columns("points", seen.points)
-    try:
-        found = fit_cloud(
-            seen.points,
-            ordered=seen.ordered,
-            length=seen.length,
-            start=None if seen.start is None else np.array(seen.start),
-            remove_outliers=seen.outliers == "remove",
-        )
-    except SceneError:
-        raise
-    except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:  # of scales that no arithmetic holds together
-        allowed = "points along one smooth curve"
-        raise SceneError("points", f"{len(seen.points)} points", allowed, "No curve can be fitted to them") from error
+    found = fit_cloud(
+        seen.points,
+        ordered=seen.ordered,
+        length=seen.length,
+        start=None if seen.start is None else np.array(seen.start),
+        remove_outliers=seen.outliers == "remove",
+    )
     curve = found.curve
     document = {
         "control_points": curve.control_points,

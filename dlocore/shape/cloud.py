@@ -61,6 +61,16 @@ def fit_cloud(
         SceneError: the points are too few, of no single curve, or of one that differs in length from the cable.
     """
     p = points_array("points", points)
+    try:
+        return _fitted(p, ordered, length, start, remove_outliers)
+    except SceneError:
+        raise
+    except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:  # of scales that no arithmetic holds together
+        allowed = "points along one smooth curve"
+        raise SceneError("points", f"{len(p)} points", allowed, "No curve can be fitted to them") from error
+
+
+def _fitted(p: Floats, ordered: bool, length: float | None, start: Floats | None, remove_outliers: bool) -> CloudFit:
     count = len(p)
     if ordered:
         found = without_spikes(p) if remove_outliers else Order(np.arange(count), np.arange(0))

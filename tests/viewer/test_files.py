@@ -85,6 +85,7 @@ def test_points_of_a_longer_cable_give_it_their_length():
         ("points.npz", npz(a=ARC, b=ARC), "points"),
         ("points.npz", npz(points=np.array(["x"])), "numbers"),
         ("points.csv", b"0,0\n0,0\n0,0\n0,0", "points"),
+        ("points.csv", b"0,0\n1e200,0\n2,3e200\n4e200,0\n5e200,1", "points"),
     ],
 )
 def test_a_file_that_is_none_is_refused_in_words(name, content, words):
