@@ -6,8 +6,7 @@ the markers with a `.json` of the same name beside it.
 
 import csv
 import json
-import zipfile
-import zlib
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dlocore.array_files import ArrayFile
 from dlocore.errors import SceneError, array, number, repeated, within
 from dlocore.words import counted
 
@@ -195,8 +195,12 @@ def _held(held: tuple[int, ...], count: int) -> tuple[int, ...]:
     return tuple(sorted(out))
 
 
-def load_recording(path: str | Path) -> Recording:
+def load_recording(path: str | Path, *, largest: float = math.inf) -> Recording:
     """Read a recording from `<name>.npz`, or from `<name>.csv` with `<name>.json` beside it.
+
+    Args:
+        path: the file.
+        largest: bytes that an array of a `.npz` may have once it is unpacked.
 
     Raises:
         SceneError: the file is not one, or what it holds does not fit together.
@@ -204,7 +208,7 @@ def load_recording(path: str | Path) -> Recording:
     """
     path = Path(path)
     if path.suffix == ".npz":
-        return _from_npz(path)
+        return _from_npz(path, largest)
     if path.suffix == ".csv":
         return _from_csv(path)
     raise SceneError("recording", path.name, "a .npz, or a .csv with a .json of the same name")
@@ -248,25 +252,6 @@ def recording_of(times: ArrayLike, markers: ArrayLike, facts: Mapping[str, Any])
     return Recording(times=times, markers=markers, **{**facts, "held": tuple(held)})
 
 
-def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a `.npz`.
-
-    Raises:
-        SceneError: it is none, or damaged, or holds objects.
-        OSError: it can't be read.
-    """
-    allowed = "a NumPy .npz file of numbers and text"
-    with path.open("rb") as file:
-        if not zipfile.is_zipfile(file):
-            raise SceneError(path.name, "no archive, or one whose end is missing", allowed)
-        file.seek(0)
-        try:
-            data = np.load(file, allow_pickle=False)
-            return {name: np.asarray(data[name]) for name in data.files}
-        except (ValueError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
-            raise SceneError(path.name, f"an archive that can't be unpacked: {error}", allowed) from error
-
-
 def read_facts(path: Path) -> dict[str, Any]:
     """Return the JSON object in a file.
 
@@ -280,14 +265,15 @@ def read_facts(path: Path) -> dict[str, Any]:
         raise SceneError(path.name, str(error), "text in UTF-8") from None
 
 
-def _from_npz(path: Path) -> Recording:
-    arrays = read_arrays(path)
-    missing = [name for name in ("times", "markers") if name not in arrays]
-    if missing:
-        allowed = "the arrays times (k,) and markers (k, m, 2 or 3)"
-        raise SceneError(f"recordings[{path.name!r}].{missing[0]}", sorted(arrays), allowed, "It is missing")
-    facts = _json(str(arrays["about"]), f"{path.name}, about") if "about" in arrays else {}
-    return _of_file(path, arrays["times"], arrays["markers"], facts)
+def _from_npz(path: Path, largest: float) -> Recording:
+    with path.open("rb") as file:
+        arrays = ArrayFile(file, path.name, largest)
+        missing = [name for name in ("times", "markers") if name not in arrays.names]
+        if missing:
+            allowed = "the arrays times (k,) and markers (k, m, 2 or 3)"
+            raise SceneError(f"recordings[{path.name!r}].{missing[0]}", sorted(arrays.names), allowed, "It is missing")
+        facts = _json(str(arrays.read("about")), f"{path.name}, about") if "about" in arrays.names else {}
+        return _of_file(path, arrays.read("times"), arrays.read("markers"), facts)
 
 
 def _from_csv(path: Path) -> Recording:

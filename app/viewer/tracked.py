@@ -17,7 +17,7 @@ from dlocore.recordings import Recording, load_recording
 from dlocore.scene.scene import ControlPoints
 
 Floats = NDArray[np.float64]
-LARGEST = 20_000_000  # bytes
+LARGEST = 20_000_000  # bytes, of a file and of each of its arrays
 MOST_WINDOWS = 8  # that are identified from; the others are shown only
 STEP = 0.02  # s, of the grippers' waypoints in the document
 POINTS_IN_SECOND = 25  # control points in time; those of a cable that swings at 3 Hz
@@ -137,7 +137,7 @@ def opened(name: str, content: bytes, beside: dict[str, bytes]) -> Tracked:
     with tempfile.TemporaryDirectory() as folder:
         for file, bytes_of in {**beside, name: content}.items():
             (Path(folder) / Path(file).name).write_bytes(bytes_of)
-        return Tracked.of(load_recording(Path(folder) / Path(name).name))
+        return Tracked.of(load_recording(Path(folder) / Path(name).name, largest=LARGEST))
 
 
 def _path(path: Waypoints) -> dict[str, Any]:

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from app.viewer.draft import Draft
 from app.viewer.shapes import scaled, with_points
 from dlocore import SceneError
+from dlocore.array_files import ArrayFile, read_array
 from dlocore.errors import points_array
 from dlocore.shape.cloud import fit_cloud
 from dlocore.shape.fit import MAX_LENGTH_MISMATCH
 
 Floats = NDArray[np.float64]
-LARGEST = 10_000_000  # bytes
+LARGEST = 10_000_000  # bytes, of a file and of its array
 MOST_POINTS = 2000  # that a document keeps; of more, a curve is fitted
 SAMPLES = 101  # of that curve
 _KINDS = "a .json scene, or points as .json, .csv, .txt, .npz or .npy"
@@ -97,15 +98,16 @@ def _csv(content: bytes) -> Floats:
 
 def _arrays(content: bytes) -> Floats:
     """Return the points of a NumPy file: its array `points`, the last of its `positions`, or its only array."""
-    try:
-        loaded = np.load(io.BytesIO(content), allow_pickle=False)
-        arrays = {"points": loaded} if isinstance(loaded, np.ndarray) else {key: loaded[key] for key in loaded.files}
-    except (ValueError, OSError, EOFError, KeyError) as error:
-        raise SceneError("file", str(error)[:80], "a file that numpy.save or numpy.savez wrote") from None
-    name = next((key for key in _ARRAYS if key in arrays), next(iter(arrays), "") if len(arrays) == 1 else "")
-    if not name:
-        raise SceneError("file", ", ".join(arrays) or "no array", "an array called points, (n, 2) or (n, 3) [m]")
-    found = np.asarray(arrays[name])
+    file = io.BytesIO(content)
+    if not content.startswith(b"PK"):  # no archive
+        name, found = "points", read_array(file, "file")
+    else:
+        arrays = ArrayFile(file, "file", LARGEST)
+        names = arrays.names
+        name = next((key for key in _ARRAYS if key in names), names[0] if len(names) == 1 else "")
+        if not name:
+            raise SceneError("file", ", ".join(names) or "no array", "an array called points, (n, 2) or (n, 3) [m]")
+        found = arrays.read(name)
     if found.ndim == 3 and len(found):  # a motion: where it ends
         found = found[-1]
     if found.dtype.kind not in "fiu" or found.ndim != 2 or found.shape[1] not in (2, 3, 4):

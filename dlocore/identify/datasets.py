@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.array_files import ArrayFile
 from dlocore.errors import SceneError, number, within
-from dlocore.recordings import Recording, read_arrays, read_facts
+from dlocore.recordings import Recording, read_facts
 
 Floats = NDArray[np.float64]
 
@@ -63,7 +64,10 @@ def load_datasets(paths: list[Path], fit: int = FIT) -> tuple[list[MovedCable], 
     moved: dict[str, list[tuple[Path, Floats, dict[str, Any]]]] = {}
     wires = []
     for file in files:
-        markers, beside = read_arrays(file).get("markers", np.zeros(0)), file.with_suffix(".json")
+        with file.open("rb") as opened:
+            arrays = ArrayFile(opened, file.name)
+            markers = arrays.read("markers") if "markers" in arrays.names else np.zeros(0)
+        beside = file.with_suffix(".json")
         facts = read_facts(beside) if beside.exists() else {}
         if markers.ndim == 4:
             numbers = _numbers(f"{_place(file)}.markers", markers)

@@ -9,8 +9,8 @@ ROOT = Path(__file__).parents[2]
 # folders, and the files beside them, from the ground up
 LAYERS = {
     "dlocore": [
-        "errors", "words", "machine", "files", "pickling", "compiling", "effects", "kernels", "spline", "scene",
-        "shape", "problem", "answer", "solvers", "stability", "statics", "levels", "prediction", "accuracy",
+        "errors", "words", "machine", "files", "array_files", "pickling", "compiling", "effects", "kernels", "spline",
+        "scene", "shape", "problem", "answer", "solvers", "stability", "statics", "levels", "prediction", "accuracy",
         "reference", "front", "many", "planning", "balance", "sensitivity", "warming", "calibration", "study",
         "recordings", "identify",
     ],

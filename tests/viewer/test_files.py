@@ -1,7 +1,9 @@
 """Scenes and points are opened from files, edited by hand and taken away again."""
 
+import contextlib
 import io
 import json
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -91,6 +93,36 @@ def test_points_of_a_longer_cable_give_it_their_length():
 def test_a_file_that_is_none_is_refused_in_words(name, content, words):
     with pytest.raises(SceneError, match=words.replace(".", r"\.")):
         uploads.opened(start_draft(), name, content)
+
+
+@pytest.mark.parametrize("ending", ["npz", "npy"])
+@pytest.mark.parametrize("compressed", [True, False])
+def test_a_damaged_file_of_arrays_is_refused_wherever_it_is_damaged(ending, compressed):
+    buffer = io.BytesIO()
+    if ending == "npy":
+        np.save(buffer, ARC)
+    else:
+        (np.savez_compressed if compressed else np.savez)(buffer, points=ARC)
+    good, rng = buffer.getvalue(), np.random.default_rng(1)
+    cut = [good[:k] for k in range(0, len(good), 7)]
+    changed = [good[:k] + bytes([rng.integers(256)]) + good[k + 1 :] for k in range(0, len(good), 3)]
+    for content in (*cut, *changed):
+        with contextlib.suppress(SceneError):  # else it is opened: what is damaged does not matter
+            uploads.opened(start_draft(), f"points.{ending}", content)
+
+
+def test_only_the_array_that_is_used_is_unpacked_and_none_that_is_too_large():
+    largest, buffer = uploads.LARGEST, io.BytesIO()
+    np.savez_compressed(buffer, points=ARC, other=np.zeros(100 * largest, dtype=np.int8))
+    assert len(buffer.getvalue()) < largest
+    tracemalloc.start()
+    uploads.opened(start_draft(), "points.npz", buffer.getvalue())
+    assert tracemalloc.get_traced_memory()[1] < largest
+    tracemalloc.stop()
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, points=np.zeros((largest // 24 + 1, 3)))
+    with pytest.raises(SceneError, match=f"at most {largest} bytes"):
+        uploads.opened(start_draft(), "points.npz", buffer.getvalue())
 
 
 def test_a_refused_file_leaves_the_scene_as_it_was(service):

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from protocol_client import SceneClient, connected
 
+from app.viewer import tracked
 from app.viewer.kept import FILE, KeptCables
 from app.viewer.tracking_report import error_card
 from benchmarks.simulated_recordings import CABLE, DRAG, simulated
+from dlocore import SceneError
 from dlocore.recordings import Recording, save_recording
 
 OPEN = "Open a recording …"
@@ -99,6 +101,16 @@ def test_a_file_that_is_no_recording_is_refused_and_the_scene_stays(service, nam
         client.upload(OPEN, name, content)
         client.wait_for(lambda: "was not opened" in client.html("was not opened"))
         assert client.document == before
+
+
+def test_a_recording_that_unpacks_to_more_than_is_allowed_is_refused(recording, tmp_path):
+    long = np.zeros((tracked.LARGEST // 24 + 1, 3))
+    np.savez_compressed(tmp_path / "long.npz", times=np.arange(len(long)), markers=long[:, None])
+    with pytest.raises(SceneError, match=f"at most {tracked.LARGEST} bytes"):
+        tracked.opened("long.npz", (tmp_path / "long.npz").read_bytes(), {})
+    parts = {"times": recording.times, "markers": recording.markers}
+    np.savez_compressed(tmp_path / "more.npz", **parts, other=long)  # which nobody unpacks
+    assert tracked.opened("more.npz", (tmp_path / "more.npz").read_bytes(), {}).windows
 
 
 def test_the_error_is_shown_at_the_cursor_and_over_time():
