@@ -9,7 +9,7 @@ from fastapi_offline import FastAPIOffline
 
 from app import viewer
 from app.http import openapi, problems
-from app.http.access import Access
+from app.http.access import Access, OtherSites
 from app.http.middleware import AccessLog, BodyLimit, Heads, PageHeaders
 from app.http.query import check_query
 from app.routes import (
@@ -60,6 +60,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(BodyLimit, limit=settings.max_body_bytes)
     if settings.token is not None:
         app.add_middleware(Access, token=settings.token.get_secret_value())
+    app.add_middleware(OtherSites, settings=settings)
     app.add_middleware(PageHeaders)
     if settings.allowed_origins:  # outside of the token: a browser asks for leave without it
         app.add_middleware(

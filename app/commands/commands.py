@@ -1,6 +1,5 @@
 """What the commands of ``dlo`` do."""
 
-import ipaddress
 import json as stdlib_json
 import math
 import os
@@ -18,6 +17,7 @@ from pydantic_settings import SettingsError
 from app.commands.bar import progress_bar
 from app.commands.errors import FAILED, NOT_CONVERGED, CommandError
 from app.commands.files import STANDARD, check_outputs, for_people, is_device, read_input, write_output
+from app.http.access import is_loopback
 from app.http.fields import BadField, bad_fields
 from app.schemas import PredictionRequest, from_prediction, to_scene
 from app.schemas.surroundings import QualityModel
@@ -54,7 +54,7 @@ def serve(host: str | None, port: int | None) -> int:
     where = f"[{settings.host}]" if ":" in settings.host else settings.host
     address = f"http://{where}:{listening.getsockname()[1]}"
     print(f"page      {address}/\n3D scene  {address}/scene/\nAPI docs  {address}/docs", flush=True)
-    if settings.token is None and not _is_loopback(settings.host):
+    if settings.token is None and not is_loopback(settings.host):
         print("warning   anyone who reaches this address can use it; DLO_TOKEN asks for a token", file=sys.stderr)
     print(f"runs      {settings.data_dir / 'runs'}", flush=True)
     uvicorn.Server(config).run(sockets=[listening])
@@ -81,13 +81,6 @@ def _listening(host: str, port: int) -> socket.socket:
             f"can't listen on port {port} of {host}: {reason}. --port 0 takes one that is free.",
             FAILED,
         ) from None
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 def predict(

@@ -1,24 +1,31 @@
-"""The optional bearer token: every address but ``/health`` and ``/ready`` asks for it.
+"""Who is let in, at every address but ``/health`` and ``/ready``: the optional bearer token, and pages of other sites.
 
 A program sends ``Authorization: Bearer TOKEN``. A browser can't, so a page opened once with ``?token=TOKEN`` gets a
 cookie that stands for the token, and is sent on to the same address without it.
+
+A browser that reaches the service may have any page open. Pages of other sites can't read answers, but without a token
+could have the service do things, and a page whose name leads to 127.0.0.1 for a moment could read, too.
 """
 
 import hashlib
 import hmac
+import ipaddress
 from http.cookies import CookieError, SimpleCookie
-from urllib.parse import parse_qsl, quote, urlencode
+from urllib.parse import parse_qsl, quote, urlencode, urlsplit
 
 from starlette.datastructures import Headers
 from starlette.responses import RedirectResponse
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.http.problems import ProblemError, problem_response
+from app.settings import Settings
 
 OPEN = frozenset({"/health", "/ready"})
 COOKIE = "dlo-session"
 IN_QUERY = "token"  # name in the query of a page that is opened with it
-_POLICY_VIOLATION = 1008
+_POLICY_VIOLATION = 1008  # the close code of a websocket that is refused
+_SAFE = frozenset({"GET", "HEAD", "OPTIONS"})  # change nothing
+_MORE = "DLO_ALLOWED_ORIGINS allows others."
 
 
 class Access:
@@ -38,15 +45,12 @@ class Access:
         """Pass the request on, or refuse it."""
         if scope["type"] not in ("http", "websocket") or scope["path"] in OPEN or self._knows(Headers(scope=scope)):
             await self.app(scope, receive, send)
-        elif scope["type"] == "websocket":
-            await receive()
-            await send({"type": "websocket.close", "code": _POLICY_VIOLATION})
-        elif scope["method"] == "GET" and self._in_query(scope):
+        elif scope["type"] == "http" and scope["method"] == "GET" and self._in_query(scope):
             await self._welcome(scope)(scope, receive, send)
         else:
             detail = "Send `Authorization: Bearer` with the token of this service, or open a page with `?token=`."
             problem = ProblemError(401, "unauthorized", detail, headers={"WWW-Authenticate": 'Bearer realm="dlo"'})
-            await problem_response(problem)(scope, receive, send)
+            await _refuse(problem, scope, receive, send)
 
     def _knows(self, headers: Headers) -> bool:
         scheme, _, given = headers.get("authorization", "").partition(" ")
@@ -68,6 +72,82 @@ class Access:
         secure = scope.get("scheme") == "https"
         response.set_cookie(COOKIE, self._session, httponly=True, samesite="strict", secure=secure)
         return response
+
+
+class OtherSites:
+    """Refuse what pages of other sites ask for; programs, which send no origin, are let in.
+
+    A websocket must come from the service's own pages or from an allowed origin. Without a token so must whatever
+    changes something; and who connects to a service on a loopback address must call it by a name that is known.
+
+    Args:
+        app: what they are let in to.
+        settings: the settings.
+    """
+
+    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+        self.app = app
+        self._origins = settings.allowed_origins
+        self._open = settings.token is None
+        self._on_loopback = is_loopback(settings.host)
+        self._names = sorted({_host_in(urlsplit(origin).netloc) for origin in self._origins} - {""})
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass the request on, or refuse it."""
+        asked = scope["type"] in ("http", "websocket") and scope["path"] not in OPEN and "*" not in self._origins
+        problem = self._problem(scope, Headers(scope=scope)) if asked else None
+        if problem is None:
+            await self.app(scope, receive, send)
+        else:
+            await _refuse(problem, scope, receive, send)
+
+    def _problem(self, scope: Scope, headers: Headers) -> ProblemError | None:
+        host, origin = headers.get("host", ""), headers.get("origin")
+        if self._open and self._on_loopback and _came_in_on_loopback(scope) and not self._is_known(host):
+            allowed = ", ".join(["localhost", "a loopback address", *self._names])
+            return ProblemError(403, "unknown-host", f"Host: Got {host[:64]!r}. Allowed: {allowed}. {_MORE}")
+        changes = scope["type"] == "websocket" or (self._open and scope["method"] not in _SAFE)
+        if changes and origin is not None and not self._is_allowed(origin, host):
+            allowed = ", ".join(["that of the service's own pages", *self._origins])
+            return ProblemError(403, "other-origin", f"Origin: Got {origin[:64]!r}. Allowed: {allowed}. {_MORE}")
+        return None
+
+    def _is_known(self, host: str) -> bool:
+        name = _host_in(host)
+        return not host or is_loopback(name) or name in self._names  # no browser leaves it out
+
+    def _is_allowed(self, origin: str, host: str) -> bool:
+        return origin in self._origins or (host != "" and origin.partition("://")[2] == host)
+
+
+def _came_in_on_loopback(scope: Scope) -> bool:
+    """Say whether the client has connected to a loopback address of this machine."""
+    address, _ = scope.get("server") or ("", None)
+    return is_loopback(address)
+
+
+def is_loopback(host: str) -> bool:
+    """Say whether `host`, an address or a name, is one that only this machine reaches."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _host_in(netloc: str) -> str:
+    """Return the name or address in `netloc`, in lower case and without its port; "" where there is none."""
+    try:
+        return urlsplit(f"//{netloc}").hostname or ""
+    except ValueError:
+        return ""
+
+
+async def _refuse(problem: ProblemError, scope: Scope, receive: Receive, send: Send) -> None:
+    if scope["type"] == "websocket":
+        await receive()
+        await send({"type": "websocket.close", "code": _POLICY_VIOLATION})
+    else:
+        await problem_response(problem)(scope, receive, send)
 
 
 def _query(scope: Scope) -> list[tuple[str, str]]:

@@ -26,6 +26,8 @@ def install(app: FastAPI) -> None:
             for address, path in document["paths"].items():
                 for operation in path.values():
                     _describe_bad_request(address, operation["responses"])
+                    if "401" in operation["responses"]:
+                        operation["responses"]["403"] = problem_document("A page of another site asks for it.")
             for name in ("HTTPValidationError", "ValidationError"):
                 schemas.pop(name, None)
             app.openapi_schema = document

@@ -1,18 +1,18 @@
 """The scene under the service's own port: its one page, and its websocket passed on to the viser server.
 
-viser listens on the loopback address only. The gateway is the single way in, so it is the place where foreign origins
-are refused: viser itself checks none.
+viser listens on the loopback address only, and checks no origins. The gateway is the single way in, before which
+`app.http.access` refuses the pages of other sites.
 """
 
 import asyncio
 import contextlib
 import re
 import secrets
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from urllib.parse import quote, urlencode, urlsplit
+from urllib.parse import quote, urlencode
 
 import viser
 from fastapi import FastAPI, Request, Response, WebSocket
@@ -64,7 +64,6 @@ PAGE_HEADERS = {
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-cache",
 }
-POLICY_VIOLATION = 1008
 TRY_AGAIN_LATER = 1013
 GOING_AWAY = 1001
 
@@ -84,14 +83,12 @@ class Upstream:
     Attributes:
         port: where it listens on the loopback address.
         key: proves to it that a connection came through the gateway.
-        allowed_origins: origins let in besides that of the page's own host.
         open_scenes: says how many scenes are open.
         most_scenes: that may be.
     """
 
     port: int
     key: str
-    allowed_origins: frozenset[str]
     open_scenes: Callable[[], int]
     most_scenes: int
 
@@ -99,17 +96,6 @@ class Upstream:
     def is_full(self) -> bool:
         """Whether as many scenes are open as may be."""
         return self.open_scenes() >= self.most_scenes
-
-
-def origin_is_allowed(origin: str | None, host: str, allowed: Collection[str]) -> bool:
-    """Say whether a websocket from `origin` may open a scene.
-
-    Programs send no origin and are let in, as for every other route. Browsers always send one: it must be that of the
-    page's own host, or one of `allowed`.
-    """
-    if origin is None:
-        return True
-    return origin in allowed or (bool(host) and urlsplit(origin).netloc == host)
 
 
 def address(socket: WebSocket) -> str:
@@ -170,11 +156,6 @@ def add_gateway(app: FastAPI) -> None:
         upstream = _upstream(socket.app)
         if upstream is None or upstream.is_full or (name != PLAIN and example(name) is None):
             await socket.close(TRY_AGAIN_LATER)
-            return
-        if not origin_is_allowed(
-            socket.headers.get("origin"), socket.headers.get("host", ""), upstream.allowed_origins
-        ):
-            await socket.close(POLICY_VIOLATION)
             return
         await _pass_on(socket, upstream, {EXAMPLE_HEADER: "" if name == PLAIN else name, TAB_HEADER: quote(tab)})
 

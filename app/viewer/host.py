@@ -64,7 +64,7 @@ class SceneHost:
         request = connection.request
         headers = {} if request is None else request.headers
         if not hmac.compare_digest(headers.get(KEY_HEADER, "").encode(), self.key.encode()):
-            await connection.close()  # not through the gateway, which checks origins
+            await connection.close()  # not through the gateway, before which origins are checked
             return
         if len(self.sessions) >= self._most:
             await connection.close()  # two came in at once for the last place
@@ -101,7 +101,6 @@ async def hosting(app: FastAPI, service: Service) -> AsyncIterator[SceneHost]:
     app.state.viewer_upstream = Upstream(
         port=host.port,
         key=host.key,
-        allowed_origins=frozenset(settings.allowed_origins),
         open_scenes=lambda: len(host.sessions),
         most_scenes=settings.max_scenes,
     )

@@ -89,6 +89,73 @@ def test_another_origin_may_ask_for_leave_without_the_token(guarded: TestClient)
     assert "Location" in answer.headers["access-control-expose-headers"]
 
 
+LOCAL, ALLOWED, SCENE = "http://127.0.0.1:8000", "https://lab.example", "ws://127.0.0.1:8000/scene"
+
+
+def connecting(data_dir: Path, **settings: Any) -> TestClient:
+    """Return a client that connects to a loopback address; the solver is not started."""
+    return TestClient(create_app(Settings(data_dir=data_dir, **settings)), base_url=LOCAL)
+
+
+@pytest.fixture(scope="module")
+def local(tmp_path_factory: pytest.TempPathFactory) -> TestClient:
+    return connecting(tmp_path_factory.mktemp("data"), allowed_origins=(ALLOWED,))
+
+
+def refusal_of_the_scene(client: TestClient, headers: dict[str, str]) -> int:
+    with pytest.raises(WebSocketDisconnect) as end, client.websocket_connect(SCENE, headers=headers):
+        pass
+    return end.value.code
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", "evil.example:8000", "127.0.0.1.evil.example", "[::1", "@", "10.0.0.1", "testserver"]
+)
+def test_a_page_whose_name_leads_here_for_a_moment_is_refused(local: TestClient, host: str) -> None:
+    for address in ("/", "/docs", "/v1/cables", "/scene/", "/v1/calibration", "/no"):
+        problem = the_problem(local.get(address, headers={"host": host}), 403)
+        assert problem["type"].endswith("unknown-host")
+        assert "Allowed: localhost, a loopback address, lab.example." in problem["detail"]
+    assert refusal_of_the_scene(local, {"host": host}) == 1008
+    assert local.get("/health", headers={"host": host}).status_code != 403
+
+
+@pytest.mark.parametrize(
+    "host", ["localhost", "LOCALHOST:8000", "127.0.0.1:8000", "127.8.8.8", "[::1]:8000", "lab.example"]
+)
+def test_names_of_this_machine_and_of_allowed_origins_are_known(local: TestClient, host: str) -> None:
+    assert local.get("/v1/cables", headers={"host": host}).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "settings", [{"token": TOKEN}, {"host": "0.0.0.0"}, {"allowed_origins": ("*",)}], ids=["token", "open", "all"]
+)
+def test_any_name_will_do_with_a_token_on_an_open_address_or_where_all_are_allowed(
+    tmp_path: Path, settings: dict[str, Any]
+) -> None:
+    headers = {"host": "dlo.example", "origin": "https://dlo.example", **BEARER}
+    client = connecting(tmp_path, **settings)
+    assert client.get("/v1/cables", headers=headers).status_code == 200
+    assert client.post("/v1/cables", headers=headers).status_code == 405
+
+
+@pytest.mark.parametrize("origin", ["https://evil.example", "http://127.0.0.1:9000", "null", ""])
+def test_what_changes_something_is_refused_to_pages_of_other_sites(local: TestClient, origin: str) -> None:
+    headers = {"origin": origin}
+    for method in ("POST", "DELETE"):
+        problem = the_problem(local.request(method, "/v1/calibration", headers=headers), 403)
+        assert problem["type"].endswith("other-origin")
+        assert "Allowed: that of the service's own pages, https://lab.example." in problem["detail"]
+    assert local.get("/v1/cables", headers=headers).status_code == 200
+    assert refusal_of_the_scene(local, headers) == 1008
+
+
+@pytest.mark.parametrize("headers", [{}, {"origin": LOCAL}, {"origin": ALLOWED}], ids=["none", "its own", "allowed"])
+def test_programs_and_its_own_pages_may_change_something(local: TestClient, headers: dict[str, str]) -> None:
+    assert local.post("/v1/cables", headers=headers).status_code == 405
+    assert refusal_of_the_scene(local, {"host": "127.0.0.1:8000", **headers}) == 1013  # the scene is not running
+
+
 def samples(text: str) -> dict[str, float]:
     return {line.rsplit(" ", 1)[0]: float(line.rsplit(" ", 1)[1]) for line in text.splitlines() if line[:1] != "#"}
 
