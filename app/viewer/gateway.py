@@ -22,7 +22,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.typing import Subprotocol
 
-from app.viewer.examples import example, example_names
+from app.pages.gallery import examples
 
 CLIENT_PAGE = Path(viser.__file__).parent / "client" / "build" / "index.html"
 # The client ignores what Number.isFinite calls no number, as "-", but takes "-0" for one and draws the field again, as
@@ -117,7 +117,7 @@ def add_gateway(app: FastAPI) -> None:
 
     def hindrance(request: Request, name: str) -> Response | None:
         upstream = _upstream(request.app)
-        if name != PLAIN and example(name) is None:
+        if name != PLAIN and name not in examples():
             return _unknown()
         if upstream is None:
             return _notice("The scene is not running", "The service is stopping, or has not started yet.", 503)
@@ -154,14 +154,14 @@ def add_gateway(app: FastAPI) -> None:
 
     async def serve(socket: WebSocket, name: str, tab: str) -> None:
         upstream = _upstream(socket.app)
-        if upstream is None or upstream.is_full or (name != PLAIN and example(name) is None):
+        if upstream is None or upstream.is_full or (name != PLAIN and name not in examples()):
             await socket.close(TRY_AGAIN_LATER)
             return
         await _pass_on(socket, upstream, {EXAMPLE_HEADER: "" if name == PLAIN else name, TAB_HEADER: quote(tab)})
 
 
 def _unknown() -> Response:
-    return _notice("There is no such scene", f"The ready scenes are: {', '.join(example_names())}.", 404)
+    return _notice("There is no such scene", f"The ready scenes are: {', '.join(examples())}.", 404)
 
 
 def _notice(title: str, words: str, status: int) -> Response:

@@ -8,10 +8,10 @@ from typing import Any
 import viser
 from viser import ClientHandle, GuiEvent
 
+from app.pages.gallery import examples
 from app.viewer import report
 from app.viewer.draft import Draft
 from app.viewer.edits import Edits
-from app.viewer.examples import example_names
 from app.viewer.forms import CableForm, EffectsForm, GripperForm, QualityForm, SurroundingsForm, show_value
 from app.viewer.forms.recording import RecordingActions, RecordingForm
 from app.viewer.kept import KeptCables
@@ -287,9 +287,7 @@ class Panel:
             download = self._gui.add_button("Download scene.json", icon=viser.Icon.DOWNLOAD, color="gray")
             self._add_file_button("Open a file …", "A scene as JSON, or points: JSON, CSV, .npz or .npy")
             self._file = self._gui.add_html("")
-            names = example_names()
-            if names:
-                self._add_examples(names)
+            self._add_examples()
         with self._gui.add_folder("Take it away"):
             playback = self._gui.add_button("Save playback.html", icon=viser.Icon.MOVIE, color="gray")
             picture = self._gui.add_button("Save picture.png", icon=viser.Icon.PHOTO, color="gray")
@@ -319,8 +317,8 @@ class Panel:
         async def _picture(_event: GuiEvent[Any]) -> None:
             await actions.save_picture()
 
-    def _add_examples(self, names: tuple[str, ...]) -> None:
-        chosen = self._gui.add_dropdown("Example", (CHOOSE, *names))
+    def _add_examples(self) -> None:
+        chosen = self._gui.add_dropdown("Example", (CHOOSE, *examples()))
 
         @chosen.on_update
         async def _chosen(event: GuiEvent[Any]) -> None:

@@ -6,14 +6,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+import orjson
 from viser import ClientHandle, SceneClickEvent
 from viser._messages import GuiUpdateMessage
 
+from app.pages.gallery import examples
 from app.viewer import grips, report, uploads
 from app.viewer.camera import FIELD_OF_VIEW, PHONE, extent, start_pose
 from app.viewer.draft import Draft, start_draft
 from app.viewer.edits import Edits
-from app.viewer.examples import example
 from app.viewer.forms.recording import RecordingActions
 from app.viewer.gizmo import Gizmo
 from app.viewer.history import History
@@ -64,8 +65,12 @@ class Work:
     @staticmethod
     def of_example(name: str) -> "Work":
         """Return the beginning with a ready scene; with the paper's case where there is none of this name."""
-        document = example(name)
-        return Work(start_draft() if document is None else Draft.of(document), History())
+        return Work(_example(name) or start_draft(), History())
+
+
+def _example(name: str) -> Draft | None:
+    found = examples().get(name)
+    return None if found is None else Draft.of(orjson.loads(found.document))
 
 
 class Session:
@@ -479,10 +484,10 @@ class Session:
         await self._tracking.open(name, content)
 
     def _open_example(self, name: str) -> None:
-        document = example(name)
-        if document is not None:
+        draft = _example(name)
+        if draft is not None:
             self._tracking.leave()
-            self._replace(Draft.of(document))
+            self._replace(draft)
 
     def _download(self) -> None:
         self._outbox.scene(self._current())

@@ -9,7 +9,7 @@ from protocol_client import SUBPROTOCOL, SceneClient, connected
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from app.viewer.examples import example_names
+from app.pages.gallery import examples
 from tests.viewer.conftest import MOST_SCENES
 
 
@@ -80,7 +80,7 @@ def test_no_more_scenes_are_opened_than_allowed_and_a_page_says_so(service):
 
 
 def test_the_address_of_an_example_leads_to_it(service):
-    for name in example_names():
+    for name in examples():
         for address, query in (("/scene/", {"example": name}), (f"/scene/{name}/", {})):
             answer = httpx.get(service.address + address, params={**query, "darkMode": ""})
             assert answer.status_code == 307
@@ -107,3 +107,8 @@ def test_solves_of_the_scene_are_counted_with_all_others(service):
         client.drag("end")
         # the first one and a refined one; a drag as short as this may end before its preview is begun
         client.wait_for(lambda: solves() >= before + 2)
+
+
+def test_the_scene_offers_the_ready_scenes_of_the_gallery_in_its_order(service):
+    with connected(service) as client:
+        assert list(client.control("Example")[1]["options"][1:]) == list(examples())
