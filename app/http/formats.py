@@ -1,6 +1,7 @@
 """What a client accepts (RFC 9110, 12.5.1), and a prediction in the forms there are: JSON, .npz, MessagePack."""
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import anyio.to_thread
 import msgpack
@@ -80,6 +81,11 @@ def as_msgpack(document: bytes) -> bytes:
 def as_npz(document: bytes, material: MaterialMotion | None) -> bytes:
     """Return the arrays of a prediction's JSON document, and of its material, as .npz."""
     return surface_npz(orjson.loads(document), material)
+
+
+def json_response(document: Any, status: int = 200) -> Response:
+    """Return a document as the JSON of an answer."""
+    return Response(orjson.dumps(document), status, media_type=JSON)
 
 
 async def prediction_response(

@@ -49,6 +49,12 @@ class ProblemError(Exception):
         self.extra = extra
 
 
+def no_such_run(id: str, field: str = "") -> ProblemError:
+    """Return the problem of an id that is none, or was one; `field`: where it was given, if not in the address."""
+    place = f"{field}: " if field else ""
+    return ProblemError(404, "no-such-run", f"{place}There is no run {id[:64]!r}; it may have been removed.")
+
+
 def phrase_of(status: int) -> str:
     """Return the phrase of a status, as RFC 9110 has it; Python before 3.13 has older ones."""
     return {413: "Content Too Large", 422: "Unprocessable Content"}.get(status, HTTPStatus(status).phrase)

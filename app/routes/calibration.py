@@ -12,7 +12,7 @@ import orjson
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
 
-from app.http.formats import EVENTS, JSON, negotiated
+from app.http.formats import EVENTS, JSON, json_response, negotiated
 from app.http.problems import ProblemError
 from app.routes import described
 from app.routes.body import JsonRoute
@@ -62,7 +62,7 @@ async def read(
     if found is None:
         detail = "This machine has not been calibrated. POST /v1/calibration, or run: dlo calibrate."
         raise ProblemError(404, "not-calibrated", detail)
-    return Response(orjson.dumps(document_of(found, int(dimensions))), media_type=JSON)
+    return json_response(document_of(found, int(dimensions)))
 
 
 @router.post("", status_code=202, response_class=Response, summary="Calibrate", responses=described.MEASURE)
@@ -83,7 +83,7 @@ async def measure(request: Request, service: TheService) -> Response:
         return orjson.dumps(document_of(found, 2))
 
     job = running[0] if running else service.measure(KIND, new_id(), work)
-    response = events.of_job(job) if form == EVENTS else _state(job.summary(), 202)
+    response = events.of_job(job) if form == EVENTS else json_response(job.summary(), 202)
     response.headers["Location"] = job.address
     return response
 
@@ -96,7 +96,7 @@ async def stop(service: TheService) -> Response:
         raise ProblemError(404, "not-calibrating", "No calibration is under way.")
     job = running[0]
     await job.stop()
-    return _state(job.summary(), 200 if job.finished.is_set() else 202)
+    return json_response(job.summary(), 200 if job.finished.is_set() else 202)
 
 
 @router.get("/events", response_class=Response, summary="Follow a calibration", responses=described.PROGRESS)
@@ -111,7 +111,3 @@ async def follow(
     if job is None:
         raise ProblemError(404, "not-calibrating", "No calibration is under way.")
     return events.of_job(job, events.seen_before(last_event_id))
-
-
-def _state(document: dict[str, Any], status: int) -> Response:
-    return Response(orjson.dumps(document), status, media_type=JSON)

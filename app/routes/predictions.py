@@ -14,9 +14,9 @@ from fastapi.responses import Response
 from pydantic import AwareDatetime, BeforeValidator
 from pydantic_core import PydanticCustomError
 
-from app.http.formats import EVENTS, FORMS, JSON, negotiated, prediction_response
+from app.http.formats import EVENTS, FORMS, JSON, json_response, negotiated, prediction_response
 from app.http.preferences import preferences
-from app.http.problems import ProblemError
+from app.http.problems import ProblemError, no_such_run
 from app.routes import described
 from app.routes.body import JsonRoute, calling_when_gone
 from app.schemas import EXAMPLES, PredictionList, PredictionRequest
@@ -159,7 +159,7 @@ async def listed(
         "offset": offset,
         "next": None if following is None else f"/v1/predictions?{following}",
     }
-    return Response(orjson.dumps(document), media_type=JSON)
+    return json_response(document)
 
 
 @router.get("/{id}", response_class=Response, summary="Read a prediction, or how far it is", responses=described.READ)
@@ -170,7 +170,7 @@ async def read(id: str, request: Request, service: TheService) -> Response:
     if document is not None:
         return await prediction_response(document, form, partial(service.material, id))
     if job is None:
-        raise no_run(id)
+        raise no_such_run(id)
     if form != JSON:
         raise not_done(job)
     return _state(job)
@@ -193,7 +193,7 @@ async def remove(id: str, service: TheService) -> Response:
     known = service.jobs.forget(id)
     service.recent.forget(id)
     if not await anyio.to_thread.run_sync(service.runs.delete, id) and not known:
-        raise no_run(id)
+        raise no_such_run(id)
     return Response(status_code=204)
 
 
@@ -217,15 +217,10 @@ async def follow(
         return Response(status_code=204) if over else events.of_job(job, seen)
     document = await anyio.to_thread.run_sync(service.document, id)
     if document is None:
-        raise no_run(id)
+        raise no_such_run(id)
     if seen > len(orjson.loads(document)["iterations"]):
         return Response(status_code=204)
     return events.of_document(document, seen)
-
-
-def no_run(id: str) -> ProblemError:
-    """Return the problem of an id that is none."""
-    return ProblemError(404, "no-such-run", f"There is no run {id[:64]!r}; it may have been removed.")
 
 
 def not_done(job: Job) -> ProblemError:
@@ -242,7 +237,7 @@ async def part(service: Service, read: Callable[[str], bytes | None], id: str) -
     """
     content, job = await _found(service, read, id)
     if content is None:
-        raise no_run(id) if job is None else not_done(job)
+        raise no_such_run(id) if job is None else not_done(job)
     return content
 
 

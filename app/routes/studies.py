@@ -10,7 +10,7 @@ import orjson
 from fastapi import APIRouter, Body, Request
 from fastapi.responses import Response
 
-from app.http.formats import EVENTS, JSON, negotiated
+from app.http.formats import EVENTS, JSON, json_response, negotiated
 from app.http.problems import ProblemError
 from app.routes import described
 from app.routes.body import JsonRoute
@@ -66,7 +66,7 @@ async def study(
         return document
 
     job = service.measure(KIND, id, work)
-    response = events.of_job(job) if form == EVENTS else _state(job.summary(), 202)
+    response = events.of_job(job) if form == EVENTS else json_response(job.summary(), 202)
     response.headers["Location"] = job.address
     return response
 
@@ -100,7 +100,7 @@ async def listed(request: Request, service: TheService) -> Response:
     """List the stored studies, newest first."""
     negotiated(request.headers.get("accept"), (JSON,))
     found = await anyio.to_thread.run_sync(store_of(service).listed)
-    return Response(orjson.dumps({"studies": found}), media_type=JSON)
+    return json_response({"studies": found})
 
 
 @router.get("/{id}", response_model=StudyResponse, summary="Read a study", responses=described.READ_STUDY)
@@ -115,7 +115,7 @@ async def read(id: str, request: Request, service: TheService) -> Response:
         raise _no_study(id)
     if job.state == "done":  # it ended while one looked
         return Response(job.document, media_type=JSON)
-    return _state(job.summary(), 202)
+    return json_response(job.summary(), 202)
 
 
 @router.delete(
@@ -132,7 +132,7 @@ async def remove(id: str, service: TheService) -> Response:
     if mine and job is not None and not job.finished.is_set():
         await job.stop()
         if job.state != "done":
-            return _state(job.summary(), 200 if job.finished.is_set() else 202)
+            return json_response(job.summary(), 200 if job.finished.is_set() else 202)
     known = mine and service.measurements.forget(id)
     if not await anyio.to_thread.run_sync(store_of(service).delete, id) and not known:
         raise _no_study(id)
@@ -159,7 +159,3 @@ async def follow(
 
 def _no_study(id: str) -> ProblemError:
     return ProblemError(404, "no-such-study", f"There is no study {id[:64]!r}; it may have been removed.")
-
-
-def _state(document: dict[str, Any], status: int) -> Response:
-    return Response(orjson.dumps(document), status, media_type=JSON)

@@ -1,5 +1,6 @@
 """Numbers, vectors and the base model of the contract."""
 
+import re
 from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag
@@ -18,7 +19,8 @@ CountOrNone = Annotated[_Integer | None, BeforeValidator(_whole)]
 Flag = Annotated[bool, Field(strict=True)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Point = Annotated[list[Number], Field(min_length=2, max_length=3)]
-RunId = Annotated[str, Field(pattern="^[0-9a-f]{28}$")]
+ID = re.compile("^[0-9a-f]{28}$")  # of a run or a study, app.store.runs.new_id
+RunId = Annotated[str, Field(pattern=ID.pattern)]
 RUN_ID = "the id of a run, 28 of the characters 0 to 9 and a to f"  # the one pattern of a text, in words
 MAX_REPORTED = 50  # faults of a request that an answer names at most
 LIKE = (

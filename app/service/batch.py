@@ -17,7 +17,7 @@ from app.logs import RUN
 from app.schemas import PredictionRequest, to_scene
 from app.service.service import Service
 from app.store.runs import new_id
-from dlocore import Iteration, Scene
+from dlocore import Scene
 
 _log = logging.getLogger("dlo")
 AHEAD = 4  # lines that may be ready before the one that is due, for each worker
@@ -82,7 +82,7 @@ async def _line(
     RUN.set(id)
     try:
         request, scene = await anyio.to_thread.run_sync(_scene, service, data)
-        prediction = await service.solve(scene, Event(), like=like, on_start=lambda: None, on_iteration=_pass)
+        prediction = await service.solve(scene, Event(), like=like)
 
         def keep() -> tuple[bytes, bool]:
             return service.keep(prediction, request, orjson.dumps(data), id, store, fields)
@@ -95,10 +95,6 @@ async def _line(
         if problem.status == 500:
             _log.error("the solve failed", exc_info=error)
         return orjson.dumps({"index": index, "status": "failed", "problem": document_of(problem)}) + b"\n"
-
-
-def _pass(iteration: Iteration) -> None:
-    pass
 
 
 def _scene(service: Service, data: Any) -> tuple[PredictionRequest, Scene]:

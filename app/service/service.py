@@ -14,7 +14,7 @@ import orjson
 from anyio.abc import TaskGroup
 from fastapi import Depends, Request
 
-from app.http.problems import ProblemError, problem_of
+from app.http.problems import ProblemError, no_such_run, problem_of
 from app.logs import RUN
 from app.schemas import PredictionRequest, from_prediction, to_scene
 from app.schemas.response import OPTIONAL_FIELDS, iteration_document
@@ -22,7 +22,7 @@ from app.service.jobs import CANCEL_TIME, Job, Jobs
 from app.service.measurements import Measurement, Measurements, Work
 from app.service.metrics import Metrics
 from app.service.stopping import when_stopped
-from app.service.worker import Worker
+from app.service.worker import Worker, nothing
 from app.settings import Settings
 from app.store.recent import Recent
 from app.store.runs import RunStore
@@ -141,7 +141,7 @@ class Service:
         if like is None or self.recent.get(like) is not None:
             return
         if await anyio.to_thread.run_sync(self.runs.document, like) is None:
-            raise ProblemError(404, "no-such-run", f"like: There is no run {like[:64]!r}; it may have been removed.")
+            raise no_such_run(like, "like")
 
     async def _work(self, job: Job, scene: Scene, request: PredictionRequest, raw: bytes, like: str | None) -> None:
         try:
@@ -199,8 +199,8 @@ class Service:
         cancelled: Event,
         *,
         like: str | None = None,
-        on_start: Callable[[], None],
-        on_iteration: Callable[[Iteration], None],
+        on_start: Callable[[], None] = nothing,
+        on_iteration: Callable[[Iteration], None] = nothing,
     ) -> Prediction:
         """Predict `scene` in a worker thread as `Worker.solve` does, from the run `like` if any; count and log it."""
         method = scene.quality.method

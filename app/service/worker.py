@@ -21,8 +21,8 @@ GRACE = 5.0  # s that a solve may take beyond its deadline, which it looks at be
 _MEMORY = 0.8  # weight of the past in the running mean of solve times
 
 
-def _nothing(*_: object) -> None:
-    pass
+def nothing(*_: object) -> None:
+    """Do nothing, where nobody wants to be told."""
 
 
 @dataclass
@@ -92,8 +92,8 @@ class Worker:
         cancelled: Event,
         *,
         like: Prediction | None = None,
-        on_start: Callable[[], None] = _nothing,
-        on_iteration: Callable[[Iteration], None] = _nothing,
+        on_start: Callable[[], None] = nothing,
+        on_iteration: Callable[[Iteration], None] = nothing,
     ) -> Prediction:
         """Predict `scene` in a worker thread; the caller has been admitted.
 

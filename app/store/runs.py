@@ -3,7 +3,6 @@
 import contextlib
 import logging
 import os
-import re
 import secrets
 import shutil
 import threading
@@ -19,13 +18,13 @@ import orjson
 from app.archive import Run, pack, unpack, unpack_motion
 from app.recording import write_recording
 from app.schemas import Motion
+from app.schemas.base import ID
 from app.schemas.response import from_prediction
 from app.settings import Settings
 from app.store.leftovers import claim
 from dlocore import Prediction
 
 _log = logging.getLogger("dlo")
-_ID = re.compile(r"[0-9a-f]{28}")
 REQUEST, DOCUMENT, NETS, SUMMARY, RECORDING = "scene.json", "prediction.json", "nets.npz", "summary.json", "run.rrd"
 
 
@@ -59,7 +58,7 @@ class RunStore:
         self._root.mkdir(parents=True, exist_ok=True)
         weakref.finalize(self, os.close, claim(settings.data_dir))
         for path in sorted(self._root.iterdir()):
-            summary = _summary(path) if _ID.fullmatch(path.name) else None
+            summary = _summary(path) if ID.fullmatch(path.name) else None
             if summary is not None:
                 recording = (path / RECORDING).stat().st_size if (path / RECORDING).is_file() else 0
                 self._entries[path.name] = _Entry(summary, _size(path), recording)

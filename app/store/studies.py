@@ -1,13 +1,12 @@
 """Stored studies: one JSON file each, written whole or not at all, capped in number."""
 
-import re
 import threading
 from pathlib import Path
 from typing import Any
 
+from app.schemas.base import ID
 from dlocore.files import write_whole
 
-_ID = re.compile(r"[0-9a-f]{28}")
 MAX_STUDIES = 100  # the oldest go first
 
 
@@ -28,7 +27,7 @@ class StudyStore:
 
     def document(self, id: str) -> bytes | None:
         """Return the document of a study, or None where there is none."""
-        if not _ID.fullmatch(id):
+        if not ID.fullmatch(id):
             return None
         try:
             return self._file(id).read_bytes() or None  # a file that was emptied is as good as none
@@ -37,7 +36,7 @@ class StudyStore:
 
     def delete(self, id: str) -> bool:
         """Remove a study; return whether it was there."""
-        if not _ID.fullmatch(id):
+        if not ID.fullmatch(id):
             return False
         try:
             self._file(id).unlink()
@@ -54,4 +53,4 @@ class StudyStore:
         return self._root / f"{id}.json"
 
     def _files(self) -> list[Path]:
-        return [file for file in self._root.glob("*.json") if _ID.fullmatch(file.stem)]
+        return [file for file in self._root.glob("*.json") if ID.fullmatch(file.stem)]

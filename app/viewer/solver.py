@@ -13,10 +13,6 @@ from dlocore.calibration import Measured
 LONGEST_PREVIEW = 20.0  # s; its time budget is far below, which a solver still to be compiled can't keep
 
 
-def _nothing(*_: object) -> None:
-    pass
-
-
 class ServiceSolver:
     """Solves scenes for the threads of all tabs.
 
@@ -60,5 +56,5 @@ class ServiceSolver:
 
     def refine(self, scene: Scene, cancelled: threading.Event) -> Prediction:
         """Solve as one of the service's solves; the calling thread waits."""
-        solve = self._service.solve(scene, cancelled, on_start=_nothing, on_iteration=_nothing)
+        solve = self._service.solve(scene, cancelled)
         return asyncio.run_coroutine_threadsafe(solve, self._loop).result()
