@@ -1,12 +1,9 @@
 """``/v1/cables:identify``: the parameters of a cable from recordings of it."""
 
-import math
-import time
 from collections.abc import Callable
 from threading import Event
 from typing import Annotated
 
-import anyio
 import anyio.from_thread
 import anyio.to_thread
 import numpy as np
@@ -21,16 +18,13 @@ from app.reports.identification import document_of_identification
 from app.routes import described
 from app.routes.body import JsonRoute, calling_when_gone
 from app.schemas.identify import IdentifyRequest, IdentifyResponse
-from app.service.service import Service
-from app.service.worker import Worker
-from dlocore import Cancelled
+from app.service.searches import Searches
+from app.service.service import TheService
 from dlocore.errors import SceneError, within
+from dlocore.identify import Identification, Progress, Resolution
 from dlocore.recordings import Recording, recording_of
 
 router = APIRouter(tags=["cables"], route_class=JsonRoute)
-_WAITING = 8  # identifications that may wait for the one that runs
-Show = Callable[[bytes], None]
-_one_at_a_time = anyio.CapacityLimiter(1)
 
 
 @router.post(
@@ -42,7 +36,7 @@ _one_at_a_time = anyio.CapacityLimiter(1)
         200: {"description": "The cable; or the course as server-sent events.", "content": {EVENTS: {}}},
     },
 )
-async def identify(request: Request, asked: Annotated[IdentifyRequest, Body()]) -> Response:
+async def identify(request: Request, asked: Annotated[IdentifyRequest, Body()], service: TheService) -> Response:
     """Find the parameters with which predictions meet recordings best, with 95 % intervals.
 
     With `Accept: text/event-stream` the answer is a course of events: `iteration` with the values so far, and `done`
@@ -51,10 +45,8 @@ async def identify(request: Request, asked: Annotated[IdentifyRequest, Body()]) 
     """
     form = negotiated(request.headers.get("accept"), (JSON, EVENTS))
     recordings = _recordings(asked)
-    service: Service = request.app.state.service
-    if _one_at_a_time.statistics().tasks_waiting >= _WAITING:
-        raise ProblemError(429, "queue-full", "Too many identifications are waiting.", headers={"Retry-After": "30"})
-    search = _Search(asked, recordings, service.worker)
+    service.searches.check_room()
+    search = _Search(asked, recordings, service.searches)
     if form == EVENTS:
         return Streamed(search.course, EVENTS, {"Cache-Control": "no-store", "X-Accel-Buffering": "no"})
     async with calling_when_gone(request, search.cancelled.set):
@@ -62,12 +54,11 @@ async def identify(request: Request, asked: Annotated[IdentifyRequest, Body()]) 
 
 
 class _Search:
-    """One identification, run in a thread."""
+    """One identification: its answer, or its course."""
 
-    def __init__(self, asked: IdentifyRequest, recordings: list[Recording], worker: Worker) -> None:
-        self.asked, self.recordings, self.worker = asked, recordings, worker
+    def __init__(self, asked: IdentifyRequest, recordings: list[Recording], searches: Searches) -> None:
+        self.asked, self.recordings, self.searches = asked, recordings, searches
         self.cancelled = Event()
-        self.ends = math.inf
 
     async def course(self, emit: Emit) -> None:
         """Emit the events."""
@@ -76,54 +67,28 @@ class _Search:
             async def send(data: bytes) -> None:
                 await emit(b"event: iteration\ndata: " + data + b"\n\n")
 
-            def show(data: bytes) -> None:
-                anyio.from_thread.run(send, data)
+            def show(progress: Progress) -> None:
+                anyio.from_thread.run(send, orjson.dumps(vars(progress)))
 
             answer = await self.result(show)
             await emit(b"event: done\ndata: " + answer + b"\n\n")
         except (ProblemError, SceneError) as error:
             await emit(b"event: error\ndata: " + orjson.dumps(document_of(problem_of(error))) + b"\n\n")
 
-    async def result(self, show: Show | None = None) -> bytes:
+    async def result(self, show: Callable[[Progress], None] | None = None) -> bytes:
         """Return the answer as JSON."""
-        try:
-            with self.worker.stoppable(self.cancelled):
-                return await anyio.to_thread.run_sync(self._run, show, abandon_on_cancel=True, limiter=_one_at_a_time)
-        except Cancelled:
-            if time.monotonic() < self.ends:
-                raise ProblemError(503, "cancelled", "The identification was cancelled.") from None
-            detail = (
-                f"The identification took longer than the limit of {self.worker.time_limit:g} s. Send fewer windows."
-            )
-            raise ProblemError(504, "time-limit", detail) from None
+        found = await self.searches.identify(
+            self.recordings,
+            self.cancelled.is_set,
+            names=tuple(self.asked.parameters),
+            resolution=Resolution(n_u=self.asked.n_u),
+            on_progress=show,
+        )
+        return await anyio.to_thread.run_sync(_answer, found)
 
-    def _run(self, show: Show | None) -> bytes:
-        from dlocore.identify import Progress, Resolution
-        from dlocore.identify import identify as find
 
-        self.ends = time.monotonic() + self.worker.time_limit
-
-        def on_progress(progress: Progress) -> None:
-            if show is not None:
-                show(orjson.dumps(vars(progress)))
-
-        def stop() -> bool:
-            return self.cancelled.is_set() or time.monotonic() > self.ends
-
-        try:
-            found = find(
-                self.recordings,
-                names=tuple(self.asked.parameters),
-                resolution=Resolution(n_u=self.asked.n_u),
-                on_progress=on_progress,
-                cancelled=stop,
-            )
-        except SceneError:
-            raise
-        except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:  # of scales that no arithmetic holds
-            allowed = "a cable of usual size, moved by what holds it"
-            raise SceneError("recordings", "markers", allowed, "They can't be replayed") from error
-        return orjson.dumps(document_of_identification(found), option=orjson.OPT_SERIALIZE_NUMPY)
+def _answer(found: Identification) -> bytes:
+    return orjson.dumps(document_of_identification(found), option=orjson.OPT_SERIALIZE_NUMPY)
 
 
 def _recordings(asked: IdentifyRequest) -> list[Recording]:

@@ -21,6 +21,7 @@ from app.schemas.response import OPTIONAL_FIELDS, iteration_document
 from app.service.jobs import CANCEL_TIME, Job, Jobs
 from app.service.measurements import Measurement, Measurements, Work
 from app.service.metrics import Metrics
+from app.service.searches import Searches
 from app.service.stopping import when_stopped
 from app.service.worker import Worker, nothing
 from app.settings import Settings
@@ -43,6 +44,7 @@ class Service:
         jobs: predictions that no stored run stands for.
         recent: the last predictions, from which others may go on.
         measurements: calibrations and studies under way.
+        searches: identifications of cables.
         ready: whether the solver is compiled.
     """
 
@@ -53,9 +55,13 @@ class Service:
     jobs: Jobs = field(default_factory=Jobs)
     recent: Recent = field(default_factory=Recent)
     measurements: Measurements = field(default_factory=Measurements)
+    searches: Searches = field(init=False)
     ready: bool = field(default=False)
     _tasks: TaskGroup | None = field(init=False, default=None)
     _closed: anyio.Event = field(init=False, default_factory=anyio.Event)
+
+    def __post_init__(self) -> None:
+        self.searches = Searches(self.worker)
 
     @staticmethod
     def of(settings: Settings) -> "Service":

@@ -132,6 +132,7 @@ class Session:
         self._tracking = Tracking(
             client.scene,
             self._panel.recording,
+            shared.solver,
             shared.cables,
             TrackingActions(
                 show=self._show_recorded, draft=self._current, flush=client.flush, kept=self._panel.offer_cables

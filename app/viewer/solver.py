@@ -2,13 +2,15 @@
 
 import asyncio
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import dlocore
 from app.service.service import Service
 from app.viewer.draft import Draft
 from dlocore import Prediction, Scene, calibration
 from dlocore.calibration import Measured
+from dlocore.identify import Candidate, Identification, Progress
+from dlocore.recordings import Recording
 
 LONGEST_PREVIEW = 20.0  # s; its time budget is far below, which a solver still to be compiled can't keep
 
@@ -58,3 +60,14 @@ class ServiceSolver:
         """Solve as one of the service's solves; the calling thread waits."""
         solve = self._service.solve(scene, cancelled)
         return asyncio.run_coroutine_threadsafe(solve, self._loop).result()
+
+    def identify(
+        self,
+        windows: Sequence[Recording],
+        start: Candidate,
+        cancelled: Callable[[], bool],
+        on_progress: Callable[[Progress], None],
+    ) -> Identification:
+        """Identify a cable as one of the service's searches; the calling thread waits."""
+        search = self._service.searches.identify(windows, cancelled, start=start, on_progress=on_progress)
+        return asyncio.run_coroutine_threadsafe(search, self._loop).result()

@@ -2,7 +2,7 @@
 
 import logging
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
 
@@ -11,6 +11,8 @@ from app.viewer.costs import measure_costs
 from app.viewer.draft import Draft
 from dlocore import Cancelled, DloError, Prediction, Quality, Scene, SceneError
 from dlocore.calibration import Measured
+from dlocore.identify import Candidate, Identification, Progress
+from dlocore.recordings import Recording
 
 PREVIEW = Quality(time_budget=0.01)  # while the hand moves
 Kind = Literal["preview", "refined", "costs"]
@@ -39,6 +41,15 @@ class Solver(Protocol):
 
     def refine(self, scene: Scene, cancelled: threading.Event) -> Prediction:
         """Solve as one of the service's solves, when a worker is free."""
+
+    def identify(
+        self,
+        windows: Sequence[Recording],
+        start: Candidate,
+        cancelled: Callable[[], bool],
+        on_progress: Callable[[Progress], None],
+    ) -> Identification:
+        """Identify a cable as one of the service's searches, when it is its turn."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -17,14 +17,14 @@ from app.viewer import tracking_report as say
 from app.viewer.draft import Draft
 from app.viewer.forms.recording import RecordingForm
 from app.viewer.kept import KeptCables
+from app.viewer.solving import Solver
 from app.viewer.tracked import MOST_WINDOWS, Tracked, opened
-from dlocore import Cancelled, Prediction, SceneError
-from dlocore.identify import Identification, Progress, Resolution, identify
+from dlocore import Prediction, SceneError
+from dlocore.identify import Identification, Progress
 
 Floats = NDArray[np.float64]
 MARKER = (213, 94, 0)  # the colour of what was measured
 SIZE = 0.012  # m, of a marker
-_one_at_a_time = threading.Semaphore()  # searches of all tabs, each of which keeps a processor busy
 _log = logging.getLogger(__name__)
 
 
@@ -51,12 +51,15 @@ class Tracking:
     Args:
         scene: where the markers go.
         form: the tab of the panel.
+        solver: searches for the cable.
         cables: where presets are kept.
         actions: what it has the tab do.
     """
 
-    def __init__(self, scene: SceneApi, form: RecordingForm, cables: KeptCables, actions: TrackingActions) -> None:
-        self._form, self._cables, self._actions = form, cables, actions
+    def __init__(
+        self, scene: SceneApi, form: RecordingForm, solver: Solver, cables: KeptCables, actions: TrackingActions
+    ) -> None:
+        self._form, self._solver, self._cables, self._actions = form, solver, cables, actions
         self._loop = asyncio.get_running_loop()
         self._tracked: Tracked | None = None
         self._beside: dict[str, bytes] = {}
@@ -153,7 +156,7 @@ class Tracking:
             return
         self._cancelled = threading.Event()
         self._form.running(True)
-        self._form.found(report.note("Waiting for the search of another tab, or compiling …", good=True), keep=False)
+        self._form.found(report.note("Waiting for another search, or compiling …", good=True), keep=False)
         threading.Thread(target=self._search, args=(self._tracked, self._cancelled), daemon=True).start()
 
     def _search(self, tracked: Tracked, cancelled: threading.Event) -> None:
@@ -172,18 +175,10 @@ class Tracking:
             deliver(lambda: self._form.found(say.progress(progress), keep=False))
 
         try:
-            with _one_at_a_time:
-                found = identify(
-                    tracked.windows[:MOST_WINDOWS],
-                    start=tracked.candidate,
-                    resolution=Resolution(),
-                    on_progress=on_progress,
-                    cancelled=cancelled.is_set,
-                )
+            windows = tracked.windows[:MOST_WINDOWS]
+            found = self._solver.identify(windows, tracked.candidate, cancelled.is_set, on_progress)
             deliver(lambda: self._take(found))
-        except Cancelled:
-            return
-        except SceneError as error:
+        except (SceneError, ProblemError) as error:
             words = str(error)
             deliver(lambda: self._fail(words))
         except Exception:

@@ -1,6 +1,10 @@
 """The doors to identification: the command line, the page, the service with its course of events."""
 
+import asyncio
 import json
+import threading
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +13,13 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.cli import main
+from app.http.problems import ProblemError
+from app.service import searches
+from app.service.worker import Worker
 from benchmarks.simulated_recordings import CABLE, DRAG, Tracking, simulated
+from dlocore import Cancelled
 from dlocore.recordings import save_recording
+from tests.app.test_bad_requests import the_problem
 
 ADDRESS = "/v1/cables:identify"
 
@@ -60,6 +69,51 @@ def test_the_course_of_an_identification_is_told_as_events(client: TestClient, a
     assert kinds[-1] == "done"
     assert set(kinds[:-1]) == {"iteration"}
     assert json.loads(events[-1][1].removeprefix("data: "))["status"] == "converged"
+
+
+def test_no_search_takes_longer_than_the_service_allows(client: TestClient, asked: dict[str, Any]) -> None:
+    worker: Worker = client.app.state.service.worker  # type: ignore[attr-defined]
+    limit, worker.time_limit = worker.time_limit, 1e-3
+    try:
+        the_problem(client.post(ADDRESS, json=asked), 504)
+    finally:
+        worker.time_limit = limit
+
+
+def test_searches_run_one_at_a_time_few_wait_and_all_can_be_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun: list[int] = []
+    running = threading.Lock()
+
+    def search(numbers: list[int], cancelled: Callable[[], bool]) -> None:
+        with running:
+            begun.append(numbers[0])
+            while not cancelled():
+                time.sleep(0.01)
+            assert running.locked()
+        raise Cancelled
+
+    async def crowd() -> None:
+        worker = Worker(workers=1, queue_size=0, time_limit=60.0)
+        shared, stopped = searches.Searches(worker), [threading.Event() for _ in range(searches.WAITING + 1)]
+        tasks = [
+            asyncio.create_task(shared.identify([k], event.is_set))  # type: ignore[list-item]
+            for k, event in enumerate(stopped)
+        ]
+        while len(begun) < 1:
+            await asyncio.sleep(0.01)
+        with pytest.raises(ProblemError) as refusal:
+            shared.check_room()
+        assert refusal.value.status == 429
+        stopped[0].set()
+        while len(begun) < 2:
+            await asyncio.sleep(0.01)
+        shared.check_room()
+        worker.cancel_all()
+        ended = await asyncio.gather(*tasks, return_exceptions=True)
+        assert [getattr(end, "status", end) for end in ended] == [503] * len(tasks)
+
+    monkeypatch.setattr(searches, "identify", search)
+    asyncio.run(crowd())
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from protocol_client import SceneClient, connected
 
+from app.service import searches
 from app.viewer import tracked
 from app.viewer.kept import FILE, KeptCables
 from app.viewer.tracking_report import error_card
@@ -67,6 +68,20 @@ def test_a_recording_is_seen_over_its_prediction_and_its_cable_is_found_and_kept
         assert [found["cable"][n] for n in names] == [kept["cable"][n] for n in names]
         assert found["environment"]["drag"] == kept["environment"]["drag"]
         assert found["cable"]["length"] == 1.0  # that of the scene
+
+
+@pytest.mark.parametrize("limit", ["time", "number"])
+def test_a_search_in_the_scene_keeps_the_limits_of_the_service(service, recording, tmp_path, monkeypatch, limit):
+    if limit == "time":
+        monkeypatch.setattr(service.app.state.service.worker, "time_limit", 1e-3)
+    else:
+        monkeypatch.setattr(searches, "WAITING", 0)
+    with connected(service) as client:
+        client.upload(OPEN, "shaken.npz", npz(recording, tmp_path))
+        client.wait_for(lambda: client.html("was opened"), timeout=60)
+        client.press("Identify the cable")
+        words = "took longer than the limit of 0.001 s" if limit == "time" else "Too many identifications are waiting"
+        client.wait_for(lambda: client.html(words), timeout=60)
 
 
 def _same(points: np.ndarray, markers: np.ndarray) -> bool:

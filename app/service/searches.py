@@ -1,0 +1,79 @@
+"""Identifications of cables: one runs at a time, few wait, and none takes longer than a solve may."""
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from threading import Event
+from typing import Any
+
+import anyio
+import anyio.to_thread
+import numpy as np
+
+from app.http.problems import ProblemError
+from app.service.worker import Worker
+from dlocore import Cancelled, SceneError
+from dlocore.identify import Identification, identify
+from dlocore.recordings import Recording
+
+WAITING = 8  # searches that may wait for the one that runs
+
+
+class Searches:
+    """The searches of the API and of all tabs of the 3D scene. Use it from one event loop.
+
+    Args:
+        worker: whose time limit they keep, and with which they are stopped.
+    """
+
+    def __init__(self, worker: Worker) -> None:
+        self._worker = worker
+        self._one_at_a_time = anyio.CapacityLimiter(1)
+
+    def check_room(self) -> None:
+        """Raise a 429 problem where as many searches wait as may."""
+        if self._one_at_a_time.statistics().tasks_waiting >= WAITING:
+            raise ProblemError(
+                429, "queue-full", "Too many identifications are waiting.", headers={"Retry-After": "30"}
+            )
+
+    async def identify(
+        self, recordings: Sequence[Recording], cancelled: Callable[[], bool], **options: Any
+    ) -> Identification:
+        """Identify a cable in a thread when it is its turn.
+
+        Args:
+            recordings: from which.
+            cancelled: asked from the thread whether to stop.
+            options: others of `dlocore.identify.identify`.
+
+        Raises:
+            SceneError: the recordings do not tell what is asked.
+            ProblemError: 429 where too many wait, 503 when cancelled, 504 at the time limit.
+        """
+        self.check_room()
+        stopped, ends = Event(), math.inf
+
+        def stop() -> bool:
+            return stopped.is_set() or cancelled() or time.monotonic() > ends
+
+        def search() -> Identification:
+            nonlocal ends
+            ends = time.monotonic() + self._worker.time_limit
+            try:
+                return identify(recordings, cancelled=stop, **options)
+            except SceneError:
+                raise
+            except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:  # of scales that no arithmetic holds
+                allowed = "a cable of usual size, moved by what holds it"
+                raise SceneError("recordings", "markers", allowed, "They can't be replayed") from error
+
+        try:
+            with self._worker.stoppable(stopped):
+                return await anyio.to_thread.run_sync(search, abandon_on_cancel=True, limiter=self._one_at_a_time)
+        except Cancelled:
+            if time.monotonic() < ends:
+                raise ProblemError(503, "cancelled", "The identification was cancelled.") from None
+            limit = f"the limit of {self._worker.time_limit:g} s"
+            detail = f"The identification took longer than {limit}. Give it a shorter recording."
+            raise ProblemError(504, "time-limit", detail) from None
