@@ -44,7 +44,7 @@ async def identify(request: Request, asked: Annotated[IdentifyRequest, Body()], 
     time limit of the service (`DLO_TIME_LIMIT`).
     """
     form = negotiated(request.headers.get("accept"), (JSON, EVENTS))
-    recordings = _recordings(asked)
+    recordings = await anyio.to_thread.run_sync(_recordings, asked)
     service.searches.check_room()
     search = _Search(asked, recordings, service.searches)
     if form == EVENTS:

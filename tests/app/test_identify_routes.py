@@ -14,10 +14,11 @@ from fastapi.testclient import TestClient
 
 from app.cli import main
 from app.http.problems import ProblemError
+from app.routes import identify as routes
 from app.service import searches
 from app.service.worker import Worker
 from benchmarks.simulated_recordings import CABLE, DRAG, Tracking, simulated
-from dlocore import Cancelled
+from dlocore import Cancelled, SceneError
 from dlocore.recordings import save_recording
 from tests.app.test_bad_requests import the_problem
 
@@ -69,6 +70,20 @@ def test_the_course_of_an_identification_is_told_as_events(client: TestClient, a
     assert kinds[-1] == "done"
     assert set(kinds[:-1]) == {"iteration"}
     assert json.loads(events[-1][1].removeprefix("data: "))["status"] == "converged"
+
+
+def test_a_recording_is_not_read_on_the_event_loop(
+    client: TestClient, asked: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def read(*_: object) -> None:
+        with pytest.raises(RuntimeError, match="no running event loop"):
+            asyncio.get_running_loop()
+        raise SceneError("times", "these", "others")
+
+    monkeypatch.setattr(routes, "recording_of", read)
+    response = client.post(ADDRESS, json=asked)
+    assert response.status_code == 422
+    assert response.json()["errors"][0]["field"] == "recordings[0].times"
 
 
 def test_no_search_takes_longer_than_the_service_allows(client: TestClient, asked: dict[str, Any]) -> None:
