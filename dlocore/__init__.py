@@ -14,7 +14,7 @@ from dlocore.answer.parts import (
 from dlocore.errors import Cancelled, DloError, SceneError
 from dlocore.prediction import Prediction, continued
 from dlocore.recordings import Recording, load_recording, save_recording
-from dlocore.scene.cable import PRESETS, Cable
+from dlocore.scene.cable import PRESETS, Cable, PointMass
 from dlocore.scene.obstacles import Box, Capsule, Cylinder, Sphere
 from dlocore.scene.paths import Move, Still, Waypoints
 from dlocore.scene.scene import (
@@ -62,6 +62,7 @@ __all__ = [
     "MaterialMotion",
     "Move",
     "Plan",
+    "PointMass",
     "Points",
     "Prediction",
     "Quality",

@@ -8,7 +8,7 @@ from dlocore.answer.parts import MaterialMotion
 from dlocore.compiling.interrupts import interruptible
 from dlocore.effects import laws
 from dlocore.errors import SceneError, instance
-from dlocore.kernels.assembly import NO_RATES, History, assemble, multiply_scalar_band, stored_energy
+from dlocore.kernels.assembly import NO_RATES, History, assemble, multiply_scalar_band, stored_energy, times_scalar_band
 from dlocore.kernels.twisted import start_frames
 from dlocore.problem.discretisation import grid_on, write_material
 from dlocore.problem.features import SAME
@@ -36,9 +36,9 @@ def energies(
     """Return the energies of the motion at `times` (k,) [s]; each (k,) [J].
 
     Keys: "kinetic", mu/2 (|r_t|^2 + D^2/8 theta_t^2), "stretch", "bend" and "twist", docs/model.md eq. 7, and
-    "gravity", -mu g . r relative to the first of the times. Each is integrated over the cable as the solver does it.
-    What is off in the scene is zero. `material` is what the sections remember (`Prediction.material`), for a cable that
-    yields.
+    "gravity", -mu g . r relative to the first of the times; point masses add m/2 |r_t|^2 and -m g . r. Each is
+    integrated over the cable as the solver does it. What is off in the scene is zero. `material` is what the sections
+    remember (`Prediction.material`), for a cable that yields.
 
     Raises:
         SceneError: a time is outside the predicted time, or the surface is of a cable of another length.
@@ -51,7 +51,7 @@ def energies(
     for k, (q, v) in enumerate(zip(states, rates, strict=True)):
         momentum = np.zeros_like(v)
         density = 0.0 if problem.inertia is None else problem.mass_density()
-        multiply_scalar_band(grid.tables.mass, v, density, momentum)
+        multiply_scalar_band(grid.tables.inertia, v, density, momentum)
         found["kinetic"][k] = 0.5 * np.sum(v * momentum)
         found["gravity"][k] = -np.sum(weight * (q - states[0]))
         for name in ("stretch", "bend", "twist"):
@@ -82,11 +82,10 @@ def effect_forces(
         squares[name] = squares.get(name, 0.0) + float(np.sum(force * force))
 
     for q, v, a, history in zip(states, rates, accelerations, histories, strict=True):
-        for name, matrix, x in (("inertia", problem.mass_density(), a), ("drag", problem.drag_coefficient(), v)):
-            if getattr(problem, name) is not None:
-                force = np.zeros_like(x)
-                multiply_scalar_band(grid.tables.mass, x, matrix, force)
-                add(name, force)
+        if problem.inertia is not None:
+            add("inertia", problem.mass_density() * times_scalar_band(grid.tables.inertia, a))
+        if problem.drag is not None:
+            add("drag", problem.drag_coefficient() * times_scalar_band(grid.tables.unit, v))
         if problem.gravity is not None:
             add("gravity", grid.tables.weight[:, None] * problem.weight())
         for name, row in _LAWS.items():

@@ -407,7 +407,7 @@ def _scale(scene: Scene, path: str) -> float:
     *before, last = _steps_of(path)
     field = next(step for step in (last, *reversed(before)) if isinstance(step, str))
     cable, time = scene.cable, min(cast(float, scene.horizon), scene.swing)
-    length, mass = cable.length, cable.linear_density * cable.length
+    length, mass = cable.length, cable.mass
     match field:
         case "control_points" | "velocity" if last == 3:
             return 1.0 if field == "control_points" else 1.0 / time

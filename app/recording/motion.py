@@ -56,6 +56,7 @@ def motion_chunks(run: Run) -> "list[Chunk]":
         chunks += _grasp(run, k, shown, thick)
     for k in range(len(run.document.get("contacts", []))):
         chunks += _contact(run, k)
+    chunks += _masses(run, times, thick)
     for name, values in energies(run.scene, run.surface, surface["t"], run.material).items():
         entity = f"/over_time/energy/{name}"
         chunks += [line_style(entity, f"{name} [J]", ENERGIES.get(name, GREY)), scalars(entity, times, values)]
@@ -87,6 +88,24 @@ def _grasp(run: Run, k: int, shown: NDArray[np.intp], thick: float) -> "list[Chu
         *_with_bounds(
             f"/over_time/reaction/{k}", name, _GRASPS[k % len(_GRASPS)], times, forces, grasp.get("reaction_error")
         ),
+    ]
+
+
+def _masses(run: Run, times: list[Any], thick: float) -> "list[Chunk]":
+    """Return the point masses at every time."""
+    import rerun as rr
+
+    masses = run.scene.cable.point_masses
+    if not masses:
+        return []
+    at = run.surface.positions([one.u for one in masses], run.document["surface"]["t"])  # (k_t, masses, 3)
+    names = [f"{one.mass:g} kg at u = {one.u:g} m" for one in masses]
+    place = rr.Points3D.columns(positions=at.reshape(-1, 3)).partition([len(masses)] * len(at))
+    look = rr.Points3D.columns(colors=[GREY] * len(masses), radii=[2.0 * thick] * len(masses), labels=names)
+    return [
+        chunk("/motion/point_masses", times, place),
+        chunk("/motion/point_masses", [], look.partition([len(masses)])),
+        chunk("/motion/point_masses", [], rr.Points3D.columns(show_labels=[False])),
     ]
 
 

@@ -5,6 +5,8 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag
 
+from dlocore.scene.cable import MAX_LENGTH
+
 
 def _whole(value: Any) -> Any:
     """Return a float that is whole as an integer, which JSON Schema counts it as; any other value as it is."""
@@ -19,6 +21,10 @@ CountOrNone = Annotated[_Integer | None, BeforeValidator(_whole)]
 Flag = Annotated[bool, Field(strict=True)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Point = Annotated[list[Number], Field(min_length=2, max_length=3)]
+Coordinate = Annotated[
+    Number,
+    Field(ge=0.0, le=MAX_LENGTH, description="Material coordinate [m], 0 to the cable's length.", examples=[0.25]),
+]
 ID = re.compile("^[0-9a-f]{28}$")  # of a run or a study, app.store.runs.new_id
 RunId = Annotated[str, Field(pattern=ID.pattern)]
 RUN_ID = "the id of a run, 28 of the characters 0 to 9 and a to f"  # the one pattern of a text, in words

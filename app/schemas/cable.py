@@ -4,9 +4,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from app.schemas.base import BY_FORM, LIST, TEXT, Model, Number, Point
+from app.schemas.base import BY_FORM, LIST, TEXT, Coordinate, Model, Number, Point
 from dlocore import PRESETS
-from dlocore.scene.cable import MAX_LENGTH, MIN_LENGTH
+from dlocore.scene.cable import MAX_LENGTH, MAX_POINT_MASSES, MIN_LENGTH
 from dlocore.scene.points import MAX_POINTS, MIN_POINTS
 
 RestPoints = Annotated[list[Point], Field(min_length=MIN_POINTS, max_length=MAX_POINTS)]
@@ -23,6 +23,13 @@ def _positive(what: str, unit: str, example: float, most: float = 1e15) -> Any:
 def _yield(what: str, example: float) -> Any:
     description = f"{what}; absent: elastic. Needs `memory_rate`."
     return Field(default=None, gt=0.0, le=10.0, description=description, examples=[example])
+
+
+class PointMassModel(Model):
+    """A connector, plug or clip in one place of the cable: weight and inertia without size, drag or rotation."""
+
+    u: Coordinate
+    mass: Number = Field(ge=0.0, le=1e4, description="Mass [kg].", examples=[0.02])
 
 
 class CableModel(Model):
@@ -90,4 +97,10 @@ class CableModel(Model):
             " 2D or 3D [m]."
         ),
         examples=["straight"],
+    )
+    point_masses: list[PointMassModel] = Field(
+        default=[],
+        max_length=MAX_POINT_MASSES,
+        description="What else hangs on the cable, as a connector at its end.",
+        examples=[[{"u": 1.0, "mass": 0.02}]],
     )

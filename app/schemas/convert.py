@@ -28,6 +28,7 @@ from dlocore import (
     Load,
     MaterialMotion,
     Move,
+    PointMass,
     Points,
     Quality,
     Scene,
@@ -89,7 +90,8 @@ def to_scene(request: PredictionRequest, stored: StoredMotion) -> Scene:
 
 def cable_of(model: CableModel) -> Cable:
     """Return the cable of the solver, or raise SceneError."""
-    values = model.model_dump(exclude={"preset"}, exclude_none=True, exclude_unset=True)
+    values = model.model_dump(exclude={"preset", "point_masses"}, exclude_none=True, exclude_unset=True)
+    values["point_masses"] = [PointMass(u=one.u, mass=one.mass) for one in model.point_masses]
     if isinstance(model.rest_shape, list):
         check_columns("rest_shape", model.rest_shape)
     if model.preset is not None:

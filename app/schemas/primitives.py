@@ -4,16 +4,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from app.schemas.base import BY_FORM, LIST, OBJECT, Model, Number, Vector
-from dlocore.scene.cable import MAX_LENGTH
+from app.schemas.base import BY_FORM, LIST, OBJECT, Coordinate, Model, Number, Vector
 from dlocore.scene.paths import MAX_STOPS, MAX_WAYPOINTS, Profile, Start, Through
 from dlocore.scene.scene import Hold
 
 Quaternion = Annotated[list[Number], Field(min_length=4, max_length=4)]
-Coordinate = Annotated[
-    Number,
-    Field(ge=0.0, le=MAX_LENGTH, description="Material coordinate [m], 0 to the cable's length.", examples=[0.25]),
-]
 Instant = Annotated[Number, Field(ge=0.0, le=1e4)]
 
 

@@ -5,7 +5,7 @@ from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from viser import SceneApi
+from viser import PointCloudHandle, SceneApi
 
 from app.viewer import geometry
 from app.viewer.contacts import contact_points
@@ -30,6 +30,7 @@ GHOSTS = 9
 GHOST_COLUMNS = 65
 LIFT = 0.45  # height of the raised surface, of the cable's length
 CONTACT_SIZE = 1.7  # of the cable's diameter
+MASS_SIZE = 3.5  # of the cable's diameter, of a point mass
 SKY_LIGHT = 2.5  # beside the viewer's lamps, so that no side is black
 GROUND_LIGHT = (200, 205, 210)
 
@@ -138,6 +139,10 @@ class Picture:
             "/contacts", np.zeros((1, 3)), CONTACT, point_size=CONTACT_SIZE * diameter, point_shape="circle"
         )
         self._marks.visible = False
+        self._masses = self._scene.add_point_cloud(
+            "/point_masses", np.zeros((1, 3)), STEEL, point_size=MASS_SIZE * diameter, point_shape="circle"
+        )
+        self._masses.visible = False
         for gripper in self._grippers:
             gripper.remove()
         self._grippers = [GripperPicture(self._scene, k, diameter, length) for k in range(grippers)]
@@ -167,15 +172,16 @@ class Picture:
         for gripper in self._grippers:
             gripper.show_reactions(self._look.reactions)
             gripper.pose(time)
-        self._mark_contacts(points)
+        self._mark(self._marks, contact_points(self._prediction, points) if self._look.contacts else points[:0])
+        masses = [one.u for one in self._prediction.scene.cable.point_masses]
+        self._mark(self._masses, surface.positions(masses, t)[0] if masses else points[:0])
 
-    def _mark_contacts(self, points: Floats) -> None:
-        assert self._prediction is not None
-        touching = contact_points(self._prediction, points) if self._look.contacts else points[:0]
-        if len(touching):
-            self._marks.points = touching.astype(np.float32)
-        if self._marks.visible != bool(len(touching)):
-            self._marks.visible = bool(len(touching))
+    @staticmethod
+    def _mark(marks: PointCloudHandle, points: Floats) -> None:
+        if len(points):
+            marks.points = points.astype(np.float32)
+        if marks.visible != bool(len(points)):
+            marks.visible = bool(len(points))
 
     def _height(self, t: Floats) -> Floats:
         """Height at which the instants `t` are drawn above where they happen [m]."""

@@ -69,7 +69,7 @@ def with_settling(draft: Draft, settle: bool) -> Draft:
 def scaled(draft: Draft, length: float) -> Draft:
     """Give the cable another length [m].
 
-    A straight one grows at its far end, with what holds it there; another shape grows in proportion about its first
+    A straight one grows at its far end, with what is there; another shape grows in proportion about its first
     point. A length that no cable may have changes nothing: from 0 nothing would grow back in proportion.
     """
     if not MIN_LENGTH <= length <= MAX_LENGTH:
@@ -78,11 +78,16 @@ def scaled(draft: Draft, length: float) -> Draft:
     share = length / before
     edited = draft.put(("cable", "length"), length)
     kind = draft.get(("shape", "kind"))
-    for k, primitive in enumerate(draft.primitives):
-        u = primitive["u"]
+
+    def placed(u: float) -> float:
         at_the_end = abs(u - before) <= 1e-9 * before
-        moved = length if at_the_end else u if kind == "straight" and u < length else u * share
-        edited = edited.put(("primitives", k, "u"), moved)
+        return length if at_the_end else u if kind == "straight" and u < length else u * share
+
+    for k, primitive in enumerate(draft.primitives):
+        edited = edited.put(("primitives", k, "u"), placed(primitive["u"]))
+    for path in (("cable", "point_masses"), ("loads",)):
+        for k, part in enumerate(draft.get(path, [])):
+            edited = edited.put((*path, k, "u"), placed(part["u"]))
     name = {"points": "points", "control_points": "control_points"}.get(kind)
     if name is None:
         return edited

@@ -13,6 +13,7 @@ from benchmarks.hard.surroundings import (
     draw_drag,
     draw_environment,
     draw_gravity,
+    draw_masses,
     draw_memory,
     draw_stiffness,
     draw_switches,
@@ -24,6 +25,7 @@ from dlocore.problem.time_grid import smallest_n_t
 
 IMPOSSIBLE = 0.05  # share of scenes that no cable can follow
 CROWDED = 1000  # seed from which scenes have several obstacles
+HEAVY = 2000  # seed from which cables carry point masses, and obstacles as below CROWDED
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +50,8 @@ class Drawn:
 def draw(seed: int, index: int, *, small: bool = False) -> Drawn:
     """Draw the scene `index` of a seed; `small`: on a grid of some ten by twenty control points, for quick tests.
 
-    Scenes of seeds from CROWDED on have two to four obstacles each, others one in some of them.
+    Scenes of seeds from CROWDED on have two to four obstacles each, others one in some of them; from HEAVY on their
+    cables carry one to three point masses of a hundredth to three times their own mass.
     """
     r = np.random.default_rng([seed, index])
     length = 1.0 if chance(r, 0.6) else spread(r, 0.05, 50.0)
@@ -60,12 +63,14 @@ def draw(seed: int, index: int, *, small: bool = False) -> Drawn:
         d.families.append("geometry: a cable of " + ("5 to 50 m" if length > 1 else "0.05 to 0.2 m"))
     draw_motion(r, d)
     _bring_within_reach(d)
-    draw_environment(r, d, crowded=seed >= CROWDED)
+    draw_environment(r, d, crowded=CROWDED <= seed < HEAVY)
     damping = draw_drag(r, d)
     draw_stiffness(r, d)
     draw_damping(r, d, damping)
     draw_memory(r, d)
     draw_switches(r, d)
+    if seed >= HEAVY:
+        draw_masses(r, d)
     possible = not chance(r, IMPOSSIBLE)
     if possible:
         _draw_quality(r, d, small)

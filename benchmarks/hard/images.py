@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from dlocore import Box, Capsule, Cylinder, Move, Points, Scene, Sphere, SplineSurface, Straight, Waypoints
+from dlocore import Box, Capsule, Cylinder, Move, PointMass, Points, Scene, Sphere, SplineSurface, Straight, Waypoints
 from dlocore.scene.obstacles import Obstacle
 from dlocore.scene.paths import Path
 from dlocore.scene.scene import Shape
@@ -83,6 +83,8 @@ def seen(scene: Scene, image: Image) -> Scene:
 
     def place(u: float) -> float:
         return a * (L - u if image.backwards else u)
+
+    cable["point_masses"] = tuple(PointMass(u=place(one.u), mass=c * one.mass) for one in cable["point_masses"])
 
     def when(t: float | None) -> float | None:
         return None if t is None else b * t

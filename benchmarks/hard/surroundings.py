@@ -4,7 +4,7 @@ import numpy as np
 
 from benchmarks.hard.draft import Draft, Floats, Rng, Room, chance, in_room, pick, spread
 from benchmarks.hard.motions import started
-from dlocore import Box, Capsule, Cylinder, Sphere, Straight, Table
+from dlocore import Box, Capsule, Cylinder, PointMass, Sphere, Straight, Table
 from dlocore.effects.distance import distances
 
 STRAIN = 1 / 300  # the largest that weight and inertia may cause: such a cable keeps its length
@@ -95,6 +95,17 @@ def draw_stiffness(r: Rng, d: Draft) -> None:
     cable["torsional_stiffness"] = ratio * EI
     if not 0.1 < ratio < 10.0:
         d.families.append("stiffness: GJ/EI far from 1")
+
+
+def draw_masses(r: Rng, d: Draft) -> None:
+    """Draw one to three point masses, half of them at an end, and stiffen the cable along itself for their forces."""
+    total = spread(r, 0.01, 3.0) * d.cable["linear_density"] * d.length
+    shares = r.dirichlet(np.ones(int(r.integers(1, 4))))
+    places = [d.length * (float(r.integers(0, 2)) if chance(r, 0.5) else r.uniform(0.0, 1.0)) for _ in shares]
+    masses = [PointMass(u=u, mass=total * float(share)) for u, share in zip(places, shares, strict=True)]
+    d.cable["point_masses"] = tuple(masses)
+    d.cable["axial_stiffness"] *= 1.0 + total / (d.cable["linear_density"] * d.length)
+    d.families.append("stiffness: point masses")
 
 
 def draw_drag(r: Rng, d: Draft) -> str:

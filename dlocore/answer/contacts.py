@@ -109,7 +109,7 @@ def _kept(lengths: Sequence[int]) -> list[Indices]:
 
 def _weight_on_table(scene: Scene) -> float:
     """Return the weight [N] with which a cable lies on the table."""
-    return scene.cable.linear_density * scene.cable.length * abs(float(cast(Floats, scene.environment.gravity)[2]))
+    return scene.cable.mass * abs(float(cast(Floats, scene.environment.gravity)[2]))
 
 
 def _all(problem: Problem, grid: Grid, window: WindowForces, at: Indices) -> Floats:

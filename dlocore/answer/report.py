@@ -47,13 +47,16 @@ def effect_reports(
     t = np.linspace(0.0, surface.horizon, 33)
     speed = np.linalg.norm(surface(u, t, dt=1)[..., :3], axis=-1)
     acceleration = np.linalg.norm(surface(u, t, dt=2)[..., :3], axis=-1)
+    masses = cable.point_masses
+    at_masses = surface([one.u for one in masses], t, dt=2)[..., :3] if masses else np.zeros((len(t), 0, 3))
+    heavy = np.linalg.norm(at_masses, axis=-1) @ np.array([one.mass for one in masses])
     curvature = surface.curvature(u, t)
     tau = surface.twist_rate(u, t)
     mu, EI = cable.linear_density, cast(float, cable.bending_stiffness)
     drag = environment.drag * speed + environment.drag_quadratic * speed**2
     weight = problem.scene.weight
     sizes: dict[str, tuple[float, str]] = {
-        "inertia": (float(mu * np.trapezoid(acceleration, u, axis=1).max()), "N"),
+        "inertia": (float((mu * np.trapezoid(acceleration, u, axis=1) + heavy).max()), "N"),
         "drag": (float(np.trapezoid(drag, u, axis=1).max()), "N"),
         "damping": (float(cable.bending_damping * np.abs(np.gradient(curvature, t, axis=0)).max()), "N m"),
         "gravity": (weight, "N"),

@@ -138,7 +138,7 @@ def _scalar(name: str) -> Parameter:
     units = {"bending_stiffness": "N m^2", "torsional_stiffness": "N m^2", "bending_damping": "N m^2 s"}
 
     def put_cable(c: Candidate, x: float) -> Candidate:
-        changes = {name: x}
+        changes: dict[str, Any] = {name: x}
         if name == "yield_strain" and c.cable.memory_rate is None:
             changes["memory_rate"] = 100.0
         return replace(c, cable=replace(c.cable, **changes))

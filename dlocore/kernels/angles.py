@@ -22,7 +22,7 @@ def angles_with(tables: Any, slopes: Any, given: Any, smooth: float) -> Any:
         given: (k,) the value at the first control point.
         smooth: times the second derivatives over a span count as the slopes do.
     """
-    n, count = len(tables.weight), len(slopes)
+    n, count = len(tables.span), len(slopes)
     R, right = np.zeros((n, 4)), np.zeros((n, count))
     row, own = np.empty(4), np.empty(count)
     for span in range(len(tables.curvature.w) // POINTS):

@@ -45,7 +45,7 @@ class History(NamedTuple):
             `space.remember`, `twisted.py`; (0, ...) where no law reads it.
         axial: (axial points, 3) stress-free axial strain, and the axial strain of the two last steps.
         stick: (contact nodes, 3) anchor of the friction there [m]; (0, 3) without.
-        slide: (body points, 2) anchor of the friction of a cable that lies on the table [m]; (0, 2) without.
+        slide: (lying points, 2) anchor of the friction of a cable that lies on the table [m]; (0, 2) without.
         pressing: (contact nodes,) weights [m] of the contact at its nodes, zero where another node stands for one.
         tension: (axial points, 4) what the tangent of a march knows of the tension, see `tension.py`; (0, 4) elsewhere.
         room: what assemblies in space write over and keep nothing in, of `ROOM` numbers in `space` or `twisted_rows`
@@ -116,7 +116,7 @@ def assemble(
             len(axes), q, v, tables.contact, active, p, history.stick, history.pressing, rates[3], scales, tangent, f, K
         )
     if active[FRICTION] and p[FRICTION, 2] > 0.0:
-        contact.lying(len(axes), q, v, points, p, history.slide, rates[3], scales, tangent, f, K)
+        contact.lying(len(axes), q, v, tables.lying, p, history.slide, rates[3], scales, tangent, f, K)
 
 
 @part
@@ -132,7 +132,7 @@ def remember(axes: Any, q: Any, tables: Any, active: Any, p: Any, history: Any, 
     if active[CONTACT]:
         deepest = contact.remember(len(axes), q, tables.contact, p, history.stick, history.pressing, loose)
     if active[FRICTION] and p[FRICTION, 2] > 0.0:
-        contact.drag_anchors(len(axes), q, tables.curvature, p, history.slide, loose)
+        contact.drag_anchors(len(axes), q, tables.lying, p, history.slide, loose)
     if active[STRETCH_MEMORY] or active[STRETCH_DAMPING]:
         for n in range(len(tables.axial.w)):
             slope = squared_slope(q, tables.axial.first[n], row_of(tables.axial.b1, n), min(len(axes), 3))

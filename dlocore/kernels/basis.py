@@ -254,21 +254,42 @@ class StrandNodes(NamedTuple):
     b0: Any
 
 
+class LyingPoints(NamedTuple):
+    """Points at which the friction of a cable that lies on the table acts: those of bending, and its point masses.
+
+    Attributes:
+        first: (p,) index of the first of the four control points at each.
+        b0: (p, 4) values of their basis functions.
+        w: (p,) weights [m]; of a point mass the length of the cable that is as heavy.
+    """
+
+    first: Any
+    b0: Any
+    w: Any
+
+
 class Tables(NamedTuple):
     """Basis functions of a set of knots at the points that kernels look at: each kernel is given those it needs.
 
+    A point mass m at u counts as m/mu of the cable's length in one place (docs/model.md eq. 9a).
+
     Attributes:
-        axial, curvature: quadrature points.
+        axial, curvature, lying: quadrature points.
         contact, strands: nodes.
-        mass: (n, 4) integrals of b_i b_{i+d} du [m].
-        weight: (n,) integrals of b_i du [m].
+        unit: (n, 4) integrals of b_i b_{i+d} du [m], of linear drag.
+        inertia: (n, 4) the same with the point masses, (m/mu) b_i b_{i+d} of each [m]: the mass matrix over mu.
+        span: (n,) integrals of b_i du [m].
+        weight: (n,) the same with the point masses, (m/mu) b_i of each [m].
     """
 
     axial: AxialPoints
     curvature: CurvaturePoints
+    lying: LyingPoints
     contact: ContactNodes
     strands: StrandNodes
-    mass: Any
+    unit: Any
+    inertia: Any
+    span: Any
     weight: Any
 
 
@@ -419,12 +440,14 @@ def build_tables(
     spacing: float,
     cell: int,
     segment: float,
+    masses: Any,
 ) -> Any:
     """Return `Tables` of the clamped cubic `knots`.
 
     `free_*`: the direction at that end of the cable is free; `above`, `spacing`: largest distance of contact nodes for
     the table and for obstacles [m]; `cell`: see `ContactNodes`; `segment`: largest distance of strand nodes [m]. A
-    distance is infinite for none.
+    distance is infinite for none. `masses` (k, 2): place [m] of each point mass, and the length of cable that is as
+    heavy [m]. Contact presses it with the stiffness of that length, so that it sinks in no deeper than the cable.
     """
     u, axial_w = _axial_points(knots, free_start, free_end, rule2, w2)
     axial_first, table = basis_rows(knots, u, 1)
@@ -436,6 +459,10 @@ def build_tables(
     b2 = np.ascontiguousarray(table[:, 2])
     u_above, w_above = _nodes(knots, above)
     u_beside, w_beside = _nodes(knots, spacing)
+    for k in range(len(masses)):
+        for places, weights in ((u_above, w_above), (u_beside, w_beside)):
+            if len(places) > 0:
+                weights[np.argmin(np.abs(places - masses[k, 0]))] += masses[k, 1]
     contact_u, contact_w = np.append(u_above, u_beside), np.append(w_above, w_beside)
     contact_first, table = basis_rows(knots, contact_u, 0)
     contact_b0 = np.ascontiguousarray(table[:, 0])
@@ -443,19 +470,32 @@ def build_tables(
     strand_first, table = basis_rows(knots, strand_u, 0)
     strand_b0 = np.ascontiguousarray(table[:, 0])
     n = len(knots) - 4
-    mass = np.zeros((n, 4))
-    weight = np.zeros(n)
+    unit = np.zeros((n, 4))
+    span = np.zeros(n)
     u4, weights4 = gauss_points(knots, rule4, w4)
     first4, table4 = basis_rows(knots, u4, 0)
     for p in range(len(u4)):
         f = first4[p]
         for i in range(4):
-            weight[f + i] += weights4[p] * table4[p, 0, i]
+            span[f + i] += weights4[p] * table4[p, 0, i]
             for j in range(i, 4):
-                mass[f + i, j - i] += weights4[p] * table4[p, 0, i] * table4[p, 0, j]
+                unit[f + i, j - i] += weights4[p] * table4[p, 0, i] * table4[p, 0, j]
+    inertia, weight = unit.copy(), span.copy()
+    first_mass, table_mass = basis_rows(knots, np.ascontiguousarray(masses[:, 0]), 0)
+    mass_b0, mass_w = np.ascontiguousarray(table_mass[:, 0]), np.ascontiguousarray(masses[:, 1])
+    for p in range(len(mass_w)):
+        f = first_mass[p]
+        for i in range(4):
+            weight[f + i] += mass_w[p] * mass_b0[p, i]
+            for j in range(i, 4):
+                inertia[f + i, j - i] += mass_w[p] * mass_b0[p, i] * mass_b0[p, j]
+    lying = LyingPoints(
+        np.append(curvature_first, first_mass), np.concatenate((b0, mass_b0)), np.append(curvature_w, mass_w)
+    )
     axial_share = shares(knots, axial_first, axial_b1, axial_w, free_start, free_end)
     axial = AxialPoints(u, axial_first, axial_b1, axial_w, axial_share)
     lanes = side_by_side(curvature_first, curvature_u, curvature_w, b0, b1, b2)
     curvature = CurvaturePoints(curvature_u, curvature_first, b0, b1, b2, curvature_w, pair_products(b1, b2), lanes)
     contact = ContactNodes(contact_u, contact_first, contact_b0, contact_w, len(u_above), cell)
-    return Tables(axial, curvature, contact, StrandNodes(strand_u, strand_first, strand_b0), mass, weight)
+    strands = StrandNodes(strand_u, strand_first, strand_b0)
+    return Tables(axial, curvature, lying, contact, strands, unit, inertia, span, weight)

@@ -4,7 +4,7 @@ Contact acts at nodes: with the table at the first `table_nodes` of them, with o
 closer, as an obstacle may be thin or have edges. Away from edges they needn't: there one node of a `cell` of them
 stands for all (`pressing`: the weights [m] of the nodes until the next step). The distance to an obstacle grows at most
 as fast as one goes along the cable, so from a node that is far away the next ones are skipped. `stick` (nodes, 3) holds
-the anchor of the friction, `slide` (body points, 2) that of a cable that lies on the table.
+the anchor of the friction, `slide` (lying points, 2) that of a cable that lies on the table.
 """
 
 from typing import Any

@@ -33,7 +33,7 @@ def remember_start(axes: Any, q: Any, tables: Any, active: Any, p: Any, history:
 
 @brief
 def begin_stretch(
-    axes: Any, q: Any, v: Any, unit: Any, density: float, dragged: float, tables: Any, active: Any, p: Any,
+    axes: Any, q: Any, v: Any, density: float, dragged: float, tables: Any, active: Any, p: Any,
     history: Any, rates: Any, load: Any, e: Any, near: Any, h: float, inertial: bool, dimensions: int,
 ) -> Any:  # fmt: skip
     """Return velocity, acceleration and G = f + C v - load, each (n, nc), where a smooth stretch begins, and its jump.
@@ -43,7 +43,7 @@ def begin_stretch(
 
     Args:
         q: (n, nc) [m] the state.
-        unit: (n, 4) mass matrix of unit density; `density` [kg/m] and `dragged` [N s/m^2] are those of the cable.
+        density, dragged: of the mass matrix [kg/m] and of the drag matrix [N s/m^2].
         rates: of strain, see `assemble`: from v, or from the last step.
         near: (3, held) [m] prescribed part of what is held at the beginning, h and 2 h later.
         h: [s], short.
@@ -52,7 +52,8 @@ def begin_stretch(
     """
     nc = len(axes)
     rate = (4.0 * near[1] - 3.0 * near[0] - near[2]) / (2.0 * h)
-    closed = constrained_mass_solve(nc, unit, e, rate, times_scalar_band(unit, v))
+    heavy = tables.inertia
+    closed = constrained_mass_solve(nc, heavy, e, rate, times_scalar_band(heavy, v))
     jump = 0.0
     for i in range(len(v)):
         for d in range(dimensions):
@@ -67,14 +68,14 @@ def begin_stretch(
         press(q, v, tables.strands, p, x, nothing_known(len(q), nc), G)
     if keeps_history(active):
         remember(axes, q, tables, active, p, history, 0.0, False)
-    multiply_scalar_band(dragged * unit, v, 1.0, G)
+    multiply_scalar_band(dragged * tables.unit, v, 1.0, G)
     for i in range(len(G)):
         for d in range(nc):
             G[i, d] -= load[i, d]
     if not inertial:
         return closed, np.zeros_like(v), G, jump
     held_acceleration = (near[2] - 2.0 * near[1] + near[0]) / (h * h)
-    return closed, constrained_mass_solve(nc, density * unit, e, held_acceleration, -G), G, jump
+    return closed, constrained_mass_solve(nc, density * heavy, e, held_acceleration, -G), G, jump
 
 
 @brief
@@ -97,7 +98,7 @@ def after_jump(e: Any, near: Any, short: float, q: Any, later: Any, h: float) ->
 
 @brief
 def lasting(
-    axes: Any, q: Any, a: Any, G: Any, unit: Any, density: float, h: float, tables: Any, active: Any, p: Any,
+    axes: Any, q: Any, a: Any, G: Any, density: float, h: float, tables: Any, active: Any, p: Any,
     history: Any, e: Any,
 ) -> Any:  # fmt: skip
     """Return what lasts for a step of the acceleration a (n, nc) that a stretch begins with, and a G that balances it.
@@ -109,7 +110,7 @@ def lasting(
 
     Args:
         q, a, G: (n, nc) what `begin_stretch` was given and returned.
-        unit: (n, 4) mass matrix of unit density; `density` [kg/m] is that of the cable.
+        density: of the mass matrix [kg/m].
         h: time step [s].
     """
     nc = len(axes)
@@ -118,12 +119,12 @@ def lasting(
     K *= _LASTS * h * h
     force = np.empty(q.size)
     multiply_band(K, a.ravel(), force)
-    add_scalar_band(nc, unit, density, K)
+    add_scalar_band(nc, tables.inertia, density, K)
     change, positive = solve_free(e, K, force)
     if not positive:
         return a, G
     fast = change.reshape(q.shape)
-    return a - fast, G + density * times_scalar_band(unit, fast)
+    return a - fast, G + density * times_scalar_band(tables.inertia, fast)
 
 
 @brief

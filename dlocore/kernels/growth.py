@@ -26,8 +26,8 @@ def looked_at(last: int, looks: int) -> Any:
 
 @kernel
 def fastest_growth(
-    axes: Any, states: Any, histories: Any, tables: Any, active: Any, p: Any, density: float, dragged: float, e: Any,
-    slowest: float,
+    axes: Any, states: Any, velocities: Any, histories: Any, tables: Any, active: Any, p: Any, density: float,
+    dragged: float, e: Any, slowest: float,
 ) -> Any:  # fmt: skip
     """Return rates (k,) [1/s] that no disturbance of the states (k, n, nc) exceeds, each up to twice too large.
 
@@ -38,6 +38,8 @@ def fastest_growth(
     Args:
         axes: (0, 1), (0, 1, 2) or (0, 1, 2, 3).
         states: (k, n, nc) [m].
+        velocities: with which they are gone through (k, n, nc) [m/s]: friction mu N of what slides at a speed v resists
+            what goes across by mu N/v, and of what is at rest by as much as holds it.
         histories: what lies behind the states, a `History` with arrays (1 or k, ...).
         density: linear density [kg/m].
         dragged: drag coefficient [N s/m^2].
@@ -46,13 +48,14 @@ def fastest_growth(
     """
     nc, n = len(axes), states.shape[1]
     rates = np.zeros(len(states))
-    still, f, K = np.zeros((n, nc)), np.empty((n, nc)), np.empty((n * nc, 4 * nc))
+    f, K = np.empty((n, nc)), np.empty((n * nc, 4 * nc))
     A = np.empty((n * nc - len(e.held), e.width))
     for k in range(len(states)):
         history, s = history_at(histories, k), slowest
         for _ in range(_DOUBLINGS):
-            assemble(axes, states[k], still, tables, active, p, history, NO_RATES, (1.0, s, 1.0), f, K)
-            add_scalar_band(nc, tables.mass, density * s * s + dragged * s, K)
+            assemble(axes, states[k], velocities[k], tables, active, p, history, NO_RATES, (1.0, s, 1.0), f, K)
+            add_scalar_band(nc, tables.inertia, density * s * s, K)
+            add_scalar_band(nc, tables.unit, dragged * s, K)
             reduce_matrix(e, K, A)
             if factor(A) < 0:
                 break

@@ -23,7 +23,9 @@ class Equations(NamedTuple):
         first, table: (k,), (k, 3, 4): time basis functions and two derivatives at the points, POINTS in each span.
         weights: (k,) [s].
         h: length of a time span [s].
-        unit: (n, 4) mass matrix of unit density; `density` [kg/m] and `dragged` [N s/m^2] are those of the cable.
+        density: of the mass matrix [kg/m].
+        dragged: of linear drag [N s/m^2], where its matrix is like the mass matrix: there are no point masses.
+        beside: the same where it isn't; one of the two is zero.
         tables: `basis.Tables`.
         active, p: switches and parameters of the laws.
         histories: `History` with arrays (1 or k, ...), what lies behind each point.
@@ -36,9 +38,9 @@ class Equations(NamedTuple):
     table: Any
     weights: Any
     h: float
-    unit: Any
     density: float
     dragged: float
+    beside: float
     tables: Any
     active: Any
     p: Any
@@ -209,7 +211,9 @@ def _add_inertia(eq: Any, k: int, state: Any, moved: Any, f: Any) -> None:
         for d in range(f.shape[1]):
             f[i, d] -= load[i, d]
             moved[i, d] = eq.density * state[2, i, d] + eq.dragged * state[1, i, d]
-    multiply_scalar_band(eq.unit, moved, 1.0, f)
+    multiply_scalar_band(eq.tables.inertia, moved, 1.0, f)
+    if eq.beside > 0.0:
+        multiply_scalar_band(eq.tables.unit, state[1], eq.beside, f)
 
 
 @kernel
@@ -236,9 +240,10 @@ def normal_equations(eq: Any, C: Any, A: Any, right: Any, matrix: bool, begin: i
     The objective [J] is (1/T) sum_k w_k |W_k Z' R_k|^2 with the residual R = M a + C v + f(q, v) - F of the motion at
     the collocation point k and W'W = G^-1 B G^-1, B = 12/h^2 M + 2/h C, G = B + K+ + 2/h N (docs/model.md eq. 16).
 
-    Masses and linear drag are parts of B, and K+ = G - B - 2/h N, so that by the control point with basis function c
-    G^-1 dR = c I + d S + e V, with S = G^-1 B, V = G^-1 N and numbers d, e. The products of three matrices serve all
-    pairs of control points, and B S and S' B S are symmetric. The right side alone takes none: S' y = B G^-1 y.
+    Masses, and linear drag where it is no part of N, are parts of B, and K+ = G - B - 2/h N, so that by the control
+    point with basis function c G^-1 dR = c I + d S + e V, with S = G^-1 B, V = G^-1 N and numbers d, e. The products
+    of three matrices serve all pairs of control points, and B S and S' B S are symmetric. The right side alone takes
+    none: S' y = B G^-1 y.
 
     Args:
         eq: `Equations`.
@@ -254,7 +259,7 @@ def normal_equations(eq: Any, C: Any, A: Any, right: Any, matrix: bool, begin: i
     K = np.zeros((size, 4 * nc))
     G, N, band = np.zeros((free + ROOM, e.width)), np.zeros((free, e.width)), np.empty((free, e.width))
     weight = 12.0 / (h * h) * eq.density + 2.0 / h * eq.dragged
-    add_scalar_band(nc, eq.unit, weight, K)
+    add_scalar_band(nc, eq.tables.inertia, weight, K)
     reduce_matrix(e, K, band)
     B = _sparse(band)
     many = free if matrix else 0
@@ -262,7 +267,7 @@ def normal_equations(eq: Any, C: Any, A: Any, right: Any, matrix: bool, begin: i
     P, Q = np.empty((POINTS, many, many)), np.empty((POINTS, many, many))
     if matrix:
         band_to_dense(band, dense)
-    viscous = has_viscosity(eq.active)
+    viscous = has_viscosity(eq.active) or eq.beside > 0.0
     wide = many if viscous else 0
     V, BV, SBV, VBV = np.empty((wide, wide)), np.empty((wide, wide)), np.empty((wide, wide)), np.empty((wide, wide))
     r, y, Bz, Nz = np.zeros(free + ROOM), np.empty(free), np.empty(free), np.zeros(free)  # S' y and V' y
@@ -280,6 +285,7 @@ def normal_equations(eq: Any, C: Any, A: Any, right: Any, matrix: bool, begin: i
                 G[i, o] += band[i, o]
         if viscous:
             assemble(eq.axes, q, v, eq.tables, eq.active, eq.p, history, NO_RATES, (0.0, 1.0, 0.0), f, K)
+            add_scalar_band(nc, eq.tables.unit, eq.beside, K)
             reduce_matrix(e, K, N)
             for i in range(free):
                 for o in range(e.width):

@@ -116,14 +116,14 @@ def march_steps(
     smooth = not mixes and not exact
     plain_iterations = _MIXED_ITERATIONS if mixes else _PLAIN_ITERATIONS
     free = size - len(e.held)
-    largest = 10.0 * np.sum(tables.weight)  # an update of ten lengths is divergence
+    largest = 10.0 * np.sum(tables.span)  # an update of ten lengths is divergence
     K = np.empty((size, 4 * nc))
     A = np.zeros((free + ROOM, e.width))
     f = np.empty((n, nc))
     R = np.empty((n, nc))
     flat = R.reshape(size)
-    unit = tables.mass
-    rows, stacked = both_sides(unit), padded(n, nc)
+    unit, heavy = tables.unit, tables.inertia
+    rows, heavy_rows, stacked = both_sides(unit), both_sides(heavy), padded(n, nc)
     x = np.empty(free)
     trial_x = np.zeros(free + ROOM)
     change = np.empty(size)
@@ -205,10 +205,10 @@ def march_steps(
                 assemble(axes, q1, v1, tables, active, p, history, rates, scales, f, K)
                 if tight:
                     pairs, depth = press(q1, v1, tables.strands, p, x1, near, f)
-                residual(nc, rows, density, dragged, al_m, al_f, a, a1, v1, load, G, f, R, stacked)
+                residual(nc, heavy_rows, rows, density, dragged, al_m, al_f, a, a1, v1, load, G, f, R, stacked)
                 reduce_vector(e, flat, x)
                 if refactor:
-                    effective(nc, K, unit, inertia, 1.0 - al_f, (1.0 - al_f) * tv * dragged)
+                    effective(nc, K, heavy, unit, inertia, 1.0 - al_f, (1.0 - al_f) * tv * dragged)
                     reduce_matrix(e, K, A)
                     wide = pairs > 0
                     if wide:
@@ -218,7 +218,7 @@ def march_steps(
                         if not robust:
                             break
                         assemble(axes, q1, v1, tables, active, p, history, rates, (1.0, tv, 0.0), f, K)
-                        effective(nc, K, unit, inertia, 1.0 - al_f, (1.0 - al_f) * tv * dragged)
+                        effective(nc, K, heavy, unit, inertia, 1.0 - al_f, (1.0 - al_f) * tv * dragged)
                         for i in range(size):
                             K[i, 0] *= 1.0 + 1e-10
                         reduce_matrix(e, K, A)
@@ -263,7 +263,7 @@ def march_steps(
                         assemble(axes, q2, v2, tables, active, p, history, rates, (0.0, 0.0, 0.0), f, K)
                         if tight:
                             pairs, depth = press(q2, v2, tables.strands, p, x2, near, f)
-                        residual(nc, rows, density, dragged, al_m, al_f, a, a2, v2, load, G, f, R, stacked)
+                        residual(nc, heavy_rows, rows, density, dragged, al_m, al_f, a, a2, v2, load, G, f, R, stacked)
                         reduce_vector(e, flat, x)
                         after = 0.0
                         for i in range(free):
@@ -335,7 +335,7 @@ def march_steps(
             if tight:
                 pairs, depth = press(q1, v1, tables.strands, p, x1, near, f)
                 info[DEEPEST] = max(info[DEEPEST], depth)
-            residual(nc, rows, density, dragged, al_m, al_f, a, a1, v1, load, G, f, R, stacked)
+            residual(nc, heavy_rows, rows, density, dragged, al_m, al_f, a, a1, v1, load, G, f, R, stacked)
         if keeps:
             info[DEEPEST] = max(info[DEEPEST], remember(axes, q1, tables, active, p, history, h, False))
             if len(log) > 0:
@@ -352,7 +352,7 @@ def march_steps(
                     reactions[k, i] = flat[e.held[i]] + moved[e.held[i]]
             else:
                 holding(e, K, change, flat, reactions, k, moved)
-            follow(nc, rows, inertia, 1.0 - al_f, step_change, moved, f, stacked)
+            follow(nc, heavy_rows, inertia, 1.0 - al_f, step_change, moved, f, stacked)
         for i in range(n):
             for d in range(nc):
                 Q[k, i, d] = q1[i, d]

@@ -32,9 +32,9 @@ STRAIN, LEAST_SLOPE, MOST_SLOPE, GROWTH, SEEN = 5, 6, 7, 8, 9
 @kernel
 def smooth_motion(
     axes: Any, knots: Any, free_start: bool, free_end: bool, rule2: Any, w2: Any, rule3: Any, w3: Any, rule4: Any,
-    w4: Any, start: Any, velocity: Any, memory: Any, times: Any, near: Any, rows: Any, sampled: Any, origin: Any,
-    directions: Any, knots_t: Any, active: Any, p: Any, density: float, dragged: float, weight: Any, rho: float,
-    tolerance: float, least_jump: float, every: int, looks: int, info: Any,
+    w4: Any, masses: Any, start: Any, velocity: Any, memory: Any, times: Any, near: Any, rows: Any, sampled: Any,
+    origin: Any, directions: Any, knots_t: Any, active: Any, p: Any, density: float, dragged: float, weight: Any,
+    rho: float, tolerance: float, least_jump: float, every: int, looks: int, info: Any,
 ) -> Any:  # fmt: skip
     """March a smooth motion without twist from its start, and fit the time spline to it.
 
@@ -43,6 +43,7 @@ def smooth_motion(
 
     Args:
         axes: (0, 1) or (0, 1, 2).
+        masses: point masses, as `build_tables` takes them.
         start, velocity: (n, nc) [m, m/s] of the control points at t = 0.
         memory: (points, 2) stress-free curvature and its natural value [1/m], in the plane; (0, 2) for a straight one.
         times: (steps + 1 + near,) [s] `near` times at the beginning, for velocity and acceleration of the paths, and
@@ -62,7 +63,9 @@ def smooth_motion(
         spline and what it misses each state by (steps + 1,) [m].
     """
     one = np.int64(1)
-    tables = build_tables(knots, free_start, free_end, rule2, w2, rule3, w3, rule4, w4, np.inf, np.inf, one, np.inf)
+    tables = build_tables(
+        knots, free_start, free_end, rule2, w2, rule3, w3, rule4, w4, np.inf, np.inf, one, np.inf, masses
+    )
     n, nc = start.shape
     points, stretched = len(tables.curvature.w), len(tables.axial.w)
     history = History(
@@ -89,16 +92,16 @@ def smooth_motion(
     first, inertial = np.int64(0), np.bool_(True)  # as constants they would have kernels of their own compiled
     h = times[near + 1] - times[near]
     closed, a, G, jump = begin_stretch(
-        axes, start, velocity, tables.mass, density, dragged, tables, active, p, history, NO_RATES, load[0], e,
+        axes, start, velocity, density, dragged, tables, active, p, history, NO_RATES, load[0], e,
         offsets[:near],
         times[1] - times[0], inertial, nc,
     )  # fmt: skip
     reactions = np.zeros((steps + 1, len(e.held)))
-    inertia = times_scalar_band(tables.mass, a)
+    inertia = times_scalar_band(tables.inertia, a)
     for k in range(len(e.held)):
         i, d = e.held[k] // nc, e.held[k] % nc
         reactions[0, k] = density * inertia[i, d] + G[i, d]
-    a, G = lasting(axes, start, a, G, tables.mass, density, h, tables, active, p, history, e)
+    a, G = lasting(axes, start, a, G, density, h, tables, active, p, history, e)
     states = np.empty((steps + 1, n, nc))
     states[0] = start
     march_steps(
@@ -118,8 +121,9 @@ def smooth_motion(
         kept = m.reshape((1, *m.shape)), past.reshape((1, *past.shape)), axial.reshape((1, *axial.shape))
         behind = History(*kept, history.stick, history.slide, history.pressing, np.zeros((0, COLUMNS)), history.room)
         at, lasts = looked_at(steps, looks), times[-1] - times[near]
+        still = np.zeros((len(at) - 1, n, nc))
         rates = fastest_growth(
-            axes, states[at[1:]], behind, tables, active, p, density, dragged, e, SLOWEST / lasts,
+            axes, states[at[1:]], still, behind, tables, active, p, density, dragged, e, SLOWEST / lasts,
         )  # fmt: skip
         info[GROWTH] = rates.mean() * lasts
     return states, closed, reactions, history, control, off

@@ -45,7 +45,7 @@ def _merit(
     """Return the energy: stored + strength/2 (q - target)' B (q - target) - applied . q."""
     w[:] = 0.0
     away = q - target
-    multiply_scalar_band(tables.mass, away, strength, w)
+    multiply_scalar_band(tables.unit, away, strength, w)
     total = stored_energy(axes, q, tables, active, p, history) + contact_energy(axes, q, tables, active, p)
     for i in range(q.shape[0]):
         for d in range(q.shape[1]):
@@ -85,12 +85,12 @@ def relax(
     energy = _merit(axes, q, target, strength, applied, tables, active, p, history, w)
     update = np.inf
     damping = 0.0
-    largest = 0.25 * np.sum(tables.weight)  # a step no longer than a quarter of the cable
+    largest = 0.25 * np.sum(tables.span)  # a step no longer than a quarter of the cable
     for it in range(limit):
         for attempt in range(40):
             geometric = 1.0 if attempt == 0 else 0.0
             assemble(axes, q, still, tables, active, p, history, NO_RATES, (1.0, 0.0, geometric), f, K)
-            add_scalar_band(nc, tables.mass, strength, K)
+            add_scalar_band(nc, tables.unit, strength, K)
             if attempt > 1:
                 damping = max(10.0 * damping, 1e-12 * np.max(K[:, 0]))
             for i in range(size):
@@ -100,7 +100,7 @@ def relax(
                 break
         damping *= 0.1
         f -= applied
-        multiply_scalar_band(tables.mass, q - target, strength, f)
+        multiply_scalar_band(tables.unit, q - target, strength, f)
         reduce_vector(e, f.ravel(), x)
         solve(A, x)
         expand_vector(e, x, change)
@@ -122,7 +122,7 @@ def relax(
                     trial = q - length * step
                     assemble(axes, trial, still, tables, active, p, history, NO_RATES, (0.0, 0.0, 0.0), f, K)
                     f -= applied
-                    multiply_scalar_band(tables.mass, trial - target, strength, f)
+                    multiply_scalar_band(tables.unit, trial - target, strength, f)
                     work = 0.0
                     for i in range(size):
                         work += change[i] * f.ravel()[i]
@@ -172,18 +172,18 @@ def descend(
     step = change.reshape((n, nc))
     target, past, memory, tension = q.copy(), history.past.copy(), history.memory.copy(), history.tension.copy()
     place_held(e, offset.reshape((1, len(offset))), 0, q.reshape(q.size))
-    largest = 0.25 * np.sum(tables.weight)  # a step no longer than a quarter of the cable
+    largest = 0.25 * np.sum(tables.span)  # a step no longer than a quarter of the cable
     enough, previous = tolerance, np.inf
     it = 0
     while it < _PLAIN_ITERATIONS:
         it += 1
         assemble(axes, q, still, tables, active, p, history, NO_RATES, (1.0, 0.0, 1.0), f, K)
-        add_scalar_band(nc, tables.mass, strength, K)
+        add_scalar_band(nc, tables.unit, strength, K)
         reduce_matrix(e, K, A)
         if factor(A) >= 0:
             break
         f -= applied
-        multiply_scalar_band(tables.mass, q - target, strength, f)
+        multiply_scalar_band(tables.unit, q - target, strength, f)
         reduce_vector(e, f.ravel(), x)
         for i in range(free):
             x[i] = -x[i]

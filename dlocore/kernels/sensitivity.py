@@ -66,7 +66,7 @@ def factor_steps(
             geometric = 1.0 if attempt == 0 else 0.0
             assemble(axes, q1, v1, tables, active, p, history, rates, (1.0, tv, geometric), f, K)
             share = 1.0 - al_f
-            effective(nc, K, tables.mass, (1.0 - al_m) * ta * density, share, share * tv * dragged)
+            effective(nc, K, tables.inertia, tables.unit, (1.0 - al_m) * ta * density, share, share * tv * dragged)
             if attempt == 2:
                 for i in range(size):
                     K[i, 0] *= 1.0 + 1e-10
@@ -103,7 +103,7 @@ def follow_steps(
     K = np.empty((1, 1))
     f = np.empty((n, nc))
     R = np.empty((n, nc))
-    rows, stacked = both_sides(tables.mass), padded(n, nc)
+    heavy, rows, stacked = both_sides(tables.inertia), both_sides(tables.unit), padded(n, nc)
     v1 = np.empty((n, nc))
     a1 = np.empty((n, nc))
     q1 = np.empty((n, nc))
@@ -132,7 +132,7 @@ def follow_steps(
                     a1[i, d] = ta * (q1[i, d] - q0[i, d] - h * v[i, d]) - carry * a[i, d]
                     v1[i, d] = v[i, d] + h * ((1.0 - gm) * a[i, d] + gm * a1[i, d])
             assemble(axes, q1, v1, tables, active, p, history, rates, (0.0, 0.0, 0.0), f, K)
-            residual(nc, rows, density, dragged, al_m, al_f, a, a1, v1, load, G, f, R, stacked)
+            residual(nc, heavy, rows, density, dragged, al_m, al_f, a, a1, v1, load, G, f, R, stacked)
             if it > 0 and (left <= tolerance or left > 10.0 * previous):
                 break
             reduce_vector(e, R.ravel(), x)

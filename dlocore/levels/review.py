@@ -338,12 +338,12 @@ def _forces(problem: Problem) -> dict[str, Force]:
     density = scene.cable.linear_density
 
     def inertia(look: _Look, level: Level) -> Floats:
-        return density * times_scalar_band(level.motion.grid.tables.mass, look.a)
+        return density * times_scalar_band(level.motion.grid.tables.inertia, look.a)
 
     def drag(look: _Look, level: Level) -> Floats:
         speed = float(np.linalg.norm(look.v, axis=1).max())
         drag = scene.environment.drag + scene.environment.drag_quadratic * speed
-        return drag * times_scalar_band(level.motion.grid.tables.mass, look.v)
+        return drag * times_scalar_band(level.motion.grid.tables.unit, look.v)
 
     def gravity(look: _Look, level: Level) -> Floats:
         pull = cast(Floats, scene.environment.gravity)
@@ -371,7 +371,7 @@ def _forces(problem: Problem) -> dict[str, Force]:
             return np.zeros_like(look.q)
         load = table.friction * density * abs(float(cast(Floats, scene.environment.gravity)[2]))
         speed = np.linalg.norm(look.v, axis=1, keepdims=True)
-        return load * times_scalar_band(level.motion.grid.tables.mass, look.v / np.maximum(speed, 1e-3))
+        return load * times_scalar_band(level.motion.grid.tables.inertia, look.v / np.maximum(speed, 1e-3))
 
     def twist(look: _Look, level: Level) -> Floats:
         clamps = [g.u for g in closed_grasps(scene, look.time, look.time) if g.hold == "clamp"]
@@ -440,7 +440,8 @@ def _given_way(level: Level, window: WindowForces, look: _Look, force: Force) ->
     for geometric in (1.0, 0.0):  # of a cable that is about to give way only the positive part is of use
         scales = (1.0, 0.0, geometric)
         assemble(problem.axes, look.q, look.v, grid.tables, active, parameters, grid.history, NO_RATES, scales, f, K)
-        add_scalar_band(nc, grid.tables.mass, slow + problem.drag_coefficient() / problem.horizon, K)
+        add_scalar_band(nc, grid.tables.inertia, slow, K)
+        add_scalar_band(nc, grid.tables.unit, problem.drag_coefficient() / problem.horizon, K)
         change, positive = solve_free(e, K, right)
         if positive:
             return float(np.linalg.norm(change.reshape(-1, nc)[:, : problem.plane.dimensions], axis=1).max())

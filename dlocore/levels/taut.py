@@ -55,4 +55,5 @@ def _others(level: Level, states: Floats, times: Floats) -> float:
     bend = float(largest_curvature(problem.axes, states, grid.tables.curvature, grid.history.memory)) + 1 / cable.length
     loads = sum(float(np.linalg.norm(np.atleast_2d(load.force), axis=1).max()) for load in scene.loads)
     stiff = cast(float, cable.bending_stiffness) * bend**2
-    return scene.weight + cable.length * spread + cable.linear_density * speed**2 + stiff + loads
+    heavy = change * sum(one.mass for one in cable.point_masses)
+    return scene.weight + cable.length * spread + heavy + cable.linear_density * speed**2 + stiff + loads

@@ -37,6 +37,7 @@ _SPANS = 24  # of the knots of a bowed start, in each part
 _AGES = 1e6  # times the horizon: all the time that a disturbance needs
 _LEANS = 1025  # places along a start, at which its frames are looked at
 _TIMES = 65  # at which each stretch of the motion is looked at
+_RESTS = 1e-3  # of its largest speed: what slides more slowly rests
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ def _straightened(scene: Scene, start: StartCurve, flat: float) -> StartCurve | 
     held = tuple(replace(g, path=Still()) for g in scene.grasps if g.start == 0.0)
     at_rest, times = replace(scene, grasps=held), np.array([0.0, cast(float, scene.horizon)])
     for part in _parts(sorted(held, key=lambda g: g.u), scene.cable.length):
-        push, torque = _loaded(at_rest, straight, along, part, times)
+        push, torque, _ = _loaded(at_rest, straight, along, part, times)
         if _buckles(scene, part, push, torque)[0]:
             return None
     return straight
@@ -231,12 +232,14 @@ def _growths(scene: Scene, start: StartCurve, along: Floats, at_rest: bool) -> d
     """Return for the parts of a straight cable the natural logarithm by which a disturbance of them grows, about.
 
     A wave of wave number k grows at the rate s with mu s^2 + c s = M k^3 + P k^2 - EI k^4 under a push P and a torque
-    M: that of the fastest is summed over the time in which the part is unstable,
+    M, where c is what resists it aside, friction mu_f N of what slides at a speed v by mu_f N/v: that of the fastest is
+    summed over the time in which the part is unstable,
     P + M^2/(4 EI) > pi^2 EI/l^2 (Greenhill, 1883).
     """
     cable, horizon = scene.cable, cast(float, scene.horizon)
     patience = _AGES if at_rest else 1.0
-    mu, c, EI = cable.linear_density, scene.environment.drag, cast(float, cable.bending_stiffness)
+    mu, EI = cable.linear_density, cast(float, cable.bending_stiffness)
+    rubs = 0.0 if at_rest else _friction(scene, start)
     times = {0.0, horizon}
     for g in scene.grasps:
         times |= {t for t in (g.start, g.release_time or 0.0) if t < horizon}
@@ -245,11 +248,12 @@ def _growths(scene: Scene, start: StartCurve, along: Floats, at_rest: bool) -> d
         held = closed_grasps(scene, a, b)
         t = np.linspace(a, b, _TIMES)
         for part in _parts(sorted(held, key=lambda g: g.u), cable.length):
-            push, torque = _loaded(scene, start, along, part, t)
+            push, torque, c = _loaded(scene, start, along, part, t, rubs)
             k = (3.0 * torque + np.sqrt(9.0 * torque**2 + 32.0 * EI * push)) / (8.0 * EI)
             k = np.maximum(k, _least_wave_number(part))
             drive = np.where(_buckles(scene, part, push, torque), torque * k**3 + push * k**2 - EI * k**4, 0.0)
-            rate = (np.sqrt(c**2 + 4.0 * mu * np.maximum(drive, 0.0)) - c) / (2.0 * mu)
+            drive = np.maximum(drive, 0.0)
+            rate = 2.0 * drive / np.maximum(c + np.sqrt(c**2 + 4.0 * mu * drive), 1e-300)
             growth = float(np.sum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t)))
             growths[part] = growths.get(part, 0.0) + patience * growth
     return growths
@@ -285,25 +289,46 @@ def _between(ends: Sequence[tuple[float, Grasp | None]], length: float) -> Itera
             yield _Part(begin, end, (first, second))
 
 
-def _loaded(scene: Scene, start: StartCurve, along: Floats, part: _Part, t: Floats) -> tuple[Floats, Floats]:
+def _friction(scene: Scene, start: StartCurve) -> float:
+    """Return by how much friction slows a start that slides on the table [m/s^2]."""
+    table, switch = scene.environment.table, scene.effects.get
+    if table is None or "off" in (switch("table"), switch("friction")) or not lies_on(table, scene, start):
+        return 0.0
+    return table.friction * abs(float(cast(Floats, scene.environment.gravity)[2]))
+
+
+def _loaded(
+    scene: Scene, start: StartCurve, along: Floats, part: _Part, t: Floats, rubs: float = 0.0
+) -> tuple[Floats, Floats, Floats]:
     """Return the largest push (k,) [N] along a part at times t (k,) [s], 0 where it is pulled, and the torque [N m].
 
     A cable that keeps its length moves as what holds it does; between two grasps that come closer, or a grasp and what
-    a free end meets, it is compressed.
+    a free end meets, it is compressed. What slides is slowed by `rubs` [m/s^2]. The third result is what resists a
+    motion aside (k,) [N s/m^2].
     """
-    cable = scene.cable
+    cable, around = scene.cable, scene.environment
+    aside = np.full(len(t), around.drag)
     first, second = part.grasps
     length = part.end - part.begin
     loads = [(load.u, load.at(t) @ along) for load in scene.loads if part.begin <= load.u <= part.end]
-    weight = cable.linear_density * float(_gravity(scene, start) @ along)
+    fall = float(_gravity(scene, start) @ along)
+    weight = cable.linear_density * fall
+    heavy = [one for one in cable.point_masses if part.begin <= one.u <= part.end]
     holder = first or second
     if holder is None:
-        needed = np.zeros(len(t)) + sum(force for _, force in loads) / length
-        way = _free_way(start, along, (weight + needed) / cable.linear_density, t)
+        mass = cable.linear_density * length + sum(one.mass for one in heavy)
+        pulled = fall + sum(force for _, force in loads) / mass + np.zeros(len(t))
+        way = _free_way(start, along, pulled, t)
+        needed = cable.linear_density * pulled - weight
     else:
         way = _way(holder, start, along, t)
         v = np.gradient(way, t)
-        needed = cable.linear_density * np.gradient(v, t) + scene.environment.drag * v - weight
+        speed = np.abs(v)
+        slides = np.maximum(speed, max(_RESTS * float(speed.max()), 1e-12))
+        aside += around.drag_quadratic * speed + cable.linear_density * rubs / slides
+        pulled = np.gradient(v, t) + rubs * v / slides
+        needed = cable.linear_density * pulled + (around.drag + around.drag_quadratic * speed) * v - weight
+    loads += [(one.u, one.mass * (fall - pulled)) for one in heavy]
     if first is not None and second is not None:
         apart = _way(second, start, along, t) - _way(first, start, along, t)
         met = np.array([max(first.start, second.start)])
@@ -315,7 +340,7 @@ def _loaded(scene: Scene, start: StartCurve, along: Floats, part: _Part, t: Floa
         turned = np.abs(_spin(second, along, t) - _spin(first, along, t) + _twist(start, part))
         both = first.hold == second.hold == "clamp" and scene.effects.get("twist", "auto") != "off"
         torque = cast(float, cable.torsional_stiffness) * turned / length if both else np.zeros(len(t))
-        return np.maximum(push, 0.0), torque
+        return np.maximum(push, 0.0), torque, aside
     # what lies beyond a place is pushed from there: from the free end on, tension by tension
     from_end = second is None
     most = cast(float, cable.axial_stiffness) * _depth(scene, start, along, part, way) / length
@@ -325,7 +350,7 @@ def _loaded(scene: Scene, start: StartCurve, along: Floats, part: _Part, t: Floa
             beyond = [f for v, f in loads if (v > u if from_end else v < u) or (there and v == u)]
             push = _SPREAD * needed * rest - np.sum(beyond, axis=0)
             most = np.maximum(most, push if from_end else -push)
-    return most, np.zeros(len(t))
+    return most, np.zeros(len(t)), aside
 
 
 def _way(grasp: Grasp, start: StartCurve, along: Floats, t: Floats) -> Floats:

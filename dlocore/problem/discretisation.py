@@ -45,13 +45,13 @@ _APART = 0.25 * BEND  # of the length: what is nearer to a sharp bend shares its
 
 
 def smallest_n_u(problem: Problem) -> int:
-    """Return the least number of control points that has a knot at every grasp and load."""
+    """Return the least number of control points that has a knot at every grasp, load and point mass."""
     return problem.features.least
 
 
 def too_few(problem: Problem, n_u: int) -> SceneError:
     """Return the error of fewer control points than `smallest_n_u`."""
-    reason = f"{len(problem.features.u)} grasps and loads need a knot each"
+    reason = f"{len(problem.features.u)} places that are held, loaded or heavy need a knot each"
     return SceneError("quality.n_u", n_u, f"at least {smallest_n_u(problem)} in this scene", reason)
 
 
@@ -92,7 +92,9 @@ def grid_on(problem: Problem, knots: Floats) -> Grid:
 def _tables_of(problem: Problem, knots: Floats) -> Tables:
     rules = (*GAUSS_2, *GAUSS_3, *GAUSS_4)
     nodes = problem.table_spacing(len(knots) - DEGREE - 1), problem.contact_spacing(), problem.contact_cell()
-    return cast(Tables, build_tables(knots, *free_ends(problem.scene), *rules, *nodes, problem.strand_spacing()))
+    return cast(
+        Tables, build_tables(knots, *free_ends(problem.scene), *rules, *nodes, problem.strand_spacing(), problem.masses)
+    )
 
 
 def room_for(nc: int, points: int) -> int:
@@ -114,7 +116,7 @@ def _no_history(problem: Problem, tables: Tables) -> History:
         past=np.zeros((kept, columns)),
         axial=np.zeros((len(tables.axial.w), 3)),
         stick=np.zeros((len(tables.contact.w) if rubs else 0, 3)),
-        slide=np.zeros((len(tables.curvature.w) if lies else 0, 2)),
+        slide=np.zeros((len(tables.lying.w) if lies else 0, 2)),
         pressing=tables.contact.w.copy(),
         tension=np.zeros((0, COLUMNS)),
         room=np.zeros(room_for(nc, points)),

@@ -1,4 +1,4 @@
-"""Where along the cable knots are needed: at grasps, loads and sharp bends, and closer beside them."""
+"""Where along the cable knots are needed: at grasps, loads, point masses and sharp bends, and closer beside them."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -57,7 +57,8 @@ def find_features(
     length = scene.cable.length
     found: dict[float, tuple[int, float, float]] = {}
     directed = 3 if kinks else 2
-    places = [(g.u, 1 if g.hold == "point" else directed) for g in scene.grasps] + [(load.u, 1) for load in scene.loads]
+    places = [(g.u, 1 if g.hold == "point" else directed) for g in scene.grasps]
+    places += [(load.u, 1) for load in scene.loads] + [(one.u, 1) for one in scene.cable.point_masses]
     for at, multiplicity in places:
         place = _without_tip(scene, at, multiplicity > 1)
         u = next((v for v in found if abs(v - place) <= SAME * length), place)
@@ -83,7 +84,7 @@ def find_features(
 
 
 def _without_tip(scene: Scene, u: float, directed: bool) -> float:
-    """Return where a knot for what is held or loaded at `u` [m] belongs: at an end that only a tip lies beyond.
+    """Return where a knot for what is held, loaded or heavy at `u` [m] belongs: at an end that only a tip lies beyond.
 
     A tip, no longer than half a diameter, has no moment and does not bend: nothing is lost where it has no span of its
     own. That would be so short that it folds, or strains, before it bends, and that what the time spline misses of the
@@ -96,8 +97,7 @@ def _without_tip(scene: Scene, u: float, directed: bool) -> float:
         tip = min(tip, _OF_TARGET * (scene.quality.target_error or AUTO_TARGET * length))
     for end in (0.0, length):
         if abs(u - end) <= tip:
-            places = [g.u for g in scene.grasps] + [load.u for load in scene.loads]
-            near = [v for v in places if abs(v - end) <= _ALONE * length]
+            near = [v for v in scene.places if abs(v - end) <= _ALONE * length]
             return end if near == [u] else u
     return u
 

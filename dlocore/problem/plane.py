@@ -178,7 +178,7 @@ def flat_plane(scene: Scene, start: StartCurve, *, still: bool = False, flat: fl
     Of grasps that stand `still` only where they begin counts. So `flat` they have to lie, relative to what is
     largest; and where that is more than FLATNESS, to what moves a free cable by its length within the horizon.
     """
-    origin, length, mass = np.array(start.control_points[0]), scene.cable.length, scene.cable.linear_density
+    origin, length, mass = np.array(start.control_points[0]), scene.cable.length, scene.cable.mass
     speed = length / cast(float, scene.horizon) if flat > FLATNESS else 0.0  # [m/s] within the horizon by its length
     fall = speed**2 / length
     spread = [(start.control_points - origin) / length]
@@ -198,7 +198,7 @@ def flat_plane(scene: Scene, start: StartCurve, *, still: bool = False, flat: fl
         spread.append(gravity[None] / max(float(np.linalg.norm(gravity)), fall))
     for load in scene.loads:
         force = np.atleast_2d(cast(Floats, load.force))
-        spread.append(force / max(1e-300, float(np.abs(force).max()), fall * mass * length))
+        spread.append(force / max(1e-300, float(np.abs(force).max()), fall * mass))
     natural = natural_points(scene)
     if natural is not None:
         spread.append((natural - natural[0]) / length)

@@ -187,6 +187,12 @@ class Problem:
         """Return the coefficient of the mass matrix [kg/m]; where inertia is off a trace that fixes rigid motion."""
         return LEAST_MASS * self.scene.cable.linear_density if self.inertia is None else self.inertia.density()
 
+    @cached_property
+    def masses(self) -> Floats:
+        """Material coordinate of each point mass, and the length of cable that is as heavy, (k, 2) [m] (eq. 9a)."""
+        cable = self.scene.cable
+        return np.array([(one.u, one.mass / cable.linear_density) for one in cable.point_masses]).reshape(-1, 2)
+
     def drag_coefficient(self) -> float:
         """Return the coefficient of the linear drag matrix [N s/m^2]."""
         return 0.0 if self.drag is None else self.drag.coefficient()

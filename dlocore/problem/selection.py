@@ -121,8 +121,9 @@ def _inertia(scene: Scene, start: StartCurve, on_table: bool) -> Choice:
     held = rubs or heavy or len(scene.grasps) > 1
     if smooth and lasting and held and start.velocity is None and not scene.loads:
         stiffness = cast(float, cable.bending_stiffness) * (1.875 / cable.length) ** 4
+        heaviest = cable.linear_density + 4.0 * sum(one.mass for one in cable.point_masses) / cable.length  # at its end
         gravity = float(np.linalg.norm(cast(Floats, environment.gravity))) if heavy else 0.0
-        period = 2.0 * math.pi / math.sqrt(stiffness / cable.linear_density + gravity / cable.length)
+        period = 2.0 * math.pi / math.sqrt(stiffness / heaviest + gravity / cable.length)
         shortest = min(m.duration for m in moves)
         if shortest > SLOW * period:
             reason = f"the motion is slow: {shortest:.3g} s against a first natural period of {period:.2g} s"

@@ -31,7 +31,7 @@ def balanced(scene: Scene, grid: Grid, u: Floats) -> Floats:
     over = _basis(knots, points)
     mass = over.T @ (weights[:, None] * over)
     sides = _held_sides(scene)
-    inside = sorted({u for u in (*(g.u for g in scene.grasps), *(f.u for f in scene.loads)) if 0.0 < u < length})
+    inside = sorted({u for u in scene.places if 0.0 < u < length})
     steps = np.array([np.heaviside(points - g, 0.5) for g in inside]).reshape(-1, len(points))
     given = np.hstack(
         [

@@ -223,6 +223,8 @@ def chain(rod: Rod, grips: tuple[Grip, ...], begin: float, end: float) -> Chain:
     cell = 0.5 * (np.append(rest, 0.0) + np.append(0.0, rest))
     mass = np.zeros((n, 4))
     mass[:, :3] = cable.linear_density * cell[:, None]
+    for one in cable.point_masses:
+        mass[node_of.index(rod.node(one.u)), :3] += one.mass
     mass[:-1, 3] = cable.linear_density * rod.law[GYRATION] ** 2 * rest
     places = np.array([int(np.flatnonzero(np.array(edge_of) == e)[0]) for e in range(last)], np.int64)
     body = Body(
@@ -232,7 +234,7 @@ def chain(rod: Rod, grips: tuple[Grip, ...], begin: float, end: float) -> Chain:
         fixed=fixed,
         mass=mass,
         cell=cell,
-        weight=cable.linear_density * cell[:, None] * rod.gravity,
+        weight=mass[:, :1] * rod.gravity,
         width=0.5 * (rest[1:] + rest[:-1]),
         natural=rod.natural[np.array(node_of)[1:-1]],
         law=rod.law,

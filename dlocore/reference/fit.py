@@ -52,13 +52,13 @@ def _held(problem: Problem, u: Floats) -> list[int]:
 
 
 def _along(problem: Problem, u: Floats, q: Floats, tolerance: float) -> Floats:
-    """Return knots in u: every 2^k-th node and those of grasps and loads, twice where a direction is held."""
+    """Return knots in u: every 2^k-th node and those held, loaded or heavy, twice where a direction is held."""
     length = u[-1]
     marks: dict[int, int] = {}
     for g, node in zip(problem.scene.grasps, _held(problem, u), strict=True):
         marks[node] = max(marks.get(node, 1), 1 if g.hold == "point" else 2)
-    for load in problem.scene.loads:
-        marks.setdefault(int(np.argmin(np.abs(u - load.u))), 1)
+    for place in problem.scene.places:
+        marks.setdefault(int(np.argmin(np.abs(u - place))), 1)
     some = q[:: max(1, len(q) // 50)].transpose(1, 0, 2).reshape(len(u), -1)
     stride = 2 ** max(1, int(np.log2(max(2.0, len(u) / 8))))
     while True:

@@ -1,4 +1,4 @@
-"""The discrete rod of a posed scene: nodes on every grasp and load, its start, its laws, its surfaces."""
+"""The discrete rod of a posed scene: nodes on every grasp, load and point mass, its start, its laws, its surfaces."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -98,15 +98,15 @@ class Rod:
         return self.problem.plane.origin + x @ self.axes
 
     def node(self, u: float) -> int:
-        """Return the node at the material coordinate of a grasp or a load [m]."""
+        """Return the node at the material coordinate of a grasp, a load or a point mass [m]."""
         return int(np.argmin(np.abs(self.u - u)))
 
 
 def nodes_of(problem: Problem, elements: int, halvings: int) -> Floats:
-    """Return the nodes (n,) [m]: about `elements` edges, halved a number of times, with a node at grasps and loads."""
+    """Return the nodes (n,) [m]: about `elements` edges, halved a number of times, with a node at each place."""
     length = problem.scene.cable.length
     marks = [0.0]
-    for place in [*sorted([g.u for g in problem.scene.grasps] + [load.u for load in problem.scene.loads]), length]:
+    for place in [*sorted(problem.scene.places), length]:
         if place - marks[-1] > SAME * length:
             marks.append(place)
     marks[-1] = length
@@ -187,8 +187,11 @@ def _points(problem: Problem, u: Floats) -> tuple[Integers, Floats, Floats, NDAr
     length: list[float] = []
     lies: list[bool] = []
     h = np.diff(u)
+    heavy = [(int(np.argmin(np.abs(u - place))), alike) for place, alike in problem.masses]
     if problem.friction is not None and problem.friction.lying > 0.0:
         cells = 0.5 * (np.append(h, 0.0) + np.append(0.0, h))
+        for node, alike in heavy:
+            cells[node] += alike
         edge += [min(k, len(h) - 1) for k in range(len(u))]
         along += [0.0] * len(h) + [1.0]
         length += [float(c) for c in cells]
@@ -201,6 +204,11 @@ def _points(problem: Problem, u: Floats) -> tuple[Integers, Floats, Floats, NDAr
                 along.append((p + 0.5) / parts)
                 length.append(float(size) / parts)
                 lies.append(False)
+        for node, alike in heavy:  # as much contact as the length of cable that is as heavy
+            edge.append(min(node, len(h) - 1))
+            along.append(float(node == len(h)))
+            length.append(float(alike))
+            lies.append(False)
     return np.array(edge, np.int64), np.array(along, float), np.array(length, float), np.array(lies, np.bool_)
 
 

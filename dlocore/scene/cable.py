@@ -6,10 +6,30 @@ from typing import Any, cast
 
 from numpy.typing import ArrayLike
 
-from dlocore.errors import SceneError, choice, number
+from dlocore.errors import SceneError, choice, instances, number
 from dlocore.scene.points import points_along
 
 MIN_LENGTH, MAX_LENGTH = 0.01, 1000.0  # [m]
+MAX_POINT_MASSES = 32
+
+
+@dataclass(frozen=True, kw_only=True)
+class PointMass:
+    """A connector, plug or clip: a `mass` [kg] at the material coordinate `u` [m], in the middle of the cable.
+
+    It has weight and inertia, rubs on a table that the cable lies on and is pressed against what the cable touches. It
+    has no size of its own, no stiffness, no drag and no inertia of rotation (docs/model.md eq. 9a).
+
+    Raises:
+        SceneError: a value is not a finite number, or negative.
+    """
+
+    u: float
+    mass: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "u", number("u", self.u, at_least=0.0, at_most=MAX_LENGTH, unit="m"))
+        object.__setattr__(self, "mass", number("mass", self.mass, at_least=0.0, at_most=1e4, unit="kg"))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,6 +66,7 @@ class Cable:
         hardening: what of the remembered strain resists as a back stress, 0 (the paper's law) to 1.
         rest_shape: the stress-free shape: "straight", "initial" (that of the start shape) or points (n, 2 or 3) [m],
             4 to 100,000.
+        point_masses: what else hangs on it, as a connector at its end.
 
     Raises:
         SceneError: a value is missing, not finite or not positive; the points of a shape are too few or all the same.
@@ -68,6 +89,7 @@ class Cable:
     memory_rate: float | None = None
     hardening: float = 0.1
     rest_shape: str | ArrayLike = "straight"
+    point_masses: tuple[PointMass, ...] = ()
 
     def __post_init__(self) -> None:
         def put(name: str, value: Any) -> None:
@@ -117,6 +139,17 @@ class Cable:
             choice("rest_shape", self.rest_shape, ("straight", "initial"))
         else:
             put("rest_shape", points_along("rest_shape", self.rest_shape))
+        put("point_masses", instances("point_masses", self.point_masses, PointMass, "PointMass"))
+        if len(self.point_masses) > MAX_POINT_MASSES:
+            raise SceneError("point_masses", f"{len(self.point_masses)} point masses", f"at most {MAX_POINT_MASSES}")
+        for i, one in enumerate(self.point_masses):
+            if not one.u <= length:
+                raise SceneError(f"point_masses[{i}].u", one.u, f"0 to the cable's length, {length:g} [m]")
+
+    @property
+    def mass(self) -> float:
+        """What the cable and its point masses have together [kg]."""
+        return self.linear_density * self.length + sum(one.mass for one in self.point_masses)
 
     @property
     def solid_axial_stiffness(self) -> float:

@@ -23,7 +23,7 @@ from dlocore.errors import (
     number,
     whole,
 )
-from dlocore.scene.cable import MAX_LENGTH, Cable
+from dlocore.scene.cable import MAX_LENGTH, Cable, PointMass
 from dlocore.scene.obstacles import Obstacle
 from dlocore.scene.paths import Move, Path, Still, Waypoints
 from dlocore.scene.points import points_along
@@ -453,9 +453,15 @@ class Scene:
 
     @property
     def weight(self) -> float:
-        """What the cable weighs [N]."""
+        """What the cable weighs, with its point masses [N]."""
         gravity = float(np.linalg.norm(cast(Floats, self.environment.gravity)))
-        return self.cable.linear_density * self.cable.length * gravity
+        return self.cable.mass * gravity
+
+    @property
+    def places(self) -> tuple[float, ...]:
+        """Material coordinates at which something holds, loads or weighs down the cable in one place [m]."""
+        parts: tuple[Grasp | Load | PointMass, ...] = (*self.grasps, *self.loads, *self.cable.point_masses)
+        return tuple(part.u for part in parts)
 
     def _check_horizon(self) -> None:
         if self.horizon is not None:

@@ -25,8 +25,8 @@ def lean_on_anchors(
     """
     assert problem.friction is not None
     stick, _, limit = problem.friction.parameters()
-    index = grid.tables.curvature.first[:, None] + np.arange(4)
-    acceleration, velocity = (np.einsum("pi,pid->pd", grid.tables.curvature.b0, x[index]) for x in (a, v))
+    index = grid.tables.lying.first[:, None] + np.arange(4)
+    acceleration, velocity = (np.einsum("pi,pid->pd", grid.tables.lying.b0, x[index]) for x in (a, v))
     pull = problem.scene.cable.linear_density * acceleration / limit
     pull = pull / np.maximum(np.linalg.norm(pull, axis=1, keepdims=True), 1.0)
     speed = np.linalg.norm(velocity, axis=1, keepdims=True)
@@ -34,7 +34,7 @@ def lean_on_anchors(
     history.slide[:] = history.slide - stick * np.where(moves, velocity / np.maximum(speed, SLIP_SPEED), pull)
     pull = np.where(moves, 0.0, pull)
     force = np.zeros_like(a)
-    weights = limit * grid.tables.curvature.w[:, None] * grid.tables.curvature.b0
+    weights = limit * grid.tables.lying.w[:, None] * grid.tables.lying.b0
     np.add.at(force, index, weights[:, :, None] * pull[:, None, :])
     G += force
     return a + constrained_mass_solve(problem.nc, mass, e, np.zeros(len(e.held)), -force)

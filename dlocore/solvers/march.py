@@ -249,7 +249,7 @@ class _Walk:
         at_ends = problem.contact is not None or problem.friction is not None  # forces that jump, see `newmark.py`
         self._lag = 0.0 if at_ends else rho / (1.0 + rho)  # of the times at which steps balance forces, in steps
         self._laws = problem.laws
-        self._mass = grid.tables.mass * problem.mass_density()
+        self._mass = grid.tables.inertia * problem.mass_density()
         self._step = problem.horizon / len(times)
         self._kept = Kept(grid.start, counts, _frames(problem), _columns(problem, grid))
         self._v = grid.velocity.copy()

@@ -113,8 +113,9 @@ def _equations(
     n_t, n_u, nc = control.shape
     size, free = n_u * nc, window.free
     K, dense = np.empty((size, 4 * nc)), np.empty((size, size))
-    unit, density, dragged = window.grid.tables.mass, window.problem.mass_density(), window.problem.drag_coefficient()
-    M, N = (np.kron(dense_of(factor * unit), np.eye(nc)) for factor in (density, dragged))
+    heavy = window.problem.mass_density() * window.grid.tables.inertia
+    dragged = window.problem.drag_coefficient() * window.grid.tables.unit
+    M, N = (np.kron(dense_of(band), np.eye(nc)) for band in (heavy, dragged))
     f, state = np.empty((n_u, nc)), np.empty((3, n_u, nc))
     J = np.zeros((len(first) * free, (n_t - 2) * free))
     R = np.empty(len(first) * free)
@@ -123,8 +124,8 @@ def _equations(
         laws = (window.equations.active, window.equations.p, history_at(histories, k), NO_RATES)
         assemble(window.equations.axes, state[0], state[1], window.grid.tables, *laws, (1.0, 0.0, 1.0), f, K)
         band_to_dense(K, dense)
-        multiply_scalar_band(unit, state[2], density, f)
-        multiply_scalar_band(unit, state[1], dragged, f)
+        multiply_scalar_band(heavy, state[2], 1.0, f)
+        multiply_scalar_band(dragged, state[1], 1.0, f)
         f -= applied[min(k, len(applied) - 1)]
         rows = slice(k * free, (k + 1) * free)
         R[rows] = Z.T @ f.ravel()

@@ -61,9 +61,9 @@ def march_smooth(
     info = np.zeros(SEEN)
     info[FAILED_STEP] = -1
     states, closed, forces, history, control, off = smooth_motion(
-        problem.axes, grid.knots, *free_ends(problem.scene), *GAUSS_2, *GAUSS_3, *GAUSS_4, grid.start, grid.velocity,
-        memory, times, len(NEAR), rows, sampled, problem.plane.origin, problem.plane.axes, knots_t, *problem.laws,
-        problem.mass_density(), problem.drag_coefficient(), problem.weight(), rho,
+        problem.axes, grid.knots, *free_ends(problem.scene), *GAUSS_2, *GAUSS_3, *GAUSS_4, problem.masses, grid.start,
+        grid.velocity, memory, times, len(NEAR), rows, sampled, problem.plane.origin, problem.plane.axes, knots_t,
+        *problem.laws, problem.mass_density(), problem.drag_coefficient(), problem.weight(), rho,
         tolerance_of(problem, grid, problem.horizon / (steps + 1)), JUMPS * problem.scene.cable.length,
         every_of(steps + 1), looks, info,
     )  # fmt: skip

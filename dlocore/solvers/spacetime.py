@@ -146,9 +146,9 @@ class WindowSolver:
             table=table,
             weights=weights,
             h=(window.end - window.begin) * POINTS / len(self.times),
-            unit=grid.tables.mass,
             density=problem.mass_density(),
-            dragged=problem.drag_coefficient(),
+            dragged=0.0 if len(problem.masses) else problem.drag_coefficient(),
+            beside=problem.drag_coefficient() if len(problem.masses) else 0.0,
             tables=grid.tables,
             active=active,
             p=parameters,
@@ -305,7 +305,7 @@ def _closed(problem: Problem, motion: March, window: Window, near: Held, v: Floa
     `near` is what is held then, _SHORT and 2 _SHORT later. Where the velocity jumps it is as the march goes on.
     """
     rate = (4 * near.offsets[1] - 3 * near.offsets[0] - near.offsets[2]) / (2 * _SHORT)
-    mass = motion.grid.tables.mass
+    mass = motion.grid.tables.inertia
     closed = constrained_mass_solve(problem.nc, mass, near.elimination, rate, times_scalar_band(mass, v))
     k = int(np.searchsorted(motion.times, window.begin - 1e-12))
     step = motion.times[k + 1] - motion.times[k]

@@ -77,7 +77,7 @@ def enter(
     rates = (1.0 / last, 0.0, -1.0 / last, 0.0) if last > 0.0 else NO_RATES
     inertial = problem.inertia is not None
     closed, a, G, jump = begin_stretch(
-        problem.axes, q, v, grid.tables.mass, problem.mass_density(), problem.drag_coefficient(), grid.tables,
+        problem.axes, q, v, problem.mass_density(), problem.drag_coefficient(), grid.tables,
         *problem.laws, history, rates, load, held.elimination, held.offsets[:3], h * NEAR[1], inertial,
         problem.plane.dimensions,
     )  # fmt: skip
@@ -97,7 +97,7 @@ def with_what_lasts(
     if problem.inertia is None:
         return a, entry.G
     found: tuple[Floats, Floats] = lasting(
-        problem.axes, q, a, entry.G, grid.tables.mass, problem.mass_density(), h, grid.tables, *problem.laws, history,
+        problem.axes, q, a, entry.G, problem.mass_density(), h, grid.tables, *problem.laws, history,
         entry.held.elimination,
     )  # fmt: skip
     return found

@@ -158,11 +158,13 @@ def _rates(problem: Problem, motion: March) -> Iterator[tuple[Floats, Floats]]:
     for window in motion.forces:
         lasts = float(window.times[-1] - window.times[0])
         at = looked_at(len(window.times) - 1, max(2, round(LOOKS * lasts / problem.horizon)))
+        step = lasts / (len(window.times) - 1)
+        frequency = 1.0 / step if problem.friction is not None else 0.0  # without friction speeds play no part
         rates = [
             fastest_growth(
-                problem.axes, window.states[some], motion.behind(window.times[some]), motion.grid.tables,
-                *problem.laws, problem.mass_density(), problem.drag_coefficient(), window.held.elimination,
-                SLOWEST / problem.horizon,
+                problem.axes, window.states[some], frequency * (window.states[some] - window.states[some - 1]),
+                motion.behind(window.times[some]), motion.grid.tables, *problem.laws, problem.mass_density(),
+                problem.drag_coefficient(), window.held.elimination, SLOWEST / problem.horizon,
             )
             for some in np.array_split(at[1:], -(-len(at) // _AT_ONCE))
         ]  # fmt: skip

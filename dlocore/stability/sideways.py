@@ -187,7 +187,7 @@ def _turned(
     n, nc = grid.n_u, problem.nc
     away = np.zeros((2, nc))
     away[0, :3], away[1, 3] = normal, 1.0
-    unit: Floats = np.kron(dense_of(grid.tables.mass), np.eye(2)).astype(np.float64)
+    unit: Floats = np.kron(dense_of(grid.tables.inertia), np.eye(2)).astype(np.float64)
     f, K, still = np.empty((n, nc)), np.empty((n * nc, 4 * nc)), np.zeros((n, nc))
     assemble(problem.axes, q, still, grid.tables, *law_table, history, NO_RATES, (1.0, 0.0, 1.0), f, K)
     stiff = np.einsum("xa,iajb,yb->ixjy", away, dense_of(K).reshape(n, nc, n, nc), away)
@@ -227,10 +227,10 @@ def _leasts_of_lying(
         added = twists + scale * turning[:, None] * _products(basis[:, 0])
         np.add.at(stiff, (first[:, None] + _COLUMN, _BELOW), added)
         clamps = [g for g in closed_grasps(problem.scene, t, t) if g.hold == "clamp"]
-        allowed = _allowed(slack, stiff, tables.mass)
+        allowed = _allowed(slack, stiff, tables.inertia)
         stiff += _held_band(grid, clamps, _firm(stiff), direction=False)
-        if factor(stiff + allowed * tables.mass) >= 0:
-            yield _least(dense_of(stiff), dense_of(tables.mass))
+        if factor(stiff + allowed * tables.inertia) >= 0:
+            yield _least(dense_of(stiff), dense_of(tables.inertia))
 
 
 def _products(rows: Floats) -> Floats:
@@ -290,7 +290,7 @@ def _bands(problem: Problem, grid: Grid, states: Floats, flat: Floats) -> tuple[
 
     `flat` (k, n, 2) are their coordinates in the plane.
     """
-    return _elastic(problem, grid, flat) + slipping_across(problem, grid, states), grid.tables.mass
+    return _elastic(problem, grid, flat) + slipping_across(problem, grid, states), grid.tables.inertia
 
 
 def _elastic(problem: Problem, grid: Grid, flat: Floats) -> Floats:

@@ -106,7 +106,7 @@ def falls(problem: Problem, grid: Grid, at: float = 0.0, starts: Starts | None =
             problem.axes, q, np.zeros_like(q), grid.tables, active, parameters, grid.past(), NO_RATES, (1.0, 0.0, 1.0),
             f, K,
         )  # fmt: skip
-        add_scalar_band(nc, grid.tables.mass, springs, K)
+        add_scalar_band(nc, grid.tables.unit, springs, K)
         change, positive = solve_free(elimination, K, np.ascontiguousarray(right).ravel())
         return change.reshape(q.shape) if positive else None
 
@@ -125,7 +125,7 @@ def falls(problem: Problem, grid: Grid, at: float = 0.0, starts: Starts | None =
     side = way.copy()
     turn = cable.length / problem.twist.radius if problem.twist is not None else 0.0
     for _ in range(_ITERATIONS):
-        moved = pushed(springs, times_scalar_band(grid.tables.mass, way))
+        moved = pushed(springs, times_scalar_band(grid.tables.unit, way))
         assert moved is not None, "these springs hold it"
         size = float(np.abs(moved[:, :dimensions]).max())
         way = moved / max(size, turn * float(np.abs(moved[:, dimensions:]).max(initial=0.0)))

@@ -1,6 +1,7 @@
 """The scenes that a machine is calibrated on."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ GRASPS = (0.0, 0.25, 0.5, 0.8)  # [m] of the paper's case
 
 def plain_cord(**changes: float) -> Cable:
     """Return the cable of the paper's case, with the given fields replaced."""
-    values = {"length": 1.0, "diameter": 0.005, "linear_density": 0.05, "bending_stiffness": 1e-3}
+    values: dict[str, Any] = {"length": 1.0, "diameter": 0.005, "linear_density": 0.05, "bending_stiffness": 1e-3}
     return Cable(**(values | changes))
 
 

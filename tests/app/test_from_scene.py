@@ -1,5 +1,6 @@
 """A scene of Python as a request: the same scene comes back of it, and the service answers as Python does."""
 
+import itertools
 import json
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
@@ -14,16 +15,16 @@ from dlocore import Grasp, Load, Move, Quality, Scene, SceneError, Straight, con
 from dlocore.scene.scene import EFFECTS
 from tests.solver.scenes import cable
 
-SEED, COUNT = 127, 300
+SEEDS, COUNT = (127, 2127), 150  # without and with point masses
 PUSHED = Scene(cable=cable(), shape=Straight(), grasps=(Grasp(u=0.0, path=Move(displacement=(0, 0.1, 0), duration=1)),))
 
 
 def drawn(count: int) -> list[Scene]:
     """Return random scenes; those that are refused as they are made are left out."""
     found = []
-    for index in range(count):
+    for seed, index in itertools.product(SEEDS, range(count)):
         try:
-            found.append(draw(SEED, index, small=True).make())
+            found.append(draw(seed, index, small=True).make())
         except SceneError:
             continue
     return found

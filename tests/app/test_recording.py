@@ -30,7 +30,11 @@ ENTITIES = {
 
 @pytest.fixture(scope="module")
 def chunks(client: TestClient, answer: dict[str, Any], tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
-    path = tmp_path_factory.mktemp("rrd") / "run.rrd"
+    return read(client, answer, tmp_path_factory.mktemp("rrd") / "run.rrd")
+
+
+def read(client: TestClient, answer: dict[str, Any], path: Path) -> list[Any]:
+    """Return all chunks of the recording of an answer, written to a path."""
     response = client.get(answer["links"]["recording"])
     assert response.status_code == 200
     path.write_bytes(response.content)
@@ -99,6 +103,15 @@ def test_grasps_and_their_forces_move_along(chunks: list[Any], answer: dict[str,
     largest = np.linalg.norm(forces, axis=1).max()
     assert np.linalg.norm(drawn, axis=1).max() == pytest.approx(0.25, rel=1e-5)  # a quarter of the cable's length
     np.testing.assert_allclose(drawn, forces * 0.25 / largest, rtol=0, atol=1e-6)
+
+
+def test_point_masses_move_along(client: TestClient, tmp_path: Path) -> None:
+    request = put(paper_scene(), "cable.point_masses", [{"u": 0.5, "mass": 0.01}, {"u": 1.0, "mass": 0.02}])
+    answer = client.post("/v1/predictions", json=request).json()
+    assert answer["status"] == "converged"
+    times, places = rows(read(client, answer, tmp_path / "run.rrd"), "/motion/point_masses", "positions", "motion")
+    assert times == pytest.approx(answer["surface"]["t"], abs=2e-9)
+    np.testing.assert_allclose(places, np.array(answer["surface"]["positions"])[:, [50, 100]], rtol=0, atol=1e-6)
 
 
 def page(chunks: list[Any], entity: str) -> str:

@@ -12,11 +12,11 @@ from dlocore import Cable, ControlPoints, Environment, Grasp, Quality, Scene, Wa
 from dlocore.effects import laws
 from dlocore.effects.damping import Damping
 from dlocore.kernels.assembly import NO_RATES, History, assemble
-from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, build_tables
 from dlocore.kernels.entry import remember_start
 from dlocore.problem.discretisation import room_for
 from dlocore.sensitivity import sensitivities
 from dlocore.spline import design_matrix, uniform_knots
+from tests.tables import plain_tables
 
 Floats = NDArray[np.float64]
 ETA, LENGTH = 2e-3, 1.0
@@ -28,7 +28,7 @@ class Damped:
 
     def __init__(self, n_u: int) -> None:
         self.knots = uniform_knots(n_u, LENGTH)
-        self.tables = build_tables(self.knots, True, True, *GAUSS_2, *GAUSS_3, *GAUSS_4, np.inf, np.inf, 1, np.inf)
+        self.tables = plain_tables(self.knots)
         self.active, self.parameters = np.zeros(laws.COUNT, np.int64), np.zeros((laws.COUNT, laws.PARAMETERS))
         self.active[laws.DAMPING], self.parameters[laws.DAMPING, 0] = 1, Damping(ETA).parameters()[0]
 

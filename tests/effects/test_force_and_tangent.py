@@ -13,10 +13,11 @@ from dlocore.effects.damping import Damping
 from dlocore.effects.drag import QuadraticDrag
 from dlocore.effects.stretch import Stretch, StretchDamping
 from dlocore.kernels.assembly import NO_RATES, History, assemble, stored_energy
-from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, Tables, build_tables, graded_knots
+from dlocore.kernels.basis import Tables, graded_knots
 from dlocore.kernels.entry import remember_start
 from dlocore.problem.discretisation import room_for
 from dlocore.spline import design_matrix
+from tests.tables import plain_tables
 
 Floats = NDArray[np.float64]
 N_U, LENGTH = 9, 1.0
@@ -80,7 +81,7 @@ def body(name: str, nc: int, n_u: int = N_U, rest: float = 0.0) -> Body:
     feature = np.array([0.3])
     one = np.ones(1, np.int64)
     knots = graded_knots(n_u, LENGTH, feature, one, np.array([0.6]), np.array([0.02]))
-    tables = build_tables(knots, True, True, *GAUSS_2, *GAUSS_3, *GAUSS_4, np.inf, np.inf, 1, np.inf)
+    tables = plain_tables(knots)
     active, parameters = np.zeros(laws.COUNT, np.int64), np.zeros((laws.COUNT, laws.PARAMETERS))
     chosen = list(LAWS) if name == "all" else [name.removesuffix(" with memory")]
     for row, effect in (LAWS[c] for c in chosen):

@@ -11,11 +11,12 @@ from dlocore.effects.bend import Bend
 from dlocore.effects.stretch import Stretch
 from dlocore.effects.twist import Twist
 from dlocore.kernels.assembly import NO_RATES, History, assemble, stored_energy
-from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, Tables, build_tables, graded_knots
+from dlocore.kernels.basis import graded_knots
 from dlocore.kernels.entry import remember_start
 from dlocore.kernels.twisted import start_frames
 from dlocore.kernels.twisted_rows import LAST, PAST
 from dlocore.problem.discretisation import room_for
+from tests.tables import plain_tables
 
 Floats = NDArray[np.float64]
 N_U, LENGTH = 9, 1.0
@@ -29,9 +30,7 @@ class Body:
     def __init__(self, remembered: bool = True) -> None:
         one = np.ones(1, np.int64)
         self.knots = graded_knots(N_U, LENGTH, np.array([0.3]), one, np.array([0.6]), np.array([0.02]))
-        self.tables: Tables = build_tables(
-            self.knots, True, True, *GAUSS_2, *GAUSS_3, *GAUSS_4, np.inf, np.inf, 1, np.inf
-        )
+        self.tables = plain_tables(self.knots)
         self.active = np.zeros(laws.COUNT, np.int64)
         self.p = np.zeros((laws.COUNT, laws.PARAMETERS))
         effects = ((laws.STRETCH, Stretch(60.0)), (laws.BEND, Bend(1e-3)), (laws.TWIST, Twist(2e-3, 0.005)))

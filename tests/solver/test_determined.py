@@ -80,8 +80,9 @@ def test_a_column_under_twice_its_critical_load_grows_as_beam_theory_says(drag: 
     history = past._replace(memory=past.memory[None], past=past.past[None], axial=past.axial[None])
 
     def fastest(slowest: float) -> float:
+        states = squeezed[None], np.zeros_like(squeezed[None])
         laws = (problem.mass_density(), problem.drag_coefficient(), held.elimination, slowest)
-        return float(fastest_growth(problem.axes, squeezed[None], history, grid.tables, *problem.laws, *laws)[0])
+        return float(fastest_growth(problem.axes, *states, history, grid.tables, *problem.laws, *laws)[0])
 
     # mu s^2 + drag s = (P - P_c) (pi/L)^2 of the first mode
     load = critical * (np.pi / LENGTH) ** 2

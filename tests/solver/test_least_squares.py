@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, Table, predict
+from dlocore import Cable, Environment, Grasp, Move, PointMass, Points, Quality, Scene, Table, predict
 from dlocore.kernels.anderson import advance, room
 from dlocore.kernels.assembly import NO_RATES, assemble, history_at
 from dlocore.kernels.banded import elimination
@@ -16,6 +16,7 @@ from dlocore.problem.events import closed_grasps
 from dlocore.problem.holding import Starts, close_grasps
 from dlocore.problem.problem import pose
 from dlocore.problem.time_grid import time_knots
+from dlocore.solvers.bands import dense_of
 from dlocore.solvers.march import march
 from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.spacetime import WindowSolver, behind_softer, windows_of
@@ -26,12 +27,14 @@ from tests.solver.scenes import arc
 Floats = NDArray[np.float64]
 
 
-def window(table: Table | None, twist: str, damping: float) -> tuple[WindowSolver, Floats]:
+def window(
+    table: Table | None, twist: str, damping: float, masses: tuple[PointMass, ...] = ()
+) -> tuple[WindowSolver, Floats]:
     """Return the least squares of a clamped cable on a small grid, and control points near its solution."""
     u = np.linspace(0.0, 1.0, 12)[:, None]
     wave = u * [1.0, 0.0, 0.0] + 0.05 * np.sin(3.0 * u) * [0.0, 1.0, 0.0]
     scene = Scene(
-        cable=Cable.preset("paper", bending_damping=damping),
+        cable=Cable.preset("paper", bending_damping=damping, point_masses=masses),
         shape=Points(points=wave),
         grasps=(Grasp(u=0.3, hold="clamp", path=Move(displacement=(0.0, 0.1, 0.0), duration=1.0)),),
         environment=Environment(drag=0.05, table=table),
@@ -59,15 +62,14 @@ def dense(solver: WindowSolver, control: Floats) -> tuple[float, Floats, Floats,
     """Return objective, normal matrix, right side and holding forces from full matrices."""
     eq, nc, (n_t, n_u, _) = solver.equations, solver.nc, control.shape
     Z = np.array([solver.expand(row)[2].ravel() for row in np.eye((n_t - 2) * solver.free)[: solver.free]]).T
-    band, full = np.zeros((n_u * nc, 4 * nc)), np.empty((n_u * nc, n_u * nc))
-    for o in range(4):
-        band[:, o * nc] = np.repeat(solver.grid.tables.mass[:, o], nc)
-    band_to_dense(band, full)
-    problem, h = solver.problem, eq.h
-    M, C = (Z.T @ (factor * full) @ Z for factor in (problem.mass_density(), problem.drag_coefficient()))
-    B = 12.0 / h**2 * M + 2.0 / h * C
+    problem, h, tables = solver.problem, eq.h, solver.grid.tables
+    inertia = np.kron(problem.mass_density() * dense_of(tables.inertia), np.eye(nc))
+    drag = np.kron(problem.drag_coefficient() * dense_of(tables.unit), np.eye(nc))
+    M, C = (Z.T @ matrix @ Z for matrix in (inertia, drag))
+    beside = len(problem.masses) > 0  # drag is viscosity then
+    B = 12.0 / h**2 * M + (0.0 if beside else 2.0 / h) * C
     A, right, value = np.zeros((n_t * solver.free,) * 2), np.zeros(n_t * solver.free), 0.0
-    state, f, K, held = np.empty((3, n_u, nc)), np.empty((n_u, nc)), np.empty((n_u * nc, 4 * nc)), np.empty_like(full)
+    state, f, K, held = np.empty((3, n_u, nc)), np.empty((n_u, nc)), np.empty((n_u * nc, 4 * nc)), np.empty_like(drag)
     holding = np.empty((len(eq.first), len(eq.e.held)))
     for k, (first, basis) in enumerate(zip(eq.first, eq.table, strict=True)):
         states_at(first, basis, control, state)
@@ -78,10 +80,10 @@ def dense(solver: WindowSolver, control: Floats) -> tuple[float, Floats, Floats,
             band_to_dense(K, held)
             tangents.append(Z.T @ held @ Z)
         V, Kp = tangents
-        weight = np.linalg.inv(B + Kp + 2.0 / h * V)
+        weight = np.linalg.inv(B + Kp + 2.0 / h * (V + C if beside else V))
         weight = weight @ B @ weight * eq.weights[k] / eq.weights.sum()
         force = (f - eq.applied[min(k, len(eq.applied) - 1)]).ravel()
-        force += full @ (problem.mass_density() * state[2] + problem.drag_coefficient() * state[1]).ravel()
+        force += inertia @ state[2].ravel() + drag @ state[1].ravel()
         holding[k] = force[eq.e.held]
         R = Z.T @ force
         J = np.zeros((solver.free, n_t * solver.free))
@@ -106,13 +108,16 @@ def whole(blocks: Floats) -> Floats:
     return upper + np.triu(upper, 1).T
 
 
+@pytest.mark.parametrize("masses", [(), (PointMass(u=0.6, mass=0.02), PointMass(u=1.0, mass=0.03))], ids=["", "heavy"])
 @pytest.mark.parametrize("damping", [0.0, 2e-4])
 @pytest.mark.parametrize(("table", "twist"), [(Table(), "off"), (None, "off"), (None, "on")], ids=["2", "3", "4"])
-def test_the_normal_equations_are_those_of_the_dense_matrices(table: Table | None, twist: str, damping: float) -> None:
-    solver, control = window(table, twist, damping)
+def test_the_normal_equations_are_those_of_the_dense_matrices(
+    table: Table | None, twist: str, damping: float, masses: tuple[PointMass, ...]
+) -> None:
+    solver, control = window(table, twist, damping, masses)
     value, A, right = solver.objective(control, True)
     problem, h = solver.problem, solver.equations.h
-    unit = (12.0 * problem.mass_density() / h**2 + 2.0 * problem.drag_coefficient() / h) * problem.scene.cable.length
+    unit = (12.0 * problem.mass_density() / h**2 + 2.0 * solver.equations.dragged / h) * problem.scene.cable.length
     expected, full, gradient, holding = dense(solver, control)
     # rounding, of matrices whose stretch is 1e5 times as stiff as their bending
     assert value * unit == pytest.approx(expected, rel=1e-8)

@@ -5,10 +5,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from dlocore.kernels.basis import GAUSS_2, GAUSS_3, GAUSS_4, build_tables
 from dlocore.kernels.inertia import both_sides, effective, padded, residual
 from dlocore.kernels.predictor import ORDERS, differences_of, predict_by, shift
 from dlocore.spline import uniform_knots
+from tests.tables import plain_tables
 
 Floats = NDArray[np.float64]
 
@@ -60,25 +60,30 @@ def test_few_states_predict_nothing() -> None:
 def test_inertia_and_drag_are_those_of_the_dense_matrices(nc: int) -> None:
     rng = np.random.default_rng(nc)
     n, density, dragged, alpha_m, alpha_f = 9, 0.7, 0.3, 0.2, 0.4
-    unit = build_tables(uniform_knots(n, 1.0), True, True, *GAUSS_2, *GAUSS_3, *GAUSS_4, np.inf, np.inf, 1, np.inf).mass
-    U = np.zeros((n, n))
+    tables = plain_tables(uniform_knots(n, 1.0), masses=np.array([[0.31, 0.4], [1.0, 2.0]]))
+    unit, heavy = tables.unit, tables.inertia
+    U, H = np.zeros((n, n)), np.zeros((n, n))
     for i in range(n):
         for o in range(min(4, n - i)):
             U[i, i + o] = U[i + o, i] = unit[i, o]
+            H[i, i + o] = H[i + o, i] = heavy[i, o]
     a, a1, v1, load, G, f = rng.normal(size=(6, n, nc))
     force, R = f.copy(), np.empty((n, nc))
-    residual(nc, both_sides(unit), density, dragged, alpha_m, alpha_f, a, a1, v1, load, G, f, R, padded(n, nc))
+    rows = both_sides(heavy), both_sides(unit)
+    residual(nc, *rows, density, dragged, alpha_m, alpha_f, a, a1, v1, load, G, f, R, padded(n, nc))
     expected = force + dragged * U @ v1 - load
     np.testing.assert_allclose(f, expected, atol=1e-14)  # rounding
-    inertia = density * U @ ((1.0 - alpha_m) * a1 + alpha_m * a)
+    inertia = density * H @ ((1.0 - alpha_m) * a1 + alpha_m * a)
     np.testing.assert_allclose(R, inertia + (1.0 - alpha_f) * expected + alpha_f * G, atol=1e-14)
 
     K = np.tril(rng.normal(size=(n * nc, 4 * nc)))
     before = K.copy()
-    effective(nc, K, unit, 5.0, 0.6, 2.0)
+    effective(nc, K, heavy, unit, 5.0, 0.6, 2.0)
     added = K - 0.6 * before
     for i in range(n):
         for o in range(min(4, n - i)):
-            np.testing.assert_allclose(added[i * nc : (i + 1) * nc, o * nc], 7.0 * U[i, i + o], atol=1e-14)
+            np.testing.assert_allclose(
+                added[i * nc : (i + 1) * nc, o * nc], 5.0 * H[i, i + o] + 2.0 * U[i, i + o], atol=1e-14
+            )
     added[:, ::nc] = 0.0
     assert np.abs(added).max() < 1e-15  # coordinates are not coupled

@@ -30,6 +30,10 @@ class CableForm(Form):
             self._diameter = gui.add_number("Diameter [mm]", 1.0, min=0.01, max=500.0, step=0.1)
             self._density = gui.add_number("Density [g/m]", 1.0, min=0.01, max=1e7, step=0.1)
             self._bending = gui.add_number("EI [10⁻³ N m²]", 1.0, min=1e-6, max=1e9, step=0.01)
+            self._connector = gui.add_number(
+                "Connector [g]", 0.0, min=0.0, max=1e7, step=1.0, hint="A point mass on the cable; 0: none"
+            )
+            self._connector_u = gui.add_number("Connector at u [m]", 1.0, min=0.0, max=LONGEST, step=0.01)
             with gui.add_folder("More of the cable", expand_by_default=False):
                 self._torsion = gui.add_number("GJ [10⁻³ N m²]", 1.0, min=1e-6, max=1e9, step=0.01)
                 self._stretch = gui.add_number("EA [N]", 1.0, min=1e-3, max=1e12, step=1.0)
@@ -51,6 +55,8 @@ class CableForm(Form):
         self._bind(self._length, lambda d: scaled(d, float(self._length.value)))
         self._bind(self._diameter, lambda d: self._with(d, "diameter", 1e-3 * self._diameter.value))
         self._bind(self._density, lambda d: self._with(d, "linear_density", 1e-3 * self._density.value))
+        self._bind(self._connector, self._with_connector)
+        self._bind(self._connector_u, self._with_connector)
         self._bind(self._bending, lambda d: self._with(d, "bending_stiffness", 1e-3 * self._bending.value))
         self._bind(self._torsion, lambda d: self._with(d, "torsional_stiffness", 1e-3 * self._torsion.value))
         self._bind(self._stretch, lambda d: self._with(d, "axial_stiffness", float(self._stretch.value)))
@@ -73,8 +79,23 @@ class CableForm(Form):
             kept = self._kept[name]
             for key, value in kept["environment"].items():
                 draft = draft.put(("environment", key), value)
-            return draft.put(("cable",), {**kept["cable"], "length": draft.length})
-        return draft if name == CUSTOM else draft.put(("cable",), {**PRESETS[name].values, "length": draft.length})
+            return draft.put(("cable",), {**kept["cable"], **self._as_it_is(draft)})
+        return draft if name == CUSTOM else draft.put(("cable",), {**PRESETS[name].values, **self._as_it_is(draft)})
+
+    @staticmethod
+    def _as_it_is(draft: Draft) -> dict[str, Any]:
+        """Return what a cable keeps as it becomes another kind: its length and what hangs on it."""
+        masses = draft.get(("cable", "point_masses"))
+        return {"length": draft.length, **({"point_masses": masses} if masses else {})}
+
+    def _with_connector(self, draft: Draft) -> Draft:
+        """Put the first point mass where it is wanted, a new one at the far end; others stay."""
+        others = draft.get(("cable", "point_masses"), [])
+        if self._connector.value <= 0.0:
+            return draft.put(("cable", "point_masses"), others[1:])
+        u = min(float(self._connector_u.value), draft.length) if others else draft.length
+        first = {"u": float(f"{u:.9g}"), "mass": float(f"{1e-3 * self._connector.value:.9g}")}
+        return draft.put(("cable", "point_masses"), [first, *others[1:]])
 
     def offer(self) -> None:
         """Offer the cables that are kept now."""
@@ -110,6 +131,11 @@ class CableForm(Form):
         show_value(self._torsion_damping, _shown(1e3, cable.torsional_damping))
         show_value(self._stretch_damping, _shown(1.0, cable.axial_damping))
         show_value(self._yield, _shown(1e2, cable.yield_strain or 0.0))
+        first = cable.point_masses[0] if cable.point_masses else None
+        show_value(self._connector, _shown(1e3, first.mass if first else 0.0))
+        show_if(self._connector_u, first is not None)
+        if first is not None:
+            show_value(self._connector_u, _shown(1.0, first.u))
         show_value(self._rate, cable.memory_rate or PLASTIC_RATE)
         show_if(self._rate, cable.memory_rate is not None)
         self._take_rest(cable)
@@ -126,8 +152,11 @@ def _shown(scale: float, value: float | None) -> float:
 
 
 def preset_of(cable: dict[str, Any], kept: dict[str, dict[str, Any]] | None = None) -> str:
-    """Return the name of the preset or kept cable that has the values of `cable`, whatever its length, or `CUSTOM`."""
-    values = {name: value for name, value in cable.items() if name != "length"}
+    """Return the name of the preset or kept cable that has the values of `cable`, or `CUSTOM`.
+
+    Its length may be any, and so may what hangs on it.
+    """
+    values = {name: value for name, value in cable.items() if name not in ("length", "point_masses")}
     if set(values) == {"preset"}:
         return str(values["preset"])
     for name, preset in PRESETS.items():
