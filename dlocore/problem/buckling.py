@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,7 @@ _SPANS = 24  # of the knots of a bowed start, in each part
 _AGES = 1e6  # times the horizon: all the time that a disturbance needs
 _LEANS = 1025  # places along a start, at which its frames are looked at
 _TIMES = 65  # at which each stretch of the motion is looked at
+_SHORTEST, _WAVES = 64.0, 25  # of the wave numbers that are looked at, over the least one
 _RESTS = 1e-3  # of its largest speed: what slides more slowly rests
 
 
@@ -96,8 +97,8 @@ def _straightened(scene: Scene, start: StartCurve, flat: float) -> StartCurve | 
     held = tuple(replace(g, path=Still()) for g in scene.grasps if g.start == 0.0)
     at_rest, times = replace(scene, grasps=held), np.array([0.0, cast(float, scene.horizon)])
     for part in _parts(sorted(held, key=lambda g: g.u), scene.cable.length):
-        push, torque, _ = _loaded(at_rest, straight, along, part, times)
-        if _buckles(scene, part, push, torque)[0]:
+        loaded = _loaded(at_rest, straight, along, part, times)
+        if _buckles(scene, part, loaded.push, loaded.torque)[0]:
             return None
     return straight
 
@@ -248,11 +249,15 @@ def _growths(scene: Scene, start: StartCurve, along: Floats, at_rest: bool) -> d
         held = closed_grasps(scene, a, b)
         t = np.linspace(a, b, _TIMES)
         for part in _parts(sorted(held, key=lambda g: g.u), cable.length):
-            push, torque, c = _loaded(scene, start, along, part, t, rubs)
+            push, beside, torque, c = _loaded(scene, start, along, part, t, rubs)
             k = (3.0 * torque + np.sqrt(9.0 * torque**2 + 32.0 * EI * push)) / (8.0 * EI)
             k = np.maximum(k, _least_wave_number(part))
             drive = np.where(_buckles(scene, part, push, torque), torque * k**3 + push * k**2 - EI * k**4, 0.0)
-            drive = np.maximum(drive, 0.0)
+            # a push that is spread along a part is larger beside what holds it, where shorter waves have the most of it
+            waves = _least_wave_number(part) * np.geomspace(1.0, _SHORTEST, _WAVES)[:, None]
+            pushes = beside * (1.0 - (1.0 - _SPREAD) * waves[0] / waves)
+            shorter = np.where(push > 0.0, (pushes * waves**2 - EI * waves**4).max(axis=0), 0.0)
+            drive = np.maximum(np.maximum(drive, shorter), 0.0)
             rate = 2.0 * drive / np.maximum(c + np.sqrt(c**2 + 4.0 * mu * drive), 1e-300)
             growth = float(np.sum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t)))
             growths[part] = growths.get(part, 0.0) + patience * growth
@@ -297,14 +302,27 @@ def _friction(scene: Scene, start: StartCurve) -> float:
     return table.friction * abs(float(cast(Floats, scene.environment.gravity)[2]))
 
 
-def _loaded(
-    scene: Scene, start: StartCurve, along: Floats, part: _Part, t: Floats, rubs: float = 0.0
-) -> tuple[Floats, Floats, Floats]:
-    """Return the largest push (k,) [N] along a part at times t (k,) [s], 0 where it is pulled, and the torque [N m].
+class _Loaded(NamedTuple):
+    """What a part of a straight cable bears, over time.
+
+    Attributes:
+        push: the largest along it (k,) [N], 0 where it is pulled; of one that is spread what counts.
+        beside: of one that is spread along a part with a free end, that beside what holds its other end (k,) [N].
+        torque: (k,) [N m].
+        aside: what resists a motion aside (k,) [N s/m^2].
+    """
+
+    push: Floats
+    beside: Floats
+    torque: Floats
+    aside: Floats
+
+
+def _loaded(scene: Scene, start: StartCurve, along: Floats, part: _Part, t: Floats, rubs: float = 0.0) -> _Loaded:
+    """Return what a part bears at times t (k,) [s].
 
     A cable that keeps its length moves as what holds it does; between two grasps that come closer, or a grasp and what
-    a free end meets, it is compressed. What slides is slowed by `rubs` [m/s^2]. The third result is what resists a
-    motion aside (k,) [N s/m^2].
+    a free end meets, it is compressed. What slides is slowed by `rubs` [m/s^2].
     """
     cable, around = scene.cable, scene.environment
     aside = np.full(len(t), around.drag)
@@ -313,8 +331,9 @@ def _loaded(
     loads = [(load.u, load.at(t) @ along) for load in scene.loads if part.begin <= load.u <= part.end]
     fall = float(_gravity(scene, start) @ along)
     weight = cable.linear_density * fall
-    heavy = [one for one in cable.point_masses if part.begin <= one.u <= part.end]
     holder = first or second
+    inside = [one for one in cable.point_masses if part.begin <= one.u <= part.end]
+    heavy = [one for one in inside if holder is None or one.u != holder.u]
     if holder is None:
         mass = cable.linear_density * length + sum(one.mass for one in heavy)
         pulled = fall + sum(force for _, force in loads) / mass + np.zeros(len(t))
@@ -340,7 +359,7 @@ def _loaded(
         turned = np.abs(_spin(second, along, t) - _spin(first, along, t) + _twist(start, part))
         both = first.hold == second.hold == "clamp" and scene.effects.get("twist", "auto") != "off"
         torque = cast(float, cable.torsional_stiffness) * turned / length if both else np.zeros(len(t))
-        return np.maximum(push, 0.0), torque, aside
+        return _Loaded(np.maximum(push, 0.0), np.zeros(len(t)), torque, aside)
     # what lies beyond a place is pushed from there: from the free end on, tension by tension
     from_end = second is None
     most = cast(float, cable.axial_stiffness) * _depth(scene, start, along, part, way) / length
@@ -350,7 +369,8 @@ def _loaded(
             beyond = [f for v, f in loads if (v > u if from_end else v < u) or (there and v == u)]
             push = _SPREAD * needed * rest - np.sum(beyond, axis=0)
             most = np.maximum(most, push if from_end else -push)
-    return most, np.zeros(len(t)), aside
+    spread = np.zeros(len(t)) if holder is None else needed * length * (1.0 if from_end else -1.0)
+    return _Loaded(most, np.maximum(spread, 0.0), np.zeros(len(t)), aside)
 
 
 def _way(grasp: Grasp, start: StartCurve, along: Floats, t: Floats) -> Floats:

@@ -16,6 +16,7 @@ from dlocore import (
     Grasp,
     Load,
     Move,
+    PointMass,
     Points,
     Prediction,
     Quality,
@@ -35,6 +36,7 @@ from dlocore.spline import greville, uniform_knots
 WEIGHTLESS = Environment(gravity=(0.0, 0.0, 0.0), drag=0.3)
 LYING = Environment(drag=0.3, table=Table())
 HANGING = Environment(drag=0.3)
+ROUGH = Environment(drag=0.05, table=Table(friction=1.0))
 
 
 def cord(**changes: Any) -> Cable:
@@ -44,6 +46,9 @@ def cord(**changes: Any) -> Cable:
 
 def way(*displacement: float, time: float = 2.0, **changes: Any) -> Move:
     return Move(displacement=displacement, duration=time, **changes)
+
+
+BEHIND = Grasp(u=0.0, path=way(0.3, 0.0, 0.0, time=3.0))  # along the cable, which it pushes
 
 
 def pushed(by: float = 0.3, around: Environment = LYING, cable: Cable | None = None, **changes: Any) -> Scene:
@@ -309,11 +314,13 @@ def test_held_directions_stay(hold: str) -> None:
             grasps=(Grasp(u=0.0, path=way(0.0, 0.0, -0.5)),),
             environment=LYING,
         ),
+        Scene(cable=cord(), shape=Straight(), grasps=(BEHIND,), environment=Environment(table=Table(friction=0.1))),
+        Scene(cable=cord(), shape=Straight(), grasps=(replace(BEHIND, path=way(-0.3, 0.0, 0.0)),), environment=ROUGH),
     ],
     ids=[
         "pulled", "hardly pushed", "drawn behind", "sideways", "weight across", "at rest", "hangs", "bent by nature",
         "sags", "load across", "moves sideways",
-        "lowered over the table",
+        "lowered over the table", "against little friction", "drawn over a rough table",
     ],
 )  # fmt: skip
 def test_what_has_a_side_or_needs_none_stays_as_it_is(scene: Scene) -> None:
@@ -335,6 +342,19 @@ PUSHED = {
     "free, pushed by a load": replace(pushed(), grasps=(), loads=(Load(u=0.0, force=(0.5, 0.0, 0.0)),), horizon=2.0),
     "from behind": replace(
         pushed(cable=cord(bending_stiffness=1e-4)), grasps=(Grasp(u=0.0, path=way(0.5, 0.0, 0.0, time=0.7)),)
+    ),
+    "against friction": Scene(cable=cord(bending_stiffness=1e-3), shape=Straight(), grasps=(BEHIND,), environment=ROUGH),
+    "against quadratic drag": Scene(
+        cable=cord(bending_stiffness=1e-4),
+        shape=Straight(),
+        grasps=(BEHIND,),
+        environment=replace(LYING, drag_quadratic=5.0),
+    ),
+    "a mass ahead of it": Scene(
+        cable=cord(bending_stiffness=1e-3, point_masses=[PointMass(u=1.0, mass=0.2)]),
+        shape=Straight(),
+        grasps=(replace(BEHIND, path=way(0.3, 0.0, 0.0, time=1.0)),),
+        environment=LYING,
     ),
     "obstacle": pushed(around=replace(LYING, obstacles=(BALL,))),
     "table on": pushed(effects={"table": "on"}),
