@@ -36,7 +36,8 @@ def identify(recordings: list[str], *, names: list[str] | None, output: str, rep
     from dlocore.identify import identify as find
     from dlocore.identify.parameters import DEFAULT
 
-    check_outputs({"--output": output, "--report": report}, recordings)
+    beside = [str(Path(path).with_suffix(".json")) for path in recordings if Path(path).suffix == ".csv"]
+    check_outputs({"--output": output, "--report": report}, [*recordings, *beside])
     try:
         loaded = [_load(path) for path in recordings]
         wanted = DEFAULT if names is None else tuple(names)
@@ -80,11 +81,13 @@ def validate(datasets: list[str], *, fit: int | None, models: list[str], json: s
         CommandError: a data set can't be read or used, or an output can't be written.
     """
     from app.reports.validation_plots import plots_of
-    from dlocore.identify.datasets import FIT, PUBLISHED, PUBLISHED_BY, load_datasets
+    from dlocore.identify.datasets import FIT, PUBLISHED, PUBLISHED_BY, dataset_files, load_datasets
     from dlocore.identify.validation import Model, each_repeat, validate_cable, validate_wire
     from dlocore.machine import machine_line
 
-    check_outputs({"--json": json}, folders={"--plots": plots})
+    files = dataset_files([Path(d) for d in datasets])
+    read = [str(file) for npz in files for file in (npz, npz.with_suffix(".json"))]
+    check_outputs({"--json": json}, read, {"--plots": plots})
     allowed = get_args(Model)
     if not set(models) <= set(allowed) or len(set(models)) < len(models):
         raise CommandError(f"--models: got {','.join(models)!r}. Allowed: {' or '.join(allowed)}, or both, by a comma.")

@@ -38,6 +38,11 @@ class HangingWire:
     published_bending_stiffness: float | None
 
 
+def dataset_files(paths: list[Path]) -> list[Path]:
+    """Return the files, and those of the folders, in the order in which `load_datasets` reads them."""
+    return [file for path in paths for file in (sorted(path.glob("*.npz")) if path.is_dir() else [path])]
+
+
 def load_datasets(paths: list[Path], fit: int = FIT) -> tuple[list[MovedCable], list[HangingWire]]:
     """Return what the files, or the files in folders, hold.
 
@@ -54,16 +59,14 @@ def load_datasets(paths: list[Path], fit: int = FIT) -> tuple[list[MovedCable], 
     """
     if type(fit) is not int or fit < 1:
         raise SceneError("fit", fit, "an integer, at least 1")
-    files: list[Path] = []
     for path in paths:
         if not path.exists():
             raise SceneError("dataset", str(path), "a file or a folder that exists")
         if not path.is_dir() and path.suffix != ".npz":
             raise SceneError("dataset", path.name, "a .npz file, with a .json beside it, or a folder of them")
-        files += sorted(path.glob("*.npz")) if path.is_dir() else [path]
     moved: dict[str, list[tuple[Path, Floats, dict[str, Any]]]] = {}
     wires = []
-    for file in files:
+    for file in dataset_files(paths):
         with file.open("rb") as opened:
             arrays = ArrayFile(opened, file.name)
             markers = arrays.read("markers") if "markers" in arrays.names else np.zeros(0)

@@ -198,6 +198,26 @@ def test_outputs_do_not_overwrite_each_other_or_the_scene(
     assert sorted(file.name for file in tmp_path.iterdir()) == ["link.json", "scene.json"]
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        "identify shaken.csv -o shaken.json",
+        "identify shaken.csv --report ./shaken.json",
+        "validate shaken.npz --json shaken.json",
+        "validate . --json shaken.json",
+    ],
+)
+def test_what_is_told_beside_a_recording_is_not_overwritten(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("shaken.csv", "shaken.npz", "shaken.json"):
+        Path(name).write_text(name)
+    assert main(command.split()) == 2
+    assert "shaken.json. Allowed: a file of its own, not that of the input." in capsys.readouterr().err
+    assert Path("shaken.json").read_text() == "shaken.json"
+
+
 @pytest.mark.parametrize("name", ["out.csv", "out", "out.json"])
 def test_arrays_are_not_written_under_the_name_of_another_format(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
