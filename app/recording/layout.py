@@ -28,7 +28,7 @@ def layout() -> bytes:
         ),
         rrb.Vertical(
             rrb.TimeSeriesView(origin="/convergence", name="Update and residual, log10"),
-            rrb.TimeSeriesView(origin="/forces", name="Forces by effect, log10"),
+            rrb.TimeSeriesView(origin="/forces", name="Forces by effect but contact, log10"),
         ),
         rrb.Vertical(
             rrb.TextDocumentView(origin="/report", name="Report"),

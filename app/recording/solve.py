@@ -1,5 +1,6 @@
 """The solve by iteration: the iterates, the norms, the steps, and the energies and forces that the iterates mean."""
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +32,9 @@ from dlocore import Iteration, effect_forces, energies
 
 if TYPE_CHECKING:
     from rerun.chunk import Chunk
+
+
+_SAME_ENERGY = 0.01  # of it: a memory with which an iterate has its elastic energy is that of the iterate
 
 
 @dataclass(frozen=True)
@@ -87,12 +91,22 @@ def _log10(values: Floats) -> Floats:
 
 
 def _balances(run: Run, drawn: NDArray[np.intp]) -> list[Line]:
-    """Return the energies at the end of the motion and the forces by effect, log10, of every iterate."""
+    """Return the energies at the end of the motion and the forces by effect, log10, of every iterate.
+
+    Of a cable that yields only the memory of the answer is known: an iterate that has another, and isn't without any
+    either, has no row.
+    """
     kept: dict[str, Floats] = {}
     for k in drawn:
         surface = run.iterations[k].surface
-        forces = effect_forces(run.scene, surface, np.linspace(0.0, surface.horizon, FORCE_TIMES), run.material)
-        terms = energies(run.scene, surface, [0.0, surface.horizon], run.material)
+        memories = [run.material] if run.material is None else [run.material, None]
+        for material in memories:
+            terms = energies(run.scene, surface, [0.0, surface.horizon], material)
+            if run.material is None or _adds_up(terms, run.iterations[k].energy):
+                break
+        else:
+            continue
+        forces = effect_forces(run.scene, surface, np.linspace(0.0, surface.horizon, FORCE_TIMES), material)
         values = {f"/forces/{name}": force for name, force in forces.items()}
         values |= {f"/energy/{name}": float(energy[-1]) for name, energy in terms.items()}
         for entity, value in values.items():
@@ -105,6 +119,10 @@ def _balances(run: Run, drawn: NDArray[np.intp]) -> list[Line]:
         else:
             lines.append(Line(entity, f"{name} [J]", ENERGIES.get(name, GREY), over))
     return lines
+
+
+def _adds_up(terms: dict[str, Floats], elastic: float) -> bool:
+    return abs(sum(terms[name][-1] for name in ("stretch", "bend", "twist")) - elastic) <= _SAME_ENERGY * elastic
 
 
 def _iterates(run: Run, drawn: NDArray[np.intp]) -> "list[Chunk]":
@@ -147,7 +165,8 @@ def _log(run: Run) -> "Chunk":
 
 
 def _words(iteration: Iteration) -> str:
+    update = f"update {iteration.update:.3g} m, " if math.isfinite(iteration.update) else ""
     grid = f"{iteration.n_u} x {iteration.n_t}"
     step = f"damping {iteration.damping:.2g}, step length {iteration.step_length:.2g}"
     note = f" ({iteration.note})" if iteration.note else ""
-    return f"update {iteration.update:.3g} m, residual {iteration.residual:.3g}, {step}, {grid}{note}"
+    return f"{update}residual {iteration.residual:.3g}, {step}, {grid}{note}"

@@ -1,6 +1,8 @@
 """A recording read back: entities, timelines, and values equal to the answer's."""
 
+import json
 import math
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,7 @@ from app.archive import Run
 from app.service.service import Service
 from dlocore import effect_forces, energies
 from dlocore.machine import machine_line
-from tests.app.conftest import paper_scene, put
+from tests.app.conftest import ROOT, paper_scene, put
 
 LOGS = ("update", "residual")
 ENTITIES = {
@@ -163,6 +165,22 @@ def test_the_energies_of_an_iterate_are_those_at_its_end(chunks: list[Any], run:
     np.testing.assert_allclose(terms["bend"] + terms["stretch"], elastic, rtol=1e-9)
 
 
+def test_the_energies_of_iterates_of_a_cable_that_yields_add_up(client: TestClient, tmp_path: Path) -> None:
+    """The memory of the answer is not that of the iterates before it, of which the first have none at all."""
+    bent = json.loads((ROOT / "static" / "gallery" / "keeps-its-bend.json").read_text())
+    document = client.post("/v1/predictions", json=bent).json()
+    assert "calls for plasticity" in document["iterations"][0]["note"]
+    path = tmp_path / "run.rrd"
+    path.write_bytes(client.get(document["links"]["recording"]).content)
+    chunks = list(rr.chunk.RrdReader(path).stream().to_chunks())
+    numbers, bend = rows(chunks, "/energy/bend", "scalars", "iteration")
+    _, stretch = rows(chunks, "/energy/stretch", "scalars", "iteration")
+    elastic = {i["number"]: i["energy"] for i in document["iterations"]}
+    assert {0, max(elastic)} <= set(numbers)
+    assert np.add(bend, stretch)[:, 0] == pytest.approx([elastic[number] for number in numbers], rel=0.01)
+    assert rows(chunks, "/forces/bend", "scalars", "iteration")[0] == numbers
+
+
 def test_the_forces_are_those_of_every_active_effect(chunks: list[Any], run: Run) -> None:
     expected = effect_forces(run.scene, run.surface, np.linspace(0.0, run.surface.horizon, 17))
     assert {"inertia", "drag", "stretch", "bend"} <= set(expected)
@@ -197,6 +215,7 @@ def test_the_log_has_a_line_for_every_iteration(chunks: list[Any], answer: dict[
     assert numbers == [i["number"] for i in answer["iterations"]]
     for (line,), iteration in zip(lines, answer["iterations"], strict=True):
         assert f"residual {iteration['residual']:.3g}" in line
+        assert ("update" in line) == (iteration["update"] is not None)  # the first has none
 
 
 def test_the_net_is_drawn_along_the_cable_and_over_time(chunks: list[Any], answer: dict[str, Any]) -> None:
