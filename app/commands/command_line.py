@@ -62,7 +62,7 @@ def parser() -> argparse.ArgumentParser:
     predict.add_argument("scene", help='scene as JSON, or "-" for standard input')
     predict.add_argument("-o", "--output", metavar="OUT.npz", help="write the surface, spline and reactions")
     predict.add_argument("--json", metavar="OUT.json", help='write the whole answer, "-" for standard output')
-    predict.add_argument("--rrd", metavar="OUT.rrd", help="write a recording for rerun, and its layout as OUT.rbl")
+    predict.add_argument("--rrd", metavar="OUT.rrd", help="write a recording for rerun, with its layout")
     predict.add_argument(
         "--method",
         choices=get_args(Method),

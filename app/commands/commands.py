@@ -121,18 +121,19 @@ def predict(
 
 
 def _check_predict(scene: str, *, npz: str | None, json: str | None, rrd: str | None) -> None:
-    if rrd == "-":
-        raise CommandError("--rrd: got -. Allowed: the name of a file, which has its layout beside it.")
-    layout = str(_layout_of(rrd)) if rrd is not None and Path(rrd).name else None
-    check_outputs({"--output": npz, "--json": json, "--rrd": rrd, "the layout of --rrd": layout}, [scene])
-    if npz is not None and npz != STANDARD and Path(npz).suffix.lower() != ".npz" and not is_device(npz):
-        allowed = "a name that ends in .npz; the whole answer as JSON is written by --json"
-        raise CommandError(f"--output: got {npz}. Allowed: {allowed}.")
+    if rrd == STANDARD:
+        raise CommandError("--rrd: got -. Allowed: the name of a file.")
+    check_outputs({"--output": npz, "--json": json, "--rrd": rrd}, [scene])
+    if npz is not None and npz != STANDARD:
+        _check_suffix("--output", npz, ".npz", "; the whole answer as JSON is written by --json")
+    if rrd is not None:
+        _check_suffix("--rrd", rrd, ".rrd")
 
 
-def _layout_of(rrd: str) -> Path:
-    """Return the file of a recording's layout."""
-    return Path(rrd).with_suffix(".rbl")
+def _check_suffix(option: str, path: str, suffix: str, advice: str = "") -> None:
+    """Refuse a file, but not a device, whose name tells of another format."""
+    if Path(path).suffix.lower() != suffix and not is_device(path):
+        raise CommandError(f"{option}: got {path}. Allowed: a name that ends in {suffix}{advice}.")
 
 
 def calibrate(*, repeats: int, json: str | None) -> int:
@@ -175,14 +176,15 @@ def warmup() -> int:
 def summary(prediction: Prediction) -> str:
     """Return status, method, error, time and active effects in a few lines."""
     accuracy = prediction.accuracy
-    error = "unknown" if accuracy.error_estimate is None else in_mm(accuracy.error_estimate, 3)
+    estimate = accuracy.error_estimate
+    error = "unknown" if estimate is None else f"{in_mm(estimate, 3)} (estimated, worst point)"
     active = ", ".join(effect.name for effect in prediction.effects if effect.active)
     return "\n".join(
         [
             f"{prediction.status}: {prediction.message}",
             f"method   {accuracy.method}, {accuracy.n_u} x {accuracy.n_t} control points",
             f"motion   {accuracy.dimensions}D: {accuracy.dimensions_reason}",
-            f"error    {error} (estimated, worst point)",
+            f"error    {error}",
             f"time     {in_ms(accuracy.wall_time)}",
             f"effects  {active}",
         ]
@@ -288,13 +290,12 @@ def _solve(request: PredictionRequest, deadline: float | None) -> Prediction:
 
 def _record(rrd: str, *, request_json: dict[str, Any], document: dict[str, Any], prediction: Prediction) -> None:
     from app.archive import Run
-    from app.recording import layout, write_recording
+    from app.recording import write_recording
 
     path = Path(rrd)
-    run = Run.of(request_json, {**document, "id": path.stem}, prediction)
+    run = Run.of(request_json, {**document, "id": ""}, prediction)
     try:
         with whole(path) as unfinished:
-            write_recording(run, unfinished)
+            write_recording(run, unfinished, name=path.stem)
     except OSError as error:
-        raise CommandError(f"can't write {rrd}: {error}", FAILED) from None
-    write_output(str(_layout_of(rrd)), layout())
+        raise CommandError(f"can't write {rrd}: {error.strerror or error}", FAILED) from None

@@ -22,6 +22,8 @@ def read_input(path: str) -> bytes:
         if sys.stdin is None:
             raise CommandError("standard input is closed")
         return sys.stdin.buffer.read()
+    if path == "":
+        raise CommandError('an input needs a name: that of a file, or "-" for standard input')
     try:
         return Path(path).read_bytes()
     except OSError as error:

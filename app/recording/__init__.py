@@ -1,9 +1,10 @@
-"""A run as a rerun recording: how the solve went by iteration, and the motion it found.
+"""A run as a rerun recording: how the solve went by iteration, and the motion it found, with the layout to see it in.
 
-Timelines: `iteration` and `solver_time` for the solve, `motion` [s] for the predicted motion. Recordings are written
-from chunks: a `RecordingStream` would keep two threads each for ever.
+Timelines: `iteration` and `solver_time` for the solve, `motion` [s] for the predicted motion.
 """
 
+import uuid
+from datetime import datetime
 from pathlib import Path
 
 from app.archive import Run
@@ -12,21 +13,39 @@ from app.recording.motion import motion_chunks
 from app.recording.page import page_chunks
 from app.recording.solve import solve_chunks
 from app.recording.style import APPLICATION, axes_chunk
+from dlocore.words import counted
 
 __all__ = ["APPLICATION", "layout", "write_recording"]
 
 
-def write_recording(run: Run, path: Path) -> None:
+def write_recording(run: Run, path: Path, name: str = "") -> None:
     """Write the recording of `run` to `path` (.rrd).
+
+    It is called what the request calls the run; else `name`; else by what the scene has. A run that is not stored, and
+    so has no id, gets one of its own: the viewer takes recordings of one id for parts of one.
 
     Raises:
         OSError: it can't be written there.
     """
     import rerun as rr
+    import rerun_bindings
 
     chunks = [axes_chunk(), *solve_chunks(run), *motion_chunks(run), *page_chunks(run)]
-    stream = rr.chunk.LazyChunkStream.from_iter(chunks)
-    try:
-        stream.write_rrd(path, application_id=APPLICATION, recording_id=run.document["id"])
-    except RuntimeError as error:  # as rerun tells of a file that can't be written
-        raise OSError(str(error)) from error
+    id = run.document["id"] or uuid.uuid4().hex
+    stream = rr.RecordingStream(APPLICATION, recording_id=id, send_properties=False)
+    content = rr.binary_stream(stream)
+    stream.send_recording_name(run.request.get("name") or name or _words(run))
+    began = datetime.fromisoformat(run.document["created"])
+    stream.send_recording_start_time_nanos(round(1e6 * began.timestamp()) * 1000)
+    stream.log_file_from_contents("layout.rbl", layout())
+    stream.send_chunks(chunks)
+    written = content.read() or b""
+    del content, stream
+    rerun_bindings.flush_and_cleanup_orphaned_recordings()  # or its two threads would stay for ever
+    path.write_bytes(written)
+
+
+def _words(run: Run) -> str:
+    scene = run.scene
+    cable = f"{run.request['cable'].get('preset') or 'cable'} of {scene.cable.length:g} m"
+    return f"{cable}, {counted(len(scene.grasps), 'grasp')}, {scene.horizon:g} s"

@@ -44,6 +44,8 @@ def read(client: TestClient, answer: dict[str, Any], path: Path) -> list[Any]:
     (store,) = reader.recordings()
     assert store.application_id == "dlo"
     assert store.recording_id == answer["id"]
+    (shown,) = reader.blueprints()
+    assert shown.application_id == "dlo"
     return list(reader.stream(store=store).to_chunks())
 
 
@@ -114,6 +116,29 @@ def test_point_masses_move_along(client: TestClient, tmp_path: Path) -> None:
     times, places = rows(read(client, answer, tmp_path / "run.rrd"), "/motion/point_masses", "positions", "motion")
     assert times == pytest.approx(answer["surface"]["t"], abs=2e-9)
     np.testing.assert_allclose(places, np.array(answer["surface"]["positions"])[:, [50, 100]], rtol=0, atol=1e-6)
+
+
+def properties(chunks: list[Any]) -> dict[str, Any]:
+    """Return what a recording says of itself."""
+    found: dict[str, Any] = {}
+    for chunk in chunks:
+        if chunk.entity_path == "/__properties":
+            batch = chunk.to_record_batch().to_pydict()
+            found |= {name.split(":")[1]: values[0][0] for name, values in batch.items() if ":" in name}
+    return found
+
+
+def test_a_recording_is_named_by_what_its_scene_has_and_dated(chunks: list[Any], answer: dict[str, Any]) -> None:
+    found = properties(chunks)
+    assert found["name"] == "cable of 1 m, 1 grasp, 1.6 s"
+    assert found["start_time"] == pytest.approx(1e9 * datetime.fromisoformat(answer["created"]).timestamp(), abs=1e6)
+
+
+def test_a_recording_is_named_as_its_run(client: TestClient, tmp_path: Path) -> None:
+    document = client.post("/v1/predictions", json=paper_scene(name="Along the wall")).json()
+    path = tmp_path / "run.rrd"
+    path.write_bytes(client.get(document["links"]["recording"]).content)
+    assert properties(rr.chunk.RrdReader(path).stream().to_chunks())["name"] == "Along the wall"
 
 
 def page(chunks: list[Any], entity: str) -> str:

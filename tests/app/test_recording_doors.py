@@ -19,12 +19,12 @@ from app.settings import Settings
 from app.store.runs import RunStore
 from dlocore import Prediction, energies, predict
 from tests.app.conftest import paper_scene
-from tests.app.test_recording import rows
+from tests.app.test_recording import properties, rows
 
 rr = pytest.importorskip("rerun")
 
 # What tells one solve of a scene from the next, and a stored run from one that is not.
-OF_ITS_OWN = {"/report", "/log"}
+OF_ITS_OWN = {"/report", "/log", "/__properties"}
 
 
 def content(path: Path, *, clock: bool = True) -> dict[str, Any]:
@@ -77,6 +77,24 @@ def test_the_command_line_gives_the_recording_of_the_service(
     shared = content(served, clock=False)
     assert len(shared) > 50
     assert content(written, clock=False) == shared
+
+
+def test_recordings_of_the_command_line_are_told_apart(tmp_path: Path) -> None:
+    """They are of one name, and no part of each other."""
+    scene = tmp_path / "scene.json"
+    scene.write_text(json.dumps(paper_scene()))
+    ids = set()
+    for folder in ("before", "after"):
+        (tmp_path / folder).mkdir()
+        path = tmp_path / folder / "out.rrd"
+        assert main(["predict", str(scene), "--rrd", str(path)]) == 0
+        assert [file.name for file in path.parent.iterdir()] == ["out.rrd"]
+        reader = rr.chunk.RrdReader(path)
+        (recording,), (shown,) = reader.recordings(), reader.blueprints()
+        assert recording.application_id == shown.application_id == "dlo"
+        assert properties(reader.stream().to_chunks())["name"] == "out"
+        ids.add(recording.recording_id)
+    assert len(ids) == 2
 
 
 def test_a_run_that_continues_another_keeps_its_recording_without_it(tmp_path: Path) -> None:
