@@ -4,7 +4,6 @@ Usage: python examples/bend_around_a_peg.py [PICTURE]
 """
 
 import sys
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -73,5 +72,6 @@ curvature.set(xlabel="material coordinate u [m]", ylabel="curvature that is kept
 curvature.set_title("the memory goes on into the second motion")
 curvature.legend(fontsize=8)
 curvature.grid(alpha=0.25)
-picture = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[1] / "docs" / "bend-around-a-peg.png"
+picture = sys.argv[1] if len(sys.argv) > 1 else "bend-around-a-peg.png"
 figure.savefig(picture, dpi=110)
+print("drew", picture)

@@ -50,6 +50,7 @@ def draw_motions(motions: list[dlo.Prediction], file: Path) -> None:
     colors = plt.cm.ScalarMappable(plt.Normalize(0.0, motions[0].surface.horizon), TIME)
     figure.colorbar(colors, cax=figure.add_axes((0.3, 0.075, 0.4, 0.018)), label="t [s]", orientation="horizontal")
     figure.savefig(file, dpi=110)
+    print("drew", file)
 
 
 def draw_convergence(motions: list[dlo.Prediction], printed: list[dlo.Prediction], file: Path) -> None:
@@ -70,10 +71,11 @@ def draw_convergence(motions: list[dlo.Prediction], printed: list[dlo.Prediction
     axes.legend(ncols=2, fontsize=8, loc="center right")
     axes.grid(alpha=0.25)
     figure.savefig(file, dpi=110)
+    print("drew", file)
 
 
 if __name__ == "__main__":
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[1] / "docs"
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path()
     solutions = [dlo.predict(scene(grasp, "spacetime")) for grasp in GRASPS]
     draw_motions(solutions, folder / "paper-fig1.png")
     draw_convergence(solutions, [dlo.predict(scene(grasp, "paper")) for grasp in GRASPS], folder / "paper-fig2.png")

@@ -4,7 +4,6 @@ Usage: python examples/point_cloud.py [PICTURE]
 """
 
 import sys
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -56,5 +55,6 @@ for axes in (left, right):
     axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
     axes.legend(fontsize=8)
     axes.grid(alpha=0.25)
-picture = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[1] / "docs" / "point-cloud.png"
+picture = sys.argv[1] if len(sys.argv) > 1 else "point-cloud.png"
 figure.savefig(picture, dpi=110)
+print("drew", picture)

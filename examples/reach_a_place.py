@@ -8,7 +8,6 @@ Usage: python examples/reach_a_place.py [PICTURE]
 
 import sys
 import time
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -68,4 +67,6 @@ axes.plot(x[50], y[50], "o", color=BLUE, label="the gripper")
 axes.set(xlabel="x [m]", ylabel="y [m]", title="The cable after each motion that was tried", aspect="equal")
 axes.legend(fontsize=8)
 axes.grid(alpha=0.25)
-figure.savefig(Path(sys.argv[1]) if len(sys.argv) > 1 else "reach-a-place.png", dpi=110)
+picture = sys.argv[1] if len(sys.argv) > 1 else "reach-a-place.png"
+figure.savefig(picture, dpi=110)
+print("drew", picture)

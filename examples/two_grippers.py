@@ -4,7 +4,6 @@ Usage: python examples/two_grippers.py [PICTURE]
 """
 
 import sys
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -60,5 +59,6 @@ figure.suptitle(
     f"A 1 m cable carried by two grippers, {accuracy.n_u} × {accuracy.n_t} control points, "
     f"estimated error {1e3 * (accuracy.error_estimate or np.nan):.1f} mm"
 )
-picture = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[1] / "docs" / "two-grippers.png"
+picture = sys.argv[1] if len(sys.argv) > 1 else "two-grippers.png"
 figure.savefig(picture, dpi=110)
+print("drew", picture)
