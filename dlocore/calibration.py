@@ -133,6 +133,9 @@ def stored_cost(path: Path | None = None) -> Cost | None:
     return _read[path][1]
 
 
+STAR = "no other one is both faster and more accurate"  # of the table
+
+
 def table(calibration: Calibration) -> str:
     """Return the measured points as text; a star marks those that no other one beats in both time and error."""
     lines = [f"{'':2}{'method':10} {'n_u':>4} {'n_t':>4} {'time [ms]':>10} {'error [mm]':>11}"]
@@ -144,7 +147,7 @@ def table(calibration: Calibration) -> str:
             mark = "*" if i in front else ""
             times = f"{1e3 * p.wall_time:10.3g} {1e3 * p.error:11.3g}"
             lines.append(f"{mark:2}{p.method:10} {p.n_u:4} {p.n_t:4} {times}" + ("" if p.converged else "  not solved"))
-    return "\n".join(lines)
+    return "\n".join([*lines, f"* {STAR}"])
 
 
 def to_document(calibration: Calibration) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from app.commands import commands
 from app.commands import identify as identify_commands
 from app.commands import study as study_command
 from app.commands.errors import FAILED, CommandError
+from dlocore.calibration import STAR
 from dlocore.machine import program_version
 from dlocore.scene.scene import Method
 
@@ -78,7 +79,8 @@ def parser() -> argparse.ArgumentParser:
     calibrate = subcommands.add_parser(
         "calibrate",
         help="measure what accuracy costs in time on this machine",
-        description="Measure errors and times of both methods on this machine and keep them in the data directory.",
+        description="Measure errors and times of both methods on this machine and keep them in the data directory. "
+        f"A star in the table: {STAR}.",
         epilog=_DONE,
     )
     calibrate.add_argument("--repeats", type=int, default=5, help="timed calls of each solve, at most (default 5)")

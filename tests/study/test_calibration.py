@@ -39,6 +39,13 @@ def test_the_front_leaves_out_what_another_point_beats(measured: Calibration) ->
     assert [p.error for p in best] == sorted((p.error for p in best), reverse=True)
 
 
+def test_the_table_says_what_its_stars_mean(measured: Calibration) -> None:
+    lines = calibration.table(measured).splitlines()
+    assert lines[-1] == f"* {calibration.STAR}"
+    starred = sum(line.startswith("* ") for line in lines[:-1])
+    assert starred == sum(len(calibration.front_of(measured.of_dimensions(dimensions))) for dimensions in (2, 3))
+
+
 def test_the_model_knows_every_number_of_coordinates_and_effect(measured: Calibration) -> None:
     assert set(measured.cost.rates) == {2, 3, 4}
     assert all(rates.iterations > 0 for rates in measured.cost.rates.values())
