@@ -1,7 +1,7 @@
 """Draw what a study measured of accuracy: error against time, and the convergence of the iterations."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,13 +10,13 @@ from matplotlib.ticker import MaxNLocator
 
 from dlocore.accuracy.cost import pareto_front
 from dlocore.study.record import Run, Study
-from dlocore.study.style import COLOURS, MARKS, new_figure, write_decimals
+from dlocore.study.style import COLOURS, DASHES, MARKS, SET_MARKS, new_figure, write_decimals
 
 _GRIDS = ("#56B4E9", "#0072B2", "#009E73", "#E69F00", "#D55E00", "#CC79A7", "#000000")
 
 
 def work_precision(study: Study) -> Figure:
-    """Draw error against time, in the plane and in space: one curve a method, the front, and a slope."""
+    """Draw error against time, in the plane and in space: a curve a method and set of effects, the front, a slope."""
     kinds = sorted({run.dimensions for run in study.runs})
     figure, panels = new_figure(6.2 * len(kinds), 5.0, 1, len(kinds))
     for axes, dimensions in zip(panels, kinds, strict=True):
@@ -34,7 +34,10 @@ def work_precision(study: Study) -> Figure:
 
 
 class Point(NamedTuple):
-    """A method on a grid: geometric means of time [ms] and error [mm] over the scenes, and the largest error [mm]."""
+    """A method, with a set of effects, on a grid.
+
+    Geometric means of time [ms] and error [mm] over the scenes, and the largest error [mm].
+    """
 
     time: float
     error: float
@@ -46,9 +49,13 @@ class Point(NamedTuple):
 def _work_precision_panel(axes: Axes, runs: Sequence[Run]) -> list[Point]:
     """Draw every run faintly and the geometric mean over the scenes strongly; return the means of what was solved."""
     points: list[Point] = []
-    for method in dict.fromkeys(run.method for run in runs):
-        colour, mark = COLOURS[method], MARKS[method]
-        mine = [run for run in runs if run.method == method]
+    sets = list(dict.fromkeys(run.effects for run in runs))
+    for method, effects in dict.fromkeys((run.method, run.effects) for run in runs):
+        number = sets.index(effects)
+        colour, dashes = COLOURS[method], DASHES[number % len(DASHES)]
+        mark = SET_MARKS[number % len(SET_MARKS)] or MARKS[method]
+        name = method if len(sets) == 1 else f"{method}, effects {effects}"
+        mine = [run for run in runs if (run.method, run.effects) == (method, effects)]
         good = [run for run in mine if run.status == "converged"]
         for run in mine:
             axes.errorbar(
@@ -66,10 +73,12 @@ def _work_precision_panel(axes: Axes, runs: Sequence[Run]) -> list[Point]:
                 for name in ("wall_time", "error")
             )
             largest = 1e3 * max(run.error for run in group)
-            curve.append(Point(time, error, method, f"{grid[0]} × {grid[1]}", largest))
-        axes.plot(*zip(*[p[:2] for p in curve], strict=True), mark + "-", color=colour, label=method) if curve else None
+            curve.append(Point(time, error, name, f"{grid[0]} × {grid[1]}", largest))
+        if curve:
+            means = zip(*[p[:2] for p in curve], strict=True)
+            axes.plot(*means, marker=mark, linestyle=dashes, color=colour, label=name)
         if len(curve) < len(mine):
-            axes.plot([], [], mark, color=colour, alpha=0.3, markersize=3.5, label=f"{method}, each scene")
+            axes.plot([], [], mark, color=colour, alpha=0.3, markersize=3.5, label=f"{name}, each scene")
         points += curve
     return points
 
@@ -102,32 +111,38 @@ def _finding(points: list[Point]) -> str:
     return f"1 mm in {fastest.time:.2g} ms by {fastest.method}"
 
 
+def _set_mark(number: int) -> str:
+    return SET_MARKS[number % len(SET_MARKS)] or "o"
+
+
 def convergence(study: Study) -> Figure:
-    """Draw the update against the iteration, by scene and grid: the paper's Fig. 2."""
+    """Draw the update against the iteration, by scene, grid and set of effects: the paper's Fig. 2."""
     methods = [m for m in dict.fromkeys(run.method for run in study.runs) if m != "march"]
     figure, panels = new_figure(8.0 * len(methods), 4.8, 1, len(methods))
     for axes, method in zip(panels, methods, strict=True):
         runs = [run for run in study.runs if run.method == method]
         grids = sorted({(run.n_u, run.n_t) for run in runs})
         scenes = list(dict.fromkeys(run.scene for run in runs))
-        styles: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (1, 3)), (0, (5, 5)))
+        sets = list(dict.fromkeys(run.effects for run in runs))
         for run in runs:
             updates = [step.update if step.update is not None else np.nan for step in run.iterations]
             colour = _GRIDS[grids.index((run.n_u, run.n_t)) % len(_GRIDS)]
-            style = styles[scenes.index(run.scene) % len(styles)]
+            style = DASHES[scenes.index(run.scene) % len(DASHES)]
             axes.semilogy(
                 range(1, len(updates) + 1),
                 updates,
-                marker="o",
-                markersize=3,
+                marker=_set_mark(sets.index(run.effects)),
+                markersize=3 if run.effects == sets[0] else 5,
                 color=colour,
                 linestyle=style,
                 linewidth=1.2,
             )
         for k, (n_u, n_t) in enumerate(grids):
             axes.plot([], [], "o-", color=_GRIDS[k % len(_GRIDS)], label=f"{n_u} × {n_t}")
-        if len(scenes) <= len(styles):
-            for scene, style in zip(scenes, styles, strict=False):
+        for k, effects in enumerate(sets if len(sets) > 1 else []):
+            axes.plot([], [], _set_mark(k), color="black", label=f"effects {effects}")
+        if len(scenes) <= len(DASHES):
+            for scene, style in zip(scenes, DASHES, strict=False):
                 axes.plot([], [], color="black", linestyle=style, linewidth=1.2, label=scene)
         for delta in sorted({run.delta for run in runs}):
             axes.axhline(delta, color="grey", linewidth=1)

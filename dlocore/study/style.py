@@ -12,6 +12,9 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator
 # Okabe-Ito, one colour a method in all plots of a study; static/style.css has those of the landing page's methods
 COLOURS = {"march": "#0072B2", "spacetime": "#D55E00", "paper": "#CC79A7", "reference": "#009E73"}
 MARKS = {"march": "o", "spacetime": "s", "paper": "^", "reference": "D"}
+# one of each a set of effects; the first has the mark of the method
+SET_MARKS = ("", "v", "P", "X", "*", "h")
+DASHES: tuple[str | tuple[int, tuple[int, int]], ...] = ("-", "--", "-.", ":", (0, (1, 3)), (0, (5, 5)))
 _LEAST = 3  # numbers at an axis
 
 

@@ -76,6 +76,29 @@ def test_the_title_counts_the_scene_that_errs_most() -> None:
     assert "at best 1.4 mm, in 2.9 ms by march" in axes.get_title()
 
 
+def test_sets_of_effects_are_told_apart() -> None:
+    runs = [
+        run(method, n, 1e-4 * n**2, share / n**2, effects=effects)
+        for method in ("march", "spacetime")
+        for n in (9, 17, 33)
+        for effects, share in (("auto", 0.1), ("no drag", 0.2))
+    ]
+    both = study(runs=tuple(runs))
+    (axes,) = accuracy_plots.work_precision(both).axes
+    curves = {line.get_label(): line for line in axes.lines if "," in str(line.get_label())}
+    assert {"march, effects auto", "march, effects no drag", "spacetime, effects no drag"} <= set(curves)
+    one, other = curves["march, effects auto"], curves["march, effects no drag"]
+    assert [len(line.get_xdata()) for line in (one, other)] == [3, 3]
+    assert one.get_linestyle() != other.get_linestyle()
+    assert one.get_marker() != other.get_marker()
+    (axes,) = accuracy_plots.convergence(both).axes
+    named = {line.get_label(): line.get_marker() for line in axes.lines}
+    assert named["effects auto"] != named["effects no drag"]
+    assert {line.get_marker() for line in axes.lines} >= {named["effects auto"], named["effects no drag"]}
+    (axes,) = accuracy_plots.work_precision(study()).axes
+    assert "march" in [line.get_label() for line in axes.lines], "the only set needs no name"
+
+
 def written(axis: Axis) -> list[float]:
     """Return the numbers at an axis, within what is seen of it."""
     low, high = axis.get_view_interval()
