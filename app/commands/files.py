@@ -82,6 +82,14 @@ def _check_folder(path: str) -> None:
     _check_made(path, made, made)
 
 
+def make_folder(path: str) -> None:
+    """Make a folder of outputs where it is missing, before any work is done for them."""
+    try:
+        Path(path).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _unwritable(path, error.strerror) from None
+
+
 def _named(path: str) -> Path:
     if path == "":
         raise CommandError("an output needs a name", FAILED)

@@ -9,7 +9,7 @@ import numpy as np
 import orjson
 
 from app.commands.errors import NOT_CONVERGED, CommandError
-from app.commands.files import check_outputs, for_people, write_output
+from app.commands.files import check_outputs, for_people, make_folder, write_output
 from dlocore import SceneError
 from dlocore.recordings import Recording, load_recording
 
@@ -94,6 +94,8 @@ def validate(datasets: list[str], *, fit: int | None, models: list[str], json: s
     table = partial(print, file=for_people(json), flush=True)
     try:
         cables, wires = load_datasets([Path(d) for d in datasets], FIT if fit is None else fit)
+        if plots is not None:
+            make_folder(plots)
         table(machine_line())
         out: list[dict[str, Any]] = []
         if cables:
@@ -126,7 +128,6 @@ def validate(datasets: list[str], *, fit: int | None, models: list[str], json: s
     if json is not None:
         write_output(json, orjson.dumps(out, option=orjson.OPT_INDENT_2 | orjson.OPT_SERIALIZE_NUMPY))
     if plots is not None:
-        Path(plots).mkdir(parents=True, exist_ok=True)
         for name, drawn in plots_of(out, PUBLISHED).items():
             write_output(str(Path(plots) / name), drawn.encode())
     return 0

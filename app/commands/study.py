@@ -11,8 +11,9 @@ from typing import Any, cast
 from app.commands.bar import progress_bar
 from app.commands.commands import read_scene
 from app.commands.errors import FAILED, CommandError
-from app.commands.files import check_outputs, for_people, write_output
+from app.commands.files import check_outputs, for_people, make_folder, write_output
 from dlocore import Scene, SceneError
+from dlocore.errors import repeated
 from dlocore.scene.scene import EFFECTS, Switch
 
 WORSE = 4  # exit code: the comparison found changes for the worse
@@ -35,9 +36,22 @@ def study(options: argparse.Namespace) -> int:
     try:
         plan = Plan(**_asked(options))
     except SceneError as error:
-        raise CommandError(str(error)) from None
-    with progress_bar("measuring") as show:
-        measured = run_study(plan, on_progress=show)
+        raise CommandError(_words(error, options)) from None
+    if options.plots is not None:
+        make_folder(options.plots)
+    reached = "before any part"
+    try:
+        with progress_bar("measuring") as show:
+
+            def noted(done: int, total: int, what: str) -> None:
+                nonlocal reached
+                reached = f"after {done} of {total} parts"
+                show(done, total, what)
+
+            measured = run_study(plan, on_progress=noted)
+    except KeyboardInterrupt:
+        print(f"dlo: interrupted {reached}; nothing is kept", file=sys.stderr)
+        raise
     table = for_people(options.output)
     print(_table(measured), file=table)
     if options.output is not None:
@@ -54,6 +68,14 @@ def study(options: argparse.Namespace) -> int:
     if comparison.compared == 0:
         raise CommandError(f"--compare: {options.compare} has no run in common with this study")
     return WORSE if comparison.worse else 0
+
+
+def _words(error: SceneError, options: argparse.Namespace) -> str:
+    """Return what is wrong with the plan, by the name of the option that asks for it."""
+    name, _, part = error.field.partition(".")
+    if getattr(options, name, None) is None or name == "scenes":
+        return str(error)
+    return f"--{name}{part and f', {part}'}{str(error).removeprefix(error.field)}"
 
 
 def _earlier(path: str) -> Any:
@@ -86,6 +108,9 @@ def _asked(options: argparse.Namespace) -> dict[str, Any]:
         if getattr(options, name) is not None:
             asked[name] = tuple(getattr(options, name))
     if options.effects is not None:
+        twice = repeated(options.effects)
+        if twice is not None:
+            raise CommandError(f"--effects: got {twice}. Allowed: each once.")
         asked["effects"] = {given: _switches(given) for given in options.effects}
     return asked
 
@@ -121,6 +146,9 @@ def _switches(given: str) -> Mapping[str, Switch]:
     pairs = [part.partition("=") for part in given.split(",")]
     if not all(sign for _, sign, _ in pairs):
         raise CommandError(f"--effects: got {given!r}. Allowed: auto, all, or switches as in twist=off,drag=on.")
+    twice = repeated(name for name, _, _ in pairs)
+    if twice is not None:
+        raise CommandError(f"--effects: got {given!r}. Allowed: {twice} once.")
     return cast(dict[str, Switch], {name: value for name, _, value in pairs})
 
 

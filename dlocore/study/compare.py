@@ -3,9 +3,11 @@
 from dataclasses import dataclass
 
 from dlocore.study.record import Run, Study
+from dlocore.words import counted
 
 SLOWER = 1.15  # times: what two measurements on one machine differ by without any change
 SPREADS = 4.0  # times the spreads of both: about 2.7 standard deviations of a normal distribution
+LEAST_REPEATS = 3  # of both: the spread of fewer tells nothing of the noise
 LESS_ACCURATE = 1.1  # times: the compiler may order additions anew, and Newton's iterations stop elsewhere
 
 
@@ -37,6 +39,7 @@ class Comparison:
         compared: runs that both have.
         missing: runs that only the earlier one has, in words.
         same_machine: whether times could be compared.
+        barely_timed: runs whose times were not compared, as one of the studies has less than three of them.
         same_judge: whether errors could be.
     """
 
@@ -44,6 +47,7 @@ class Comparison:
     compared: int
     missing: tuple[str, ...]
     same_machine: bool
+    barely_timed: int
     same_judge: bool
 
     @property
@@ -56,17 +60,18 @@ def compare(now: Study, before: Study) -> Comparison:
     """Compare the runs that two studies have in common.
 
     A time has changed where it differs by more than 15 % and by more than four times the spreads of both. An error has
-    changed where it differs by more than 10 % and by more than the errors of both truths. Times of different machines,
-    and errors against different truths, are not compared.
+    changed where it differs by more than 10 % and by more than the errors of both truths. Times of different machines
+    or of less than three repeats, and errors against different truths, are not compared.
     """
     earlier = {run.key: run for run in before.runs}
     pairs = [(run, earlier[run.key]) for run in now.runs if run.key in earlier]
     machines = all(now.machine.get(part) == before.machine.get(part) for part in ("processor", "cores", "system"))
     judges = now.judge == before.judge
+    timed = [run.key for run, old in pairs if min(run.repeats, old.repeats) >= LEAST_REPEATS]
     changes = []
     for run, old in pairs:
         changes += _status(run, old)
-        if machines:
+        if machines and run.key in timed:
             changes += _time(run, old)
         if judges and run.status == old.status:
             changes += _error(run, old)
@@ -77,6 +82,7 @@ def compare(now: Study, before: Study) -> Comparison:
         compared=len(pairs),
         missing=tuple(_name(run) for run in before.runs if run.key not in measured),
         same_machine=machines,
+        barely_timed=len(pairs) - len(timed),
         same_judge=judges,
     )
 
@@ -117,6 +123,9 @@ def words(comparison: Comparison) -> str:
     lines += [f"not measured now: {run}" for run in comparison.missing]
     if not comparison.same_machine:
         lines.append("another machine: times are not compared")
+    elif comparison.barely_timed:
+        of = counted(comparison.barely_timed, "run")
+        lines.append(f"times of {of} are not compared: less than {LEAST_REPEATS} repeats in one of the studies")
     if not comparison.same_judge:
         lines.append("another judge: errors are not compared")
     for change in comparison.changes:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 from dlocore.errors import SceneError, choice, repeated
-from dlocore.scene.scene import EFFECTS, Method, Quality, Scene, Switch
+from dlocore.scene.scene import Method, Quality, Scene, Switch
 from dlocore.study.record import PARTS, Part
 from dlocore.study.scenes import accuracy_scenes
 
@@ -78,13 +78,14 @@ class Plan:
             except SceneError as error:
                 raise SceneError("grids", f"{n_u}x{n_t}", f"for {error.field} {error.allowed}") from None
         for delta in self.deltas:
-            Quality(delta=delta)
-        for switches in self.effects.values():
-            for effect, switch in switches.items():
-                choice("effects", effect, EFFECTS)
-                choice(f"effects.{effect}", switch, ("auto", "on", "off"))
+            try:
+                Quality(delta=delta)
+            except SceneError as error:
+                raise SceneError("deltas", delta, error.allowed) from None
         if self.count > MAX_RUNS:
             raise SceneError("scenes", f"{self.count} runs", f"at most {MAX_RUNS} runs in one study")
+        for _ in self.variants():  # a scene refuses switches that it can't have
+            pass
 
     @property
     def count(self) -> int:

@@ -170,6 +170,10 @@ def _run(values: dict[str, Any]) -> Run:
     run = _plain(Run, {**values, "iterations": steps, "active": tuple(values["active"])})
     if not run.wall_time > 0.0:
         raise StudyError(f"wall_time: got {run.wall_time!r}. Allowed: a time above zero [s].")
+    for name, unit in (("spread", "s"), ("error", "m"), ("rms", "m"), ("truth_error", "m"), ("estimate", "m")):
+        value = getattr(run, name)
+        if value is not None and value < 0.0:
+            raise StudyError(f"{name}: got {value!r}. Allowed: zero or more [{unit}].")
     return run
 
 

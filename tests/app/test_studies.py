@@ -83,6 +83,8 @@ def test_effects_are_compared_and_impossible_scenes_are_refused_by_name(client: 
     far = paper_scene(primitives=[{**paper_scene()["primitives"][0], "u": 1.5}])
     problem = the_problem(client.post(ADDRESS, json={"scenes": {"far": far}}), 422)
     assert problem["errors"][0]["field"] == "scenes.far.primitives[0].u"
+    problem = the_problem(client.post(ADDRESS, json={**QUICK, "effects": {"x": {"stretch": "off"}}}), 422)
+    assert problem["errors"][0]["field"] == "effects.stretch"
 
 
 @pytest.mark.parametrize(

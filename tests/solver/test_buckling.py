@@ -343,7 +343,9 @@ PUSHED = {
     "from behind": replace(
         pushed(cable=cord(bending_stiffness=1e-4)), grasps=(Grasp(u=0.0, path=way(0.5, 0.0, 0.0, time=0.7)),)
     ),
-    "against friction": Scene(cable=cord(bending_stiffness=1e-3), shape=Straight(), grasps=(BEHIND,), environment=ROUGH),
+    "against friction": Scene(
+        cable=cord(bending_stiffness=1e-3), shape=Straight(), grasps=(BEHIND,), environment=ROUGH
+    ),
     "against quadratic drag": Scene(
         cable=cord(bending_stiffness=1e-4),
         shape=Straight(),

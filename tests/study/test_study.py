@@ -106,7 +106,16 @@ def test_what_is_no_study_is_refused_in_words(text: str, tmp_path: Path) -> None
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("wall_time", "fast"), ("wall_time", None), ("wall_time", 0.0), ("error", True), ("n_u", 9.5), ("status", 1)],
+    [
+        ("wall_time", "fast"),
+        ("wall_time", None),
+        ("wall_time", 0.0),
+        ("error", True),
+        ("error", -1e-3),
+        ("truth_error", -1e-3),
+        ("n_u", 9.5),
+        ("status", 1),
+    ],
 )
 def test_a_run_of_a_study_with_a_wrong_value_is_refused_by_its_name(measured: Study, name: str, value: object) -> None:
     document = json.loads(record.as_json(measured))
@@ -135,7 +144,8 @@ def test_a_study_compared_with_itself_shows_no_change(measured: Study) -> None:
 
 
 def test_slower_and_less_accurate_runs_are_told_and_noise_is_not(measured: Study) -> None:
-    sharp = replace(measured, runs=tuple(replace(run, spread=0.001 * run.wall_time) for run in measured.runs))
+    often = tuple(replace(run, repeats=5) for run in measured.runs)
+    sharp = replace(measured, runs=tuple(replace(run, spread=0.001 * run.wall_time) for run in often))
     slower = compare(changed(sharp, time=1.3), sharp)
     assert len(slower.worse) == len(sharp.runs)
     assert all(change.quantity == "time" for change in slower.worse)
@@ -144,7 +154,7 @@ def test_slower_and_less_accurate_runs_are_told_and_noise_is_not(measured: Study
     assert not faster.worse
     assert len(faster.changes) == len(sharp.runs)
     assert compare(changed(sharp, time=1.1), sharp).changes == (), "within what two measurements differ by"
-    blurred = replace(measured, runs=tuple(replace(run, spread=0.1 * run.wall_time) for run in measured.runs))
+    blurred = replace(measured, runs=tuple(replace(run, spread=0.1 * run.wall_time) for run in often))
     assert compare(changed(blurred, time=1.3), blurred).changes == (), "within the spread"
     worse = compare(changed(sharp, error=1.5), sharp).worse
     # but where the truth itself is too uncertain to tell
@@ -154,6 +164,17 @@ def test_slower_and_less_accurate_runs_are_told_and_noise_is_not(measured: Study
     assert {change.quantity for change in worse} == {"error"}
     lost = replace(sharp, runs=tuple(replace(run, status="stalled") for run in sharp.runs))
     assert {change.quantity for change in compare(lost, sharp).worse} == {"status"}
+
+
+def test_times_of_few_repeats_are_not_compared_but_errors_are(measured: Study) -> None:
+    once = replace(measured, runs=tuple(replace(run, repeats=1, spread=0.0) for run in measured.runs))
+    often = replace(once, runs=tuple(replace(run, repeats=5) for run in once.runs))
+    for now, before in ((changed(once, time=1.8), often), (changed(often, time=1.8), once)):
+        comparison = compare(now, before)
+        assert comparison.changes == ()
+        assert f"times of {len(once.runs)} runs are not compared: less than 3 repeats" in words(comparison)
+    assert "not compared" not in words(compare(often, often))
+    assert {change.quantity for change in compare(changed(once, time=1.8, error=2.0), often).worse} == {"error"}
 
 
 def test_times_of_another_machine_are_not_compared(measured: Study) -> None:
@@ -182,10 +203,11 @@ def test_a_grid_without_room_is_noted_and_the_rest_is_measured() -> None:
         ({"repeats": 1000}, "repeats"),
         ({"grids": ((3, 13),)}, "grids"),
         ({"grids": ()}, "grids"),
-        ({"deltas": (1.0,)}, "delta"),
+        ({"deltas": (1.0,)}, "deltas"),
         ({"methods": ("guess",)}, "methods"),
         ({"effects": {"odd": {"wind": "on"}}}, "effects"),
         ({"effects": {"odd": {"drag": "maybe"}}}, "effects.drag"),
+        ({"effects": {"odd": {"stretch": "off"}}}, "effects.stretch"),
         ({"parts": ("all",)}, "parts"),
         ({"judge": "me"}, "judge"),
         ({"grids": ((9, 13), (9, 13))}, "grids"),
