@@ -54,7 +54,7 @@ GRIPPER = ("primitives", 0)
         ({"Density [g/m]": 70.0}, ("cable", "linear_density"), 0.07),
         ({"Connector [g]": 20.0}, ("cable", "point_masses"), [{"u": 1.0, "mass": 0.02}]),
         (
-            {"Connector [g]": 20.0, "Connector at u [m]": 0.7},
+            {"Connector [g]": 20.0, "Placed at u [m]": 0.7},
             ("cable", "point_masses"),
             [{"u": 0.7, "mass": 0.02}],
         ),

@@ -33,7 +33,7 @@ class CableForm(Form):
             self._connector = gui.add_number(
                 "Connector [g]", 0.0, min=0.0, max=1e7, step=1.0, hint="A point mass on the cable; 0: none"
             )
-            self._connector_u = gui.add_number("Connector at u [m]", 1.0, min=0.0, max=MAX_LENGTH, step=0.01)
+            self._connector_u = gui.add_number("Placed at u [m]", 1.0, min=0.0, max=MAX_LENGTH, step=0.01)
             with gui.add_folder("More of the cable", expand_by_default=False):
                 self._torsion = gui.add_number("GJ [10⁻³ N m²]", 1.0, min=1e-6, max=1e9, step=0.01)
                 self._stretch = gui.add_number("EA [N]", 1.0, min=1e-3, max=1e12, step=1.0)
