@@ -145,6 +145,8 @@ class Rod:
             raise ValueError("the explicit rod has no table")
         if scene.effects.get("inertia") == "off":
             raise ValueError("the explicit rod can't leave out inertia")
+        if cable.point_masses:
+            raise ValueError("the explicit rod has no point masses")
         if not isinstance(cable.rest_shape, str) or (cable.rest_shape == "initial" and len(axes) == 3):
             raise ValueError("the explicit rod is straight at rest, or in the plane as it starts")
 

@@ -141,7 +141,7 @@ def _own(scene: Scene) -> tuple[float, float]:
     cable = scene.cable
     assert cable.bending_stiffness is not None
     gravity = float(np.linalg.norm(np.asarray(scene.environment.gravity)))
-    return cable.bending_stiffness / cable.length**2, cable.linear_density * cable.length * gravity
+    return cable.bending_stiffness / cable.length**2, cable.mass * gravity
 
 
 def _work(prediction: Prediction, times: Floats) -> Floats:
@@ -187,8 +187,10 @@ def lost_impulse(prediction: Prediction) -> float | None:
         return None
     cable, around = scene.cable, scene.environment
     u, w = along(surface.knots_u)
-    mass = cable.linear_density if "inertia" in active else 0.0
-    weight = cable.linear_density * cable.length * np.asarray(around.gravity) * ("gravity" in active)
+    inertial = "inertia" in active
+    places = np.concatenate([u, [one.u for one in cable.point_masses]])
+    masses = np.concatenate([cable.linear_density * w, [one.mass for one in cable.point_masses]])
+    weight = cable.mass * np.asarray(around.gravity) * ("gravity" in active)
     worst, scale = 0.0, _NOTHING * sum(_own(scene)) * surface.horizon
     for times in windows_of(prediction.grasps[0].times):
         if len(times) < 3 * _SETTLE:
@@ -205,7 +207,8 @@ def lost_impulse(prediction: Prediction) -> float | None:
         impulse = np.concatenate(
             [np.zeros((1, 3)), np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(times)[:, None], axis=0)]
         )
-        momentum = mass * np.einsum("u,kud->kd", w, v)
+        moving = surface(places, times, dt=1)[..., :3]
+        momentum = inertial * np.einsum("u,kud->kd", masses, moving)
         lost = np.linalg.norm(momentum - momentum[0] - impulse, axis=1)
         flow = np.linalg.norm(held, axis=2).sum(axis=0) + np.linalg.norm(weight)
         scale = max(scale, float(np.trapezoid(flow, times)), float(np.abs(momentum).max()))
