@@ -232,7 +232,7 @@ def _stretched(level: Level) -> list[str]:
         advice = "allow a larger time_budget"
     return [
         f"the surface stretches the cable by up to {strain[k, s]:.0%} within a span, at {u[s]:.4g} m and {t[k]:.3g} s: "
-        f"positions are as near as the error says, lengths and directions there are not; {advice}"
+        f"of lengths and directions there an error of positions tells nothing; {advice}"
     ]
 
 

@@ -417,3 +417,32 @@ def test_a_part_of_a_solve_has_no_more_time_than_all_of_it():
         whole.within(5.0).check()
     with pytest.raises(TimeIsUp):
         Monitor().within(-1.0).check()
+
+
+def test_friction_resists_a_disturbance_as_that_of_what_slides() -> None:
+    # as if at rest it would hold everything: a cable pushed straight over a rough table was not looked at again
+    x = np.linspace(0.0, LENGTH, 41)
+    scene = Scene(
+        cable=Cable.preset("paper", bending_stiffness=2e-3, axial_stiffness=None),
+        shape=Points(points=np.column_stack([x, 1e-5 * np.sin(np.pi * x)])),
+        grasps=(Grasp(u=0.0, path=Move(displacement=(0.3, 0.0, 0.0), duration=3.0)),),
+        environment=Environment(drag=0.05, table=Table(friction=1.0)),
+        quality=Quality(n_u=13, n_t=25, method="march", estimate=False),
+    )
+    answer = predict(scene)
+    assert answer.level is not None
+    problem, motion = answer.level.problem, answer.level.motion
+    assert may_grow(problem, motion)
+    (window,) = motion.forces
+    at, still = [len(window.times) // 2], np.zeros((1, *window.states.shape[1:]))
+    speeds = (window.states[at] - window.states[[at[0] - 1]]) / (window.times[1] - window.times[0])
+
+    def fastest(velocities: np.ndarray) -> float:
+        laws = (problem.mass_density(), problem.drag_coefficient(), window.held.elimination, 1.0)
+        behind = motion.behind(window.times[at])
+        tables = motion.grid.tables
+        return float(
+            fastest_growth(problem.axes, window.states[at], velocities, behind, tables, *problem.laws, *laws)[0]
+        )
+
+    assert fastest(speeds) > 4.0 * max(fastest(still), 1.0)

@@ -56,7 +56,7 @@ class CableForm(Form):
         self._bind(self._diameter, lambda d: self._with(d, "diameter", 1e-3 * self._diameter.value))
         self._bind(self._density, lambda d: self._with(d, "linear_density", 1e-3 * self._density.value))
         self._bind(self._connector, self._with_connector)
-        self._bind(self._connector_u, self._with_connector)
+        self._bind(self._connector_u, self._with_place)
         self._bind(self._bending, lambda d: self._with(d, "bending_stiffness", 1e-3 * self._bending.value))
         self._bind(self._torsion, lambda d: self._with(d, "torsional_stiffness", 1e-3 * self._torsion.value))
         self._bind(self._stretch, lambda d: self._with(d, "axial_stiffness", float(self._stretch.value)))
@@ -89,13 +89,17 @@ class CableForm(Form):
         return {"length": draft.length, **({"point_masses": masses} if masses else {})}
 
     def _with_connector(self, draft: Draft) -> Draft:
-        """Put the first point mass where it is wanted, a new one at the far end; others stay."""
-        others = draft.get(("cable", "point_masses"), [])
-        if self._connector.value <= 0.0:
-            return draft.put(("cable", "point_masses"), others[1:])
-        u = min(float(self._connector_u.value), draft.length) if others else draft.length
-        first = {"u": float(f"{u:.9g}"), "mass": float(f"{1e-3 * self._connector.value:.9g}")}
-        return draft.put(("cable", "point_masses"), [first, *others[1:]])
+        """Give the first point mass its mass, a new one at the far end; of none it is taken away. Others stay."""
+        masses = draft.get(("cable", "point_masses"), [])
+        mass = float(f"{1e-3 * self._connector.value:.9g}")
+        first = [{"u": masses[0]["u"] if masses else draft.length, "mass": mass}] if mass > 0.0 else []
+        return draft.put(("cable", "point_masses"), [*first, *masses[1:]])
+
+    def _with_place(self, draft: Draft) -> Draft:
+        """Put the first point mass, if there is one, where it is wanted."""
+        u = float(f"{min(float(self._connector_u.value), draft.length):.9g}")
+        there = draft.get(("cable", "point_masses"))
+        return draft.put(("cable", "point_masses", 0, "u"), u) if there else draft
 
     def offer(self) -> None:
         """Offer the cables that are kept now."""
