@@ -119,6 +119,21 @@ def test_a_mass_in_the_gripper_weighs_on_the_gripper_alone() -> None:
     assert np.abs(more - expected).max() < 0.02 * np.abs(expected).max()  # the spline's acceleration is a linear one
 
 
+@pytest.mark.parametrize("hold", ["point", "clamp"])
+def test_a_gripper_that_sets_out_at_once_feels_the_mass_from_the_first(hold) -> None:
+    sets_out = Scene(
+        cable=cable(()),
+        shape=Straight(direction=(0.0, 0.0, -1.0)),
+        grasps=(Grasp(u=0.0, hold=hold, path=Move(displacement=(0.3, 0.1, 0.2), duration=0.8, profile="cubic")),),
+        quality=Quality(n_u=13, n_t=25, method="march"),
+    )
+    without = converged(sets_out)
+    heavy = converged(replace(sets_out, cable=cable((PointMass(u=0.0, mass=0.5),))))
+    more = heavy.grasps[0].reaction[0] - without.grasps[0].reaction[0]
+    first = 6.0 * np.array([0.3, 0.1, 0.2]) / 0.8**2  # of 3 s^2 - 2 s^3
+    np.testing.assert_allclose(more, 0.5 * (first + np.array([0.0, 0.0, G])), rtol=0.01)
+
+
 def test_what_falls_falls_together() -> None:
     masses = (PointMass(u=0.2, mass=0.1), PointMass(u=0.9, mass=0.03))
     falls = Scene(cable=cable(masses), shape=Straight(), horizon=0.4)

@@ -352,12 +352,6 @@ PUSHED = {
         grasps=(BEHIND,),
         environment=replace(LYING, drag_quadratic=5.0),
     ),
-    "a mass ahead of it": Scene(
-        cable=cord(bending_stiffness=1e-3, point_masses=[PointMass(u=1.0, mass=0.2)]),
-        shape=Straight(),
-        grasps=(replace(BEHIND, path=way(0.3, 0.0, 0.0, time=1.0)),),
-        environment=LYING,
-    ),
     "obstacle": pushed(around=replace(LYING, obstacles=(BALL,))),
     "table on": pushed(effects={"table": "on"}),
     "no inertia": pushed(effects={"inertia": "off"}),
@@ -390,6 +384,20 @@ def test_every_kind_of_straight_start_and_push_gets_a_bow(scene: Scene) -> None:
     along = np.asarray(scene.shape.direction if isinstance(scene.shape, Straight) else (1.0, 0.0, 0.0))
     at = prediction.surface.positions(np.linspace(0.0, 1.0, 65), prediction.surface.horizon)[0]
     assert np.linalg.norm(np.cross(at - at[0], along), axis=1).max() > 1.5 * BOW
+
+
+def test_a_mass_ahead_of_what_pushes_it_buckles_a_cable_that_alone_stays_straight() -> None:
+    alone = Scene(
+        cable=cord(bending_stiffness=0.05),
+        shape=Straight(),
+        grasps=(replace(BEHIND, path=way(0.3, 0.0, 0.0, time=1.0)),),
+        environment=LYING,
+    )
+    loaded = replace(alone, cable=replace(alone.cable, point_masses=[PointMass(u=1.0, mass=1.0)]))
+    assert bow(alone) == 0.0
+    assert bow(loaded) == pytest.approx(BOW, rel=0.02)
+    in_the_gripper = replace(alone, cable=replace(alone.cable, point_masses=[PointMass(u=0.0, mass=1.0)]))
+    assert bow(in_the_gripper) == 0.0
 
 
 def test_a_column_that_its_foot_bears_stands_and_a_taller_one_bends_over() -> None:
