@@ -25,6 +25,7 @@ from dlocore import (
     Table,
     energies,
     equilibrium,
+    plan,
     predict,
     sensitivities,
 )
@@ -119,12 +120,13 @@ def test_a_mass_in_the_gripper_weighs_on_the_gripper_alone() -> None:
     assert np.abs(more - expected).max() < 0.02 * np.abs(expected).max()  # the spline's acceleration is a linear one
 
 
-@pytest.mark.parametrize("hold", ["point", "clamp"])
-def test_a_gripper_that_sets_out_at_once_feels_the_mass_from_the_first(hold) -> None:
+@pytest.mark.parametrize("twist", ["auto", "on"])  # smooth motions without are a call of their own
+def test_a_gripper_that_sets_out_at_once_feels_the_mass_from_the_first(twist) -> None:
     sets_out = Scene(
         cable=cable(()),
         shape=Straight(direction=(0.0, 0.0, -1.0)),
-        grasps=(Grasp(u=0.0, hold=hold, path=Move(displacement=(0.3, 0.1, 0.2), duration=0.8, profile="cubic")),),
+        grasps=(Grasp(u=0.0, path=Move(displacement=(0.3, 0.1, 0.2), duration=0.8, profile="cubic")),),
+        effects={"twist": twist},
         quality=Quality(n_u=13, n_t=25, method="march"),
     )
     without = converged(sets_out)
@@ -316,3 +318,24 @@ def test_masses_in_one_place_are_one() -> None:
     two = predict(replace(scene, cable=cable((PointMass(u=1.0, mass=0.01), PointMass(u=1.0, mass=0.02)))))
     one = predict(replace(scene, cable=cable((PointMass(u=1.0, mass=0.03),))))
     assert apart(one, two) < 1e-9
+
+
+def test_a_motion_that_is_slow_for_a_cable_is_not_for_one_with_a_heavy_end() -> None:
+    def inertia(masses: tuple[PointMass, ...]) -> bool:
+        slow = Scene(
+            cable=cable(masses, bending_stiffness=1e-2),
+            shape=Straight(),
+            grasps=(Grasp(u=0.0, hold="clamp", path=Move(displacement=(0.0, 0.1, 0.0), duration=150.0)),),
+            environment=Environment(drag=0.05, table=Table()),
+        )
+        return next(effect.active for effect in plan(slow).effects if effect.name == "inertia")
+
+    assert not inertia(())
+    assert inertia((PointMass(u=LENGTH, mass=0.5),))
+
+
+def test_a_table_bears_what_lies_on_it() -> None:
+    scene = replace(lying(), quality=Quality(n_u=13, n_t=25, method="march", estimate=False))
+    (table,) = predict(scene).contacts
+    np.testing.assert_allclose(table.force[:, 2], scene.weight, rtol=1e-12)
+    assert scene.weight == pytest.approx((MU * LENGTH + 0.08) * G)
