@@ -110,8 +110,7 @@ def _motion(
     instance("scene", scene, Scene, "a Scene")
     instance("surface", surface, SplineSurface, "a SplineSurface, as Prediction.surface")
     cable = scene.cable
-    yields = any(x is not None for x in (cable.yield_strain, cable.yield_twist, cable.yield_stretch))
-    called = material is not None and yields and scene.effects.get("plasticity", "auto") != "off"
+    called = material is not None and cable.yields and scene.effects.get("plasticity", "auto") != "off"
     shown = {"plasticity": "it shows in the motion"} if called else {}
     problem = pose_as_shown(scene, shown, surface.control_points)
     grid = grid_on(problem, surface.knots_u)

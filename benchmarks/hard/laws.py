@@ -197,17 +197,17 @@ def lost_impulse(prediction: Prediction) -> float | None:
             continue
         held = [g.reaction[_window(g.times, times)][_SETTLE:] for g in prediction.grasps]
         times = times[_SETTLE:]
-        v = surface(u, times, dt=1)[..., :3]
+        moving = surface(places, times, dt=1)[..., :3]
         force = np.tile(weight, (len(times), 1)) + np.sum(held, axis=0)
         for load in scene.loads:
             force += load.at(times)
         if "drag" in active:
+            v = moving[:, : len(u)]
             speed = np.linalg.norm(v, axis=-1, keepdims=True)
             force -= np.einsum("u,kud->kd", w, (around.drag + around.drag_quadratic * speed) * v)
         impulse = np.concatenate(
             [np.zeros((1, 3)), np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(times)[:, None], axis=0)]
         )
-        moving = surface(places, times, dt=1)[..., :3]
         momentum = inertial * np.einsum("u,kud->kd", masses, moving)
         lost = np.linalg.norm(momentum - momentum[0] - impulse, axis=1)
         flow = np.linalg.norm(held, axis=2).sum(axis=0) + np.linalg.norm(weight)

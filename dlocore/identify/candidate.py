@@ -44,7 +44,7 @@ class Candidate:
     @property
     def yields(self) -> bool:
         """Its cable has a strain at which bends, or twist or stretch, stay."""
-        return (self.cable.yield_strain, self.cable.yield_twist, self.cable.yield_stretch) != (None, None, None)
+        return self.cable.yields
 
 
 def varied(problem: Problem, before: Candidate, after: Candidate) -> Problem | None:

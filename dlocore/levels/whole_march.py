@@ -90,9 +90,8 @@ def march_level(
 
 def sided(problem: Problem, monitor: Monitor) -> Problem:
     """Return the problem, with a side to go to where a march says that its motion leaves its plane."""
-    cable = problem.scene.cable
-    yields = any(x is not None for x in (cable.yield_strain, cable.yield_twist, cable.yield_stretch))
-    bends = yields and problem.scene.effects.get("plasticity", "auto") != "off"  # what is bent for good may turn over
+    scene = problem.scene
+    bends = scene.cable.yields and scene.effects.get("plasticity", "auto") != "off"  # for good: they may turn over
     if not (may_leave_plane(problem) or bends):
         return problem
     for number in _LOOKS:

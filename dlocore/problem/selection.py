@@ -76,7 +76,7 @@ def choose(
     heavy = down != (0.0, 0.0, 0.0)
     drags = environment.drag > 0 or environment.drag_quadratic > 0
     damps = cable.bending_damping > 0 or cable.torsional_damping > 0
-    plastic = (cable.yield_strain, cable.yield_twist, cable.yield_stretch) != (None, None, None)
+    plastic = cable.yields
     rough = (
         environment.table is not None and environment.table.friction > 0 and scene.effects.get("table", "auto") != "off"
     ) or any(environment.obstacles[i].friction > 0 for i in met)

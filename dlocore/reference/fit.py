@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from dlocore.problem.problem import Problem
 from dlocore.reference.motion import events_of
+from dlocore.reference.rod import nearest
 from dlocore.spline import DEGREE, SplineSurface, design_matrix
 
 Floats = NDArray[np.float64]
@@ -48,7 +49,7 @@ def _least(over: Floats, right: Floats) -> Floats:
 
 def _held(problem: Problem, u: Floats) -> list[int]:
     """Return the nodes of u (n,) [m] that grasps hold."""
-    return [int(np.argmin(np.abs(u - g.u))) for g in problem.scene.grasps]
+    return [nearest(u, g.u) for g in problem.scene.grasps]
 
 
 def _along(problem: Problem, u: Floats, q: Floats, tolerance: float) -> Floats:
@@ -58,7 +59,7 @@ def _along(problem: Problem, u: Floats, q: Floats, tolerance: float) -> Floats:
     for g, node in zip(problem.scene.grasps, _held(problem, u), strict=True):
         marks[node] = max(marks.get(node, 1), 1 if g.hold == "point" else 2)
     for place in problem.scene.places:
-        marks.setdefault(int(np.argmin(np.abs(u - place))), 1)
+        marks.setdefault(nearest(u, place), 1)
     some = q[:: max(1, len(q) // 50)].transpose(1, 0, 2).reshape(len(u), -1)
     stride = 2 ** max(1, int(np.log2(max(2.0, len(u) / 8))))
     while True:

@@ -99,7 +99,12 @@ class Rod:
 
     def node(self, u: float) -> int:
         """Return the node at the material coordinate of a grasp, a load or a point mass [m]."""
-        return int(np.argmin(np.abs(self.u - u)))
+        return nearest(self.u, u)
+
+
+def nearest(nodes: Floats, u: float) -> int:
+    """Return which of nodes (n,) [m] is nearest to a material coordinate [m]."""
+    return int(np.argmin(np.abs(nodes - u)))
 
 
 def nodes_of(problem: Problem, elements: int, halvings: int) -> Floats:
@@ -187,7 +192,7 @@ def _points(problem: Problem, u: Floats) -> tuple[Integers, Floats, Floats, NDAr
     length: list[float] = []
     lies: list[bool] = []
     h = np.diff(u)
-    heavy = [(int(np.argmin(np.abs(u - place))), alike) for place, alike in problem.masses]
+    heavy = [(nearest(u, place), alike) for place, alike in problem.masses]
     if problem.friction is not None and problem.friction.lying > 0.0:
         cells = 0.5 * (np.append(h, 0.0) + np.append(0.0, h))
         for node, alike in heavy:

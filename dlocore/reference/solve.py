@@ -250,7 +250,7 @@ def _effects(refined: Refined, surface: SplineSurface) -> tuple[EffectReport, ..
     """Return what was simulated: all that the scene has and does not switch off."""
     problem, motion = refined.problem, refined.levels[-1].motion
     space = problem.plane.dimensions == 3
-    yields = problem.scene.cable.memory_rate is not None and problem.scene.effects.get("plasticity") != "off"
+    yields = problem.scene.cable.yields and problem.scene.effects.get("plasticity") != "off"
     own = {
         "inertia": (True, "the reference goes through the motion step by step"),
         "twist": (space, "in space the sections of the reference always twist" if space else "the motion is planar"),

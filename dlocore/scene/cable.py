@@ -147,6 +147,11 @@ class Cable:
                 raise SceneError(f"point_masses[{i}].u", one.u, f"0 to the cable's length, {length:g} [m]")
 
     @property
+    def yields(self) -> bool:
+        """Whether it may keep bends, twist or stretch: a yield strain is given."""
+        return any(x is not None for x in (self.yield_strain, self.yield_twist, self.yield_stretch))
+
+    @property
     def mass(self) -> float:
         """What the cable and its point masses have together [kg]."""
         return self.linear_density * self.length + sum(one.mass for one in self.point_masses)
