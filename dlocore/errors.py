@@ -82,6 +82,17 @@ def within(prefix: str) -> Iterator[None]:
         raise SceneError(f"{prefix}.{error.field}", error.given, error.allowed, error.reason) from None
 
 
+@contextmanager
+def calculable(field: str, given: Any, allowed: str, reason: str) -> Iterator[None]:
+    """Raise such a SceneError where numbers of scales that no arithmetic holds together end in another error inside."""
+    try:
+        yield
+    except SceneError:
+        raise
+    except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
+        raise SceneError(field, given, allowed, reason) from error
+
+
 def number(
     field: str,
     value: Any,

@@ -8,11 +8,11 @@ from typing import Any
 
 import anyio
 import anyio.to_thread
-import numpy as np
 
 from app.http.problems import ProblemError
 from app.service.worker import Worker
-from dlocore import Cancelled, SceneError
+from dlocore import Cancelled
+from dlocore.errors import calculable
 from dlocore.identify import Identification, identify
 from dlocore.recordings import Recording
 
@@ -60,13 +60,9 @@ class Searches:
         def search() -> Identification:
             nonlocal ends
             ends = time.monotonic() + self._worker.time_limit
-            try:
+            allowed = "a cable of usual size, moved by what holds it"
+            with calculable("recordings", "markers", allowed, "They can't be replayed"):
                 return identify(recordings, cancelled=stop, **options)
-            except SceneError:
-                raise
-            except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:  # of scales that no arithmetic holds
-                allowed = "a cable of usual size, moved by what holds it"
-                raise SceneError("recordings", "markers", allowed, "They can't be replayed") from error
 
         try:
             with self._worker.stoppable(stopped):

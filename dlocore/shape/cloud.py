@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline
 from scipy.spatial import cKDTree
 
-from dlocore.errors import SceneError, points_array
+from dlocore.errors import SceneError, calculable, points_array
 from dlocore.scene.scene import Points
 from dlocore.shape.fit import MAX_SPANS, NOISE, fit_points
 from dlocore.shape.ordering import DEVIATIONS, Indices, Order, order_points, without_spikes
@@ -61,13 +61,9 @@ def fit_cloud(
         SceneError: the points are too few, of no single curve, or of one that differs in length from the cable.
     """
     p = points_array("points", points)
-    try:
+    allowed, reason = "points along one smooth curve", "No curve can be fitted to them"
+    with calculable("points", f"{len(p)} points", allowed, reason):
         return _fitted(p, ordered, length, start, remove_outliers)
-    except SceneError:
-        raise
-    except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:  # of scales that no arithmetic holds together
-        allowed = "points along one smooth curve"
-        raise SceneError("points", f"{len(p)} points", allowed, "No curve can be fitted to them") from error
 
 
 def _fitted(p: Floats, ordered: bool, length: float | None, start: Floats | None, remove_outliers: bool) -> CloudFit:
