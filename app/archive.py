@@ -154,9 +154,9 @@ def surface_npz(document: dict[str, Any], material: MaterialMotion | None) -> by
     Arrays: `u` (k_u,), `t` (k_t,), `positions` (k_t, k_u, 3), `twist` (k_t, k_u), `control_points` (n_t, n_u, 4),
     `knots_u`, `knots_t`, `degree`, `grasp_u` (g,), `reaction` and `moment` (g, k_t, 3), `reaction_error` and
     `moment_error` (g, k_t), `peak_force`, `peak_force_time`, `peak_moment` and `peak_moment_time` (g,), which are NaN
-    of a document without them; `contact` (c,), the names of what presses on the cable, `contact_force` (c, k_t, 3),
-    `contact_pressed` and `contact_force_error` (c, k_t); where the cable remembers, `material_` and each field of
-    `MaterialMotion`; SI units.
+    of a document without them; `contact` (c,), the names of what presses on the cable, `contact_force` and
+    `contact_friction` (c, k_t, 3), `contact_pressed`, `contact_force_error` and `contact_friction_error` (c, k_t), NaN
+    where unknown; where the cable remembers, `material_` and each field of `MaterialMotion`; SI units.
     """
     surface, grasps, contacts = document["surface"], document["grasps"], document.get("contacts", [])
     times = len(surface["t"])
@@ -172,8 +172,11 @@ def surface_npz(document: dict[str, Any], material: MaterialMotion | None) -> by
             **{name: np.array([grasp.get(name, np.nan) for grasp in grasps], dtype=float) for name in PEAKS},
             "contact": np.array([contact["name"] for contact in contacts], dtype=str),
             "contact_force": np.array([contact["force"] for contact in contacts], dtype=float).reshape(-1, times, 3),
+            "contact_friction": np.array([_friction(one, times) for one in contacts], dtype=float).reshape(
+                -1, times, 3
+            ),
             "contact_pressed": np.array([contact["pressed"] for contact in contacts], dtype=float).reshape(-1, times),
-            "contact_force_error": _errors(contacts, "force_error", times),
+            **{f"contact_{name}": _errors(contacts, name, times) for name in ("force_error", "friction_error")},
             **_named("material_", material),
         }
     )
@@ -186,6 +189,12 @@ def _errors(givers: list[dict[str, Any]], name: str, times: int) -> NDArray[np.f
         if giver.get(name) is not None:
             row[:] = giver[name]
     return found
+
+
+def _friction(contact: dict[str, Any], times: int) -> Any:
+    """Return the friction of a contact (times, 3), NaN of a document that was stored before it was noted."""
+    known = contact.get("friction")
+    return np.full((times, 3), np.nan) if known is None else known
 
 
 def _npz(arrays: dict[str, Any]) -> bytes:

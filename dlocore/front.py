@@ -260,6 +260,8 @@ def _answer(
     left_out = neglected(level)
     find_once: FindForces = partial(getattr, level.motion, "forces") if find_forces is None else cache(find_forces)
     stretch = partial(stretch_of, problem, grid, level.motion.times, level.motion.states)
+    material = partial(_material, problem, level)
+    contacts = cache(partial(_contacts, level, find_once, judged, find_forces is None))
     errors: dict[str, float] = {}
     if outcome.errors is not None:
         errors = {**outcome.errors, "neglected": left_out}
@@ -270,9 +272,9 @@ def _answer(
         said=outcome.message,
         surface=surface,
         report_grasps=partial(_reactions, level, find_once, judged),
-        report_contacts=partial(_contacts, level, find_once, judged, find_forces is None),
-        report_effects=partial(effect_reports, problem, partial(_material, problem, level), stretch),
-        report_material=partial(_material, problem, level),
+        report_contacts=contacts,
+        report_effects=partial(effect_reports, problem, material, stretch, contacts),
+        report_material=material,
         report_stretch=stretch,
         iterations=tuple(monitor.iterations),
         accuracy=Accuracy(
@@ -309,14 +311,14 @@ def _contacts(
     level: Level, find_forces: FindForces, judged: Prediction | None, marched: bool
 ) -> tuple[ContactForce, ...]:
     windows = find_forces()
-    found = contact_forces(level.problem, level.motion.grid, windows, marched)
+    found = contact_forces(level.marched, level.motion.grid, windows, marched)
     if judged is not None:
         return contacts_taken_on(found, judged.contacts)
     return with_contact_errors(found, windows, _beside(level))
 
 
 def _beside(level: Level) -> list[tuple[Problem, Grid, Windows]]:
-    return [(other.problem, other.motion.grid, other.motion.forces) for other in level.beside]
+    return [(other.marched, other.motion.grid, other.motion.forces) for other in level.beside]
 
 
 def _start_energy(level: Level) -> float:

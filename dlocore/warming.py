@@ -116,7 +116,7 @@ def _differentiated(table: Table | None, twist: Switch) -> None:
 
 def _rough(table: Table | None, twist: Switch) -> None:
     """Motions of two, three or four coordinates that begin with a speed, rub, lie beside something, and may yield."""
-    beside = (Sphere(center=(0.5, 0.3, 0.0), radius=0.2),)
+    beside = (Sphere(center=(0.5, 0.3, 0.0), radius=0.2, friction=0.1),)
     environment = Environment(drag=0.1, drag_quadratic=0.1, table=table, obstacles=beside)
     given = Quality(n_u=9, n_t=9, keep_grid=True)
     for quality in (Quality(), given, replace(given, method="spacetime")):
@@ -136,7 +136,7 @@ def _rough(table: Table | None, twist: Switch) -> None:
 
 def _read_all(answer: Prediction) -> None:
     """Read all that is found only as it is read, and ask for its energies, so that what that takes is compiled, too."""
-    _ = answer.message, answer.grasps, answer.effects, answer.material, answer.start_energy
+    _ = answer.message, answer.grasps, answer.contacts, answer.effects, answer.material, answer.start_energy
     _ = [(iteration.surface, iteration.energy) for iteration in answer.iterations]
     energies(answer.scene, answer.surface, [0.0])
 

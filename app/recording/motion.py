@@ -9,6 +9,7 @@ from app.archive import Run
 from app.recording.obstacles import obstacle_chunks
 from app.recording.style import (
     BLUE,
+    EFFECTS,
     ENERGIES,
     GREY,
     ORANGE,
@@ -110,13 +111,17 @@ def _masses(run: Run, times: list[Any], thick: float) -> "list[Chunk]":
 
 
 def _contact(run: Run, k: int) -> "list[Chunk]":
-    """Return how hard the table or an obstacle presses at every time, and how sure that is."""
+    """Return how hard the table or an obstacle presses and rubs at every time, and how sure that is."""
     import rerun as rr
 
     contact, t = run.document["contacts"][k], run.document["surface"]["t"]
     times = [rr.TimeColumn("motion", duration=t)]
     entity = f"/over_time/reaction/contact_{k}"
-    return _with_bounds(entity, contact["name"], GREY, times, contact["force"], contact["force_error"])
+    chunks = _with_bounds(entity, contact["name"], GREY, times, contact["force"], contact["force_error"])
+    if np.any(contact.get("friction")):  # which runs that were stored before it was noted don't have
+        name, error = f"friction of {contact['name']}", contact["friction_error"]
+        chunks += _with_bounds(f"{entity}_friction", name, EFFECTS["friction"], times, contact["friction"], error)
+    return chunks
 
 
 def _with_bounds(entity: str, name: str, colour: Colour, times: list[Any], force: Any, errors: Any) -> "list[Chunk]":

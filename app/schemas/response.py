@@ -69,14 +69,20 @@ class GraspModel(BaseModel):
 
 
 class ContactModel(BaseModel):
-    """How hard the table or an obstacle presses on the cable, without friction."""
+    """How hard the table or an obstacle presses on the cable, and how its friction holds it."""
 
     name: str = Field(
         description="`table`, or `obstacles[i]` with the number of the obstacle in the request.",
         examples=["obstacles[0]"],
     )
     force: list[list[float]] = Field(
-        description="Force on the cable at the times of the surface [t][3] [N].", examples=[[[0.0, 0.0, 0.32]]]
+        description="Force on the cable across its surface, without friction, at the times of the surface [t][3] [N].",
+        examples=[[[0.0, 0.0, 0.32]]],
+    )
+    friction: list[list[float]] | None = Field(
+        default=None,
+        description="Friction on the cable at these times [t][3] [N]; none of a run stored before it was noted.",
+        examples=[[[-0.06, 0.0, 0.0]]],
     )
     pressed: list[float] = Field(
         description="Sum of the sizes of the forces along the cable [t] [N]: more than the size of `force` where it "
@@ -87,6 +93,11 @@ class ContactModel(BaseModel):
         default=None,
         description="Estimated error of the force at these times [t] [N]; none where none was computed.",
         examples=[[0.006]],
+    )
+    friction_error: list[float] | None = Field(
+        default=None,
+        description="Estimated error of the friction at these times [t] [N]; none where none was computed.",
+        examples=[[0.002]],
     )
 
 
@@ -194,8 +205,8 @@ class PredictionResponse(BaseModel):
     grasps: list[GraspModel] = Field(description="What each gripper must give, in the order of `primitives`.")
     contacts: list[ContactModel] = Field(
         default=[],
-        description="How hard the table, and each obstacle that was simulated, presses; empty of a run that was stored "
-        "before it was noted, and of method reference.",
+        description="How hard the table, and each obstacle that was simulated, presses and rubs; empty of a run "
+        "that was stored before it was noted, and of method reference.",
     )
     effects: list[EffectModel] = Field(description="What was simulated, and why.")
     iterations: list[IterationModel] = Field(description="How the solve went.")
@@ -384,10 +395,16 @@ def _grasp_document(grasp: GraspReaction, t: Floats) -> dict[str, Any]:
 
 
 def _contact_document(contact: ContactForce, t: Floats) -> dict[str, Any]:
-    """Return how hard the table or an obstacle presses at the times `t` (k,) [s]."""
+    """Return what the table or an obstacle gives to the cable at the times `t` (k,) [s]."""
+
+    def error(values: Floats | None) -> Floats | None:
+        return None if values is None else np.interp(t, contact.times, values)
+
     return {
         "name": contact.name,
         "force": at_times(t, contact.times, contact.force),
+        "friction": at_times(t, contact.times, contact.friction),
         "pressed": np.interp(t, contact.times, contact.pressed),
-        "force_error": None if contact.force_error is None else np.interp(t, contact.times, contact.force_error),
+        "force_error": error(contact.force_error),
+        "friction_error": error(contact.friction_error),
     }

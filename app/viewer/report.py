@@ -174,7 +174,9 @@ def effect_note(effect: EffectReport, cost: float | None) -> str:
 def forces_list(prediction: Prediction) -> str:
     """Return the largest force on the cable of table, obstacles and grippers, and its estimated error there."""
     given = [(f"u = {g.u:.2f} m", g.times, g.reaction, g.reaction_error) for g in prediction.grasps]
-    given += [(c.name, c.times, c.force, c.force_error) for c in prediction.contacts if c.force.any()]
+    for c in prediction.contacts:
+        given += [(c.name, c.times, c.force, c.force_error)] if c.force.any() else []
+        given += [(f"{c.name}, friction", c.times, c.friction, c.friction_error)] if c.friction.any() else []
     rows = []
     for name, times, force, error in given:
         size = np.linalg.norm(force, axis=1)

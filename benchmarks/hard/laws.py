@@ -1,4 +1,4 @@
-"""Laws that every predicted motion keeps, measured on its surface and reactions alone."""
+"""Laws that every predicted motion keeps, measured on its surface and the forces that it tells of."""
 
 from dataclasses import dataclass
 
@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore import Grasp, Prediction, Scene, Waypoints, energies
+from dlocore.answer.compared import at_times
 from dlocore.scene.paths import held_at
 from dlocore.shape.shape import start_curve
 
@@ -15,6 +16,7 @@ _LOOKS = 33  # times at which a law is looked at
 _NOTHING = 1e-3  # of a cable's own forces: what is smaller than that is no motion
 _BEFORE = 1e-9  # of a stretch between two events: how far before its end is still in it
 _SETTLE = 4  # steps after an event, in which the forces of what jumped die away
+_TOUCH = {"friction", "obstacles", "table"}  # of which the reference does not tell
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,8 +29,8 @@ class Measures:
         held: largest distance of a grasped point from its gripper, at the start and at the end of the motion [m].
         held_between: the same in between, where the time spline only comes near to the path [m].
         energy: largest gain of energy that no gripper and no load put in, of the energy that was about.
-        momentum: largest impulse that no force accounts for, of the impulses that were about; None where forces act
-            that an answer does not tell of: contact, friction, jumps of the velocity.
+        momentum: largest impulse that no force accounts for, of the impulses that were about; None where nobody holds
+            the cable, or an answer does not tell of all forces: what strikes, does so between the times of the others.
     """
 
     finite: bool
@@ -130,10 +132,15 @@ def windows_of(times: Floats) -> list[Floats]:
 
     Each but the last ends a little before its event: at the event itself a surface has the velocity after it.
     """
-    windows = [part.copy() for part in np.split(times, np.flatnonzero(np.diff(times) <= 0.0) + 1)]
+    windows = [times[part] for part in _parts(times)]
     for part in windows[:-1]:
         part[-1] -= _BEFORE * (part[-1] - part[0])
     return windows
+
+
+def _parts(times: Floats) -> list[NDArray[np.int64]]:
+    """Return which of the times are of each stretch between events."""
+    return np.split(np.arange(len(times)), np.flatnonzero(np.diff(times) <= 0.0) + 1)
 
 
 def _own(scene: Scene) -> tuple[float, float]:
@@ -183,22 +190,29 @@ def lost_impulse(prediction: Prediction) -> float | None:
     """Return the largest impulse that no force accounts for, of the impulses that were about."""
     scene, surface = prediction.scene, prediction.surface
     active = {e.name for e in prediction.effects if e.active}
-    if not prediction.grasps or active & {"friction", "obstacles", "self_contact", "table"}:
+    strikes = prediction.contacts and prediction.level is not None and prediction.level.motion.split
+    if not prediction.grasps or strikes or (prediction.accuracy.method == "reference" and active & _TOUCH):
         return None
     cable, around = scene.cable, scene.environment
     u, w = along(surface.knots_u)
     inertial = "inertia" in active
     places = np.concatenate([u, [one.u for one in cable.point_masses]])
     masses = np.concatenate([cable.linear_density * w, [one.mass for one in cable.point_masses]])
-    weight = cable.mass * np.asarray(around.gravity) * ("gravity" in active)
+    carried = "table" in active and prediction.accuracy.dimensions == 2  # by a table, which is told of
+    weight = cable.mass * np.asarray(around.gravity) * ("gravity" in active or carried)
     worst, scale = 0.0, _NOTHING * sum(_own(scene)) * surface.horizon
-    for times in windows_of(prediction.grasps[0].times):
+    for k, times in enumerate(windows_of(prediction.grasps[0].times)):
         if len(times) < 3 * _SETTLE:
             continue
         held = [g.reaction[_window(g.times, times)][_SETTLE:] for g in prediction.grasps]
         times = times[_SETTLE:]
         moving = surface(places, times, dt=1)[..., :3]
         force = np.tile(weight, (len(times), 1)) + np.sum(held, axis=0)
+        pressed = np.zeros(len(times))
+        for contact in prediction.contacts:
+            at = _parts(contact.times)[k]
+            force += at_times(times, contact.times[at], (contact.force + contact.friction)[at])
+            pressed += np.interp(times, contact.times[at], contact.pressed[at])
         for load in scene.loads:
             force += load.at(times)
         if "drag" in active:
@@ -210,7 +224,7 @@ def lost_impulse(prediction: Prediction) -> float | None:
         )
         momentum = inertial * np.einsum("u,kud->kd", masses, moving)
         lost = np.linalg.norm(momentum - momentum[0] - impulse, axis=1)
-        flow = np.linalg.norm(held, axis=2).sum(axis=0) + np.linalg.norm(weight)
+        flow = np.linalg.norm(held, axis=2).sum(axis=0) + np.linalg.norm(weight) + pressed
         scale = max(scale, float(np.trapezoid(flow, times)), float(np.abs(momentum).max()))
         worst = max(worst, float(lost.max()))
     return float(worst / scale)

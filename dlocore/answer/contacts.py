@@ -1,8 +1,8 @@
-"""How hard table and obstacles press on the cable, over time."""
+"""How hard table and obstacles press on the cable, and how their friction holds it, over time."""
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import cast
+from typing import Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +12,9 @@ from dlocore.answer.parts import ContactForce
 from dlocore.answer.reactions import WindowForces, Windows
 from dlocore.effects.contact import normal_forces
 from dlocore.effects.distance import distances
-from dlocore.effects.laws import CONTACT, COUNT, TABLE
-from dlocore.kernels.entry import remember_start
+from dlocore.effects.friction import friction_forces
+from dlocore.effects.laws import CONTACT, COUNT, FRICTION, TABLE
+from dlocore.kernels.contact import follow
 from dlocore.problem.grid import Grid
 from dlocore.problem.problem import Problem
 from dlocore.scene.scene import Scene
@@ -29,37 +30,44 @@ _SIDE = 0.01  # of the depth at which contact is as stiff as it gets: way by whi
 
 
 def contact_forces(problem: Problem, grid: Grid, windows: Windows, marched: bool = True) -> tuple[ContactForce, ...]:
-    """Return the forces of the table and of every obstacle that was simulated on the cable, without friction.
+    """Return the forces of the table and of every obstacle that was simulated on the cable.
 
-    They are the sums of N n ds over the nodes of contact, with N of docs/model.md eq. 21, and the speed of a node over
-    the step that ends with a state. A cable that is solved in the plane of the table is carried by it, whatever moves.
-    Where the states are those of a least squares, not `marched`, all nodes act.
+    They are the sums of N n ds and of f ds over the nodes of contact, with N of docs/model.md eq. 21, f of eq. 22, and
+    the speed of a node over the step that ends with a state. A cable that is solved in the plane of the table is
+    carried by it, whatever moves. Where the states are those of a least squares, not `marched`, all nodes act, and
+    friction goes with their speed.
+
+    Args:
+        problem: as it was marched, see `Level.marched`.
+        grid: of its nodes.
+        windows: between events.
+        marched: whether the states are those of a march.
     """
     kept = _kept([len(window.times) for window in windows])
     times = np.concatenate([window.times[at] for window, at in zip(windows, kept, strict=True)])
     found: list[ContactForce] = []
+    if not (problem.on_table or problem.contact):
+        return ()
+    behind = _behind(problem, grid, windows, kept) if marched else _nothing_behind(grid, kept)
     if problem.on_table:
-        carried = np.array([0.0, 0.0, _weight_on_table(problem.scene)])
-        found.append(ContactForce("table", times, np.tile(carried, (len(times), 1)), np.full(len(times), carried[2])))
+        carried = np.tile([0.0, 0.0, _weight_on_table(problem.scene)], (len(times), 1))
+        rubs = [_lying(problem, grid, *one, marched) for one in zip(windows, kept, behind, strict=True)]
+        found.append(ContactForce("table", times, carried, np.concatenate(rubs), carried[:, 2]))
     if problem.contact is None:
         return tuple(found)
-    nodes, weigh = grid.tables.contact, _acting if marched else _all
-    weights = [weigh(problem, grid, window, at) for window, at in zip(windows, kept, strict=True)]
+    nodes = grid.tables.contact
     met = [] if nodes.table_nodes == 0 else [("table", slice(0, nodes.table_nodes), TABLE)]
     numbered = enumerate(problem.scene.environment.obstacles)  # of which those that are simulated are some, in order
     for i, obstacle in enumerate(problem.obstacles):
         number = next(number for number, other in numbered if other is obstacle)
         met.append((f"obstacles[{number}]", slice(nodes.table_nodes, len(nodes.u)), COUNT + i))
     for name, part, row in met:
-        forces, pressed = zip(
-            *[
-                _pressed(problem, grid, window, at[some], part, row, of_nodes[some, part])
-                for window, at, of_nodes in zip(windows, kept, weights, strict=True)
-                for some in np.array_split(np.arange(len(at)), -(-len(at) * (part.stop - part.start) // _AT_ONCE))
-            ],
-            strict=True,
-        )
-        found.append(ContactForce(name, times, np.concatenate(forces), np.concatenate(pressed)))
+        parts = [
+            _pressed(problem, grid, window, at[some], part, row, past.of(some), marched)
+            for window, at, past in zip(windows, kept, behind, strict=True)
+            for some in np.array_split(np.arange(len(at)), -(-len(at) * (part.stop - part.start) // _AT_ONCE))
+        ]
+        found.append(ContactForce(name, times, *(np.concatenate(values) for values in zip(*parts, strict=True))))
     return tuple(found)
 
 
@@ -73,28 +81,32 @@ def with_contact_errors(
         windows: between events.
         beside: problem, grid and windows of each other march.
     """
+    others = [(force, w) for problem, grid, w in beside for force in contact_forces(problem, grid, w)]
 
-    def series(force: ContactForce, of: Windows) -> Series:
-        return Series(force.times, parts_of([len(at) for at in _kept([len(w.times) for w in of])]), force.force)
+    def error(own: ContactForce, kind: Literal["force", "friction"]) -> Floats | None:
+        def series(of: ContactForce, windows: Windows) -> Series:
+            return Series(
+                of.times, parts_of([len(at) for at in _kept([len(w.times) for w in windows])]), getattr(of, kind)
+            )
 
-    others = [(contact_forces(*other), other[2]) for other in beside]
-    return tuple(
-        replace(
-            own,
-            force_error=errors(
-                series(own, windows),
-                [series(force, of) for forces, of in others for force in forces if force.name == own.name],
-            ),
-        )
-        for own in found
-    )
+        return errors(series(own, windows), [series(*other) for other in others if other[0].name == own.name])
+
+    return tuple(replace(own, force_error=error(own, "force"), friction_error=error(own, "friction")) for own in found)
 
 
 def contacts_taken_on(found: tuple[ContactForce, ...], judged: tuple[ContactForce, ...]) -> tuple[ContactForce, ...]:
     """Return contact forces with the errors of those of a motion like it, as far as it has them."""
-    known = {like.name: like for like in judged if like.force_error is not None}
+    known = {like.name: like for like in judged}
+
+    def error(own: ContactForce, of: Floats | None) -> Floats | None:
+        return None if of is None else np.interp(own.times, known[own.name].times, of)
+
     return tuple(
-        replace(own, force_error=np.interp(own.times, known[own.name].times, cast(Floats, known[own.name].force_error)))
+        replace(
+            own,
+            force_error=error(own, known[own.name].force_error),
+            friction_error=error(own, known[own.name].friction_error),
+        )
         if own.name in known
         else own
         for own in found
@@ -112,31 +124,95 @@ def _weight_on_table(scene: Scene) -> float:
     return scene.cable.mass * abs(float(cast(Floats, scene.environment.gravity)[2]))
 
 
-def _all(problem: Problem, grid: Grid, window: WindowForces, at: Indices) -> Floats:
-    """Return the weights (k, nodes) [m] of nodes that all act, as they do where no march is."""
-    w = grid.tables.contact.w
-    return np.broadcast_to(w, (len(at), len(w)))
+class _Behind(NamedTuple):
+    """What lies behind some states when the steps that end with them begin.
 
-
-def _acting(problem: Problem, grid: Grid, window: WindowForces, at: Indices) -> Floats:
-    """Return the weights (k, nodes) [m] that nodes have in the steps that end with some states of a march.
-
-    One of a cell may stand for all of it, as the cable lay at the beginning of the step.
+    Attributes:
+        weights: (k, contact nodes) [m] of these in the step: one of a cell may stand for all of it.
+        stick: (k, contact nodes, 3) anchors of the friction [m]; (k, 0, 3) without.
+        slide: (k, lying points, 2) those of a cable that lies on the table [m]; (k, 0, 2) without.
     """
-    nodes = grid.tables.contact
-    if nodes.cell == 1:
-        return _all(problem, grid, window, at)
-    history, weights = grid.past(), np.empty((len(at), len(nodes.w)))
-    for k, before in enumerate(np.maximum(at - 1, 0)):
-        remember_start(problem.axes, window.states[before], grid.tables, *problem.laws, history)
-        weights[k] = history.pressing
-    return weights
+
+    weights: Floats
+    stick: Floats
+    slide: Floats
+
+    def of(self, some: Indices) -> "_Behind":
+        """Return what lies behind some of the states."""
+        return _Behind(*(values[some] for values in self))
+
+
+def _nothing_behind(grid: Grid, kept: Sequence[Indices]) -> list[_Behind]:
+    """Return what lies behind states in each window where no march led to them: all nodes act."""
+    w = grid.tables.contact.w
+    return [
+        _Behind(np.broadcast_to(w, (len(at), len(w))), np.empty((len(at), 0, 3)), np.empty((len(at), 0, 2)))
+        for at in kept
+    ]
+
+
+def _behind(problem: Problem, grid: Grid, windows: Windows, kept: Sequence[Indices]) -> list[_Behind]:
+    """Return what lies behind the states `kept` of each window of a march.
+
+    Which nodes act is known from where the cable was at the beginning of a step, but the anchors of friction from all
+    that it has done in the window.
+    """
+    if problem.friction is None and grid.tables.contact.cell == 1:
+        return _nothing_behind(grid, kept)
+    history, found = grid.past(), []
+    for window, at in zip(windows, kept, strict=True):
+        if window.anchors is not None:
+            history.stick[:], history.slide[:] = window.anchors
+        states, before = window.states, np.maximum(at - 1, 0)
+        if problem.friction is None:
+            states, before = states[before], np.arange(len(at))
+        past = _Behind(*(np.empty((len(at), *x.shape)) for x in (history.pressing, history.stick, history.slide)))
+        follow(problem.nc, np.ascontiguousarray(states), before, grid.tables, *problem.laws, history, *past)
+        found.append(past)
+    return found
+
+
+def _basis(n_u: int, first: Indices, b0: Floats) -> Floats:
+    """Return the basis functions (k, n_u) where four of them, b0 (k, 4), from `first` (k,) on are not zero."""
+    basis = np.zeros((len(first), n_u))
+    np.put_along_axis(basis, first[:, None] + np.arange(4), b0, axis=1)
+    return basis
+
+
+def _speeds(window: WindowForces, at: Indices) -> Floats:
+    """Return the speed of control points (k, n_u, nc) [m/s] over the steps that end with some states of a window."""
+    step = np.maximum(at, 1)  # the first step is that of both its ends
+    return np.asarray((window.states[step] - window.states[step - 1]) / np.diff(window.times)[step - 1, None, None])
+
+
+def _lying(problem: Problem, grid: Grid, window: WindowForces, at: Indices, behind: _Behind, marched: bool) -> Floats:
+    """Return the friction (k, 3) [N] of the table on a cable that lies on it and moves in its plane, in the world."""
+    points, parameters = grid.tables.lying, problem.laws[1]
+    if problem.friction is None or problem.friction.lying == 0.0:
+        return np.zeros((len(at), 3))
+    over = _basis(grid.n_u, points.first, points.b0)
+    slip, speed = np.zeros((2, len(at), len(over), 3))
+    speed[..., :2] = over @ _speeds(window, at)
+    if marched:
+        slip[..., :2] = over @ window.states[at] - behind.slide
+    slip, speed, rough = slip.reshape(-1, 3), speed.reshape(-1, 3), parameters[FRICTION]
+    limit, up = np.full(len(slip), problem.friction.lying), np.broadcast_to([0.0, 0.0, 1.0], slip.shape)
+    rub = friction_forces(limit, up, slip, speed, rough[0], rough[1], marched)
+    force = np.einsum("p,kpd->kd", points.w, rub.reshape(len(at), -1, 3))
+    return problem.plane.world_vectors(force[:, :2])
 
 
 def _pressed(
-    problem: Problem, grid: Grid, window: WindowForces, at: Indices, part: slice, row: int, weights: Floats
-) -> tuple[Floats, Floats]:
-    """Return the force (k, 3) [N] of one thing on some nodes, in the world, and the sum of its sizes (k,) [N].
+    problem: Problem,
+    grid: Grid,
+    window: WindowForces,
+    at: Indices,
+    part: slice,
+    row: int,
+    behind: _Behind,
+    marched: bool,
+) -> tuple[Floats, Floats, Floats]:
+    """Return force and friction (k, 3) [N] of one thing on some nodes, in the world, and the sum of sizes (k,) [N].
 
     Args:
         problem: that was solved.
@@ -145,12 +221,12 @@ def _pressed(
         at: (k,) of them.
         part: the nodes that may meet it.
         row: of the parameters of the laws that are its.
-        weights: (k, of the part) [m] of the nodes.
+        behind: the states.
+        marched: whether friction goes with the displacement from anchors, or with the speed.
     """
-    nodes, parameters, d = grid.tables.contact, problem.laws[1], min(3, problem.nc)
+    nodes, (active, parameters), d = grid.tables.contact, problem.laws, min(3, problem.nc)
     radius, stiffness, width, damping = parameters[CONTACT, :4]
-    u, basis = nodes.u[part], np.zeros((part.stop - part.start, grid.n_u))
-    np.put_along_axis(basis, nodes.first[part, None] + np.arange(4), nodes.b0[part], axis=1)
+    u, basis = nodes.u[part], _basis(grid.n_u, nodes.first[part], nodes.b0[part])
 
     def places(states: Floats) -> Floats:
         x = np.zeros((len(states), len(u), 3))
@@ -162,8 +238,7 @@ def _pressed(
             return np.asarray(x[:, 2] - parameters[TABLE, 0])
         return np.asarray(distances(parameters[row : row + 1], np.ascontiguousarray(x)))[:, 0] - radius
 
-    now, step = places(window.states[at]), np.maximum(at, 1)  # the first step is that of both its ends
-    speed = places(window.states[step] - window.states[step - 1]) / np.diff(window.times)[step - 1, None, None]
+    now, speed = places(window.states[at]), places(_speeds(window, at))
     of = np.arange(len(u)) // _STRIDE
     some = np.minimum(_STRIDE * np.unique(of) + _STRIDE // 2, len(u) - 1)
     nearest = gaps(now[:, some].reshape(-1, 3)).reshape(len(at), -1)
@@ -174,8 +249,15 @@ def _pressed(
     normal = np.stack([gaps(now[k, n] + way) + depth for way in _SIDE * width * np.eye(3)], axis=-1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     leaving = np.einsum("nd,nd->n", speed[k, n], normal)
-    pressure = normal_forces(stiffness, width, damping, depth, leaving) * weights[k, n]
-    force, pressed = np.zeros((len(at), 3)), np.zeros(len(at))
-    np.add.at(force, k, pressure[:, None] * normal)
-    np.add.at(pressed, k, pressure)
-    return problem.plane.world_vectors(force[:, :d]), pressed
+    weights = behind.weights[:, part][k, n]
+    pressure = normal_forces(stiffness, width, damping, depth, leaving)
+    force, rubs, pressed = np.zeros((len(at), 3)), np.zeros((len(at), 3)), np.zeros(len(at))
+    np.add.at(force, k, (weights * pressure)[:, None] * normal)
+    np.add.at(pressed, k, weights * pressure)
+    if active[FRICTION]:
+        limit = parameters[row, 1 if row == TABLE else 16] * pressure
+        slip = now[k, n] - behind.stick[:, part][k, n] if marched else np.zeros_like(normal)
+        rough = parameters[FRICTION]
+        rub = friction_forces(limit, normal, slip, speed[k, n], rough[0], rough[1], marched)
+        np.add.at(rubs, k, weights[:, None] * rub)
+    return problem.plane.world_vectors(force[:, :d]), problem.plane.world_vectors(rubs[:, :d]), pressed

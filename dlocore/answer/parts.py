@@ -119,23 +119,27 @@ class GraspReaction:
 
 @dataclass(frozen=True, eq=False)
 class ContactForce:
-    """How hard the table or an obstacle presses on the cable, without friction.
+    """How hard the table or an obstacle presses on the cable, and how its friction holds it.
 
     Attributes:
         name: "table", or "obstacles[i]" with the number of the obstacle in the scene.
         times: (k,) [s].
-        force: that it gives to the cable (k, 3) [N].
+        force: that it gives to the cable across its surface (k, 3) [N], without friction.
+        friction: force that it gives to the cable along its surface (k, 3) [N].
         pressed: sum of the sizes of what it gives along the cable (k,) [N]: more than the size of `force` where it
             presses from several sides, as a peg on a cable that is laid around it.
         force_error: estimated error of the force (k,) [N], as `GraspReaction.reaction_error`; None where none was
             computed.
+        friction_error: that of the friction (k,) [N].
     """
 
     name: str
     times: Floats
     force: Floats
+    friction: Floats
     pressed: Floats
     force_error: Floats | None = None
+    friction_error: Floats | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -25,12 +25,15 @@ class WindowForces:
         times: (k,) [s].
         forces: residual of the equations at the held degrees of freedom (k, held) [N].
         states: control points (k, n_u, nc) [m] at those times.
+        anchors: of friction as it begins, see `History`: (contact nodes, 3) and (lying points, 2) [m]; None where the
+            motion has none.
     """
 
     held: Held
     times: Floats
     forces: Floats
     states: Floats
+    anchors: tuple[Floats, Floats] | None = None
 
 
 Windows = tuple[WindowForces, ...]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.answer.clearance import least_distance
-from dlocore.answer.parts import EffectReport, MaterialMotion, StretchMotion
+from dlocore.answer.parts import ContactForce, EffectReport, MaterialMotion, StretchMotion
 from dlocore.kernels.assembly import History, stored_energy
 from dlocore.problem.grid import Grid
 from dlocore.problem.problem import Problem
@@ -39,6 +39,7 @@ def effect_reports(
     problem: Problem,
     material: Callable[[], MaterialMotion | None],
     stretch: Callable[[], StretchMotion],
+    contacts: Callable[[], tuple[ContactForce, ...]],
     surface: SplineSurface,
 ) -> tuple[EffectReport, ...]:
     """Return for each effect whether it was simulated, why, and its size on the predicted motion."""
@@ -69,8 +70,9 @@ def effect_reports(
         del sizes["twist"]
     if not problem.on_table:
         del sizes["table"]
-    if problem.friction is not None and environment.table is not None:
-        sizes["friction"] = (environment.table.friction * weight, "N")
+    if problem.friction is not None:
+        rubs = np.sum([np.linalg.norm(one.friction, axis=1) for one in contacts()], axis=0)
+        sizes["friction"] = (float(np.max(rubs)), "N")
     if problem.obstacles:
         rows = obstacle_rows(problem.scene, problem.obstacles)
         gap = least_distance(surface, rows, _NEAR * cable.diameter) - 0.5 * cable.diameter

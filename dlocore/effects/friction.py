@@ -14,9 +14,12 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dlocore.compiling.kernel import law
 from dlocore.effects.base import Effect, Site, Symmetric, Vector
+
+Floats = NDArray[np.float64]
 
 STICK = 0.02  # of the diameter: s_0 of steps of COARSE and longer ones
 COARSE = 0.05  # [s] for a cable of 1 m; with the root of the length, as the period of one that swings
@@ -80,3 +83,13 @@ def friction(
     nothing = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     force = (-scale * a, -scale * b, -scale * c)
     return (force, tangent, nothing) if steps else (force, nothing, tangent)
+
+
+def friction_forces(
+    limit: Floats, n: Floats, slip: Floats, v: Floats, stick: float, slow: float, steps: bool
+) -> Floats:
+    """Return the force that `friction` does (k, 3) [N/m], of nodes with limits (k,), and n, slip and v (k, 3)."""
+    x = slip if steps else v
+    x = x - np.einsum("kd,kd->k", x, n)[:, None] * n
+    size = np.linalg.norm(x, axis=1)
+    return np.asarray(-(limit / (np.maximum(size, stick) if steps else np.hypot(size, slow)))[:, None] * x)

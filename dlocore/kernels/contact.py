@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from dlocore.compiling.kernel import law, leaf, part
+from dlocore.compiling.kernel import kernel, law, leaf, part
 from dlocore.effects.base import Symmetric, Vector
 from dlocore.effects.contact import normal_force
 from dlocore.effects.distance import signed_distance, to_edge
@@ -399,3 +399,32 @@ def drag_anchors(nc: int, q: Any, points: Any, p: Any, slide: Any, loose: bool) 
         kept = 0.0 if loose else 1.0 if size <= p[FRICTION, 0] else p[FRICTION, 0] / size
         slide[n, 0] = x[0] - kept * a
         slide[n, 1] = x[1] - kept * b
+
+
+@kernel
+def follow(
+    nc: int,
+    states: Any,
+    until: Any,
+    tables: Any,
+    active: Any,
+    p: Any,
+    history: Any,
+    pressing: Any,
+    stick: Any,
+    slide: Any,
+) -> None:
+    """Drag the anchors of friction in `history` behind states (m, n, nc), one after the other, as a march does.
+
+    What it is behind some of them, `until` (k,), in order, is written to pressing (k, contact nodes), stick
+    (k, contact nodes, 3) and slide (k, lying points, 2), see `History`.
+    """
+    row = 0
+    for m in range(until[-1] + 1):
+        if active[CONTACT]:
+            remember(nc, states[m], tables.contact, p, history.stick, history.pressing, False)
+        if active[FRICTION] and p[FRICTION, 2] > 0.0:
+            drag_anchors(nc, states[m], tables.lying, p, history.slide, False)
+        while row < len(until) and until[row] == m:
+            pressing[row], stick[row], slide[row] = history.pressing, history.stick, history.slide
+            row += 1

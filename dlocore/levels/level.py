@@ -15,7 +15,7 @@ from dlocore.problem.discretisation import smallest_n_u
 from dlocore.problem.events import JUMP, moments, swings
 from dlocore.problem.grid import Grid
 from dlocore.problem.held_ends import held_back
-from dlocore.problem.problem import Problem, stiff_as_taut, stiffer, stiffer_for
+from dlocore.problem.problem import Problem, firmer, stiff_as_taut, stiffer, stiffer_for
 from dlocore.problem.time_grid import smallest_n_t, time_knots
 from dlocore.problem.trembling import trembles
 from dlocore.scene.scene import AUTO_TARGET
@@ -100,6 +100,11 @@ class Level:
     def alone(self) -> "Level":
         """The level without those beside it."""
         return replace(self, beside=())
+
+    @property
+    def marched(self) -> Problem:
+        """The problem as it was marched: friction gives way by what is in keeping with the steps."""
+        return firmer(self.problem, self.problem.horizon / self.motion.asked)
 
     @cached_property
     def unseen(self) -> float:

@@ -271,6 +271,7 @@ class _Walk:
     def go(self, begin: float, end: float, first: int, last: int) -> None:
         """Walk through the stretch from `begin` to `end` [s], steps `first` to `last`, or until it has to stop."""
         stretch = self._enter(begin, end, first, last)
+        anchors = self._history.stick.copy(), self._history.slide.copy()
         at, smooth = first, first  # the step reached, and the first of the smooth steps that it is one of
         jumps = stretch.entry.jumps  # whether these begin with a jump or a strike
         try:
@@ -308,9 +309,8 @@ class _Walk:
         begins, ends = np.searchsorted(kept.steps, (first, last))
         rows = slice(begins, ends + 1)
         steps = kept.steps[rows]
-        self._forces.append(
-            WindowForces(stretch.entry.held, self._times[steps], stretch.reactions[steps - first], kept.states[rows])
-        )
+        reactions = stretch.reactions[steps - first]
+        self._forces.append(WindowForces(stretch.entry.held, self._times[steps], reactions, kept.states[rows], anchors))
 
     def _astray(self) -> str:
         """Return why it is given up at the step that was reached, "" where it is not."""

@@ -104,7 +104,7 @@ def test_the_errors_of_what_a_gripper_gives_are_those_at_the_times_of_the_surfac
 
 
 def test_what_table_and_obstacles_give_is_what_python_finds(client: TestClient) -> None:
-    peg = {"kind": "cylinder", "center": [0.6, 0.08, 0.0], "radius": 0.02, "height": 0.1}
+    peg = {"kind": "cylinder", "center": [0.6, 0.08, 0.0], "radius": 0.02, "height": 0.1, "friction": 0.3}
     scene = put(paper_scene(output={"samples_u": 2, "samples_t": 17}), "environment.obstacles", [peg])
     found = predict(to_scene(PredictionRequest.model_validate(scene), nothing_stored)).contacts
     answer = client.post("/v1/predictions?store=false", json=scene).json()
@@ -113,15 +113,28 @@ def test_what_table_and_obstacles_give_is_what_python_finds(client: TestClient) 
     assert npz["contact"].tolist() == ["table", "obstacles[0]"]
     for k, (own, shown) in enumerate(zip(found, answer["contacts"], strict=True)):
         assert own.force_error is not None
-        force = np.column_stack([np.interp(t, own.times, own.force[:, d]) for d in range(3)])
+        assert own.friction_error is not None
         for name, values in (
-            ("force", force),
+            ("force", np.column_stack([np.interp(t, own.times, own.force[:, d]) for d in range(3)])),
+            ("friction", np.column_stack([np.interp(t, own.times, own.friction[:, d]) for d in range(3)])),
             ("pressed", np.interp(t, own.times, own.pressed)),
             ("force_error", np.interp(t, own.times, own.force_error)),
+            ("friction_error", np.interp(t, own.times, own.friction_error)),
         ):
             np.testing.assert_allclose(shown[name], values, **SAME)
             np.testing.assert_array_equal(npz[f"contact_{name}"][k], shown[name])
     assert np.array(answer["contacts"][1]["pressed"]).max() > 1e-3  # N: it was met, so equal forces mean something
+    assert np.abs(answer["contacts"][1]["friction"]).max() > 3e-4
+
+
+def test_a_run_that_was_stored_before_friction_was_noted_still_gives_its_arrays(client: TestClient) -> None:
+    answer = client.post("/v1/predictions?store=false", json=paper_scene()).json()
+    before = [{name: one[name] for name in ("name", "force", "pressed", "force_error")} for one in answer["contacts"]]
+    npz = arrays(surface_npz({**answer, "contacts": before}, None))
+    np.testing.assert_array_equal(npz["contact_force"], [one["force"] for one in before])
+    assert npz["contact_friction"].shape == npz["contact_force"].shape
+    assert np.isnan(npz["contact_friction"]).all()
+    assert np.isnan(npz["contact_friction_error"]).all()
 
 
 def test_where_no_error_was_estimated_there_is_none_of_the_forces(client: TestClient) -> None:
