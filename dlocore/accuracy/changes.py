@@ -19,7 +19,7 @@ _MOST_FALL = 20.0  # times less than the refinement before, at most, is believed
 _MOST_FALL_DAMPED = 3.0 * _LEFT_KINKED
 _MOST_FALL_YIELDING = 4.0  # ... where the cable yields: it is bent for good within a span, which coarse grids lack
 MORE = 1.1  # times as many steps, or control points: fewer are as many
-_STALE = 4.0  # times what a refinement in one direction moved the surface by: once those in the other moved it by more,
+_STALE = 2.0  # times what a refinement in one direction moved the surface by: once those in the other moved it by more,
 # what the first has left is measured again
 DIRECTIONS = "space", "time"
 

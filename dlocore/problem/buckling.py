@@ -29,6 +29,7 @@ Floats = NDArray[np.float64]
 
 BOW = 1e-3  # height, of the length of the part that buckles
 UNSTABLE = "in its plane the motion is unstable, as a disturbance out of it grows"
+_AS_LIKELY = "and its mirror image is as likely; with another bow it goes sooner or later, which no estimate counts"
 GROWTH = math.log(10.0)  # of a disturbance, from which on it matters that there is one
 # What of a force that is spread along a part, free at one end, counts as if it pushed there: of a column under its own
 # weight, mu g L^3/EI = 7.84 against P L^2/EI = pi^2/4 (Greenhill, 1881)
@@ -158,11 +159,11 @@ def side_notes(start: StartCurve) -> list[str]:
     notes = []
     if start.bow:
         side = "left" if start.bow > 0.0 else "right"
-        bow = f"it starts with a bow of {in_mm(abs(start.bow))} to its {side}, and its mirror image is as likely"
+        bow = f"it starts with a bow of {in_mm(abs(start.bow))} to its {side}, {_AS_LIKELY}"
         why = "the straight cable is pushed or twisted along itself and has no side to buckle to"
         notes.append(f"{why}: {bow}")
     if start.aside:
-        bow = f"it starts with a bow of {in_mm(start.aside)} out of it, and its mirror image is as likely"
+        bow = f"it starts with a bow of {in_mm(start.aside)} out of it, {_AS_LIKELY}"
         notes.append(f"{'the plane of its bow may not hold it' if start.bow else UNSTABLE}: {bow}")
     return notes
 

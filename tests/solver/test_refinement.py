@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from benchmarks.hard.curves import arc, hairpin
 from benchmarks.hard.generator import draw
 from benchmarks.hard.judge import compare
-from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, Sphere, Straight, equilibrium, predict
+from dlocore import Box, Cable, Environment, Grasp, Move, Points, Quality, Scene, Sphere, Straight, equilibrium, predict
 from dlocore.accuracy import budget, refinement
 from dlocore.accuracy.changes import Change, Changes
 from dlocore.accuracy.refinement import AUTO_ENOUGH
@@ -276,9 +276,9 @@ def test_contact_that_a_grid_had_to_make_stiffer_begins_so_on_the_next():
 def test_a_direction_is_stale_once_the_other_has_moved_the_surface_by_far_more():
     changes = Changes({"space": Change(2e-3, np.inf, 0.75), "time": Change(9e-3, np.inf, 0.45)})
     changes.since = {"space": 9e-3}
-    assert changes.stale(target=5e-3) == ["space"]  # more than four times as much, and more than the target
+    assert changes.stale(target=5e-3) == ["space"]  # more than twice as much, and more than the target
     assert changes.stale(target=1e-2) == []
-    changes.last["space"] = Change(2.5e-3, np.inf, 0.75)
+    changes.last["space"] = Change(4.6e-3, np.inf, 0.75)
     assert changes.stale(target=5e-3) == []
 
 
@@ -403,3 +403,26 @@ def test_a_rod_that_swings_is_within_its_target_where_strong_damping_begins(hori
     error = np.linalg.norm(found.surface.positions(u, t) - u[None, :, None] * way[:, None], axis=-1).max()
     assert error < 0.01
     assert error < 2.0 * found.accuracy.error_estimate
+
+
+@pytest.mark.slow
+def test_what_steps_err_by_is_measured_again_where_more_points_have_moved_the_surface_by_more():
+    """A cable is pushed along itself between walls: at 93 points twice the steps move it by 9 mm, at 41 by 0.7 mm.
+
+    The answer on 93 points was 5 mm off at an estimate of 0.8 mm: targets of 0.2 and 0.5 mm have its middle 16.3 mm
+    aside.
+    """
+    x = np.linspace(0.0, 1.0, 401)
+    walls = [Box(center=(0.5, side, 0.0), size=(2.0, 0.04, 0.1)) for side in (0.035, -0.035)]
+    scene = Scene(
+        cable=Cable(length=1.0, diameter=0.006, linear_density=0.05, bending_stiffness=3e-3),
+        shape=Points(points=np.column_stack([x, 0.004 * np.sin(2.0 * np.pi * x), 0.0 * x])),
+        grasps=[Grasp(u=0.0, path=Move(displacement=(0.06, 0.0, 0.0), duration=1.5)), Grasp(u=1.0)],
+        environment=Environment(drag=0.3, gravity=(0.0, 0.0, 0.0), obstacles=walls),
+        horizon=2.0,
+    )
+    found = predict(scene)
+    assert found.status == "converged"
+    assert "with another bow it goes sooner or later" in found.message
+    assert found.accuracy.error_estimate < 2e-3
+    assert found.surface([0.5], [1.2])[0, 0, 1] == pytest.approx(0.0163, abs=2.0 * found.accuracy.error_estimate)
