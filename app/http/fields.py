@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from app.schemas.base import MAX_REPORTED, RUN_ID
+from app.schemas.base import MAX_NAMES, MAX_REPORTED, RUN_ID
 from app.schemas.request import PredictionRequest
 from dlocore import SceneError
 
@@ -71,7 +71,7 @@ def _bad_field(error: Any, body: Any, schema: "_Schema") -> BadField:
     if kind == "json_invalid":
         at = loc[1] if len(loc) > 1 else 0
         given = str(body or "")[max(0, at - 30) : at + 30]
-        allowed = "JSON (RFC 8259) in UTF-8, with each name once in an object"
+        allowed = f"JSON (RFC 8259) in UTF-8, with each name once in an object, and at most {MAX_NAMES}"
         return BadField(_WHOLE, given, allowed, f"The body can't be read: {context['error']}. Allowed: {allowed}.")
     if kind == "two_forms":
         given, allowed = context["given"], context["allowed"]

@@ -1,7 +1,7 @@
 """Numbers, vectors and the base model of the contract."""
 
 import re
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag
 
@@ -21,6 +21,8 @@ CountOrNone = Annotated[_Integer | None, BeforeValidator(_whole)]
 Flag = Annotated[bool, Field(strict=True)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Point = Annotated[list[Number], Field(min_length=2, max_length=3)]
+_Item = TypeVar("_Item")
+Long = Annotated[list[_Item], Field(fail_fast=True)]  # its first fault is told: all of a large body fill the memory
 Coordinate = Annotated[
     Number,
     Field(ge=0.0, le=MAX_LENGTH, description="Material coordinate [m], 0 to the cable's length.", examples=[0.25]),
@@ -28,6 +30,7 @@ Coordinate = Annotated[
 ID = re.compile("^[0-9a-f]{28}$")  # of a run or a study, app.store.runs.new_id
 RunId = Annotated[str, Field(pattern=ID.pattern)]
 RUN_ID = "the id of a run, 28 of the characters 0 to 9 and a to f"  # the one pattern of a text, in words
+MAX_NAMES = 200  # of one object of a request: each that is no field would be a fault, and all are found first
 MAX_REPORTED = 50  # faults of a request that an answer names at most
 LIKE = (
     "Id of a run of a scene much like this one, a target moved by centimetres say: its grid and its error estimate are "

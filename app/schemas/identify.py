@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
-from app.schemas.base import Count, Flag, Model, Number, Vector
+from app.schemas.base import Count, Flag, Long, Model, Number, Vector
 from app.schemas.fit import Coordinate
 from dlocore.identify.parameters import DEFAULT
 from dlocore.scene.cable import MAX_LENGTH
@@ -17,16 +17,16 @@ Name = Annotated[str, Field(max_length=40)]
 class RecordingModel(Model):
     """Tracked markers of one motion, or of shapes at rest."""
 
-    times: list[Number] = Field(
+    times: Long[Number] = Field(
         min_length=1, max_length=5000, description="Time of each frame [s], rising.", examples=[[0.0, 0.01, 0.02]]
     )
-    markers: list[Frame] = Field(
+    markers: Long[Frame] = Field(
         min_length=1,
         max_length=5000,
         description="Position of each marker in each frame [m], in order along the cable; null where it was lost.",
         examples=[[[[0.0, 0.0, 0.0], None, [0.2, 0.0, -0.1]]]],
     )
-    u: list[Number] | None = Field(
+    u: Long[Number] | None = Field(
         default=None,
         description="Material coordinate of each marker [m]; absent: from the distances of neighbours.",
         examples=[[0.0, 0.1, 0.2]],

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from app.schemas.base import BY_FORM, LIST, OBJECT, Coordinate, Model, Number, Vector
+from app.schemas.base import BY_FORM, LIST, OBJECT, Coordinate, Long, Model, Number, Vector
 from dlocore.scene.paths import MAX_STOPS, MAX_WAYPOINTS, Profile, Start, Through
 from dlocore.scene.scene import Hold
 
@@ -34,15 +34,15 @@ class WaypointsPath(Model):
     """Pass through positions at given times, along a C2 spline, or stop at each."""
 
     kind: Literal["waypoints"]
-    times: list[Instant] = Field(
+    times: Long[Instant] = Field(
         min_length=2, max_length=MAX_WAYPOINTS, description="Rising times since the grasp [s].", examples=[[0, 0.5, 1]]
     )
-    positions: list[Vector] = Field(
+    positions: Long[Vector] = Field(
         min_length=2,
         description="One position for each time [m]; the first is where the cable is grasped.",
         examples=[[[0.25, 0, 0], [0.25, 0.1, 0], [0.25, 0.3, 0]]],
     )
-    orientations: list[Quaternion] | None = Field(
+    orientations: Long[Quaternion] | None = Field(
         default=None,
         description="One unit quaternion (w, x, y, z) for each time; it turns the shorter way to the next, with "
         "profile `spline` as smoothly as it goes.",
@@ -83,12 +83,12 @@ class PrimitiveModel(Model):
 class ForceOverTime(Model):
     """A force given at times, linear between them and constant outside."""
 
-    times: list[Number] = Field(
+    times: Long[Number] = Field(
         min_length=1,
         description="Rising times [s]; the first force acts before them, too, and the last one after.",
         examples=[[0, 1]],
     )
-    values: list[Vector] = Field(
+    values: Long[Vector] = Field(
         min_length=1, description="One force for each time [N].", examples=[[[0, 0, 0], [0, 1, 0]]]
     )
 

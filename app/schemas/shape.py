@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from app.schemas.base import Flag, Model, Number, Point, Vector
+from app.schemas.base import Flag, Long, Model, Number, Point, Vector
 from dlocore.scene.points import MAX_POINTS, MIN_POINTS
 from dlocore.scene.scene import MAX_CONTROL_POINTS, MAX_STRAIN
 
@@ -19,14 +19,14 @@ class PointVelocities(Model):
     """Velocities at points: at the points of the shape, or evenly spaced along a straight one."""
 
     kind: Literal["points"]
-    points: list[Vector] = Field(min_length=4, description="Velocities [m/s].", examples=[[[0, 0.1, 0]] * 4])
+    points: Long[Vector] = Field(min_length=4, description="Velocities [m/s].", examples=[[[0, 0.1, 0]] * 4])
 
 
 class ControlVelocities(Model):
     """Control points of the velocity, one for each control point of the shape."""
 
     kind: Literal["control_points"]
-    control_points: list[ControlPoint] = Field(
+    control_points: Long[ControlPoint] = Field(
         min_length=4,
         description=(
             "[m/s, m/s, m/s] or [m/s, m/s, m/s, rad/s]; the fourth is the rate of theta. With three the "
@@ -44,7 +44,7 @@ def _velocity_form(value: object) -> str:
 
 Velocity = Annotated[
     Annotated[Vector, Tag("~one")]
-    | Annotated[Annotated[list[Vector], Field(min_length=4)], Tag("~rows")]
+    | Annotated[Annotated[Long[Vector], Field(min_length=4)], Tag("~rows")]
     | Annotated[
         Annotated[PointVelocities | ControlVelocities, Field(discriminator="kind")],
         Tag("~object"),
@@ -99,14 +99,14 @@ class ControlPointsShape(Model):
         ),
         examples=[[[0, 0, 0], [0.3, 0, 0], [0.7, 0, 0], [1, 0, 0]]],
     )
-    knots: list[Number] | None = Field(
+    knots: Long[Number] | None = Field(
         default=None,
         description="Knots [m], four more than control points, from 0 to the cable's length; absent: uniform.",
         examples=[[0, 0, 0, 0, 1, 1, 1, 1]],
     )
     settle: Settle = False
     velocity: Velocity | None = Field(default=None, description="Initial velocity [m/s]; absent: at rest.")
-    strain: list[Annotated[Number, Field(ge=-MAX_STRAIN, le=MAX_STRAIN)]] | None = Field(
+    strain: Long[Annotated[Number, Field(ge=-MAX_STRAIN, le=MAX_STRAIN)]] | None = Field(
         default=None,
         description=(
             "Axial strain, one number for each control point, at the mean of three successive inner knots; absent: the "

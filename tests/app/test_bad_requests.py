@@ -1,13 +1,21 @@
 """Every kind of wrong request is answered by a problem document that names the field."""
 
+import asyncio
 import gzip
 import json
 import re
+import threading
+import tracemalloc
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
+from pydantic import ValidationError
+from starlette.types import Message
 
+from app.routes import body as bodies
+from app.schemas.base import MAX_NAMES, MAX_REPORTED
+from app.schemas.identify import IdentifyRequest
 from tests.app.conftest import ABSENT, contract_scene, paper_scene, put
 
 PAPER = paper_scene()
@@ -307,6 +315,57 @@ def test_a_list_of_many_wrong_numbers_does_not_give_an_endless_answer(client: Te
         client.post("/v1/predictions", json=put(POINTS, "shape.points", [["a", "b", "c"]] * 5000)), 422
     )
     assert len(problem["errors"]) == 50
+
+
+def test_a_large_body_of_faults_is_refused_without_one_for_each(client: TestClient) -> None:
+    frames = [[["", "", ""]] * 200] * 100
+    recording = {"times": [""] * 1000, "markers": frames, "u": [""] * 1000}
+    with pytest.raises(ValidationError) as found:
+        IdentifyRequest.model_validate({"recordings": [recording]})
+    assert found.value.error_count() == 1 + 3 * 200 + 1
+    path = {"kind": "waypoints", "times": [""] * 1000, "positions": [["", "", ""]] * 1000}
+    load = {"u": 0.5, "force": {"times": [""] * 1000, "values": [["", "", ""]] * 1000}}
+    shape = {"kind": "straight", "velocity": [["", "", ""]] * 1000}
+    scene = {**PAPER, "shape": shape, "primitives": [{"u": 0.5, "path": path}], "loads": [load]}
+    problem = the_problem(client.post("/v1/predictions", json=scene), 422)
+    assert len(problem["errors"]) == 3 * (1 + 3) - 1
+
+
+def test_an_object_of_too_many_names_is_refused_before_each_is_a_fault(client: TestClient) -> None:
+    body = json.dumps({"scenes": [{str(i): 1 for i in range(MAX_NAMES + 1)}]})
+    (error,) = the_problem(posted(client, "/v1/predictions:batch", body), 422)["errors"]
+    assert error["field"] == "body"
+    assert "an object has too many names" in error["message"]
+    assert error["allowed"].endswith(f"and at most {MAX_NAMES}")
+    assert f'"{MAX_NAMES}"' in error["given"]
+    scene = {**PAPER, **{str(i): 1 for i in range(MAX_NAMES - len(PAPER))}}
+    assert len(the_problem(client.post("/v1/predictions", json=scene), 422)["errors"]) == MAX_REPORTED
+
+
+@pytest.mark.parametrize("body", [b"{" * 500_000, b'{"a":' * 100_000], ids=range(2))
+def test_a_body_of_objects_without_end_takes_no_memory_for_each(body: bytes) -> None:
+    tracemalloc.start()
+    try:
+        with pytest.raises(json.JSONDecodeError):
+            asyncio.run(_received(body).json())
+        assert tracemalloc.get_traced_memory()[1] < 20 * len(body)  # an object's names take 200
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_large_body_is_read_beside_other_requests(monkeypatch: pytest.MonkeyPatch) -> None:
+    threads: list[threading.Thread] = []
+    monkeypatch.setattr(bodies, "_check_names", lambda text: threads.append(threading.current_thread()))
+    for size in (10, 1_000_000):
+        assert asyncio.run(_received(b"[" + b" " * size + b"]").json()) == []
+    assert [thread is threading.current_thread() for thread in threads] == [True, False]
+
+
+def _received(content: bytes) -> bodies.JsonRequest:
+    async def receive() -> Message:
+        return {"type": "http.request", "body": content}
+
+    return bodies.JsonRequest({"type": "http"}, receive)
 
 
 @pytest.mark.parametrize("media", ["text/plain", "application/x-www-form-urlencoded", "application/xml", ""])
