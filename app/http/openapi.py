@@ -28,6 +28,8 @@ def install(app: FastAPI) -> None:
                     _describe_bad_request(address, operation["responses"])
                     if "401" in operation["responses"]:
                         operation["responses"]["403"] = problem_document("A page of another site asks for it.")
+            _add_enums(document)
+            _add_token(document, is_needed=app.state.settings.token is not None)
             for name in ("HTTPValidationError", "ValidationError"):
                 schemas.pop(name, None)
             app.openapi_schema = document
@@ -40,6 +42,25 @@ def _schemas(model: type[BaseModel]) -> dict[str, Any]:
     schema = model.model_json_schema(ref_template=_REFERENCE, mode="serialization")
     parts = schema.pop("$defs", {})
     return {**parts, model.__name__: schema}
+
+
+def _add_enums(node: Any) -> None:
+    """Give each constant as the one value of an enum, too, which more generators of clients read."""
+    if isinstance(node, dict) and isinstance(node.get("const"), str):
+        node["enum"] = [node["const"]]
+    for part in node.values() if isinstance(node, dict) else node if isinstance(node, list) else ():
+        _add_enums(part)
+
+
+def _add_token(document: dict[str, Any], *, is_needed: bool) -> None:
+    """Describe the bearer token, wherever an address can answer 401; optional in a service that needs none."""
+    description = "The token of the service (`DLO_TOKEN`), where it has one."
+    schemes = document["components"].setdefault("securitySchemes", {})
+    schemes["token"] = {"type": "http", "scheme": "bearer", "description": description}
+    for path in document["paths"].values():
+        for operation in path.values():
+            if "401" in operation["responses"]:
+                operation["security"] = [{"token": []}] if is_needed else [{}, {"token": []}]
 
 
 def _describe_bad_request(address: str, responses: dict[str, Any]) -> None:

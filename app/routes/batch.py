@@ -14,7 +14,7 @@ from app.service.batch import check_size, predict_all
 from app.service.service import TheService
 
 router = APIRouter(tags=["predictions"], route_class=JsonRoute)
-_LINE = {"itemSchema": {"$ref": "#/components/schemas/BatchLine"}}
+_LINE = {"schema": {"$ref": "#/components/schemas/BatchLine"}}  # of each: OpenAPI 3.1 has no word for that
 
 
 @router.post(
@@ -22,7 +22,7 @@ _LINE = {"itemSchema": {"$ref": "#/components/schemas/BatchLine"}}
     response_class=Response,
     summary="Predict many scenes",
     responses={
-        200: {"description": "One JSON object a line, see `BatchLine`.", "content": {LINES: _LINE}},
+        200: {"description": "JSON lines: the schema, `BatchLine`, is that of each line.", "content": {LINES: _LINE}},
         **described.failures(401, 404, 406, 413, 415, 422, 429, 503),
     },
 )

@@ -18,10 +18,11 @@ _MEASUREMENT = {"$ref": "#/components/schemas/MeasurementResponse"}
 
 
 def _course(item: str, example: str) -> dict[str, Any]:
-    """Return the description of a course of events whose items are called `item`."""
+    """Return the description of a course of events whose items are called `item`: the schema is that of each event."""
     return {
-        "itemSchema": {
+        "schema": {
             "type": "object",
+            "description": "One event of the stream.",
             "properties": {
                 "event": {"enum": ["state", item, "done", "error"]},
                 "id": {"type": "string", "description": "Number of the event, but for `state`.", "examples": ["0"]},
@@ -29,7 +30,7 @@ def _course(item: str, example: str) -> dict[str, Any]:
             },
             "required": ["event", "data"],
         },
-        "example": f"id: 0\nevent: {item}\ndata: {example}\n\n",
+        "example": {"id": "0", "event": item, "data": example},
     }
 
 
