@@ -64,10 +64,29 @@ class FitResponse(BaseModel):
 
 
 _SEEN = [[0.02, 0.01], [0.13, 0.06], [0.24, 0.05], [0.36, -0.01], [0.47, -0.03], [0.58, 0.02], [0.68, 0.09]]
+_CLOUD = [
+    [0.47, 0.03],
+    [0.61, 0.11],
+    [0.16, 0.11],
+    [0.3, 0.6],
+    [0.52, 0.06],
+    [0.38, -0.01],
+    [0.56, 0.09],
+    [0.7, 0.09],
+    [0.07, 0.09],
+    [0.11, 0.11],
+    [0.65, 0.11],
+    [0.02, 0.06],
+    [0.43, 0.0],
+    [0.2, 0.08],
+    [0.34, 0.0],
+    [0.29, 0.02],
+    [0.25, 0.05],
+]
 FIT_EXAMPLES: dict[str, Example] = {
     "ordered": {"summary": "Points in order along a cable of known length", "value": {"points": _SEEN, "length": 0.73}},
     "cloud": {
-        "summary": "The same points in no order, and one that is not of the cable",
-        "value": {"points": [*_SEEN[::-2], *_SEEN[::2], [0.3, 0.6]], "ordered": False},
+        "summary": "Points in no order, one of them not of the cable",
+        "value": {"points": _CLOUD, "ordered": False},
     },
 }

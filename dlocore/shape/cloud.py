@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from dlocore.errors import SceneError, calculable, points_array
 from dlocore.scene.scene import Points
-from dlocore.shape.fit import MAX_SPANS, NOISE, fit_points
+from dlocore.shape.fit import MAX_SPANS, NOISE, check_length, fit_points
 from dlocore.shape.ordering import DEVIATIONS, Indices, Order, order_points, without_spikes
 from dlocore.shape.shape import StartCurve, start_curve
 from dlocore.shape.smoothing import smooth
@@ -79,14 +79,17 @@ def _fitted(p: Floats, ordered: bool, length: float | None, start: Floats | None
         if len(kept) < LEAST:
             raise SceneError("points", f"{len(kept)} points along the cable", f"at least {LEAST}")
         seen = p[kept] if ordered else _averaged(p[kept])
+        no_curve = _no_curve(len(kept), count)
         try:
             measured = _measured(seen)
+        except SceneError:  # about a length and points that are not the caller's, as that of the fit below
+            raise no_curve from None
+        try:
             curve = start_curve(Points(points=seen), measured if length is None else length)
-        except SceneError as error:
-            if length is None:
-                allowed = "points along one smooth curve, in their order if need be; or the cable's length beside them"
-                raise SceneError("points", f"{len(kept)} points", allowed, "They show no single curve") from None
-            raise SceneError(error.field.removeprefix("shape."), error.given, error.allowed, error.reason) from None
+        except SceneError:
+            if length is not None:
+                check_length("points", "points along the whole cable", measured, length, "length")
+            raise no_curve from None
         off = _off(curve, p[kept])
         bad = off > max(DEVIATIONS * float(np.median(off)) / 0.6745, NOISE)
         if not remove_outliers or not bad.any():
@@ -95,6 +98,13 @@ def _fitted(p: Floats, ordered: bool, length: float | None, start: Floats | None
     off = _off(curve, p[kept])
     curve = replace(curve, fit_rms=float(np.sqrt((off**2).mean())), fit_max=float(off.max()))
     return CloudFit(curve, measured, kept, np.setdiff1d(np.arange(count), kept))
+
+
+def _no_curve(kept: int, count: int) -> SceneError:
+    """Return the error of `count` points of which those that are `kept` have no fit."""
+    given = f"{count} points" if kept == count else f"{count} points, of which {count - kept} would be left out"
+    allowed = "points along one smooth curve, in their order if need be, or more of them, without outliers"
+    return SceneError("points", given, allowed, "They show no single curve")
 
 
 def _averaged(p: Floats) -> Floats:

@@ -157,13 +157,13 @@ def _doubled_back(at: int | None) -> SceneError:
     return SceneError("shape.points", f"points that double back on themselves{where}", allowed)
 
 
-def check_length(name: str, allowed: str, given: float, length: float) -> None:
-    """Raise SceneError on the field `name` unless a curve of length `given` [m] fits a cable of `length` [m]."""
+def check_length(name: str, allowed: str, given: float, length: float, field: str = "cable.length") -> None:
+    """Raise SceneError on `name` unless a curve of length `given` [m] fits a cable of `length` [m], that of `field`."""
     if not _is_about(given, length):
         reason = f"The cable is {length:.4g} m long; the two may differ by {MAX_LENGTH_MISMATCH:.0%}"
         if given > FARTHEST * length:
             reason = f"{MILLIMETRES}. {reason}"
-        raise SceneError(name, f"a curve {given:.4g} m long", f"{allowed}, or another cable.length", reason)
+        raise SceneError(name, f"a curve {given:.4g} m long", f"{allowed}, or another {field}", reason)
 
 
 def _is_about(given: float, length: float) -> bool:

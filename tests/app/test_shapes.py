@@ -126,6 +126,24 @@ def test_points_of_no_cable_are_refused_by_name(client: TestClient, body: dict[s
     assert [error["field"] for error in problem["errors"]] == [field]
 
 
+@pytest.mark.parametrize("length", [None, 0.73])
+def test_few_points_with_an_outlier_are_refused_with_no_length_but_the_given_one(length: float | None) -> None:
+    points = [[0.68, 0.09], [0.47, -0.03], [0.24, 0.05], [0.02, 0.01], [0.13, 0.06], [0.36, -0.01], [0.58, 0.02]]
+    with pytest.raises(SceneError) as error:
+        fit_cloud([*points, [0.3, 0.6]], ordered=False, length=length)
+    assert error.value.field == "points"
+    assert error.value.given == "8 points, of which 1 would be left out"
+    assert error.value.reason == "They show no single curve"
+
+
+def test_points_of_another_length_than_the_cable_are_told_both(client: TestClient) -> None:
+    points = sine(np.linspace(0, 1, 60))[np.random.default_rng(1).permutation(60)]
+    problem = the_problem(client.post(FIT, json={"points": points.tolist(), "ordered": False, "length": 2.5}), 422)
+    assert "The cable is 2.5 m long" in problem["detail"]
+    assert "Got a curve 1.19" in problem["detail"]
+    assert problem["errors"][0]["allowed"] == "points along the whole cable, or another length"
+
+
 def test_a_cross_is_no_cable() -> None:
     s = np.linspace(-1, 1, 101)
     zero = np.zeros_like(s)
