@@ -149,6 +149,9 @@ class AccuracyModel(BaseModel):
         "stiff contact is decides on it; empty where it is unknown.",
         examples=[{"grid": 8.8e-4, "iteration": 1e-8, "neglected": 0.0}],
     )
+    neglected: float = Field(
+        description="The part of it that effects left out by `auto` may have, about [m].", examples=[0.0]
+    )
     wall_time: float = Field(description="Time of the solve [s].", examples=[0.004])
     n_u: int = Field(description="Control points along the cable.", examples=[13])
     n_t: int = Field(description="Control points in time.", examples=[19])

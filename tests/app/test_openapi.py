@@ -7,10 +7,15 @@ from typing import Any
 import pytest
 import schemathesis
 from fastapi.testclient import TestClient
+from pydantic import BaseModel
 
 from app.main import create_app
-from app.schemas.fit import FIT_EXAMPLES
+from app.schemas import PredictionList, PredictionResponse
+from app.schemas.batch import BatchLine
+from app.schemas.fit import FIT_EXAMPLES, FitResponse
+from app.schemas.plan import PlanResponse
 from app.settings import Settings
+from tests.app.conftest import paper_scene
 
 
 @pytest.mark.parametrize("token", [None, "a long token"])
@@ -57,3 +62,21 @@ def test_the_example_of_a_cloud_has_the_one_point_left_out_that_is_not_of_the_ca
     found = client.post("/v1/shapes:fit", json=example).json()
     assert [example["points"][i] for i in found["outliers"]] == [[0.3, 0.6]]
     assert found["fit_error"]["max"] < 0.01
+
+
+@pytest.mark.parametrize(
+    ("model", "address", "body"),
+    [
+        (PredictionResponse, "/v1/predictions", paper_scene()),
+        (PredictionResponse, "/v1/predictions?store=false", paper_scene(quality={"method": "reference"})),
+        (BatchLine, "/v1/predictions:batch", {"scenes": [paper_scene()]}),
+        (PlanResponse, "/v1/scenes:explain", paper_scene()),
+        (FitResponse, "/v1/shapes:fit", FIT_EXAMPLES["ordered"]["value"]),
+        (PredictionList, "/v1/predictions", None),
+    ],
+)
+def test_an_answer_has_no_field_that_the_schema_does_not_know(
+    client: TestClient, model: type[BaseModel], address: str, body: Any
+) -> None:
+    answer = (client.get(address) if body is None else client.post(address, json=body)).json()
+    assert model.model_validate(answer).model_dump(mode="json", exclude_unset=True) == answer
