@@ -1,10 +1,11 @@
 """Compile every kernel, by predictions that between them call for all of them; from the cache where it has them."""
 
-import atexit
 import os
 import subprocess
 import sys
+import threading
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import numpy as np
 from dlocore.balance import energies
 from dlocore.compiling.caching import is_kept
 from dlocore.compiling.interrupts import interruptible
+from dlocore.errors import Cancelled
 from dlocore.front import predict
 from dlocore.kernels.march import march_steps
 from dlocore.prediction import Prediction
@@ -34,23 +36,35 @@ GRASP = Grasp(u=0.3, hold="clamp", path=MOVE)
 CABLE = Cable.preset("paper", bending_damping=1e-4, yield_strain=0.1, memory_rate=1.0)
 
 
+def is_compiled() -> bool:
+    """Return whether the kernels have been compiled before: to load them takes seconds, to compile them minutes."""
+    return is_kept(march_steps)
+
+
 @interruptible
-def warm_up(processes: int | None = None) -> None:
+def warm_up(processes: int | None = None, cancelled: Callable[[], bool] | None = None) -> None:
     """Compile, or load from the cache, every kernel, so that the first prediction is as fast as the next.
 
     Args:
         processes: how many compile at once where nothing is compiled yet; by default one a core.
+        cancelled: asked ten times a second while they do, and between what is loaded; where it returns True it stops.
 
     Raises:
         ValueError: fewer than one process.
+        Cancelled: `cancelled` returned True.
     """
     if processes is not None and processes < 1:
         raise ValueError(f"processes: {processes} is not allowed; at least 1")
-    at_once = processes or os.cpu_count() or 1
+
+    def check() -> None:
+        if cancelled is not None and cancelled():
+            raise Cancelled("the warm-up was cancelled")
+
     by_python = Path(sys.executable or "").name.startswith("python")  # not a program that has one inside
-    if at_once > 1 and by_python and not is_kept(march_steps):
-        _compile_in_processes(at_once)
+    if by_python and not is_compiled():
+        _compile_in_processes(processes or os.cpu_count() or 1, check)
     for part in PARTS.values():
+        check()
         part()
 
 
@@ -63,7 +77,7 @@ def warm_up_for(scene: Scene) -> None:
     Raises:
         SceneError: the scene can't be solved as it was given.
     """
-    if not is_kept(march_steps):
+    if not is_compiled():
         warm_up()
         return
     for name in TAKEN[pose(scene).nc]:
@@ -72,27 +86,40 @@ def warm_up_for(scene: Scene) -> None:
         PARTS["reference"]()
 
 
-def _compile_in_processes(at_once: int) -> None:
-    """Compile every share in a process of its own; what one fails to do is left to the caller."""
+def _compile_in_processes(at_once: int, check: Callable[[], None]) -> None:
+    """Compile every share in a process of its own; what one fails to do is left to the caller.
+
+    Where one is killed no other is started. All end where `check` raises, and as this process ends, however it does:
+    each reads from a pipe that this one holds. An interrupt from a terminal is for this one alone.
+    """
     waiting, running = list(SHARES), list[subprocess.Popen[bytes]]()
-
-    def stop() -> None:
-        waiting.clear()
-        for process in running:
-            process.kill()
-            process.wait()
-
-    atexit.register(stop)  # where this thread is left behind as the program ends
+    nowhere = subprocess.DEVNULL
     try:
         while waiting or running:
+            check()
             while waiting and len(running) < at_once:
                 command = [sys.executable, "-m", "dlocore.warming", *waiting.pop(0)]
-                running.append(subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+                running.append(
+                    subprocess.Popen(
+                        command, stdin=subprocess.PIPE, stdout=nowhere, stderr=nowhere, start_new_session=True
+                    )
+                )
             time.sleep(0.1)
-            running[:] = [process for process in running if process.poll() is None]
+            for process in [process for process in running if process.poll() is not None]:
+                running.remove(process)
+                process.communicate()
+                if process.returncode < 0:
+                    waiting.clear()
     finally:
-        stop()
-        atexit.unregister(stop)
+        for process in running:
+            process.kill()
+            process.communicate()
+
+
+def _end_with_parent() -> None:
+    """End this process when the one that started it has ended, which closes the pipe that is read here."""
+    os.read(0, 1)
+    os._exit(1)
 
 
 def _smooth(table: Table | None) -> None:
@@ -190,5 +217,6 @@ SHARES = (
 )
 
 if __name__ == "__main__":
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     for name in sys.argv[1:]:
         PARTS[name]()

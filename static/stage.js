@@ -5,7 +5,7 @@ import { isDark } from "./appearance.js";
 const RETRY = 2000; // ms
 const COMPILING = "urn:dlo:problem:not-ready";
 const SAID = {
-  compiling: "The solver is being compiled for this machine. That takes a minute or two, once; this page then comes alive by itself.",
+  compiling: "The solver is being compiled or loaded. The first time that takes some minutes, later seconds; this page then comes alive by itself.",
   silent: "The service does not answer. This page tries again by itself.",
 };
 const scene = document.getElementById("scene");

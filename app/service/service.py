@@ -1,9 +1,9 @@
 """What the routes work with: the settings, the stored runs, the solves under way, and whether the solver is ready."""
 
 import asyncio
+import contextlib
 import logging
 from collections.abc import AsyncIterator, Callable, Collection
-from contextlib import asynccontextmanager
 from dataclasses import dataclass, field, replace
 from threading import Event
 from typing import Annotated
@@ -27,7 +27,8 @@ from app.service.worker import Worker, nothing
 from app.settings import Settings
 from app.store.recent import Recent
 from app.store.runs import RunStore
-from dlocore import Iteration, MaterialMotion, Prediction, Scene, SceneError, warm_up
+from dlocore import Cancelled, Iteration, MaterialMotion, Prediction, Scene, SceneError, warm_up
+from dlocore.warming import is_compiled
 
 _log = logging.getLogger("dlo")
 
@@ -45,7 +46,8 @@ class Service:
         recent: the last predictions, from which others may go on.
         measurements: calibrations and studies under way.
         searches: identifications of cables.
-        ready: whether the solver is compiled.
+        ready: whether the solver is compiled and loaded.
+        compiled: whether the solver had been compiled before the start, so that it is loaded within seconds.
     """
 
     settings: Settings
@@ -57,6 +59,7 @@ class Service:
     measurements: Measurements = field(default_factory=Measurements)
     searches: Searches = field(init=False)
     ready: bool = field(default=False)
+    compiled: bool = field(default_factory=is_compiled)
     _tasks: TaskGroup | None = field(init=False, default=None)
     _closed: anyio.Event = field(init=False, default_factory=anyio.Event)
 
@@ -69,7 +72,7 @@ class Service:
         runs, worker = RunStore(settings), Worker.of(settings)
         return Service(settings, runs, worker, Metrics(worker, runs))
 
-    @asynccontextmanager
+    @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
         """Compile the solver and work at jobs while the context lasts, or until `stop`; then finish or cancel them."""
         async with anyio.create_task_group() as self._tasks:
@@ -84,9 +87,14 @@ class Service:
                 self._tasks.cancel_scope.cancel()
 
     async def _warm_up(self) -> None:
-        await anyio.to_thread.run_sync(warm_up, abandon_on_cancel=True)
-        self.ready = True
-        _log.info("ready", extra={"workers": self.worker.workers})
+        def work() -> None:
+            with contextlib.suppress(Cancelled):
+                warm_up(cancelled=lambda: self.worker.closed)
+
+        await anyio.to_thread.run_sync(work, abandon_on_cancel=True)
+        if not self.worker.closed:
+            self.ready = True
+            _log.info("ready", extra={"workers": self.worker.workers})
 
     def stop(self) -> None:
         """Begin to close: refuse what is new, let what is under way finish within the grace, and then cancel it."""
@@ -111,12 +119,15 @@ class Service:
             self._closed.set()
 
     def check_ready(self) -> None:
-        """Raise a 503 problem while the solver is being compiled, and when the service stops."""
-        if not self.ready:
-            detail = "The solver is being compiled. Try again in a few seconds."
-            raise ProblemError(503, "not-ready", detail, headers={"Retry-After": "2"})
+        """Raise a 503 problem when the service stops, and while the solver is being compiled or loaded."""
         if self.worker.closed:
             raise ProblemError(503, "shutting-down", "The service is shutting down.", headers={"Retry-After": "5"})
+        if not self.ready and self.compiled:
+            detail = "The solver is being loaded. Try again in a few seconds."
+            raise ProblemError(503, "not-ready", detail, headers={"Retry-After": "2"})
+        if not self.ready:
+            detail = "The solver is being compiled, which takes some minutes, once."
+            raise ProblemError(503, "not-ready", detail, headers={"Retry-After": "30"})
 
     async def submit(self, request: PredictionRequest, raw: bytes, *, store: bool, like: str | None = None) -> Job:
         """Take up a prediction and return it as it is waiting.

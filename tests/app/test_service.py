@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +21,10 @@ from fastapi.testclient import TestClient
 from app.http.problems import ProblemError
 from app.main import create_app
 from app.schemas import PredictionRequest, to_scene
+from app.service import service
 from app.service.worker import Worker
 from app.settings import Settings
+from dlocore import Cancelled
 from tests.app.conftest import ROOT, SLOW, paper_scene, start
 from tests.app.test_bad_requests import the_problem
 
@@ -122,6 +124,31 @@ def test_it_is_healthy_before_it_is_ready(tmp_path: Path) -> None:
         refused = client.post("/v1/predictions", json=paper_scene())
         the_problem(refused, 503)
         assert int(refused.headers["retry-after"]) >= 1
+
+
+def test_a_first_compile_is_told_of_and_stops_with_the_service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ended = threading.Event()
+
+    def compile_for_minutes(cancelled: Callable[[], bool]) -> None:
+        while not cancelled():
+            time.sleep(0.01)
+        ended.set()
+        raise Cancelled
+
+    monkeypatch.setattr(service, "warm_up", compile_for_minutes)
+    app = create_app(Settings(data_dir=tmp_path))
+    with TestClient(app) as client:
+        app.state.service.compiled = False
+        first = client.get("/ready")
+        assert "minutes" in the_problem(first, 503)["detail"]
+        app.state.service.compiled = True
+        later = client.get("/ready")
+        assert "seconds" in the_problem(later, 503)["detail"]
+        assert int(first.headers["retry-after"]) > int(later.headers["retry-after"]) >= 1
+        assert client.portal is not None
+        client.portal.call(app.state.service.stop)
+        assert ended.wait(5.0)
+        assert "shutting down" in the_problem(client.get("/ready"), 503)["detail"]
 
 
 def test_presets_are_listed_with_their_sources(client: TestClient) -> None:

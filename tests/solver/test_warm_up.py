@@ -1,13 +1,16 @@
 """After `warm_up` nothing is left to compile, whatever a scene calls for."""
 
 import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from dlocore import warm_up
+from dlocore import Cancelled, warm_up, warming
 
 PROGRAM = """
 import sys
@@ -58,7 +61,7 @@ def test_nothing_is_compiled_in_a_solve_or_its_derivatives_after_warm_up():
 
 
 LEFT_BEHIND = """
-import threading, time
+import os, sys, threading, time
 from dlocore import warming
 started = []
 class Seen(warming.subprocess.Popen):
@@ -69,19 +72,71 @@ warming.subprocess.Popen = Seen
 threading.Thread(target=warming.warm_up, args=(2,), daemon=True).start()
 while len(started) < 2:
     time.sleep(0.05)
-print(*started)
+print(*started, flush=True)
+if len(sys.argv) > 1:
+    os.kill(os.getpid(), int(sys.argv[1]))
 """
 
 
-def test_a_program_that_ends_while_it_compiles_takes_its_processes_along(tmp_path: Path) -> None:
+@pytest.mark.parametrize("by", [None, signal.SIGTERM, signal.SIGKILL], ids=["ends", "terminated", "killed"])
+def test_a_program_that_ends_while_it_compiles_takes_its_processes_along(
+    tmp_path: Path, by: signal.Signals | None
+) -> None:
     cold = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-    done = subprocess.run([sys.executable, "-c", LEFT_BEHIND], env=cold, capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0, done.stderr
+    command = [sys.executable, "-c", LEFT_BEHIND, *([] if by is None else [str(int(by))])]
+    done = subprocess.run(command, env=cold, capture_output=True, text=True, timeout=120)
+    assert done.returncode == -(by or 0), done.stderr
     processes = [int(pid) for pid in done.stdout.split()]
     assert len(processes) == 2
-    for pid in processes:
-        with pytest.raises(ProcessLookupError):
-            os.kill(pid, 0)
+    give_up = time.monotonic() + 60
+    while any(map(runs, processes)):  # until they have imported what they compile, and look
+        assert time.monotonic() < give_up
+        time.sleep(0.05)
+
+
+def runs(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+@pytest.fixture
+def shares(monkeypatch: pytest.MonkeyPatch) -> list["subprocess.Popen[bytes]"]:
+    """The processes that a warm-up starts of three shares, which are programs here; none of the kernels is compiled."""
+    started: list[subprocess.Popen[bytes]] = []
+
+    class Program(subprocess.Popen[bytes]):
+        def __init__(self, command: list[str], **options: Any) -> None:
+            super().__init__([*command[:1], "-c", command[-1]], **options)
+            started.append(self)
+
+    monkeypatch.setattr(warming.subprocess, "Popen", Program)
+    monkeypatch.setattr(warming, "is_compiled", lambda: False)
+    monkeypatch.setattr(warming, "PARTS", {})
+    return started
+
+
+SLEEPS, ENDS, IS_KILLED = "import time; time.sleep(60)", "", "import os; os.kill(os.getpid(), 9)"
+
+
+@pytest.mark.parametrize(("first", "count"), [(ENDS, 3), ("raise ValueError", 3), (IS_KILLED, 1)])
+def test_where_a_share_is_killed_no_other_is_begun(
+    shares: list["subprocess.Popen[bytes]"], monkeypatch: pytest.MonkeyPatch, first: str, count: int
+) -> None:
+    monkeypatch.setattr(warming, "SHARES", ((first,), (ENDS,), (ENDS,)))
+    warm_up(1)
+    assert len(shares) == count
+
+
+def test_a_cancelled_warm_up_ends_what_it_has_begun(
+    shares: list["subprocess.Popen[bytes]"], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(warming, "SHARES", ((SLEEPS,), (SLEEPS,), (SLEEPS,)))
+    with pytest.raises(Cancelled):
+        warm_up(2, cancelled=lambda: len(shares) > 0)
+    assert [share.returncode for share in shares] == [-signal.SIGKILL] * 2
 
 
 @pytest.mark.parametrize("processes", [0, -1])
