@@ -85,6 +85,11 @@ def problem_of(error: Exception) -> ProblemError:
     return ProblemError(500, "internal-error", _DEFECT)
 
 
+def not_written(what: str, error: OSError) -> ProblemError:
+    """Return the problem that `what` can't be written, as on a full disk."""
+    return ProblemError(507, "not-written", f"{what} can't be written: {error.strerror or error}.")
+
+
 def bad_scene(fields: list[BadField]) -> ProblemError:
     """Return the problem of a request whose `fields` are wrong."""
     first = f"{fields[0].field}: {fields[0].message}"

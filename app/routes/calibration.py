@@ -4,6 +4,7 @@ It is measured when someone asks for it, not at the first start: it takes tens o
 requests would feel a part, and what it measures while others compile is worth little.
 """
 
+import logging
 from typing import Annotated, Any, Literal
 
 import anyio
@@ -13,7 +14,7 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
 
 from app.http.formats import EVENTS, JSON, json_response, negotiated
-from app.http.problems import ProblemError
+from app.http.problems import ProblemError, not_written
 from app.routes import described
 from app.routes.body import JsonRoute
 from app.schemas.calibration import CalibrationResponse
@@ -25,6 +26,7 @@ from dlocore import calibration
 from dlocore.calibration import Calibration
 
 router = APIRouter(prefix="/v1/calibration", tags=["calibration"], route_class=JsonRoute)
+_log = logging.getLogger("dlo")
 KIND = "calibration"
 
 
@@ -79,7 +81,11 @@ async def measure(request: Request, service: TheService) -> Response:
         from dlocore.study import calibrating  # the solver, which it measures, is slow to import
 
         found = calibrating.measure(on_progress=tell, cancelled=cancelled)
-        found.save(service.settings.calibration_file)
+        try:
+            found.save(service.settings.calibration_file)
+        except OSError as error:
+            _log.error("the calibration is not stored: %s", error)
+            raise not_written("The calibration", error) from None
         return orjson.dumps(document_of(found, 2))
 
     job = running[0] if running else service.measure(KIND, new_id(), work)

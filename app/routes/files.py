@@ -5,7 +5,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import RedirectResponse, Response
 
 from app.http.formats import JSON, NPZ, as_npz
-from app.http.problems import ProblemError
+from app.http.problems import not_written
 from app.routes import described
 from app.routes.predictions import part
 from app.service.service import TheService
@@ -41,8 +41,7 @@ async def recording(id: str, service: TheService) -> Response:
     try:
         content = await part(service, service.runs.recording, id)
     except OSError as error:
-        detail = f"The recording can't be written: {error.strerror or error}."
-        raise ProblemError(507, "not-written", detail) from None
+        raise not_written("The recording", error) from None
     return _file(content, _ANY, f"{id}.rrd")
 
 

@@ -1,5 +1,7 @@
 """The calibration over HTTP and on the command line: none at first, measured on request, followed, stopped, read."""
 
+import errno
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,6 +13,7 @@ from app.main import create_app
 from app.schemas.calibration import CalibrationResponse, MeasurementResponse
 from app.settings import Settings
 from dlocore import calibration
+from dlocore.calibration import Calibration
 from dlocore.study import calibrating
 from tests.app.conftest import paper_scene, start
 from tests.app.test_bad_requests import the_problem
@@ -73,6 +76,23 @@ def test_its_progress_ends_with_what_is_then_read(fresh: TestClient) -> None:
     the_problem(fresh.get(ADDRESS, params={"dimensions": 4}), 422)
     again = parsed(fresh.get(f"{ADDRESS}/events", headers={"last-event-id": "2"}).text)
     assert [data["number"] for kind, _, data in again if kind == "progress"] == list(range(3, len(news)))
+
+
+def test_one_that_cant_be_written_is_told_of_with_507(fresh: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(found: Calibration, file: Path) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(calibrating, "measure", lambda **options: calibration.load(_file(fresh)))
+    monkeypatch.setattr(Calibration, "save", full)
+    kind, _, problem = parsed(fresh.post(ADDRESS, headers={"accept": "text/event-stream"}).text)[-1]
+    assert kind == "error"
+    assert problem["status"] == 507
+    assert problem["detail"] == "The calibration can't be written: No space left on device."
+
+
+def _file(client: TestClient) -> Path:
+    settings: Settings = client.app.state.settings  # type: ignore[attr-defined]
+    return settings.calibration_file
 
 
 def test_predictions_are_answered_while_it_is_measured(fresh: TestClient) -> None:
