@@ -225,6 +225,21 @@ def test_a_lower_cap_evicts_at_the_next_start(tmp_path: Path, prediction: Predic
     assert listed(store(tmp_path, max_runs=2)) == ids[:1:-1]
 
 
+def test_a_second_process_on_a_data_directory_is_told_of_the_first(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    first = store(tmp_path)
+    assert caplog.messages == []
+    second = store(tmp_path)
+    assert caplog.messages == [
+        f"another process uses {tmp_path}: each answers 404 for what the other one is given from now on"
+    ]
+    del first, second
+    caplog.clear()
+    store(tmp_path)
+    assert caplog.messages == []
+
+
 def test_an_unfinished_run_is_never_listed(
     tmp_path: Path, prediction: Prediction, monkeypatch: pytest.MonkeyPatch
 ) -> None:
