@@ -15,7 +15,7 @@ from dlocore.identify.identification import Identification, Progress
 from dlocore.identify.intervals import assess
 from dlocore.identify.parameters import DEFAULT, PLACES, Parameter, parameters, prepared
 from dlocore.identify.replay import Resolution
-from dlocore.identify.search import Search, robust_deviation
+from dlocore.identify.search import Search
 from dlocore.identify.together import check_together
 from dlocore.recordings import Recording
 from dlocore.scene.cable import Cable
@@ -191,9 +191,9 @@ def _stiff(search: Search, candidate: Candidate) -> Candidate:
     scalar = next((p for p in search.chosen if p.name == "bending_stiffness"), None)
     if scalar is None:
         return candidate
-    given = np.concatenate(search.play(candidate).residuals)
-    deviation = robust_deviation(given)
-    best, least = candidate, search.misfit(given, deviation)
+    given = search.play(candidate)
+    deviation = search.deviation(given)
+    best, least = candidate, search.misfit(np.concatenate(given.residuals), deviation)
     for factor in _STIFFNESSES:
         try:
             other = scalar.put(candidate, factor * scalar.get(candidate))

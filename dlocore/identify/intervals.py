@@ -1,6 +1,7 @@
 """How well identified parameters are known: intervals, correlations, and what the data do not tell."""
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
@@ -23,6 +24,7 @@ _BLOCK = 0.5  # [s] in which residuals hang together
 _SHAKES = 12  # replays with other noise of the held markers and the start
 _UNSEEN = 1.0  # half the interval of a logarithm, or in usual values, from which on a parameter is not identified
 _UNEXPLAINED = 2.0  # times what noise explains: a model that misses markers by more lacks something
+_ELSEWHERE = 0.2  # of the length: what misses half of the markers by more is no motion of theirs
 _ASTRAY = 0.01  # of the length: what misses the markers by more, or is moved so far by noise, is none to trust
 
 
@@ -36,7 +38,7 @@ def assess(search: Search, state: State, seconds: float) -> Identification:
     chosen = search.chosen
     x = search.coordinates(state.candidate)
     r = np.concatenate(state.residuals)
-    deviation = robust_deviation(r)
+    deviation = search.deviation(state)
     derivatives = cast(list[Floats], state.derivatives)
     J = np.concatenate(derivatives)
     w = weights(r, deviation)
@@ -116,15 +118,15 @@ def _blocks(search: Search, state: State, pull: Floats) -> list[Floats]:
     return out
 
 
-def _shaken(search: Search, state: State, scale: Floats) -> tuple[Floats, float, int]:
+def _shaken(search: Search, state: State, scale: Floats) -> tuple[Floats, dict[str, Floats], int]:
     """Return what noise of the held markers and the start does.
 
-    That is the covariance of the gradient of the misfit; the robust deviation of a coordinate of the free markers of
-    motions [m], infinite where there are none; and the number of replays that could not begin.
+    That is the covariance of the gradient of the misfit; the robust deviation (3,) of the coordinates of the free
+    markers [m] by recording of a motion; and the number of replays that could not begin.
     """
     size = len(search.chosen)
     total = np.zeros((size, size))
-    at, moved, lost = 0, list[Floats](), 0
+    at, moved, lost = 0, dict[str, list[Floats]](), 0
     for i, (replay, played) in enumerate(zip(search.replays, state.played, strict=True)):
         D = cast(list[Floats], state.derivatives)[i]
         factor = scale[at : at + len(D)]
@@ -135,26 +137,32 @@ def _shaken(search: Search, state: State, scale: Floats) -> tuple[Floats, float,
             search.check()
             noise = np.random.default_rng([i, seed])
             try:
-                other = _disturbed(search, replay, state.residuals[i], noise).play(state.candidate)
+                deviation = robust_deviation(state.residuals[i][search.measured[i]])
+                other = _disturbed(search, replay, deviation, noise).play(state.candidate)
             except SceneError:
                 lost += 1
                 continue
             change = (other.predicted - played.predicted)[:, free].ravel()
             found.append(D.T @ (factor * change))
             if not replay.recording.static:
-                moved.append(change)
+                moved.setdefault(replay.recording.name, []).append(change.reshape(-1, 3))
         if found:
             total += np.array(found).T @ np.array(found) / len(found)
-    return total, robust_deviation(np.concatenate(moved)) if moved else np.inf, lost
+    return total, {name: _by_axis(np.concatenate(changes)) for name, changes in moved.items()}, lost
 
 
-def _disturbed(search: Search, replay: Replay | Rest, residuals: Floats, noise: np.random.Generator) -> Replay | Rest:
-    """Return a replay with other noise of what is held; of shapes at rest with noise of the size of the residuals."""
+def _by_axis(away: Floats) -> Floats:
+    """Return the robust deviation (3,) of each coordinate of (k, 3) [m]."""
+    return np.array([robust_deviation(x) for x in away.T])
+
+
+def _disturbed(search: Search, replay: Replay | Rest, deviation: float, noise: np.random.Generator) -> Replay | Rest:
+    """Return a replay with other noise of what is held; of shapes at rest with noise as large as their residuals."""
     recording = replay.recording
     if not recording.static:
         return search.replay(recording, noise)
     markers = cast(Floats, recording.markers)
-    size = min(robust_deviation(residuals), _ASTRAY * cast(float, recording.length))
+    size = min(deviation, _ASTRAY * cast(float, recording.length))
     return search.replay(replace(recording, markers=markers + size * noise.standard_normal(markers.shape)))
 
 
@@ -229,40 +237,77 @@ def _estimated(
     )
 
 
-def _doubts(search: Search, state: State, by_noise: float) -> list[str]:
-    """Return in words why intervals may not hold.
+def _doubts(search: Search, state: State, by_noise: Mapping[str, Floats]) -> list[str]:
+    """Return in words why intervals may not hold, of the worst recording of a motion and the worst of shapes at rest.
+
+    Each is judged by the direction in which it is missed most: in a plane the one across it holds noise alone.
 
     Args:
         search, state: that has ended, and where.
-        by_noise: by which noise of the held markers and the start moves the prediction [m]; infinite where not known.
+        by_noise: by which noise of the held markers and the start moves the prediction along each axis (3,) [m], by
+            recording of a motion; none where not known.
     """
     length = max(cast(float, window.length) for window in search.windows)
-    if np.isfinite(by_noise) and by_noise > _ASTRAY * length:
-        return [
-            f"Noise of the held markers and the start alone moves the prediction by {in_mm(by_noise)}:",
+    said = list[str]()
+    wild = {name: float(moved.max()) for name, moved in by_noise.items() if moved.max() > _ASTRAY * length}
+    if wild:
+        said += [
+            f"Noise of the held markers and the start alone moves the prediction by {in_mm(max(wild.values()))}:",
             "intervals don't hold for a motion so wild. Record a slower one, or replay shorter windows.",
         ]
-    noise = max((noise_of_free(window) for window in search.windows if not window.static), default=np.inf)
-    said = list[str]()
-    for static in (False, True):
-        residuals = [r for w, r in zip(search.windows, state.residuals, strict=True) if w.static is static]
-        if not residuals:
+    found: dict[bool, list[_Miss]] = {False: [], True: []}
+    for static, name in dict.fromkeys((w.static, w.name) for w in search.windows):
+        if not static and name in wild:
             continue
-        deviation = robust_deviation(np.concatenate(residuals))
-        explained = np.inf if static else float(np.hypot(by_noise, noise))  # of shapes at rest nothing tells the noise
-        if deviation > _UNEXPLAINED * explained:
-            much, why = f"{deviation / explained:.2g} times what noise explains", "the model lacks something"
-        elif deviation > _ASTRAY * length:
-            much = f"with a deviation of {100 * deviation / length:.2g} % of the length"
-            why = "the tracking is wild, the model lacks something"
+        own = [i for i, w in enumerate(search.windows) if (w.static, w.name) == (static, name)]
+        away = np.concatenate([search.away(state, i) for i in own])
+        explained = np.full(3, np.inf)  # of shapes at rest nothing tells the noise
+        if not static and name in by_noise:
+            noise = np.max([noise_of_free(search.windows[i]) for i in own], axis=0)
+            explained = np.hypot(by_noise[name], noise)
+        deviation = _by_axis(away)
+        miss = _Miss(
+            name, float(np.median(np.linalg.norm(away, axis=1))) / length, float(deviation.max()) / length,
+            float((deviation / explained).max()),
+        )  # fmt: skip
+        if miss.times > _UNEXPLAINED or miss.deviation > _ASTRAY:
+            found[static].append(miss)
+    several = len({w.name for w in search.windows}) > 1
+    for static, misses in found.items():
+        if not misses:
+            continue
+        worst = max(misses, key=lambda miss: (miss.times, miss.deviation))
+        whose = f" of {worst.name!r}" if several else ""
+        if worst.times > _UNEXPLAINED:
+            much, why = f"{worst.times:.2g} times what noise explains", "the model lacks something"
         else:
-            continue
-        missed = search.distance(replace(state, residuals=residuals))
+            much = f"with a deviation of {100 * worst.deviation:.2g} % of the length"
+            why = "the tracking is wild, the model lacks something"
         said += [
-            f"The free markers {'at rest ' if static else ''}are missed by {in_mm(missed, 3)} in the median, {much}:",
+            f"The free markers{whose} {'at rest ' if static else ''}are missed by {in_mm(worst.distance * length, 3)} "
+            f"in the median, {much}:",
             f"{why}, or another cable meets them better. Intervals tell of noise alone.",
         ]
+        if worst.distance > _ELSEWHERE:
+            said.append("That is another motion: is gravity right, and are held and the order of the markers?")
     return said
+
+
+@dataclass(frozen=True)
+class _Miss:
+    """How far the free markers of a recording are missed.
+
+    Attributes:
+        name: of the recording.
+        distance: median distance of the free markers, in lengths.
+        deviation: robust deviation in the worst direction, in lengths.
+        times: that of what noise explains in the worst direction.
+    """
+
+    name: str
+    distance: float
+    deviation: float
+    times: float
 
 
 def _message(state: State, estimated: tuple[Estimated, ...], correlations: Floats) -> str:

@@ -12,7 +12,7 @@ from dlocore.errors import SceneError, array
 from dlocore.identify.candidate import Candidate
 from dlocore.identify.parameters import DEFAULT, parameters, prepared
 from dlocore.identify.replay import Played, Replay, Resolution
-from dlocore.identify.search import robust_deviation, weights
+from dlocore.identify.search import measured, robust_deviation, weights
 from dlocore.recordings import Recording
 from dlocore.scene.cable import Cable
 from dlocore.scene.scene import Environment
@@ -162,7 +162,7 @@ class Identifier:
         away = (played.predicted - replay.markers)[:, free]
         r = np.where(np.isfinite(away), away, 0.0).ravel()
         J[~np.isfinite(away).ravel()] = 0.0
-        deviation = robust_deviation(r)
+        deviation = robust_deviation(r[measured(recording, replay.markers)])
         w = weights(r, deviation) / (deviation**2 * _BLOCK)
         prior = np.linalg.inv(np.linalg.inv(self._precision) + _FORGOTTEN**2 * np.eye(len(x)))
         data = (J * w[:, None]).T @ J

@@ -13,6 +13,7 @@ from dlocore.identify.identification import Progress, Status
 from dlocore.identify.parameters import Parameter
 from dlocore.identify.replay import Played, Replay, Resolution, common_references
 from dlocore.identify.rest import Rest, Settled
+from dlocore.identify.tracks import varying
 from dlocore.recordings import Recording
 
 Floats = NDArray[np.float64]
@@ -53,6 +54,7 @@ class Search:
         self.windows, self.chosen, self.resolution, self.cancelled = windows, chosen, resolution, cancelled
         self.references = common_references(windows)
         self.replays = [self.replay(w) for w in windows]
+        self.measured = [measured(w, replay.markers) for w, replay in zip(windows, self.replays, strict=True)]
 
     def replay(self, window: Recording, shake: np.random.Generator | None = None) -> Replay | Rest:
         """Return what replays a window, or its shapes at rest; with `shake` from other noise of what moves it."""
@@ -75,7 +77,7 @@ class Search:
         even = np.array([not p.logarithmic for p in self.chosen])
         for done in range(1, iterations + 1):
             r = np.concatenate(state.residuals)
-            deviation = robust_deviation(r)
+            deviation = self.deviation(state)
             state = replace(state, derivatives=self.derivatives(state))
             J = np.concatenate(cast(list[Floats], state.derivatives))
             x = self.coordinates(state.candidate)
@@ -239,18 +241,33 @@ class Search:
         """Return the robust cost of residuals."""
         return float((np.sqrt(1.0 + (r / (_KNEE * deviation)) ** 2) - 1.0).sum()) * _KNEE**2
 
-    @staticmethod
-    def distance(state: State) -> float:
+    def away(self, state: State, window: int) -> Floats:
+        """Return how far the predictions of the free markers of a window are from where they were seen (k, 3) [m]."""
+        seen = np.isfinite(self.replays[window].markers[:, self.windows[window].free, 0]).ravel()
+        return state.residuals[window].reshape(-1, 3)[seen]
+
+    def distance(self, state: State) -> float:
         """Return the median distance of the free markers from their predictions [m]."""
-        found = [np.linalg.norm(r.reshape(-1, 3), axis=1) for r in state.residuals]
-        every = np.concatenate(found)
-        return float(np.median(every[every > 0.0]))
+        every = np.concatenate([self.away(state, i) for i in range(len(self.windows))])
+        return float(np.median(np.linalg.norm(every, axis=1)))
+
+    def deviation(self, state: State) -> float:
+        """Return the robust deviation of a coordinate of the residuals that were measured [m]."""
+        return robust_deviation(np.concatenate(state.residuals)[np.concatenate(self.measured)])
+
+
+def measured(recording: Recording, markers: Floats) -> NDArray[np.bool_]:
+    """Tell which coordinates (k,) of the free ones of `markers` (frames, m, 3) [m] of a recording were measured.
+
+    Not those of lost markers, and not those that never change, as z of 2D markers.
+    """
+    known = np.isfinite(markers) & varying(cast(Floats, recording.markers))
+    return np.asarray(known[:, recording.free].ravel())
 
 
 def robust_deviation(r: Floats) -> float:
-    """Return the standard deviation of residuals (k,) [m] that outliers do not swell; zeros are lost markers."""
-    seen = r[r != 0.0]
-    return max(1.4826 * float(np.median(np.abs(seen))) if len(seen) else 0.0, _LEAST_DEVIATION)
+    """Return the standard deviation of residuals (k,) [m] that outliers do not swell."""
+    return max(1.4826 * float(np.median(np.abs(r))) if len(r) else 0.0, _LEAST_DEVIATION)
 
 
 def weights(r: Floats, deviation: float) -> Floats:

@@ -41,6 +41,12 @@ def held_paths(recording: Recording, shake: np.random.Generator | None) -> dict[
     return out
 
 
+def varying(x: Floats) -> NDArray[np.bool_]:
+    """Tell which coordinates of positions (..., 3) [m] ever change; NaN where a marker was lost."""
+    flat = x.reshape(-1, x.shape[-1])
+    return np.asarray(np.nanmax(flat, axis=0) > np.nanmin(flat, axis=0))
+
+
 def noise_of(x: Floats) -> float:
     """Return the standard deviation of the noise of samples x (k, 3) [m] in a row, or more; infinite of three.
 
@@ -49,15 +55,16 @@ def noise_of(x: Floats) -> float:
     """
     if len(x) < 4:
         return np.inf
-    away = np.abs(np.diff(x[:, np.ptp(x, axis=0) > 0.0], n=3, axis=0))
+    away = np.abs(np.diff(x[:, varying(x)], n=3, axis=0))
     return 1.4826 * float(np.median(away)) / np.sqrt(20.0) if away.size else 0.0
 
 
-def noise_of_free(recording: Recording) -> float:
-    """Return the standard deviation of the noise of the markers that nothing holds [m], the median over them."""
+def noise_of_free(recording: Recording) -> Floats:
+    """Return the standard deviation (3,) of the noise of the markers that nothing holds [m], the median over them."""
     markers = cast(Floats, recording.markers)[:, recording.free]
-    found = [noise_of(x[np.isfinite(x[:, 0])]) for x in markers.swapaxes(0, 1)]
-    return float(np.median(found)) if found else np.inf
+    seen = [x[np.isfinite(x[:, 0])] for x in markers.swapaxes(0, 1)]
+    found = [[noise_of(x[:, [axis]]) for axis in range(3)] for x in seen if len(x)]
+    return np.asarray(np.median(found, axis=0)) if found else np.full(3, np.inf)
 
 
 def _without_outliers(t: Floats, x: Floats) -> tuple[Floats, Floats]:
