@@ -174,7 +174,7 @@ class Replay:
         """Return the scene of the recording for a candidate."""
         recording = self.recording
         span = self.span.scaled(candidate.length_ratio)
-        length, u = span.length, span.u
+        cable, length, u = span.of_cable(candidate.cable), span.length, span.u
         grasps, held, positions, rates = [], [], [], []
         clamp, angles = 0, candidate.clamp_angles
         frames = []
@@ -200,9 +200,8 @@ class Replay:
         on = span.inside(self.seen)
         seen = self.seen[on]
         markers = self.start_markers[on] - self._beside_start(candidate, seen, self.start_markers[on])
-        q = fit.shape(
-            candidate.cable, cast(Floats, environment.gravity), u[seen], markers, np.array(positions), self._guess
-        )
+        gravity = cast(Floats, environment.gravity)
+        q = fit.shape(cable, gravity, u[seen], markers, np.array(positions), self._guess)
         self._guess = q
         v = None if self.at_rest else fit.velocity(q, u[seen], self.start_speeds[on], np.array(rates))
         shape = ControlPoints(control_points=q, knots=fit.grid.knots, velocity=v, settle=self.at_rest)
@@ -212,7 +211,7 @@ class Replay:
         if candidate.twist and candidate.yields:
             switches["plasticity"] = "on"
         return Scene(
-            cable=replace(candidate.cable, length=length),
+            cable=cable,
             shape=shape,
             grasps=tuple(grasps),
             environment=environment,

@@ -101,7 +101,7 @@ class Rest:
                 frames.append((turn.apply(across(reference)), targets[-1]))
                 clamp += 1
             grasps.append(Grasp(u=at, hold=kind))
-        cable = replace(candidate.cable, length=length)
+        cable = span.of_cable(candidate.cable)
         environment = replace(candidate.environment, gravity=self.recording.gravity)
         seen = np.flatnonzero(np.isfinite(self.markers[frame, :, 0]))
         seen = seen[span.inside(seen)]

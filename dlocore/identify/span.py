@@ -1,12 +1,13 @@
 """The part of a cable between its grippers that bends, and where the markers lie on it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.recordings import Recording
+from dlocore.scene.cable import Cable
 from dlocore.spline import design_matrix
 
 Floats = NDArray[np.float64]
@@ -22,10 +23,14 @@ class Span:
     Attributes:
         length: [m].
         u: of all markers (m,) [m], from where it begins: negative, or beyond its length, for those on a gripper.
+        begin: where it begins on the whole cable [m].
+        whole: length of that [m].
     """
 
     length: float
     u: Floats
+    begin: float
+    whole: float
 
     @staticmethod
     def of(recording: Recording) -> "Span":
@@ -39,11 +44,23 @@ class Span:
                 begin = float(u[h.marker])
             elif h.forward and h.marker > free.max():
                 end = float(u[h.marker])
-        return Span(end - begin, u - begin)
+        return Span(end - begin, u - begin, begin, cast(float, recording.length))
 
     def scaled(self, ratio: float) -> "Span":
         """Return it with all lengths `ratio` times as large."""
-        return Span(self.length * ratio, self.u * ratio)
+        return Span(self.length * ratio, self.u * ratio, self.begin * ratio, self.whole * ratio)
+
+    def of_cable(self, cable: Cable) -> Cable:
+        """Return this part of a whole cable, with the point masses that lie on it; grippers hold the others.
+
+        These keep their shares of the cable's length, whatever that is in the recording.
+        """
+        slack = 1e-9 * self.length
+        moved = [(one.u * (self.whole / cable.length) - self.begin, one) for one in cable.point_masses]
+        masses = [
+            replace(one, u=min(max(u, 0.0), self.length)) for u, one in moved if -slack <= u <= self.length + slack
+        ]
+        return replace(cable, length=self.length, point_masses=tuple(masses))
 
     def inside(self, markers: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Tell which of some markers lie on it."""
