@@ -8,7 +8,7 @@ import csv
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.array_files import ArrayFile
-from dlocore.errors import SceneError, array, number, repeated, within
+from dlocore.errors import SceneError, array, instances, number, repeated, within
+from dlocore.scene.cable import PointMass
 from dlocore.words import counted
 
 Floats = NDArray[np.float64]
@@ -24,7 +25,7 @@ Floats = NDArray[np.float64]
 PAIR = 0.06  # of the length: two held neighbours at an end, nearer than this to each other, are one clamp
 LEAST_SEEN = 0.2  # of the frames in which each marker must be seen
 LEAST_FRAMES = 10  # of a motion
-_FACTS = ("u", "held", "length", "diameter", "linear_density", "gravity", "static", "name")
+_FACTS = ("u", "held", "length", "diameter", "linear_density", "point_masses", "gravity", "static", "name")
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,7 @@ class Recording:
         held: the markers that grippers hold; negative ones count from the end.
         length: of the cable [m]; None: it ends at the outermost markers.
         diameter, linear_density: what is known of the cable, [m] and [kg/m].
+        point_masses: what else hangs on it, as a connector at its end.
         gravity: (3,) [m/s^2].
         static: every frame is a shape at rest of its own, and `times` only number them.
         name: for reports.
@@ -68,6 +70,7 @@ class Recording:
     length: float | None = None
     diameter: float | None = None
     linear_density: float | None = None
+    point_masses: tuple[PointMass, ...] = ()
     gravity: ArrayLike = (0.0, 0.0, -9.81)
     static: bool = False
     name: str = "recording"
@@ -100,6 +103,10 @@ class Recording:
         for name in ("diameter", "linear_density"):
             if getattr(self, name) is not None:
                 put(name, number(name, getattr(self, name), above=0.0, at_most=1e4))
+        put("point_masses", instances("point_masses", self.point_masses, PointMass, "PointMass"))
+        for i, one in enumerate(self.point_masses):
+            if not one.u <= length:
+                raise SceneError(f"point_masses[{i}].u", one.u, f"0 to the cable's length, {length:g} [m]")
         put("gravity", array("gravity", self.gravity, shape=(3,), unit="m/s^2"))
 
     def _spacing(self) -> Floats:
@@ -234,6 +241,7 @@ def save_recording(recording: Recording, path: str | Path) -> None:
 def about(recording: Recording) -> dict[str, Any]:
     """Return what a recording says beside its arrays, as JSON."""
     facts = {name: getattr(recording, name) for name in _FACTS}
+    facts["point_masses"] = [asdict(one) for one in recording.point_masses]
     return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in facts.items() if v is not None}
 
 
@@ -249,7 +257,20 @@ def recording_of(times: ArrayLike, markers: ArrayLike, facts: Mapping[str, Any])
     held = facts.get("held", ())
     if not isinstance(held, list | tuple):
         raise SceneError("held", held, "a list of markers' numbers")
-    return Recording(times=times, markers=markers, **{**facts, "held": tuple(held)})
+    masses = _point_masses(facts.get("point_masses", []))
+    return Recording(times=times, markers=markers, **{**facts, "held": tuple(held), "point_masses": masses})
+
+
+def _point_masses(given: Any) -> tuple[PointMass, ...]:
+    if not isinstance(given, list | tuple):
+        raise SceneError("point_masses", given, 'a list of {"u": ..., "mass": ...}')
+    out = []
+    for i, one in enumerate(given):
+        if not isinstance(one, Mapping) or set(one) != {"u", "mass"}:
+            raise SceneError(f"point_masses[{i}]", one, '"u" [m] and "mass" [kg]')
+        with within(f"point_masses[{i}]"):
+            out.append(PointMass(u=one["u"], mass=one["mass"]))
+    return tuple(out)
 
 
 def read_facts(path: Path) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from app.schemas.describe import from_cable
 from dlocore.identify import Fit, Identification
 from dlocore.words import counted
 
@@ -26,14 +27,10 @@ def document_of_identification(found: Identification) -> dict[str, Any]:
     """Return an identification as JSON-ready data: the cable and drag as scenes take them, and how they are known."""
     candidate = found.candidate
     cable = candidate.cable
-    names = (
-        "length", "diameter", "linear_density", "bending_stiffness", "axial_stiffness", "torsional_stiffness",
-        "bending_damping", "axial_damping", "yield_strain", "memory_rate",
-    )  # fmt: skip
     document: dict[str, Any] = {
         "status": found.status,
         "message": found.message,
-        "cable": {n: getattr(cable, n) for n in names},
+        "cable": from_cable(cable),
         "environment": {
             "drag": candidate.environment.drag,
             "drag_quadratic": candidate.environment.drag_quadratic,

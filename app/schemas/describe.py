@@ -7,7 +7,7 @@ import numpy as np
 
 from app.schemas.convert import OBSTACLES
 from app.schemas.request import MAX_LOADS
-from dlocore import ControlPoints, Load, Move, Points, Scene, SceneError, Still, Straight, Waypoints
+from dlocore import Cable, ControlPoints, Load, Move, Points, Scene, SceneError, Still, Straight, Waypoints
 
 _KINDS: dict[type, str] = {
     Straight: "straight",
@@ -38,7 +38,7 @@ def from_scene(scene: Scene) -> dict[str, Any]:
     if len(scene.loads) > MAX_LOADS:
         raise SceneError("loads", f"{len(scene.loads)} loads", f"at most {MAX_LOADS}")
     return {
-        "cable": _plain(scene.cable),
+        "cable": from_cable(scene.cable),
         "shape": _shape(scene.shape),
         "primitives": [_plain(grasp) for grasp in scene.grasps],
         "loads": [_load(load) for load in scene.loads],
@@ -47,6 +47,12 @@ def from_scene(scene: Scene) -> dict[str, Any]:
         "effects": dict(scene.effects),
         "quality": {name: value for name, value in _plain(scene.quality).items() if name != "estimate"},
     }
+
+
+def from_cable(cable: Cable) -> dict[str, Any]:
+    """Return a cable as a request has it, ready for JSON."""
+    described: dict[str, Any] = _plain(cable)
+    return described
 
 
 def _plain(value: Any) -> Any:

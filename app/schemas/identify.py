@@ -5,9 +5,10 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field
 
 from app.schemas.base import Count, Flag, Long, Model, Number, Vector
+from app.schemas.cable import PointMassModel
 from app.schemas.fit import Coordinate
 from dlocore.identify.parameters import DEFAULT
-from dlocore.scene.cable import MAX_LENGTH
+from dlocore.scene.cable import MAX_LENGTH, MAX_POINT_MASSES
 
 Marker = Annotated[list[Coordinate], Field(min_length=2, max_length=3)]
 Frame = Annotated[list[Marker | None], Field(min_length=3, max_length=200)]
@@ -45,6 +46,12 @@ class RecordingModel(Model):
         le=1e4,
         description="Mass per length [kg/m]; absent: 0.04. Stiffnesses and drag are in proportion to it.",
         examples=[0.04],
+    )
+    point_masses: list[PointMassModel] = Field(
+        default=[],
+        max_length=MAX_POINT_MASSES,
+        description="What else hangs on the cable, as a connector at its end.",
+        examples=[[{"u": 1.0, "mass": 0.02}]],
     )
     gravity: Vector = Field(default=[0.0, 0.0, -9.81], description="[m/s^2].", examples=[[0.0, 0.0, -9.81]])
     static: Flag = Field(default=False, description="Every frame is a shape at rest.", examples=[False])

@@ -14,6 +14,7 @@ from dlocore.files import write_whole
 LONGEST_NAME = 60
 MOST = 200
 FILE = "cables.json"
+_OF_A_PIECE = ("length", "point_masses")  # of a cable, and not of its kind
 _log = logging.getLogger(__name__)
 
 
@@ -29,7 +30,7 @@ class KeptCables:
         self._lock = threading.Lock()
 
     def all(self) -> dict[str, dict[str, Any]]:
-        """Return what is kept: by name `cable` without its length, and `environment` with its drag."""
+        """Return what is kept: by name `cable` without its length and connectors, and `environment` with its drag."""
         try:
             found = json.loads(self._path.read_text())
         except FileNotFoundError:
@@ -55,7 +56,7 @@ class KeptCables:
             kept = self.all()
             if name not in kept and len(kept) >= MOST:
                 raise ProblemError(422, "too-many-presets", f"{MOST} cables are kept already.")
-            values = {key: value for key, value in cable.items() if key != "length" and value is not None}
+            values = {key: value for key, value in cable.items() if key not in _OF_A_PIECE and value is not None}
             kept[name] = {"cable": values, "environment": dict(environment)}
             self._path.parent.mkdir(parents=True, exist_ok=True)
             write_whole(self._path, json.dumps(kept, indent=1).encode())

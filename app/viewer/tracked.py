@@ -1,7 +1,7 @@
 """A recording in the scene: the window that is shown as a scene of its own, and how far a prediction is from it."""
 
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from app.schemas.describe import from_cable
 from app.viewer.draft import Draft
 from dlocore import Environment, Prediction, SceneError, Waypoints
 from dlocore.identify import Candidate, Replay, Resolution
@@ -60,10 +61,6 @@ class Tracked:
         """Return the scene of the shown window: its start, its grippers' paths, the cable as it is known."""
         scene = self._replay.scene(self.candidate)
         shape, cable, surroundings = cast(ControlPoints, scene.shape), scene.cable, scene.environment
-        names = (
-            "length", "diameter", "linear_density", "bending_stiffness", "axial_stiffness", "bending_damping",
-            "axial_damping",
-        )  # fmt: skip
         start: dict[str, Any] = {
             "kind": "control_points",
             "control_points": _rounded(cast(Floats, shape.control_points)),
@@ -76,7 +73,7 @@ class Tracked:
         return Draft.of(
             {
                 "name": self.recording.name[:200],
-                "cable": {name: float(f"{getattr(cable, name):.9g}") for name in names},
+                "cable": _to_nine_digits(from_cable(cable)),
                 "shape": start,
                 "primitives": [
                     {"u": grasp.u, "hold": grasp.hold, "path": _path(cast(Waypoints, grasp.path))}
@@ -98,6 +95,18 @@ class Tracked:
                 },
             }
         )
+
+    def edited(self, draft: Draft) -> "Tracked":
+        """Return the recording with the cable and the drag that were edited in its scene.
+
+        Raises:
+            SceneError: they are none, or the cable is one that yields, which a search in the scene has no twist for.
+        """
+        if draft.cable().yields:
+            raise SceneError("cable", "a cable that yields", "an elastic one, to search for in the scene")
+        cable, given = self._replay.span.to_whole(draft.cable()), draft.request().environment
+        drag = replace(self.candidate.environment, drag=given.drag, drag_quadratic=given.drag_quadratic)
+        return replace(self, candidate=replace(self.candidate, cable=cable, environment=drag))
 
     def markers_at(self, time: float) -> Floats:
         """Return the measured markers (k, 3) [m] of the frame nearest to a time [s] of the scene that were seen."""
@@ -150,6 +159,15 @@ def _path(path: Waypoints) -> dict[str, Any]:
     if path.orientations is not None:
         found["orientations"] = np.round(cast(Floats, path.orientations), 9).tolist()
     return found
+
+
+def _to_nine_digits(part: Any) -> Any:
+    """Return a part of the document with its numbers as exact as a panel can show them."""
+    if isinstance(part, dict):
+        return {name: _to_nine_digits(value) for name, value in part.items()}
+    if isinstance(part, list):
+        return [_to_nine_digits(value) for value in part]
+    return float(f"{part:.9g}") if isinstance(part, float) else part
 
 
 def _rounded(values: Floats) -> list[Any]:

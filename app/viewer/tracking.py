@@ -120,6 +120,8 @@ class Tracking:
     def window(self, number: int) -> None:
         """Show another window."""
         if self._tracked is not None and 0 <= number < len(self._tracked.windows):
+            with contextlib.suppress(SceneError):  # what makes no cable is edited no more
+                self._tracked = self._tracked.edited(self._actions.draft())
             self._tracked = replace(self._tracked, shown=number)
             self._distances = None
             self._actions.show(self._tracked.draft())
@@ -146,13 +148,18 @@ class Tracking:
         return say.error_card(self._tracked.times, self._distances, time)
 
     def search(self) -> None:
-        """Identify the cable from the recording, or stop doing so."""
+        """Identify the cable from the recording, beginning with the edited one, or stop doing so."""
         if self._tracked is None:
             return
         if self._cancelled is not None:
             self.close()
             self._form.running(False)
             self._form.found("Stopped.", keep=False)
+            return
+        try:
+            self._tracked = self._tracked.edited(self._actions.draft())
+        except SceneError as error:
+            self._form.found(report.note(str(error), good=False), keep=False)
             return
         self._cancelled = threading.Event()
         self._form.running(True)

@@ -210,14 +210,18 @@ def cable_of(recordings: Sequence[Recording]) -> Cable:
 
     The axial stiffness is that of a cable that nothing stretches.
     """
+    length = cast(float, recordings[0].length)
+    telling = next((r for r in recordings if r.point_masses), recordings[0])
+    masses = tuple(replace(one, u=one.u * (length / cast(float, telling.length))) for one in telling.point_masses)
     density = next((r.linear_density for r in recordings if r.linear_density is not None), _DENSITY)
     return Cable(
-        length=cast(float, recordings[0].length),
+        length=length,
         diameter=next((r.diameter for r in recordings if r.diameter is not None), 0.005),
         linear_density=density,
         bending_stiffness=1e-3 * density / _DENSITY,
         axial_stiffness=500.0 * density / _DENSITY,
         bending_damping=2e-4,
+        point_masses=masses,
     )
 
 

@@ -62,6 +62,12 @@ class Span:
         ]
         return replace(cable, length=self.length, point_masses=tuple(masses))
 
+    def to_whole(self, cable: Cable) -> Cable:
+        """Return the whole cable of which `cable` is this part, with the point masses on that."""
+        share = self.length / cable.length
+        masses = [replace(one, u=min(one.u * share + self.begin, self.whole)) for one in cable.point_masses]
+        return replace(cable, length=self.whole, point_masses=tuple(masses))
+
     def inside(self, markers: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Tell which of some markers lie on it."""
         slack = 1e-9 * self.length

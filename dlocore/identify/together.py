@@ -21,7 +21,8 @@ def check_together(recordings: Sequence[Recording]) -> None:
     """Refuse recordings that can't be of one cable, each seen once, in metres.
 
     Raises:
-        SceneError: one is in other units, given twice, or tells another length, diameter or density than another.
+        SceneError: one is in other units, given twice, or tells another length, diameter, density or other point
+            masses than another.
     """
     for recording in recordings:
         _check_metres(recording)
@@ -35,6 +36,20 @@ def check_together(recordings: Sequence[Recording]) -> None:
             if one is not None and other is not None and abs(other - one) > _ALIKE * one:
                 allowed = f"{one:.4g} {unit} as of {first.name!r}, to {_ALIKE:.0%}"
                 raise SceneError(f"{second.place}.{name}", f"{other:.4g} {unit}", allowed, "All are of one cable")
+        if first.point_masses and second.point_masses and not _hang_alike(first, second):
+            allowed = f"those of {first.name!r}, to {_ALIKE:.0%}"
+            given = "; ".join(f"{one.mass:.4g} kg at {one.u:.4g} m" for one in second.point_masses)
+            raise SceneError(f"{second.place}.point_masses", given, allowed, "All are of one cable")
+
+
+def _hang_alike(first: Recording, second: Recording) -> bool:
+    """Tell whether the same point masses are on the cables of two recordings, in the same order."""
+    if len(first.point_masses) != len(second.point_masses):
+        return False
+    return all(
+        abs(other.mass - one.mass) <= _ALIKE * one.mass and abs(other.u - one.u) <= _ALIKE * cast(float, first.length)
+        for one, other in zip(first.point_masses, second.point_masses, strict=True)
+    )
 
 
 def _check_metres(recording: Recording) -> None:

@@ -15,10 +15,11 @@ from fastapi.testclient import TestClient
 from app.cli import main
 from app.http.problems import ProblemError
 from app.routes import identify as routes
+from app.schemas.identify import IdentifyRequest
 from app.service import searches
 from app.service.worker import Worker
 from benchmarks.simulated_recordings import CABLE, DRAG, Tracking, simulated
-from dlocore import Cancelled, SceneError
+from dlocore import Cancelled, PointMass, SceneError
 from dlocore.recordings import save_recording
 from tests.app.test_bad_requests import the_problem
 
@@ -61,6 +62,12 @@ def test_the_service_identifies_a_cable_that_a_scene_takes(client: TestClient, a
     }
     explained = client.post("/v1/scenes:explain", json=scene)
     assert explained.status_code == 200, explained.text
+
+
+def test_a_recording_tells_what_hangs_on_the_cable(asked: dict[str, Any]) -> None:
+    told = {**asked["recordings"][0], "point_masses": [{"u": 1.0, "mass": 0.02}]}
+    (recording,) = routes._recordings(IdentifyRequest.model_validate({**asked, "recordings": [told]}))
+    assert recording.point_masses == (PointMass(u=1.0, mass=0.02),)
 
 
 def test_the_course_of_an_identification_is_told_as_events(client: TestClient, asked: dict[str, Any]) -> None:

@@ -14,7 +14,7 @@ from app.viewer import tracked
 from app.viewer.kept import FILE, KeptCables
 from app.viewer.tracking_report import error_card
 from benchmarks.simulated_recordings import CABLE, DRAG, simulated
-from dlocore import SceneError
+from dlocore import PointMass, SceneError
 from dlocore.recordings import Recording, save_recording
 
 OPEN = "Open a recording …"
@@ -128,6 +128,20 @@ def test_a_recording_that_unpacks_to_more_than_is_allowed_is_refused(recording, 
     assert tracked.opened("more.npz", (tmp_path / "more.npz").read_bytes(), {}).windows
 
 
+def test_a_connector_is_in_the_scene_of_a_recording_and_an_edited_one_in_the_search(recording):
+    connector = PointMass(u=0.5, mass=0.02)
+    opened = tracked.Tracked.of(replace(recording, point_masses=(connector,)))
+    draft = opened.draft()
+    # 5 cm are in each gripper
+    assert draft.get(("cable", "point_masses")) == [{"u": 0.45, "mass": 0.02}]
+    heavier = draft.put(("cable", "point_masses", 0, "mass"), 0.03).put(("environment", "drag"), 0.08)
+    edited = opened.edited(heavier.put(("cable", "bending_stiffness"), 2e-3)).candidate
+    assert [(one.u, one.mass) for one in edited.cable.point_masses] == [(pytest.approx(0.5), 0.03)]
+    assert (edited.cable.length, edited.cable.bending_stiffness, edited.environment.drag) == (1.0, 2e-3, 0.08)
+    with pytest.raises(SceneError, match="a cable that yields"):
+        opened.edited(draft.put(("cable", "yield_strain"), 0.01).put(("cable", "memory_rate"), 50.0))
+
+
 def test_the_error_is_shown_at_the_cursor_and_over_time():
     times, distances = np.linspace(0.0, 2.0, 201), np.linspace(0.0, 0.02, 201)
     assert 'data-error="5.00"' in error_card(times, distances, 0.5)
@@ -136,7 +150,8 @@ def test_the_error_is_shown_at_the_cursor_and_over_time():
 
 
 def test_kept_cables_outlive_the_service_and_a_damaged_file(tmp_path):
-    KeptCables(tmp_path).keep("one", {"length": 2.0, "diameter": 0.01, "bending_stiffness": 0.2}, {"drag": 0.1})
+    cable = {"length": 2.0, "diameter": 0.01, "bending_stiffness": 0.2, "point_masses": [{"u": 2.0, "mass": 0.1}]}
+    KeptCables(tmp_path).keep("one", cable, {"drag": 0.1})
     expected = {"one": {"cable": {"diameter": 0.01, "bending_stiffness": 0.2}, "environment": {"drag": 0.1}}}
     assert KeptCables(tmp_path).all() == expected
     (tmp_path / FILE).write_text("{")
