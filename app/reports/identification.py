@@ -26,11 +26,10 @@ figure{margin:1rem 0}figcaption{color:#555;font-size:.9rem}svg{width:100%;height
 def document_of_identification(found: Identification) -> dict[str, Any]:
     """Return an identification as JSON-ready data: the cable and drag as scenes take them, and how they are known."""
     candidate = found.candidate
-    cable = candidate.cable
     document: dict[str, Any] = {
         "status": found.status,
         "message": found.message,
-        "cable": from_cable(cable),
+        "cable": from_cable(found.cable),
         "environment": {
             "drag": candidate.environment.drag,
             "drag_quadratic": candidate.environment.drag_quadratic,
@@ -66,8 +65,6 @@ def document_of_identification(found: Identification) -> dict[str, Any]:
         document["marker_offsets"] = candidate.marker_offsets.tolist()
     if any(p.name == "turn" for p in found.parameters):
         document["turn"] = candidate.turn
-    if any(p.name == "length_ratio" for p in found.parameters):
-        document["cable"]["length"] = cable.length * candidate.length_ratio
     return document
 
 

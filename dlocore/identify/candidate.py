@@ -47,6 +47,13 @@ class Candidate:
         return self.cable.yields
 
 
+def resized(cable: Cable, length: float) -> Cable:
+    """Return a cable at another length [m], with its point masses at the same shares of it."""
+    share = length / cable.length
+    masses = tuple(replace(one, u=min(one.u * share, length)) for one in cable.point_masses)
+    return replace(cable, length=length, point_masses=masses)
+
+
 def varied(problem: Problem, before: Candidate, after: Candidate) -> Problem | None:
     """Return the problem of a candidate from the one posed for another.
 

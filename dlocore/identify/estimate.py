@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dlocore.compiling.interrupts import interruptible
 from dlocore.errors import SceneError, within
-from dlocore.identify.candidate import Candidate
+from dlocore.identify.candidate import Candidate, resized
 from dlocore.identify.identification import Identification, Progress
 from dlocore.identify.intervals import assess
 from dlocore.identify.parameters import DEFAULT, PLACES, Parameter, parameters, prepared
@@ -60,8 +60,9 @@ def identify(
 
     Args:
         recordings: of one cable.
-        cable: what is known of it, and first guesses; None: from the recordings' facts. Motion and shape depend on
-            forces per mass alone, so its linear density is taken as known.
+        cable: what is known of it, and first guesses; None: from the recordings' facts. Its length is that of the
+            first recording, where its point masses keep their shares of it. Motion and shape depend on forces per mass
+            alone, so its linear density is taken as known.
         environment: first guesses of the drag, and a table.
         names: parameters to identify (`parameters.SCALARS`, "rest_curvature", "clamp_angles", "marker_offsets").
         start: a candidate to begin with instead of cable and environment.
@@ -85,7 +86,11 @@ def identify(
     clamps = max(sum(h.towards is not None for h in r.holds) for r in windows)
     free = sorted({int(i) for r in windows for i in r.free})
     given = start or Candidate(cable=cable or cable_of(recordings), environment=environment or Environment())
-    given = replace(given, environment=replace(given.environment, gravity=recordings[0].gravity))
+    given = replace(
+        given,
+        cable=resized(given.cable, cast(float, recordings[0].length)),
+        environment=replace(given.environment, gravity=recordings[0].gravity),
+    )
     places = PLACES if given.rest_curvature is None else len(given.rest_curvature)
     chosen = parameters(names, clamps, free, places)
     markers = sorted({cast(Floats, r.markers).shape[1] for r in windows})
@@ -210,19 +215,18 @@ def cable_of(recordings: Sequence[Recording]) -> Cable:
 
     The axial stiffness is that of a cable that nothing stretches.
     """
-    length = cast(float, recordings[0].length)
     telling = next((r for r in recordings if r.point_masses), recordings[0])
-    masses = tuple(replace(one, u=one.u * (length / cast(float, telling.length))) for one in telling.point_masses)
     density = next((r.linear_density for r in recordings if r.linear_density is not None), _DENSITY)
-    return Cable(
-        length=length,
+    cable = Cable(
+        length=cast(float, telling.length),
         diameter=next((r.diameter for r in recordings if r.diameter is not None), 0.005),
         linear_density=density,
         bending_stiffness=1e-3 * density / _DENSITY,
         axial_stiffness=500.0 * density / _DENSITY,
         bending_damping=2e-4,
-        point_masses=masses,
+        point_masses=telling.point_masses,
     )
+    return resized(cable, cast(float, recordings[0].length))
 
 
 def cut(recordings: Sequence[Recording], window: float) -> list[Recording]:

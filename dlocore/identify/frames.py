@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from dlocore.answer.frames import unit
 from dlocore.answer.transport import transported
+from dlocore.identify.span import Span
 from dlocore.scene.scene import ControlPoints, Material
 from dlocore.spline import design_matrix, greville
 
@@ -51,6 +52,28 @@ def carried(tangents: Floats, director: Floats) -> Floats:
     for i in range(1, len(tangents)):
         out[i] = transported(tangents[i - 1], tangents[i], out[i - 1])
     return out
+
+
+def rest_points(rest_curvature: Floats, span: Span, direction: Floats) -> Floats:
+    """Return points (k, 3) [m] along the stress-free shape of a whole cable, from the origin.
+
+    Args:
+        rest_curvature: (k, 2) [1/m] in the frame of the sections, from end to end of the span; straight beyond.
+        span: the part of the cable that bends.
+        direction: (3,) in which it sets out, with the director that a clamp of this reference has.
+    """
+    u = np.unique(np.concatenate([np.linspace(0.0, span.whole, 201), [span.begin, span.begin + span.length]]))
+    middle = 0.5 * (u[1:] + u[:-1]) - span.begin
+    places = np.linspace(0.0, span.length, len(rest_curvature))
+    on = (middle > 0.0) & (middle < span.length)
+    bends = np.column_stack([np.interp(middle, places, column) * on for column in rest_curvature.T])
+    tangent, director, points = direction, across(direction), [np.zeros(3)]
+    for step, (first, second) in zip(np.diff(u), bends, strict=True):
+        axis = first * np.cross(tangent, director) - second * director  # about which the tangent turns
+        half = Rotation.from_rotvec(0.5 * step * axis)
+        points.append(points[-1] + step * half.apply(tangent))
+        tangent, director = (half * half).apply([tangent, director])
+    return np.array(points)
 
 
 def with_sections(

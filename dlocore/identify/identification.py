@@ -1,12 +1,12 @@
 """What is identified: values with intervals, what they rest on, and how the search goes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.identify.candidate import Candidate
+from dlocore.identify.candidate import Candidate, resized
 from dlocore.scene.cable import Cable
 from dlocore.scene.scene import Environment
 
@@ -81,6 +81,8 @@ class Identification:
         candidate: everything that was found, to replay with.
         parameters: as asked for, with intervals.
         correlations: between the identified ones, (n, n), in the order of `parameters`; NaN for others.
+        rest_shape: points (k, 3) [m] of the stress-free shape that was found, as it would lie were the first clamp held
+            as in the recordings in the mean; None: none was sought, straight.
         fits: how each window is met.
         deviation: robust standard deviation of a coordinate of the residuals [m].
         iterations: of Gauss-Newton.
@@ -92,6 +94,7 @@ class Identification:
     candidate: Candidate
     parameters: tuple[Estimated, ...]
     correlations: Floats
+    rest_shape: Floats | None
     fits: tuple[Fit, ...]
     deviation: float
     iterations: int
@@ -99,8 +102,10 @@ class Identification:
 
     @property
     def cable(self) -> Cable:
-        """The cable, to be used in scenes."""
-        return self.candidate.cable
+        """The cable, to be used in scenes: with the length and the stress-free shape that were found."""
+        found = self.candidate.cable
+        cable = resized(found, found.length * self.candidate.length_ratio)
+        return cable if self.rest_shape is None else replace(cable, rest_shape=self.rest_shape)
 
     @property
     def environment(self) -> Environment:

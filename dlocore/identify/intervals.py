@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from dlocore.errors import SceneError
+from dlocore.identify.candidate import Candidate
+from dlocore.identify.frames import rest_points
 from dlocore.identify.identification import Estimated, Fit, Identification
 from dlocore.identify.parameters import Parameter
 from dlocore.identify.replay import Played, Replay
@@ -78,11 +80,19 @@ def assess(search: Search, state: State, seconds: float) -> Identification:
         candidate=state.candidate,
         parameters=estimated,
         correlations=correlations,
+        rest_shape=_rest_shape(search, state.candidate),
         fits=fits,
         deviation=deviation,
         iterations=state.iterations,
         seconds=seconds,
     )
+
+
+def _rest_shape(search: Search, candidate: Candidate) -> Floats | None:
+    if candidate.rest_curvature is None:
+        return None
+    replay = search.replays[0]
+    return rest_points(candidate.rest_curvature, replay.span.scaled(candidate.length_ratio), replay.references[0])
 
 
 def _fit(replay: Replay | Rest, played: Played | Settled) -> Fit:
