@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import orjson
@@ -21,7 +22,7 @@ from app.viewer.history import History
 from app.viewer.kept import KeptCables
 from app.viewer.outbox import Outbox, Runs
 from app.viewer.palette import BRAND
-from app.viewer.panel import Actions, Panel
+from app.viewer.panel import TO_READ, Actions, Panel
 from app.viewer.picking import GripperClick
 from app.viewer.picture import Look, Picture, light
 from app.viewer.playback import Playback
@@ -109,7 +110,8 @@ class Session:
         client.scene.on_click()(self._clicked)  # type: ignore[arg-type]
         self._gizmo = Gizmo(client.scene, self._begin_drag, self._drag, self._end_drag)
         self._shape = ShapeEditor(client, self._shape_dragged)
-        self._edits = Edits(lambda: self._draft, self._edited)
+        tell = partial(client.add_notification, auto_close_seconds=TO_READ)
+        self._edits = Edits(lambda: self._draft, self._edited, tell)
         # controls are not told of "0.0" after "0", on the way to 0.02
         client._websock_connection.register_handler(GuiUpdateMessage, lambda *_: self._edits.go_on())
         self._panel = Panel(

@@ -43,3 +43,14 @@ def test_negative_fractions_are_typed_into_the_target(service, witness):
     expect(target).to_have_value("0")
     assert solved_target(page) == [0.0, 0.0, 0.0]
     assert witness.errors == []
+
+
+def test_a_power_of_ten_is_typed_and_what_is_out_of_range_is_told(service, witness):
+    page = open_scene(witness, service)
+    stiffness = typed(page, "EI [10⁻³ N m²]", 0, "1e-1")
+    solved_target(page)
+    expect(stiffness).to_have_value("1e-1")
+    typed(page, "EI [10⁻³ N m²]", 0, "1e20")
+    expect(page.get_by_text("Got 1e20, allowed: a number from 1e-6 to 1e9.")).to_be_visible()
+    expect(stiffness).to_have_value("0.1")
+    assert witness.errors == []

@@ -51,6 +51,7 @@ class SceneClient:
         self.owners: dict[str, str] = {}
         self.controls: dict[str, dict[str, Any]] = {}
         self.notifications: list[str] = []
+        self.notices: list[str] = []  # their texts
         self.downloads: dict[str, bytes] = {}
         self._transfers: dict[str, tuple[str, int]] = {}
         self._parts: dict[str, dict[int, bytes]] = {}
@@ -123,6 +124,7 @@ class SceneClient:
                 self.visible[name] = message["visible"]
             elif kind == "NotificationShowMessage":
                 self.notifications.append(message["props"]["title"])
+                self.notices.append(message["props"]["body"])
             elif kind == "FileTransferStartDownload":
                 self._transfers[message["transfer_uuid"]] = (message["filename"], message["part_count"])
             elif kind == "FileTransferPart":

@@ -66,10 +66,10 @@ def test_undo_and_redo_are_on_the_panel(service):
         client.wait_for(lambda: client.control("Changes")[1]["visible"])
         assert drag_of(client) == 0.2
         client.set("Changes", "Undo")
-        client.wait_for(lambda: client.control("Drag [N s/m²]")[1]["value"] == before)
+        client.wait_for(lambda: client.control("Drag [N s/m²]")[1]["value"] == f"{before}")
         assert drag_of(client) == before
         client.set("Changes", "Redo")
-        client.wait_for(lambda: client.control("Drag [N s/m²]")[1]["value"] == 0.2)
+        client.wait_for(lambda: client.control("Drag [N s/m²]")[1]["value"] == "0.2")
         client.refined()
 
 

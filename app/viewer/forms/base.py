@@ -2,7 +2,7 @@
 
 from typing import Any, Protocol
 
-from viser import GuiEvent
+from viser import GuiEvent, GuiSliderHandle
 
 from app.viewer.draft import Draft
 from app.viewer.edits import Change, Edits
@@ -30,7 +30,7 @@ class Form:
     def _bind(self, control: Any, change: Change) -> None:
         @control.on_update
         async def _edited(event: GuiEvent[Any]) -> None:
-            if event.client is not None:
+            if event.client is not None and not _beyond(control):
                 self._edits.by(control, change)
 
     def _on_click(self, button: Any, change: Change) -> None:
@@ -38,6 +38,11 @@ class Form:
         async def _clicked(_event: GuiEvent[Any]) -> None:
             self._edits.finish()
             self._edits.make(change)
+
+
+def _beyond(control: Any) -> bool:
+    """Return whether the number beside a slider is out of its range, as 0 is on the way to 0.5."""
+    return isinstance(control, GuiSliderHandle) and not control.min <= control.value <= control.max
 
 
 class ShowsDraft(Protocol):

@@ -8,6 +8,7 @@ from app.viewer.draft import Draft
 from app.viewer.edits import Edits
 from app.viewer.forms.base import Form, show_if, show_value
 from app.viewer.kept import KeptCables
+from app.viewer.number_field import NumberField
 from app.viewer.shapes import scaled
 from dlocore import PRESETS, Cable, SceneError
 from dlocore.scene.cable import MAX_LENGTH, MIN_LENGTH
@@ -26,47 +27,45 @@ class CableForm(Form):
         self._kept = cables.all()
         with gui.add_folder("Cable"):
             self._preset = gui.add_dropdown("Preset", (*PRESETS, *self._kept, CUSTOM))
-            self._length = gui.add_number("Length [m]", 1.0, min=MIN_LENGTH, max=MAX_LENGTH, step=0.05)
-            self._diameter = gui.add_number("Diameter [mm]", 1.0, min=0.01, max=500.0, step=0.1)
-            self._density = gui.add_number("Density [g/m]", 1.0, min=0.01, max=1e7, step=0.1)
-            self._bending = gui.add_number("EI [10⁻³ N m²]", 1.0, min=1e-6, max=1e9, step=0.01)
-            self._connector = gui.add_number(
-                "Connector [g]", 0.0, min=0.0, max=1e7, step=1.0, hint="A point mass on the cable; 0: none"
+            self._length = NumberField(gui, "Length [m]", 1.0, low=MIN_LENGTH, high=MAX_LENGTH)
+            self._diameter = NumberField(gui, "Diameter [mm]", 1.0, low=0.01, high=5e5)
+            self._density = NumberField(gui, "Density [g/m]", 1.0, low=0.01, high=1e7)
+            self._bending = NumberField(gui, "EI [10⁻³ N m²]", 1.0, low=1e-6, high=1e9)
+            self._connector = NumberField(
+                gui, "Connector [g]", 0.0, low=0.0, high=1e7, hint="A point mass on the cable; 0: none"
             )
-            self._connector_u = gui.add_number("Placed at u [m]", 1.0, min=0.0, max=MAX_LENGTH, step=0.01)
+            self._connector_u = NumberField(gui, "Placed at u [m]", 1.0, low=0.0, high=MAX_LENGTH)
             with gui.add_folder("More of the cable", expand_by_default=False):
-                self._torsion = gui.add_number("GJ [10⁻³ N m²]", 1.0, min=1e-6, max=1e9, step=0.01)
-                self._stretch = gui.add_number("EA [N]", 1.0, min=1e-3, max=1e12, step=1.0)
-                self._damping = gui.add_number(
-                    "Damping [10⁻³ N m² s]", 0.0, min=0.0, max=1e9, step=0.01, hint="Of bending"
+                self._torsion = NumberField(gui, "GJ [10⁻³ N m²]", 1.0, low=1e-6, high=1e9)
+                self._stretch = NumberField(gui, "EA [N]", 1.0, low=1e-3, high=1e12)
+                self._damping = NumberField(gui, "Damping [10⁻³ N m² s]", 0.0, low=0.0, high=1e9, hint="Of bending")
+                self._torsion_damping = NumberField(gui, "Twist damping [10⁻³ N m² s]", 0.0, low=0.0, high=1e9)
+                self._stretch_damping = NumberField(
+                    gui, "Stretch damping [N s]", 0.0, low=0.0, high=1e9, hint="0: waves of stretch ring on"
                 )
-                self._torsion_damping = gui.add_number("Twist damping [10⁻³ N m² s]", 0.0, min=0.0, max=1e9, step=0.01)
-                self._stretch_damping = gui.add_number(
-                    "Stretch damping [N s]", 0.0, min=0.0, max=1e9, step=0.01, hint="0: waves of stretch ring on"
+                self._yield = NumberField(
+                    gui, "Yields at strain [%]", 0.0, low=0.0, high=1000.0, hint="Of its outermost fibre; 0: never"
                 )
-                self._yield = gui.add_number(
-                    "Yields at strain [%]", 0.0, min=0.0, max=1000.0, step=0.1, hint="Of its outermost fibre; 0: never"
-                )
-                self._rate = gui.add_number("Memory rate [1/s]", PLASTIC_RATE, min=1e-3, max=1e9, step=1.0)
+                self._rate = NumberField(gui, "Memory rate [1/s]", PLASTIC_RATE, low=1e-3, high=1e9)
                 self._rest = gui.add_dropdown(
                     "Stress-free shape", ("straight", "initial", "as loaded"), hint="initial: that of its start"
                 )
         self._bind(self._preset, self._with_preset)
-        self._bind(self._length, lambda d: scaled(d, float(self._length.value)))
+        self._bind(self._length, lambda d: scaled(d, self._length.value))
         self._bind(self._diameter, lambda d: self._with(d, "diameter", 1e-3 * self._diameter.value))
         self._bind(self._density, lambda d: self._with(d, "linear_density", 1e-3 * self._density.value))
         self._bind(self._connector, self._with_connector)
         self._bind(self._connector_u, self._with_place)
         self._bind(self._bending, lambda d: self._with(d, "bending_stiffness", 1e-3 * self._bending.value))
         self._bind(self._torsion, lambda d: self._with(d, "torsional_stiffness", 1e-3 * self._torsion.value))
-        self._bind(self._stretch, lambda d: self._with(d, "axial_stiffness", float(self._stretch.value)))
+        self._bind(self._stretch, lambda d: self._with(d, "axial_stiffness", self._stretch.value))
         self._bind(self._damping, lambda d: self._with(d, "bending_damping", 1e-3 * self._damping.value))
         self._bind(
             self._torsion_damping, lambda d: self._with(d, "torsional_damping", 1e-3 * self._torsion_damping.value)
         )
-        self._bind(self._stretch_damping, lambda d: self._with(d, "axial_damping", float(self._stretch_damping.value)))
+        self._bind(self._stretch_damping, lambda d: self._with(d, "axial_damping", self._stretch_damping.value))
         self._bind(self._yield, lambda d: self._with_yield(d, 1e-2 * self._yield.value))
-        self._bind(self._rate, lambda d: self._with(d, "memory_rate", float(self._rate.value)))
+        self._bind(self._rate, lambda d: self._with(d, "memory_rate", self._rate.value))
         self._bind(self._rest, self._with_rest)
 
     @staticmethod
@@ -97,7 +96,7 @@ class CableForm(Form):
 
     def _with_place(self, draft: Draft) -> Draft:
         """Put the first point mass, if there is one, where it is wanted."""
-        u = float(f"{min(float(self._connector_u.value), draft.length):.9g}")
+        u = float(f"{min(self._connector_u.value, draft.length):.9g}")
         there = draft.get(("cable", "point_masses"))
         return draft.put(("cable", "point_masses", 0, "u"), u) if there else draft
 
@@ -139,6 +138,7 @@ class CableForm(Form):
         show_value(self._connector, _shown(1e3, first.mass if first else 0.0))
         show_if(self._connector_u, first is not None)
         if first is not None:
+            self._connector_u.high = cable.length
             show_value(self._connector_u, _shown(1.0, first.u))
         show_value(self._rate, cable.memory_rate or PLASTIC_RATE)
         show_if(self._rate, cable.memory_rate is not None)

@@ -11,6 +11,7 @@ from app.viewer import grips
 from app.viewer.draft import Draft
 from app.viewer.edits import Edits
 from app.viewer.forms.base import Form, show_if, show_value
+from app.viewer.number_field import NumberField
 from dlocore import SplineSurface
 from dlocore.scene.scene import MAX_GRASPS
 from dlocore.shape.shape import StartCurve
@@ -58,10 +59,10 @@ class GripperForm(Form):
         )
         with gui.add_folder("Timing", expand_by_default=False) as self._timing:
             self._profile = gui.add_dropdown("Speed profile", grips.PROFILES)
-            self._closes = gui.add_number("Closes at [s]", 0.0, min=0.0, max=1e4, step=0.1)
-            self._opens = gui.add_number("Opens at [s]", 0.0, min=0.0, max=1e4, step=0.1, hint="0: it stays closed")
-            self._horizon = gui.add_number(
-                "Predict until [s]", 0.0, min=0.0, max=1e4, step=0.1, hint="0: until the last path ends"
+            self._closes = NumberField(gui, "Closes at [s]", 0.0, low=0.0, high=1e4)
+            self._opens = NumberField(gui, "Opens at [s]", 0.0, low=0.0, high=1e4, hint="0: it stays closed")
+            self._horizon = NumberField(
+                gui, "Predict until [s]", 0.0, low=0.0, high=1e4, hint="0: until the last path ends"
             )
         self._bind_controls()
 
@@ -77,9 +78,9 @@ class GripperForm(Form):
         self._bind(self._duration, lambda d: grips.with_duration(d, float(self._duration.value)))
         self._on_click(self._moves, self._with_moves)
         self._bind(self._profile, lambda d: grips.path_changed(d, "profile", self._profile.value))
-        self._bind(self._closes, lambda d: grips.changed(d, "grasp_time", float(self._closes.value) or None))
-        self._bind(self._opens, lambda d: grips.changed(d, "release_time", float(self._opens.value) or None))
-        self._bind(self._horizon, lambda d: d.put(("horizon",), float(self._horizon.value) or None))
+        self._bind(self._closes, lambda d: grips.changed(d, "grasp_time", self._closes.value or None))
+        self._bind(self._opens, lambda d: grips.changed(d, "release_time", self._opens.value or None))
+        self._bind(self._horizon, lambda d: d.put(("horizon",), self._horizon.value or None))
 
     def _with_new(self, draft: Draft) -> Draft:
         """Add a gripper, and say which targets that has changed."""

@@ -7,6 +7,7 @@ from viser import GuiApi
 from app.viewer.draft import Draft
 from app.viewer.edits import Edits
 from app.viewer.forms.base import Form, show_if, show_value
+from app.viewer.number_field import NumberField
 
 Mode = Literal["automatic", "target error", "time budget", "grid"]
 QUALITY = ("quality",)
@@ -26,8 +27,8 @@ class QualityForm(Form):
     def __init__(self, gui: GuiApi, draft: Draft, edits: Edits) -> None:
         super().__init__(draft, edits)
         self._mode = gui.add_dropdown("Ask for", get_args(Mode))
-        self._error = gui.add_number("Target error [mm]", 2.0, min=0.001, max=1e4, step=0.1)
-        self._budget = gui.add_number("Time budget [ms]", 20.0, min=0.1, max=60_000.0, step=1.0)
+        self._error = NumberField(gui, "Target error [mm]", 2.0, low=0.001, high=1e4)
+        self._budget = NumberField(gui, "Time budget [ms]", 20.0, low=0.1, high=60_000.0)
         self._n_u = gui.add_slider("Points along n_u", min=5, max=65, step=1, initial_value=9)
         self._n_t = gui.add_slider("Points in time n_t", min=5, max=129, step=1, initial_value=13)
         self._delta = gui.add_dropdown("Threshold δ", (NONE, *DELTAS))

@@ -9,6 +9,7 @@ from app.viewer import obstacle_edits
 from app.viewer.draft import Draft
 from app.viewer.edits import Edits
 from app.viewer.forms.base import Form, show_if, show_value
+from app.viewer.number_field import NumberField
 
 NONE = "no obstacle"
 ADDED = {"Cylinder": "cylinder", "Box": "box", "Sphere": "sphere", "Capsule": "capsule"}
@@ -25,29 +26,29 @@ class SurroundingsForm(Form):
         self._chosen = 0
         with gui.add_folder("Surroundings"):
             self._table = gui.add_checkbox("Table", initial_value=True)
-            self._height = gui.add_number("Table height [m]", 0.0, min=-FAR, max=FAR, step=0.01)
-            self._friction = gui.add_number("Table friction", 0.0, min=0.0, max=10.0, step=0.05)
-            self._drag = gui.add_number("Drag [N s/m²]", 0.0, min=0.0, max=1e6, step=0.005)
+            self._height = NumberField(gui, "Table height [m]", 0.0, low=-FAR, high=FAR)
+            self._friction = NumberField(gui, "Table friction", 0.0, low=0.0, high=10.0)
+            self._drag = NumberField(gui, "Drag [N s/m²]", 0.0, low=0.0, high=1e6)
             with gui.add_folder("More of the surroundings", expand_by_default=False):
-                self._quadratic = gui.add_number("Drag [N s²/m³]", 0.0, min=0.0, max=1e6, step=0.005)
+                self._quadratic = NumberField(gui, "Drag [N s²/m³]", 0.0, low=0.0, high=1e6)
                 self._gravity = gui.add_vector3("Gravity [m/s²]", (0.0, 0.0, -9.81), step=0.1)
         with gui.add_folder("Obstacles"):
             self._add = gui.add_button_group("Add", tuple(ADDED))
             self._which = gui.add_dropdown("Obstacle", (NONE,))
             self._centre = gui.add_vector3("Centre [m]", (0.0, 0.0, 0.0), step=0.01)
-            self._radius = gui.add_number("Radius [mm]", 1.0, min=0.1, max=1e7, step=1.0)
+            self._radius = NumberField(gui, "Radius [mm]", 1.0, low=0.1, high=1e7)
             self._size = gui.add_vector3("Size [mm]", (1.0, 1.0, 1.0), step=1.0)
-            self._long = gui.add_number("Length [mm]", 1.0, min=0.1, max=1e7, step=1.0)
-            self._rough = gui.add_number("Obstacle friction", 0.0, min=0.0, max=10.0, step=0.05)
+            self._long = NumberField(gui, "Length [mm]", 1.0, low=0.1, high=1e7)
+            self._rough = NumberField(gui, "Obstacle friction", 0.0, low=0.0, high=10.0)
             self._remove = gui.add_button("Remove obstacle", color="gray")
         self._bind_controls()
 
     def _bind_controls(self) -> None:
         self._bind(self._table, lambda d: self._with_table(d, self._table.value))
-        self._bind(self._height, lambda d: d.put((*TABLE, "height"), float(self._height.value)))
-        self._bind(self._friction, lambda d: d.put((*TABLE, "friction"), float(self._friction.value)))
-        self._bind(self._drag, lambda d: d.put((*ENVIRONMENT, "drag"), float(self._drag.value)))
-        self._bind(self._quadratic, lambda d: d.put((*ENVIRONMENT, "drag_quadratic"), float(self._quadratic.value)))
+        self._bind(self._height, lambda d: d.put((*TABLE, "height"), self._height.value))
+        self._bind(self._friction, lambda d: d.put((*TABLE, "friction"), self._friction.value))
+        self._bind(self._drag, lambda d: d.put((*ENVIRONMENT, "drag"), self._drag.value))
+        self._bind(self._quadratic, lambda d: d.put((*ENVIRONMENT, "drag_quadratic"), self._quadratic.value))
         self._bind(self._gravity, lambda d: d.put((*ENVIRONMENT, "gravity"), [float(x) for x in self._gravity.value]))
         self._bind(self._centre, lambda d: obstacle_edits.moved(d, self._chosen, np.array(self._centre.value)))
         self._bind(self._radius, lambda d: obstacle_edits.changed(d, self._chosen, "radius", 1e-3 * self._radius.value))
@@ -56,7 +57,7 @@ class SurroundingsForm(Form):
             lambda d: obstacle_edits.changed(d, self._chosen, "size", [1e-3 * float(x) for x in self._size.value]),
         )
         self._bind(self._long, lambda d: obstacle_edits.lengthened(d, self._chosen, 1e-3 * self._long.value))
-        self._bind(self._rough, lambda d: obstacle_edits.changed(d, self._chosen, "friction", float(self._rough.value)))
+        self._bind(self._rough, lambda d: obstacle_edits.changed(d, self._chosen, "friction", self._rough.value))
 
         self._on_click(self._add, self._with_new)
         self._on_click(self._remove, lambda d: obstacle_edits.removed(d, self._chosen))

@@ -1,0 +1,74 @@
+"""The number fields of the panel: what is typed is what is solved, or is told to be none."""
+
+import pytest
+from protocol_client import SceneClient, connected
+
+from app.viewer.number_field import read, written
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [("0.5", 0.5), ("0,5", 0.5), ("1e-4", 1e-4), ("1.5E2", 150.0), (" -.3 ", -0.3), ("−2", -2.0), ("3.", 3.0)],
+)
+def test_a_number_is_read_as_people_write_it(text, number):
+    assert read(text) == number
+
+
+@pytest.mark.parametrize("text", ["", "-", "1e", "1e-", "1.000,5", "1 2", "1_000", "nan", "inf", "five", "0x10"])
+def test_what_is_no_number_is_none(text):
+    assert read(text) is None
+
+
+@pytest.mark.parametrize(
+    ("number", "text"), [(1e-6, "1e-6"), (1e9, "1e9"), (0.30000000000000004, "0.3"), (-0.0, "0"), (1200.0, "1200")]
+)
+def test_a_number_is_written_short_and_read_again(number, text):
+    assert written(number) == text
+    assert read(text) == pytest.approx(number, rel=1e-7)
+
+
+LABEL = "EI [10⁻³ N m²]"
+
+
+def typed(client: SceneClient, text: str) -> None:
+    """Type into the field, which shows it until it is told otherwise."""
+    client.control(LABEL)[1]["value"] = text
+    client.set(LABEL, text)
+
+
+def test_a_power_of_ten_is_the_number_that_is_solved_and_stays_as_it_was_typed(service):
+    with connected(service) as client:
+        for text, stiffness in (("1e-1", 1e-4), ("1.5e2", 0.15), ("0,5", 5e-4)):
+            typed(client, text)
+            assert client.document["cable"]["bending_stiffness"] == pytest.approx(stiffness, rel=1e-9)
+            assert client.control(LABEL)[1]["value"] == text
+
+
+def test_what_is_not_allowed_is_told_and_the_field_shows_what_holds(service):
+    with connected(service) as client:
+        before = client.document
+        for text in ("", "five", "1e", "0", "-1", "1e12"):
+            typed(client, text)
+            assert client.document == before
+            assert client.control(LABEL)[1]["value"] == "1"
+            assert client.notifications.pop() == f"{LABEL} is left at 1"
+            assert client.notices.pop() == f"Got {text or 'nothing'}, allowed: a number from 1e-6 to 1e9."
+
+
+def test_the_beginning_of_a_number_is_waited_for(service):
+    with connected(service) as client:
+        for text in ("1", "1e", "1e-", "1e-1"):
+            typed(client, text)
+            client.listen(0.6)  # s: longer than the rest after which a number counts as typed
+        client.wait_for(lambda: '"bending_stiffness": 0.0001' in client.markdown("```json"))
+        typed(client, "2e")
+        client.wait_for(lambda: client.notifications == [f"{LABEL} is left at 0.1"])
+
+
+@pytest.mark.parametrize("label", ["Duration [s]", "Grasp u [m]"])
+def test_a_slider_beside_which_nothing_of_its_range_is_typed_yet_changes_nothing(service, label):
+    with connected(service) as client:
+        before = client.document
+        for beyond in (-1.0, 20.0):
+            client.set(label, beyond)
+            assert client.document == before
