@@ -86,8 +86,7 @@ def plot(x_label: str, y_label: str, series: Sequence[Series], *, log_x: bool, m
     y = Axis.of(y_label, [point[1] for one in drawn for point in one.points], log=True)
     parts = [*_frame(x, y), *(_series(one, x, y) for one in drawn)]
     legend = "".join(
-        f'<span style="white-space: nowrap; margin-right: 0.7rem;"><span style="color: {one.colour};">●</span> '
-        f"{escape(one.name)}</span>"
+        f'<span style="white-space: nowrap;"><span style="color: {one.colour};">●</span> {escape(one.name)}</span>'
         for one in drawn
         if one.name
     )
@@ -95,7 +94,8 @@ def plot(x_label: str, y_label: str, series: Sequence[Series], *, log_x: bool, m
         f'<div style="margin: 0.3rem 0.5rem;" data-plot="{escape(mark, quote=True)}">'
         f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(y_label)} against {escape(x_label)}" '
         f'style="width: 100%; display: block;" font-size="10" fill="currentColor" stroke="none">{"".join(parts)}</svg>'
-        f'<div style="font-size: 0.72rem; padding-left: 0.4rem;">{legend}</div></div>'
+        f'<div style="display: flex; flex-wrap: wrap; column-gap: 0.7rem; font-size: 0.72rem; padding-left: 0.4rem;">'
+        f"{legend}</div></div>"
     )
 
 

@@ -150,6 +150,13 @@ def test_a_plot_is_well_formed_whatever_its_words_and_lies_inside_its_frame():
         assert plots.TOP <= float(dot.attrib["cy"]) <= plots.HEIGHT - plots.BOTTOM
 
 
+def test_the_names_of_a_legend_go_on_in_a_line_below_where_they_are_too_long():
+    series = [plots.Series(name=f"the series {k}", points=[(1.0, 1.0)], colour="red") for k in range(4)]
+    (legend,) = ET.fromstring(plots.plot("x", "y", series, log_x=True, mark="a")).findall("div")
+    assert len(legend) == 4
+    assert "flex-wrap: wrap" in legend.attrib["style"]
+
+
 def test_the_present_solve_is_a_dot_among_what_the_machine_was_calibrated_to():
     prediction = predict(start_draft().scene(NOTHING_STORED))
     common = {"dimensions": 2, "method": "march", "n_t": 13, "steps": 48, "spread": 1e-4, "iterations": 0}
