@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from statistics import median
 
 import dlocore
@@ -14,7 +14,24 @@ REPEATS = 5  # of each march; the median counts
 LONGEST = 10.0  # s, of one march
 
 
-def measure_costs(prediction: Prediction, cancelled: Callable[[], bool], on_cost: Callable[[str, float], None]) -> None:
+@dataclass(frozen=True, kw_only=True)
+class Costs:
+    """What effects cost, as far as it is measured.
+
+    Attributes:
+        seconds: by how much longer an effect makes a solve [s], negative where it saves time.
+        effect: that is being measured; "" at the end.
+        number: of this effect among those that are measured, from 1.
+        count: of those.
+    """
+
+    seconds: dict[str, float] = field(default_factory=dict)
+    effect: str = ""
+    number: int
+    count: int
+
+
+def measure_costs(prediction: Prediction, cancelled: Callable[[], bool], on_costs: Callable[[Costs], None]) -> None:
     """Measure how much longer each active effect makes a solve of the scene of `prediction`.
 
     Each is switched off in turn, and everything else stays: the same grid, the same steps, the same choice of the other
@@ -23,7 +40,7 @@ def measure_costs(prediction: Prediction, cancelled: Callable[[], bool], on_cost
     Args:
         prediction: of the scene.
         cancelled: asked between and during the marches.
-        on_cost: called with the name of an effect and its cost [s], negative where it saves time.
+        on_costs: called before the first effect, and whenever one more is measured.
 
     Raises:
         Cancelled: `cancelled` said so.
@@ -32,13 +49,15 @@ def measure_costs(prediction: Prediction, cancelled: Callable[[], bool], on_cost
     chosen: dict[str, Switch] = {effect.name: "on" if effect.active else "off" for effect in effects}
     grid = Quality(n_u=accuracy.n_u, n_t=accuracy.n_t, method="march", estimate=False)
     scene = replace(prediction.scene, quality=grid, effects=chosen)
-    usual = _time(scene, cancelled)
-    for effect in effects:
-        if usual is None or not effect.active or effect.name in NEEDED:
-            continue
-        without = _time(replace(scene, effects={**chosen, effect.name: "off"}), cancelled)
-        if without is not None:
-            on_cost(effect.name, usual - without)
+    names = [effect.name for effect in effects if effect.active and effect.name not in NEEDED]
+    costs = Costs(effect=names[0] if names else "", number=1, count=len(names))
+    on_costs(costs)
+    usual = _time(scene, cancelled) if names else None
+    for number, (name, following) in enumerate(zip(names, [*names[1:], ""], strict=True), 2):
+        without = None if usual is None else _time(replace(scene, effects={**chosen, name: "off"}), cancelled)
+        seconds = costs.seconds if usual is None or without is None else {**costs.seconds, name: usual - without}
+        costs = Costs(seconds=seconds, effect=following, number=number, count=len(names))
+        on_costs(costs)
 
 
 def _time(scene: Scene, cancelled: Callable[[], bool]) -> float | None:

@@ -1,6 +1,6 @@
 """The control panel: what a person sets, and what the last solve was worth."""
 
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -10,6 +10,7 @@ from viser import ClientHandle, GuiEvent
 
 from app.pages.gallery import examples
 from app.viewer import report
+from app.viewer.costs import Costs
 from app.viewer.draft import Draft
 from app.viewer.edits import Edits
 from app.viewer.forms import CableForm, EffectsForm, GripperForm, QualityForm, SurroundingsForm, show_value
@@ -108,6 +109,7 @@ class Panel:
         self._actions = actions
         self._address = address
         self._earlier: list[tuple[float, float]] = []
+        self._measured: Prediction | None = None  # of whose effects the costs are being measured
         self._stale = False  # whether the results are of a scene before
         self._solve = SolveCard(self._gui, report.waiting_card(ready=ready), actions.stop, actions.solve)
         self._add_timeline()
@@ -358,6 +360,7 @@ class Panel:
             measured: what this machine was calibrated to.
             preview: whether it is one.
         """
+        self._measured = None
         self._solve.show(report.status_card(prediction, preview=preview))
         if self._slider.max != self._playback.horizon:
             self._slider.max = self._playback.horizon
@@ -378,12 +381,16 @@ class Panel:
 
     def take_wait(self, elapsed: float, longest: float) -> None:
         """Say that a solve is under way since `elapsed` [s], which takes `longest` [s] at most."""
+        self._measured = None
         self._solve.show(report.solving_card(elapsed, longest), offer="stop")
         self._mark_stale()
 
     def take_stop(self) -> None:
-        """Say that the solve was ended by hand."""
-        self._solve.show(report.stopped_card(), offer="solve")
+        """Say that the solve was ended by hand; where costs were being measured, there is the answer."""
+        if self._measured is None:
+            self._solve.show(report.stopped_card(), offer="solve")
+        else:
+            self._solve.show(report.status_card(self._measured, preview=False))
 
     def _mark_stale(self) -> None:
         """Show the results so that nobody takes them for those of the scene on the panel."""
@@ -392,9 +399,14 @@ class Panel:
             for part in (self._accuracy, self._convergence, self._message, self._forces):
                 part.content = report.stale(part.content)
 
-    def take_costs(self, prediction: Prediction, costs: Mapping[str, float]) -> None:
-        """Show what the effects cost [s]."""
-        self._effects.show(prediction.effects, costs)
+    def take_costs(self, prediction: Prediction, costs: Costs) -> None:
+        """Show what the effects cost, as far as it is measured."""
+        self._effects.show(prediction.effects, costs.seconds)
+        if costs.effect:
+            self._measured = prediction
+            self._solve.show(report.measuring_card(costs), offer="stop")
+        else:
+            self._solve.show(report.status_card(prediction, preview=False))
 
     def take_problem(self, problem: str, details: str) -> None:
         """Say why there is no prediction of the edited scene."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from app.viewer import plots
+from app.viewer.costs import Costs
 from app.viewer.palette import ColourScale, css_ramp
 from dlocore import EffectReport, Prediction
 from dlocore.accuracy.fallback import errs
@@ -124,6 +125,12 @@ def _waiting(words: str, limit: str) -> str:
     return _plain_card(
         "waiting", words, f"{limit}The first scene with other effects than before takes some seconds more."
     )
+
+
+def measuring_card(costs: Costs) -> str:
+    """Return what to show while it is measured what the effects cost."""
+    words = f"Measuring {costs.number} of {costs.count}: {escape(costs.effect.replace('_', ' '))} …"
+    return _plain_card("measuring", words, "The scene is solved again without each effect, a few times.")
 
 
 def stopped_card() -> str:

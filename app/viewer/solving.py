@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
 
 from app.http.problems import ProblemError
-from app.viewer.costs import measure_costs
+from app.viewer.costs import Costs, measure_costs
 from app.viewer.draft import Draft
 from dlocore import Cancelled, DloError, Prediction, Quality, Scene, SceneError
 from dlocore.calibration import Measured
@@ -76,7 +76,7 @@ class Outcome:
     prediction: Prediction | None
     problem: str = ""
     details: str = ""
-    costs: dict[str, float] | None = None
+    costs: Costs | None = None
     measured: tuple[Measured, ...] = ()
 
 
@@ -147,18 +147,16 @@ class SolverThread:
                 self._deliver(outcome)
 
     def _measure(self, job: Job, prediction: Prediction) -> None:
-        """Deliver what the effects cost, whenever one more of them is measured."""
-        costs: dict[str, float] = {}
+        """Deliver what the effects cost, as far as it is measured."""
 
-        def on_cost(name: str, cost: float) -> None:
-            costs[name] = cost
+        def on_costs(costs: Costs) -> None:
             if not self._closed:
-                self._deliver(Outcome(job=job, prediction=prediction, costs=dict(costs)))
+                self._deliver(Outcome(job=job, prediction=prediction, costs=costs))
 
         def ended() -> bool:  # not `superseded`, which is set by now
             return self._closed or self._newest is not None or job.stopped.is_set()
 
-        measure_costs(prediction, ended, on_cost)
+        measure_costs(prediction, ended, on_costs)
 
     def _solve(self, job: Job) -> Outcome | None:
         try:

@@ -213,6 +213,19 @@ def test_what_each_effect_costs_is_measured_when_asked_for(service):
         client.wait_for(lambda: " ms.</b>" in client.html('data-effect="inertia"'), timeout=60)
 
 
+def test_what_is_being_measured_is_told_and_can_be_stopped(service):
+    with connected(service) as client:
+        client.refined()
+        client.press("Measure what each costs")
+        client.wait_for(lambda: "Measuring 1 of " in client.card)
+        assert client.control("Stop")[1]["visible"]
+        client.wait_for(lambda: "Measuring 2 of " in client.card, timeout=60)
+        client.press("Stop")
+        client.wait_for(lambda: 'data-status="converged"' in client.card)
+        assert not client.control("Stop")[1]["visible"]
+        assert " ms.</b>" in client.html('data-effect="inertia"')
+
+
 def test_an_obstacle_is_drawn_where_it_stands_and_taken_away(service):
     with connected(service) as client:
         client.set("Add", "Box")
