@@ -3,9 +3,9 @@
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.archive import Run
+from app.instants import instants
 from app.recording.obstacles import obstacle_chunks
 from app.recording.style import (
     BLUE,
@@ -14,10 +14,12 @@ from app.recording.style import (
     GREY,
     ORANGE,
     PURPLE,
+    SAMPLES_U,
     SKY,
     STRIPS,
     VERMILION,
     Colour,
+    Floats,
     chunk,
     drawable,
     line_style,
@@ -45,8 +47,10 @@ def motion_chunks(run: Run) -> "list[Chunk]":
     times = [rr.TimeColumn("motion", duration=surface["t"])]
     thick = 0.006 * run.surface.length
     cable = rr.LineStrips3D.columns(colors=[BLUE], radii=[thick])
-    shown = np.linspace(0, len(positions) - 1, STRIPS).astype(int)
-    trace = rr.LineStrips3D.columns(strips=positions[shown], colors=time_ramp(), radii=[0.4 * thick] * STRIPS)
+    shown = instants(run.surface, STRIPS)
+    shapes = list(run.surface.positions(np.linspace(0.0, run.surface.length, SAMPLES_U), shown))
+    colours = time_ramp(shown / run.surface.horizon)
+    trace = rr.LineStrips3D.columns(strips=shapes, colors=colours, radii=[0.4 * thick] * STRIPS)
     chunks = [
         chunk("/motion/trace/cable", [], trace.partition([STRIPS])),
         chunk("/motion/cable", times, rr.LineStrips3D.columns(strips=positions)),
@@ -64,8 +68,8 @@ def motion_chunks(run: Run) -> "list[Chunk]":
     return chunks
 
 
-def _grasp(run: Run, k: int, shown: NDArray[np.intp], thick: float) -> "list[Chunk]":
-    """Return a grasp and the force of its gripper: where, how large and how sure at every time, and all of them."""
+def _grasp(run: Run, k: int, shown: Floats, thick: float) -> "list[Chunk]":
+    """Return a grasp and the force of its gripper at every time, how sure it is, and arrows at times `shown` [s]."""
     import rerun as rr
 
     grasp, t = run.document["grasps"][k], run.document["surface"]["t"]
@@ -75,7 +79,10 @@ def _grasp(run: Run, k: int, shown: NDArray[np.intp], thick: float) -> "list[Chu
     vectors = forces * arrow_scale(run)
     path = rr.LineStrips3D.columns(strips=[held], colors=[ORANGE], radii=[0.4 * thick])
     along = rr.Arrows3D.columns(
-        origins=held[shown], vectors=vectors[shown], colors=[VERMILION] * STRIPS, radii=[0.3 * thick] * STRIPS
+        origins=run.surface.positions([grasp["u"]], shown)[:, 0],
+        vectors=np.column_stack([np.interp(shown, t, vectors[:, axis]) for axis in range(3)]),
+        colors=[VERMILION] * STRIPS,
+        radii=[0.3 * thick] * STRIPS,
     )
     name = f"grasp at u = {grasp['u']:g} m"
     look = rr.Points3D.columns(colors=[ORANGE], radii=[2.5 * thick], labels=[name], show_labels=[False])

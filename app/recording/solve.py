@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.archive import Run
+from app.instants import instants
 from app.recording.obstacles import obstacle_chunks
 from app.recording.style import (
     BLUE,
@@ -126,18 +127,20 @@ def _adds_up(terms: dict[str, Floats], elastic: float) -> bool:
 
 
 def _iterates(run: Run, drawn: NDArray[np.intp]) -> "list[Chunk]":
-    """Return the shape of every iterate at several times, and its net of control points."""
+    """Return the shape of every iterate at the instants of the answer, and its net of control points."""
     import rerun as rr
 
     surfaces = [run.iterations[k].surface for k in drawn]
-    shapes = np.concatenate([surface.sample(SAMPLES_U, STRIPS)[2][..., :3] for surface in surfaces])
+    u, t = np.linspace(0.0, run.surface.length, SAMPLES_U), instants(run.surface, STRIPS)
+    shapes = np.concatenate([surface.positions(u, t) for surface in surfaces])
     points = [surface.control_points[..., :3].reshape(-1, 3) for surface in surfaces]
     rows = [row for surface in surfaces for row in _net(surface.control_points[..., :3])]
     counts = [sum(surface.control_points.shape[:2]) for surface in surfaces]
     indexes = _indexes(run, drawn)
     thin = 0.004 * run.surface.length
     strips = rr.LineStrips3D.columns(strips=shapes).partition([STRIPS] * len(drawn))
-    style = rr.LineStrips3D.columns(colors=time_ramp(), radii=[thin] * STRIPS).partition([STRIPS])
+    colours = time_ramp(t / run.surface.horizon)
+    style = rr.LineStrips3D.columns(colors=colours, radii=[thin] * STRIPS).partition([STRIPS])
     dots = rr.Points3D.columns(positions=np.concatenate(points)).partition([len(net) for net in points])
     return [
         *obstacle_chunks(run.scene.environment.obstacles, "/iterate/obstacles"),

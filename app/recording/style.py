@@ -77,7 +77,7 @@ def drawable(positions: Floats) -> bool:
     return bool(np.abs(positions).max() < MAX_COORDINATE)
 
 
-def time_ramp() -> NDArray[np.uint8]:
-    """Return the colours of the strips of a motion, light at its start and dark at its end; (STRIPS, 3)."""
-    share = np.linspace(0.0, 1.0, STRIPS)[:, None]
+def time_ramp(share: Floats) -> NDArray[np.uint8]:
+    """Return the colours of instants by their `share` of the horizon (k,), light first and dark last; (k, 3)."""
+    share = share[:, None]
     return np.rint((1 - share) * EARLY + share * LATE).astype(np.uint8)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from viser import PointCloudHandle, SceneApi
 
+from app.instants import instants
 from app.viewer import geometry
 from app.viewer.contacts import contact_points
 from app.viewer.grippers import GripperPicture
@@ -23,10 +24,9 @@ SURFACE_STYLES: tuple[SurfaceStyle, ...] = get_args(SurfaceStyle)
 
 CABLE_SEGMENTS = 120
 STRIPS = 8
-STRIP_COLOURS = [colour((k + 0.5) / STRIPS) for k in range(STRIPS)]
-STRIP_ROWS = 4  # times in a strip
+STRIP_ROWS = 13  # instants in a strip: more of them cost the browser more than they show
 STRIP_COLUMNS = 49  # points along the cable
-GHOSTS = 9
+GHOSTS = STRIPS + 1  # where strips begin and end
 GHOST_COLUMNS = 65
 LIFT = 0.45  # height of the raised surface, of the cable's length
 CONTACT_SIZE = 1.7  # of the cable's diameter
@@ -60,6 +60,7 @@ class Picture:
         self._scale: ColourScale | None = None
         self._time = 0.0
         self._points = np.zeros((CABLE_SEGMENTS + 1, 3))
+        self._instants = np.zeros(STRIPS * (STRIP_ROWS - 1) + 1)  # s, of the rows of the swept surface
         self._size: tuple[float, float, int] | None = None  # length, diameter, grippers of what is drawn
         self._grippers: list[GripperPicture] = []
         self._strips = [
@@ -67,7 +68,7 @@ class Picture:
                 f"/surface/{k}",
                 np.zeros((STRIP_ROWS * STRIP_COLUMNS, 3)),
                 geometry.strip_faces(STRIP_ROWS, STRIP_COLUMNS),
-                color=STRIP_COLOURS[k],
+                color=STEEL,
                 opacity=0.34,
                 side="double",
                 cast_shadow=False,
@@ -93,6 +94,7 @@ class Picture:
         self.select(selected)
         self._obstacles.show(prediction.scene.environment.obstacles)
         self._ground.show(prediction)
+        self._instants = instants(prediction.surface, len(self._instants))
         self._draw_strips()
         self._draw_ghosts()
         self.pose(time)
@@ -193,17 +195,19 @@ class Picture:
         assert self._prediction is not None
         surface = self._prediction.surface
         raised = self._look.surface == "raised with time"
-        t = np.linspace(0.0, surface.horizon, STRIPS * (STRIP_ROWS - 1) + 1)
+        t = self._instants
         points = surface.positions(np.linspace(0.0, surface.length, STRIP_COLUMNS), t)
         points[..., 2] += self._height(t)[:, None]
         radius = 0.5 * self._prediction.scene.cable.diameter
         for k, strip in enumerate(self._strips):
-            rows = points[k * (STRIP_ROWS - 1) : k * (STRIP_ROWS - 1) + STRIP_ROWS].copy()
+            first = k * (STRIP_ROWS - 1)
+            rows = points[first : first + STRIP_ROWS].copy()
             if not raised:
                 # strips that lie on each other must not be coplanar: later ones a little higher, all below the cable
                 rows[..., 2] -= radius * (1.0 - 0.9 * k / STRIPS)
             strip.vertices = rows.reshape(-1, 3).astype(np.float32)
-            strip.color = STRIP_COLOURS[k] if self._look.quantity.name == "time" else STEEL
+            middle = t[first + STRIP_ROWS // 2] / surface.horizon
+            strip.color = colour(middle) if self._look.quantity.name == "time" else STEEL
             strip.visible = self._look.surface != "hidden"
 
     def _draw_ghosts(self) -> None:
@@ -213,7 +217,7 @@ class Picture:
         if not self._look.ghosts:
             return
         surface = self._prediction.surface
-        t = np.linspace(0.0, surface.horizon, GHOSTS)
+        t = self._instants[:: STRIP_ROWS - 1]
         u = np.linspace(0.0, surface.length, GHOST_COLUMNS)
         points = surface.positions(u, t)
         points[..., 2] += self._height(t)[:, None]

@@ -15,8 +15,8 @@ LAYERS = {
         "recordings", "identify",
     ],
     "app": [
-        "settings", "logs", "solids", "schemas", "archive", "pages", "http", "recording", "reports", "store", "service",
-        "routes", "viewer", "main", "commands", "cli",
+        "settings", "logs", "solids", "instants", "schemas", "archive", "pages", "http", "recording", "reports",
+        "store", "service", "routes", "viewer", "main", "commands", "cli",
     ],
 }  # fmt: skip
 FOREIGN = {"dlocore": {"app", "benchmarks", "fastapi", "pydantic", "rerun", "viser"}, "app": {"benchmarks"}}

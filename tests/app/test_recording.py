@@ -15,6 +15,8 @@ pytest.importorskip("rerun")
 import rerun as rr
 
 from app.archive import Run
+from app.instants import instants
+from app.recording.style import SAMPLES_U, STRIPS
 from app.service.service import Service
 from dlocore import effect_forces, energies
 from dlocore.machine import machine_line
@@ -322,3 +324,16 @@ def test_the_viewer_link_opens_layout_and_recording_from_this_service(
     assert wasm.headers["content-type"] == "application/wasm"
     assert wasm.content[:4] == b"\0asm"
     assert client.get("/rerun/../settings").status_code == 404
+
+
+def test_the_trace_of_a_motion_and_its_iterates_is_at_instants_of_its_way(chunks: list[Any], run: Run) -> None:
+    t = instants(run.surface, STRIPS)
+    shapes = run.surface.positions(np.linspace(0.0, run.surface.length, SAMPLES_U), t)
+    _, iterates = rows(chunks, "/iterate/shape", "strips", "iteration")
+    np.testing.assert_allclose(iterates[-1], shapes, rtol=0, atol=1e-6)
+    static = {chunk.entity_path: chunk for chunk in chunks if chunk.is_static}
+    traced = static["/motion/trace/cable"].to_record_batch().to_pydict()
+    np.testing.assert_allclose(traced["LineStrips3D:strips"][0], shapes, rtol=0, atol=1e-6)
+    arrows = static["/motion/trace/reactions/0"].to_record_batch().to_pydict()
+    held = run.surface.positions([run.scene.grasps[0].u], t)[:, 0]
+    np.testing.assert_allclose(arrows["Arrows3D:origins"][0], held, rtol=0, atol=1e-6)

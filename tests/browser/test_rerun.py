@@ -76,7 +76,7 @@ def test_the_link_of_an_answer_opens_its_recording(service, witness):
     page.on("response", lambda response: answered.add(urlsplit(response.url).netloc))
     page.set_viewport_size(SIZE)
     page.goto(service.address + answer["links"]["viewer"])
-    halfway = tuple(time_ramp()[4].tolist())
+    halfway = tuple(time_ramp(np.array([0.5]))[0].tolist())
     net, shape = (ORANGE, SHAPES, 200), (halfway, SHAPES, 500)
     update, residual = (BLUE, PLOTS, 300), (VERMILION, PLOTS, 300)
     report = drawn(page, net, shape, update, residual, words=(2000, np.inf))

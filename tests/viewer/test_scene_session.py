@@ -1,3 +1,4 @@
+import json
 import threading
 import time
 
@@ -22,6 +23,23 @@ def test_a_new_client_sees_the_papers_case_predicted(service):
         points = expected.positions(np.linspace(0, 1, 49), [1.6])[0]
         assert np.abs(final[:, :2] - points[:, :2]).max() < 1e-6  # single precision on the wire
         assert "spacetime, 9 × 13 control points" in client.card
+
+
+def test_the_swept_surface_and_the_shapes_follow_a_short_move_in_a_long_time(service):
+    path = {"kind": "waypoints", "times": [0.0, 0.4, 0.8], "positions": [[0, 0.5, 0], [0.5, 0.5, 0], [0, 0.5, 0]]}
+    scene = start_draft().put(("primitives", 0, "path"), path).put(("horizon",), 24.0).put(("quality",), "auto")
+    scene = scene.put(("shape", "start"), [-0.25, 0.5, 0.0])
+    with connected(service) as client:
+        client.upload("Open a file …", "scene.json", json.dumps(scene.document).encode())
+        client.wait_for(lambda: "Preview" not in client.card and client.control("Time [s]")[1]["max"] == 24.0)
+        strips = [client.nodes[f"/surface/{k}"]["vertices"].reshape(-1, 49, 3) for k in range(8)]
+        held = np.concatenate([strip[:, 12, :2] for strip in strips])  # at u = 0.25 m
+        assert held[:, 0].max() > 0.49  # where it turned back
+        assert np.linalg.norm(np.diff(held, axis=0), axis=1).max() < 0.1
+        ghosts = client.nodes["/ghosts"]["points"].reshape(9, -1, 2, 3)[:, 16, 0]
+        assert (ghosts[:, 0] > 0.1).sum() >= 2
+        colours = [tuple(client.nodes[f"/surface/{k}"]["color"]) for k in range(8)]
+        assert np.linalg.norm(np.subtract(colours[0], colours[3])) < 20.0  # both in the first second of 24
 
 
 def test_dragging_the_target_changes_the_prediction(service):
