@@ -75,7 +75,7 @@ class GripperPicture:
         """Show whether it is the one in hand."""
         self._body.batched_colors = linear(np.array(BRAND if selected else STEEL))
 
-    def show_reactions(self, shown: bool) -> None:
+    def show_forces(self, shown: bool) -> None:
         """Draw the reaction's arrow, or not."""
         self._reactions = shown
 

@@ -16,6 +16,7 @@ BRAND = (46, 107, 214)
 STEEL = (128, 138, 154)
 WARNING = (222, 72, 50)
 REACTION = (213, 94, 0)
+LOAD = (0, 140, 95)  # Okabe-Ito's bluish green: no colour of the ramp
 OBSTACLE = (84, 152, 134)  # Okabe-Ito's bluish green, calmed down by grey
 CONTACT = (230, 159, 0)
 # from blue to amber, ever lighter, in about even steps of what the eye tells apart

@@ -13,7 +13,7 @@ from app.viewer import report
 from app.viewer.costs import Costs
 from app.viewer.draft import Draft
 from app.viewer.edits import Edits
-from app.viewer.forms import CableForm, EffectsForm, GripperForm, QualityForm, SurroundingsForm, show_value
+from app.viewer.forms import CableForm, EffectsForm, GripperForm, LoadsForm, QualityForm, SurroundingsForm, show_value
 from app.viewer.forms.recording import RecordingActions, RecordingForm
 from app.viewer.kept import KeptCables
 from app.viewer.palette import QUANTITIES, ColourScale
@@ -123,6 +123,7 @@ class Panel:
             self._add_start()
             self._cable = CableForm(self._gui, draft, edits, cables)
             self._surroundings = SurroundingsForm(self._gui, draft, edits)
+            self._loads = LoadsForm(self._gui, draft, edits)
         with tabs.add_tab("Effects"):
             self._add_effects(draft)
         with tabs.add_tab("Quality"):
@@ -134,7 +135,7 @@ class Panel:
             self._add_share()
             with self._gui.add_folder("Tracked cable"):
                 self.recording = RecordingForm(self._gui, recording)
-        self._forms = (self._gripper, self._cable, self._surroundings, self._effects, self._quality)
+        self._forms = (self._gripper, self._cable, self._surroundings, self._loads, self._effects, self._quality)
 
     def _add_timeline(self) -> None:
         self._slider = self._gui.add_slider(
@@ -244,7 +245,7 @@ class Panel:
         colour = self._gui.add_dropdown("Colour", tuple(QUANTITIES), initial_value="time")
         surface = self._surface = self._gui.add_dropdown("Surface", SURFACE_STYLES)
         ghosts = self._ghosts = self._gui.add_checkbox("Shapes at intervals", initial_value=True)
-        reactions = self._gui.add_checkbox("Forces of the grippers", initial_value=True)
+        forces = self._gui.add_checkbox("Forces", initial_value=True, hint="Of the grippers, and known ones")
         contacts = self._gui.add_checkbox("Contacts", initial_value=True)
         looping = self._gui.add_checkbox("Repeat", initial_value=self._playback.looping)
         reset = self._gui.add_button("Show the whole scene", icon=viser.Icon.MAXIMIZE, color="gray")
@@ -255,12 +256,12 @@ class Panel:
                     quantity=QUANTITIES[colour.value],
                     surface=surface.value,
                     ghosts=ghosts.value,
-                    reactions=reactions.value,
+                    forces=forces.value,
                     contacts=contacts.value,
                 )
             )
 
-        for control in (colour, surface, ghosts, reactions, contacts):
+        for control in (colour, surface, ghosts, forces, contacts):
             control.on_update(restyle)
 
         @looping.on_update

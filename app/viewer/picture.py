@@ -1,4 +1,4 @@
-"""What stands in the 3D scene: table, obstacles, cable, space-time surface, ghosts, grippers, contacts."""
+"""What stands in the 3D scene: table, obstacles, cable, space-time surface, ghosts, grippers, forces, contacts."""
 
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -12,6 +12,7 @@ from app.viewer import geometry
 from app.viewer.contacts import contact_points
 from app.viewer.grippers import GripperPicture
 from app.viewer.ground import Ground
+from app.viewer.loads import LoadsPicture
 from app.viewer.obstacles import ObstaclesPicture
 from app.viewer.palette import CONTACT, QUANTITIES, STEEL, ColourScale, Quantity, colour
 from app.viewer.picking import CableClick, GripperClick, picked
@@ -42,7 +43,7 @@ class Look:
     quantity: Quantity = QUANTITIES["time"]
     surface: SurfaceStyle = "where it moved"
     ghosts: bool = True
-    reactions: bool = True
+    forces: bool = True
     contacts: bool = True
 
 
@@ -91,6 +92,7 @@ class Picture:
         forces = [np.linalg.norm(grasp.reaction, axis=1).max(initial=0.0) for grasp in prediction.grasps]
         for number, gripper in enumerate(self._grippers):
             gripper.take(prediction, number, max(float(max(forces)), 1e-12))
+        self._loads.take(prediction)
         self.select(selected)
         self._obstacles.show(prediction.scene.environment.obstacles)
         self._ground.show(prediction)
@@ -148,6 +150,7 @@ class Picture:
         for gripper in self._grippers:
             gripper.remove()
         self._grippers = [GripperPicture(self._scene, k, diameter, length) for k in range(grippers)]
+        self._loads = LoadsPicture(self._scene, diameter, length)
 
     def restyle(self, look: Look) -> ColourScale | None:
         """Show the same prediction in another way; return the scale of the colours, if there is a prediction."""
@@ -172,8 +175,10 @@ class Picture:
         self._cable.batched_wxyzs = wxyz.astype(np.float32)
         self._cable.batched_colors = self._scale.colours(self._prediction, 0.5 * (self._u[1:] + self._u[:-1]), t)[0]
         for gripper in self._grippers:
-            gripper.show_reactions(self._look.reactions)
+            gripper.show_forces(self._look.forces)
             gripper.pose(time)
+        self._loads.show_forces(self._look.forces)
+        self._loads.pose(time)
         self._mark(self._marks, contact_points(self._prediction, points) if self._look.contacts else points[:0])
         masses = [one.u for one in self._prediction.scene.cable.point_masses]
         self._mark(self._masses, surface.positions(masses, t)[0] if masses else points[:0])

@@ -11,6 +11,7 @@ import numpy as np
 
 from app.viewer import plots
 from app.viewer.costs import Costs
+from app.viewer.loads import forces_over
 from app.viewer.palette import ColourScale, css_ramp
 from dlocore import EffectReport, Prediction
 from dlocore.accuracy.fallback import errs
@@ -179,11 +180,13 @@ def effect_note(effect: EffectReport, cost: float | None) -> str:
 
 
 def forces_list(prediction: Prediction) -> str:
-    """Return the largest force on the cable of table, obstacles and grippers, and its estimated error there."""
+    """Return the largest forces on the cable, of grippers, table, obstacles and known ones, and estimated errors."""
     given = [(f"u = {g.u:.2f} m", g.times, g.reaction, g.reaction_error) for g in prediction.grasps]
     for c in prediction.contacts:
         given += [(c.name, c.times, c.force, c.force_error)] if c.force.any() else []
         given += [(f"{c.name}, friction", c.times, c.friction, c.friction_error)] if c.friction.any() else []
+    for load in prediction.scene.loads:
+        given.append((f"known force, u = {load.u:.2f} m", *forces_over(load, prediction.surface.horizon), None))
     rows = []
     for name, times, force, error in given:
         size = np.linalg.norm(force, axis=1)

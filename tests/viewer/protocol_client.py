@@ -250,7 +250,8 @@ class SceneClient:
 def connected(service: Any, example: str = "new", tab: str = "", **options: Any) -> SceneClient:
     """Return a client that sees its first prediction, of a ready scene or of the paper's case, or goes on in a tab."""
     client = SceneClient(f"{service.socket}/{example}/{tab or uuid4().hex}", **options)
-    client.wait_for(lambda: "control points" in client.card and "/cable" in client.nodes)
+    # a frame has at most 128 messages: what is drawn may come in one after that of the card
+    client.wait_for(lambda: "control points" in client.card and "/cable" in client.nodes and client.final_shape.any())
     return client
 
 

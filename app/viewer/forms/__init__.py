@@ -4,6 +4,7 @@ from app.viewer.forms.base import ShowsDraft, show_if, show_value
 from app.viewer.forms.cable import CableForm
 from app.viewer.forms.effects import EffectsForm
 from app.viewer.forms.gripper import GripperForm
+from app.viewer.forms.loads import LoadsForm
 from app.viewer.forms.quality import QualityForm
 from app.viewer.forms.surroundings import SurroundingsForm
 
@@ -11,6 +12,7 @@ __all__ = [
     "CableForm",
     "EffectsForm",
     "GripperForm",
+    "LoadsForm",
     "QualityForm",
     "ShowsDraft",
     "SurroundingsForm",
