@@ -13,7 +13,8 @@ from app.schemas.describe import from_cable
 from app.viewer.draft import Draft
 from dlocore import Environment, Prediction, SceneError, Waypoints
 from dlocore.identify import Candidate, Replay, Resolution
-from dlocore.identify.estimate import WINDOW, cable_of, cut
+from dlocore.identify.estimate import WINDOW, cable_of
+from dlocore.identify.windows import cut
 from dlocore.recordings import Recording, load_recording
 from dlocore.scene.scene import ControlPoints
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.compiling.interrupts import interruptible
-from dlocore.errors import SceneError, within
+from dlocore.errors import SceneError
 from dlocore.identify.candidate import Candidate, resized
 from dlocore.identify.identification import Identification, Progress
 from dlocore.identify.intervals import assess
@@ -17,6 +17,7 @@ from dlocore.identify.parameters import DEFAULT, PLACES, Parameter, parameters, 
 from dlocore.identify.replay import Resolution
 from dlocore.identify.search import Search
 from dlocore.identify.together import check_together
+from dlocore.identify.windows import cut, gaps_told
 from dlocore.recordings import Recording
 from dlocore.scene.cable import Cable
 from dlocore.scene.scene import Environment, Quality
@@ -67,7 +68,7 @@ def identify(
         names: parameters to identify (`parameters.SCALARS`, "rest_curvature", "clamp_angles", "marker_offsets").
         start: a candidate to begin with instead of cable and environment.
         resolution: how finely recordings are replayed.
-        window: [s] of the windows into which longer recordings are cut.
+        window: [s] of the windows into which longer recordings are cut, and where held markers are lost for too long.
         iterations: at most.
         on_progress: called after every iteration.
         cancelled: asked between replays.
@@ -103,7 +104,8 @@ def identify(
     search = Search(windows, chosen, resolution, cancelled)
     state = search.run(candidate, iterations, on_progress)
     found = assess(search, state, perf_counter() - began)
-    told = _assumed(recordings, given, names, cable is None and start is None, environment is None and start is None)
+    told = gaps_told(recordings)
+    told += _assumed(recordings, given, names, cable is None and start is None, environment is None and start is None)
     if clamps > 1 and "bending_damping" in names and not candidate.twist:
         told.append(_UNTWISTED)
     elif _twists(recordings, found.cable) and not candidate.twist:
@@ -227,19 +229,3 @@ def cable_of(recordings: Sequence[Recording]) -> Cable:
         point_masses=telling.point_masses,
     )
     return resized(cable, cast(float, recordings[0].length))
-
-
-def cut(recordings: Sequence[Recording], window: float) -> list[Recording]:
-    """Return the recordings in windows of about `window` seconds.
-
-    Raises:
-        SceneError: a window has too few frames.
-    """
-    out = []
-    for recording in recordings:
-        parts = 1 if recording.static else max(1, round(recording.duration / window))
-        with within(recording.place):
-            for i in range(parts):
-                width = recording.duration / parts
-                out.append(recording if parts == 1 else recording.part(i * width, (i + 1) * width))
-    return out

@@ -13,6 +13,7 @@ from dlocore.identify.candidate import Candidate
 from dlocore.identify.parameters import DEFAULT, parameters, prepared
 from dlocore.identify.replay import Played, Replay, Resolution
 from dlocore.identify.search import measured, robust_deviation, weights
+from dlocore.identify.windows import gaps
 from dlocore.recordings import Recording
 from dlocore.scene.cable import Cable
 from dlocore.scene.scene import Environment
@@ -133,7 +134,8 @@ class Identifier:
     def update(self) -> Update | None:
         """Improve the estimate by the latest frames; None while there are too few, or they tell nothing.
 
-        They don't where nothing can be replayed, or where it is so unstable that it has no derivative.
+        They don't where a held marker is lost for too long, where nothing can be replayed, or where it is so unstable
+        that it has no derivative.
         """
         if len(self._times) < self._frames:
             return None
@@ -146,6 +148,8 @@ class Identifier:
             length=self._length,
             gravity=self._candidate.environment.gravity,
         )
+        if gaps(recording):
+            return None
         try:
             replay = Replay(recording, self._resolution)
             played = replay.play(self._candidate)
