@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.array_files import ArrayFile
-from dlocore.errors import SceneError, array, instances, number, repeated, within
+from dlocore.errors import MILLIMETRES, SceneError, array, instances, number, repeated, within
 from dlocore.scene.cable import PointMass
 from dlocore.words import counted
 
@@ -25,6 +25,8 @@ Floats = NDArray[np.float64]
 PAIR = 0.06  # of the length: two held neighbours at an end, nearer than this to each other, are one clamp
 LEAST_SEEN = 0.2  # of the frames in which each marker must be seen
 LEAST_FRAMES = 10  # of a motion
+_NOISY = 0.02  # relative, by which noise makes the distances of markers add up to more than the cable's length
+_OTHER_UNIT = 20.0  # times the length, that no order of the markers makes
 _FACTS = ("u", "held", "length", "diameter", "linear_density", "point_masses", "gravity", "static", "name")
 
 
@@ -96,9 +98,11 @@ class Recording:
         u = self._spacing() if self.u is None else array("u", self.u, shape=(count,), unit="m")
         if not ((np.diff(u) > 0).all() and u[0] >= 0):
             raise SceneError("u", u, "rising material coordinates from 0 on [m]")
-        put("u", u)
-        least = float(u[-1])
-        length = least if self.length is None else number("length", self.length, at_least=least, at_most=1e3, unit="m")
+        length = float(u[-1])
+        if self.length is not None:
+            least = {"above": 0.0} if self.u is None else {"at_least": length}
+            length = number("length", self.length, at_most=1e3, unit="m", **least)
+        put("u", _no_longer(u, length))
         put("length", length)
         for name in ("diameter", "linear_density"):
             if getattr(self, name) is not None:
@@ -164,6 +168,21 @@ class Recording:
             reason = f"Frames are up to {np.diff(times).max():.3g} s apart: times in another unit than s, or a pause"
             raise SceneError("times", given, f"at least {LEAST_FRAMES} frames in every window of a motion", reason)
         return replace(self, times=times[inside], markers=cast(Floats, self.markers)[inside])
+
+
+def _no_longer(u: Floats, length: float) -> Floats:
+    """Return coordinates from distances (m,) [m], which noise makes longer, on a cable of a length [m].
+
+    Raises:
+        SceneError: they are longer by more than noise makes them.
+    """
+    times = float(u[-1]) / length
+    if times > 1.0 + _NOISY:
+        k = int(np.argmax(np.diff(u)))
+        apart = f"Markers {k} and {k + 1} are {u[k + 1] - u[k]:.4g} m apart: perhaps they are in another order"
+        allowed = f"at least {u[-1]:.6g} m, to which the distances of neighbouring markers add up"
+        raise SceneError("length", f"{length:.6g} m", allowed, MILLIMETRES if times > _OTHER_UNIT else apart)
+    return np.minimum(u / max(times, 1.0), length)
 
 
 def _markers(value: ArrayLike, frames: int) -> Floats:

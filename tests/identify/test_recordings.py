@@ -86,6 +86,30 @@ def test_what_is_wrong_with_a_recording_is_named(changes: dict[str, Any], field:
     assert error.value.field == field
 
 
+@pytest.mark.parametrize(
+    ("x", "length", "said"),
+    [
+        (1e3 * markers(), 0.4, "this looks like millimetres. Allowed: at least 400 m, to which the distances of"),
+        (markers()[:, [0, 1, 3, 2, 4]], 0.4, "Markers 1 and 2 are 0.2 m apart: perhaps they are in another order."),
+        (markers(), 0.3, "Allowed: at least 0.4 m, to which the distances of neighbouring markers add up"),
+    ],
+)
+def test_distances_that_are_longer_than_the_cable_are_told(x: np.ndarray, length: float, said: str) -> None:
+    with pytest.raises(SceneError) as error:
+        recording(markers=x, length=length)
+    assert error.value.field == "length"
+    assert said in str(error.value)
+
+
+def test_noise_makes_no_cable_longer_than_it_is() -> None:
+    longer = 1.01 * markers()  # noise across the cable makes the distances of neighbours longer, never shorter
+    known = recording(markers=longer, length=0.4)
+    assert known.length == 0.4
+    np.testing.assert_allclose(known.u, [0.0, 0.1, 0.2, 0.3, 0.4])
+    with pytest.raises(SceneError, match=r"^length: got 0\.4\."):
+        recording(markers=longer, u=1.01 * np.arange(5) * 0.1, length=0.4)  # which somebody measured
+
+
 def test_a_marker_that_is_never_seen_is_refused() -> None:
     x = markers()
     x[:, 2] = np.nan
