@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from time import perf_counter
 from typing import cast
 
@@ -18,7 +19,7 @@ from dlocore.identify.replay import Resolution
 from dlocore.identify.search import Search
 from dlocore.identify.together import check_together
 from dlocore.identify.windows import cut, gaps_told
-from dlocore.recordings import Recording
+from dlocore.recordings import PAIR, Recording
 from dlocore.scene.cable import Cable
 from dlocore.scene.scene import Environment, Quality
 
@@ -104,13 +105,37 @@ def identify(
     search = Search(windows, chosen, resolution, cancelled)
     state = search.run(candidate, iterations, on_progress)
     found = assess(search, state, perf_counter() - began)
-    told = gaps_told(recordings)
+    told = [*gaps_told(recordings), *_held_told(recordings)]
     told += _assumed(recordings, given, names, cable is None and start is None, environment is None and start is None)
     if clamps > 1 and "bending_damping" in names and not candidate.twist:
         told.append(_UNTWISTED)
     elif _twists(recordings, found.cable) and not candidate.twist:
         told.append(_UNTWISTED_FREE)
     return replace(found, message=" ".join([found.message, *told]))
+
+
+def _held_told(recordings: Sequence[Recording]) -> list[str]:
+    """Return in words how held neighbours were read: as one clamp, or as two point grasps."""
+    clamps, points = dict[str, None](), dict[str, None]()  # each once, in order
+    for recording in recordings:
+        held, u = recording.held, cast(Floats, recording.u)
+        pairs = {tuple(sorted((h.marker, h.towards))) for h in recording.holds if h.towards is not None}
+        taken = {marker for pair in pairs for marker in pair}
+        for first, second in pairwise(held):
+            said = f"{first} and {second} ({100 * (u[second] - u[first]) / cast(float, recording.length):.3g} %)"
+            if (first, second) in pairs:
+                clamps[said] = None
+            elif second == first + 1 and not taken & {first, second}:
+                points[said] = None
+    told = []
+    if clamps:
+        told.append(f"Held markers within {100 * PAIR:g} % of the length are a clamp: {', '.join(clamps)}.")
+    if points:
+        told.append(
+            f"Held neighbours farther apart than {100 * PAIR:g} % of the length are two point grasps, which leave the "
+            f"direction free: {', '.join(points)}."
+        )
+    return told
 
 
 def _twists(recordings: Sequence[Recording], cable: Cable) -> bool:

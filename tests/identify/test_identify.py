@@ -23,6 +23,7 @@ from dlocore import (
 )
 from dlocore.identify import Candidate, Replay, Resolution, identify
 from dlocore.identify.datasets import load_datasets
+from dlocore.identify.estimate import _held_told
 from dlocore.identify.parameters import parameters, prepared
 from dlocore.identify.rest import Rest
 from dlocore.identify.search import Search
@@ -460,3 +461,23 @@ def test_strong_damping_of_a_cable_that_may_turn_at_its_ends_is_told_of(damping:
     cable = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=4.905e-3, bending_damping=damping)
     found = identify([recording], cable, Environment(drag=0.0125), names=("drag",), iterations=1)
     assert ("EI may be found far too large" in found.message) is told
+
+
+def hung(*u: float, held: tuple[int, ...]) -> Recording:
+    """Return a recording of a cable of 0.5 m that hangs still, with markers at u."""
+    markers = np.zeros((40, len(u), 3))
+    markers[:, :, 2] = -np.array(u)
+    return Recording(times=np.arange(40) * 0.02, markers=markers, u=u, held=held, linear_density=0.05)
+
+
+def test_how_held_neighbours_were_read_is_told() -> None:
+    clamped, pointed = hung(0.0, 0.02, 0.3, 0.5, held=(0, 1)), hung(0.0, 0.0315, 0.3, 0.5, held=(0, 1, -1))
+    clamp = "Held markers within 6 % of the length are a clamp: 0 and 1 (4 %)."
+    points = (
+        "Held neighbours farther apart than 6 % of the length are two point grasps, which leave the direction free: "
+        "0 and 1 (6.3 %)."
+    )
+    assert _held_told([clamped, clamped]) == [clamp]
+    assert _held_told([clamped, pointed]) == [clamp, points]
+    assert not _held_told([hung(0.0, 0.1, 0.3, 0.5, held=(0, -1))])
+    assert clamp in identify([clamped], names=("drag",), iterations=1, resolution=Resolution(n_u=9)).message
