@@ -25,6 +25,7 @@ Floats = NDArray[np.float64]
 PAIR = 0.06  # of the length: two held neighbours at an end, nearer than this to each other, are one clamp
 LEAST_SEEN = 0.2  # of the frames in which each marker must be seen
 LEAST_FRAMES = 10  # of a motion
+_ELSEWHERE = 0.05  # of the largest distance from the origin: a marker is not at it
 _NOISY = 0.02  # relative, by which noise makes the distances of markers add up to more than the cable's length
 _OTHER_UNIT = 20.0  # times the length, that no order of the markers makes
 _FACTS = ("u", "held", "length", "diameter", "linear_density", "point_masses", "gravity", "static", "name")
@@ -92,7 +93,7 @@ class Recording:
         if not self.static and len(times) < LEAST_FRAMES:
             raise SceneError("times", counted(len(times), "frame"), f"at least {LEAST_FRAMES} frames of a motion")
         put("times", times)
-        put("markers", _markers(self.markers, len(times)))
+        put("markers", _markers(self.markers, len(times), self.static))
         count = cast(Floats, self.markers).shape[1]
         put("held", _held(self.held, count))
         u = self._spacing() if self.u is None else array("u", self.u, shape=(count,), unit="m")
@@ -185,7 +186,7 @@ def _no_longer(u: Floats, length: float) -> Floats:
     return np.minimum(u / max(times, 1.0), length)
 
 
-def _markers(value: ArrayLike, frames: int) -> Floats:
+def _markers(value: ArrayLike, frames: int, static: bool) -> Floats:
     try:
         raw = np.asarray(value)
     except ValueError:
@@ -200,12 +201,30 @@ def _markers(value: ArrayLike, frames: int) -> Floats:
     if markers.shape[2] == 2:
         markers = np.concatenate([markers, 0.0 * markers[..., :1]], axis=2)
     markers[np.isnan(markers).any(axis=2)] = np.nan
+    if not static:
+        markers[_zeros_of_lost(markers)] = np.nan
     seen = np.isfinite(markers[..., 0]).mean(axis=0)
     if not (seen >= LEAST_SEEN).all():
         i = int(np.argmin(seen))
         raise SceneError(f"markers[:, {i}]", f"seen in {seen[i]:.0%} of the frames", f"at least {LEAST_SEEN:.0%}")
     markers.setflags(write=False)
     return markers
+
+
+def _zeros_of_lost(markers: Floats) -> NDArray[np.bool_]:
+    """Tell which samples (frames, m) of a motion are (0, 0, 0) because their marker was lost, as some trackers write.
+
+    Such a marker is somewhere else in the frames before and after; one that is at the origin comes from near it.
+    """
+    at = np.linalg.norm(markers, axis=2)
+    lost, far = np.zeros(at.shape, dtype=bool), _ELSEWHERE * float(np.nanmax(at, initial=0.0))
+    for marker, away in enumerate(at.T):
+        zeros, others = np.flatnonzero(away == 0.0), np.flatnonzero(away > 0.0)
+        if len(zeros) and len(others):
+            after = np.searchsorted(others, zeros)
+            beside = others[np.maximum(after - 1, 0)], others[np.minimum(after, len(others) - 1)]
+            lost[zeros, marker] = np.minimum(away[beside[0]], away[beside[1]]) > far
+    return lost
 
 
 def _held(held: tuple[int, ...], count: int) -> tuple[int, ...]:

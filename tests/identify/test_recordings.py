@@ -110,6 +110,18 @@ def test_noise_makes_no_cable_longer_than_it_is() -> None:
         recording(markers=longer, u=1.01 * np.arange(5) * 0.1, length=0.4)  # which somebody measured
 
 
+def test_zeros_of_markers_that_are_elsewhere_are_lost_ones() -> None:
+    x = markers()
+    x[:, 0, 2] = np.maximum(np.arange(12) - 6, 0) * 1e-3  # which is at the origin, and leaves it
+    x[4:6, 3], x[0, 2], x[-1, 4] = 0.0, 0.0, 0.0
+    lost = np.isnan(np.asarray(recording(markers=x).markers)[..., 0])
+    assert sorted(np.argwhere(lost).tolist()) == [[0, 2], [4, 3], [5, 3], [11, 4]]
+    flat = recording(markers=x[..., :2], u=0.1 * np.arange(5))
+    assert np.isnan(np.asarray(flat.markers)).sum() == 3 * 4
+    shapes = recording(markers=x, static=True)  # each of its own
+    assert np.isfinite(np.asarray(shapes.markers)).all()
+
+
 def test_a_marker_that_is_never_seen_is_refused() -> None:
     x = markers()
     x[:, 2] = np.nan
