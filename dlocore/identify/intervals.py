@@ -289,7 +289,8 @@ def _doubts(search: Search, state: State, by_noise: Mapping[str, Floats]) -> lis
         worst = max(misses, key=lambda miss: (miss.times, miss.deviation))
         whose = f" of {worst.name!r}" if several else ""
         if worst.times > _UNEXPLAINED:
-            much, why = f"{worst.times:.2g} times what noise explains", "the model lacks something"
+            times = float(f"{worst.times:.2g}")
+            much, why = f"{times:g} times what noise explains", "the model lacks something"
         else:
             much = f"with a deviation of {100 * worst.deviation:.2g} % of the length"
             why = "the tracking is wild, the model lacks something"
@@ -299,7 +300,7 @@ def _doubts(search: Search, state: State, by_noise: Mapping[str, Floats]) -> lis
             f"{why}, or another cable meets them better. Intervals tell of noise alone.",
         ]
         if worst.distance > _ELSEWHERE:
-            said.append("That is another motion: is gravity right, and are held and the order of the markers?")
+            said.append("That is another motion: are gravity, held and the order of the markers right?")
     return said
 
 

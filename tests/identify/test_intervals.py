@@ -89,8 +89,9 @@ def test_markers_that_are_somewhere_else_are_told_of_as_another_motion() -> None
     moving = simulated(4, 1.0, cable=CABLE, environment=DRAG)
     above = np.array(moving.markers)
     above[..., 2] *= -1.0  # as if gravity were upwards
-    assert "is gravity right, and are held and the order of the markers?" in doubts(replace(moving, markers=above))
-    assert "is gravity right" not in doubts(replace(moving, markers=np.asarray(moving.markers) * 1.05))
+    assert "180 times what noise explains" in doubts(replace(moving, markers=above))
+    assert "are gravity, held and the order of the markers right?" in doubts(replace(moving, markers=above))
+    assert "gravity" not in doubts(replace(moving, markers=np.asarray(moving.markers) * 1.05))
 
 
 def test_coordinates_that_were_not_measured_are_no_residuals() -> None:
