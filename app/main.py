@@ -4,12 +4,11 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from fastapi import Depends, FastAPI
-from fastapi.middleware.cors import CORSMiddleware
 from fastapi_offline import FastAPIOffline
 
 from app import viewer
 from app.http import openapi, problems
-from app.http.access import Access, OtherSites
+from app.http.access import Access, AllowedSites, OtherSites
 from app.http.middleware import AccessLog, BodyLimit, Heads, PageHeaders
 from app.http.query import check_query
 from app.routes import (
@@ -63,13 +62,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(OtherSites, settings=settings)
     app.add_middleware(PageHeaders)
     if settings.allowed_origins:  # outside of the token: a browser asks for leave without it
-        app.add_middleware(
-            CORSMiddleware,
-            allow_origins=settings.allowed_origins,
-            allow_methods=["GET", "POST", "DELETE"],
-            allow_headers=["Authorization", "Content-Type", "Last-Event-ID", "Prefer"],
-            expose_headers=["Location", "Preference-Applied", "Retry-After"],
-        )
+        app.add_middleware(AllowedSites, origins=settings.allowed_origins)
     app.add_middleware(AccessLog)
     for routes in (batch, predictions, files, scenes, examples, shapes, cables, calibration, studies, identify):
         app.include_router(routes.router, dependencies=[Depends(check_query)])

@@ -1,13 +1,18 @@
 """Settings of the service, from environment variables that begin with ``DLO_``."""
 
+import re
 from pathlib import Path
 from typing import Literal
 
 from pydantic import Field, SecretStr, field_validator
+from pydantic_core import PydanticCustomError
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from dlocore.calibration import FILE
 from dlocore.machine import usable_cores, user_data_dir
+
+_ORIGIN = re.compile(r"([a-z][a-z0-9+.-]*)://(\[[0-9a-f:.]+\]|[a-z0-9._-]+)(:[0-9]{1,5})?")
+_PORTS = {"http": ":80", "https": ":443"}  # which a browser leaves out
 
 
 class Settings(BaseSettings):
@@ -44,7 +49,26 @@ class Settings(BaseSettings):
         """Where the calibration of this machine is stored."""
         return self.data_dir / FILE
 
+    @field_validator("allowed_origins")
+    @classmethod
+    def _as_browsers_send_them(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(_origin(text) for text in value)
+
     @field_validator("data_dir")
     @classmethod
     def _absolute(cls, value: Path) -> Path:
         return value.expanduser().absolute()
+
+
+def _origin(text: str) -> str:
+    """Return an origin as browsers send it: in lower case, without a slash at its end or the usual port."""
+    origin = text.lower().removesuffix("/")
+    if origin in ("*", "null"):  # any, and that of a page from a file
+        return origin
+    parts = _ORIGIN.fullmatch(origin)
+    if parts is None:
+        told = {"text": repr(text)}
+        raise PydanticCustomError(
+            "origin", "{text} is no origin, as https://host or http://host:port without a path", told
+        )
+    return origin.removesuffix(_PORTS.get(parts[1], ""))

@@ -10,11 +10,13 @@ could have the service do things, and a page whose name leads to 127.0.0.1 for a
 import hashlib
 import hmac
 import ipaddress
+from collections.abc import Sequence
 from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qsl, quote, urlencode, urlsplit
 
 from starlette.datastructures import Headers
-from starlette.responses import RedirectResponse
+from starlette.middleware.cors import CORSMiddleware
+from starlette.responses import RedirectResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.http.problems import ProblemError, problem_response
@@ -72,6 +74,36 @@ class Access:
         secure = scope.get("scheme") == "https"
         response.set_cookie(COOKIE, self._session, httponly=True, samesite="strict", secure=secure)
         return response
+
+
+class AllowedSites(CORSMiddleware):
+    """Give browsers leave to let pages of some other origins call the API, and tell those of others in a problem.
+
+    Args:
+        app: what they may call.
+        origins: theirs.
+    """
+
+    def __init__(self, app: ASGIApp, origins: Sequence[str]) -> None:
+        super().__init__(
+            app,
+            allow_origins=origins,
+            allow_methods=["GET", "POST", "DELETE"],
+            allow_headers=["Authorization", "Content-Type", "Last-Event-ID", "Prefer"],
+            expose_headers=["Location", "Preference-Applied", "Retry-After"],
+        )
+
+    def preflight_response(self, request_headers: Headers) -> Response:
+        """Return the leave, or the problem of a request that may not be made."""
+        answer = super().preflight_response(request_headers)
+        if answer.status_code == 200:
+            return answer
+        detail = (
+            f"{bytes(answer.body).decode()}. Allowed: origins {', '.join(self.allow_origins)}; methods "
+            f"{', '.join(self.allow_methods)}; headers {', '.join(self.allow_headers)}."
+        )
+        headers = {name: value for name, value in answer.headers.items() if not name.startswith("content-")}
+        return problem_response(ProblemError(400, "preflight-refused", detail, headers=headers))
 
 
 class OtherSites:

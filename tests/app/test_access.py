@@ -11,6 +11,7 @@ from typing import Any
 import httpx
 import pytest
 from fastapi.testclient import TestClient
+from pydantic import ValidationError
 from starlette.websockets import WebSocketDisconnect
 
 from app.main import create_app
@@ -84,9 +85,38 @@ def test_another_origin_may_ask_for_leave_without_the_token(guarded: TestClient)
     leave = guarded.options("/v1/predictions", headers=asks)
     assert leave.status_code == 200
     assert leave.headers["access-control-allow-origin"] == "https://lab.example"
-    assert guarded.options("/v1/predictions", headers={**asks, "origin": "https://evil.example"}).status_code == 400
+    evil = {**asks, "origin": "https://evil.example", "access-control-request-method": "PUT"}
+    problem = the_problem(guarded.options("/v1/predictions", headers=evil), 400)
+    assert problem["type"].endswith("preflight-refused")
+    assert "CORS origin, method. Allowed: origins https://lab.example; methods GET, POST, DELETE" in problem["detail"]
+    assert "prefer" in problem["detail"]
     answer = guarded.get("/v1/predictions", headers={**BEARER, "origin": "https://lab.example"})
     assert "Location" in answer.headers["access-control-expose-headers"]
+
+
+@pytest.mark.parametrize(
+    ("given", "meant"),
+    [
+        ("https://lab.example/", "https://lab.example"),
+        ("HTTPS://Lab.Example:443", "https://lab.example"),
+        ("http://lab.example:8080", "http://lab.example:8080"),
+        ("http://[::1]:80/", "http://[::1]"),
+        ("chrome-extension://abcdef", "chrome-extension://abcdef"),
+        ("*", "*"),
+        ("null", "null"),
+    ],
+)
+def test_an_allowed_origin_is_taken_as_browsers_send_it(given: str, meant: str) -> None:
+    assert Settings(allowed_origins=(given,)).allowed_origins == (meant,)
+
+
+@pytest.mark.parametrize(
+    "given",
+    ["lab.example", "https://lab.example/app", "https://", "https://*.lab.example", "https://me@lab.example", ""],
+)
+def test_an_allowed_origin_that_no_browser_sends_is_refused(given: str) -> None:
+    with pytest.raises(ValidationError, match="is no origin, as https://host or http://host:port without a path"):
+        Settings(allowed_origins=("https://lab.example", given))
 
 
 LOCAL, ALLOWED, SCENE = "http://127.0.0.1:8000", "https://lab.example", "ws://127.0.0.1:8000/scene"
