@@ -1,6 +1,8 @@
 """What is wrong with which field of a request: pydantic's findings in the words of the contract."""
 
+import ast
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -13,6 +15,7 @@ from app.schemas.request import PredictionRequest
 from dlocore import SceneError
 
 _WHOLE = "body"
+_SHAPE = re.compile(r"shape \(([0-9, ]+)\)")
 
 
 @dataclass(frozen=True)
@@ -35,7 +38,7 @@ class BadField:
     def from_scene_error(error: SceneError) -> "BadField":
         """Return the field that the solver refused."""
         reason = f"{error.reason}. " if error.reason else ""
-        given = _written(error.given)
+        given = _written(_from_python(error.given))
         return BadField(error.field, given, error.allowed, f"{reason}Got {given}. Allowed: {error.allowed}.")
 
     @staticmethod
@@ -118,6 +121,16 @@ def _shown(value: Any, kind: str) -> str:
         return f"{len(value)} items"
     text = _written(_as_json(value))
     return text if len(text) <= 120 else text[:117] + "..."
+
+
+def _from_python(text: str) -> str:
+    """Return as JSON has it what the solver shows as Python has it: None, a bool, a tuple, the shape of an array."""
+    try:
+        value = ast.literal_eval(text)
+    except (ValueError, SyntaxError):  # no value, but words, or one that is shortened
+        shape = _SHAPE.fullmatch(text)
+        return text if shape is None else " x ".join(re.findall("[0-9]+", shape[1])) + " numbers"
+    return json.dumps(value) if value is None or isinstance(value, bool | tuple | list) else text
 
 
 def _written(text: str) -> str:

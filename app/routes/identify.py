@@ -77,13 +77,16 @@ class _Search:
 
     async def result(self, show: Callable[[Progress], None] | None = None) -> bytes:
         """Return the answer as JSON."""
-        found = await self.searches.identify(
-            self.recordings,
-            self.cancelled.is_set,
-            names=tuple(self.asked.parameters),
-            resolution=Resolution(n_u=self.asked.n_u),
-            on_progress=show,
-        )
+        try:
+            found = await self.searches.identify(
+                self.recordings,
+                self.cancelled.is_set,
+                names=tuple(self.asked.parameters),
+                resolution=Resolution(n_u=self.asked.n_u),
+                on_progress=show,
+            )
+        except SceneError as error:
+            raise _by_number(error, self.recordings) from None
         return await anyio.to_thread.run_sync(_answer, found)
 
 
@@ -91,10 +94,23 @@ def _answer(found: Identification) -> bytes:
     return orjson.dumps(document_of_identification(found), option=orjson.OPT_SERIALIZE_NUMPY)
 
 
+def _by_number(error: SceneError, recordings: list[Recording]) -> SceneError:
+    """Return the error with the path of a recording's field as the request has it: by number, not by name."""
+    places = {recording.place: f"recordings[{i}]" for i, recording in enumerate(recordings)}
+    place = next((place for place in places if error.field.startswith(place)), None)
+    field = error.field if place is None else places[place] + error.field.removeprefix(place)
+    return SceneError(field, error.given, error.allowed, error.reason)
+
+
 def _recordings(asked: IdentifyRequest) -> list[Recording]:
-    out = []
+    out: list[Recording] = []
     for i, given in enumerate(asked.recordings):
         with within(f"recordings[{i}]"):
+            name = f"recordings[{i}]" if given.name is None else given.name
+            if name in [recording.name for recording in out]:
+                raise SceneError("name", name, "a name that no other recording has")
+            if len(given.markers) != len(given.times):
+                raise SceneError("markers", f"{len(given.markers)} frames", f"{len(given.times)}, one for each time")
             width = next((len(m) for frame in given.markers for m in frame if m is not None), 3)
             count = len(given.markers[0])
             markers = np.full((len(given.markers), count, width), np.nan)
@@ -107,5 +123,5 @@ def _recordings(asked: IdentifyRequest) -> list[Recording]:
                     if marker is not None:
                         markers[k, m] = marker
             facts = given.model_dump(exclude={"times", "markers"}, exclude_none=True)
-            out.append(recording_of(np.array(given.times), markers, facts))
+            out.append(recording_of(np.array(given.times), markers, {**facts, "name": name}))
     return out

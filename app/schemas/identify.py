@@ -55,8 +55,10 @@ class RecordingModel(Model):
     )
     gravity: Vector = Field(default=[0.0, 0.0, -9.81], description="[m/s^2].", examples=[[0.0, 0.0, -9.81]])
     static: Flag = Field(default=False, description="Every frame is a shape at rest.", examples=[False])
-    name: Annotated[str, Field(max_length=100)] = Field(
-        default="recording", description="What to call it in the answer.", examples=["shaken"]
+    name: Annotated[str, Field(max_length=100)] | None = Field(
+        default=None,
+        description="What to call it in the answer, each another name; absent: `recordings[0]` and so on.",
+        examples=["shaken"],
     )
 
 

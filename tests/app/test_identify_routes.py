@@ -13,6 +13,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.cli import main
+from app.http.fields import BadField
 from app.http.problems import ProblemError
 from app.routes import identify as routes
 from app.schemas.identify import IdentifyRequest
@@ -158,6 +159,52 @@ def test_frames_with_other_numbers_of_markers_are_named(client: TestClient, aske
     response = client.post(ADDRESS, json=asked | {"recordings": [recording]})
     assert response.status_code == 422
     assert response.json()["errors"][0]["field"] == "recordings[0].markers[5]"
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "given"),
+    [
+        ({"held": []}, "recordings[1].held", "[]"),
+        ({"held": [1, 1]}, "recordings[1].held", "[1, 1]"),
+        ({"u": [0.0, 0.5]}, "recordings[1].u", "2 numbers"),
+        ({"times": [0.0, 0.1]}, "recordings[1].markers", "{frames} frames"),
+        ({"length": 3.0}, "recordings[1].length", "3 m"),
+        ({"name": "shaken"}, "recordings[1].name", "shaken"),
+        ({}, "recordings[1]", "times and markers of 'shaken' again"),
+    ],
+)
+def test_what_is_wrong_with_a_recording_is_named_by_its_number_in_words_of_json(
+    client: TestClient, asked: dict[str, Any], change: dict[str, Any], field: str, given: str
+) -> None:
+    first = asked["recordings"][0]
+    second = {name: value for name, value in first.items() if name != "name"} | change
+    moved = second["markers"] if change == {} else second["markers"][::-1]
+    response = client.post(ADDRESS, json=asked | {"recordings": [first, {**second, "markers": moved}]})
+    (error,) = the_problem(response, 422)["errors"]
+    assert (error["field"], error["given"]) == (field, given.format(frames=len(first["markers"])))
+
+
+def test_recordings_without_names_are_told_apart(asked: dict[str, Any]) -> None:
+    unnamed = {name: value for name, value in asked["recordings"][0].items() if name != "name"}
+    found = routes._recordings(IdentifyRequest.model_validate({"recordings": [unnamed, unnamed]}))
+    assert [recording.name for recording in found] == ["recordings[0]", "recordings[1]"]
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("(0, 0)", "[0, 0]"),
+        ("()", "[]"),
+        ("None", "null"),
+        ("True", "true"),
+        ("1e-05", "1e-05"),
+        ("a cable", "a cable"),
+    ],
+)
+def test_a_value_of_python_is_shown_as_json_has_it(text: str, shown: str) -> None:
+    field = BadField.from_scene_error(SceneError("x", text, "others"))
+    assert field.given == shown
+    assert field.message == f"Got {shown}. Allowed: others."
 
 
 def test_the_command_line_writes_the_cable_and_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
