@@ -70,7 +70,7 @@ class BodyLimit:
         detail = f"The body is larger than {self.limit} bytes."
         declared = Headers(scope=scope).get("content-length", "")
         if declared.isdigit() and int(declared) > self.limit:
-            await problem_response(ProblemError(413, "body-too-large", detail))(scope, receive, send)
+            await problem_response(ProblemError(413, "content-too-large", detail))(scope, receive, send)
             return
         received = 0
 

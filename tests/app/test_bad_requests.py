@@ -407,7 +407,7 @@ def test_a_body_beyond_the_limit_is_refused_whether_it_says_so_or_not(client: Te
     problem = the_problem(client.post("/v1/predictions", content=large, headers=headers), 413)
     assert problem["title"] == "Content Too Large"
     chunks = (b" " * 1_000_000 for _ in range(11))
-    the_problem(client.post("/v1/predictions", content=chunks, headers=headers), 413)
+    assert the_problem(client.post("/v1/predictions", content=chunks, headers=headers), 413) == problem
 
 
 @pytest.mark.parametrize(
