@@ -18,10 +18,10 @@ from app.http.problems import ProblemError, not_written
 from app.routes import described
 from app.routes.body import JsonRoute
 from app.schemas.calibration import CalibrationResponse
+from app.schemas.ids import new_id
 from app.service import events
 from app.service.measurements import Tell
 from app.service.service import TheService
-from app.store.runs import new_id
 from dlocore import calibration
 from dlocore.calibration import Calibration
 

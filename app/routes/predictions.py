@@ -125,13 +125,16 @@ async def listed(
     ] = None,
     name: Annotated[str, Query(max_length=200, description="Only runs with this in their name, in any case.")] = "",
     since: Annotated[
-        Instant | None, Query(description="Only runs made at that time or later, ISO 8601 with offset.")
+        Instant | None, Query(description="Only runs asked for at that time or later, ISO 8601 with offset.")
     ] = None,
     before: Annotated[
-        Instant | None, Query(description="Only runs made before that time, ISO 8601 with offset.")
+        Instant | None, Query(description="Only runs asked for before that time, ISO 8601 with offset.")
     ] = None,
 ) -> Response:
-    """List the stored runs. Follow `next` for the next page: runs that come or go meanwhile don't shift it."""
+    """List the stored runs, and apart from them what runs or waits, which is not filtered.
+
+    Follow `next` for the next page: runs that come or go meanwhile don't shift it.
+    """
     negotiated(request.headers.get("accept"), (JSON,))
 
     def wanted(run: dict[str, Any]) -> bool:
@@ -158,6 +161,7 @@ async def listed(
         "limit": limit,
         "offset": offset,
         "next": None if following is None else f"/v1/predictions?{following}",
+        "under_way": [job.item() for job in service.jobs.under_way()],
     }
     return json_response(document)
 

@@ -15,11 +15,11 @@ from app.http.problems import ProblemError
 from app.routes import described
 from app.routes.body import JsonRoute
 from app.schemas import to_scene
+from app.schemas.ids import new_id
 from app.schemas.study import STUDY_EXAMPLES, StudyList, StudyRequest, StudyResponse
 from app.service import events
-from app.service.measurements import Tell
+from app.service.measurements import Tell, item_of
 from app.service.service import Service, TheService
-from app.store.runs import new_id
 from app.store.studies import StudyStore
 from dlocore import Scene
 from dlocore.errors import within
@@ -97,10 +97,12 @@ def _plan(wanted: StudyRequest, service: Service) -> Plan:
 
 @router.get("", response_model=StudyList, summary="List the studies", responses=described.failures(401, 406))
 async def listed(request: Request, service: TheService) -> Response:
-    """List the stored studies, newest first."""
+    """List the studies, newest first: those that are stored, run or wait, and the last that failed or were stopped."""
     negotiated(request.headers.get("accept"), (JSON,))
-    found = await anyio.to_thread.run_sync(store_of(service).listed)
-    return json_response({"studies": found})
+    found = {job.id: {**job.item(), "size": None} for job in service.measurements.of(KIND)}
+    for id, size in (await anyio.to_thread.run_sync(store_of(service).sizes)).items():
+        found[id] = {**item_of(f"/v1/{KIND}/{id}", id, "done"), "size": size}
+    return json_response({"studies": [found[id] for id in sorted(found, reverse=True)]})
 
 
 @router.get("/{id}", response_model=StudyResponse, summary="Read a study", responses=described.READ_STUDY)

@@ -27,7 +27,7 @@ Coordinate = Annotated[
     Number,
     Field(ge=0.0, le=MAX_LENGTH, description="Material coordinate [m], 0 to the cable's length.", examples=[0.25]),
 ]
-ID = re.compile("^[0-9a-f]{28}$")  # of a run or a study, app.store.runs.new_id
+ID = re.compile("^[0-9a-f]{28}$")  # of a run or a study, app.schemas.ids.new_id
 RunId = Annotated[str, Field(pattern=ID.pattern)]
 RUN_ID = "the id of a run, 28 of the characters 0 to 9 and a to f"  # the one pattern of a text, in words
 MAX_NAMES = 200  # of one object of a request: each that is no field would be a fault, and all are found first

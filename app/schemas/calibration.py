@@ -66,9 +66,7 @@ class MeasurementResponse(BaseModel):
     """A calibration or a study that is under way, or has failed."""
 
     id: str = Field(description="Its id.", examples=["019b1f5a2c07f3e9d1c5b6a7e8f0"])
-    created: str = Field(
-        description="When it was asked for, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000000Z"]
-    )
+    created: str = Field(description="When it was asked for, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000Z"])
     state: Literal["queued", "running", "done", "failed", "cancelled"] = Field(
         description="How far it is.", examples=["running"]
     )

@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Collection
 from dataclasses import fields as dataclass_fields
-from datetime import UTC, datetime
 from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
+from app.schemas.ids import created_of
 from dlocore import Prediction
 from dlocore.answer.compared import at_times
 from dlocore.answer.parts import ContactForce, GraspReaction, Iteration, Status
@@ -189,7 +189,7 @@ class PredictionResponse(BaseModel):
 
     id: str = Field(description="Id of the run.", examples=[_ID])
     state: Literal["done"] = Field(description="There is an answer.")
-    created: str = Field(description="When it was made, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000000Z"])
+    created: str = Field(description="When it was asked for, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000Z"])
     status: Status = Field(description="`converged`, or why not.", examples=["converged"])
     message: str = Field(
         description="The status in words, and what to do about it.",
@@ -227,19 +227,22 @@ class JobLinksModel(BaseModel):
     events: str = Field(description="Its progress as server-sent events.", examples=[_RUN + "/events"])
 
 
-class JobResponse(BaseModel):
-    """A prediction that has no answer: not yet, or not any more."""
+class JobItem(BaseModel):
+    """A prediction that has no answer in a list."""
 
     id: str = Field(description="Id of the run.", examples=["019b1f5a2c07f3e9d1c5b6a7e8f0"])
-    created: str = Field(
-        description="When it was asked for, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000000Z"]
-    )
+    created: str = Field(description="When it was asked for, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000Z"])
     state: Literal["queued", "running", "failed", "cancelled"] = Field(
         description="How far it is.", examples=["running"]
     )
+    links: JobLinksModel = Field(description="Addresses of its parts.")
+
+
+class JobResponse(JobItem):
+    """A prediction that has no answer: not yet, or not any more."""
+
     iterations: list[IterationModel] = Field(description="The iterations so far.")
     problem: "ProblemDocument | None" = Field(description="Why it failed.")
-    links: JobLinksModel = Field(description="Addresses of its parts.")
 
 
 class RunSummary(BaseModel):
@@ -247,7 +250,7 @@ class RunSummary(BaseModel):
 
     id: str = Field(description="Its id.", examples=[_ID])
     name: str = Field(description="What the request calls it.", examples=["Lay the cable along the wall"])
-    created: str = Field(description="When it was made, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000000Z"])
+    created: str = Field(description="When it was asked for, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000Z"])
     status: Status = Field(description="`converged`, or why not.", examples=["converged"])
     method: str = Field(description="Method that gave the answer.", examples=["march"])
     error_estimate: float | None = Field(description="Error of position at the worst point [m].", examples=[8.9e-4])
@@ -265,6 +268,7 @@ class PredictionList(BaseModel):
     next: str | None = Field(
         description="Address of the next page, or null.", examples=["/v1/predictions?limit=20&cursor=" + _ID]
     )
+    under_way: list[JobItem] = Field(description="All predictions that run or wait, newest first.")
 
 
 class BadFieldModel(BaseModel):
@@ -316,11 +320,6 @@ def job_links(id: str) -> dict[str, str]:
     return {name: address for name, address in links(id).items() if name in JobLinksModel.model_fields}
 
 
-def now() -> str:
-    """Return the time, ISO 8601 in UTC, to the microsecond."""
-    return datetime.now(UTC).isoformat(timespec="microseconds").replace("+00:00", "Z")
-
-
 def from_prediction(
     prediction: Prediction,
     id: str,
@@ -359,7 +358,7 @@ def from_prediction(
     return {
         "id": id,
         "state": "done",
-        "created": now(),
+        "created": created_of(id),
         "status": prediction.status,
         "message": prediction.message,
         **{name: part() for name, part in parts.items() if name in fields},

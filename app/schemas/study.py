@@ -6,6 +6,7 @@ from fastapi.openapi.models import Example
 from pydantic import BaseModel, Field
 
 from app.schemas.base import Count, Flag, Model, Number
+from app.schemas.calibration import MeasurementLinks
 from app.schemas.request import PAPER, PredictionRequest
 from app.schemas.surroundings import EffectsModel
 from dlocore.scene.scene import MAX_N_T, MAX_N_U
@@ -136,7 +137,7 @@ class StudyResponse(BaseModel):
         examples=["done"],
     )
     created: str | None = Field(
-        default=None, description="When it was asked for, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000000Z"]
+        default=None, description="When it was asked for, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000Z"]
     )
     format: int = Field(description="Version of this form; a file of it can be compared by `dlo study`.", examples=[1])
     machine: dict[str, str] = Field(description="Processor, cores, system and versions.", examples=[{"cores": "2"}])
@@ -151,15 +152,19 @@ class StudyResponse(BaseModel):
 
 
 class StudySummary(BaseModel):
-    """A stored study in a list."""
+    """A study in a list."""
 
     id: str = Field(description="Its id.", examples=["019b1f5a2c07f3e9d1c5b6a7e8f0"])
-    size: int = Field(description="Bytes.", examples=[20000])
-    self: str = Field(description="Its address.", examples=["/v1/studies/019b1f5a2c07f3e9d1c5b6a7e8f0"])
+    created: str = Field(description="When it was asked for, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000Z"])
+    state: Literal["queued", "running", "done", "failed", "cancelled"] = Field(
+        description="How far it is.", examples=["running"]
+    )
+    links: MeasurementLinks = Field(description="Addresses of its parts.")
+    size: int | None = Field(description="Bytes of what is stored of it; null where nothing is.", examples=[20000])
 
 
 class StudyList(BaseModel):
-    """The stored studies, newest first."""
+    """The studies, newest first."""
 
     studies: list[StudySummary] = Field(description="The studies.")
 

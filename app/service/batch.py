@@ -15,8 +15,8 @@ from app.http.problems import ProblemError, bad_scene, document_of, problem_of
 from app.http.streamed import Emit
 from app.logs import RUN
 from app.schemas import PredictionRequest, to_scene
+from app.schemas.ids import new_id
 from app.service.service import Service
-from app.store.runs import new_id
 from dlocore import Scene
 
 _log = logging.getLogger("dlo")

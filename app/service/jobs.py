@@ -8,8 +8,8 @@ from typing import Any, ClassVar, Literal
 import anyio
 
 from app.http.problems import ProblemError, document_of
-from app.schemas.response import job_links, now
-from app.store.runs import new_id
+from app.schemas.ids import created_of, new_id
+from app.schemas.response import job_links
 from dlocore import MaterialMotion
 
 State = Literal["queued", "running", "done", "failed", "cancelled"]
@@ -26,7 +26,6 @@ class Job:
     Attributes:
         store: whether the run is to be stored; at the end, whether it is.
         id: that of the run.
-        created: when it was asked for, ISO 8601 in UTC.
         state: how far it is.
         iterations: the documents of the iterations so far.
         document: the answer as JSON.
@@ -41,7 +40,6 @@ class Job:
 
     store: bool
     id: str = field(default_factory=new_id)
-    created: str = field(default_factory=now)
     state: State = "queued"
     iterations: list[dict[str, Any]] = field(default_factory=list)
     document: bytes | None = None
@@ -52,6 +50,11 @@ class Job:
     finished: anyio.Event = field(default_factory=anyio.Event)
     scope: anyio.CancelScope = field(default_factory=anyio.CancelScope)
     _changed: anyio.Event = field(default_factory=anyio.Event)
+
+    @property
+    def created(self) -> str:
+        """When it was asked for, ISO 8601 in UTC."""
+        return created_of(self.id)
 
     @property
     def size(self) -> int:
@@ -117,13 +120,14 @@ class Job:
     def summary(self) -> dict[str, Any]:
         """Return its state as a document."""
         return {
-            "id": self.id,
-            "created": self.created,
-            "state": self.state,
+            **self.item(),
             "iterations": self.iterations,
             "problem": None if self.problem is None else document_of(self.problem),
-            "links": job_links(self.id),
         }
+
+    def item(self) -> dict[str, Any]:
+        """Return what a list tells of it."""
+        return {"id": self.id, "created": self.created, "state": self.state, "links": job_links(self.id)}
 
 
 class Jobs:
@@ -145,6 +149,10 @@ class Jobs:
     def get(self, id: str) -> Job | None:
         """Return a job, or None."""
         return self._jobs.get(id)
+
+    def under_way(self) -> list[Job]:
+        """Return those that run or wait, newest first."""
+        return [job for job in reversed(self._jobs.values()) if not job.finished.is_set()]
 
     def forget(self, id: str) -> bool:
         """Forget a job; return whether it was there."""

@@ -14,7 +14,8 @@ from typing import Any, ClassVar
 import anyio
 
 from app.http.problems import ProblemError, document_of, problem_of
-from app.service.jobs import MAX_FINISHED, Job
+from app.schemas.ids import created_of
+from app.service.jobs import MAX_FINISHED, Job, State
 from dlocore import Cancelled
 
 _log = logging.getLogger("dlo")
@@ -46,13 +47,20 @@ class Measurement(Job):
     def summary(self) -> dict[str, Any]:
         """Return its state as a document."""
         return {
-            "id": self.id,
-            "created": self.created,
-            "state": self.state,
+            **self.item(),
             "progress": self.iterations[-1] if self.iterations else None,
             "problem": None if self.problem is None else document_of(self.problem),
-            "links": {"self": self.address, "events": f"{self.address}/events"},
         }
+
+    def item(self) -> dict[str, Any]:
+        """Return what a list tells of it."""
+        return item_of(self.address, self.id, self.state)
+
+
+def item_of(address: str, id: str, state: State) -> dict[str, Any]:
+    """Return what a list tells of a measurement at an address."""
+    links = {"self": address, "events": f"{address}/events"}
+    return {"id": id, "created": created_of(id), "state": state, "links": links}
 
 
 class Measurements:
@@ -81,11 +89,15 @@ class Measurements:
 
     def last(self, kind: str) -> Measurement | None:
         """Return the last measurement of a kind, or None."""
-        return next((kept for kept in reversed(self._kept.values()) if kept.kind == kind), None)
+        return next(reversed(self.of(kind)), None)
+
+    def of(self, kind: str) -> list[Measurement]:
+        """Return those of a kind that run or wait, and the last that ended."""
+        return [kept for kept in self._kept.values() if kept.kind == kind]
 
     def under_way(self, kind: str) -> list[Measurement]:
         """Return those of a kind that run or wait."""
-        return [kept for kept in self._kept.values() if kept.kind == kind and not kept.finished.is_set()]
+        return [kept for kept in self.of(kind) if not kept.finished.is_set()]
 
     def give_up(self) -> None:
         """End what is under way as cancelled, without waiting for its thread to notice."""

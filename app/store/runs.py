@@ -6,7 +6,6 @@ import os
 import secrets
 import shutil
 import threading
-import time
 import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from app.archive import Run, pack, unpack, unpack_motion
 from app.recording import write_recording
 from app.schemas import Motion
 from app.schemas.base import ID
+from app.schemas.ids import new_id
 from app.schemas.response import from_prediction
 from app.settings import Settings
 from app.store.leftovers import claim
@@ -26,11 +26,6 @@ from dlocore import Prediction
 
 _log = logging.getLogger("dlo")
 REQUEST, DOCUMENT, NETS, SUMMARY, RECORDING = "scene.json", "prediction.json", "nets.npz", "summary.json", "run.rrd"
-
-
-def new_id() -> str:
-    """Return an id that sorts by time (12 hex digits of milliseconds) and can't be guessed (64 random bits)."""
-    return f"{time.time_ns() // 1_000_000:012x}{secrets.token_hex(8)}"
 
 
 @dataclass

@@ -2,7 +2,6 @@
 
 import threading
 from pathlib import Path
-from typing import Any
 
 from app.schemas.base import ID
 from dlocore.files import write_whole
@@ -44,10 +43,9 @@ class StudyStore:
             return False
         return True
 
-    def listed(self) -> list[dict[str, Any]]:
-        """Return the stored studies, newest first."""
-        files = sorted(self._files(), reverse=True)
-        return [{"id": f.stem, "size": f.stat().st_size, "self": f"/v1/studies/{f.stem}"} for f in files]
+    def sizes(self) -> dict[str, int]:
+        """Return the bytes of each stored study by its id."""
+        return {file.stem: file.stat().st_size for file in self._files()}
 
     def _file(self, id: str) -> Path:
         return self._root / f"{id}.json"

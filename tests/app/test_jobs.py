@@ -13,6 +13,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.main import create_app
+from app.schemas import PredictionList
 from app.service import jobs
 from app.service.service import Service
 from app.settings import Settings
@@ -58,11 +59,13 @@ def test_an_asynchronous_prediction_is_taken_up_and_then_there(client: TestClien
     document = taken.json()
     assert document["links"]["self"] == address == f"/v1/predictions/{document['id']}"
     assert document["state"] in ("queued", "running")
+    found = PredictionList.model_validate(client.get("/v1/predictions").json(), strict=True).under_way
+    assert (address, document["created"]) in {(item.links.self, item.created) for item in found}
     the_problem(client.get(f"{address}/surface.npz"), 409)
     the_problem(client.get(address, headers={"accept": "application/x-npz"}), 409)
     done = until(client, address, "done")
     assert done["status"] == "converged"
-    assert done["id"] == document["id"]
+    assert (done["id"], done["created"]) == (document["id"], document["created"])
     assert document["id"] in {run["id"] for run in client.get("/v1/predictions").json()["predictions"]}
     assert client.get(f"{address}/scene.json").json() == SLOW
 

@@ -12,6 +12,7 @@ from fastapi.testclient import TestClient
 
 from app.main import create_app
 from app.schemas import PredictionRequest, to_scene
+from app.schemas.ids import new_id
 from app.settings import Settings
 from app.store import runs
 from app.store.runs import RunStore
@@ -284,7 +285,7 @@ def test_a_run_whose_summary_is_damaged_is_not_listed(tmp_path: Path, prediction
 
 
 def test_ids_differ_and_sort_by_time() -> None:
-    ids = [runs.new_id() for _ in range(1000)]
+    ids = [new_id() for _ in range(1000)]
     assert len(set(ids)) == 1000
     assert [id[:12] for id in ids] == sorted(id[:12] for id in ids)
 

@@ -11,7 +11,7 @@ from fastapi.testclient import TestClient
 
 from app import cli
 from app.schemas.calibration import MeasurementResponse
-from app.schemas.study import StudyResponse
+from app.schemas.study import StudyList, StudyResponse
 from app.store import studies
 from dlocore.study import record
 from tests.app.conftest import SCENES, paper_scene
@@ -43,7 +43,9 @@ def test_a_study_is_followed_to_its_end_and_then_read(client: TestClient) -> Non
     assert document["created"][:19] <= document["measured_at"][:19]
     assert [(run["n_u"], run["method"]) for run in document["runs"]] == [(9, "march"), (13, "march")]
     assert document["runs"][0]["error"] > document["runs"][1]["error"] > 0
-    assert {"id": document["id"], "self": address}.items() <= client.get(ADDRESS).json()["studies"][0].items()
+    summary = StudyList.model_validate(client.get(ADDRESS).json(), strict=True).studies[0]
+    assert (summary.id, summary.created, summary.state) == (document["id"], document["created"], "done")
+    assert (summary.links.self, summary.size) == (address, len(client.get(address).content))
     assert client.delete(address).status_code == 204
     the_problem(client.get(address), 404)
     the_problem(client.delete(address), 404)
@@ -69,10 +71,15 @@ def test_a_study_under_way_is_read_as_its_state_and_can_be_stopped(client: TestC
     address = taken.headers["location"]
     assert client.get(address).status_code == 202
     waiting = client.post(ADDRESS, json=LONG)
+    newest = client.get(ADDRESS).json()["studies"][:2]
+    assert [study["links"]["self"] for study in newest] == [waiting.headers["location"], address]
+    assert [study["created"] for study in newest] == [waiting.json()["created"], taken.json()["created"]]
+    assert {study["state"] for study in newest} <= {"queued", "running"}
     assert client.delete(waiting.headers["location"]).json()["state"] == "cancelled"
     assert client.delete(address).status_code in (200, 202)
     assert parsed(client.get(f"{address}/events").text)[-1][2]["type"] == "urn:dlo:problem:cancelled"
     assert client.get(address).json()["state"] == "cancelled"
+    assert [study["state"] for study in client.get(ADDRESS).json()["studies"][:2]] == ["cancelled"] * 2
 
 
 def test_effects_are_compared_and_impossible_scenes_are_refused_by_name(client: TestClient) -> None:
