@@ -136,12 +136,24 @@ def whole(field: str, value: Any, *, at_least: int, at_most: int) -> int:
     return int(value)
 
 
+def unmasked(value: ArrayLike) -> ArrayLike:
+    """Return `value` with NaN for the numbers that a masked array, or one in a list, hides; else as it is."""
+    rows = value if isinstance(value, list | tuple) else (value,)
+    if not any(isinstance(row, np.ma.MaskedArray) for row in rows):
+        return value
+    masked: np.ma.MaskedArray[Any, Any] = np.ma.array(value)
+    return np.where(np.ma.getmaskarray(masked), np.nan, masked.data) if masked.dtype.kind in "fiu" else value
+
+
 def array(field: str, value: ArrayLike, *, shape: tuple[int | None, ...], unit: str = "") -> NDArray[np.float64]:
-    """Return `value` as a read-only float array of `shape` (None: any length), or raise SceneError."""
+    """Return `value` as a read-only float array of `shape` (None: any length), or raise SceneError.
+
+    What a masked array hides is no number.
+    """
     sizes = " x ".join("n" if n is None else str(n) for n in shape)
     allowed = f"finite numbers, {sizes}" + (f" [{unit}]" if unit else "")
     try:
-        raw = np.asarray(value)
+        raw = np.asarray(unmasked(value))
     except ValueError:
         raise SceneError(field, value, allowed, "The rows differ in length") from None
     if raw.dtype.kind not in "fiu":

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.array_files import ArrayFile
-from dlocore.errors import MILLIMETRES, SceneError, array, instances, number, repeated, within
+from dlocore.errors import MILLIMETRES, SceneError, array, instances, number, repeated, unmasked, within
 from dlocore.scene.cable import PointMass
 from dlocore.words import counted
 
@@ -52,7 +52,7 @@ class Recording:
 
     Args:
         times: (k,) [s], rising, evenly or not.
-        markers: (k, m, 2 or 3) [m], NaN where a marker was lost; 2D markers lie at z = 0.
+        markers: (k, m, 2 or 3) [m], NaN or masked where a marker was lost; 2D markers lie at z = 0.
         u: material coordinates of the markers (m,) [m], rising; None: from the distances of neighbours.
         held: the markers that grippers hold; negative ones count from the end.
         length: of the cable [m]; None: it ends at the outermost markers.
@@ -188,7 +188,7 @@ def _no_longer(u: Floats, length: float) -> Floats:
 
 def _markers(value: ArrayLike, frames: int, static: bool) -> Floats:
     try:
-        raw = np.asarray(value)
+        raw = np.asarray(unmasked(value))
     except ValueError:
         raise SceneError("markers", "rows that differ in length", "as many markers in every frame") from None
     if raw.dtype.kind not in "fiu":

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.compiling.interrupts import interruptible
-from dlocore.errors import SceneError, array
+from dlocore.errors import SceneError, array, unmasked
 from dlocore.identify.candidate import Candidate
 from dlocore.identify.parameters import DEFAULT, parameters, prepared
 from dlocore.identify.replay import Played, Replay, Resolution
@@ -99,12 +99,12 @@ class Identifier:
         return self._candidate.environment
 
     def add(self, time: float, markers: ArrayLike) -> None:
-        """Take a frame: time [s] and markers (m, 3) [m], NaN where lost.
+        """Take a frame: time [s] and markers (m, 3) [m], NaN or masked where lost.
 
         Raises:
             SceneError: the time is not after the last one, or the number of markers is another.
         """
-        x = np.array(markers, dtype=float)
+        x = np.array(unmasked(markers), dtype=float)
         if x.shape != (len(self._u), 3):
             raise SceneError("markers", f"shape {x.shape}", f"({len(self._u)}, 3)")
         if self._times and not time > self._times[-1]:

@@ -27,6 +27,14 @@ def test_a_wrong_stiffness_is_corrected_while_frames_arrive(off: float) -> None:
     assert identifier.cable.bending_stiffness == pytest.approx(3e-3, rel=0.35)
 
 
+def test_what_is_masked_in_a_frame_was_not_seen() -> None:
+    identifier = Identifier(np.linspace(0.0, 1.0, 5), (0,), CABLE)
+    frame = np.ma.masked_array(np.zeros((5, 3)))
+    frame[2] = np.ma.masked
+    identifier.add(0.0, frame)
+    assert np.isnan(identifier._markers[-1]).any(axis=1).tolist() == [False, False, True, False, False]
+
+
 def test_frames_that_do_not_fit_are_refused() -> None:
     identifier = Identifier(np.linspace(0.0, 1.0, 5), (0,), CABLE)
     identifier.add(0.0, np.zeros((5, 3)))

@@ -1,6 +1,7 @@
 """The format of recordings: what is read is what was written, and what is wrong is named."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,14 @@ def test_an_npz_is_read_as_it_was_written(tmp_path: Path) -> None:
     again = load_recording(tmp_path / "shaken.npz")
     np.testing.assert_array_equal(np.asarray(again.markers), np.asarray(first.markers))
     assert (again.held, again.linear_density, again.name, again.length) == ((0, 4), 0.03, "shaken", first.length)
+
+
+@pytest.mark.parametrize("as_given", [lambda x: x, list], ids=["array", "list of frames"])
+def test_what_is_masked_was_not_seen(as_given: Callable[[Any], Any]) -> None:
+    x = np.ma.masked_array(markers())
+    x[3, 2, 1] = np.ma.masked
+    seen = np.asarray(recording(markers=as_given(x)).markers)
+    assert np.argwhere(np.isnan(seen)).tolist() == [[3, 2, 0], [3, 2, 1], [3, 2, 2]]
 
 
 @pytest.mark.parametrize("name", ["a.rec", "a", "a.csv"])

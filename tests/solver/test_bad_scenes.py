@@ -242,6 +242,15 @@ def test_text_where_none_is_allowed_is_told_in_quotes(make, given):
     assert str(caught.value).startswith(given)
 
 
+@pytest.mark.parametrize("as_given", [lambda x: x, list, lambda x: (1000 * x).astype(int)])
+def test_what_a_masked_array_hides_is_no_number(as_given: Callable[[Any], Any]) -> None:
+    points = np.ma.masked_array(arc(1.0, 1.0))
+    assert np.array_equal(Points(points=points).points, arc(1.0, 1.0))
+    points[7, 1] = np.ma.masked
+    with pytest.raises(SceneError, match=r"^points\[7\]\[1\]: got nan\. Allowed: finite numbers, n x 3 \[m\]\."):
+        Points(points=as_given(points))
+
+
 def test_grasps_loads_and_obstacles_may_come_from_any_iterable():
     balls = (Sphere(center=(0.0, 9.0, i), radius=0.1) for i in range(2))
     found = scene(grasps=iter([SIDE]), loads=iter([]), environment=Environment(obstacles=balls))  # type: ignore[arg-type]
