@@ -113,7 +113,7 @@ def _motion(
     called = material is not None and cable.yields and scene.effects.get("plasticity", "auto") != "off"
     shown = {"plasticity": "it shows in the motion"} if called else {}
     problem = pose_as_shown(scene, shown, surface.control_points)
-    grid = grid_on(problem, surface.knots_u)
+    grid = grid_on(problem, surface.knots_u.copy())  # kernels are compiled for arrays that may be written
     if abs(surface.length - cable.length) > SAME * cable.length:
         raise SceneError(
             "surface", f"that of a cable of {surface.length:g} m", f"one of the scene's, {cable.length:g} m"

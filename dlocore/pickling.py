@@ -1,8 +1,36 @@
-"""Parts of an answer that are found when they are first read are pickled as what they are, without what finds them."""
+"""How parts of scenes and answers are pickled and copied.
 
+Arrays stay read-only. What is found when it is first read is pickled as what it is, without what finds it.
+"""
+
+from dataclasses import fields
 from typing import Any, Generic, TypeVar
 
+import numpy as np
+
 T = TypeVar("T")
+
+
+class Checked:
+    """A part whose fields were checked as it was made: its arrays are read-only, also where it is pickled or copied."""
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        for field in fields(self):  # type: ignore[arg-type]  # those who inherit are dataclasses
+            value = state[field.name]
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+
+class Answered(Checked):
+    """A part of an answer: its arrays are read-only views, as the solver's own may be written."""
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if isinstance(value, np.ndarray):
+                view = value.view()
+                view.setflags(write=False)
+                vars(self)[name] = view
 
 
 class Known(Generic[T]):

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dlocore.array_files import ArrayFile
 from dlocore.errors import MILLIMETRES, SceneError, array, instances, number, repeated, unmasked, within
+from dlocore.pickling import Checked
 from dlocore.scene.cable import PointMass
 from dlocore.words import counted
 
@@ -47,7 +48,7 @@ class Hold:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Recording:
+class Recording(Checked):
     """Tracked markers of one motion, or of several shapes at rest.
 
     Args:

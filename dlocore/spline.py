@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.errors import SceneError, whole
+from dlocore.pickling import Answered
 
 Floats = NDArray[np.float64]
 DEGREE = 3
@@ -64,7 +65,7 @@ def _order(name: str, order: int) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class SplineSurface:
+class SplineSurface(Answered):
     """A predicted space-time surface.
 
     Attributes:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dlocore.compiling.interrupts import interruptible
 from dlocore.errors import SceneError
-from dlocore.pickling import state_with
+from dlocore.pickling import Answered, state_with
 from dlocore.scene.scene import Material
 from dlocore.spline import SplineSurface, in_range
 
@@ -96,7 +96,7 @@ OnIteration = Callable[[Iteration], None]
 
 
 @dataclass(frozen=True, eq=False)
-class GraspReaction:
+class GraspReaction(Answered):
     """Force and moment that a gripper gives to the cable.
 
     Attributes:
@@ -118,7 +118,7 @@ class GraspReaction:
 
 
 @dataclass(frozen=True, eq=False)
-class ContactForce:
+class ContactForce(Answered):
     """How hard the table or an obstacle presses on the cable, and how its friction holds it.
 
     Attributes:
@@ -143,7 +143,7 @@ class ContactForce:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class MaterialMotion:
+class MaterialMotion(Answered):
     """What the sections of the cable remember, over time; see `dlocore.Material`.
 
     Attributes:
@@ -180,7 +180,7 @@ class MaterialMotion:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class StretchMotion:
+class StretchMotion(Answered):
     """How far the cable is stretched, over time: what its spline does not tell to the accuracy of a tension.
 
     Attributes:

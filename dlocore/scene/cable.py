@@ -7,6 +7,7 @@ from typing import Any, cast
 from numpy.typing import ArrayLike
 
 from dlocore.errors import SceneError, choice, instances, number
+from dlocore.pickling import Checked
 from dlocore.scene.points import points_along
 
 MIN_LENGTH, MAX_LENGTH = 0.01, 1000.0  # [m]
@@ -33,7 +34,7 @@ class PointMass:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Cable:
+class Cable(Checked):
     """A cable of round section, nearly inextensible, with independent section stiffnesses.
 
     Give each stiffness itself, or `youngs_modulus` and `shear_modulus` and the solid round section gives it

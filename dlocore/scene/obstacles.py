@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dlocore.effects.kinds import BOX, CAPSULE, CYLINDER, SPHERE
 from dlocore.errors import SceneError, array, number
+from dlocore.pickling import Checked
 
 Floats = NDArray[np.float64]
 
@@ -62,7 +63,7 @@ def _friction(value: float) -> float:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Sphere:
+class Sphere(Checked):
     """A ball at `center` (3,) of `radius` [m], with Coulomb friction."""
 
     center: ArrayLike
@@ -87,7 +88,7 @@ class Sphere:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Capsule:
+class Capsule(Checked):
     """All points within `radius` [m] of the segment from `start` (3,) to `end` (3,) [m]."""
 
     start: ArrayLike
@@ -124,7 +125,7 @@ class Capsule:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Cylinder:
+class Cylinder(Checked):
     """A solid cylinder with flat ends: `center` (3,) [m], direction `axis` (3,), `radius` and `height` [m]."""
 
     center: ArrayLike
@@ -161,7 +162,7 @@ class Cylinder:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Box:
+class Box(Checked):
     """A solid box: `center` (3,) and edge lengths `size` (3,) [m], turned by the unit quaternion (w, x, y, z)."""
 
     center: ArrayLike

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.errors import SceneError, array, choice, number
+from dlocore.pickling import Checked
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -67,7 +68,7 @@ class Still:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Move:
+class Move(Checked):
     """Move by `displacement` (3,) [m] and turn by the rotation vector `rotation` (3,) [rad] in `duration` [s].
 
     `profile` is "minimum_jerk" (zero velocity and acceleration at both ends), "cubic" (zero velocity) or "linear"
@@ -130,7 +131,7 @@ class Move:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Waypoints:
+class Waypoints(Checked):
     """Pass through `positions` (n, 3) [m] at `times` (n,) [s] along a C2 cubic spline, or stop at each.
 
     It starts at rest; with `start` "moving" at the velocity that the first waypoints tell, as a recorded path does.

@@ -6,7 +6,8 @@ Frozen data in SI units, world frame right-handed with z up. Everything is valid
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, cast, get_args
+from types import MappingProxyType
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +24,7 @@ from dlocore.errors import (
     number,
     whole,
 )
+from dlocore.pickling import Checked
 from dlocore.scene.cable import MAX_LENGTH, Cable, PointMass
 from dlocore.scene.obstacles import Obstacle
 from dlocore.scene.paths import Move, Path, Still, Waypoints
@@ -62,7 +64,7 @@ MIN_GRASP_DISTANCE = 1e-4  # of the length, between two grasps that hold at the 
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Straight:
+class Straight(Checked):
     """A straight cable from `start` (3,) [m] along `direction` (3,), which need not have unit length.
 
     Args (of every start shape):
@@ -89,7 +91,7 @@ class Straight:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Points:
+class Points(Checked):
     """Points `points` (n, 2 or 3) [m] in order along the whole cable, as a vision system delivers them.
 
     Uneven spacing, noise and repeated points are welcome; 2D points lie at z = 0. 4 to 100,000 points.
@@ -107,7 +109,7 @@ class Points:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Material:
+class Material(Checked):
     """What the sections of a cable remember: how they are turned, and the strain that has become theirs.
 
     Args:
@@ -142,7 +144,7 @@ class Material:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ControlPoints:
+class ControlPoints(Checked):
     """A cubic spline by its control points (n, 3 or 4) [m, m, m, rad], on `knots` (n + 4,) [m] or uniform ones.
 
     The knots are clamped (four equal at each end) and run from 0 to the cable's length. The fourth column is theta,
@@ -239,7 +241,7 @@ class Grasp:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Load:
+class Load(Checked):
     """A known force at material coordinate `u` [m]: `force` (3,) [N], or (k, 3) at `times` (k,) [s], linear between."""
 
     u: float
@@ -278,7 +280,7 @@ class Table:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Environment:
+class Environment(Checked):
     """Gravity (3,) [m/s^2], drag per unit length: linear [N s/m^2] and quadratic [N s^2/m^3], a table, obstacles."""
 
     gravity: ArrayLike = (0.0, 0.0, -9.81)
@@ -377,7 +379,7 @@ class Quality:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Scene:
+class Scene(Checked):
     """Everything `predict` needs.
 
     Args:
@@ -409,7 +411,7 @@ class Scene:
         instance("environment", self.environment, Environment, "an Environment")
         instance("effects", self.effects, Mapping, 'a dict of "on", "off" or "auto" by effect name')
         instance("quality", self.quality, Quality, "a Quality")
-        object.__setattr__(self, "effects", dict(self.effects))  # the caller's may change
+        object.__setattr__(self, "effects", MappingProxyType(dict(self.effects)))  # the caller's may change
         object.__setattr__(self, "grasps", instances("grasps", self.grasps, Grasp, "Grasp"))
         object.__setattr__(self, "loads", instances("loads", self.loads, Load, "Load"))
         length = self.cable.length
@@ -428,6 +430,12 @@ class Scene:
             last = float(cast(Floats, self.shape.knots)[-1])
             if not abs(last - length) <= 1e-9 * length:
                 raise SceneError("shape.knots[-1]", last, f"the cable's length, {length:g} [m]")
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "effects": dict(self.effects)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        super().__setstate__({**state, "effects": MappingProxyType(state["effects"])})
 
     def _check_sizes(self) -> None:
         """Refuse what is so large against the cable that it is in another unit."""

@@ -2,6 +2,7 @@
 
 import itertools
 import json
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
@@ -42,7 +43,7 @@ def differences(a: Any, b: Any, name: str) -> list[str]:
         return [d for f in fields(a) for d in differences(getattr(a, f.name), getattr(b, f.name), f"{name}.{f.name}")]
     if isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b):
         return [d for k, (x, y) in enumerate(zip(a, b, strict=True)) for d in differences(x, y, f"{name}[{k}]")]
-    if isinstance(a, dict) and isinstance(b, dict):
+    if isinstance(a, Mapping) and isinstance(b, Mapping):
         return [f"{name}.{key}" for key in {*a, *b} if a.get(key, "auto") != b.get(key, "auto")]
     same = np.array_equal(a, b) if isinstance(a, np.ndarray) else a == b
     return [] if same else [name]

@@ -1,9 +1,14 @@
-"""A prediction can be sent to another process: what is read from it there is what would have been read here."""
+"""A prediction can be sent to another process: what is read from it there is what would have been read here.
+
+Neither it nor its scene can be changed by writing to its arrays, here or there.
+"""
 
 import pickle
 import subprocess
 import sys
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from copy import copy, deepcopy
+from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +19,7 @@ from dlocore import (
     Cylinder,
     Environment,
     Grasp,
+    Load,
     Move,
     Points,
     Prediction,
@@ -113,6 +119,60 @@ def test_a_chain_starts_from_one_that_was_pickled_as_from_the_one_itself() -> No
     prediction = predict(SCENES["twisted"])
     for a, b in zip(vars(prediction.shape_at()).values(), vars(sent(prediction).shape_at()).values(), strict=True):
         assert repr(a) == repr(b) or np.array_equal(a, b)
+
+
+def arrays_of(part: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:
+    """Give the arrays that can be reached from a part by its fields, each with its name."""
+    if isinstance(part, np.ndarray):
+        yield name, part
+    elif isinstance(part, tuple):
+        for i, one in enumerate(part):
+            yield from arrays_of(one, f"{name}[{i}]")
+    elif is_dataclass(part):
+        for field in fields(part):
+            yield from arrays_of(getattr(part, field.name), f"{name}.{field.name}")
+
+
+def as_it_is(part: Any) -> Any:
+    return part
+
+
+def pickled(part: Any) -> Any:
+    return pickle.loads(pickle.dumps(part))
+
+
+@pytest.mark.parametrize("kept", [as_it_is, pickled, deepcopy])
+@pytest.mark.parametrize("name", ["free grids", "reference", "twisted", "settled", "round a peg"])
+def test_what_an_answer_tells_cant_be_changed(name: str, kept: Callable[[Any], Any]) -> None:
+    answer = kept(predict(SCENES[name]))
+    surfaces = tuple(iteration.surface for iteration in answer.iterations)
+    told = (answer.surface, surfaces, answer.grasps, answer.contacts, answer.stretch, answer.material)
+    found = dict(arrays_of(told))
+    assert len(found) >= 3 + 3 + 3
+    assert [name for name, array in found.items() if array.flags.writeable] == []
+
+
+FULL = Scene(
+    cable=Cable.preset("paper", rest_shape=[(0.0, 0.0), (0.3, 0.1), (0.6, 0.1), (0.97, 0.05)]),
+    shape=Points(points=[[0.0, 0.0], [0.3, 0.1], [0.6, 0.1], [0.97, 0.05]], velocity=(0.1, 0.0, 0.0)),
+    grasps=[SIDE, Grasp(u=0.8, path=Waypoints(times=[0.0, 1.0], positions=[(0.8, 0.0, 0.0)] * 2))],
+    loads=[Load(u=0.5, force=[(0.0, 0.0, 0.1)] * 2, times=[0.0, 1.0])],
+    environment=Environment(obstacles=[PEG]),
+    effects={"twist": "off"},
+)
+
+
+@pytest.mark.parametrize("kept", [as_it_is, pickled, deepcopy, copy])
+def test_what_a_scene_was_checked_for_cant_be_changed(kept: Callable[[Any], Any]) -> None:
+    scene = kept(FULL)
+    found = dict(arrays_of((scene,)))
+    assert found.keys() == dict(arrays_of((FULL,))).keys()
+    assert len(found) >= 9
+    assert [name for name, array in found.items() if array.flags.writeable] == []
+    with pytest.raises(TypeError):
+        scene.effects["twist"] = "bogus"
+    assert scene.effects == {"twist": "off"}
+    assert replace(scene, horizon=2.0).effects == {"twist": "off"}
 
 
 PROGRAM = """
