@@ -83,9 +83,8 @@ def predict(
         Cancelled: `cancelled` returned True.
     """
     instance("scene", scene, Scene, "a Scene")
-    instance("like", like, Prediction | None, "a Prediction, or None")
     instance("cost", cost, Cost | None, "a Cost, as stored_cost returns it, or None")
-    flag("keep_grid", keep_grid)
+    check_options(like, deadline, keep_grid)
     monitor = Monitor(on_iteration, time_allowed(deadline), cancelled)
     keep_grid = keep_grid or scene.quality.keep_grid
     if like is None:
@@ -101,6 +100,13 @@ def predict(
         again = found.said
     fresh = _shown(scene, monitor, cost, keep_grid)
     return replace(fresh, said=f"{fresh.said} Solved from the beginning: {again}")
+
+
+def check_options(like: Prediction | None, deadline: float | None, keep_grid: bool) -> None:
+    """Raise SceneError unless these options of `predict` are what it takes, whatever the scene."""
+    instance("like", like, Prediction | None, "a Prediction, or None")
+    time_allowed(deadline)
+    flag("keep_grid", keep_grid)
 
 
 def _shown(scene: Scene, monitor: Monitor, cost: Cost | None, keep_grid: bool) -> Prediction:

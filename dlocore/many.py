@@ -6,7 +6,7 @@ from threading import Event, Lock, Thread
 from typing import cast
 
 from dlocore.errors import SceneError, whole
-from dlocore.front import predict
+from dlocore.front import check_options, predict
 from dlocore.machine import usable_cores
 from dlocore.prediction import Prediction
 from dlocore.scene.scene import Scene
@@ -40,10 +40,12 @@ def predict_many(
         For each scene, in order, its prediction, or the error that says why it can't be solved as it was given.
 
     Raises:
-        SceneError: `threads` is no positive whole number, or `scenes` are none.
+        SceneError: `threads` is no positive whole number, another option is none that `predict` takes, or `scenes` are
+            none.
         Cancelled: `cancelled` returned True.
     """
     wanted = usable_cores() if threads is None else whole("threads", threads, at_least=1, at_most=1024)
+    check_options(like, deadline, keep_grid)
     if not isinstance(scenes, Iterable):
         raise SceneError("scenes", scenes, "scenes one after the other, as a list of them")
     given = list(scenes)

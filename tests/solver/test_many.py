@@ -3,6 +3,7 @@
 import gc
 import threading
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -113,6 +114,16 @@ def test_a_wrong_number_of_threads_is_refused_by_name(threads: object):
     with pytest.raises(SceneError) as error:
         predict_many([scene(0.2)], threads=threads)  # type: ignore[arg-type]
     assert error.value.field == "threads"
+
+
+@pytest.mark.parametrize("wrong", [{"deadline": -1}, {"keep_grid": "x"}, {"like": 3}])
+def test_an_option_that_no_solve_takes_is_refused_once(wrong: dict[str, Any]) -> None:
+    with pytest.raises(SceneError) as of_one:
+        predict(scene(0.2), **wrong)
+    with pytest.raises(SceneError) as of_all:
+        predict_many([scene(0.2)] * 2, **wrong)
+    assert str(of_all.value) == str(of_one.value)
+    assert [of_all.value.field] == list(wrong)
 
 
 @pytest.mark.parametrize("threads", [1, 3])
