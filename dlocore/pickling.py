@@ -4,10 +4,11 @@ Arrays stay read-only. What is found when it is first read is pickled as what it
 """
 
 from dataclasses import fields
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NoReturn, TypeVar
 
 import numpy as np
 
+K = TypeVar("K")
 T = TypeVar("T")
 
 
@@ -20,6 +21,19 @@ class Checked:
             value = state[field.name]
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
+
+
+class Unwritten(dict[K, T]):
+    """A dict that was checked as it was made, and can't be written over; a copy of it, `dict(it)`, can."""
+
+    def _refuse(self, *_: Any, **__: Any) -> NoReturn:
+        raise TypeError("it can't be written over: make a new one, by dataclasses.replace where it is part of another")
+
+    __setitem__ = __delitem__ = __ior__ = _refuse  # type: ignore[assignment]
+    update = setdefault = pop = popitem = clear = _refuse  # type: ignore[assignment]
+
+    def __reduce__(self) -> tuple[type["Unwritten[K, T]"], tuple[dict[K, T]]]:
+        return type(self), (dict(self),)
 
 
 class Answered(Checked):

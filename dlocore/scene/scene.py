@@ -6,8 +6,7 @@ Frozen data in SI units, world frame right-handed with z up. Everything is valid
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
-from typing import Any, Literal, cast, get_args
+from typing import Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,7 +23,7 @@ from dlocore.errors import (
     number,
     whole,
 )
-from dlocore.pickling import Checked
+from dlocore.pickling import Checked, Unwritten
 from dlocore.scene.cable import MAX_LENGTH, Cable, PointMass
 from dlocore.scene.obstacles import Obstacle
 from dlocore.scene.paths import Move, Path, Still, Waypoints
@@ -411,7 +410,7 @@ class Scene(Checked):
         instance("environment", self.environment, Environment, "an Environment")
         instance("effects", self.effects, Mapping, 'a dict of "on", "off" or "auto" by effect name')
         instance("quality", self.quality, Quality, "a Quality")
-        object.__setattr__(self, "effects", MappingProxyType(dict(self.effects)))  # the caller's may change
+        object.__setattr__(self, "effects", Unwritten(self.effects))  # the caller's may change
         object.__setattr__(self, "grasps", instances("grasps", self.grasps, Grasp, "Grasp"))
         object.__setattr__(self, "loads", instances("loads", self.loads, Load, "Load"))
         length = self.cable.length
@@ -430,12 +429,6 @@ class Scene(Checked):
             last = float(cast(Floats, self.shape.knots)[-1])
             if not abs(last - length) <= 1e-9 * length:
                 raise SceneError("shape.knots[-1]", last, f"the cable's length, {length:g} [m]")
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "effects": dict(self.effects)}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        super().__setstate__({**state, "effects": MappingProxyType(state["effects"])})
 
     def _check_sizes(self) -> None:
         """Refuse what is so large against the cable that it is in another unit."""

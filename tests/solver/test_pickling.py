@@ -3,12 +3,14 @@
 Neither it nor its scene can be changed by writing to its arrays, here or there.
 """
 
+import json
+import operator
 import pickle
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from copy import copy, deepcopy
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import asdict, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -169,10 +171,19 @@ def test_what_a_scene_was_checked_for_cant_be_changed(kept: Callable[[Any], Any]
     assert found.keys() == dict(arrays_of((FULL,))).keys()
     assert len(found) >= 9
     assert [name for name, array in found.items() if array.flags.writeable] == []
-    with pytest.raises(TypeError):
-        scene.effects["twist"] = "bogus"
+    for write in (
+        lambda: operator.setitem(scene.effects, "twist", "bogus"),
+        lambda: operator.delitem(scene.effects, "twist"),
+        lambda: operator.ior(scene.effects, {"stretch": "off"}),
+        lambda: scene.effects.update(stretch="off"),
+        lambda: scene.effects.pop("twist"),
+        lambda: scene.effects.clear(),
+    ):
+        with pytest.raises(TypeError, match="can't be written over"):
+            write()
     assert scene.effects == {"twist": "off"}
-    assert replace(scene, horizon=2.0).effects == {"twist": "off"}
+    assert replace(scene, horizon=2.0).effects == asdict(scene)["effects"] == {"twist": "off"}
+    assert json.dumps(scene.effects) == '{"twist": "off"}'
 
 
 PROGRAM = """
