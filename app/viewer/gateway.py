@@ -11,10 +11,8 @@ import secrets
 from collections.abc import Callable
 from dataclasses import dataclass
 from html import escape
-from pathlib import Path
 from urllib.parse import quote, urlencode
 
-import viser
 from fastapi import FastAPI, Request, Response, WebSocket
 from starlette.responses import RedirectResponse
 from starlette.websockets import WebSocketDisconnect
@@ -23,26 +21,8 @@ from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.typing import Subprotocol
 
 from app.pages.gallery import examples
+from app.viewer.client_page import client_page
 
-CLIENT_PAGE = Path(viser.__file__).parent / "client" / "build" / "index.html"
-# The client ignores what Number.isFinite calls no number, as "-", but takes "-0" for one and draws the field again, as
-# 0, before the rest of -0.2 is typed. Here that is no number while it is typed; who leaves the field at it means 0.
-NEGATIVE_NUMBERS = rb"""<script>
-{
-  const begun = (field) => field.inputMode === "decimal" && /^-\.?0[.0]*$/.test(field.value);
-  const isFinite = Number.isFinite;
-  let typing = false;
-  Number.isFinite = (number) => isFinite(number) && !(typing && number === 0);
-  addEventListener("input", ({ target }) => { typing = begun(target); }, true);
-  addEventListener("input", () => { typing = false; });
-  addEventListener("focusout", ({ target }) => {
-    if (!begun(target)) return;
-    target.setRangeText("0", 0, target.value.length);
-    target.dispatchEvent(new InputEvent("input", { bubbles: true }));
-  }, true);
-}
-</script>
-"""
 CONTENT_SECURITY_POLICY = "; ".join(
     [
         "default-src 'self'",
@@ -113,7 +93,7 @@ def add_gateway(app: FastAPI) -> None:
     scene. `/scene/` and `?example=` lead there. Without a viser server, and where as many scenes are open as may be,
     the pages say so.
     """
-    client = CLIENT_PAGE.read_bytes().replace(b"</head>", NEGATIVE_NUMBERS + b"</head>")
+    client = client_page()
 
     def hindrance(request: Request, name: str) -> Response | None:
         upstream = _upstream(request.app)

@@ -12,6 +12,7 @@ from playwright.sync_api import Locator, Page, expect
 from test_browser import canvas, on_screen, open_scene
 
 from app.pages.gallery import examples
+from app.viewer.client_page import GONE, TITLE, client_page
 from benchmarks.simulated_recordings import simulated
 from dlocore.recordings import save_recording
 
@@ -156,3 +157,22 @@ def test_a_recording_is_opened_and_its_error_is_read_on_the_timeline(service, wi
     page.get_by_role("tab", name="Scene").click()
     expect(page.get_by_role("combobox", name="Preset")).to_have_value("my cable")
     assert witness.errors == []
+
+
+def test_the_page_has_a_title_and_says_where_its_service_is_gone(witness):
+    nowhere = "http://127.0.0.1:9"
+    page = witness.page
+    page.route(f"{nowhere}/**", lambda route: route.fulfill(body=client_page(), content_type="text/html"))
+    page.goto(f"{nowhere}/scene/new/tab/")
+    expect(page).to_have_title(TITLE)
+    told = "[...document.querySelectorAll('div')].map(div => getComputedStyle(div, '::before').content)"
+    page.wait_for_function(f"{told}.filter(words => words.includes('{GONE}')).length === 1")
+
+
+def test_no_control_lies_under_the_scrollbar_of_the_panel(service, witness):
+    page = open_scene(witness, service)
+    bar = page.locator('.mantine-ScrollArea-scrollbar[data-orientation="vertical"]').first.bounding_box()
+    play = page.get_by_role("button", name="Pause").bounding_box()
+    assert bar is not None
+    assert play is not None
+    assert play["x"] + play["width"] <= bar["x"]
