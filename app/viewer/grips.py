@@ -30,6 +30,11 @@ def gripper(draft: Draft) -> dict[str, Any] | None:
     return draft.primitives[draft.selected] if draft.selected < len(draft.primitives) else None
 
 
+def places(draft: Draft) -> list[float]:
+    """Return where the grippers hold the cable [m]."""
+    return [float(primitive["u"]) for primitive in draft.primitives]
+
+
 def changed(draft: Draft, name: str, value: Any) -> Draft:
     """Set a field of the gripper in hand; None takes it out."""
     return draft if gripper(draft) is None else draft.put(("primitives", draft.selected, name), value)

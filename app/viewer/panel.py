@@ -1,6 +1,6 @@
 """The control panel: what a person sets, and what the last solve was worth."""
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -409,9 +409,9 @@ class Panel:
         else:
             self._solve.show(report.status_card(prediction, preview=False))
 
-    def take_problem(self, problem: str, details: str) -> None:
-        """Say why there is no prediction of the edited scene."""
-        self._solve.show(report.problem_card(problem, details))
+    def take_problem(self, problem: str, details: str, places: Sequence[float]) -> None:
+        """Say why there is no prediction of the edited scene, whose grippers hold the cable at `places` [m]."""
+        self._solve.show(report.problem_card(problem, details, places))
         self._mark_stale()
         self._keep.disabled = True
 

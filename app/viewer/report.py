@@ -4,6 +4,7 @@ import json
 import re
 import shlex
 import textwrap
+from collections.abc import Sequence
 from html import escape
 from typing import Any
 
@@ -13,6 +14,7 @@ from app.viewer import plots
 from app.viewer.costs import Costs
 from app.viewer.loads import forces_over
 from app.viewer.palette import ColourScale, css_ramp
+from app.viewer.wording import in_labels, problem_in_labels
 from dlocore import EffectReport, Prediction
 from dlocore.accuracy.fallback import errs
 from dlocore.calibration import Measured, front_of
@@ -50,9 +52,9 @@ def status_card(prediction: Prediction, *, preview: bool) -> str:
     if preview:
         told: tuple[str, ...] = ()
     elif prediction.status != "converged" or errs(prediction):
-        told = (prediction.message,)
+        told = (_in_labels(prediction.message, prediction),)
     else:
-        told = tuple(f"Note: {note}." for note in prediction.notes)
+        told = tuple(f"Note: {_in_labels(note, prediction)}." for note in prediction.notes)
     ground = _DOUBT if told else _GOOD
     state = "Preview" if preview else _WORDS[prediction.status]
     numbers = [
@@ -80,8 +82,9 @@ def status_card(prediction: Prediction, *, preview: bool) -> str:
     )
 
 
-def problem_card(problem: str, details: str) -> str:
-    """Return why there is no prediction, in words."""
+def problem_card(problem: str, details: str, places: Sequence[float]) -> str:
+    """Return why there is no prediction, in words, of a scene whose grippers hold the cable at `places` [m]."""
+    problem, details = problem_in_labels(problem, details, places)
     headline = "This is not possible." if details else "No prediction."
     why, more = (details, "") if _name_the_field(problem, details) else (f"{problem}.", f"{details} ")
     return (
@@ -91,8 +94,9 @@ def problem_card(problem: str, details: str) -> str:
     )
 
 
-def problem_label(problem: str, details: str) -> str:
+def problem_label(problem: str, details: str, places: Sequence[float]) -> str:
     """Return why there is no prediction, with value and what is allowed, in a few short lines for the picture."""
+    problem, details = problem_in_labels(problem, details, places)
     words = details if _name_the_field(problem, details) else f"{problem}. {details}"
     return textwrap.fill(f"Not possible. {words}", LABEL_WIDTH, max_lines=LABEL_LINES, placeholder=" …")
 
@@ -237,7 +241,11 @@ def accuracy_plot(prediction: Prediction, earlier: list[tuple[float, float]], me
 
 def message(prediction: Prediction) -> str:
     """Return what the solver says about its answer."""
-    return note(prediction.message, good=True)
+    return note(_in_labels(prediction.message, prediction), good=True)
+
+
+def _in_labels(text: str, prediction: Prediction) -> str:
+    return in_labels(text, [grasp.u for grasp in prediction.scene.grasps])
 
 
 def note(text: str, *, good: bool) -> str:

@@ -394,8 +394,9 @@ class Session:
             self._busy_timer = self._loop.call_later(PATIENCE, self._say_busy)
         with self._client.atomic():
             if outcome.prediction is None:
-                self._panel.take_problem(outcome.problem, outcome.details)
-                self._gizmo.warn(report.problem_label(outcome.problem, outcome.details))
+                told = outcome.problem, outcome.details, grips.places(outcome.job.draft)
+                self._panel.take_problem(*told)
+                self._gizmo.warn(report.problem_label(*told))
                 self._picture.refuse(
                     outcome.job.draft.obstacles(), report.named_obstacles(outcome.problem, outcome.details)
                 )

@@ -72,3 +72,16 @@ def test_a_slider_beside_which_nothing_of_its_range_is_typed_yet_changes_nothing
         for beyond in (-1.0, 20.0):
             client.set(label, beyond)
             assert client.document == before
+
+
+def test_a_target_error_is_at_most_as_long_as_the_cable_in_millimetres(service):
+    with connected(service) as client:
+        client.set("Ask for", "target error")
+        before = client.document
+        client.set("Target error [mm]", 2000)
+        assert client.document == before
+        client.wait_for(lambda: client.notices == ["Got 2000, allowed: a number from 0.001 to 1000."])
+        client.set("Length [m]", 3)
+        assert client.document["cable"]["length"] == 3.0
+        client.set("Target error [mm]", 2000)
+        assert client.document["quality"]["target_error"] == 2.0

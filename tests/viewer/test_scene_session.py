@@ -124,7 +124,7 @@ def test_an_impossible_target_is_said_and_the_last_good_prediction_stays(service
         client.wait_for(lambda: client.visible.get("/warning"))
         label = " ".join(client.nodes["/warning"]["text"].split())
         assert label.startswith("Not possible. No cable can follow: the two grasps are farther apart")
-        assert "got 1.172 m from primitives[0] at 1.6 s, allowed: at most 0.75 m" in label
+        assert "got 1.172 m from gripper 1 at 0.25 m at 1.6 s, allowed: at most 0.75 m" in label
         assert np.array_equal(client.final_shape, good)
         client.drag("update", 0.5, 0.2)
         client.drag("end")
@@ -135,18 +135,19 @@ def test_an_impossible_target_is_said_and_the_last_good_prediction_stays(service
 
 
 def test_the_label_in_the_picture_tells_the_value_and_what_is_allowed():
-    label = report.problem_label("quality.n_u", "quality.n_u: got 900, allowed: an integer, 5 to 129.")
-    assert " ".join(label.split()) == "Not possible. quality.n_u: got 900, allowed: an integer, 5 to 129."
+    label = report.problem_label("quality.n_u", "quality.n_u: got 900, allowed: an integer, 5 to 129.", [])
+    assert " ".join(label.split()) == "Not possible. Points along n_u: got 900, allowed: an integer, 5 to 129."
     assert max(len(line) for line in label.splitlines()) <= report.LABEL_WIDTH
 
 
 def test_the_card_names_a_field_once():
     details = "cable.diameter: got 10.0, allowed: at most 0.5 [m]."
-    card = report.problem_card("cable.diameter", details)
-    assert card.count("cable.diameter") == 1
-    assert f"</b> {details}<div" in card
-    assert "</b> Two grasps meet.<div" in (card := report.problem_card("Two grasps meet", details))
-    assert details in card
+    card = report.problem_card("cable.diameter", details, [])
+    assert "</b> Diameter: got 10.0, allowed: at most 0.5 [m].<div" in card
+    assert card.count("Diameter") == 1
+    card = report.problem_card("Two grasps meet", details, [])
+    assert "</b> Two grasps meet.<div" in card
+    assert "Diameter: got 10.0, allowed: at most 0.5 [m]." in card
 
 
 def test_an_answer_that_is_no_success_is_told_in_the_picture(service):

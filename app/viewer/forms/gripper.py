@@ -12,6 +12,7 @@ from app.viewer.draft import Draft
 from app.viewer.edits import Edits
 from app.viewer.forms.base import Form, show_if, show_value
 from app.viewer.number_field import NumberField
+from app.viewer.wording import gripper_name
 from dlocore import SplineSurface
 from dlocore.scene.scene import MAX_GRASPS
 from dlocore.shape.shape import StartCurve
@@ -105,8 +106,7 @@ class GripperForm(Form):
 
     @staticmethod
     def _names(draft: Draft) -> tuple[str, ...]:
-        grippers = [f"{k + 1} at {primitive['u']:.3g} m" for k, primitive in enumerate(draft.primitives)]
-        return tuple(grippers) or (NONE,)
+        return tuple(gripper_name(k, u) for k, u in enumerate(grips.places(draft))) or (NONE,)
 
     def _begin(self, draft: Draft) -> Any:
         return grips.origin(draft, self._start, self._shown)

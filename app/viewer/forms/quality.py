@@ -66,6 +66,7 @@ class QualityForm(Form):
         self._draft = draft
         given = _given(draft)
         mode = _mode(given)
+        self._error.high = 1e3 * draft.length
         if mode == "target error":
             show_value(self._error, float(f"{1e3 * given['target_error']:.7g}"))
         elif mode == "time budget":

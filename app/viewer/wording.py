@@ -1,0 +1,104 @@
+"""What the solver says of a scene, in the words of the panel: its labels for fields, its names of grippers."""
+
+import re
+from collections.abc import Sequence
+
+from dlocore.errors import MILLIMETRES
+
+LABELS = {  # of the panel, by field of a scene's document; [] for any number
+    "cable.preset": "Preset",
+    "cable.length": "Length [m]",
+    "cable.diameter": "Diameter [mm]",
+    "cable.linear_density": "Density [g/m]",
+    "cable.bending_stiffness": "EI [10⁻³ N m²]",
+    "cable.torsional_stiffness": "GJ [10⁻³ N m²]",
+    "cable.axial_stiffness": "EA [N]",
+    "cable.bending_damping": "Damping [10⁻³ N m² s]",
+    "cable.torsional_damping": "Twist damping [10⁻³ N m² s]",
+    "cable.axial_damping": "Stretch damping [N s]",
+    "cable.yield_strain": "Yields at strain [%]",
+    "cable.memory_rate": "Memory rate [1/s]",
+    "cable.rest_shape": "Stress-free shape",
+    "cable.point_masses[].mass": "Connector [g]",
+    "cable.point_masses[].u": "Placed at u [m]",
+    "shape.settle": "Let it settle first",
+    "primitives[].u": "Grasp u [m]",
+    "primitives[].hold": "Holds",
+    "primitives[].grasp_time": "Closes at [s]",
+    "primitives[].release_time": "Opens at [s]",
+    "primitives[].path.displacement": "Target [m]",
+    "primitives[].path.rotation": "Turn [°]",
+    "primitives[].path.duration": "Duration [s]",
+    "primitives[].path.profile": "Speed profile",
+    "horizon": "Predict until [s]",
+    "environment.gravity": "Gravity [m/s²]",
+    "environment.drag": "Drag [N s/m²]",
+    "environment.drag_quadratic": "Drag [N s²/m³]",
+    "environment.table.height": "Table height [m]",
+    "environment.table.friction": "Table friction",
+    "environment.obstacles[].center": "Centre [m]",
+    "environment.obstacles[].radius": "Radius [mm]",
+    "environment.obstacles[].size": "Size [mm]",
+    "environment.obstacles[].height": "Length [mm]",
+    "environment.obstacles[].friction": "Obstacle friction",
+    "quality.target_error": "Target error [mm]",
+    "quality.time_budget": "Time budget [ms]",
+    "quality.n_u": "Points along n_u",
+    "quality.n_t": "Points in time n_t",
+    "quality.delta": "Threshold δ",
+    "quality.method": "Method",
+    "quality.keep_grid": "Keep this grid",
+}
+_ALONE = [label.partition(" [")[0] for label in LABELS.values()]  # without their units, by which some differ
+_NAMES = {
+    field: name if _ALONE.count(name) == 1 else label
+    for (field, label), name in zip(LABELS.items(), _ALONE, strict=True)
+}
+_BARE = {field.rpartition(".")[2]: name for field, name in _NAMES.items()}
+_BARE = {field: name for field, name in _BARE.items() if "_" in field and field not in name}  # else a word of the prose
+_PART = r"[a-z_]+(?:\[\d+\])*"
+_FIELD = re.compile(
+    rf"\b(?:(?:cable|environment|shape|quality|effects)(?:\.{_PART})+|primitives\[\d+\](?:\.{_PART})*|horizon(?=: got)"
+    rf"|{'|'.join(sorted(_BARE, key=len, reverse=True))})"
+    r"(?!\w)"
+)
+
+
+def gripper_name(number: int, u: float) -> str:
+    """Return what the panel calls the gripper of this number, from 0, that holds the cable at `u` [m]."""
+    return f"{number + 1} at {u:.3g} m"
+
+
+def in_labels(text: str, places: Sequence[float]) -> str:
+    """Return a text in which the panel's labels are in the place of fields of the API.
+
+    Args:
+        text: of the solver.
+        places: at which the grippers hold the cable [m].
+    """
+    return _FIELD.sub(lambda found: _label(found[0], places), text)
+
+
+def problem_in_labels(problem: str, details: str, places: Sequence[float]) -> tuple[str, str]:
+    """Return what is wrong, and its field, value and what is allowed, likewise."""
+    if problem == MILLIMETRES and details.startswith("quality.target_error:"):  # which the panel has in millimetres
+        problem = "quality.target_error"
+    told = (in_labels(text, places) for text in (problem, details))
+    problem, details = (new if new in (problem, details) else new[:1].upper() + new[1:] for new in told)
+    return problem, details
+
+
+def _label(field: str, places: Sequence[float]) -> str:
+    if field.startswith("effects."):
+        return f"the effect {field.removeprefix('effects.').replace('_', ' ')}"
+    key = re.sub(r"\[\d+\]", "[]", field)
+    label = _NAMES.get(key, _NAMES.get(key.removesuffix("[]"), ""))
+    whose = re.match(r"(primitives|environment\.obstacles)\[(\d+)\]\.?", field)
+    if whose is None:
+        return label or _BARE.get(field, field)
+    number, rest = int(whose[2]), field[whose.end() :]
+    if whose[1] == "primitives":
+        owner = f"gripper {gripper_name(number, places[number]) if number < len(places) else number + 1}"
+    else:
+        owner = f"obstacle {number + 1}"
+    return f"{label or rest} of {owner}" if rest else owner
