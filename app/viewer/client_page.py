@@ -6,6 +6,7 @@ import viser
 
 _PAGE = Path(viser.__file__).parent / "client" / "build" / "index.html"
 TITLE = "dlo scene"
+FOLD = "told"  # class of what is folded to three lines until it is clicked
 GONE = "The service does not answer. This page connects again as soon as it does."
 # The client ignores what Number.isFinite calls no number, as "-", but takes "-0" for one and draws the field again, as
 # 0, before the rest of -0.2 is typed. Here that is no number while it is typed; who leaves the field at it means 0.
@@ -41,6 +42,15 @@ _STYLE = f"""<style>
   animation: told 0.2s 1s both;
 }}
 @keyframes told {{ from {{ opacity: 0; }} }}
+.{FOLD} > summary {{ list-style: none; cursor: pointer; }}
+.{FOLD} > summary::after {{ content: "more"; text-decoration: underline; }}
+.{FOLD}[open] > summary::after {{ content: "less"; }}
+.{FOLD}:not([open]) > summary > div {{
+  display: -webkit-box;
+  -webkit-box-orient: vertical;
+  -webkit-line-clamp: 3;
+  overflow: hidden;
+}}
 .mantine-ScrollArea-viewport:not(.mantine-ScrollArea-viewport *) > div {{ padding-right: 0.4em; }}
 </style>
 """

@@ -113,7 +113,7 @@ class Panel:
         self._stale = False  # whether the results are of a scene before
         self._solve = SolveCard(self._gui, report.waiting_card(ready=ready), actions.stop, actions.solve)
         self._add_timeline()
-        self.steps = StepButtons(self._gui, actions.step_back, actions.step_forward)
+        StepButtons(self._gui, actions.step_back, actions.step_forward)
         self._legend = self._gui.add_html("")
         tabs = self._gui.add_tab_group()
         with tabs.add_tab("Scene"):

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from app.viewer import plots
+from app.viewer.client_page import FOLD
 from app.viewer.costs import Costs
 from app.viewer.loads import forces_over
 from app.viewer.palette import ColourScale, css_ramp
@@ -27,6 +28,7 @@ _GOOD = "rgba(46, 107, 214, 0.10)"
 _DOUBT = "rgba(235, 150, 30, 0.16)"
 SMALLEST_ERROR = 1e-9  # m: a smaller one is none, and has no place on a logarithmic axis
 EARLIER = 30  # solves that are shown beside the present one
+UNFOLDED = 120  # characters: about as many as the lines hold that are left of a long text
 LABEL_WIDTH, LABEL_LINES = 48, 6  # of characters, and of lines, of a label in the picture
 _BAD = "rgba(222, 72, 50, 0.16)"
 _WORDS = {
@@ -74,12 +76,19 @@ def status_card(prediction: Prediction, *, preview: bool) -> str:
     }
     if not preview and len(parts) > 1:
         detail += "; error by " + ", ".join(f"{name} {millimetres(size)}" for name, size in parts.items())
-    advice = "".join(f'<div style="margin-top: 0.3rem;">{escape(text)}</div>' for text in told)
     return (
         f'<div style="{_CARD} background: {ground};" data-status="{escape(prediction.status)}">'
-        f'<div style="display: flex; justify-content: space-between; gap: 0.6rem;">{cells}</div>{advice}'
+        f'<div style="display: flex; justify-content: space-between; gap: 0.6rem;">{cells}</div>{_folded(told)}'
         f'<div style="opacity: 0.75; margin-top: 0.3rem;">{escape(detail)}</div></div>'
     )
+
+
+def _folded(texts: Sequence[str]) -> str:
+    """Return paragraphs, of which the page shows a few lines where they are long, and all where that is clicked."""
+    words = "<br/>".join(escape(text) for text in texts)
+    if sum(map(len, texts)) <= UNFOLDED:
+        return f'<div style="margin-top: 0.3rem;">{words}</div>' if words else ""
+    return f'<details class="{FOLD}" style="margin-top: 0.3rem;"><summary><div>{words}</div></summary></details>'
 
 
 def problem_card(problem: str, details: str, places: Sequence[float]) -> str:

@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -29,6 +28,7 @@ from app.viewer.playback import Playback
 from app.viewer.shape_editor import ShapeEditor
 from app.viewer.shapes import straightened, with_points
 from app.viewer.solving import Kind, Outcome, Solver, SolverThread
+from app.viewer.step_buttons import REDO, UNDO
 from app.viewer.tracking import Tracking, TrackingActions
 from dlocore import Prediction, SceneError
 
@@ -110,8 +110,8 @@ class Session:
         client.scene.on_click()(self._clicked)  # type: ignore[arg-type]
         self._gizmo = Gizmo(client.scene, self._begin_drag, self._drag, self._end_drag)
         self._shape = ShapeEditor(client, self._shape_dragged)
-        tell = partial(client.add_notification, auto_close_seconds=TO_READ)
-        self._edits = Edits(lambda: self._draft, self._edited, tell)
+        self._tell = partial(client.add_notification, auto_close_seconds=TO_READ)
+        self._edits = Edits(lambda: self._draft, self._edited, self._tell)
         # controls are not told of "0.0" after "0", on the way to 0.02
         client._websock_connection.register_handler(GuiUpdateMessage, lambda *_: self._edits.go_on())
         self._panel = Panel(
@@ -158,8 +158,8 @@ class Session:
             measure_costs=self._measure_costs,
             stop=self._stop,
             solve=self._solve_again,
-            step_back=lambda: self._step(self._history.back),
-            step_forward=lambda: self._step(self._history.forward),
+            step_back=lambda: self._step(UNDO),
+            step_forward=lambda: self._step(REDO),
             edit_shape=self._edit_shape,
             straighten=self._straighten,
             reset_camera=self._reset_camera,
@@ -286,10 +286,14 @@ class Session:
                 draft = grips.carried(draft, start, self._draft, self._start)
         self.edit(draft)
 
-    def _step(self, step: Callable[[Draft], Draft]) -> None:
-        """Go a step back or forward to a scene of before."""
+    def _step(self, name: str) -> None:
+        """Go a step back or forward to a scene of before, to undo or to redo; tell where there is none."""
         self._edits.finish()
-        draft = step(self._draft)
+        back, forward = self._history.steps
+        if not (back if name == UNDO else forward):
+            self._tell(f"There is nothing to {name.lower()}", "")
+            return
+        draft = (self._history.back if name == UNDO else self._history.forward)(self._draft)
         if draft != self._draft:
             self._change(draft)
 
@@ -321,7 +325,6 @@ class Session:
         with self._client.atomic():
             self._panel.follow(self._start, None if self._latest is None else self._latest.surface)
             self._panel.take_draft(draft)
-            self._panel.steps.offer(*self._history.steps)
             self._panel.clear_kept()
             self._picture.select(draft.selected)
             self._shape.in_space = draft.in_space

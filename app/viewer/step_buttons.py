@@ -9,7 +9,7 @@ UNDO, REDO = "Undo", "Redo"
 
 
 class StepButtons:
-    """Two buttons beside each other, once there is a change, and the keys that everybody knows for them.
+    """Two buttons beside each other, and the keys that everybody knows for them.
 
     Args:
         gui: of the client.
@@ -19,7 +19,7 @@ class StepButtons:
 
     def __init__(self, gui: GuiApi, back: Callable[[], None], forward: Callable[[], None]) -> None:
         self._group = gui.add_button_group(
-            "Changes", (UNDO, REDO), visible=False, hint="Ctrl+Z: the scene before; Ctrl+Shift+Z: forward again"
+            "Changes", (UNDO, REDO), hint="Ctrl+Z: the scene before; Ctrl+Shift+Z: forward again"
         )
         by_key = (
             (gui.add_command(f"{UNDO} the last change", hotkey="Z", modifier="cmd/ctrl"), back),
@@ -35,8 +35,3 @@ class StepButtons:
             @command.on_trigger
             async def _pressed(_event: Any, step: Callable[[], None] = step) -> None:
                 step()
-
-    def offer(self, back: bool, forward: bool) -> None:
-        """Be there as soon as there is a scene to go back or forward to."""
-        if self._group.visible != (back or forward):
-            self._group.visible = back or forward

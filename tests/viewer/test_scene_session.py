@@ -1,6 +1,7 @@
 import json
 import threading
 import time
+import xml.etree.ElementTree as ET
 
 import httpx
 import numpy as np
@@ -138,6 +139,14 @@ def test_the_label_in_the_picture_tells_the_value_and_what_is_allowed():
     label = report.problem_label("quality.n_u", "quality.n_u: got 900, allowed: an integer, 5 to 129.", [])
     assert " ".join(label.split()) == "Not possible. Points along n_u: got 900, allowed: an integer, 5 to 129."
     assert max(len(line) for line in label.splitlines()) <= report.LABEL_WIDTH
+
+
+def test_long_notes_on_an_answer_are_folded_and_short_ones_are_not():
+    prediction = predict(start_draft().scene(NOTHING_STORED))
+    for notes, folded in (((), False), (("short",), False), (("long " * 40, "a <b>"), True)):
+        vars(prediction)["notes"] = notes
+        card = ET.fromstring(report.status_card(prediction, preview=False))
+        assert (card.find("details") is not None) == folded
 
 
 def test_the_card_names_a_field_once():
