@@ -55,10 +55,18 @@ def straightened(draft: Draft, start: StartCurve) -> Draft:
     along = end - begin
     if float(np.linalg.norm(along)) < 1e-6 * draft.length:
         along = np.array([1.0, 0.0, 0.0])
+    return draft.put(("shape",), _line(begin, along))
+
+
+def between(draft: Draft, begin: Floats, end: Floats) -> Draft:
+    """Let the cable start straight from one point towards another, (3,) [m]; one that was to settle still is."""
+    settles = {"settle": True} if draft.get(("shape", "settle")) else {}
+    return draft.put(("shape",), {**_line(begin, end - begin), **settles})
+
+
+def _line(begin: Floats, along: Floats) -> dict[str, Any]:
     direction = along / np.linalg.norm(along)
-    return draft.put(
-        ("shape",), {"kind": "straight", "start": _listed(begin[None])[0], "direction": _listed(direction[None])[0]}
-    )
+    return {"kind": "straight", "start": _listed(begin[None])[0], "direction": _listed(direction[None])[0]}
 
 
 def with_settling(draft: Draft, settle: bool) -> Draft:

@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -9,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.viewer.draft import Draft
-from app.viewer.shapes import scaled, with_points
+from app.viewer.shapes import between, scaled, with_points
 from dlocore import SceneError
 from dlocore.array_files import ArrayFile, read_array
 from dlocore.errors import points_array
-from dlocore.shape.cloud import fit_cloud
+from dlocore.scene.cable import MAX_LENGTH, MIN_LENGTH
+from dlocore.shape.cloud import LEAST, fit_cloud
 from dlocore.shape.fit import MAX_LENGTH_MISMATCH
 
 Floats = NDArray[np.float64]
@@ -117,15 +119,31 @@ def _arrays(content: bytes) -> Floats:
 
 def _along(draft: Draft, points: Floats) -> Draft:
     """Let the cable start along points, in order or not; its length follows theirs where it differs too much."""
+    if len(points) == 2:
+        return _between(draft, *points)
     try:
         fit = fit_cloud(points)
     except SceneError:
+        if len(points) < LEAST:
+            raise
         fit = fit_cloud(points, ordered=False)
         points = points[fit.order]
     measured = float(fit.measured_length)
     if len(points) > MOST_POINTS:
         points = fit.curve(np.linspace(0.0, float(fit.curve.knots[-1]), SAMPLES))
-    edited = draft
-    if not abs(measured - draft.length) <= 0.5 * MAX_LENGTH_MISMATCH * draft.length:
-        edited = scaled(draft, round(measured, 6))
-    return with_points(edited, points)
+    return with_points(_as_long(draft, measured), points)
+
+
+def _between(draft: Draft, begin: Floats, end: Floats) -> Draft:
+    """Let the cable start straight between two points, (3,) [m]."""
+    apart = math.dist(begin, end)
+    if not MIN_LENGTH <= apart <= MAX_LENGTH:
+        raise SceneError("points", f"two points {apart:g} m apart", f"a line of {MIN_LENGTH:g} to {MAX_LENGTH:g} m")
+    return between(_as_long(draft, apart), begin, end)
+
+
+def _as_long(draft: Draft, measured: float) -> Draft:
+    """Give the cable the length of its points [m], unless its own is about that."""
+    if abs(measured - draft.length) <= 0.5 * MAX_LENGTH_MISMATCH * draft.length:
+        return draft
+    return scaled(draft, round(measured, 6))

@@ -71,6 +71,22 @@ def test_points_of_a_longer_cable_give_it_their_length():
     assert np.abs(draft.start(NOTHING_STORED)([2.0])[0, :2] - 2.0 * ARC[-1]).max() < 2 * FITTED
 
 
+def test_two_points_are_a_straight_cable_between_them():
+    draft = uploads.opened(start_draft(), "line.csv", b"0,0\n1,1")
+    assert draft.length == pytest.approx(np.sqrt(2.0), abs=1e-6)
+    ends = draft.start(NOTHING_STORED)([0.0, draft.length])
+    np.testing.assert_allclose(ends, [[0, 0, 0], [1, 1, 0]], rtol=0, atol=1e-4)  # the direction has 5 digits
+    settling = uploads.opened(shapes.with_settling(start_draft(), True), "line.csv", b"0,0.1,0.2\n1,0.1,0.2")
+    assert settling.document["shape"] == {
+        "kind": "straight",
+        "start": [0, 0.1, 0.2],
+        "direction": [1, 0, 0],
+        "settle": True,
+    }
+    assert settling.length == 1.0
+    settling.scene(NOTHING_STORED)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
@@ -87,6 +103,9 @@ def test_points_of_a_longer_cable_give_it_their_length():
         ("points.npz", npz(a=ARC, b=ARC), "points"),
         ("points.npz", npz(points=np.array(["x"])), "numbers"),
         ("points.csv", b"0,0\n0,0\n0,0\n0,0", "points"),
+        ("points.csv", b"0,0\n0,0", "two points 0 m apart"),
+        ("points.csv", b"0,0\n1e300,1e300", "two points"),
+        ("points.csv", b"0,0\n1,1\n2,2", "3 points along the cable"),
         ("points.csv", b"0,0\n1e200,0\n2,3e200\n4e200,0\n5e200,1", "points"),
     ],
 )
