@@ -4,7 +4,7 @@ import json
 import re
 import shlex
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -28,6 +28,7 @@ _GOOD = "rgba(46, 107, 214, 0.10)"
 _DOUBT = "rgba(235, 150, 30, 0.16)"
 SMALLEST_ERROR = 1e-9  # m: a smaller one is none, and has no place on a logarithmic axis
 EARLIER = 30  # solves that are shown beside the present one
+WAYPOINTS = 50  # that are listed
 UNFOLDED = 120  # characters: about as many as the lines hold that are left of a long text
 LABEL_WIDTH, LABEL_LINES = 48, 6  # of characters, and of lines, of a label in the picture
 _BAD = "rgba(222, 72, 50, 0.16)"
@@ -246,6 +247,23 @@ def accuracy_plot(prediction: Prediction, earlier: list[tuple[float, float]], me
         earlier[:] = [*earlier, here][-EARLIER:]
     hint = "" if measured else note("What accuracy costs on this machine is not measured yet: dlo calibrate", good=True)
     return plots.plot("time [ms]", "error [mm]", series, log_x=True, mark="accuracy") + hint
+
+
+def waypoints(path: Mapping[str, Any]) -> str:
+    """Return how many waypoints a path has, how long it takes, and, unfolded, when it is where; "" of another path."""
+    if path.get("kind") != "waypoints":
+        return ""
+    times, positions = path["times"], path["positions"]
+    rows = "".join(
+        f"<div>{time:.4g} s: {', '.join(f'{x:.4g}' for x in position)}</div>"
+        for time, position in zip(times[:WAYPOINTS], positions, strict=False)
+    )
+    rest = f"<div>and {len(times) - WAYPOINTS} more</div>" if len(times) > WAYPOINTS else ""
+    return (
+        '<details style="margin: 0.2rem 0.75rem; font-size: 0.78rem; line-height: 1.35;">'
+        f'<summary style="cursor: pointer;">{len(times)} waypoints in {times[-1] - times[0]:.4g} s</summary>'
+        f"<div>time: x, y, z [m]</div>{rows}{rest}</details>"
+    )
 
 
 def message(prediction: Prediction) -> str:

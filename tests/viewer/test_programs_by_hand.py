@@ -9,7 +9,7 @@ from protocol_client import NOTHING_STORED, SceneClient, connected
 from scipy.spatial.transform import Rotation
 
 from app.schemas import PredictionRequest, to_scene
-from app.viewer import grips, programs
+from app.viewer import grips, programs, report
 from app.viewer.draft import Draft, start_draft
 from app.viewer.shapes import scaled
 from dlocore import Waypoints
@@ -96,6 +96,16 @@ def test_a_program_goes_with_the_place_that_its_gripper_holds() -> None:
     assert grips.carried(late, start, before, start) == late
 
 
+def test_waypoints_are_listed_with_how_long_they_take() -> None:
+    path = two_moves().primitives[0]["path"]
+    listed = report.waypoints(path)
+    assert "3 waypoints in 3.2 s" in listed
+    assert f"<div>1.6 s: {', '.join(f'{x:g}' for x in path['positions'][1])}</div>" in listed
+    many = {**path, "times": list(range(60)), "positions": [[0.25, 0.0, 0.0]] * 60}
+    assert "and 10 more" in report.waypoints(many)
+    assert report.waypoints(MOVE) == ""
+
+
 @pytest.fixture
 def client(service: httpx.URL) -> Iterator[SceneClient]:
     with connected(service) as client:
@@ -109,6 +119,7 @@ def test_moves_are_added_dragged_and_taken_away_on_the_panel(client: SceneClient
     client.set("Target [m]", [0.4, 0.3, 0.0])
     client.set("Duration [s]", 0.8)
     path = client.wait_for(lambda: _path_that_ends_at(client, [0.4, 0.3, 0.0], 2.4))
+    assert "3 waypoints in 2.4 s" in client.html("waypoints in")
     assert path["positions"][:2] == [[0.25, 0.0, 0.0], [0.25, 0.5, 0.0]]
     client.set("Grasp u [m]", 0.3)  # what it holds begins elsewhere, and so do its moves
     path = client.wait_for(lambda: _path_that_ends_at(client, [0.45, 0.3, 0.0], 2.4))

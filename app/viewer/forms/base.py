@@ -20,6 +20,12 @@ def show_if(control: Any, visible: bool) -> None:
         control.visible = visible
 
 
+def show_content(control: Any, content: str) -> None:
+    """Let an HTML control show `content`, unless it does."""
+    if control.content != content:
+        control.content = content
+
+
 class Form:
     """Controls that show a draft and change it; a change by the program is not taken for one by a person."""
 

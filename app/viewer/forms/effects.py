@@ -9,7 +9,7 @@ from viser import GuiApi
 from app.viewer import report
 from app.viewer.draft import Draft
 from app.viewer.edits import Edits
-from app.viewer.forms.base import Form, show_value
+from app.viewer.forms.base import Form, show_content, show_value
 from dlocore import EffectReport
 from dlocore.scene.scene import EFFECTS, NEEDED, Switch
 
@@ -48,9 +48,3 @@ class EffectsForm(Form):
         """Show what was simulated and why, and by how much an effect changes the time of a solve [s], where known."""
         for effect in effects:
             show_content(self._notes[effect.name], report.effect_note(effect, costs.get(effect.name)))
-
-
-def show_content(control: Any, content: str) -> None:
-    """Let an HTML control show `content`, unless it does."""
-    if control.content != content:
-        control.content = content

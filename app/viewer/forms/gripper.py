@@ -7,10 +7,10 @@ from typing import Any, get_args
 import numpy as np
 from viser import GuiApi
 
-from app.viewer import grips
+from app.viewer import grips, report
 from app.viewer.draft import Draft
 from app.viewer.edits import Edits
-from app.viewer.forms.base import Form, show_if, show_value
+from app.viewer.forms.base import Form, show_content, show_if, show_value
 from app.viewer.number_field import NumberField
 from app.viewer.wording import gripper_name
 from dlocore import SplineSurface
@@ -58,6 +58,7 @@ class GripperForm(Form):
             (ANOTHER, LAST),
             hint="One after another; target and duration are those of the last, a pause goes nowhere",
         )
+        self._waypoints = gui.add_html("")
         with gui.add_folder("Timing", expand_by_default=False) as self._timing:
             self._profile = gui.add_dropdown("Speed profile", grips.PROFILES)
             self._closes = NumberField(gui, "Closes at [s]", 0.0, low=0.0, high=1e4)
@@ -134,6 +135,7 @@ class GripperForm(Form):
         show_if(self._target, path.get("kind") in ("move", "waypoints"))
         show_if(self._in_space, held is not None)
         show_if(self._turn, grips.can_turn(draft))
+        show_content(self._waypoints, report.waypoints(path))
         show_value(self._horizon, float(draft.get(("horizon",), 0.0)))
         if held is not None:
             self._take_gripper(draft, held)
