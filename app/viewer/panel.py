@@ -339,13 +339,17 @@ class Panel:
         show_value(self._settle, bool(draft.get(("shape", "settle"))))
         show_value(self._name, draft.get(("name",), ""))
 
+    def show_scene(self, draft: Draft) -> None:
+        """Show the scene as JSON, and the shell line that posts it."""
+        self._json.content = report.json_block(draft.document)
+        self._curl.content = report.curl_block(self._address, draft.document)
+
     def show_editing(self, editing: bool) -> None:
         """Show whether the start shape is being dragged."""
         show_value(self._editing, editing)
 
     def take_prediction(
         self,
-        draft: Draft,
         prediction: Prediction,
         scale: ColourScale,
         measured: tuple[Measured, ...],
@@ -355,7 +359,6 @@ class Panel:
         """Show a new prediction; a preview leaves out what nobody reads while dragging.
 
         Args:
-            draft: what was predicted.
             prediction: the prediction.
             scale: of the colours.
             measured: what this machine was calibrated to.
@@ -376,8 +379,6 @@ class Panel:
         self._accuracy.content = report.accuracy_plot(prediction, self._earlier, measured)
         self._convergence.content = report.convergence(prediction)
         self._message.content = report.message(prediction)
-        self._json.content = report.json_block(draft.document)
-        self._curl.content = report.curl_block(self._address, draft.document)
         self._keep.disabled = False
 
     def take_wait(self, elapsed: float, longest: float) -> None:
@@ -399,6 +400,7 @@ class Panel:
             self._stale = True
             for part in (self._accuracy, self._convergence, self._message, self._forces):
                 part.content = report.stale(part.content)
+            self._effects.mark_stale()
 
     def take_costs(self, prediction: Prediction, costs: Costs) -> None:
         """Show what the effects cost, as far as it is measured."""

@@ -31,6 +31,7 @@ EARLIER = 30  # solves that are shown beside the present one
 WAYPOINTS = 50  # that are listed
 UNFOLDED = 120  # characters: about as many as the lines hold that are left of a long text
 LABEL_WIDTH, LABEL_LINES = 48, 6  # of characters, and of lines, of a label in the picture
+OF_BEFORE = '<div style="margin: 0.2rem 0.75rem; font-size: 0.78rem;"><b>Of the scene before:</b></div>'
 _BAD = "rgba(222, 72, 50, 0.16)"
 _WORDS = {
     "converged": "Converged",
@@ -155,8 +156,12 @@ def stopped_card() -> str:
 
 def stale(html: str) -> str:
     """Return results, so that nobody takes them for those of a scene that has none yet."""
-    words = '<div style="margin: 0.2rem 0.75rem; font-size: 0.78rem;"><b>Of the scene before:</b></div>'
-    return f'<div data-stale="" style="opacity: 0.45;">{words}{html}</div>' if html else ""
+    return dimmed(f"{OF_BEFORE}{html}") if html else ""
+
+
+def dimmed(html: str) -> str:
+    """Return what is of a scene before, so that it stands back."""
+    return f'<div data-stale="" style="opacity: 0.45;">{html}</div>'
 
 
 def _plain_card(status: str, words: str, more: str) -> str:

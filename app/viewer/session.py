@@ -298,13 +298,14 @@ class Session:
             self._change(draft)
 
     def _change(self, draft: Draft) -> None:
-        solved_for = self._draft.document
+        before = self._draft
         moved = draft.shape_key() != self._draft.shape_key()
         self._draft = draft
         if moved:
             self._take_start()
         self._take_draft()
-        if draft.document == solved_for:  # another gripper in hand: nothing to solve
+        if draft.same_but_name(before):  # another gripper in hand, or another name: nothing to solve
+            self._panel.show_scene(draft)
             self._client.flush()
             return
         self._ask("preview")
@@ -356,6 +357,8 @@ class Session:
     def _ask(self, kind: Kind) -> None:
         """Have the draft solved; where that takes longer than a blink, say that it is under way."""
         self._solver.ask(self._draft, kind)
+        if kind != "preview":  # nobody reads it while the hand moves
+            self._panel.show_scene(self._draft)
         self._asked_at = self._loop.time()
         if self._busy_timer is None:
             self._busy_timer = self._loop.call_later(PATIENCE, self._say_busy)
@@ -417,7 +420,7 @@ class Session:
         if self._dragging and not self._shape.held:
             self._playback.seek(self._playback.horizon)
         scale = self._picture.show(prediction, self._playback.time, self._draft.selected)
-        self._panel.take_prediction(outcome.job.draft, prediction, scale, outcome.measured, preview=preview)
+        self._panel.take_prediction(prediction, scale, outcome.measured, preview=preview)
         self._gizmo.warn("" if preview else report.status_label(prediction))
         if not preview:
             self._tracking.take_prediction(prediction)
@@ -500,8 +503,10 @@ class Session:
         self._outbox.scene(self._current())
 
     async def _save_playback(self) -> None:
-        if self._latest is not None:
-            await self._outbox.playback(self._current(), self._latest, self._look, self._playback.speed)
+        draft = self._current()
+        prediction = self._solved(draft, "No playback")
+        if prediction is not None:
+            await self._outbox.playback(draft, prediction, self._look, self._playback.speed)
 
     async def _save_picture(self) -> None:
         await self._outbox.picture(self._current())
@@ -509,9 +514,14 @@ class Session:
     async def _keep(self) -> None:
         """Store the last refined prediction with its scene, and link to it, unless the scene was edited since."""
         draft = self._current()
-        if self._shown is None or not self._shown[0].same_but_name(draft):
-            self._client.add_notification("Not kept", "This scene is not solved yet.", auto_close_seconds=6.0)
-            return
-        run_id = await self._outbox.keep(draft, self._shown[1])
+        prediction = self._solved(draft, "Not kept")
+        run_id = None if prediction is None else await self._outbox.keep(draft, prediction)
         if run_id is not None:
             self._panel.show_kept(run_id)
+
+    def _solved(self, draft: Draft, refusal: str) -> Prediction | None:
+        """Return the refined prediction of a scene; where there is none, say that under the title of a refusal."""
+        if self._shown is not None and self._shown[0].same_but_name(draft):
+            return self._shown[1]
+        self._client.add_notification(refusal, "This scene is not solved.", auto_close_seconds=6.0)
+        return None

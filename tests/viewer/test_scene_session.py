@@ -242,3 +242,35 @@ def test_a_kept_run_is_stored_with_its_scene(service):
         assert httpx.get(f"{base}/recording.rrd").content[:4] == b"RRF2"
         curl = next(c["_markdown"] for c in client.controls.values() if "curl -s" in c.get("_markdown", ""))
         assert f"curl -s {service.address}/v1/predictions " in curl
+
+
+def test_an_impossible_scene_leaves_nothing_of_the_scene_before_as_its_own(service):
+    with connected(service, "two-grippers") as client:
+        client.refined()
+        client.wait_for(lambda: client.html('data-effect="inertia"'))
+        client.set("Target [m]", [5.0, 0.0, 0.0])
+        client.wait_for(lambda: 'data-status="impossible"' in client.card)
+        written = client.document
+        client.wait_for(lambda: json.loads(client.markdown("```json").strip("`json\n")) == written)
+        assert json.loads(client.markdown("curl -s").split(" -d '")[1].rsplit("'", 1)[0]) == written
+        notes = [c["content"] for c in client.controls.values() if "data-effect" in c.get("content", "")]
+        assert all("data-stale" in note for note in notes)
+        assert sum(c.get("content", "").count("Of the scene before") for c in client.controls.values()) == 5
+        client.press("Save playback.html")
+        client.wait_for(lambda: client.notifications == ["No playback"])
+        client.set("Changes", "Undo")
+        client.refined()
+        client.wait_for(lambda: not client.html("data-stale"))
+
+
+def test_a_name_is_no_reason_to_solve_again(service, monkeypatch):
+    with connected(service) as client:
+        client.refined()
+        solved = []
+        monkeypatch.setattr(service.app.state.service.metrics, "solved", solved.append)
+        client.set("Name", "my run")
+        client.wait_for(lambda: '"name": "my run"' in client.markdown("```json"))
+        client.listen(0.5)
+        assert solved == []
+        client.set("Table friction", 0.1)
+        client.wait_for(lambda: solved)

@@ -23,6 +23,7 @@ class EffectsForm(Form):
         super().__init__(draft, edits)
         self._switches: dict[str, Any] = {}
         self._notes: dict[str, Any] = {}
+        self._mark = gui.add_html("")
         for name in EFFECTS:
             options = tuple(option for option in SWITCHES if option != "off" or name not in NEEDED)
             self._switches[name] = gui.add_dropdown(name.replace("_", " "), options)
@@ -46,5 +47,14 @@ class EffectsForm(Form):
 
     def show(self, effects: tuple[EffectReport, ...], costs: Mapping[str, float]) -> None:
         """Show what was simulated and why, and by how much an effect changes the time of a solve [s], where known."""
+        show_content(self._mark, "")
         for effect in effects:
             show_content(self._notes[effect.name], report.effect_note(effect, costs.get(effect.name)))
+
+    def mark_stale(self) -> None:
+        """Show the notes so that nobody takes them for those of a scene that has none yet."""
+        if self._mark.content or not any(note.content for note in self._notes.values()):
+            return
+        self._mark.content = report.dimmed(report.OF_BEFORE)
+        for note in self._notes.values():
+            note.content = report.dimmed(note.content)
