@@ -23,6 +23,7 @@ class Playback:
     playing: bool = True
     looping: bool = True
     _rested: float = 0.0
+    _held: tuple[bool, float] | None = None  # whether it ran, and where it stood, before it was held
 
     def play(self) -> None:
         """Run, from the start where the end is shown."""
@@ -30,10 +31,29 @@ class Playback:
             self.time = 0.0
         self.playing = True
         self._rested = 0.0
+        self._held = None
 
     def pause(self) -> None:
         """Stand still."""
         self.playing = False
+        self._held = None
+
+    def hold(self, time: float) -> None:
+        """Stand still at `time` [s] while the hand is on something."""
+        held = (self.playing, self.time)
+        self.pause()
+        self.seek(time)
+        self._held = held
+
+    def resume(self) -> None:
+        """Run again, or stand where it stood, as before it was held; not where it was played or paused since."""
+        if self._held is not None:
+            ran, time = self._held
+            self._held = None
+            if ran:
+                self.play()
+            else:
+                self.seek(time)
 
     def seek(self, time: float) -> None:
         """Show `time` [s]."""

@@ -206,8 +206,7 @@ class Session:
         """Show where the motion ends while the hand is on the target."""
         self._edits.finish()
         self._dragging = True
-        self._playback.pause()
-        self._playback.seek(self._playback.horizon)
+        self._playback.hold(self._playback.horizon)
         self._draw_time()
 
     def _drag(self, position: np.ndarray, wxyz: np.ndarray) -> None:
@@ -223,7 +222,8 @@ class Session:
         self._dragging = False
         self._released_at = self._loop.time()
         self._refine()
-        self._playback.play()
+        self._playback.resume()
+        self._draw_time()
 
     def _origin(self) -> np.ndarray:
         return grips.origin(self._draft, self._start, None if self._latest is None else self._latest.surface)
@@ -246,12 +246,11 @@ class Session:
         self._edits.finish()
         with self._client.atomic():
             if wanted:
-                self._playback.pause()
-                self._playback.seek(0.0)
+                self._playback.hold(0.0)
                 self._shape.show(self._start, self._draft.length)
             else:
                 self._shape.hide()
-                self._playback.play()
+                self._playback.resume()
             self._gizmo.show(visible=not wanted and grips.gripper(self._draft) is not None)
         self._draw_time()
 

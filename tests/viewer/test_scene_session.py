@@ -10,6 +10,7 @@ from protocol_client import NOTHING_STORED, connected
 
 from app.viewer import report
 from app.viewer.draft import start_draft
+from app.viewer.playback import Playback
 from dlocore import predict
 
 
@@ -274,3 +275,39 @@ def test_a_name_is_no_reason_to_solve_again(service, monkeypatch):
         assert solved == []
         client.set("Table friction", 0.1)
         client.wait_for(lambda: solved)
+
+
+@pytest.mark.parametrize("paused", [True, False])
+def test_a_drag_leaves_the_playback_as_it_was(service, paused):
+    with connected(service) as client:
+        client.refined()
+        if paused:
+            client.press("Pause")
+            client.set("Time [s]", 0.4)
+            client.wait_for(lambda: any(c.get("label") == "Play" for c in client.controls.values()))
+        client.drag("start")
+        client.drag("update", 0.25, 0.4)
+        client.wait_for(lambda: client.control("Time [s]")[1]["value"] == 1.6)
+        client.drag("end")
+        client.wait_for(lambda: client.control("Time [s]")[1]["value"] < 1.6)
+        client.listen(0.3)
+        assert any(c.get("label") == ("Play" if paused else "Pause") for c in client.controls.values())
+        assert (client.control("Time [s]")[1]["value"] == 0.4) == paused
+
+
+def test_a_playback_that_was_held_goes_on_as_before_unless_it_was_played_or_paused_since():
+    clock = Playback(horizon=2.0, time=0.5)
+    clock.hold(2.0)
+    assert (clock.playing, clock.time) == (False, 2.0)
+    clock.resume()
+    assert clock.playing
+    clock.pause()
+    clock.seek(0.7)
+    clock.hold(0.0)
+    clock.resume()
+    assert (clock.playing, clock.time) == (False, 0.7)
+    clock.hold(0.0)
+    clock.play()
+    clock.seek(1.0)
+    clock.resume()
+    assert (clock.playing, clock.time) == (True, 1.0)
