@@ -22,7 +22,10 @@ function row(run) {
   const status = make("span", { className: `status ${run.status}` }, STATUS[run.status] ?? run.status);
   const time = when(run.created);
   const link = (href, text) => make("a", { href, "aria-label": `${text} of ${run.name || time.textContent}` }, text);
-  const links = [link(run.links.viewer, "recording"), link(run.links.scene, "scene"), link(run.links.self, "JSON")];
+  const links = [
+    link(`/scene/?run=${run.id}`, "open in the scene"), link(run.links.viewer, "recording"), link(run.links.scene, "scene"),
+    link(run.links.self, "JSON"),
+  ];
   return make("tr", {}, cell(time), cell(named, "name"), cell(status), cell(run.method),
     cell(withUnit(run.wall_time * 1e3, "ms"), "number"), cell(withUnit(error, "mm"), "number"), cell(links, "links"));
 }

@@ -21,6 +21,7 @@ from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.typing import Subprotocol
 
 from app.pages.gallery import examples
+from app.schemas.base import ID
 from app.viewer.client_page import client_page
 
 CONTENT_SECURITY_POLICY = "; ".join(
@@ -50,9 +51,10 @@ GOING_AWAY = 1001
 
 KEY_HEADER = "X-Scene-Key"
 ADDRESS_HEADER = "X-Scene-Address"
-EXAMPLE_HEADER = "X-Scene-Example"
+BEGIN_HEADER = "X-Scene-Begin"
 TAB_HEADER = "X-Scene-Tab"
 PLAIN = "new"  # in the place of a ready scene's name: none
+RUN = "run-"  # and before the id of a stored run
 _HOST = re.compile(r"[A-Za-z0-9.\-_]+(:[0-9]{1,5})?|\[[0-9a-fA-F:.]+\](:[0-9]{1,5})?")
 
 
@@ -65,12 +67,16 @@ class Upstream:
         key: proves to it that a connection came through the gateway.
         open_scenes: says how many scenes are open.
         most_scenes: that may be.
+        era: with which the names of its tabs begin: those of before a restart begin otherwise.
+        has_run: says whether a run is stored.
     """
 
     port: int
     key: str
     open_scenes: Callable[[], int]
     most_scenes: int
+    era: str
+    has_run: Callable[[str], bool]
 
     @property
     def is_full(self) -> bool:
@@ -86,34 +92,43 @@ def address(socket: WebSocket) -> str:
 
 
 def add_gateway(app: FastAPI) -> None:
-    """Add `GET /scene/` and the websocket `/scene`, alone and followed by the name of a ready scene and of a tab.
+    """Add `GET /scene/` and the websocket `/scene`, alone and followed by the name of a scene and of a tab.
 
-    The client takes the address of its websocket from that of its page, without the query: so the name of the scene
-    goes into the path, and with it one of the tab, by which a page that is loaded again, or connects anew, finds its
-    scene. `/scene/` and `?example=` lead there. Without a viser server, and where as many scenes are open as may be,
-    the pages say so.
+    The client takes the address of its websocket from that of its page, without the query: so the name of the scene, a
+    ready one or that of a run, goes into the path, and with it one of the tab, by which a page that is loaded again, or
+    connects anew, finds its scene. `/scene/`, `?example=` and `?run=` lead there. Without a viser server, where as many
+    scenes are open as may be, and where a run is gone, the pages say so.
     """
     client = client_page()
 
-    def hindrance(request: Request, name: str) -> Response | None:
+    def found(request: Request, name: str) -> Upstream | Response:
+        """Return the server that shows a scene, or the page that says why none does."""
         upstream = _upstream(request.app)
-        if name != PLAIN and name not in examples():
+        if not _named(name):
             return _unknown()
         if upstream is None:
             return _notice("The scene is not running", "The service is stopping, or has not started yet.", 503)
         if upstream.is_full:
             words = "As many scenes are open as this service allows. Close another tab, or try again later."
             return _notice("All scenes are taken", words, 503)
-        return None
+        return upstream
 
     def new_tab(request: Request, name: str, query: dict[str, str]) -> Response:
-        path = f"/scene/{name}/{secrets.token_urlsafe(12)}/"
-        return hindrance(request, name) or RedirectResponse(path + (f"?{urlencode(query)}" if query else ""))
+        upstream = found(request, name)
+        if isinstance(upstream, Response):
+            return upstream
+        if name.startswith(RUN) and not upstream.has_run(name.removeprefix(RUN)):
+            return _gone()
+        path = f"/scene/{name}/{upstream.era}{secrets.token_urlsafe(12)}/"
+        return RedirectResponse(path + (f"?{urlencode(query)}" if query else ""))
 
     @app.get("/scene/", include_in_schema=False)
     async def scene_page(request: Request) -> Response:
         query = dict(request.query_params)
-        return new_tab(request, query.pop("example", PLAIN), query)
+        name, run = query.pop("example", PLAIN), query.pop("run", None)
+        if run is not None and not ID.fullmatch(run):
+            return _gone()
+        return new_tab(request, name if run is None else f"{RUN}{run}", query)
 
     @app.get("/scene/{name}/", include_in_schema=False)
     async def example_page(name: str, request: Request) -> Response:
@@ -121,8 +136,9 @@ def add_gateway(app: FastAPI) -> None:
 
     @app.get("/scene/{name}/{tab}/", include_in_schema=False)
     async def tab_page(name: str, tab: str, request: Request) -> Response:
+        upstream = found(request, name)
         page = Response(client, media_type="text/html; charset=utf-8", headers=PAGE_HEADERS)
-        return hindrance(request, name) or page
+        return upstream if isinstance(upstream, Response) else page
 
     @app.websocket("/scene")
     async def scene_socket(socket: WebSocket) -> None:
@@ -134,10 +150,19 @@ def add_gateway(app: FastAPI) -> None:
 
     async def serve(socket: WebSocket, name: str, tab: str) -> None:
         upstream = _upstream(socket.app)
-        if upstream is None or upstream.is_full or (name != PLAIN and name not in examples()):
+        if upstream is None or upstream.is_full or not _named(name):
             await socket.close(TRY_AGAIN_LATER)
             return
-        await _pass_on(socket, upstream, {EXAMPLE_HEADER: "" if name == PLAIN else name, TAB_HEADER: quote(tab)})
+        await _pass_on(socket, upstream, {BEGIN_HEADER: name, TAB_HEADER: quote(tab)})
+
+
+def _named(name: str) -> bool:
+    """Return whether there may be a scene of this name."""
+    return name == PLAIN or name in examples() or bool(name.startswith(RUN) and ID.fullmatch(name.removeprefix(RUN)))
+
+
+def _gone() -> Response:
+    return _notice("There is no such run", "It was deleted, or made room for newer ones, or never was.", 404)
 
 
 def _unknown() -> Response:

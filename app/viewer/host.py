@@ -13,10 +13,11 @@ from fastapi import FastAPI
 from viser import ClientHandle, _messages
 
 from app.service.service import Service
-from app.viewer.gateway import ADDRESS_HEADER, EXAMPLE_HEADER, KEY_HEADER, TAB_HEADER, Upstream
+from app.viewer.draft import Draft
+from app.viewer.gateway import ADDRESS_HEADER, BEGIN_HEADER, KEY_HEADER, RUN, TAB_HEADER, Upstream
 from app.viewer.kept import KeptCables
 from app.viewer.quiet import quiet_console
-from app.viewer.session import Session, Shared, Work
+from app.viewer.session import Session, Shared, Work, of_example, of_run
 from app.viewer.solver import ServiceSolver
 
 MOST_LEFT = 64  # closed tabs whose scenes are kept
@@ -34,6 +35,7 @@ class SceneHost:
         self._shared = shared
         self._most = most
         self.key = secrets.token_urlsafe(32)
+        self.era = secrets.token_hex(4)
         self.sessions: dict[int, Session] = {}
         self._left: dict[str, Work] = {}  # of tabs that are closed, by their names, the newest last
         with quiet_console():
@@ -70,8 +72,24 @@ class SceneHost:
             await connection.close()  # two came in at once for the last place
             return
         tab = headers.get(TAB_HEADER, "")
-        work = self._found(tab) or Work.of_example(headers.get(EXAMPLE_HEADER, ""))
+        work, lost = self._found(tab), None
+        if work is None:
+            name = headers.get(BEGIN_HEADER, "")
+            draft = await self._begin(name)
+            work = Work.begun(draft)
+            if draft is None and name.startswith(RUN):
+                lost = ("The run can't be opened", "It is gone, or the one is that it goes on from.")
+            elif tab and not tab.startswith(self.era):
+                lost = ("The service was restarted", "What was edited in this tab is lost: it begins anew.")
         self.sessions[client.client_id] = Session(client, self._shared, headers.get(ADDRESS_HEADER, ""), tab, work)
+        if lost is not None:
+            client.add_notification(*lost, color="yellow")
+
+    async def _begin(self, name: str) -> Draft | None:
+        """Return the scene that a tab begins with by the name in its address."""
+        if name.startswith(RUN):
+            return await asyncio.to_thread(of_run, name.removeprefix(RUN), self._shared.runs)
+        return of_example(name)
 
     def _found(self, tab: str) -> Work | None:
         """Return what was being done in a tab: it is loaded again, or another is a copy of it."""
@@ -103,6 +121,8 @@ async def hosting(app: FastAPI, service: Service) -> AsyncIterator[SceneHost]:
         key=host.key,
         open_scenes=lambda: len(host.sessions),
         most_scenes=settings.max_scenes,
+        era=host.era,
+        has_run=service.runs.__contains__,
     )
     try:
         yield host

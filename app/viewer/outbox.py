@@ -33,6 +33,9 @@ class Runs(Protocol):
     def save(self, scene_json: dict[str, Any], prediction: Prediction, *, name: str = "") -> tuple[str, bytes]:
         """Store a run; return its id and its document."""
 
+    def request(self, id: str) -> bytes | None:
+        """Return the scene of a stored run."""
+
     def motion(self, id: str) -> Motion | None:
         """Return the motion of a stored run."""
 

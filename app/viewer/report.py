@@ -298,9 +298,10 @@ def curl_block(address: str, document: dict[str, Any]) -> str:
 
 
 def run_links(run_id: str) -> str:
-    """Return the links to a stored run: its recording, its JSON and its scene."""
+    """Return the links to a stored run: the 3D scene of it, its recording, its JSON and its scene."""
     path = f"/v1/predictions/{escape(run_id, quote=True)}"
     links = [
+        (f"/scene/?run={escape(run_id, quote=True)}", "open in the scene"),
         (f"{path}/viewer", "recording"),
         (f"{path}/recording.rrd", ".rrd"),
         (path, "JSON"),

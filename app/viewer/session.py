@@ -64,14 +64,28 @@ class Work:
     history: History
 
     @staticmethod
-    def of_example(name: str) -> "Work":
-        """Return the beginning with a ready scene; with the paper's case where there is none of this name."""
-        return Work(_example(name) or start_draft(), History())
+    def begun(draft: Draft | None) -> "Work":
+        """Return the beginning with a scene; with the paper's case where there is none."""
+        return Work(draft or start_draft(), History())
 
 
-def _example(name: str) -> Draft | None:
+def of_example(name: str) -> Draft | None:
+    """Return a ready scene, or None where there is none of this name."""
     found = examples().get(name)
     return None if found is None else Draft.of(orjson.loads(found.document))
+
+
+def of_run(id: str, runs: Runs) -> Draft | None:
+    """Return the scene of a stored run, or None where it, or the one whose motion it goes on from, is gone."""
+    found = runs.request(id)
+    if found is None:
+        return None
+    draft = Draft.of({name: part for name, part in orjson.loads(found).items() if name != "output"})
+    try:
+        draft.start(runs.motion)
+    except SceneError:
+        return None
+    return draft
 
 
 class Session:
@@ -493,7 +507,7 @@ class Session:
         await self._tracking.open(name, content)
 
     def _open_example(self, name: str) -> None:
-        draft = _example(name)
+        draft = of_example(name)
         if draft is not None:
             self._tracking.leave()
             self._replace(draft)

@@ -299,7 +299,10 @@ def test_a_new_run_appears_with_its_status_time_error_and_recording(service, wit
     assert re.search(r"\d ms", row.inner_text())
     assert re.search(r"\d mm", row.inner_text())
     assert row.get_by_role("link", name="recording of Seen on the page").get_attribute("href") == run["links"]["viewer"]
-    assert row.get_by_role("link", name="scene of Seen on the page").get_attribute("href") == run["links"]["scene"]
+    scene_file = row.get_by_role("link", name="scene of Seen on the page", exact=True)
+    assert scene_file.get_attribute("href") == run["links"]["scene"]
+    opens = row.get_by_role("link", name="open in the scene of Seen on the page")
+    assert opens.get_attribute("href") == f"/scene/?run={run['id']}"
 
 
 # --- for everyone ---

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 from uuid import uuid4
 
+import httpx
 import msgspec.msgpack
 import numpy as np
 import viser
@@ -249,7 +250,8 @@ class SceneClient:
 
 def connected(service: Any, example: str = "new", tab: str = "", **options: Any) -> SceneClient:
     """Return a client that sees its first prediction, of a ready scene or of the paper's case, or goes on in a tab."""
-    client = SceneClient(f"{service.socket}/{example}/{tab or uuid4().hex}", **options)
+    path = f"/scene/{example}/{tab}" if tab else httpx.get(f"{service.address}/scene/{example}/").headers["location"]
+    client = SceneClient(service.address.replace("http", "ws") + path.rstrip("/"), **options)
     # a frame has at most 128 messages: what is drawn may come in one after that of the card
     client.wait_for(lambda: "control points" in client.card and "/cable" in client.nodes and client.final_shape.any())
     return client

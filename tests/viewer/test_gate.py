@@ -10,6 +10,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from app.pages.gallery import examples
+from app.viewer.draft import start_draft
 from tests.viewer.conftest import MOST_SCENES
 
 
@@ -112,3 +113,51 @@ def test_solves_of_the_scene_are_counted_with_all_others(service):
 def test_the_scene_offers_the_ready_scenes_of_the_gallery_in_its_order(service):
     with connected(service) as client:
         assert list(client.control("Example")[1]["options"][1:]) == list(examples())
+
+
+def test_a_kept_run_is_opened_in_the_scene_again(service):
+    with connected(service) as client:
+        client.refined()
+        client.set("Name", "kept")
+        client.set("Table friction", 0.2)
+        client.wait_for(lambda: '"friction": 0.2' in client.markdown("```json"))
+        client.refined()
+        client.press("Keep this run")
+        links = client.wait_for(lambda: client.html("data-run"))
+        kept = client.document
+    (address,) = re.findall(r'href="(/scene/[^"]+)"[^>]*>open in the scene', links)
+    answer = httpx.get(f"{service.address}{address}&darkMode")
+    assert answer.status_code == 307
+    path = answer.headers["location"]
+    assert httpx.get(service.address + path).status_code == 200
+    with SceneClient(service.address.replace("http", "ws") + path.split("/?")[0]) as client:
+        client.refined()
+        assert client.document == kept
+        assert client.notifications == []
+    run = address.partition("=")[2]
+    assert httpx.delete(f"{service.address}/v1/predictions/{run}").is_success
+    for gone in (run, "nonsense", "../..", "f" * 28):
+        page = httpx.get(f"{service.address}/scene/", params={"run": gone})
+        assert page.status_code == 404
+        assert "There is no such run" in page.text
+    with connected(service, f"run-{run}", tab="another") as client:
+        client.wait_for(lambda: client.notifications == ["The run can't be opened"])
+
+
+def test_a_run_that_goes_on_from_one_that_is_gone_is_not_opened(service):
+    scene = start_draft().document
+    first = httpx.post(f"{service.address}/v1/predictions", json=scene).json()["id"]
+    later = {**scene, "shape": {"kind": "prediction", "id": first}}
+    answer = httpx.post(f"{service.address}/v1/predictions", json=later)
+    assert answer.is_success, answer.text
+    httpx.delete(f"{service.address}/v1/predictions/{first}")
+    with connected(service, f"run-{answer.json()['id']}") as client:
+        client.wait_for(lambda: client.notifications == ["The run can't be opened"])
+
+
+def test_a_tab_of_before_a_restart_says_that_its_scene_is_lost(service):
+    with connected(service, tab="of-another-era") as client:
+        client.wait_for(lambda: client.notifications == ["The service was restarted"])
+    with connected(service) as client:
+        client.listen(0.5)
+        assert client.notifications == []
