@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.viewer.draft import Draft
+from dlocore import SplineSurface
 from dlocore.shape.shape import StartCurve
 
 Floats = NDArray[np.float64]
@@ -13,15 +14,21 @@ SMALLEST = 0.2  # of the cable's length: half the room that is seen at least, to
 WIDE = 1.35  # picture at least that much wider than high: a wide scene is in it from `DISTANCE`
 PANEL = 320  # px that the docked panel takes
 PHONE = 576  # px: a page no wider has its panel in a sheet over the lower part of the picture
+ROWS = 97  # times at which a motion is looked at
 SHEET = 0.6  # of the picture's height, that the sheet covers
 FROM_ABOVE = np.array([0.0, 0.66, -0.75])  # from the camera to what it looks at: a table
 FROM_THE_SIDE = np.array([0.28, 0.90, -0.34])  # a cable that hangs
 
 
-def extent(draft: Draft, start: StartCurve) -> Floats:
-    """Return points (n, 3) [m] that are to be seen: the start of the cable, and where its grippers take it.
+def extent(draft: Draft, start: StartCurve, shown: SplineSurface | None = None) -> Floats:
+    """Return points (n, 3) [m] that are to be seen: the start of the cable, where its grippers take it, and its motion.
 
     A small motion gets room around it to drag a target in.
+
+    Args:
+        draft: the scene.
+        start: its start curve.
+        shown: the motion that is shown, if any.
     """
     curve = start(np.linspace(0.0, draft.length, 33))
     middle = 0.5 * (curve.min(axis=0) + curve.max(axis=0))
@@ -33,6 +40,8 @@ def extent(draft: Draft, start: StartCurve) -> Floats:
             points.append(start(primitive["u"]) + np.array(path["displacement"], dtype=float))
         elif path["kind"] == "waypoints":
             points.append(np.array(path["positions"], dtype=float))
+    if shown is not None:
+        points.append(shown.sample(33, ROWS)[2][..., :3].reshape(-1, 3))
     return np.concatenate(points)
 
 

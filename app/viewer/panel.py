@@ -52,7 +52,7 @@ class Actions:
         step_forward: and forward again.
         edit_shape: show the beads of the start shape, or not.
         straighten: start straight.
-        reset_camera: look at the whole scene again.
+        show_whole: look at the whole scene again.
     """
 
     look: Callable[[Look], None]
@@ -70,7 +70,7 @@ class Actions:
     step_forward: Callable[[], None]
     edit_shape: Callable[[bool], None]
     straighten: Callable[[], None]
-    reset_camera: Callable[[], None]
+    show_whole: Callable[[], None]
 
 
 class Panel:
@@ -142,6 +142,7 @@ class Panel:
             "Time [s]", min=0.0, max=self._playback.horizon, step=0.01, initial_value=0.0
         )
         self._play = self._gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
+        whole = self._gui.add_button("Show the whole scene", icon=viser.Icon.MAXIMIZE, color="gray")
         self._speed = self._gui.add_dropdown("Speed", tuple(SPEEDS), initial_value="1×")
         self._error = self._gui.add_html("")
 
@@ -156,6 +157,10 @@ class Panel:
         @self._play.on_click
         async def _toggle(_event: GuiEvent[Any]) -> None:
             self.toggle()
+
+        @whole.on_click
+        async def _show_whole(_event: GuiEvent[Any]) -> None:
+            self._actions.show_whole()
 
         @self._speed.on_update
         async def _speed(_event: GuiEvent[Any]) -> None:
@@ -248,7 +253,6 @@ class Panel:
         forces = self._gui.add_checkbox("Forces", initial_value=True, hint="Of the grippers, and known ones")
         contacts = self._gui.add_checkbox("Contacts", initial_value=True)
         looping = self._gui.add_checkbox("Repeat", initial_value=self._playback.looping)
-        reset = self._gui.add_button("Show the whole scene", icon=viser.Icon.MAXIMIZE, color="gray")
 
         async def restyle(_event: GuiEvent[Any]) -> None:
             self._actions.look(
@@ -267,10 +271,6 @@ class Panel:
         @looping.on_update
         async def _looping(_event: GuiEvent[Any]) -> None:
             self._playback.looping = looping.value
-
-        @reset.on_click
-        async def _reset(_event: GuiEvent[Any]) -> None:
-            self._actions.reset_camera()
 
     def _add_result(self) -> None:
         with self._gui.add_folder("Accuracy and time"):

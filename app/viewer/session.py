@@ -30,7 +30,7 @@ from app.viewer.shapes import straightened, with_points
 from app.viewer.solving import Kind, Outcome, Solver, SolverThread
 from app.viewer.step_buttons import REDO, UNDO
 from app.viewer.tracking import Tracking, TrackingActions
-from dlocore import Prediction, SceneError
+from dlocore import Prediction, SceneError, SplineSurface
 
 FRAME = 1 / 40  # s
 PANEL_FRAMES = 3  # pictures for one update of the timeline: redrawing the panel is what costs the browser most
@@ -176,7 +176,7 @@ class Session:
             step_forward=lambda: self._step(REDO),
             edit_shape=self._edit_shape,
             straighten=self._straighten,
-            reset_camera=self._reset_camera,
+            show_whole=self._show_whole,
         )
 
     def work(self) -> Work:
@@ -204,17 +204,20 @@ class Session:
         client.camera.fov = FIELD_OF_VIEW
         self._reset_camera()
 
-    def _camera(self) -> tuple[np.ndarray, np.ndarray]:
+    def _reset_camera(self, shown: SplineSurface | None = None) -> None:
+        """Look at the scene from where it is seen, and all of a motion that is `shown`."""
         camera = self._client.camera
-        points = extent(self._draft, self._start)
+        points = extent(self._draft, self._start, shown)
         on_table = self._draft.get(("environment", "table")) is not None
-        return start_pose(points, camera.image_width, camera.image_height, on_table=on_table)
-
-    def _reset_camera(self) -> None:
-        camera = self._client.camera
-        camera.position, camera.look_at = self._camera()
-        camera.max_orbit_distance = 20.0 * self._draft.length
+        position, middle = start_pose(points, camera.image_width, camera.image_height, on_table=on_table)
+        camera.max_orbit_distance = max(20.0 * self._draft.length, 2.0 * float(np.linalg.norm(position - middle)))
+        camera.position, camera.look_at = position, middle
         self._seen_length = self._draft.length
+
+    def _show_whole(self) -> None:
+        self._edits.finish()
+        self._reset_camera(None if self._latest is None else self._latest.surface)
+        self._client.flush()
 
     def _begin_drag(self) -> None:
         """Show where the motion ends while the hand is on the target."""

@@ -1,11 +1,14 @@
 """What a person takes back: a change, a solve that lasts too long; and what a scene without an answer looks like."""
 
 import numpy as np
-from protocol_client import SceneClient, connected
+import pytest
+from protocol_client import NOTHING_STORED, SceneClient, connected
 
+from app.viewer.camera import extent
 from app.viewer.draft import start_draft
 from app.viewer.history import JOINED, MOST, History
 from app.viewer.palette import OBSTACLE, WARNING
+from dlocore import predict
 
 DRAG = ("environment", "drag")
 DRAFTS = [start_draft().put(DRAG, 0.01 * (k + 1)) for k in range(MOST + 2)]
@@ -172,3 +175,25 @@ def test_a_tab_that_is_opened_beside_another_is_a_copy_of_it(service):
             other.set("Drag [N s/m²]", 0.4)
             other.wait_for(lambda: drag_of(other) == 0.4)
         assert drag_of(one) == 0.3
+
+
+def test_the_whole_scene_is_seen_with_a_target_and_a_motion_that_left_the_view(service):
+    with connected(service) as client:
+        client.refined()
+        near = list(client.camera)
+        client.set("Length [m]", 1.9)  # not so much longer that the camera would move by itself
+        client.set("Target [m]", [0.5, 6.0, 0.0])
+        client.refined()
+        client.wait_for(lambda: client.final_shape[:, 1].max() > 5.9)
+        client.press("Show the whole scene")
+        client.wait_for(lambda: np.linalg.norm(np.subtract(client.camera, near)) > 4.0)
+
+
+def test_what_is_to_be_seen_of_a_motion_is_all_of_its_way():
+    draft = start_draft().put(("environment", "table"), None).put(("quality",), "auto")
+    start = draft.start(NOTHING_STORED)
+    surface = predict(draft.scene(NOTHING_STORED)).surface
+    falls = surface.sample()[2][..., 2].min()
+    assert falls < -0.3
+    assert extent(draft, start)[:, 2].min() == 0.0
+    assert extent(draft, start, surface)[:, 2].min() == pytest.approx(falls, abs=0.01)
