@@ -251,6 +251,11 @@ class SceneClient:
 def connected(service: Any, example: str = "new", tab: str = "", **options: Any) -> SceneClient:
     """Return a client that sees its first prediction, of a ready scene or of the paper's case, or goes on in a tab."""
     path = f"/scene/{example}/{tab}" if tab else httpx.get(f"{service.address}/scene/{example}/").headers["location"]
+    return opened(service, path, **options)
+
+
+def opened(service: Any, path: str, **options: Any) -> SceneClient:
+    """Return a client of the scene whose page is at `path`, which sees its first prediction."""
     client = SceneClient(service.address.replace("http", "ws") + path.rstrip("/"), **options)
     # a frame has at most 128 messages: what is drawn may come in one after that of the card
     client.wait_for(lambda: "control points" in client.card and "/cable" in client.nodes and client.final_shape.any())

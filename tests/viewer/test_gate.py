@@ -5,7 +5,7 @@ import time
 
 import httpx
 import pytest
-from protocol_client import SUBPROTOCOL, SceneClient, connected
+from protocol_client import SUBPROTOCOL, SceneClient, connected, opened
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
@@ -130,7 +130,7 @@ def test_a_kept_run_is_opened_in_the_scene_again(service):
     assert answer.status_code == 307
     path = answer.headers["location"]
     assert httpx.get(service.address + path).status_code == 200
-    with SceneClient(service.address.replace("http", "ws") + path.split("/?")[0]) as client:
+    with opened(service, path.split("?")[0]) as client:
         client.refined()
         assert client.document == kept
         assert client.notifications == []
