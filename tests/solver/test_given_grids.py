@@ -201,12 +201,18 @@ def test_finer_grids_keep_a_deadline_and_can_be_cancelled():
     began = time.thread_time()
     found = predict(scene, deadline=deadline)
     took = time.thread_time() - began
-    assert found.status == "max_iterations"
-    assert control_points(found) == (scene.quality.n_u, scene.quality.n_t)
-    assert "Finer grids were tried for" in found.said
-    assert "time limit" in found.said
     assert took < deadline + 0.5  # without one it is half a minute
+    given = predict(scene, keep_grid=True).accuracy.error_estimate
+    assert given is not None
     assert found.accuracy.error_estimate is not None
+    if control_points(found) == (scene.quality.n_u, scene.quality.n_t):
+        assert found.status == "max_iterations"
+        assert found.accuracy.error_estimate == given
+        assert "Finer grids were tried for" in found.said
+    else:  # how far they come hangs on the machine: some are the answer, as they err by less than half as much
+        assert found.status == "time_limit"
+        assert found.accuracy.error_estimate < 0.5 * given
+    assert "time limit" in found.said.lower()
     seen: list[Iteration] = []
     with pytest.raises(Cancelled):
         predict(scene, on_iteration=seen.append, cancelled=lambda: len(seen) > 3)
