@@ -17,7 +17,6 @@ from dlocore import (
     Environment,
     Grasp,
     Move,
-    Points,
     Prediction,
     Quality,
     Scene,
@@ -27,6 +26,7 @@ from dlocore import (
     predict,
 )
 from dlocore.effects.contact import normal_force, normal_forces
+from tests.pegs import RADIUS, around_a_peg
 
 G = 9.81  # [m/s^2]
 CABLE = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-3)
@@ -72,26 +72,6 @@ def test_a_cable_in_the_plane_of_the_table_lies_on_it_with_its_weight() -> None:
     np.testing.assert_array_equal(contact.pressed, WEIGHT)
 
 
-def around_a_peg(EI: float, EA: float, pull: float, gravity: float) -> Scene:
-    """Return a scene in which a cable that lies in a U around a smooth peg is pulled at both ends by `pull` [m]."""
-    cable = Cable(length=0.8, diameter=0.004, linear_density=0.05, bending_stiffness=EI, axial_stiffness=EA)
-    radius = 0.05 + 0.5 * cable.diameter
-    leg = 0.5 * (cable.length - math.pi * radius)
-    angle = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 61)[:, None]
-    along, beside = np.linspace(-leg, 0.0, 41)[:-1, None], np.full((40, 1), radius)
-    turn = radius * np.hstack([np.cos(angle), np.sin(angle)])
-    points = np.concatenate([np.hstack([along, -beside]), turn, np.hstack([along[::-1], beside])])
-    path = Move(displacement=(-pull, 0.0, 0.0), duration=2.0)
-    peg = Cylinder(center=(0.0, 0.0, 0.0), radius=0.05, height=0.1)
-    return Scene(
-        cable=cable,
-        shape=Points(points=points),
-        grasps=[Grasp(u=0.0, path=path), Grasp(u=cable.length, path=path)],
-        environment=Environment(drag=0.5, gravity=(0.0, 0.0, -gravity), table=Table(), obstacles=[peg]),
-        horizon=4.0,
-    )
-
-
 PULLED = {
     "limp": (1e-5, 200.0, 0.004, G),
     "bends": (1e-3, 640.0, 0.002, G),
@@ -110,7 +90,7 @@ def test_a_cable_that_is_pulled_around_a_smooth_peg_presses_with_its_tension_ove
     stretches, or has no weight, sank into the peg instead, to 3 % of T and 70 % of its diameter.
     """
     EI, EA, pull, gravity = PULLED[name]
-    prediction = predict(around_a_peg(EI, EA, pull, gravity))
+    prediction = predict(around_a_peg(EI, EA, (pull, pull), gravity=gravity))
     assert prediction.status == "converged", prediction.message
     assert prediction.level is not None
     assert prediction.level.motion.deepest < 0.02 * prediction.scene.cable.diameter
@@ -121,7 +101,7 @@ def test_a_cable_that_is_pulled_around_a_smooth_peg_presses_with_its_tension_ove
         assert abs(-grasp.reaction[-1, 0] - EA * 2.0 * pull / 0.8) < grasp.reaction_error[-1]
     assert contact.force[-1, 0] == pytest.approx(tension.sum(), rel=1e-3)
     assert abs(contact.force[-1, 1]) < 1e-3 * tension[0]
-    where_bent = tension.mean() - 0.5 * EI / (0.05 + 0.5 * 0.004) ** 2
+    where_bent = tension.mean() - 0.5 * EI / (RADIUS + 0.5 * 0.004) ** 2
     assert contact.pressed[-1] == pytest.approx(math.pi * where_bent, rel=0.01)
 
 

@@ -12,11 +12,9 @@ from dlocore import (
     Box,
     Cable,
     ContactForce,
-    Cylinder,
     Environment,
     Grasp,
     Move,
-    Points,
     Prediction,
     Quality,
     Scene,
@@ -26,6 +24,7 @@ from dlocore import (
     predict,
 )
 from dlocore.effects.friction import friction, friction_forces
+from tests.pegs import around_a_peg
 
 G = 9.81  # [m/s^2]
 CABLE = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-3)
@@ -90,28 +89,9 @@ def test_contacts_their_friction_and_grippers_together_bear_the_weight_of_a_cabl
     np.testing.assert_allclose(total(found), [0.0, 0.0, WEIGHT], atol=5e-3 * WEIGHT)
 
 
-def around_a_rough_peg(way: float) -> Scene:
-    """Return a scene in which a cable that lies in a U around a rough peg is drawn around it by `way` [m]."""
-    cable = Cable(length=0.8, diameter=0.004, linear_density=0.05, bending_stiffness=1e-4, axial_stiffness=200.0)
-    radius = 0.05 + 0.5 * cable.diameter
-    leg = 0.5 * (cable.length - math.pi * radius)
-    angle = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 61)[:, None]
-    along, beside = np.linspace(-leg, 0.0, 41)[:-1, None], np.full((40, 1), radius)
-    turn = radius * np.hstack([np.cos(angle), np.sin(angle)])
-    points = np.concatenate([np.hstack([along, -beside]), turn, np.hstack([along[::-1], beside])])
-    drawn, follows = (Move(displacement=(-0.004 - w, 0.0, 0.0), duration=2.0) for w in (way, -way))
-    peg = Cylinder(center=(0.0, 0.0, 0.0), radius=0.05, height=0.1, friction=ROUGH)
-    return Scene(
-        cable=cable,
-        shape=Points(points=points),
-        grasps=[Grasp(u=0.0, path=drawn), Grasp(u=cable.length, path=follows)],
-        environment=Environment(drag=0.5, gravity=(0.0, 0.0, 0.0), table=Table(), obstacles=[peg]),
-    )
-
-
 def test_a_rough_peg_holds_back_what_is_drawn_around_it_as_a_capstan_does() -> None:
     """T_1 = T_2 exp(mu pi), and both pulls together load the peg."""
-    found = predict(around_a_rough_peg(0.02))
+    found = predict(around_a_peg(1e-4, 200.0, (0.024, -0.016), friction=ROUGH))
     assert found.status == "converged", found.message
     peg = given(found, "obstacles[0]")
     strong, weak = (-grasp.reaction[-1, 0] for grasp in found.grasps)
