@@ -525,7 +525,9 @@ class Session:
             await self._outbox.playback(draft, prediction, self._look, self._playback.speed)
 
     async def _save_picture(self) -> None:
-        await self._outbox.picture(self._current())
+        draft = self._current()
+        if self._solved(draft, "No picture") is not None:
+            await self._outbox.picture(draft)
 
     async def _keep(self) -> None:
         """Store the last refined prediction with its scene, and link to it, unless the scene was edited since."""

@@ -259,6 +259,8 @@ def test_an_impossible_scene_leaves_nothing_of_the_scene_before_as_its_own(servi
         assert sum(c.get("content", "").count("Of the scene before") for c in client.controls.values()) == 5
         client.press("Save playback.html")
         client.wait_for(lambda: client.notifications == ["No playback"])
+        client.press("Save picture.png")
+        client.wait_for(lambda: client.notifications == ["No playback", "No picture"])
         client.set("Changes", "Undo")
         client.refined()
         client.wait_for(lambda: not client.html("data-stale"))
