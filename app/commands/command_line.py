@@ -106,10 +106,15 @@ def parser() -> argparse.ArgumentParser:
         "torsional_stiffness, linear_density, length_ratio, turn, yield_strain, clamp_angles, marker_offsets, "
         "rest_curvature",
     )
+    find.add_argument(
+        "--cable",
+        metavar="KNOWN.json",
+        help="what is known of it, and first guesses: a cable as in a scene, a scene, or what this command wrote",
+    )
     find.add_argument("--n-u", type=int, default=13, help="control points along the cable (default 13)")
     find.set_defaults(
         run=lambda o: identify_commands.identify(
-            o.recordings, names=o.parameters, output=o.output, report=o.report, n_u=o.n_u
+            o.recordings, names=o.parameters, cable=o.cable, output=o.output, report=o.report, n_u=o.n_u
         )
     )
 

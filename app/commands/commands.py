@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from pydantic_settings import SettingsError
 
 from app.commands.bar import progress_bar
-from app.commands.errors import FAILED, NOT_CONVERGED, CommandError
+from app.commands.errors import FAILED, NOT_CONVERGED, CommandError, in_lines
 from app.commands.files import STANDARD, check_outputs, for_people, is_device, read_input, write_output
 from app.http.access import is_loopback
 from app.http.fields import BadField, bad_fields
@@ -219,7 +219,7 @@ def _request(raw: bytes) -> PredictionRequest:
     try:
         return PredictionRequest.model_validate(body)
     except ValidationError as error:
-        raise CommandError(_words(bad_fields(error.errors(), body))) from None
+        raise CommandError(in_lines(bad_fields(error.errors(), body))) from None
 
 
 def _by(request: PredictionRequest, method: Method) -> PredictionRequest:
@@ -240,11 +240,6 @@ def _with_each_name_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return dict(pairs)
 
 
-def _words(fields: list[BadField]) -> str:
-    lines = [f"{field.field}: {field.message}" for field in fields]
-    return "\n     ".join(lines)
-
-
 def read_scene(file: str) -> Scene:
     """Return the scene of a JSON file, "-" for standard input.
 
@@ -255,7 +250,7 @@ def read_scene(file: str) -> Scene:
     try:
         return to_scene(_request(raw), _stored)
     except SceneError as error:
-        raise CommandError(f"{file}: {_words([BadField.from_scene_error(error)])}") from None
+        raise CommandError(f"{file}: {in_lines([BadField.from_scene_error(error)])}") from None
     except CommandError as error:
         raise CommandError(f"{file}: {error}", error.exit_code) from None
 
@@ -285,7 +280,7 @@ def _solve(request: PredictionRequest, deadline: float | None) -> Prediction:
             cost = stored_cost(_settings().calibration_file) if scene.quality.time_budget is not None else None
             return solve(scene, on_iteration=show, deadline=deadline, cost=cost)
         except SceneError as error:
-            raise CommandError(_words([BadField.from_scene_error(error)])) from None
+            raise CommandError(in_lines([BadField.from_scene_error(error)])) from None
 
 
 def _record(rrd: str, *, request_json: dict[str, Any], document: dict[str, Any], prediction: Prediction) -> None:

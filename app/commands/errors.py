@@ -1,5 +1,9 @@
 """How a command fails."""
 
+from collections.abc import Sequence
+
+from app.http.fields import BadField
+
 FAILED, BAD_INPUT, NOT_CONVERGED = 1, 2, 3  # exit codes
 
 
@@ -9,3 +13,8 @@ class CommandError(Exception):
     def __init__(self, message: str, exit_code: int = BAD_INPUT) -> None:
         super().__init__(message)
         self.exit_code = exit_code
+
+
+def in_lines(fields: Sequence[BadField]) -> str:
+    """Return what is wrong with input, a line a field."""
+    return "\n     ".join(f"{field.field}: {field.message}" for field in fields)

@@ -7,10 +7,14 @@ from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
 import orjson
+from pydantic import ValidationError
 
-from app.commands.errors import NOT_CONVERGED, CommandError
-from app.commands.files import check_outputs, for_people, make_folder, write_output
-from dlocore import SceneError
+from app.commands.errors import NOT_CONVERGED, CommandError, in_lines
+from app.commands.files import check_outputs, for_people, make_folder, read_input, write_output
+from app.http.fields import BadField, bad_fields
+from app.schemas.cable import CableModel
+from app.schemas.convert import cable_of
+from dlocore import Cable, SceneError
 from dlocore.recordings import Recording, load_recording
 
 if TYPE_CHECKING:
@@ -18,18 +22,21 @@ if TYPE_CHECKING:
     from dlocore.identify.validation import CableValidation, WireValidation
 
 
-def identify(recordings: list[str], *, names: list[str] | None, output: str, report: str | None, n_u: int) -> int:
+def identify(
+    recordings: list[str], *, names: list[str] | None, cable: str | None, output: str, report: str | None, n_u: int
+) -> int:
     """Identify a cable from recordings, write it as JSON, and a report where one is asked for.
 
     Args:
         recordings: files.
         names: of the parameters; None: the usual ones.
+        cable: file of what is known of it; None: what the recordings tell.
         output: file for the cable, "-" for standard output.
         report: file for the report, None for none.
         n_u: control points along the cable.
 
     Raises:
-        CommandError: a recording can't be read or used, or an output can't be written.
+        CommandError: a recording, or the cable, can't be read or used, or an output can't be written.
     """
     from app.reports.identification import document_of_identification, report_of
     from dlocore.identify import Resolution
@@ -37,11 +44,12 @@ def identify(recordings: list[str], *, names: list[str] | None, output: str, rep
     from dlocore.identify.parameters import DEFAULT
 
     beside = [str(Path(path).with_suffix(".json")) for path in recordings if Path(path).suffix == ".csv"]
-    check_outputs({"--output": output, "--report": report}, [*recordings, *beside])
+    check_outputs({"--output": output, "--report": report}, [*recordings, *beside, *([] if cable is None else [cable])])
+    known = None if cable is None else _read_cable(cable)
     try:
         loaded = [_load(path) for path in recordings]
         wanted = DEFAULT if names is None else tuple(names)
-        found = find(loaded, names=wanted, resolution=Resolution(n_u=n_u), on_progress=_show)
+        found = find(loaded, known, names=wanted, resolution=Resolution(n_u=n_u), on_progress=_show)
     except SceneError as error:
         raise CommandError(str(error)) from None
     document = document_of_identification(found)
@@ -53,6 +61,25 @@ def identify(recordings: list[str], *, names: list[str] | None, output: str, rep
         print(f"{p.name:<24} {value}", file=sys.stderr)
     print(found.message, file=sys.stderr)
     return 0 if found.status == "converged" else NOT_CONVERGED
+
+
+def _read_cable(file: str) -> Cable:
+    """Return the cable of a JSON file, alone or as the `cable` of something.
+
+    Raises:
+        CommandError: it can't be read, or is no cable; what is wrong is said with the file's name.
+    """
+    try:
+        body = orjson.loads(read_input(file))
+        if isinstance(body, dict) and "cable" in body:
+            body = body["cable"]
+        return cable_of(CableModel.model_validate(body))
+    except orjson.JSONDecodeError as error:
+        raise CommandError(f"{file}: it is not JSON: {error}") from None
+    except ValidationError as error:
+        raise CommandError(f"{file}: {in_lines(bad_fields(error.errors(), body, CableModel))}") from None
+    except SceneError as error:
+        raise CommandError(f"{file}: {in_lines([BadField.from_scene_error(error)])}") from None
 
 
 def _load(path: str) -> Recording:

@@ -17,9 +17,11 @@ from app.http.streamed import Emit, Streamed
 from app.reports.identification import document_of_identification
 from app.routes import described
 from app.routes.body import JsonRoute, calling_when_gone
+from app.schemas.convert import cable_of
 from app.schemas.identify import IdentifyRequest, IdentifyResponse
 from app.service.searches import Searches
 from app.service.service import TheService
+from dlocore import Cable
 from dlocore.errors import SceneError, within
 from dlocore.identify import Identification, Progress, Resolution
 from dlocore.recordings import Recording, recording_of
@@ -45,8 +47,10 @@ async def identify(request: Request, asked: Annotated[IdentifyRequest, Body()], 
     """
     form = negotiated(request.headers.get("accept"), (JSON, EVENTS))
     recordings = await anyio.to_thread.run_sync(_recordings, asked)
+    with within("cable"):
+        cable = None if asked.cable is None else cable_of(asked.cable)
     service.searches.check_room()
-    search = _Search(asked, recordings, service.searches)
+    search = _Search(asked, recordings, cable, service.searches)
     if form == EVENTS:
         return Streamed(search.course, EVENTS, {"Cache-Control": "no-store", "X-Accel-Buffering": "no"})
     async with calling_when_gone(request, search.cancelled.set):
@@ -56,8 +60,10 @@ async def identify(request: Request, asked: Annotated[IdentifyRequest, Body()], 
 class _Search:
     """One identification: its answer, or its course."""
 
-    def __init__(self, asked: IdentifyRequest, recordings: list[Recording], searches: Searches) -> None:
-        self.asked, self.recordings, self.searches = asked, recordings, searches
+    def __init__(
+        self, asked: IdentifyRequest, recordings: list[Recording], cable: Cable | None, searches: Searches
+    ) -> None:
+        self.asked, self.recordings, self.cable, self.searches = asked, recordings, cable, searches
         self.cancelled = Event()
 
     async def course(self, emit: Emit) -> None:
@@ -81,6 +87,7 @@ class _Search:
             found = await self.searches.identify(
                 self.recordings,
                 self.cancelled.is_set,
+                cable=self.cable,
                 names=tuple(self.asked.parameters),
                 resolution=Resolution(n_u=self.asked.n_u),
                 on_progress=show,

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field
 
 from app.schemas.base import Count, Flag, Long, Model, Number, Vector
-from app.schemas.cable import PointMassModel
+from app.schemas.cable import CableModel, PointMassModel
 from app.schemas.fit import Coordinate
 from dlocore.identify.parameters import DEFAULT
 from dlocore.scene.cable import MAX_LENGTH, MAX_POINT_MASSES
@@ -72,6 +72,12 @@ class IdentifyRequest(Model):
         max_length=40,
         description="What to find (docs/identification.md).",
         examples=[list(DEFAULT)],
+    )
+    cable: CableModel | None = Field(
+        default=None,
+        description="What is known of it, and first guesses of what is to be found; absent: from the recordings. Its "
+        "length is that of the first recording.",
+        examples=[{"length": 1.0, "diameter": 0.005, "linear_density": 0.04, "bending_damping": 1e-4}],
     )
     n_u: Count = Field(default=13, ge=7, le=65, description="Control points along the cable.", examples=[13])
 

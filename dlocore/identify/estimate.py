@@ -63,7 +63,8 @@ def identify(
     Args:
         recordings: of one cable.
         cable: what is known of it, and first guesses; None: from the recordings' facts. Its length is that of the
-            first recording, where its point masses keep their shares of it. Motion and shape depend on forces per mass
+            first recording, where its point masses keep their shares of it; where it has none, those of the recordings
+            hang on it. Motion and shape depend on forces per mass
             alone, so its linear density is taken as known.
         environment: first guesses of the drag, and a table.
         names: parameters to identify (`parameters.SCALARS`, "rest_curvature", "clamp_angles", "marker_offsets").
@@ -87,7 +88,8 @@ def identify(
     windows = cut(recordings, window)
     clamps = max(sum(h.towards is not None for h in r.holds) for r in windows)
     free = sorted({int(i) for r in windows for i in r.free})
-    given = start or Candidate(cable=cable or cable_of(recordings), environment=environment or Environment())
+    known = cable_of(recordings) if cable is None else _with_masses(cable, recordings)
+    given = start or Candidate(cable=known, environment=environment or Environment())
     given = replace(
         given,
         cable=resized(given.cable, cast(float, recordings[0].length)),
@@ -235,6 +237,14 @@ def _stiff(search: Search, candidate: Candidate) -> Candidate:
         if misfit < least:
             best, least = other, misfit
     return best
+
+
+def _with_masses(cable: Cable, recordings: Sequence[Recording]) -> Cable:
+    """Return a given cable, with the point masses that recordings tell where it has none."""
+    telling = next((r for r in recordings if r.point_masses), None)
+    if telling is None or cable.point_masses:
+        return cable
+    return replace(resized(cable, cast(float, telling.length)), point_masses=telling.point_masses)
 
 
 def cable_of(recordings: Sequence[Recording]) -> Cable:

@@ -25,6 +25,13 @@ from dlocore.recordings import save_recording
 from tests.app.test_bad_requests import the_problem
 
 ADDRESS = "/v1/cables:identify"
+KNOWN = {
+    "length": 1.0,
+    "diameter": 0.006,
+    "linear_density": 0.05,
+    "bending_stiffness": 3e-3,
+    "bending_damping": 2e-4,
+}
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +70,13 @@ def test_the_service_identifies_a_cable_that_a_scene_takes(client: TestClient, a
     }
     explained = client.post("/v1/scenes:explain", json=scene)
     assert explained.status_code == 200, explained.text
+
+
+def test_what_is_known_of_the_cable_is_kept_where_it_is_not_sought(client: TestClient, asked: dict[str, Any]) -> None:
+    answer = client.post(ADDRESS, json={**asked, "cable": KNOWN, "parameters": ["drag"]}).json()
+    assert {name: answer["cable"][name] for name in KNOWN} == KNOWN
+    assert "kept at what is assumed: bending" not in answer["message"]
+    assert answer["parameters"][0]["value"] == pytest.approx(DRAG.drag, rel=0.3)
 
 
 def test_a_recording_tells_what_hangs_on_the_cable(asked: dict[str, Any]) -> None:
@@ -145,6 +159,8 @@ def test_searches_run_one_at_a_time_few_wait_and_all_can_be_stopped(monkeypatch:
         ({"parameters": ["colour"]}, "parameters"),
         ({"recordings": []}, "recordings"),
         ({"colour": 1}, "colour"),
+        ({"cable": {"length": 1.0, "diameter": 0.005}}, "cable.linear_density"),
+        ({"cable": {"length": -1.0, "diameter": 0.005, "linear_density": 0.05}}, "cable.length"),
     ],
 )
 def test_what_is_wrong_is_named(client: TestClient, asked: dict[str, Any], change: dict[str, Any], field: str) -> None:
@@ -219,6 +235,33 @@ def test_the_command_line_writes_the_cable_and_a_page(tmp_path: Path, capsys: py
     assert page.count("<svg") == 2
     assert "http" not in page  # it needs nothing from elsewhere
     assert "bending_damping" in capsys.readouterr().err
+
+
+def test_the_command_line_begins_with_what_is_known_of_the_cable(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    save_recording(simulated(6, 1.5, cable=CABLE, environment=DRAG), tmp_path / "shaken.npz")
+    file = tmp_path / "known.json"
+    command = ["identify", str(tmp_path / "shaken.npz"), "-o", str(tmp_path / "cable.json"), "--parameters", "drag"]
+    for document in (KNOWN, {"cable": KNOWN, "status": "converged"}):
+        file.write_text(json.dumps(document))
+        assert main([*command, "--cable", str(file)]) == 0
+        cable = json.loads((tmp_path / "cable.json").read_text())["cable"]
+        assert {name: cable[name] for name in KNOWN} == KNOWN
+    for wrong, told in (
+        ("{", "not JSON"),
+        ("[]", "object"),
+        (json.dumps({**KNOWN, "colour": 1}), "colour"),
+        (json.dumps({**KNOWN, "diameter": -1.0}), "diameter: Got -1.0"),
+        (json.dumps({"length": 1.0, "diameter": 0.005}), "linear_density"),
+    ):
+        file.write_text(wrong)
+        capsys.readouterr()
+        assert main([*command, "--cable", str(file)]) == 2
+        said = capsys.readouterr().err
+        assert "known.json" in said
+        assert told in said
+    assert main([*command[:3], str(file), "--cable", str(file)]) == 2  # it would be written over
 
 
 def test_the_command_line_names_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

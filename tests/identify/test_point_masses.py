@@ -80,3 +80,9 @@ def test_one_recording_of_several_may_tell_them_and_two_tell_the_same() -> None:
     other = hanging(41, point_masses=(replace(CONNECTOR, mass=0.03),), name="other")
     with pytest.raises(SceneError, match=r"^recordings\['other'\]\.point_masses: got 0\.03 kg at 0\.5 m\."):
         identify([hanging(), other])
+
+
+@pytest.mark.parametrize("own", [(), (PointMass(u=0.3, mass=0.01),)], ids=["without", "with its own"])
+def test_a_given_cable_has_its_own_or_those_of_the_recordings(own: tuple[PointMass, ...]) -> None:
+    known = replace(estimate.cable_of([hanging()]), point_masses=own)
+    assert identify([hanging()], known, names=("drag",)).cable.point_masses == (own or (CONNECTOR,))
