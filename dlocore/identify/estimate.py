@@ -88,7 +88,7 @@ def identify(
     windows = cut(recordings, window)
     clamps = max(sum(h.towards is not None for h in r.holds) for r in windows)
     free = sorted({int(i) for r in windows for i in r.free})
-    known = cable_of(recordings) if cable is None else _with_masses(cable, recordings)
+    known = cable_of(recordings) if cable is None else _known(cable, recordings)
     given = start or Candidate(cable=known, environment=environment or Environment())
     given = replace(
         given,
@@ -239,8 +239,15 @@ def _stiff(search: Search, candidate: Candidate) -> Candidate:
     return best
 
 
-def _with_masses(cable: Cable, recordings: Sequence[Recording]) -> Cable:
-    """Return a given cable, with the point masses that recordings tell where it has none."""
+def _known(cable: Cable, recordings: Sequence[Recording]) -> Cable:
+    """Return a given cable, with the point masses that recordings tell where it has none.
+
+    Raises:
+        SceneError: it is bent without stress.
+    """
+    if not isinstance(cable.rest_shape, str) or cable.rest_shape != "straight":
+        allowed = '"straight"; bends without stress are sought as the parameter "rest_curvature"'
+        raise SceneError("cable.rest_shape", cable.rest_shape, allowed)
     telling = next((r for r in recordings if r.point_masses), None)
     if telling is None or cable.point_masses:
         return cable

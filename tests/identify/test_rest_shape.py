@@ -9,7 +9,7 @@ from app.reports.identification import document_of_identification
 from app.schemas.cable import CableModel
 from app.schemas.convert import cable_of
 from benchmarks.simulated_recordings import CABLE, DRAG, Tracking, simulated
-from dlocore import PointMass
+from dlocore import PointMass, SceneError
 from dlocore.identify import Candidate, Replay, Resolution, identify
 from dlocore.identify.frames import rest_points
 from dlocore.identify.span import Span
@@ -72,3 +72,10 @@ def test_a_connector_at_the_end_stays_there_where_another_length_is_found() -> N
     start = Candidate(cable=cable, environment=DRAG, length_ratio=0.98)
     found = identify([recording], names=("drag",), start=start, iterations=1, resolution=Resolution(n_u=9))
     assert [one.u for one in found.cable.point_masses] == [pytest.approx(0.49), pytest.approx(0.98)]
+
+
+def test_bends_without_stress_are_sought_and_not_given() -> None:
+    points = [[0.1 * i, 0.01 * i * i, 0.0] for i in range(11)]
+    with pytest.raises(SceneError, match="rest_curvature") as error:
+        identify([simulated(6, 0.5)], replace(CABLE, rest_shape=points))
+    assert error.value.field == "cable.rest_shape"
