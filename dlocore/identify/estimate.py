@@ -90,6 +90,9 @@ def identify(
     free = sorted({int(i) for r in windows for i in r.free})
     known = cable_of(recordings) if cable is None else _known(cable, recordings)
     given = start or Candidate(cable=known, environment=environment or Environment())
+    if not isinstance(given.cable.rest_shape, str) or given.cable.rest_shape != "straight":
+        allowed = '"straight"; bends without stress are sought as the parameter "rest_curvature"'
+        raise SceneError("cable.rest_shape", given.cable.rest_shape, allowed)
     given = replace(
         given,
         cable=resized(given.cable, cast(float, recordings[0].length)),
@@ -240,14 +243,7 @@ def _stiff(search: Search, candidate: Candidate) -> Candidate:
 
 
 def _known(cable: Cable, recordings: Sequence[Recording]) -> Cable:
-    """Return a given cable, with the point masses that recordings tell where it has none.
-
-    Raises:
-        SceneError: it is bent without stress.
-    """
-    if not isinstance(cable.rest_shape, str) or cable.rest_shape != "straight":
-        allowed = '"straight"; bends without stress are sought as the parameter "rest_curvature"'
-        raise SceneError("cable.rest_shape", cable.rest_shape, allowed)
+    """Return a given cable, with the point masses that recordings tell where it has none."""
     telling = next((r for r in recordings if r.point_masses), None)
     if telling is None or cable.point_masses:
         return cable

@@ -75,7 +75,8 @@ def test_a_connector_at_the_end_stays_there_where_another_length_is_found() -> N
 
 
 def test_bends_without_stress_are_sought_and_not_given() -> None:
-    points = [[0.1 * i, 0.01 * i * i, 0.0] for i in range(11)]
-    with pytest.raises(SceneError, match="rest_curvature") as error:
-        identify([simulated(6, 0.5)], replace(CABLE, rest_shape=points))
-    assert error.value.field == "cable.rest_shape"
+    bent = replace(CABLE, rest_shape=[[0.1 * i, 0.01 * i * i, 0.0] for i in range(11)])
+    for cable, start in ((bent, None), (None, Candidate(cable=bent, environment=DRAG))):
+        with pytest.raises(SceneError, match="rest_curvature") as error:
+            identify([simulated(6, 0.5)], cable, start=start)
+        assert error.value.field == "cable.rest_shape"
