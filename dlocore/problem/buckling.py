@@ -14,6 +14,7 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.answer.transport import transported
 from dlocore.effects.distance import distances
 from dlocore.problem.events import closed_grasps
 from dlocore.problem.plane import FLATNESS, is_straight, leftwards, lies_on, natural_points, off_line, turns_of
@@ -116,7 +117,18 @@ def out_of_plane(scene: Scene, start: StartCurve, normal: Floats) -> StartCurve:
     bowed = replace(start, knots=knots, control_points=control, aside=float(aside.max()))
     if start.material is None and isinstance(scene.cable.rest_shape, str):
         return bowed  # it has no bends but its own
-    return replace(bowed, lean=-_lean(scene, bowed, normal))
+    level = _off_level(start, bowed) if start.material is None else 0.0
+    return replace(bowed, lean=level - _lean(scene, bowed, normal))
+
+
+def _off_level(start: StartCurve, bowed: StartCurve) -> float:
+    """Return by how much a bow turns a section that was level at u = 0 out of level [rad].
+
+    A tangent near the vertical needs little for it: what is level across it is another direction on its other side.
+    """
+    before, after = (curve(0.0, 1)[0] / np.linalg.norm(curve(0.0, 1)[0]) for curve in (start, bowed))
+    carried, level = transported(before, after, leftwards(before)), leftwards(after)
+    return math.atan2(float(np.cross(after, level) @ carried), float(level @ carried))
 
 
 def _lean(scene: Scene, curve: StartCurve, normal: Floats) -> float:
