@@ -267,7 +267,7 @@ def _answer(
     find_once: FindForces = partial(getattr, level.motion, "forces") if find_forces is None else cache(find_forces)
     stretch = partial(stretch_of, problem, grid, level.motion.times, level.motion.states)
     material = partial(_material, problem, level)
-    contacts = cache(partial(_contacts, level, find_once, judged, find_forces is None))
+    pressing = cache(partial(_pressing, level, find_once, find_forces is None))
     errors: dict[str, float] = {}
     if outcome.errors is not None:
         errors = {**outcome.errors, "neglected": left_out}
@@ -278,8 +278,8 @@ def _answer(
         said=outcome.message,
         surface=surface,
         report_grasps=partial(_reactions, level, find_once, judged),
-        report_contacts=contacts,
-        report_effects=partial(effect_reports, problem, material, stretch, contacts),
+        report_contacts=partial(_contacts, level, find_once, judged, pressing),
+        report_effects=partial(effect_reports, problem, material, stretch, pressing),
         report_material=material,
         report_stretch=stretch,
         iterations=tuple(monitor.iterations),
@@ -313,13 +313,16 @@ def _reactions(level: Level, find_forces: FindForces, judged: Prediction | None)
     return with_reaction_errors(found, windows, _beside(level))
 
 
+def _pressing(level: Level, find_forces: FindForces, marched: bool) -> tuple[ContactForce, ...]:
+    return contact_forces(level.marched, level.motion.grid, find_forces(), marched)
+
+
 def _contacts(
-    level: Level, find_forces: FindForces, judged: Prediction | None, marched: bool
+    level: Level, find_forces: FindForces, judged: Prediction | None, pressing: Callable[[], tuple[ContactForce, ...]]
 ) -> tuple[ContactForce, ...]:
-    windows = find_forces()
-    found = contact_forces(level.marched, level.motion.grid, windows, marched)
+    windows, found = find_forces(), pressing()
     if judged is not None:
-        return contacts_taken_on(found, judged.contacts)
+        return contacts_taken_on(found, level.problem.scene, judged.contacts, judged.scene)
     return with_contact_errors(found, windows, _beside(level))
 
 

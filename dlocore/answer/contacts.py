@@ -23,6 +23,7 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 CONTACT_TIMES = 129  # at most, about, at which contact is looked at
+NEAR = 0.05  # of the length: obstacles that lie closer are the same one, moved
 _AT_ONCE = 1_000_000  # nodes that are looked at together, over all times
 _STRIDE = 16  # of so many nodes one is looked at first
 _LONGER = 1.1  # times as long as it is the cable may be strained
@@ -94,23 +95,41 @@ def with_contact_errors(
     return tuple(replace(own, force_error=error(own, "force"), friction_error=error(own, "friction")) for own in found)
 
 
-def contacts_taken_on(found: tuple[ContactForce, ...], judged: tuple[ContactForce, ...]) -> tuple[ContactForce, ...]:
-    """Return contact forces with the errors of those of a motion like it, as far as it has them."""
-    known = {like.name: like for like in judged}
+def contacts_taken_on(
+    found: tuple[ContactForce, ...], scene: Scene, judged: tuple[ContactForce, ...], like: Scene
+) -> tuple[ContactForce, ...]:
+    """Return contact forces of a scene with the errors of those of one like it, as far as it has them.
 
-    def error(own: ContactForce, of: Floats | None) -> Floats | None:
-        return None if of is None else np.interp(own.times, known[own.name].times, of)
+    An obstacle has those of one of its kind that is as large and lies within NEAR of the length, whatever its number.
+    """
+    near, here, there = NEAR * scene.cable.length, _rows(scene), _rows(like)
+    errs = {force.name: force for force in judged}
+
+    def judged_as(own: ContactForce) -> ContactForce | None:
+        if own.name not in here:
+            return errs.get(own.name)
+        row = here[own.name]
+        alike = (name for name, other in there.items() if other[0] == row[0] and np.abs(other - row).max() <= near)
+        return next((errs[name] for name in alike if name in errs), None)
+
+    def error(own: ContactForce, of: ContactForce, values: Floats | None) -> Floats | None:
+        return None if values is None else np.interp(own.times, of.times, values)
 
     return tuple(
-        replace(
+        own
+        if (of := judged_as(own)) is None
+        else replace(
             own,
-            force_error=error(own, known[own.name].force_error),
-            friction_error=error(own, known[own.name].friction_error),
+            force_error=error(own, of, of.force_error),
+            friction_error=error(own, of, of.friction_error),
         )
-        if own.name in known
-        else own
         for own in found
     )
+
+
+def _rows(scene: Scene) -> dict[str, Floats]:
+    """Return the rows of the obstacles of a scene by the names of their contact forces."""
+    return {f"obstacles[{i}]": obstacle.row() for i, obstacle in enumerate(scene.environment.obstacles)}
 
 
 def _kept(lengths: Sequence[int]) -> list[Indices]:
@@ -177,6 +196,11 @@ def _basis(n_u: int, first: Indices, b0: Floats) -> Floats:
     basis = np.zeros((len(first), n_u))
     np.put_along_axis(basis, first[:, None] + np.arange(4), b0, axis=1)
     return basis
+
+
+def _sums(k: Indices, vectors: Floats, count: int) -> Floats:
+    """Return the sums (count, 3) of vectors (n, 3) by what they belong to, k (n,)."""
+    return np.column_stack([np.bincount(k, component, count) for component in vectors.T])
 
 
 def _speeds(window: WindowForces, at: Indices) -> Floats:
@@ -251,13 +275,12 @@ def _pressed(
     leaving = np.einsum("nd,nd->n", speed[k, n], normal)
     weights = behind.weights[:, part][k, n]
     pressure = normal_forces(stiffness, width, damping, depth, leaving)
-    force, rubs, pressed = np.zeros((len(at), 3)), np.zeros((len(at), 3)), np.zeros(len(at))
-    np.add.at(force, k, (weights * pressure)[:, None] * normal)
-    np.add.at(pressed, k, weights * pressure)
+    force, rubs = _sums(k, (weights * pressure)[:, None] * normal, len(at)), np.zeros((len(at), 3))
+    pressed = np.asarray(np.bincount(k, weights * pressure, len(at)), dtype=float)
     if active[FRICTION]:
         limit = parameters[row, 1 if row == TABLE else 16] * pressure
         slip = now[k, n] - behind.stick[:, part][k, n] if marched else np.zeros_like(normal)
         rough = parameters[FRICTION]
         rub = friction_forces(limit, normal, slip, speed[k, n], rough[0], rough[1], marched)
-        np.add.at(rubs, k, weights[:, None] * rub)
+        rubs = _sums(k, weights[:, None] * rub, len(at))
     return problem.plane.world_vectors(force[:, :d]), problem.plane.world_vectors(rubs[:, :d]), pressed

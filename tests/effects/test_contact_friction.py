@@ -130,7 +130,11 @@ def test_the_error_of_friction_holds_against_a_much_finer_march() -> None:
     fine = given(predict(replace(scene, quality=Quality(target_error=0.0005))), "table")
     finer = np.column_stack([np.interp(own.times, fine.times, fine.friction[:, d]) for d in range(3)])
     assert own.friction_error is not None
-    assert np.mean(np.linalg.norm(own.friction - finer, axis=1) <= own.friction_error) > 0.9
+    off = np.linalg.norm(own.friction - finer, axis=1)
+    assert np.mean(off <= own.friction_error) > 0.9
+    assert np.median(own.friction_error) < 20.0 * np.median(off)
+    assert own.force_error is not None
+    assert not np.allclose(own.friction_error, own.force_error)
 
 
 def test_friction_is_pickled_and_taken_on_by_a_motion_like_it() -> None:
@@ -161,3 +165,29 @@ def test_the_law_of_nodes_that_slip_at_once_is_that_of_one(steps: bool) -> None:
         for one, normal, s, w in zip(limit, n, slip, v, strict=True)
     ]
     np.testing.assert_allclose(friction_forces(limit, n, slip, v, 1e-5, 0.005, steps), alone, rtol=1e-11)
+
+
+def test_the_errors_that_are_taken_on_are_those_of_the_same_obstacle_whatever_its_number() -> None:
+    block = Box(center=(0.5, 0.0, -0.1), size=(2.0, 1.0, 0.2), friction=ROUGH)
+    ball, moved = (Sphere(center=(0.5, y, 0.5), radius=0.1) for y in (0.3, 0.36))
+
+    def with_obstacles(*obstacles: Box | Sphere) -> Scene:
+        return Scene(
+            cable=CABLE,
+            shape=Straight(start=(0.0, 0.0, 0.0025)),
+            grasps=(Grasp(u=0.0, path=Move(displacement=(-0.1, 0.0, 0.0), duration=1.0)),),
+            environment=Environment(drag=0.3, obstacles=obstacles),
+            effects={"obstacles": "on"},
+        )
+
+    like = predict(with_obstacles(ball, block))
+    of_ball, of_block = like.contacts
+    again = predict(with_obstacles(block, ball, moved), like=like)
+    assert again.judged is like
+    assert [contact.name for contact in again.contacts] == ["obstacles[0]", "obstacles[1]", "obstacles[2]"]
+    for own, of in zip(again.contacts, (of_block, of_ball), strict=False):
+        np.testing.assert_array_equal(own.force_error, of.force_error)
+        np.testing.assert_array_equal(own.friction_error, of.friction_error)
+    assert again.contacts[2].force_error is None  # 6 cm from the ball, of a cable of 1 m
+    assert of_block.friction_error is not None
+    assert of_block.friction_error.max() > 0.0
