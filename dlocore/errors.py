@@ -7,7 +7,7 @@ Bad input is an exception that names the field, the value and what is allowed. N
 from collections.abc import Hashable, Iterable, Iterator
 from contextlib import contextmanager
 from types import UnionType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -137,12 +137,13 @@ def whole(field: str, value: Any, *, at_least: int, at_most: int) -> int:
 
 
 def unmasked(value: ArrayLike) -> ArrayLike:
-    """Return `value` with NaN for the numbers that a masked array, or one in a list, hides; else as it is."""
-    rows = value if isinstance(value, list | tuple) else (value,)
-    if not any(isinstance(row, np.ma.MaskedArray) for row in rows):
+    """Return `value` with NaN for numbers that masked arrays, alone or in lists of any depth, hide; else as it is."""
+    if isinstance(value, np.ma.MaskedArray):
+        return np.where(np.ma.getmaskarray(value), np.nan, value.data) if value.dtype.kind in "fiu" else value
+    if not isinstance(value, list | tuple) or not value or isinstance(value[0], int | float):
         return value
-    masked: np.ma.MaskedArray[Any, Any] = np.ma.array(value)
-    return np.where(np.ma.getmaskarray(masked), np.nan, masked.data) if masked.dtype.kind in "fiu" else value
+    rows: list[Any] = [unmasked(row) for row in value]
+    return cast(ArrayLike, value if all(row is given for row, given in zip(rows, value, strict=True)) else rows)
 
 
 def array(field: str, value: ArrayLike, *, shape: tuple[int | None, ...], unit: str = "") -> NDArray[np.float64]:

@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 PAIR = 0.06  # of the length: two held neighbours at an end, nearer than this to each other, are one clamp
 LEAST_SEEN = 0.2  # of the frames in which each marker must be seen
 LEAST_FRAMES = 10  # of a motion
-_ELSEWHERE = 0.05  # of the largest distance from the origin: a marker is not at it
+_ELSEWHERE = 20.0  # times as far as a marker goes from frame to frame, on average: so far it does not go in one
 _NOISY = 0.02  # relative, by which noise makes the distances of markers add up to more than the cable's length
 _OTHER_UNIT = 20.0  # times the length, that no order of the markers makes
 _FACTS = ("u", "held", "length", "diameter", "linear_density", "point_masses", "gravity", "static", "name")
@@ -215,13 +215,17 @@ def _markers(value: ArrayLike, frames: int, static: bool) -> Floats:
 def _zeros_of_lost(markers: Floats) -> NDArray[np.bool_]:
     """Tell which samples (frames, m) of a motion are (0, 0, 0) because their marker was lost, as some trackers write.
 
-    Such a marker is somewhere else in the frames before and after; one that is at the origin comes from near it.
+    Such a marker is somewhere else in the frames before and after, farther than it goes from frame to frame; one that
+    is at the origin comes from near it.
     """
     at = np.linalg.norm(markers, axis=2)
-    lost, far = np.zeros(at.shape, dtype=bool), _ELSEWHERE * float(np.nanmax(at, initial=0.0))
+    steps = np.where((at[1:] > 0.0) & (at[:-1] > 0.0), np.linalg.norm(np.diff(markers, axis=0), axis=2), np.nan)
+    lost = np.zeros(at.shape, dtype=bool)
     for marker, away in enumerate(at.T):
         zeros, others = np.flatnonzero(away == 0.0), np.flatnonzero(away > 0.0)
         if len(zeros) and len(others):
+            own = steps[:, marker][np.isfinite(steps[:, marker])]
+            far = _ELSEWHERE * float(own.mean()) if len(own) else 0.0
             after = np.searchsorted(others, zeros)
             beside = others[np.maximum(after - 1, 0)], others[np.minimum(after, len(others) - 1)]
             lost[zeros, marker] = np.minimum(away[beside[0]], away[beside[1]]) > far

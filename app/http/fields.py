@@ -127,10 +127,13 @@ def _from_python(text: str) -> str:
     """Return as JSON has it what the solver shows as Python has it: None, a bool, a tuple, the shape of an array."""
     try:
         value = ast.literal_eval(text)
-    except (ValueError, SyntaxError):  # no value, but words, or one that is shortened
+    except (ValueError, SyntaxError, MemoryError, RecursionError):  # no value, but words, or one that is shortened
         shape = _SHAPE.fullmatch(text)
         return text if shape is None else " x ".join(re.findall("[0-9]+", shape[1])) + " numbers"
-    return json.dumps(value) if value is None or isinstance(value, bool | tuple | list) else text
+    try:
+        return json.dumps(value) if value is None or isinstance(value, bool | tuple | list) else text
+    except TypeError:  # a text that only looks like a value
+        return text
 
 
 def _written(text: str) -> str:

@@ -33,10 +33,14 @@ _STYLE = f"""<style>
 {_FROZEN}:not({_FROZEN} *)::before {{
   content: "{GONE}";
   display: block;
+  position: sticky;
+  top: 0.4rem;
+  z-index: 9;
   margin: 0 0.75rem 0.6rem;
   padding: 0.55rem 0.7rem;
   border-radius: 0.5rem;
-  background: rgba(222, 72, 50, 0.4);
+  background: rgb(240, 178, 166);
+  color: rgb(64, 16, 10);
   font-size: 0.8rem;
   font-weight: 700;
   animation: told 0.2s 1s both;

@@ -78,9 +78,12 @@ class SceneHost:
             draft = await self._begin(name)
             work = Work.begun(draft)
             if draft is None and name.startswith(RUN):
-                lost = ("The run can't be opened", "It is gone, or the one is that it goes on from.")
+                lost = (
+                    "The run can't be opened",
+                    "It was deleted, or the one that it goes on from. This is another scene.",
+                )
             elif tab and not tab.startswith(self.era):
-                lost = ("The service was restarted", "What was edited in this tab is lost: it begins anew.")
+                lost = ("The service was restarted", "This scene begins anew; what was edited in it before is lost.")
         self.sessions[client.client_id] = Session(client, self._shared, headers.get(ADDRESS_HEADER, ""), tab, work)
         if lost is not None:
             client.add_notification(*lost, color="yellow")

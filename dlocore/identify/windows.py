@@ -22,11 +22,11 @@ _NAMED = 3  # gaps that are told of one by one
 
 @dataclass(frozen=True)
 class Gap:
-    """Frames in which a held marker was lost for so long that nothing tells how its gripper moved.
+    """A time for which a held marker was lost so long that nothing tells how its gripper moved.
 
     Attributes:
         marker: that was lost.
-        first, last: frames.
+        first, last: frames; none, and `first` the one after, where the frames themselves are missing.
         begin, end: when it was last seen before, and first after [s], or where the recording begins or ends.
     """
 
@@ -48,7 +48,7 @@ def gaps(recording: Recording) -> tuple[Gap, ...]:
         seen = np.flatnonzero(np.isfinite(markers[:, marker, 0]))
         for before, after in pairwise([-1, *seen, len(times)]):
             begin, end = times[max(before, 0)], times[min(after, len(times) - 1)]
-            if after - before > 1 and end - begin > longest:
+            if end - begin > longest:
                 found.append(Gap(marker, int(before) + 1, int(after) - 1, float(begin), float(end)))
     return tuple(found)
 
@@ -88,12 +88,14 @@ def _pieces(recording: Recording) -> list[Recording]:
     times, seen = cast(Floats, recording.times), np.isfinite(cast(Floats, recording.markers)[..., 0])
     lost = np.zeros(len(times), dtype=bool)
     lost[: int(np.argmax(seen.sum(axis=1) >= _LEAST_BEGUN))] = True
+    apart = np.zeros(len(times), dtype=bool)  # from the frame before
     for gap in gaps(recording):
         lost[gap.first : gap.last + 1] = True
-    if not lost.any():
+        apart[min(gap.first, len(times) - 1)] = True
+    if not (lost.any() or apart.any()):
         return [recording]
     kept = np.flatnonzero(~lost)
-    runs = np.split(kept, np.flatnonzero(np.diff(kept) > 1) + 1)
+    runs = np.split(kept, 1 + np.flatnonzero((np.diff(kept) > 1) | apart[kept[1:]]))
     whole = [
         recording.part(float(times[run[0]] - times[0]), float(times[run[-1]] - times[0]))
         for run in runs

@@ -215,6 +215,8 @@ def test_recordings_without_names_are_told_apart(asked: dict[str, Any]) -> None:
         ("True", "true"),
         ("1e-05", "1e-05"),
         ("a cable", "a cable"),
+        ("[...]", "[...]"),  # a value of Python, which JSON has no word for
+        ("(1j,)", "(1j,)"),
     ],
 )
 def test_a_value_of_python_is_shown_as_json_has_it(text: str, shown: str) -> None:

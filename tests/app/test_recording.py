@@ -337,3 +337,13 @@ def test_the_trace_of_a_motion_and_its_iterates_is_at_instants_of_its_way(chunks
     arrows = static["/motion/trace/reactions/0"].to_record_batch().to_pydict()
     held = run.surface.positions([run.scene.grasps[0].u], t)[:, 0]
     np.testing.assert_allclose(arrows["Arrows3D:origins"][0], held, rtol=0, atol=1e-6)
+
+
+def test_the_friction_of_a_rough_table_is_drawn(client: TestClient, tmp_path: Path) -> None:
+    rough = client.post("/v1/predictions", json=put(paper_scene(), "environment.table", {"friction": 0.3})).json()
+    _, drawn = rows(
+        read(client, rough, tmp_path / "run.rrd"), "/over_time/reaction/contact_0_friction", "scalars", "motion"
+    )
+    sizes = np.linalg.norm(rough["contacts"][0]["friction"], axis=1)
+    assert sizes.max() > 0.1  # N
+    np.testing.assert_allclose([size for (size,) in drawn], sizes, rtol=1e-12)

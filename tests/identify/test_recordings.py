@@ -34,7 +34,11 @@ def test_an_npz_is_read_as_it_was_written(tmp_path: Path) -> None:
     assert (again.held, again.linear_density, again.name, again.length) == ((0, 4), 0.03, "shaken", first.length)
 
 
-@pytest.mark.parametrize("as_given", [lambda x: x, list], ids=["array", "list of frames"])
+@pytest.mark.parametrize(
+    "as_given",
+    [lambda x: x, list, lambda x: [list(frame) for frame in x]],
+    ids=["array", "list of frames", "list of lists of markers"],
+)
 def test_what_is_masked_was_not_seen(as_given: Callable[[Any], Any]) -> None:
     x = np.ma.masked_array(markers())
     x[3, 2, 1] = np.ma.masked
@@ -129,6 +133,17 @@ def test_zeros_of_markers_that_are_elsewhere_are_lost_ones() -> None:
     assert np.isnan(np.asarray(flat.markers)).sum() == 3 * 4
     shapes = recording(markers=x, static=True)  # each of its own
     assert np.isfinite(np.asarray(shapes.markers)).all()
+
+
+def test_zeros_of_a_gripper_beside_the_origin_are_lost_and_those_of_one_that_leaves_it_are_not() -> None:
+    noise = 3e-4 * np.random.default_rng(4).standard_normal((12, 5, 3))
+    x = markers() + noise
+    x[:, 1] += (-0.06, 0.0, 0.0)  # 4 cm from the first one, where a clamp holds both
+    x[5:8, 1] = 0.0
+    assert np.flatnonzero(np.isnan(np.asarray(recording(markers=x).markers)[:, 1, 0])).tolist() == [5, 6, 7]
+    sets_out = markers()
+    sets_out[:, 0, 2] = np.maximum(np.arange(12) - 8, 0) * 2e-3  # at once, after a rest
+    assert np.isfinite(np.asarray(recording(markers=sets_out).markers)).all()
 
 
 def test_a_marker_that_is_never_seen_is_refused() -> None:

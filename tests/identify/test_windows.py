@@ -42,6 +42,16 @@ def test_windows_end_where_a_held_marker_is_lost_for_long() -> None:
     assert (gap.marker, gap.begin, gap.end) == (0, 1.49, 2.5)
 
 
+def test_windows_end_where_frames_are_missing_for_long() -> None:
+    whole = hanging()
+    kept = np.r_[0:150, 250:500]
+    dropped = replace(whole, times=np.asarray(whole.times)[kept], markers=np.asarray(whole.markers)[kept])
+    assert spans(dropped) == [(0.0, 1.49), (2.5, 4.99)]
+    (gap,) = gaps(dropped)
+    assert (gap.marker, gap.begin, gap.end) == (0, 1.49, 2.5)
+    assert "held marker 0 of 'still' from 1.49 to 2.5 s" in gaps_told([dropped])[0]
+
+
 def test_short_gaps_and_free_markers_cut_nothing() -> None:
     assert spans(lost(hanging(), 150, 160)) == [(0.0, 4.99)]
     assert spans(lost(hanging(), 150, 249, slice(1, None))) == [(0.0, 4.99)]

@@ -8,6 +8,7 @@ from app.viewer import load_edits
 from app.viewer.draft import Draft
 from app.viewer.edits import Edits
 from app.viewer.forms.base import Form, show_if, show_value
+from app.viewer.number_field import NumberField
 from dlocore.scene.cable import MAX_LENGTH
 
 NONE = "no force"
@@ -23,20 +24,20 @@ class LoadsForm(Form):
         with gui.add_folder("Known forces"):
             self._add = gui.add_button("Add a force", color="gray", hint="Beside those of grippers and surroundings")
             self._which = gui.add_dropdown("Force", (NONE,))
-            self._u = gui.add_number("Acts at u [m]", 0.0, min=0.0, max=MAX_LENGTH, step=0.01)
-            self._force = gui.add_vector3("Force [N]", (0.0, 0.0, 0.0), step=0.01)
-            self._start = gui.add_number("From [s]", 0.0, min=0.0, max=LATEST, step=0.1)
-            self._end = gui.add_number("Until [s]", 0.0, min=0.0, max=LATEST, step=0.1, hint="0: to the end")
+            self._u = NumberField(gui, "Acts at u [m]", 0.0, low=0.0, high=MAX_LENGTH)
+            self._force = gui.add_vector3("Force [N]", (0.0, 0.0, 0.0), step=0.001)
+            self._start = NumberField(gui, "From [s]", 0.0, low=0.0, high=LATEST)
+            self._end = NumberField(gui, "Until [s]", 0.0, low=0.0, high=LATEST, hint="0: to the end")
             self._over_time = gui.add_html(
                 '<div style="margin: 0.2rem 0.75rem; font-size: 0.78rem;">It changes over time as its file tells.</div>'
             )
             self._remove = gui.add_button("Remove force", color="gray")
         self._on_click(self._add, self._with_new)
         self._on_click(self._remove, lambda d: load_edits.removed(d, self._chosen))
-        self._bind(self._u, lambda d: load_edits.placed(d, self._chosen, float(self._u.value)))
+        self._bind(self._u, lambda d: load_edits.placed(d, self._chosen, self._u.value))
         self._bind(self._force, self._with_force)
-        self._bind(self._start, lambda d: load_edits.changed(d, self._chosen, start=float(self._start.value)))
-        self._bind(self._end, lambda d: load_edits.changed(d, self._chosen, end=float(self._end.value)))
+        self._bind(self._start, lambda d: load_edits.changed(d, self._chosen, start=self._start.value))
+        self._bind(self._end, lambda d: load_edits.changed(d, self._chosen, end=self._end.value))
 
         @self._which.on_update
         async def _choose(event: GuiEvent[Any]) -> None:
@@ -73,6 +74,7 @@ class LoadsForm(Form):
             show_if(control, pull is not None)
         show_if(self._over_time, load is not None and pull is None)
         if load is not None:
+            self._u.high = draft.length
             show_value(self._u, load["u"])
         if pull is not None:
             show_value(self._force, pull.force)
