@@ -167,9 +167,14 @@ class Recording(Checked):
         inside = (times >= times[0] + begin - 1e-9) & (times <= times[0] + end + 1e-9)
         if not self.static and inside.sum() < LEAST_FRAMES:
             given = f"{counted(int(inside.sum()), 'frame')} between {begin:.6g} and {end:.6g} s"
-            reason = f"Frames are up to {np.diff(times).max():.3g} s apart: times in another unit than s, or a pause"
+            reason = apart_in_words(times)
             raise SceneError("times", given, f"at least {LEAST_FRAMES} frames in every window of a motion", reason)
         return replace(self, times=times[inside], markers=cast(Floats, self.markers)[inside])
+
+
+def apart_in_words(times: Floats) -> str:
+    """Return how far frames are apart at most, and what that may come from, in words."""
+    return f"Frames are up to {np.diff(times).max():.3g} s apart: times in another unit than s, or a pause"
 
 
 def _no_longer(u: Floats, length: float) -> Floats:

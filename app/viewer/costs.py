@@ -30,6 +30,11 @@ class Costs:
     number: int
     count: int
 
+    @property
+    def found_none(self) -> bool:
+        """Whether all that could be measured was, and it is nothing."""
+        return not (self.effect or self.seconds)
+
 
 def measure_costs(prediction: Prediction, cancelled: Callable[[], bool], on_costs: Callable[[Costs], None]) -> None:
     """Measure how much longer each active effect makes a solve of the scene of `prediction`.

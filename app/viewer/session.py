@@ -429,6 +429,8 @@ class Session:
     def _take_prediction(self, outcome: Outcome, prediction: Prediction) -> None:
         if outcome.costs is not None:
             self._panel.take_costs(prediction, outcome.costs)
+            if outcome.costs.found_none:
+                self._tell("No costs", "With its effects held as they are this scene has no solve to compare with.")
             return
         preview = outcome.job.kind == "preview"
         self._latest = prediction

@@ -31,6 +31,9 @@ LABELS = {  # of the panel, by field of a scene's document; [] for any number
     "primitives[].path.duration": "Duration [s]",
     "primitives[].path.profile": "Speed profile",
     "horizon": "Predict until [s]",
+    "loads[].u": "Acts at u [m]",
+    "loads[].force": "Force [N]",
+    "loads[].force.times": "Until [s]",
     "environment.gravity": "Gravity [m/s²]",
     "environment.drag": "Drag [N s/m²]",
     "environment.drag_quadratic": "Drag [N s²/m³]",
@@ -58,8 +61,8 @@ _BARE = {field.rpartition(".")[2]: name for field, name in _NAMES.items()}
 _BARE = {field: name for field, name in _BARE.items() if "_" in field and field not in name}  # else a word of the prose
 _PART = r"[a-z_]+(?:\[\d+\])*"
 _FIELD = re.compile(
-    rf"\b(?:(?:cable|environment|shape|quality|effects)(?:\.{_PART})+|primitives\[\d+\](?:\.{_PART})*|horizon(?=: got)"
-    rf"|{'|'.join(sorted(_BARE, key=len, reverse=True))})"
+    rf"\b(?:(?:cable|environment|shape|quality|effects)(?:\.{_PART})+|(?:primitives|loads)\[\d+\](?:\.{_PART})*"
+    rf"|horizon(?=: got)|{'|'.join(sorted(_BARE, key=len, reverse=True))})"
     r"(?!\w)"
 )
 
@@ -93,12 +96,12 @@ def _label(field: str, places: Sequence[float]) -> str:
         return f"the effect {field.removeprefix('effects.').replace('_', ' ')}"
     key = re.sub(r"\[\d+\]", "[]", field)
     label = _NAMES.get(key, _NAMES.get(key.removesuffix("[]"), ""))
-    whose = re.match(r"(primitives|environment\.obstacles)\[(\d+)\]\.?", field)
+    whose = re.match(r"(primitives|loads|environment\.obstacles)\[(\d+)\]\.?", field)
     if whose is None:
         return label or _BARE.get(field, field)
     number, rest = int(whose[2]), field[whose.end() :]
     if whose[1] == "primitives":
         owner = f"gripper {gripper_name(number, places[number]) if number < len(places) else number + 1}"
     else:
-        owner = f"obstacle {number + 1}"
+        owner = f"{'force' if whose[1] == 'loads' else 'obstacle'} {number + 1}"
     return f"{label or rest} of {owner}" if rest else owner

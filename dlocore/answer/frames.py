@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.answer.parts import MaterialMotion, StretchMotion
-from dlocore.answer.transport import transported
 from dlocore.kernels.angles import angles_with
 from dlocore.kernels.basis import spline_values
 from dlocore.kernels.timefit import fit_time
@@ -21,6 +20,7 @@ from dlocore.problem.grid import Grid
 from dlocore.problem.plane import turned_about
 from dlocore.problem.problem import Problem
 from dlocore.problem.tension import balanced
+from dlocore.shape.transport import transported
 from dlocore.spline import DEGREE, SplineSurface
 
 Floats = NDArray[np.float64]

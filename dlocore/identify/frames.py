@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from dlocore.answer.frames import unit
-from dlocore.answer.transport import transported
 from dlocore.identify.span import Span
 from dlocore.scene.scene import ControlPoints, Material
+from dlocore.shape.transport import transported
 from dlocore.spline import design_matrix, greville
 
 Floats = NDArray[np.float64]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.errors import SceneError, within
-from dlocore.recordings import LEAST_FRAMES, LEAST_SEEN, Recording
+from dlocore.recordings import LEAST_FRAMES, LEAST_SEEN, Recording, apart_in_words
 
 Floats = NDArray[np.float64]
 
@@ -106,5 +106,5 @@ def _pieces(recording: Recording) -> list[Recording]:
     if not whole:
         given = "held markers that are lost again and again"
         allowed = f"every held marker seen for {_SHORTEST:g} s at least, without a gap of {LONGEST_GAP:g} s"
-        raise SceneError("markers", given, allowed)
+        raise SceneError("markers", given, allowed, apart_in_words(times) if apart.any() and not lost.any() else "")
     return whole

@@ -14,7 +14,6 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.answer.transport import transported
 from dlocore.effects.distance import distances
 from dlocore.problem.events import closed_grasps
 from dlocore.problem.plane import FLATNESS, is_straight, leftwards, lies_on, natural_points, off_line, turns_of
@@ -23,6 +22,7 @@ from dlocore.problem.straightening import straightened
 from dlocore.scene.paths import Move, Path, Still
 from dlocore.scene.scene import Grasp, Scene
 from dlocore.shape.shape import StartCurve, fit_to_knots
+from dlocore.shape.transport import transported
 from dlocore.spline import greville
 from dlocore.words import in_mm
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dlocore.answer.transport import transported
+from dlocore.shape.transport import transported
 
 
 def turned(away: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

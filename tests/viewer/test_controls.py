@@ -231,6 +231,14 @@ def test_what_is_being_measured_is_told_and_can_be_stopped(service):
         assert " ms.</b>" in client.html('data-effect="inertia"')
 
 
+def test_where_no_effect_can_be_measured_that_is_told(service):
+    with connected(service, "keeps-its-bend") as client:  # plastic in its plane, which explicit switches do not allow
+        client.refined()
+        client.press("Measure what each costs")
+        client.wait_for(lambda: client.notifications == ["No costs"], timeout=60)
+        assert 'data-status="converged"' in client.card
+
+
 def test_an_obstacle_is_drawn_where_it_stands_and_taken_away(service):
     with connected(service) as client:
         client.set("Add", "Box")

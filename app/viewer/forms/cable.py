@@ -134,7 +134,6 @@ class CableForm(Form):
         show_value(self._torsion_damping, _shown(1e3, cable.torsional_damping))
         show_value(self._stretch_damping, _shown(1.0, cable.axial_damping))
         show_value(self._yield, _shown(1e2, cable.yield_strain or 0.0))
-        self._diameter.high = 500.0 * cable.length
         first = cable.point_masses[0] if cable.point_masses else None
         show_value(self._connector, _shown(1e3, first.mass if first else 0.0))
         show_if(self._connector_u, first is not None)
