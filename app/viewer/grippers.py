@@ -5,14 +5,13 @@ from numpy.typing import NDArray
 from viser import SceneApi
 
 from app.viewer import geometry
+from app.viewer.arrows import ForceArrows
 from app.viewer.palette import BRAND, REACTION, STEEL, linear
 from dlocore import Grasp, GraspReaction, Prediction
 
 Floats = NDArray[np.float64]
 DASHES = 24
-ARROW_LENGTH = 0.22  # of the largest reaction of all grippers, as a fraction of the cable's length
 REACH = (0.03, 0.12)  # of the cable's length: the part of the body that is clearly above the cable
-SMALLEST_ARROW = 0.02  # shorter ones, as a fraction of the longest, are not drawn
 
 
 class GripperPicture:
@@ -30,8 +29,6 @@ class GripperPicture:
 
     def __init__(self, scene: SceneApi, number: int, cable_diameter: float, cable_length: float) -> None:
         vertices, faces = geometry.gripper(cable_diameter, cable_length)
-        self._arrow_length = ARROW_LENGTH * cable_length
-        self._lift = np.array([0.0, 0.0, 0.6 * cable_diameter])
         # a batch of one: its pose then reaches the browser the same way as the cable's, and they are drawn in step
         self._body = scene.add_batched_meshes_simple(
             f"/gripper/{number}",
@@ -45,15 +42,7 @@ class GripperPicture:
         self._path = scene.add_line_segments(
             f"/gripper_path/{number}", np.zeros((DASHES, 2, 3)), STEEL, thickness=2.0, thickness_units="screen"
         )
-        self._arrow = scene.add_arrows(
-            f"/reaction/{number}",
-            np.zeros((1, 2, 3)),
-            linear(np.array(REACTION)),
-            shaft_radius=0.0035 * cable_length,
-            head_radius=0.010 * cable_length,
-            head_length=0.030 * cable_length,
-            visible=False,
-        )
+        self._arrow = ForceArrows(scene, f"/reaction/{number}", REACTION, cable_diameter, cable_length)
         self._prediction: Prediction | None = None
         self._held: tuple[Grasp, GraspReaction] | None = None
         self._newtons = 1.0
@@ -67,7 +56,7 @@ class GripperPicture:
         self._held = (prediction.scene.grasps[number], prediction.grasps[number])
         grasp, horizon = self._held[0], prediction.surface.horizon
         closes, opens = min(grasp.start, horizon), min(grasp.release_time or horizon, horizon)
-        track = prediction.surface.positions([grasp.u], np.linspace(closes, opens, 2 * DASHES))[:, 0] + self._lift
+        track = prediction.surface.positions([grasp.u], np.linspace(closes, opens, 2 * DASHES))[:, 0] + self._arrow.lift
         self._path.points = track.reshape(DASHES, 2, 3).astype(np.float32)
         self._path.visible = bool(np.ptp(track, axis=0).max() > 1e-6)
 
@@ -95,12 +84,7 @@ class GripperPicture:
         self._body.batched_wxyzs = geometry.quaternion(axes)[None].astype(np.float32)
         self.body = point + np.outer(self._reach, axes[:, 2]) if closed else np.zeros((0, 3))
         force = np.array([np.interp(time, given.times, given.reaction[:, axis]) for axis in range(3)])
-        share = float(np.linalg.norm(force)) / self._newtons
-        visible = self._reactions and closed and share > SMALLEST_ARROW
-        if self._arrow.visible != visible:
-            self._arrow.visible = visible
-        start = point + self._lift
-        self._arrow.points = np.array([[start, start + force / self._newtons * self._arrow_length]], dtype=np.float32)
+        self._arrow.draw(point[None], force[None] / self._newtons, self._reactions and closed)
 
     def _axes(self, grasp: Grasp, time: float, along: Floats) -> Floats:
         """Return the axes (3, 3) of the body: along the cable, and turned with the path where it turns."""

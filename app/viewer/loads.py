@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi
 
-from app.viewer.grippers import ARROW_LENGTH, SMALLEST_ARROW
-from app.viewer.palette import LOAD, linear
+from app.viewer.arrows import ForceArrows
+from app.viewer.palette import LOAD
 from dlocore import Load, Prediction
 
 Floats = NDArray[np.float64]
@@ -21,20 +21,10 @@ class LoadsPicture:
     """
 
     def __init__(self, scene: SceneApi, cable_diameter: float, cable_length: float) -> None:
-        self._arrow_length = ARROW_LENGTH * cable_length
         self._prediction: Prediction | None = None
         self._newtons = 1.0
         self._shown = True
-        self._lift = np.array([0.0, 0.0, 0.6 * cable_diameter])
-        self._arrows = scene.add_arrows(
-            "/loads",
-            np.zeros((1, 2, 3)),
-            linear(np.array(LOAD)),
-            shaft_radius=0.0035 * cable_length,
-            head_radius=0.010 * cable_length,
-            head_length=0.030 * cable_length,
-            visible=False,
-        )
+        self._arrows = ForceArrows(scene, "/loads", LOAD, cable_diameter, cable_length)
 
     def take(self, prediction: Prediction) -> None:
         """Belong to a new prediction, in which the largest of them has the longest arrow."""
@@ -53,14 +43,8 @@ class LoadsPicture:
         t = np.array([time])
         loads = self._prediction.scene.loads
         forces = np.array([load.at(t)[0] for load in loads]).reshape(-1, 3) / self._newtons
-        acting = (np.linalg.norm(forces, axis=1) > SMALLEST_ARROW) & self._shown
-        if self._arrows.visible != bool(acting.any()):
-            self._arrows.visible = bool(acting.any())
-        if acting.any():
-            places = [load.u for load, acts in zip(loads, acting, strict=True) if acts]
-            starts = self._prediction.surface.positions(places, t)[0] + self._lift
-            ends = starts + forces[acting] * self._arrow_length
-            self._arrows.points = np.stack([starts, ends], axis=1).astype(np.float32)
+        points = self._prediction.surface.positions([load.u for load in loads], t)[0] if loads else np.zeros((0, 3))
+        self._arrows.draw(points, forces, self._shown)
 
 
 def forces_over(load: Load, horizon: float) -> tuple[Floats, Floats]:

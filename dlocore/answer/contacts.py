@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 CONTACT_TIMES = 129  # at most, about, at which contact is looked at
-NEAR = 0.05  # of the length: obstacles that lie closer are the same one, moved
+_NEAR = 0.05  # of the length: obstacles that lie closer are the same one, moved
 _AT_ONCE = 1_000_000  # nodes that are looked at together, over all times
 _STRIDE = 16  # of so many nodes one is looked at first
 _LONGER = 1.1  # times as long as it is the cable may be strained
@@ -100,9 +100,9 @@ def contacts_taken_on(
 ) -> tuple[ContactForce, ...]:
     """Return contact forces of a scene with the errors of those of one like it, as far as it has them.
 
-    An obstacle has those of one of its kind that is as large and lies within NEAR of the length, whatever its number.
+    An obstacle has those of one of its kind that is as large and lies within _NEAR of the length, whatever its number.
     """
-    near, here, there = NEAR * scene.cable.length, _rows(scene), _rows(like)
+    near, here, there = _NEAR * scene.cable.length, _rows(scene), _rows(like)
     errs = {force.name: force for force in judged}
 
     def judged_as(own: ContactForce) -> ContactForce | None:

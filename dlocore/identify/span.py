@@ -6,6 +6,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.identify.candidate import resized
 from dlocore.recordings import Recording
 from dlocore.scene.cable import Cable
 from dlocore.spline import design_matrix
@@ -56,7 +57,7 @@ class Span:
         These keep their shares of the cable's length, whatever that is in the recording.
         """
         slack = 1e-9 * self.length
-        moved = [(one.u * (self.whole / cable.length) - self.begin, one) for one in cable.point_masses]
+        moved = [(one.u - self.begin, one) for one in resized(cable, self.whole).point_masses]
         masses = [
             replace(one, u=min(max(u, 0.0), self.length)) for u, one in moved if -slack <= u <= self.length + slack
         ]
@@ -64,8 +65,8 @@ class Span:
 
     def to_whole(self, cable: Cable) -> Cable:
         """Return the whole cable of which `cable` is this part, with the point masses on that."""
-        share = self.length / cable.length
-        masses = [replace(one, u=min(one.u * share + self.begin, self.whole)) for one in cable.point_masses]
+        part = resized(cable, self.length)
+        masses = [replace(one, u=min(one.u + self.begin, self.whole)) for one in part.point_masses]
         return replace(cable, length=self.whole, point_masses=tuple(masses))
 
     def inside(self, markers: NDArray[np.int64]) -> NDArray[np.bool_]:

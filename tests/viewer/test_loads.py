@@ -7,8 +7,8 @@ import pytest
 from protocol_client import NOTHING_STORED, connected
 
 from app.viewer import load_edits
+from app.viewer.arrows import ARROW_LENGTH
 from app.viewer.draft import start_draft
-from app.viewer.grippers import ARROW_LENGTH
 from app.viewer.load_edits import Pull
 
 LOAD = {"u": 0.5, "force": [0.0, 0.5, 0.0]}
