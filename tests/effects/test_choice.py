@@ -156,7 +156,7 @@ def snapping_arch() -> Scene:
         grasps=tuple(Grasp(u=u, hold="tangent", path=path) for u, path in zip((0.0, 1.0), turns, strict=True)),
         environment=Environment(drag=0.05, table=Table()),
         horizon=60.0,
-        quality=Quality(target_error=0.02),
+        quality=Quality(target_error=0.03),
     )
 
 
