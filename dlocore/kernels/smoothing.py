@@ -25,7 +25,8 @@ def scores(
         square: D + b . c, the sum w |y|^2 of the data.
         count: number of data.
         most_noise: bound on the standard deviation of a coordinate of the data.
-        strengths: (k,).
+        strengths: (k,), growing. So does the least of the misfit and its penalty, but for rounding: where lambda is
+            so strong that rounding drowns that least, it counts as it was before.
     """
     n, width = normal.shape
     free = n - 3
@@ -33,6 +34,7 @@ def scores(
     band = np.empty((n, width))
     c = np.empty(n)
     out = np.empty(len(strengths))
+    least = 0.0
     for k in range(len(strengths)):
         for i in range(n):
             for o in range(width):
@@ -46,7 +48,8 @@ def scores(
             solve(band, c)
             for i in range(n):
                 misfit -= c[i] * right[i, d]
-        misfit = max(misfit, 0.0) + LEAST_NOISE**2 * square + TINY
+        least = max(misfit, least)
+        misfit = least + LEAST_NOISE**2 * square + TINY
         variance = min(misfit / seen, most_noise**2)
         determinant = 0.0
         for i in range(n):
