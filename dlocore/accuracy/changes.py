@@ -18,6 +18,7 @@ _MOST_FALL = 20.0  # times less than the refinement before, at most, is believed
 # before has, so that these two may agree as they err alike. A third of what that was moved by is left in both.
 _MOST_FALL_DAMPED = 3.0 * _LEFT_KINKED
 _MOST_FALL_YIELDING = 4.0  # ... where the cable yields: it is bent for good within a span, which coarse grids lack
+_MOST_FALL_RISEN = 3.0  # ... where the one before it had risen: such changes are in no order yet
 MORE = 1.1  # times as many steps, or control points: fewer are as many
 _STALE = 2.0  # times what a refinement in one direction moved the surface by: once those in the other moved it by more,
 # what the first has left is measured again
@@ -67,14 +68,20 @@ def weighed(level: Level, before: Level, last: Change | None, first: bool = Fals
     moved_before = np.inf if last is None else last.moved
     more = level.motion.steps / before.motion.steps
     yields = level.problem.choices["plasticity"].active
+    falls = [_MOST_FALL]
+    if yields:
+        falls.append(_MOST_FALL_YIELDING)
+    if last is not None and last.before < last.moved:
+        falls.append(_MOST_FALL_RISEN)
     if more <= MORE:
-        return Change(level.change, moved_before, _LEFT_ALONG, _MOST_FALL_YIELDING if yields else _MOST_FALL)
+        return Change(level.change, moved_before, _LEFT_ALONG, min(falls))
     # the errors of the steps are of second order: what twice as many take away is three times what they leave
     counts = max(1.0, 3.0 / (more**2 - 1.0))
     damped, was_damped = (x.motion.rho == STRONGLY_DAMPED for x in (level, before))
-    fall = _MOST_FALL_YIELDING if yields else _MOST_FALL_DAMPED if damped and not was_damped else _MOST_FALL
+    if damped and not was_damped:
+        falls.append(_MOST_FALL_DAMPED)
     left = _MOST_LEFT if first else _LEFT_KINKED
-    return Change(counts * level.change, moved_before, left if level.motion.kinked else _LEFT, fall)
+    return Change(counts * level.change, moved_before, left if level.motion.kinked else _LEFT, min(falls))
 
 
 def refined(level: Level, before: Level) -> str:
