@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import uvicorn
 from fastapi.testclient import TestClient
 from scipy.spatial.transform import Rotation
 
@@ -324,6 +325,19 @@ def test_the_viewer_link_opens_layout_and_recording_from_this_service(
     assert wasm.headers["content-type"] == "application/wasm"
     assert wasm.content[:4] == b"\0asm"
     assert client.get("/rerun/../settings").status_code == 404
+
+
+@pytest.mark.parametrize(("proxy", "scheme"), [("127.0.0.1", "https"), ("10.0.0.1", "http")])
+def test_behind_a_proxy_with_tls_the_viewer_is_given_addresses_with_tls(
+    client: TestClient, answer: dict[str, Any], proxy: str, scheme: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("FORWARDED_ALLOW_IPS", raising=False)
+    served = uvicorn.Config(client.app, log_config=None)
+    served.load()
+    outside = TestClient(served.loaded_app, base_url="http://lab.example", client=(proxy, 50000))
+    headers = {"x-forwarded-proto": "https", "x-forwarded-for": "10.0.0.2"}
+    response = outside.get(answer["links"]["viewer"], headers=headers, follow_redirects=False)
+    assert f"url={scheme}://lab.example{answer['links']['recording']}" in response.headers["location"]
 
 
 def test_the_trace_of_a_motion_and_its_iterates_is_at_instants_of_its_way(chunks: list[Any], run: Run) -> None:
