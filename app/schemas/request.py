@@ -33,7 +33,8 @@ class PredictionRequest(Model):
         default=None,
         gt=1e-4,
         le=1e4,
-        description="Predicted time [s]; absent: until the longest path ends.",
+        description="Predicted time [s]; absent: until the last path ends, the last grasp opens and "
+        "the last load is given.",
         examples=[2.5],
     )
     effects: Effects = Field(default="auto", description="Which effects to simulate.", examples=["auto"])

@@ -64,7 +64,7 @@ class GripperForm(Form):
             self._closes = NumberField(gui, "Closes at [s]", 0.0, low=0.0, high=1e4)
             self._opens = NumberField(gui, "Opens at [s]", 0.0, low=0.0, high=1e4, hint="0: it stays closed")
             self._horizon = NumberField(
-                gui, "Predict until [s]", 0.0, low=0.0, high=1e4, hint="0: until the last path ends"
+                gui, "Predict until [s]", 0.0, low=0.0, high=1e4, hint="0: until all paths, grasps and loads have ended"
             )
         self._bind_controls()
 
