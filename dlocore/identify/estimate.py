@@ -177,14 +177,21 @@ def _assumed(
     """
     moves = any(not r.static for r in recordings)
     assumed = {
-        "bending_stiffness": cable, "bending_damping": cable and moves,
+        "bending_stiffness": cable, "torsional_stiffness": cable, "bending_damping": cable and moves,
         "drag": drag and moves, "drag_quadratic": drag and moves,
     }  # fmt: skip
-    kept = [p for p in parameters(DEFAULT, 0) if assumed[p.name] and p.name not in names]
+    kept = [
+        f"{p.name} {p.get(given):g} {p.unit}"
+        for p in parameters(tuple(assumed), 0)
+        if assumed[p.name] and p.name not in names
+    ]
+    if cable:
+        kept.append(f"axial_stiffness {given.cable.axial_stiffness:g} N")
+    if cable and not any(r.diameter is not None for r in recordings):
+        kept.append(f"diameter {given.cable.diameter:g} m")
     said = []
     if kept:
-        values = ", ".join(f"{p.name} {p.get(given):g} {p.unit}" for p in kept)
-        said.append(f"Neither given nor sought, and kept at what is assumed: {values}.")
+        said.append(f"Neither given nor sought, and kept at what is assumed: {', '.join(kept)}.")
     if cable and not any(r.linear_density is not None for r in recordings) and "linear_density" not in names:
         said.append(
             f"The recordings tell no linear density: {given.cable.linear_density:g} kg/m is assumed, and stiffnesses, "

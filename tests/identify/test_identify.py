@@ -434,7 +434,15 @@ def test_a_derivative_is_taken_to_the_side_on_which_the_cable_can_begin(monkeypa
 def test_what_is_kept_at_an_assumed_value_is_told_of() -> None:
     assert (
         "Neither given nor sought, and kept at what is assumed: bending_stiffness 0.00125 N m^2, "
-        "drag_quadratic 0 N s^2/m^3, bending_damping 0.0002 N m^2 s." in identify([still()], names=("drag",)).message
+        "torsional_stiffness 0.00125 N m^2, bending_damping 0.0002 N m^2 s, drag_quadratic 0 N s^2/m^3, "
+        "axial_stiffness 625 N, diameter 0.005 m." in identify([still()], names=("drag",)).message
+    )
+
+
+def test_what_is_sought_or_told_by_a_recording_is_not_told_of_as_assumed() -> None:
+    message = identify([still(diameter=0.004)], names=("bending_stiffness", "bending_damping", "drag")).message
+    assert message.endswith(
+        "assumed: torsional_stiffness 0.00125 N m^2, drag_quadratic 0 N s^2/m^3, axial_stiffness 625 N."
     )
 
 
@@ -442,7 +450,11 @@ def test_what_is_kept_at_an_assumed_value_is_told_of() -> None:
     ("given", "kept"),
     [
         ({"cable": CABLE}, ": drag_quadratic 0 N s^2/m^3."),
-        ({"environment": DRAG}, ": bending_stiffness 0.00125 N m^2, bending_damping 0.0002 N m^2 s."),
+        (
+            {"environment": DRAG},
+            ": bending_stiffness 0.00125 N m^2, torsional_stiffness 0.00125 N m^2, "
+            "bending_damping 0.0002 N m^2 s, axial_stiffness 625 N, diameter 0.005 m.",
+        ),
         ({"cable": CABLE, "environment": DRAG}, ""),
         ({"start": Candidate(cable=CABLE, environment=DRAG)}, ""),
     ],
