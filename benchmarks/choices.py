@@ -12,6 +12,7 @@ import os
 
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
 
+import argparse
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import replace
@@ -231,6 +232,7 @@ def print_springs() -> None:
 
 
 def main() -> None:
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     print_errors()
     print_energies()
     print_kinks()

@@ -6,6 +6,7 @@ A service of its own is started on the loopback address with one worker for each
 over and over, and a third one asks for the health every few milliseconds.
 """
 
+import argparse
 import os
 import socket
 import statistics
@@ -85,6 +86,7 @@ def measure(address: str, solving: bool) -> list[float]:
 
 
 def main() -> None:
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     """Measure and print."""
     print(f"/health, {REQUESTS} requests; {machine_line()}")
     with service() as address:

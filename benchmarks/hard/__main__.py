@@ -114,11 +114,12 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="file to write the results to")
     parser.add_argument("--cases", default="", help="only those whose name contains this")
     options = parser.parse_args()
+    chosen = [case for name, case in CASES.items() if options.cases in name]
+    if not chosen:
+        parser.error(f"--cases: got {options.cases!r}. Allowed: a part of the name of one of {', '.join(CASES)}.")
     warm_up()
     results: dict[str, dict[str, Any]] = {}
-    for case in CASES.values():
-        if options.cases not in case.name:
-            continue
+    for case in chosen:
         results[case.name] = {method: row(case, method) for method in METHODS}
         if options.json is not None:
             options.json.write_text(json.dumps(results, indent=1))

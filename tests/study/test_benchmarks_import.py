@@ -2,10 +2,14 @@
 
 import importlib
 import pkgutil
+import runpy
+import sys
 
 import pytest
 
 import benchmarks
+import benchmarks.hard.__main__ as hard
+from benchmarks.hard.cases import CASES
 from benchmarks.paper_case import GRASPS, METHODS, paper_scene
 from dlocore import predict
 
@@ -25,6 +29,25 @@ def test_benchmark_finds_what_it_takes_from_the_program(name: str) -> None:
 
 def test_all_benchmarks_are_looked_at() -> None:
     assert {"benchmarks.choices", "benchmarks.hard.generator", "benchmarks.peers.cosserat"} <= set(MODULES)
+
+
+@pytest.mark.parametrize("name", ["benchmarks.choices", "benchmarks.health"])
+def test_help_measures_nothing(name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(sys, "argv", [name, "--help"])
+    with pytest.raises(SystemExit) as end:
+        runpy.run_path(str(importlib.import_module(name).__file__), run_name="__main__")
+    assert end.value.code == 0
+    assert f"python -m {name}" in capsys.readouterr().out
+
+
+def test_a_hard_case_that_is_not_there_is_told(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["benchmarks.hard", "--cases", "no such"])
+    with pytest.raises(SystemExit) as end:
+        hard.main()
+    assert end.value.code == 2
+    assert f"got 'no such'. Allowed: a part of the name of one of {next(iter(CASES))}, " in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("method", ["march", "spacetime"])
