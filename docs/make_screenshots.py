@@ -1,4 +1,4 @@
-"""Make docs/scene.png and docs/landing*.png from a running service: `python docs/make_screenshots.py http://127.0.0.1:8000`.
+"""Make docs/scene*.png and docs/landing-*.png from a running service: `python docs/make_screenshots.py http://127.0.0.1:8000`.
 
 Needs Playwright and a Chromium (`DLO_CHROMIUM` names another one than the first on the path).
 """
@@ -66,25 +66,15 @@ def drawn(page: Page, time: str, tab: str, file: str) -> None:
 
 
 def landing(browser: Browser, address: str) -> None:
-    """Draw the top of the landing page in light, on a phone too, and in dark its gallery and what accuracy costs."""
-    page = browser.new_page(viewport={"width": 1400, "height": 900}, color_scheme="light")
-    show(page, address)
-    page.screenshot(path=HERE / "landing.png")
-    page.emulate_media(color_scheme="dark")
-    for part in ("gallery", "speed"):
-        page.locator(f"#{part}").screenshot(path=HERE / f"landing-{part}.png")
-    phone = browser.new_page(viewport={"width": 390, "height": 844}, color_scheme="light")
-    show(phone, address)
-    phone.screenshot(path=HERE / "landing-phone.png")
-
-
-def show(page: Page, address: str) -> None:
-    """Open the landing page with its motion stopped."""
+    """Draw the gallery of the landing page and what accuracy costs, in dark, with its motion stopped."""
+    page = browser.new_page(viewport={"width": 1400, "height": 900}, color_scheme="dark")
     page.goto(address)
     frame = page.frame_locator("#scene")
     frame.locator('[data-status="converged"]').wait_for(timeout=FIRST_SOLVE)
     frame.get_by_role("button", name="Pause").click()
     settle(page)
+    for part in ("gallery", "speed"):
+        page.locator(f"#{part}").screenshot(path=HERE / f"landing-{part}.png")
 
 
 def settle(page: Page) -> None:
