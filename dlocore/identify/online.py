@@ -56,7 +56,6 @@ class Identifier:
         u: material coordinates of the markers (m,) [m].
         held: markers that grippers hold.
         cable, environment: first guesses, and what is known.
-        length: of the cable [m].
         names: parameters to identify.
         window: [s].
         rate: of the frames [Hz].
