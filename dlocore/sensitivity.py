@@ -244,7 +244,7 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     """Return the derivatives of a predicted motion by parameters of its scene.
 
     The prediction's march, on its grid and with the effects that it found, is differentiated step by step: exact up to
-    about 1e-6 of the largest derivative, for a time spline whose knots move with events alone. Where steps can't be
+    about 1e-7 of the largest derivative, for a time spline whose knots move with events alone. Where steps can't be
     differentiated (contact, friction, strands that touch, steps that had to be split) whole marches are compared
     instead, and `exact` and `reason` say so.
     A parameter that can't be less, or more, as a drag of zero or the place of a grasp at an end, is changed to the

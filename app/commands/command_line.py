@@ -18,7 +18,7 @@ _DESCRIPTION = "Predict how a cable moves when grippers move it."
 _EPILOG = """examples:
   dlo serve                             page, 3D scene and API on http://127.0.0.1:8000
   dlo predict scene.json -o out.npz     the surface as NumPy arrays
-  dlo predict scene.json --json -       the whole answer, as the API gives it
+  dlo predict scene.json --json -       the answer of the API, but for id, state and links
   dlo predict scene.json --rrd out.rrd  a recording for rerun: iterations and motion
   dlo calibrate                         what accuracy costs in time on this machine
   dlo study -o now.json --plots plots   the same in full, with plots

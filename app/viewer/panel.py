@@ -213,7 +213,7 @@ class Panel:
                 "Let it settle first", initial_value=False, hint="It comes to rest under its grippers before they move"
             )
             straighten = self._gui.add_button("Make it straight", color="gray")
-            self._add_file_button("Open points …", "Points [m] in order along the cable: CSV, JSON, .npz or .npy")
+            self._add_file_button("Open points …", "Points [m], in order or not: .csv, .txt, .json, .npz or .npy")
 
         @self._editing.on_update
         async def _edit(event: GuiEvent[Any]) -> None:
