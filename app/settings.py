@@ -12,6 +12,7 @@ from dlocore.calibration import FILE
 from dlocore.machine import usable_cores, user_data_dir
 
 _ORIGIN = re.compile(r"([a-z][a-z0-9+.-]*)://(\[[0-9a-f:.]+\]|[a-z0-9._-]+)(:[0-9]{1,5})?")
+_TOKEN = 8  # characters at least
 _PORTS = {"http": ":80", "https": ":443"}  # which a browser leaves out
 
 
@@ -34,7 +35,7 @@ class Settings(BaseSettings):
         default=(), description='Other origins whose pages may call the API, as JSON: ["https://lab.example"].'
     )
     token: SecretStr | None = Field(
-        default=None, min_length=8, description="Bearer token that every request must carry; absent: none is needed."
+        default=None, description="Bearer token that every request must carry; absent: none is needed."
     )
     shutdown_grace: float = Field(
         default=5.0, ge=0.0, le=3600.0, description="Time for running solves to finish when the service stops [s]."
@@ -53,6 +54,14 @@ class Settings(BaseSettings):
     @classmethod
     def _as_browsers_send_them(cls, value: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(_origin(text) for text in value)
+
+    @field_validator("token")
+    @classmethod
+    def _hard_to_guess(cls, value: SecretStr | None) -> SecretStr | None:
+        if value is not None and len(value) < _TOKEN:
+            told = {"given": len(value), "least": _TOKEN}
+            raise PydanticCustomError("token", "It has {given} characters, and needs at least {least}", told)
+        return value
 
     @field_validator("data_dir")
     @classmethod

@@ -203,7 +203,7 @@ def _allowed(kind: str, context: dict[str, Any], loc: list[Any], whole: "_Schema
         return "texts and names in Unicode, which has surrogates in pairs only"
     if kind in ("too_short", "too_long"):
         return _bounds(context, "min_length", "max_length", "{} items")
-    text = _TYPES.get(kind, "")
+    text = whole.form(schema) if kind == "missing" else _TYPES.get(kind, "")
     if kind in ("string_too_short", "string_too_long"):
         text = _bounds(context, "min_length", "max_length", "{} characters")
     if kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
@@ -267,6 +267,26 @@ class _Schema:
         options = [self._resolved(option) for option in _options(self.at(loc))]
         words = {"array": "a list", "object": "an object with some of " + ", ".join(self.names(loc))}
         return [words[option["type"]] for option in options if option.get("type") in words]
+
+    def form(self, node: dict[str, Any]) -> str:
+        """Return in words what a value of the schema `node` is; "" where that is not told."""
+        node = self._resolved(node)
+        kinds = node.get("discriminator", {}).get("mapping")
+        if kinds:
+            return "an object whose kind is one of " + ", ".join(kinds)
+        options = _options(node)
+        if options:
+            return " or ".join(filter(None, map(self.form, options)))
+        kind = node.get("type", "")
+        if kind == "object":
+            needed = node.get("required") or ["some of " + ", ".join(node.get("properties", {}))]
+            return "an object with " + ", ".join(needed)
+        if kind == "array":
+            least, most = node.get("minItems"), node.get("maxItems")
+            return f"a list of {least} items" if least == most is not None else "a list"
+        if kind == "string":
+            return RUN_ID if "pattern" in node else "a text"
+        return _range(node) or {"number": "a finite number", "integer": "an integer"}.get(kind, "")
 
     def _resolved(self, node: dict[str, Any]) -> dict[str, Any]:
         while "$ref" in node:

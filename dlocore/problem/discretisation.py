@@ -51,7 +51,11 @@ def smallest_n_u(problem: Problem) -> int:
 
 def too_few(problem: Problem, n_u: int) -> SceneError:
     """Return the error of fewer control points than `smallest_n_u`."""
-    reason = f"{len(problem.features.u)} places that are held, loaded or heavy need a knot each"
+    features = problem.features
+    knots = features.multiplicity[(features.u > 0.0) & (features.u < problem.scene.cable.length)].sum()
+    reason = (
+        f"Places that are held, loaded or heavy need {knots} knots inside the cable (two where a direction is held)"
+    )
     return SceneError("quality.n_u", n_u, f"at least {smallest_n_u(problem)} in this scene", reason)
 
 

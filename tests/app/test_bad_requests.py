@@ -13,9 +13,11 @@ from fastapi.testclient import TestClient
 from pydantic import ValidationError
 from starlette.types import Message
 
+from app.http.fields import bad_fields
 from app.routes import body as bodies
 from app.schemas.base import MAX_NAMES, MAX_REPORTED
 from app.schemas.identify import IdentifyRequest
+from app.schemas.request import PredictionRequest
 from tests.app.conftest import ABSENT, contract_scene, paper_scene, put
 
 PAPER = paper_scene()
@@ -207,6 +209,26 @@ def test_the_scenes_that_the_cases_are_made_of_are_right(client: TestClient, sce
 def test_what_is_allowed_is_said_with_what_the_field_is_and_no_more(client: TestClient) -> None:
     problem = the_problem(client.post("/v1/predictions", json=put(PAPER, "quality", {"n_u": 500, "n_t": 13})), 422)
     assert problem["errors"][0]["allowed"] == "an integer at least 5 at most 129 (Control points along the cable)"
+
+
+@pytest.mark.parametrize(
+    ("path", "needed"),
+    [
+        ("cable", "an object with some of preset, length, diameter, "),
+        ("shape", "an object whose kind is one of control_points, points, prediction, straight (Where the cable is"),
+        ("primitives.0.u", "a finite number at least 0 at most 1000 (Material coordinate [m]"),
+        ("primitives.0.path.displacement", "a list of 3 items (Displacement [m])"),
+        ("loads.0.force", "a list of 3 items or an object with times, values (Force [N]"),
+        ("environment.obstacles.0.radius", "a finite number above 0 "),
+    ],
+)
+def test_of_a_field_that_is_missing_it_is_said_what_it_has_to_be(path: str, needed: str) -> None:
+    body = put(put(LOADED, "environment.obstacles", OBSTACLES), path, ABSENT)
+    with pytest.raises(ValidationError) as caught:
+        PredictionRequest.model_validate(body)
+    (bad,) = bad_fields(caught.value.errors(), body)
+    assert bad.allowed.startswith(needed)
+    assert bad.message == f"It is missing. Got nothing. Allowed: {bad.allowed}."
 
 
 def test_a_whole_number_with_a_point_is_an_integer(client: TestClient) -> None:

@@ -394,7 +394,7 @@ def test_a_recording_of_the_command_line_is_that_of_the_solve(tmp_path: Path) ->
         ("DLO_PORT", "here", "DLO_PORT: got 'here'. "),
         ("DLO_ALLOWED_ORIGINS", "foo", "DLO_ALLOWED_ORIGINS: got 'foo'. Allowed: Other origins"),
         ("DLO_ALLOWED_ORIGINS", '["lab"]', "DLO_ALLOWED_ORIGINS: got ['lab']. 'lab' is no origin, as https://host"),
-        ("DLO_TOKEN", "short", "DLO_TOKEN: got a secret. "),
+        ("DLO_TOKEN", "short", "DLO_TOKEN: got a secret. It has 5 characters, and needs at least 8: Bearer token"),
     ],
 )
 def test_a_bad_setting_is_named(

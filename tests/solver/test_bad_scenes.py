@@ -220,6 +220,14 @@ def test_what_is_as_large_as_in_millimetres_is_told_of_as_such():
         predict(scene(shape=Points(points=1000.0 * arc(1.0, 1.0))))
 
 
+def test_of_too_few_control_points_it_is_told_how_many_knots_are_needed():
+    grasps = (Grasp(u=0.0, path=UP), Grasp(u=0.3, path=UP), Grasp(u=0.6, hold="tangent", path=UP))
+    with pytest.raises(
+        SceneError, match=r"need 3 knots inside .*\(two where a direction is held\)\. Allowed: at least 7"
+    ):
+        predict(scene(grasps=grasps, quality=Quality(n_u=5, n_t=13)))
+
+
 def test_a_short_cable_may_be_carried_through_a_hall():
     carried = Grasp(u=0.0, path=Move(displacement=(40.0, 0.0, 0.0), duration=60.0))
     short = Cable(length=0.1, diameter=0.002, linear_density=0.01, bending_stiffness=1e-4)
