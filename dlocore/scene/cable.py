@@ -38,7 +38,8 @@ class Cable(Checked):
     """A cable of round section, nearly inextensible, with independent section stiffnesses.
 
     Give each stiffness itself, or `youngs_modulus` and `shear_modulus` and the solid round section gives it
-    (EA = E pi D^2/4, EI = E pi D^4/64, GJ = G pi D^4/32; docs/model.md eq. 2). Real wires do not follow the isotropic
+    (EA = E pi D^2/4, EI = E pi D^4/64, GJ = G pi D^4/32; docs/model.md eq. 2): of a solid rod only, for strands slide
+    on each other (docs/cable.md tells how to measure EI). Real wires do not follow the isotropic
     rule between EI and GJ, so they are independent. Where nothing is given, EA = 16 EI/D^2 (the solid section of the
     same EI) and GJ = EI (measured wires lie at 0.8 to 1.6). The axial damping that is not given lets waves of stretch
     die out as fast as they can: 2 L/pi sqrt(mu EA), critical for the slowest one (docs/model.md eq. 7a).

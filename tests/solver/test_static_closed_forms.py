@@ -41,6 +41,21 @@ def test_small_cantilever_sinks_by_pl3_over_3ei():
     assert -tip[2] == pytest.approx(1e-3 / 3, rel=1e-6)
 
 
+@pytest.mark.parametrize(("sag", "off"), [(0.1, 0.008), (0.2, 0.033)])
+def test_a_piece_that_sticks_out_over_an_edge_tells_its_stiffness(sag, off):
+    """As docs/cable.md says: EI = mu g l^4/(8 s), which is too large by so much."""
+    free = cable(bending_stiffness=MU * G / (8 * sag * (1 + off)))  # l = 1 m
+    tip = equilibrium(Scene(cable=free, shape=Straight(), grasps=(CLAMPED,), horizon=1)).positions(1.0)[0]
+    assert -tip[2] == pytest.approx(sag, rel=2e-3)
+
+
+def test_what_a_gripper_gives_to_a_level_cable_acts_on_the_cable_about_the_grasped_point():
+    stiff = cable(bending_stiffness=10.0)
+    level = equilibrium(Scene(cable=stiff, shape=Straight(start=(2, 3, 4)), grasps=(CLAMPED,), horizon=1))
+    np.testing.assert_allclose(level.reactions[0], [0.0, 0.0, MU * G], atol=1e-4)  # N: it carries the weight
+    np.testing.assert_allclose(level.moments[0], [0.0, -MU * G / 2, 0.0], atol=1e-3)  # N m: and holds it up
+
+
 @pytest.mark.parametrize(
     ("a", "shortening", "deflection"),
     [(1, 0.05643, 0.30172), (2, 0.16064, 0.49346), (3, 0.25442, 0.60325), (5, 0.38763, 0.71379), (10, 0.555, 0.81061)],
