@@ -24,7 +24,9 @@ class MovePath(Model):
     kind: Literal["move"]
     displacement: Vector = Field(description="Displacement [m].", examples=[[0, 0.5, 0]])
     rotation: Vector | None = Field(
-        default=None, description="Final rotation vector [rad]; holds other than `point` only.", examples=[[0, 0, 0.8]]
+        default=None,
+        description="Final rotation vector [rad], in world axes; holds other than `point` only.",
+        examples=[[0, 0, 0.8]],
     )
     duration: Number = Field(gt=1e-4, le=1e4, description="Duration [s].", examples=[1.6])
     profile: Profile = Field(default="minimum_jerk", description="Position law in time.", examples=["minimum_jerk"])
@@ -44,8 +46,8 @@ class WaypointsPath(Model):
     )
     orientations: Long[Quaternion] | None = Field(
         default=None,
-        description="One unit quaternion (w, x, y, z) for each time; it turns the shorter way to the next, with "
-        "profile `spline` as smoothly as it goes.",
+        description="One unit quaternion (w, x, y, z) for each time, in world axes, of which only the turn since the "
+        "first counts, R(t) R(0)^-1; it turns the shorter way to the next, of profile `spline` as smoothly as may be.",
         examples=[[[1, 0, 0, 0]] * 3],
     )
     start: Start = Field(

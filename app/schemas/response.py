@@ -37,7 +37,7 @@ class SurfaceModel(BaseModel):
 
 
 class GraspModel(BaseModel):
-    """What a gripper must give to the cable."""
+    """What a gripper must give to the cable, in world axes; the moment is about the grasped point."""
 
     u: float = Field(description="Material coordinate [m].", examples=[0.25])
     reaction: list[list[float]] = Field(

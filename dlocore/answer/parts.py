@@ -97,7 +97,7 @@ OnIteration = Callable[[Iteration], None]
 
 @dataclass(frozen=True, eq=False)
 class GraspReaction(Answered):
-    """Force and moment that a gripper gives to the cable.
+    """Force and moment that a gripper gives to the cable, in world axes, the moment about the grasped point.
 
     Attributes:
         u: material coordinate of the grasp [m].

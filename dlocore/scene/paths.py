@@ -138,10 +138,10 @@ class Waypoints(Checked):
     With a `profile` other than "spline" it goes straight from each waypoint to the next as a `Move` with that profile
     does, and turns about one axis: a robot's program of moves, and pauses where two waypoints are the same. A "linear"
     one goes on at once, with another velocity.
-    `orientations` (n, 4), unit quaternions (w, x, y, z), turn the grasp by their rotation since the first, the shorter
-    way from each to the next; along a spline they do so as smoothly as positions go, and start at rest, too. The first
-    position must be that of the cable at the grasped point as the grasp closes, within GRASP_TOLERANCE of
-    `dlocore.problem.brought`; the start shape is brought to it, and a cable in motion drawn to it within DRAWN.
+    `orientations` (n, 4), unit quaternions (w, x, y, z), turn the grasp by their rotation since the first, R(t) R(0)^-1
+    in world axes, the shorter way from each to the next; along a spline they do so as smoothly as positions go, and
+    start at rest, too. The first position must be that of the cable at the grasped point as the grasp closes, within
+    10 mm; the start shape is brought to it, and a cable in motion drawn to it within 0.2 s.
     """
 
     times: ArrayLike

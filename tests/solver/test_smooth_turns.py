@@ -61,6 +61,12 @@ def test_one_that_is_recorded_in_motion_starts_at_the_rate_that_its_waypoints_te
     np.testing.assert_allclose(rates(path), np.tile(0.5 * TURN, (len(FINE) - 1, 1)), rtol=2e-4)
 
 
+def test_only_the_turn_since_the_first_counts_in_world_axes() -> None:
+    times, first = np.linspace(0.0, 2.0, 5), Rotation.from_rotvec([0.9, 0.2, -1.1])  # a tool that begins turned
+    turns = Rotation.from_rotvec(np.outer(times / 2.0, TURN))
+    assert apart(waypoints(turns * first, times), waypoints(turns, times)) < 1e-7
+
+
 def test_the_other_sign_of_a_quaternion_is_the_same_turn() -> None:
     path = sampled(9)
     signs = np.array([1, -1, -1, 1, -1, 1, 1, -1, 1])[:, None]
