@@ -28,11 +28,12 @@ from dlocore.kernels.timefit import fit_time
 from dlocore.prediction import Prediction
 from dlocore.problem.discretisation import applied_forces, applied_in_steps
 from dlocore.problem.events import closed_grasps
+from dlocore.problem.features import longest_tip
 from dlocore.problem.grid import Grid
 from dlocore.problem.holding import Starts
 from dlocore.problem.problem import Problem, pose, stiffer
 from dlocore.problem.time_grid import marks_of
-from dlocore.scene.scene import Scene
+from dlocore.scene.scene import Grasp, Scene
 from dlocore.solvers.march import March, march
 from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.stretch import Entry, enter, with_what_lasts
@@ -49,6 +50,7 @@ LEAST = 0.01  # of the natural scale of a number that may be 0: a smaller one is
 SLIGHT = 0.1  # the natural scale of a strain
 _FITTED = ("shape.points[", "cable.rest_shape[")  # numbers that a curve is fitted through
 _FITTED_STEP = 3e-3  # of the length, of theirs: the choice of smoothness moves the curve by a millionth, at any change
+_OFF_END = 1e-3  # of the length, at least: how far from an end places are that are compared in place of one there
 _FOLLOWED = 1e-12  # of the length, on the last update of a followed step
 _STRAYED = 1e-8  # of the length: a step left with more than this was not followed
 
@@ -209,7 +211,8 @@ class Sensitivities:
         reason: why not, "" where all are.
         steps: half the change of each parameter on which the derivative rests.
         above, below: the motions with each parameter a little larger and smaller; one of them is the motion itself
-            where the parameter ends there, as a drag of zero does, and the derivative is that to the other side.
+            where the parameter ends there, as a drag of zero does, and the derivative is that to the other side; by a
+            place at an end both may be to one side of the motion.
     """
 
     names: tuple[str, ...]
@@ -250,6 +253,8 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     A parameter that can't be less, or more, as a drag of zero or the place of a grasp at an end, is changed to the
     other side only: the derivative then errs by about the relative change of it over that of the parameter, a millionth
     of its natural scale.
+    What is held, loaded or heavy at an end of the cable has other knots than what is a little away from it. There the
+    motions with it at a thousandth of the length from the end, and at twice that, are compared.
 
     Args:
         prediction: of the scene.
@@ -280,10 +285,10 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     elif not reason:
         reason = "the start is an equilibrium that is found by iteration"
 
-    def around(name: str, value: float, width: float) -> list[tuple[float, Problem, Grid]]:
-        """Return the scene with a larger and a smaller number, and by how much; as it is where no scene has that."""
+    def around(name: str, value: float, changes: tuple[float, float]) -> list[tuple[float, Problem, Grid]]:
+        """Return the scene with a number changed, and by how much; as it is where no scene has that."""
         found, refused = list[tuple[float, Problem, Grid]](), list[SceneError]()
-        for change in (width, -width):
+        for change in changes:
             try:
                 other = stiffer(pose(_with(scene, name, value + change), problem.called_for), hardness)
                 found.append((change, other, begun(other)))
@@ -299,17 +304,22 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
         size = max(abs(value), LEAST * _scale(scene, name))
         surfaces: list[SplineSurface] = []
         fitted = name.startswith(_FITTED)
-        followed = known is not None and not fitted
+        changes = _changes(scene, name, STEP * size)
+        others = changes != (STEP * size, -STEP * size)
+        followed = known is not None and not fitted and not others
         if fitted:
             reason = "a fit through points chooses its smoothness anew"
-        sides = around(name, value, STEP * size) if followed else []
+        elif others:
+            reason = "a place at an end has other knots than one beside it"
+        sides = around(name, value, changes) if followed else []
         try:
             if known is not None and followed:
                 surfaces = [_surface(p, g, *beside(known, p, g), _moved(knots_t, problem, p)) for _, p, g in sides]
         except ValueError as error:
             followed, reason = False, str(error)
         if not followed:
-            sides = around(name, value, _FITTED_STEP * scene.cable.length if fitted else COARSE_STEP * size)
+            width = _FITTED_STEP * scene.cable.length if fitted else COARSE_STEP * size
+            sides = around(name, value, _changes(scene, name, width))
             marched = [(p, g, march(p, g, motion.asked, monitor, rho=motion.rho)) for _, p, g in sides]
             surfaces = [
                 _surface(p, g, m.states, m.times, m.velocity, _moved(knots_t, problem, p)) for p, g, m in marched
@@ -397,6 +407,24 @@ def _number(scene: Scene, path: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         raise SceneError("wrt", path, "the path of a number of the scene")
     return float(value)
+
+
+def _changes(scene: Scene, path: str, width: float) -> tuple[float, float]:
+    """Return the changes of the number at a path of which the motions are compared: by `width` up and down.
+
+    But of a place so near to an end that the tip beyond it would have a span of its own in one of them alone, or bend
+    with a held direction as it has one in none, which doubles the derivative: to where it has one in both.
+    """
+    if path.endswith(".u"):
+        part, length = _part(scene, path.removesuffix(".u")), scene.cable.length
+        directed = isinstance(part, Grasp) and part.hold != "point"
+        tip, longest = min(part.u, length - part.u), longest_tip(scene, part.u, directed)
+        shorter = tip - width if width <= tip else tip
+        if shorter <= longest and (directed or tip + width > longest):
+            off = max(_OFF_END * length, 2.0 * longest)
+            inward = (2.0 * off - tip, off - tip)
+            return inward if part.u < 0.5 * length else (-inward[1], -inward[0])
+    return width, -width
 
 
 def _scale(scene: Scene, path: str) -> float:

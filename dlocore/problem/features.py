@@ -83,8 +83,8 @@ def find_features(
     )
 
 
-def _without_tip(scene: Scene, u: float, directed: bool) -> float:
-    """Return where a knot for what is held, loaded or heavy at `u` [m] belongs: at an end that only a tip lies beyond.
+def longest_tip(scene: Scene, u: float, directed: bool) -> float:
+    """Return how long an end beyond what is held, loaded or heavy at `u` [m] may be that needs no span of its own [m].
 
     A tip, no longer than half a diameter, has no moment and does not bend: nothing is lost where it has no span of its
     own. That would be so short that it folds, or strains, before it bends, and that what the time spline misses of the
@@ -92,14 +92,21 @@ def _without_tip(scene: Scene, u: float, directed: bool) -> float:
     stiffer: the motion is off by about half of what the tip is long, a twentieth of the error that is aimed at.
     """
     length = scene.cable.length
+    if [v for v in scene.places if abs(v - _end_near(scene, u)) <= _ALONE * length] != [u]:
+        return 0.0
     tip = min(0.5 * scene.cable.diameter, _TIP * length)
-    if directed:
-        tip = min(tip, _OF_TARGET * (scene.quality.target_error or AUTO_TARGET * length))
-    for end in (0.0, length):
-        if abs(u - end) <= tip:
-            near = [v for v in scene.places if abs(v - end) <= _ALONE * length]
-            return end if near == [u] else u
-    return u
+    return min(tip, _OF_TARGET * (scene.quality.target_error or AUTO_TARGET * length)) if directed else tip
+
+
+def _end_near(scene: Scene, u: float) -> float:
+    length = scene.cable.length
+    return 0.0 if u < 0.5 * length else length
+
+
+def _without_tip(scene: Scene, u: float, directed: bool) -> float:
+    """Return where a knot for what is at `u` [m] belongs: at an end that only a tip lies beyond."""
+    end = _end_near(scene, u)
+    return end if abs(u - end) <= longest_tip(scene, u, directed) else u
 
 
 def free_ends(scene: Scene) -> tuple[bool, bool]:

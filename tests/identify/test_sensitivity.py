@@ -194,6 +194,28 @@ def test_a_number_at_its_bound_is_changed_to_the_other_side(name: str, scale: fl
     assert np.abs(sensed(U, T)[0] - expected).max() < 2e-3 * np.abs(expected).max()
 
 
+@pytest.mark.parametrize(
+    ("hold", "end", "others"),
+    [("tangent", 0.0, ()), ("clamp", 1.0, ()), ("tangent", 0.0, (0.05,)), ("point", 0.0, (0.05,))],
+    ids=["tangent", "clamp", "tangent beside a load", "point beside a load"],
+)
+def test_by_the_place_of_a_grasp_at_an_end_it_is_nearly_that_a_little_away_from_it(
+    hold: Any, end: float, others: tuple[float, ...]
+) -> None:
+    """A tip that bent with a held direction, as it had no span of its own, doubled it, and it was called exact."""
+
+    def held(off: float) -> Scene:
+        grasp = Grasp(u=abs(end - off), hold=hold, path=Move(displacement=(0.0, 0.1, 0.0), duration=1.5))
+        loads = tuple(Load(u=u, force=(0.0, 0.01, 0.0)) for u in others)
+        return scene(grasps=(grasp,), loads=loads, quality=Quality(n_u=14, n_t=15, method="march", estimate=False))
+
+    at_end, inside = (sensitivities(predict(held(off)), ["grasps[0].u"]) for off in (0.0, 3e-3))
+    assert (at_end.exact, inside.exact) == ((False,), (True,))
+    assert "at an end" in at_end.reason
+    difference = at_end(U, T) - inside(U, T)
+    assert np.linalg.norm(difference) < 0.05 * np.linalg.norm(inside(U, T))
+
+
 @pytest.mark.parametrize("name", ["grasps[0].path.displacement[0]", "shape.start[0]", "environment.drag_quadratic"])
 def test_a_number_that_is_tiny_by_chance_is_changed_as_zero_is(name: str) -> None:
     """As 0.5 cos(pi/2) is 3e-17, by a share of which nothing moves: derivatives were 0, or rounding."""
