@@ -77,6 +77,9 @@ def with_contact_errors(
 ) -> tuple[ContactForce, ...]:
     """Return contact forces with their errors, from those of the same motion marched on other grids.
 
+    A cable that lies on an obstacle as the motion begins has not been pressed against it yet, on any grid: there the
+    error is the distance to the next force at least.
+
     Args:
         found: of the `windows`.
         windows: between events.
@@ -90,7 +93,11 @@ def with_contact_errors(
                 of.times, parts_of([len(at) for at in _kept([len(w.times) for w in windows])]), getattr(of, kind)
             )
 
-        return errors(series(own, windows), [series(*other) for other in others if other[0].name == own.name])
+        found = errors(series(own, windows), [series(*other) for other in others if other[0].name == own.name])
+        if found is not None:
+            first, second = getattr(own, kind)[:2]
+            found[0] = max(found[0], np.linalg.norm(second - first))
+        return found
 
     return tuple(replace(own, force_error=error(own, "force"), friction_error=error(own, "friction")) for own in found)
 

@@ -148,6 +148,17 @@ def test_the_error_of_a_force_holds_against_a_much_finer_march() -> None:
     assert own.force_error.mean() < 0.1 * WEIGHT
 
 
+def test_a_cable_that_begins_on_a_box_is_borne_by_it_from_the_beginning_within_the_error() -> None:
+    """It gave nothing at t = 0, where it had not been pressed yet, with an error of a fifth of the weight."""
+    box = Box(center=(0.5, 0.0, -0.5 * CABLE.diameter - 0.25), size=(4.0, 4.0, 0.5))
+    lifts = Grasp(u=0.0, path=Move(displacement=(0.0, 0.0, 0.2), duration=1.0))
+    around = Environment(drag=0.05, obstacles=[box])
+    (contact,) = predict(Scene(cable=CABLE, shape=Straight(), grasps=[lifts], environment=around)).contacts
+    assert contact.force_error is not None
+    assert abs(contact.force[0, 2] - WEIGHT) < contact.force_error[0]
+    assert np.median(contact.force_error) < 0.02 * WEIGHT
+
+
 def pressed_into_a_ball(velocity: float) -> ContactForce:
     """Return what a ball gives to a straight cable that begins 20 um deep in it, and is moved there with a velocity."""
     ball = Sphere(center=(0.5, 0.0, -0.05 - 0.0025 + 2e-5), radius=0.05)
