@@ -4,8 +4,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from app.schemas.cable import CableModel
 from app.schemas.primitives import ForceOverTime, LoadModel, MovePath, PrimitiveModel, StillPath, WaypointsPath
 from app.schemas.request import PredictionRequest
@@ -45,7 +43,7 @@ from dlocore import (
 from dlocore.errors import within
 from dlocore.scene.obstacles import Obstacle
 from dlocore.scene.paths import Path
-from dlocore.scene.scene import Shape
+from dlocore.scene.scene import Shape, load_times
 
 
 class Motion(NamedTuple):
@@ -188,11 +186,10 @@ def load_of(i: int, model: LoadModel) -> Load:
     if not isinstance(model.force, ForceOverTime):
         with within(prefix):
             return Load(u=model.u, force=model.force)
-    times, values = model.force.times, model.force.values
-    if len(times) != len(values):
-        raise SceneError(f"{prefix}.force.values", f"{len(values)} forces", f"as many as times ({len(times)})")
-    if not (np.diff(times) > 0).all():
-        raise SceneError(f"{prefix}.force.times", times, "rising times [s]")
+    count, values = len(model.force.times), model.force.values
+    if count != len(values):
+        raise SceneError(f"{prefix}.force.values", f"{len(values)} forces", f"as many as times ({count})")
+    times = load_times(f"{prefix}.force.times", model.force.times)
     with within(prefix):
         return Load(u=model.u, force=values, times=times)
 

@@ -87,7 +87,8 @@ class ForceOverTime(Model):
 
     times: Long[Number] = Field(
         min_length=1,
-        description="Rising times [s]; the first force acts before them, too, and the last one after.",
+        description="Rising times [s], two equal ones where the force jumps; the first force acts before them, too, "
+        "and the last one after.",
         examples=[[0, 1]],
     )
     values: Long[Vector] = Field(

@@ -48,7 +48,11 @@ class LoadsPicture:
 
 
 def forces_over(load: Load, horizon: float) -> tuple[Floats, Floats]:
-    """Return times (k,) [s] until `horizon` [s] between which a force changes evenly, and the force then (k, 3) [N]."""
+    """Return times (k,) [s] until `horizon` [s] between which a force changes evenly, and the force then (k, 3) [N].
+
+    Those in between are there twice, with the force before and after them.
+    """
     given = np.zeros(0) if load.times is None else np.clip(load.times, 0.0, horizon)
     times = np.unique([0.0, *given, horizon])
-    return times, load.at(times)
+    both = np.stack([load.at(times, 0.0), load.at(times)], axis=1).reshape(-1, 3)
+    return np.repeat(times, 2)[1:-1], both[1:-1]

@@ -101,7 +101,8 @@ class GraspReaction(Answered):
 
     Attributes:
         u: material coordinate of the grasp [m].
-        times: (k,) [s], those of the prediction's reactions.
+        times: (k,) [s], those of the prediction's reactions; twice where these may jump, as a grasp closes or opens, as
+            `dlocore.Load` takes them.
         reaction: (k, 3) [N]; zero while the gripper is open.
         moment: (k, 3) [N m]; zero for a grasp that holds only the position.
         reaction_error: estimated error of the force at those times (k,) [N], of the discretisation, from its distance

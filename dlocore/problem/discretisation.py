@@ -374,15 +374,18 @@ def consistent_start(problem: Problem, grid: Grid, *, touches: bool = True) -> F
     return np.concatenate([q, grid.start[:, line.nc :]], axis=1)
 
 
-def applied_forces(problem: Problem, grid: Grid, t: Floats) -> Floats:
-    """Return the applied forces (1 or k, n_u, nc) [N]: weight, and loads at times t (k,) where there are any."""
+def applied_forces(problem: Problem, grid: Grid, t: Floats, end: float = np.inf) -> Floats:
+    """Return the applied forces (1 or k, n_u, nc) [N]: weight, and loads at times t (k,) where there are any.
+
+    Of a load that jumps they are those after it, but before it from `end` [s] on.
+    """
     steady = cast(Floats, grid.tables.weight)[:, None] * problem.weight()
     if not problem.scene.loads:
         return steady[None]
     applied = np.tile(steady, (len(t), 1, 1))
     for load in problem.scene.loads:
         first, b = grid.rows(load.u)
-        force = problem.rates(load.at(t))
+        force = problem.rates(load.at(t, end))
         applied[:, first : first + 4] += b[:, None] * force[:, None, :]
     return applied
 
@@ -394,20 +397,23 @@ def applied_in_steps(problem: Problem, grid: Grid, times: Floats, begin: float, 
     its impulse nothing is lost (docs/model.md eq. 13b). A stretch is entered with the forces at its `begin` [s]; what
     their mean would have more comes with the next step. What comes after its `end` [s] is not known to it.
     """
-    applied = applied_forces(problem, grid, times)
+    applied = applied_forces(problem, grid, times, end)
     h = times[1] - times[0]
     for load in problem.scene.loads:
         if load.times is None:
             continue
         at, force = cast(Floats, load.times), cast(Floats, load.force)
-        slopes = np.diff(force, axis=0) / np.diff(at)[:, None]
-        turns = np.diff(slopes, axis=0, prepend=np.zeros((1, 3)), append=np.zeros((1, 3)))
+        lasts, rises, none = np.diff(at)[:, None], np.diff(force, axis=0), np.zeros((1, 3))
+        slopes = np.divide(rises, lasts, out=np.zeros_like(rises), where=lasts > 0.0)
+        turns = np.diff(slopes, axis=0, prepend=none, append=none)
+        jumps = np.append(np.where(lasts > 0.0, 0.0, rises), none, axis=0)
         inside = (at > times[0]) & (at < min(times[-1] + h, end))
-        at, turns = at[inside], turns[inside]
-        before = np.searchsorted(times, at, side="right") - 1
+        at, turns, jumps = at[inside], turns[inside], jumps[inside]
+        before = np.searchsorted(times, at) - 1
         mean = np.zeros((len(times) + 1, 3))
-        for rows, apart in ((before, at - times[before]), (before + 1, h - (at - times[before]))):
-            np.add.at(mean, rows, turns * (np.clip(h - apart, 0.0, h) ** 3 / (6.0 * h**2))[:, None])
+        for rows, apart, sign in ((before, at - times[before], 1.0), (before + 1, h - (at - times[before]), -1.0)):
+            near = np.clip(h - apart, 0.0, h)[:, None]
+            np.add.at(mean, rows, turns * (near**3 / (6.0 * h**2)) + sign * jumps * (near**2 / (2.0 * h**2)))
         if times[0] == begin:
             mean[1] += mean[0]
         first, b = grid.rows(load.u)

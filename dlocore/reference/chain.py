@@ -73,7 +73,7 @@ class Chain:
             spin[:, j] = (rate[:, 1] * np.cross(now[:, 0], now[:, 1])).sum(axis=1)
         load = np.zeros((len(t), len(self.node_of), 3))
         for given in rod.problem.scene.loads:
-            load[:, int(np.argmax(self.node_of == rod.node(given.u)))] += given.at(t) @ rod.axes.T
+            load[:, int(np.argmax(self.node_of == rod.node(given.u)))] += given.at(t, self.end) @ rod.axes.T
         stack = np.array([places[int(self.node_of[k])] for k in held]).reshape(len(held), 2, len(t), 3)
         position, velocity = (np.ascontiguousarray(stack[:, d].transpose(1, 0, 2)) for d in (0, 1))
         return Guide(np.array(held, np.int64), position, velocity, virtual, tangent, director, rates, spin, load)

@@ -241,7 +241,10 @@ class Grasp:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Load(Checked):
-    """A known force at material coordinate `u` [m]: `force` (3,) [N], or (k, 3) at `times` (k,) [s], linear between."""
+    """A known force at material coordinate `u` [m]: `force` (3,) [N], or (k, 3) at `times` (k,) [s], linear between.
+
+    Of two equal times the first has the force before a jump, the second that after it.
+    """
 
     u: float
     force: ArrayLike
@@ -252,18 +255,28 @@ class Load(Checked):
         if self.times is None:
             object.__setattr__(self, "force", array("force", self.force, shape=(3,), unit="N"))
             return
-        times = array("times", self.times, shape=(None,), unit="s")
-        if not (len(times) >= 1 and (np.diff(times) > 0).all()):
-            raise SceneError("times", times, "rising times")
+        times = load_times("times", self.times)
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "force", array("force", self.force, shape=(len(times), 3), unit="N"))
 
-    def at(self, t: Floats) -> Floats:
-        """Forces at times `t` (k,) [s]; (k, 3) [N]."""
+    def at(self, t: Floats, end: float = np.inf) -> Floats:
+        """Forces at times `t` (k,) [s]; (k, 3) [N]. At a jump it is that after it, but before it from `end` [s] on."""
         force = cast(Floats, self.force)
         if self.times is None:
             return np.broadcast_to(force, (len(t), 3))
-        return np.column_stack([np.interp(t, cast(Floats, self.times), force[:, d]) for d in range(3)])
+        times = cast(Floats, self.times)
+        after, before = (
+            [np.interp(way * t, (way * times)[::way], force[::way, d]) for d in range(3)] for way in (1, -1)
+        )
+        return np.where(t < end, after, before).T
+
+
+def load_times(field: str, given: ArrayLike) -> Floats:
+    """Return the times (k,) [s] of a load, or raise SceneError unless they rise, or two are equal where it jumps."""
+    times = array(field, given, shape=(None,), unit="s")
+    if not (len(times) >= 1 and (np.diff(times) >= 0.0).all() and (times[2:] > times[:-2]).all()):
+        raise SceneError(field, times, "rising times [s], two equal ones where the force jumps")
+    return times
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -152,6 +152,7 @@ CASES: list[tuple[dict[str, Any], str, Any, str]] = [
     (WAYPOINTS, "primitives.0.path.times", [0, 0.5, 0.5], "primitives[0].path.times[2]"),
     (WAYPOINTS, "primitives.0.path.orientations", [[2, 0, 0, 0]] * 3, "primitives[0].path.orientations[0]"),
     (LOADED, "loads.0.force.times", [1, 0], "loads[0].force.times"),
+    (LOADED, "loads.0.force", {"times": [1, 1, 1], "values": [[0, 0, 0]] * 3}, "loads[0].force.times"),
     (PAPER, "shape", {"kind": "prediction", "id": "../../etc/passwd"}, "shape.id"),
     (PAPER, "shape", {"kind": "prediction", "id": "0" * 28}, "shape.id"),
     (PAPER, "effects", {"stretch": "off"}, "effects.stretch"),

@@ -85,6 +85,12 @@ def test_what_a_motion_goes_on_with_comes_back() -> None:
     assert differences(scene, again(scene), "scene") == []
 
 
+def test_a_force_that_jumps_comes_back_as_it_was() -> None:
+    jumps = Load(u=0.5, force=[(0, 0, 0), (0, 1, 0), (0, 0, 0)], times=[0.5, 0.5, 1.0])
+    scene = replace(PUSHED, loads=(jumps,))
+    assert differences(scene, again(scene), "scene") == []
+
+
 def test_every_effect_can_be_switched() -> None:
     scene = replace(PUSHED, effects=dict.fromkeys(EFFECTS, "on"))
     assert differences(scene, again(scene), "scene") == []

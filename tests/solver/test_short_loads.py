@@ -1,11 +1,13 @@
-"""Loads that last for less than a step: none is stepped over, and of its impulse nothing is lost."""
+"""Loads that jump, or last for less than a step: none is stepped over, and of its impulse nothing is lost."""
 
+from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 
-from dlocore import Cable, Environment, Grasp, Load, Quality, Scene, Straight, predict
+from dlocore import Cable, Environment, Grasp, Load, Move, Quality, Scene, SceneError, Straight, predict
 from dlocore.problem.discretisation import applied_forces, applied_in_steps, make_grid
 from dlocore.problem.problem import pose
 
@@ -17,7 +19,7 @@ PUSHES = np.random.default_rng(5).normal(size=(40, 3))
 PUSHES[[0, -1]] = 0.0
 
 
-def bar(load: Load, **quality: float) -> Scene:
+def bar(load: Load, **quality: Any) -> Scene:
     """Return a stiff bar that flies freely."""
     cable = Cable(length=1.0, diameter=0.01, linear_density=MASS, bending_stiffness=1.0)
     return Scene(
@@ -37,6 +39,65 @@ def test_the_impulse_of_any_load_is_kept(steps: int) -> None:
     times = np.linspace(0.0, HORIZON, steps + 1)
     forces = stepped(Load(u=0.3, force=PUSHES, times=INSTANTS), times)
     np.testing.assert_allclose(HORIZON / steps * forces.sum(axis=0), np.trapezoid(PUSHES, INSTANTS, axis=0), atol=1e-12)
+
+
+@pytest.mark.parametrize("steps", [20, 21, 1000])
+def test_the_impulse_of_a_load_that_jumps_is_kept(steps: int) -> None:
+    instants = np.append(INSTANTS[:-1], 1.9)  # the last on a time of 20 steps
+    pushes = np.random.default_rng(6).normal(size=(80, 3))
+    pushes[[0, -1]] = 0.0
+    jumps = Load(u=0.3, force=pushes, times=np.repeat(instants, 2))
+    forces = stepped(jumps, np.linspace(0.0, HORIZON, steps + 1))
+    expected = (np.diff(instants)[:, None] * 0.5 * (pushes[1:-1:2] + pushes[2::2])).sum(axis=0)
+    np.testing.assert_allclose(HORIZON / steps * forces.sum(axis=0), expected, atol=1e-12)
+
+
+def test_where_a_load_jumps_it_is_that_before_it_to_what_ends_there_and_that_after_it_to_what_begins() -> None:
+    load = Load(u=0.3, force=[[1.0, 0, 0], [2.0, 0, 0], [5.0, 0, 0], [6.0, 0, 0]], times=[0.0, 1.0, 1.0, 2.0])
+    times = np.array([0.5, 1.0, 1.5])
+    np.testing.assert_allclose(load.at(times)[:, 0], [1.5, 5.0, 5.5], atol=1e-15)
+    np.testing.assert_allclose(load.at(times[:2], 1.0)[:, 0], [1.5, 2.0], atol=1e-15)
+    before, after = np.linspace(0.0, 1.0, 11), np.linspace(1.0, 2.0, 11)
+    np.testing.assert_allclose(stepped(load, before, 0.0, 1.0)[:, 0], 1.0 + before, atol=1e-12)
+    np.testing.assert_allclose(stepped(load, after, 1.0, 2.0)[:, 0], 4.0 + after, atol=1e-12)
+
+
+@pytest.mark.parametrize("times", [[0.0, 2.0, 1.0], [1.0, 1.0, 1.0]], ids=["falling", "three are equal"])
+def test_times_that_neither_rise_nor_are_a_jump_are_refused(times: list[float]) -> None:
+    with pytest.raises(SceneError, match=r"^times: got .* Allowed: rising times \[s\], two equal ones where the force"):
+        Load(u=0.3, force=np.zeros((3, 3)), times=times)
+
+
+@pytest.mark.parametrize(("method", "error"), [("march", 1e-3), ("reference", 1e-7)])
+def test_a_free_bar_that_is_pushed_at_once_goes_as_far_as_that_takes_it(method: str, error: float) -> None:
+    force, begin, end = 0.05, 0.37, 1.21  # [N, s, s]
+    push = Load(u=0.5, force=[[0, 0, 0], [0, force, 0], [0, force, 0], [0, 0, 0]], times=[begin, begin, end, end])
+    found = predict(bar(push, target_error=1e-2, method=method))
+    t = np.array([0.3, 1.0, HORIZON])
+    went = 0.5 * force / MASS * (np.maximum(t - begin, 0.0) ** 2 - np.maximum(t - end, 0.0) ** 2)
+    middle = np.trapezoid(found.surface(np.linspace(0.0, 1.0, 101), t)[:, :, 1], dx=0.01, axis=1)
+    np.testing.assert_allclose(middle, went, atol=error)
+
+
+@pytest.mark.parametrize("replaced", [0, 1])
+def test_the_force_of_a_gripper_in_its_place_moves_the_cable_as_it_did(replaced: int) -> None:
+    """It had been refused, as the times of a reaction are there twice where a grasp opens."""
+    up, aside = (Move(displacement=way, duration=1.0) for way in ((0.05, 0.1, 0.1), (-0.2, 0.1, 0.1)))
+    held = Scene(
+        cable=Cable(length=1.0, diameter=0.006, linear_density=0.05, bending_stiffness=2e-3),
+        shape=Straight(),
+        grasps=[Grasp(u=0.0, path=up), Grasp(u=1.0, path=aside, release_time=0.6)],
+        environment=Environment(drag=0.1),
+        quality=Quality(target_error=2e-3),
+    )
+    own = predict(held)
+    given = own.grasps[replaced]
+    load = Load(u=given.u, force=given.reaction, times=given.times)
+    pulled = predict(replace(held, grasps=[held.grasps[1 - replaced]], loads=[load]))
+    assert (own.status, pulled.status) == ("converged", "converged")
+    u, t = np.linspace(0.0, 1.0, 21), np.linspace(0.0, 1.0, 41)
+    off = np.linalg.norm(own.surface.positions(u, t) - pulled.surface.positions(u, t), axis=-1).max()
+    assert off < own.accuracy.error_estimate + pulled.accuracy.error_estimate
 
 
 def test_what_pushes_in_the_first_step_comes_with_the_next() -> None:

@@ -10,6 +10,8 @@ from app.viewer import load_edits
 from app.viewer.arrows import ARROW_LENGTH
 from app.viewer.draft import start_draft
 from app.viewer.load_edits import Pull
+from app.viewer.loads import forces_over
+from dlocore import Load
 
 LOAD = {"u": 0.5, "force": [0.0, 0.5, 0.0]}
 
@@ -38,6 +40,13 @@ def test_a_force_that_changes_otherwise_is_moved_but_not_written_anew():
     draft = loaded({"u": 0.5, "force": force})
     assert load_edits.changed(draft, 0, start=0.2) == draft
     assert load_edits.loads(load_edits.placed(draft, 0, 0.7)) == [{"u": 0.7, "force": force}]
+
+
+def test_a_force_that_jumps_is_shown_before_and_after_the_jump():
+    load = Load(u=0.5, force=[[0, 0, 0], [0, 3, 0], [0, 1, 0], [0, 0, 0]], times=[0.0, 0.5, 0.5, 1.0])
+    times, forces = forces_over(load, 2.0)
+    np.testing.assert_array_equal(times, [0.0, 0.5, 0.5, 1.0, 1.0, 2.0])
+    np.testing.assert_array_equal(forces[:, 1], [0, 3, 1, 0, 0, 0])
 
 
 def test_a_new_force_acts_where_no_gripper_is():
