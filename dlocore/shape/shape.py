@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import cast
@@ -53,7 +53,7 @@ class StartCurve(SplineCurve):
         velocity: v(u) [m/s], or None at rest.
         fit_rms: root mean square distance of the given points from the curve [m]; 0 where it is given exactly.
         fit_max: the largest of these distances [m].
-        length_given: length of the curve before it was made as long as the cable [m].
+        length_given: length of the curve, its strain taken off, before it was made as long as the cable [m].
         ends_moved: by how much that moved the end that it moved farther [m]; 0 where the curve is given exactly.
         theta: angle of the sections, a spline with control points (n, 1) [rad], or None where it is the same
             everywhere.
@@ -166,16 +166,6 @@ def _given(shape: ControlPoints, length: float) -> StartCurve:
     rows = cast(Floats, shape.control_points)
     control, angles = rows[:, :3].copy(), rows[:, 3:].copy()
     knots = uniform_knots(len(control), length) if shape.knots is None else cast(Floats, shape.knots)
-    speed, width = _speed(SplineCurve(knots=knots, control_points=control))
-    given = float((speed * width).sum())
-    check_length("shape.control_points", "control points of the whole cable", given, length)
-    slowest, fastest = float(speed.min()), float(speed.max())
-    if not (slowest >= SPEED_RANGE[0] and fastest <= SPEED_RANGE[1]):
-        allowed = (
-            f"|r'| from {SPEED_RANGE[0]:g} to {SPEED_RANGE[1]:g} everywhere, as u is the cable's own arclength: "
-            "a straight cable has its control points at the means of three successive knots"
-        )
-        raise SceneError("shape.control_points", f"|r'| from {slowest:.3g} to {fastest:.3g}", allowed)
     velocity = theta_rate = None
     if shape.velocity is not None:
         rates = cast(Floats, shape.velocity)
@@ -183,17 +173,27 @@ def _given(shape: ControlPoints, length: float) -> StartCurve:
         if rates.shape[-1] == 4:
             theta_rate = SplineCurve(knots=knots, control_points=rates[:, 3:].copy())
     turned = _turned(angles, SAME_ANGLE, shape.material)
-    theta = SplineCurve(knots=knots, control_points=angles) if turned else None
-    return StartCurve(
+    curve = StartCurve(
         knots=knots,
         control_points=control,
         velocity=velocity,
-        length_given=given,
-        theta=theta,
+        theta=SplineCurve(knots=knots, control_points=angles) if turned else None,
         theta_rate=theta_rate,
         strain=None if shape.strain is None else (greville(knots), cast(Floats, shape.strain)),
         material=shape.material,
     )
+    speed, width = _speed(curve)
+    given = float((speed * width).sum())
+    unstrained = "" if curve.strain is None else " without `strain`"
+    check_length("shape.control_points", f"control points of the whole cable{unstrained}", given, length)
+    slowest, fastest = float(speed.min()), float(speed.max())
+    if not (slowest >= SPEED_RANGE[0] and fastest <= SPEED_RANGE[1]):
+        allowed = (
+            f"|r'|{unstrained} from {SPEED_RANGE[0]:g} to {SPEED_RANGE[1]:g} everywhere, as u is the cable's own "
+            "arclength: a straight cable has its control points at the means of three successive knots"
+        )
+        raise SceneError("shape.control_points", f"|r'| from {slowest:.3g} to {fastest:.3g}", allowed)
+    return replace(curve, length_given=given)
 
 
 def _turned(angles: Floats, same: float, material: Material | None) -> bool:
@@ -201,10 +201,10 @@ def _turned(angles: Floats, same: float, material: Material | None) -> bool:
     return bool(np.ptp(angles) > same or (material is not None and np.abs(angles).max() > same))
 
 
-def _speed(curve: SplineCurve) -> tuple[Floats, Floats]:
-    """Return |r'| at the Gauss points of each knot span (k,), and their quadrature weights (k,) [m]."""
+def _speed(curve: StartCurve) -> tuple[Floats, Floats]:
+    """Return |r'| without strain at the Gauss points of each knot span (k,), and their quadrature weights (k,) [m]."""
     u, width = gauss_points(_plain(curve.knots), *GAUSS_4)
-    return np.sqrt((curve(u, 1) ** 2).sum(axis=1)), width
+    return np.sqrt((curve(u, 1) ** 2).sum(axis=1)) / (1.0 + curve.strain_at(u)), width
 
 
 def _fitted(shape: Points, length: float) -> StartCurve:

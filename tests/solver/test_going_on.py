@@ -15,6 +15,7 @@ from dlocore import (
     ControlPoints,
     Environment,
     Grasp,
+    Load,
     Move,
     Points,
     Prediction,
@@ -169,6 +170,26 @@ def test_sections_that_were_turned_as_the_start_settled_go_on_turned() -> None:
     assert whole.material is not None
     without = energies(whole.scene, whole.surface, [0.4])  # about, as the way on which it settled is not known
     assert without["bend"][0] == pytest.approx(found["bend"][0], rel=0.1)
+
+
+def test_a_cable_that_is_a_tenth_longer_than_without_load_goes_on() -> None:
+    """The control points of a motion are those of the stretched cable: its own length is theirs less the strain."""
+    cable = Cable(length=1.0, diameter=0.01, linear_density=0.05, bending_stiffness=1e-4, axial_stiffness=9.0)
+    hung = Scene(
+        cable=cable,
+        shape=Straight(direction=(0.0, 0.0, -1.0)),
+        grasps=(Grasp(u=0.0),),
+        loads=(Load(u=1.0, force=(0.0, 0.0, -0.7)),),
+        horizon=1.0,
+        environment=Environment(drag=0.5),
+    )
+    first = predict(hung)
+    found = predict(replace(hung, shape=first.shape_at(), horizon=0.5))
+    assert (first.status, found.status) == ("converged", "converged")
+    reaction = 0.05 * 9.81 + 0.7
+    np.testing.assert_allclose(found.grasps[0].reaction[:, 2], reaction, rtol=2e-3)
+    tip = found.surface.positions([1.0], [0.0, 0.5])[:, 0, 2]
+    np.testing.assert_allclose(tip, -1.0 - (0.7 + 0.5 * 0.05 * 9.81) / 9.0, atol=1e-3)
 
 
 def test_the_strain_of_a_start_is_that_of_the_tension_that_its_weight_calls_for() -> None:

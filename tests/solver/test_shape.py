@@ -296,6 +296,19 @@ def test_control_points_of_another_cable_are_refused_by_name() -> None:
     assert error.value.field == "shape.control_points"
 
 
+def test_the_length_of_stretched_control_points_is_told_without_their_strain() -> None:
+    control = bent_control_points(uniform_knots(9, 1.0))
+    own = start_curve(ControlPoints(control_points=control), 1.0).length_given
+    stretched = start_curve(ControlPoints(control_points=1.4 * control, strain=np.full(9, 0.4)), 1.0)
+    assert stretched.length_given == pytest.approx(own, rel=1e-12)
+    uneven = np.linspace([0, 0, 0], [1, 0, 0], 9)
+    for points, given in ((control, r"a curve 0\.7\d* m long"), (1.4 * uneven, r"\|r'\| from 0\.75 to 2\.1")):
+        with pytest.raises(SceneError, match=given) as error:
+            start_curve(ControlPoints(control_points=points, strain=np.full(9, 0.4)), 1.0)
+        assert error.value.field == "shape.control_points"
+        assert "without `strain`" in error.value.allowed
+
+
 def test_a_spline_of_the_same_space_is_transferred_exactly() -> None:
     coarse = np.array([0, 0, 0, 0, 0.1, 0.3, 0.6, 1, 1, 1, 1])
     curve = start_curve(ControlPoints(control_points=bent_control_points(coarse), knots=coarse), 1.0)
