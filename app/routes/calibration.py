@@ -111,7 +111,10 @@ async def follow(
     service: TheService,
     last_event_id: events.LastEventId = None,
 ) -> Response:
-    """Give the course of the last calibration as server-sent events: `state`, `progress`, and `done` or `error`."""
+    """Give the course of the last calibration as server-sent events: `state`, `progress`, and `done` or `error`.
+
+    204: nothing is left to tell.
+    """
     negotiated(request.headers.get("accept"), (EVENTS,))
     job = service.measurements.last(KIND)
     if job is None:

@@ -122,10 +122,7 @@ STOP: Responses = {
     202: {"description": "It stops soon.", "content": {JSON: {"schema": _MEASUREMENT}}},
     **failures(401, 404),
 }
-PROGRESS: Responses = {
-    200: {"description": "The events.", "content": {EVENTS: _PROGRESS}},
-    **failures(401, 404, 406),
-}
+PROGRESS: Responses = {**FOLLOW, 200: {"description": "The events.", "content": {EVENTS: _PROGRESS}}}
 
 
 def a_file(description: str, media: str) -> Responses:

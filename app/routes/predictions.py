@@ -217,13 +217,10 @@ async def follow(
     seen = events.seen_before(last_event_id)
     job = service.jobs.get(id)
     if job is not None:
-        over = job.finished.is_set() and seen > len(job.iterations)
-        return Response(status_code=204) if over else events.of_job(job, seen)
+        return events.of_job(job, seen)
     document = await anyio.to_thread.run_sync(service.document, id)
     if document is None:
         raise no_such_run(id)
-    if seen > len(orjson.loads(document)["iterations"]):
-        return Response(status_code=204)
     return events.of_document(document, seen)
 
 

@@ -148,15 +148,19 @@ async def follow(
     service: TheService,
     last_event_id: events.LastEventId = None,
 ) -> Response:
-    """Give the course of a study as server-sent events: `state`, `progress`, and `done` or `error`."""
+    """Give the course of a study as server-sent events: `state`, `progress`, and `done` or `error`.
+
+    204: nothing is left to tell.
+    """
     negotiated(request.headers.get("accept"), (EVENTS,))
+    seen = events.seen_before(last_event_id)
     job = service.measurements.get(id)
     if job is not None and job.kind == KIND:
-        return events.of_job(job, events.seen_before(last_event_id))
+        return events.of_job(job, seen)
     document = await anyio.to_thread.run_sync(store_of(service).document, id)
     if document is None:
         raise _no_study(id)
-    return events.of_finished(id, document)
+    return events.of_finished(id, document, seen)
 
 
 def _no_study(id: str) -> ProblemError:

@@ -15,6 +15,8 @@ LastEventId = Annotated[
 ]
 # nothing may keep events back: no cache, and no proxy that collects them
 _HEADERS = {"Cache-Control": "no-store", "X-Accel-Buffering": "no", "Vary": "Accept"}
+_DIGITS = 9  # of the number of an event, at most
+_LAST = 10**_DIGITS - 1  # number of the end where it is not known how many events came before
 
 
 def _event(kind: str, data: bytes, number: int | None = None) -> bytes:
@@ -30,11 +32,15 @@ def _state(id: str, state: str) -> bytes:
 def of_job(job: Job, seen: int = 0, *, cancel: bool = False) -> Response:
     """Return the events of a job: states, the iterations after the first `seen`, and `done` or `error`.
 
+    It is 204 where nothing is left to tell, so that an `EventSource` does not connect again.
+
     Args:
         job: the job.
-        seen: how many iterations the client knows.
+        seen: how many events but states the client knows.
         cancel: whether the job ends when the client goes.
     """
+    if job.finished.is_set() and seen > len(job.iterations):
+        return Response(status_code=204)
 
     async def produce(emit: Emit) -> None:
         try:
@@ -62,20 +68,26 @@ async def _follow(job: Job, seen: int, emit: Emit) -> None:
 
 
 def of_document(document: bytes, seen: int = 0) -> Response:
-    """Return the events of a stored run, as those of its job were."""
+    """Return the events of a stored run after the first `seen`, as those of its job were."""
     answer = orjson.loads(document)
-    pieces = [_state(answer["id"], "done")]
-    pieces += [_event("iteration", orjson.dumps(shown), shown["number"]) for shown in answer["iterations"][seen:]]
-    pieces.append(_event("done", document, len(answer["iterations"])))
+    past = [_event("iteration", orjson.dumps(shown), shown["number"]) for shown in answer["iterations"][seen:]]
+    return _of_past(answer["id"], past, document, seen, len(answer["iterations"]))
+
+
+def of_finished(id: str, document: bytes, seen: int = 0) -> Response:
+    """Return the events of a measurement that ended in an earlier life of the service: its progress is forgotten."""
+    return _of_past(id, [], document, seen, _LAST)
+
+
+def _of_past(id: str, past: list[bytes], document: bytes, seen: int, last: int) -> Response:
+    """Return the `past` events and a `done` with the number `last`, or 204 where that was seen, too."""
+    if seen > last:
+        return Response(status_code=204)
+    pieces = [_state(id, "done"), *past, _event("done", document, last)]
     return Response(b"".join(pieces), media_type=EVENTS, headers=_HEADERS)
 
 
-def of_finished(id: str, document: bytes) -> Response:
-    """Return the events of a measurement that ended in an earlier life of the service."""
-    return Response(_state(id, "done") + _event("done", document), media_type=EVENTS, headers=_HEADERS)
-
-
 def seen_before(last_event_id: str | None) -> int:
-    """Return how many iterations a client has seen by its ``Last-Event-ID``; 0 where that makes no sense."""
+    """Return how many events a client has seen by its ``Last-Event-ID``; 0 where that makes no sense."""
     given = (last_event_id or "").strip()
-    return int(given) + 1 if given.isascii() and given.isdigit() and len(given) < 10 else 0
+    return int(given) + 1 if given.isascii() and given.isdigit() and len(given) <= _DIGITS else 0

@@ -76,6 +76,7 @@ def test_its_progress_ends_with_what_is_then_read(fresh: TestClient) -> None:
     the_problem(fresh.get(ADDRESS, params={"dimensions": 4}), 422)
     again = parsed(fresh.get(f"{ADDRESS}/events", headers={"last-event-id": "2"}).text)
     assert [data["number"] for kind, _, data in again if kind == "progress"] == list(range(3, len(news)))
+    assert fresh.get(f"{ADDRESS}/events", headers={"last-event-id": again[-1][1] or ""}).status_code == 204
 
 
 def test_one_that_cant_be_written_is_told_of_with_507(fresh: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:

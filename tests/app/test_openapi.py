@@ -36,6 +36,13 @@ def test_openapi_has_each_constant_as_an_enum_too(client: TestClient) -> None:
     assert all(kind["enum"] == [kind["const"]] for kind in kinds if "const" in kind)
 
 
+def test_every_course_of_events_can_be_over() -> None:
+    paths = create_app().openapi()["paths"]
+    courses = [path["get"]["responses"] for address, path in paths.items() if address.endswith("/events")]
+    assert len(courses) == 3
+    assert all("204" in answers for answers in courses)
+
+
 def _examples() -> list[Any]:
     """Return the address and the body of each example of a request."""
     found = []

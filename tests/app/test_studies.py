@@ -10,7 +10,9 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app import cli
+from app.routes.studies import store_of
 from app.schemas.calibration import MeasurementResponse
+from app.schemas.ids import new_id
 from app.schemas.study import StudyList, StudyResponse
 from app.store import studies
 from dlocore.study import record
@@ -46,10 +48,24 @@ def test_a_study_is_followed_to_its_end_and_then_read(client: TestClient) -> Non
     summary = StudyList.model_validate(client.get(ADDRESS).json(), strict=True).studies[0]
     assert (summary.id, summary.created, summary.state) == (document["id"], document["created"], "done")
     assert (summary.links.self, summary.size) == (address, len(client.get(address).content))
+    seen = {"last-event-id": events[-1][1] or ""}
+    assert client.get(f"{address}/events", headers=seen).status_code == 204  # so that an EventSource stops
     assert client.delete(address).status_code == 204
     the_problem(client.get(address), 404)
     the_problem(client.delete(address), 404)
     the_problem(client.get(f"{address}/events"), 404)
+
+
+def test_a_study_of_an_earlier_life_of_the_service_is_told_once(client: TestClient) -> None:
+    id = new_id()
+    store_of(client.app.state.service).save(id, b'{"state":"done"}')  # type: ignore[attr-defined]
+    address = f"{ADDRESS}/{id}/events"
+    for seen in ("", "12"):  # of the progress, after which it ended
+        told = parsed(client.get(address, headers={"last-event-id": seen}).text)
+        assert [kind for kind, _, _ in told] == ["state", "done"]
+        assert told[-1][2] == {"state": "done"}
+    assert client.get(address, headers={"last-event-id": told[-1][1] or ""}).status_code == 204
+    client.delete(f"{ADDRESS}/{id}")
 
 
 def test_a_study_that_cant_be_stored_can_be_read(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -77,7 +93,9 @@ def test_a_study_under_way_is_read_as_its_state_and_can_be_stopped(client: TestC
     assert {study["state"] for study in newest} <= {"queued", "running"}
     assert client.delete(waiting.headers["location"]).json()["state"] == "cancelled"
     assert client.delete(address).status_code in (200, 202)
-    assert parsed(client.get(f"{address}/events").text)[-1][2]["type"] == "urn:dlo:problem:cancelled"
+    _, number, problem = parsed(client.get(f"{address}/events").text)[-1]
+    assert problem["type"] == "urn:dlo:problem:cancelled"
+    assert client.get(f"{address}/events", headers={"last-event-id": number or ""}).status_code == 204
     assert client.get(address).json()["state"] == "cancelled"
     assert [study["state"] for study in client.get(ADDRESS).json()["studies"][:2]] == ["cancelled"] * 2
 
