@@ -8,7 +8,20 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks.hard.generator import draw
-from dlocore import Cable, Environment, Grasp, Move, Points, Prediction, Quality, Scene, Straight, Table, predict
+from dlocore import (
+    Cable,
+    Environment,
+    Grasp,
+    Move,
+    Points,
+    Prediction,
+    Quality,
+    Scene,
+    SceneError,
+    Straight,
+    Table,
+    predict,
+)
 from dlocore.effects.selfcontact import APART
 from dlocore.levels.level import distance, run_level
 from dlocore.problem.problem import pose
@@ -187,6 +200,33 @@ def test_strands_that_start_close_are_kept_apart_without_asking() -> None:
     assert far.self_contact is None
     off = pose(replace(near_start(1.8 * DIAMETER), effects={"self_contact": "off"}))
     assert off.self_contact is None
+
+
+def wound(turns: float, pitch: float) -> Scene:
+    """Return a cable of a metre wound to so many turns, each `pitch` [m] above the one before."""
+    angle = np.linspace(0.0, 2.0 * np.pi * turns, 161)
+    radius = 1.0 / np.hypot(2.0 * np.pi * turns, pitch * turns)
+    points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), pitch * angle / (2.0 * np.pi)])
+    cable = Cable(length=1.0, diameter=DIAMETER, linear_density=0.05, bending_stiffness=1e-3)
+    return Scene(
+        cable=cable,
+        shape=Points(points=points),
+        grasps=(Grasp(u=0.0),),
+        horizon=1.0,
+        effects={"self_contact": "on"},
+    )
+
+
+def test_strands_that_lie_in_each_other_are_pressed_apart_until_they_pass_through() -> None:
+    assert pose(wound(1.5, 0.2 * DIAMETER)).self_contact is not None
+    with pytest.raises(SceneError, match=r"shape: got two strands 0\.0002 m apart\. The start passes through itself"):
+        pose(wound(1.5, 0.04 * DIAMETER))
+
+
+@pytest.mark.parametrize("table", [None, Table()])
+def test_the_ends_of_a_ring_may_meet(table: Table | None) -> None:
+    ring = replace(wound(1.0, 0.0), environment=Environment(table=table))
+    assert pose(ring).self_contact is not None
 
 
 def test_on_a_table_strands_may_lie_over_each_other_and_the_message_says_so() -> None:

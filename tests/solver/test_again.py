@@ -17,10 +17,12 @@ from dlocore import (
     Sphere,
     Straight,
     Table,
+    Waypoints,
     predict,
     predict_many,
 )
 from dlocore.accuracy import again as again_module
+from dlocore.accuracy.changes import untold
 from dlocore.solvers.monitor import TimeIsUp
 from dlocore.stability.determined import UNDETERMINED, UNSEEN
 from tests.solver.scenes import WEIGHTLESS, apart, cable, march, paper_scene, samples
@@ -90,6 +92,32 @@ def test_the_least_squares_goes_on_without_a_companion():
 def longer(scene: Scene) -> Scene:
     (g,) = scene.grasps
     return replace(scene, grasps=(replace(g, path=replace(g.path, duration=1.7)),), horizon=None)
+
+
+def test_what_is_left_to_iterate_is_of_its_own_solve():
+    before = predict(paper_scene(0.25, quality=Quality(n_u=13, n_t=19, delta=1e-4)))
+    again = predict(moved(before.scene, 0.0, 0.01, 0.0), like=before)
+    assert AFRESH not in again.message
+    assert again.accuracy.method == "spacetime"
+    assert again.accuracy.error_parts["iteration"] == pytest.approx(again.iterations[-1].update)
+    assert again.accuracy.error_parts["iteration"] > 1.1 * before.accuracy.error_parts["iteration"]
+
+
+def led(tremble: float) -> Scene:
+    """Return the paper's case led by waypoints, 40 ms apart, that tremble by so much [m] at 10 Hz."""
+    t = np.linspace(0.0, 1.6, 41)
+    y = 0.3 * t / 1.6 + tremble * np.sin(20.0 * np.pi * t)
+    path = Waypoints(times=t, positions=np.column_stack([0.25 + 0.0 * t, y, 0.0 * t]))
+    return replace(paper_scene(0.25, quality=Quality()), grasps=(Grasp(u=0.25, path=path),))
+
+
+def test_what_its_own_steps_miss_of_a_path_that_trembles_counts():
+    before = predict(led(0.0))
+    again = predict(led(4e-3), like=before)
+    assert AFRESH not in again.message
+    assert again.level is not None
+    missed = max(untold(again.level).values())
+    assert again.accuracy.error_estimate >= missed > 3.0 * before.accuracy.error_estimate
 
 
 DIFFERENT: dict[str, tuple[Any, str]] = {

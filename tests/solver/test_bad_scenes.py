@@ -278,6 +278,22 @@ def test_two_grasps_pulled_exactly_taut_are_no_bad_scene():
     assert np.isfinite(prediction.surface.control_points).all()
 
 
+def test_how_far_grasps_are_apart_is_told_by_the_clock_of_each():
+    """One closes after a second and moves on, and so does the other by then: they stay apart as they were."""
+    late = Waypoints(times=[0.0, 1.0], positions=[(1.0, 0.0, 0.0), (1.4, 0.0, 0.0)], profile="linear")
+    places = [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.4, 0.0, 0.0)]
+    early = Waypoints(times=[0.0, 1.0, 2.0], positions=places, profile="linear")
+    grasps = (Grasp(u=1.0, grasp_time=1.0, path=late), Grasp(u=0.0, path=early))
+    for given in (grasps, grasps[::-1]):
+        assert pose(scene(grasps=given)).horizon == 2.0
+    with pytest.raises(SceneError, match=r"primitives\[1\]\.path: got 1\.2 m from primitives\[0\]"):
+        pose(scene(grasps=(replace(grasps[0], grasp_time=0.5), grasps[1])))
+    smooth = (grasps[0], replace(grasps[1], path=replace(early, profile="spline")))  # slower at first
+    for given in (smooth, smooth[::-1]):
+        with pytest.raises(SceneError, match="where a smooth path swings out between its waypoints"):
+            pose(scene(grasps=given))
+
+
 @pytest.mark.parametrize("length", [0.05, 1.0])
 def test_a_start_is_on_the_table_within_what_is_seen_of_such_a_cable(length: float):
     off = min(0.005, 0.02 * length)
