@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+import dlocore
 from app.cli import main
 from app.commands.files import write_output
+from dlocore import Prediction, Scene, calibration, predict
 from dlocore.files import whole
 from dlocore.identify.datasets import FIT
 from dlocore.identify.parameters import DEFAULT
@@ -126,6 +128,23 @@ def test_not_converging_exits_with_3_and_still_writes(tmp_path: Path, capsys: py
     assert message.startswith("max_iterations: ")
     assert "take method march" in message  # the remedy
     assert all(output.stat().st_size > 1000 for output in outputs)
+
+
+@pytest.mark.parametrize("quality", [{"time_budget": 5.0}, "auto"])
+def test_a_time_budget_goes_by_what_solves_were_measured_to_cost(
+    quality: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    costs: list[Any] = []
+
+    def solve(scene: Scene, *, cost: Any, **_: object) -> Prediction:
+        costs.append(cost)
+        return predict(scene)
+
+    monkeypatch.setenv("DLO_DATA_DIR", str(tmp_path))
+    monkeypatch.setattr(dlocore, "predict", solve)
+    monkeypatch.setattr(calibration, "stored_cost", lambda path: f"that of {path.name}")
+    assert main(["predict", written(tmp_path, paper_scene(quality=quality))]) == 0
+    assert costs == ["that of calibration.json" if isinstance(quality, dict) else None]
 
 
 def test_a_least_squares_that_does_not_converge_is_answered_by_a_march(

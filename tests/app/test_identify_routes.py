@@ -85,6 +85,21 @@ def test_a_recording_tells_what_hangs_on_the_cable(asked: dict[str, Any]) -> Non
     assert recording.point_masses == (PointMass(u=1.0, mass=0.02),)
 
 
+def test_a_search_has_the_control_points_that_are_asked_for(
+    client: TestClient, asked: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken: dict[str, Any] = {}
+
+    def search(*_: object, **options: Any) -> None:
+        taken.update(options)
+        raise SceneError("recordings", "none", "what is sought in earnest")
+
+    monkeypatch.setattr(searches, "identify", search)
+    the_problem(client.post(ADDRESS, json={**asked, "n_u": 21}), 422)
+    assert taken["resolution"].n_u == 21
+    assert taken["names"] == tuple(asked["parameters"])
+
+
 def test_the_course_of_an_identification_is_told_as_events(client: TestClient, asked: dict[str, Any]) -> None:
     response = client.post(ADDRESS, json=asked, headers={"Accept": "text/event-stream"})
     events = [block.split("\n") for block in response.text.strip().split("\n\n")]

@@ -112,6 +112,12 @@ def test_grasps_and_their_forces_move_along(chunks: list[Any], answer: dict[str,
     np.testing.assert_allclose(drawn, forces * 0.25 / largest, rtol=0, atol=1e-6)
 
 
+def test_the_longest_arrow_is_a_quarter_of_the_cable(client: TestClient, tmp_path: Path) -> None:
+    twice = client.post("/v1/predictions", json=put(paper_scene(), "cable.length", 2.0)).json()
+    _, arrows = rows(read(client, twice, tmp_path / "run.rrd"), "/motion/reactions/0", "vectors", "motion")
+    assert np.linalg.norm(arrows, axis=-1).max() == pytest.approx(0.5, rel=1e-5)
+
+
 def test_point_masses_move_along(client: TestClient, tmp_path: Path) -> None:
     request = put(paper_scene(), "cable.point_masses", [{"u": 0.5, "mass": 0.01}, {"u": 1.0, "mass": 0.02}])
     answer = client.post("/v1/predictions", json=request).json()

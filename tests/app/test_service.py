@@ -114,6 +114,16 @@ def test_a_worker_shutting_down_cancels_and_refuses() -> None:
     anyio.run(run)
 
 
+def test_a_full_queue_tells_when_those_before_will_be_done() -> None:
+    worker = Worker(workers=1, queue_size=1, time_limit=60.0)
+    worker._mean_time = 10.0
+    for _ in range(2):
+        worker.admit()
+    with pytest.raises(ProblemError, match=r"Try again in 20 s") as refused:
+        worker.admit()
+    assert (refused.value.status, refused.value.headers) == (429, {"Retry-After": "20"})
+
+
 def test_it_is_healthy_before_it_is_ready(tmp_path: Path) -> None:
     app = create_app(Settings(data_dir=tmp_path))
     with TestClient(app) as client:

@@ -25,7 +25,7 @@ from dlocore import (
     predict,
 )
 from dlocore.scene.scene import EFFECTS
-from tests.solver.scenes import apart, cable
+from tests.solver.scenes import apart, cable, march
 
 ALL_ON = dict.fromkeys(EFFECTS, "on")
 QUICK = [
@@ -188,6 +188,21 @@ def test_an_effect_that_is_off_and_matters_is_obeyed_and_told(name):
     found = predict(hanging)
     assert effect(found, name) == (False, "switched off in the scene")
     assert f"{name} is off" in found.message
+
+
+@pytest.mark.parametrize("second", ["clamp", "tangent"])
+def test_twist_that_is_off_is_told_where_two_grasps_hold_how_sections_are_turned(second):
+    aside = Move(displacement=(-0.2, 0.2, 0.0), duration=1.0)
+    between = Scene(
+        cable=cable(),
+        shape=Straight(),
+        grasps=(Grasp(u=0.0, hold="clamp"), Grasp(u=1.0, hold=second, path=aside)),
+        environment=Environment(drag=0.5),
+        effects={"twist": "off"},
+        quality=march(9, 13),
+    )
+    note = "twist is off, though two grasps hold the orientation of the sections"
+    assert (note in predict(between).notes) == (second == "clamp")
 
 
 def test_what_is_off_and_does_not_matter_is_not_mentioned():
