@@ -59,6 +59,13 @@ def test_quaternions_in_order_are_not_asked_about(first: tuple[float, float, flo
     assert oriented(np.tile([0.0, 0.0, 0.0, 1.0], (5, 1))) == []  # it does not turn
 
 
+def test_quaternions_that_turn_far_from_a_half_turn_are_not_asked_about() -> None:
+    """In the other order they would begin at no turn, too, but go on to a half turn."""
+    angles = np.linspace(np.pi, 0.0, 5)
+    upright = Rotation.from_rotvec(np.outer(angles, [0.0, 0.0, 1.0])).as_quat()
+    assert oriented(upright[:, [3, 0, 1, 2]]) == []
+
+
 def test_a_late_path_whose_times_begin_at_its_grasp_time_is_asked_about() -> None:
     path = Waypoints(times=[1.0, 2.0], positions=PLACE[:2])
     (note,) = notes(path, grasp_time=1.0)

@@ -28,7 +28,7 @@ from dlocore import (
 )
 from dlocore.problem.discretisation import axial_strain, corners
 from dlocore.problem.tension import balanced
-from dlocore.scene.scene import Hold, Method
+from dlocore.scene.scene import MAX_STRAIN, Hold, Method
 from dlocore.shape.shape import start_curve
 from dlocore.spline import greville, spline_at
 from dlocore.study.scenes import hanging
@@ -190,6 +190,23 @@ def test_a_cable_that_is_a_tenth_longer_than_without_load_goes_on() -> None:
     np.testing.assert_allclose(found.grasps[0].reaction[:, 2], reaction, rtol=2e-3)
     tip = found.surface.positions([1.0], [0.0, 0.5])[:, 0, 2]
     np.testing.assert_allclose(tip, -1.0 - (0.7 + 0.5 * 0.05 * 9.81) / 9.0, atol=1e-3)
+
+
+def test_a_cable_that_is_torn_goes_on_with_a_strain_that_a_start_may_have() -> None:
+    rubber = Cable(length=1.0, diameter=0.01, linear_density=0.05, bending_stiffness=1e-4, axial_stiffness=1.0)
+    torn = predict(
+        Scene(
+            cable=rubber,
+            shape=Straight(direction=(0.0, 0.0, -1.0)),
+            grasps=(Grasp(u=0.0),),
+            loads=(Load(u=1.0, force=(0.0, 0.0, -1.0)),),
+            horizon=0.5,
+            quality=Quality(n_u=9, n_t=13, method="march", estimate=False),
+        )
+    )
+    assert torn.status != "converged"
+    assert torn.stretch.at(0.5).max() > 3.0 * MAX_STRAIN
+    assert np.max(torn.shape_at().strain) == MAX_STRAIN
 
 
 def test_the_strain_of_a_start_is_that_of_the_tension_that_its_weight_calls_for() -> None:

@@ -86,6 +86,11 @@ def test_a_cable_that_is_heavier_than_metal_is_told_what_its_density_is() -> Non
     assert "mass per length in kg/m" in note
 
 
+def test_a_cable_of_the_heaviest_metal_is_not_told_of() -> None:
+    tungsten = Cable(length=1.0, diameter=0.001, linear_density=0.0157, bending_stiffness=1e-3)  # 2e4 kg/m^3
+    assert scene_notes(Scene(cable=tungsten, shape=Straight(), grasps=[HOLD], horizon=1.0)) == []
+
+
 @pytest.mark.parametrize(
     ("hold", "rotation", "told"),
     [("tangent", (3.0, 0.0, 0.0), True), ("tangent", (0.0, 0.0, 0.3), False), ("clamp", (3.0, 0.0, 0.0), False)],
@@ -182,6 +187,14 @@ def test_a_path_that_swings_far_out_of_its_waypoints_is_told_of_with_how_far_and
     assert told == pytest.approx(1e3 * out.max(), rel=0.02)
     assert when == pytest.approx(t[out.argmax()], abs=0.06)
     assert not scene_notes(led(np.linspace(0.0, 1.4, 5), x))  # in even times it goes smoothly
+
+
+def test_a_path_that_swings_a_little_past_where_it_stops_is_not_told_of() -> None:
+    """It stands for a second after 0.2 m, and goes 28 mm past that."""
+    stops = led(np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.0, 0.2, 0.2, 0.2]))
+    path = stops.grasps[0].path.at(np.linspace(0.0, 3.0, 301), np.zeros(3))[:, 0]
+    assert path.max() == pytest.approx(0.228, abs=1e-3)
+    assert scene_notes(stops) == []
 
 
 def test_noise_of_a_recorded_path_is_no_swing_out_of_it() -> None:

@@ -83,6 +83,12 @@ def test_what_a_cable_passes_below_or_is_not_upright_is_not_told_of(obstacle: Ob
     assert edge_notes(drawn(obstacle), (obstacle,)) == []
 
 
+def test_nothing_slips_under_what_stands_where_the_table_is_off() -> None:
+    off = drawn(peg(0.001), effects={"table": "off"})
+    assert edge_notes(off, off.environment.obstacles) == []
+    assert edge_notes(replace(off, effects={}), off.environment.obstacles) != []
+
+
 def test_the_note_is_told_with_the_prediction_and_names_the_obstacle() -> None:
     far = Cylinder(center=(0.0, -5.0, 0.051), radius=0.02, height=0.1)  # which the cable does not come near
     scene = drawn(far, peg(0.001), quality=Quality(n_u=9, n_t=13, estimate=False), way=0.1)
