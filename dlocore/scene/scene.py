@@ -241,9 +241,10 @@ class Grasp:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Load(Checked):
-    """A known force at material coordinate `u` [m]: `force` (3,) [N], or (k, 3) at `times` (k,) [s], linear between.
+    """A known force at material coordinate `u` [m]: `force` (3,) [N], or (k, 3) at `times` (k,) [s].
 
-    Of two equal times the first has the force before a jump, the second that after it.
+    Between the times it is linear, before them the first and after them the last. Of two equal times the first has the
+    force before a jump, the second that after it.
     """
 
     u: float

@@ -84,6 +84,17 @@ def test_a_gripper_that_closes_a_little_beside_draws_the_cable_to_its_path() -> 
     np.testing.assert_allclose(path[late], scene.grasps[0].path.at(t[late] - 0.5, at[0]), atol=1e-15)
 
 
+@pytest.mark.parametrize(("duration", "within"), [(1.0, 0.2), (0.1, 0.1)])
+def test_it_is_drawn_within_a_fifth_of_a_second_or_the_time_of_all_waypoints(duration: float, within: float) -> None:
+    path = Waypoints(times=[0.0, duration], positions=[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])
+    t = within * np.array([0.0, 0.5, 0.99, 1.0])
+    beside = np.array([0.0, 0.008, 0.0])
+    off = held_at(path, t, beside) - path.at(t, beside)
+    x = 0.99
+    share = 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
+    np.testing.assert_allclose(off, np.outer([1.0, 0.5, share, 0.0], beside), atol=1e-15)
+
+
 @pytest.mark.parametrize("method", ["auto", "reference"])
 def test_one_that_closes_far_beside_is_no_success(method: Any) -> None:
     quality = Quality(method=method, target_error=5e-3)

@@ -20,7 +20,7 @@ from dlocore import (
 from dlocore.answer.clearance import least_distance
 from dlocore.effects.distance import distances
 from dlocore.scene.obstacles import Obstacle
-from dlocore.spline import uniform_knots
+from dlocore.spline import greville, uniform_knots
 from tests.solver.scenes import Floats
 
 
@@ -63,6 +63,18 @@ def test_the_least_distance_is_that_of_the_nearest_of_several_obstacles() -> Non
     rows = [obstacle.row()[None] for obstacle in OBSTACLES.values()]
     alone = [least_distance(surface, row, 2e-5) for row in rows]
     assert least_distance(surface, np.concatenate(rows), 2e-5) == pytest.approx(min(alone), abs=2e-5)
+
+
+def test_a_corner_of_a_saddle_is_nearer_than_its_slopes_at_the_middle_tell() -> None:
+    """The cable turns in the x-z plane about its middle, which goes nowhere: a cell that bends by r_ut alone."""
+    knots = uniform_knots(4, 1.0)
+    u, t = greville(knots), greville(knots)[:, None]
+    control = np.stack([u + 0.0 * t, 0.0 * u * t, 1.2 * (u - 0.5) * (t - 0.5), 0.0 * u * t], axis=-1)
+    surface = SplineSurface(control, knots, knots)
+    middle, corner = Sphere(center=(0.5, 0.08, 0.0), radius=0.03), Sphere(center=(1.0, 0.0, 0.3), radius=0.01)
+    rows = np.stack([middle.row(), corner.row()])
+    assert least_distance(surface, rows[:1], 1e-5) == pytest.approx(0.05, abs=1e-5)
+    assert least_distance(surface, rows, 1e-5) == pytest.approx(-0.01, abs=1e-5)
 
 
 def test_the_gap_of_a_cable_that_passes_a_small_ball_early_in_a_long_motion_is_found() -> None:

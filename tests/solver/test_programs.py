@@ -68,6 +68,12 @@ def test_stops_after_the_release_are_none() -> None:
     assert [event.time for event in find_events(hanging(program(), grasps=(Grasp(u=0.0), let_go)))] == [1.0, 1.2]
 
 
+@pytest.mark.parametrize("path", [program(), Move(displacement=PLACES[1] - PLACES[0], duration=2.0)])
+def test_the_end_of_a_path_after_the_release_is_none(path: Waypoints | Move) -> None:
+    let_go = Grasp(u=1.0, path=path, release_time=0.7)
+    assert [event.time for event in find_events(hanging(path, grasps=(Grasp(u=0.0), let_go)))] == [0.7]
+
+
 def test_the_clock_of_a_late_program_starts_as_its_gripper_closes() -> None:
     late = Waypoints(times=[0.5, 1.0, 2.0], positions=PLACES[:3], profile="cubic")
     scene = hanging(program(), grasps=(Grasp(u=0.0), Grasp(u=1.0, path=late, grasp_time=0.25)))

@@ -114,6 +114,12 @@ def test_a_load_that_is_linear_meanwhile_stays_what_it_is() -> None:
     np.testing.assert_allclose(stepped(steady, times), steady.at(times), atol=1e-12)
 
 
+def test_a_load_is_constant_before_its_times_and_after_them() -> None:
+    load = Load(u=0.3, force=[[1.0, -2.0, 0.5], [-3.0, 1.0, 0.0]], times=[0.5, 1.0])
+    expected = [load.force[0], load.force[0], [-1.0, -0.5, 0.25], load.force[1], load.force[1]]
+    np.testing.assert_array_equal(load.at(np.array([0.0, 0.5, 0.75, 1.0, 2.0])), expected)
+
+
 def test_steps_that_are_taken_in_parts_take_the_same_forces() -> None:
     times = np.linspace(0.0, HORIZON, 21)
     load = Load(u=0.3, force=PUSHES, times=np.sort(np.append(INSTANTS[1:], times[8])))  # one as a part ends

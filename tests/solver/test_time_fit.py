@@ -101,6 +101,7 @@ def test_a_march_follows_a_path_of_few_waypoints_exactly_at_all_times(quality: Q
     "times",
     [
         pytest.param(np.linspace(0.0, 1.6, 40).tolist(), id="too many"),
+        pytest.param(np.linspace(0.0, 1.6, 12).tolist(), id="more than half of what is left"),
         pytest.param([0.0, 0.4, 0.4001, 1.0, 1.6], id="too close"),
         pytest.param([0.0, 0.4, 1.5999, 1.6], id="too close to the end"),
         pytest.param([0.0, 1.6], id="none inside"),
