@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from app.schemas import PredictionRequest, to_scene
 from tests.app.conftest import paper_scene
 
 ARC, TURN = 0.3, 2.4  # m, rad: that length is bent to this angle, a curvature of 8 1/m
@@ -72,6 +73,14 @@ def test_a_motion_goes_on_from_within_another_with_its_memory(client: TestClient
     assert bend(rest, -1) == pytest.approx(bend(whole, -1), abs=0.04)  # rad, as above
     shapes = [np.array(document["surface"]["positions"])[-1] for document in (rest, whole)]
     np.testing.assert_allclose(*shapes, rtol=0, atol=0.02)  # m: four times the error asked for, of two unlike grids
+
+
+@pytest.mark.parametrize("settle", [False, True])
+def test_a_start_that_goes_on_may_settle_first(client: TestClient, answer: dict[str, Any], settle: bool) -> None:
+    shape = {"kind": "prediction", "id": answer["id"], "settle": settle}
+    stored = client.app.state.service.runs.motion  # type: ignore[attr-defined]
+    scene = to_scene(PredictionRequest.model_validate(paper_scene(shape=shape)), stored)
+    assert scene.shape.settle is settle
 
 
 def test_twist_goes_on_until_a_clamp_opens(client: TestClient) -> None:

@@ -120,6 +120,15 @@ def test_what_its_own_steps_miss_of_a_path_that_trembles_counts():
     assert again.accuracy.error_estimate >= missed > 3.0 * before.accuracy.error_estimate
 
 
+def test_an_error_above_the_target_is_none_of_an_answer():
+    asked = Quality(target_error=5e-3)
+    before = predict(replace(led(0.0), quality=asked))
+    again = predict(replace(led(4e-3), quality=asked), like=before)
+    assert "mm is above the target" in again.message.split(AFRESH)[1]
+    assert again.status == "converged"
+    assert again.accuracy.error_estimate < 5e-3
+
+
 DIFFERENT: dict[str, tuple[Any, str]] = {
     "accuracy": (lambda s: replace(s, quality=march(11, 13)), "accuracy or grid"),
     "length": (lambda s: replace(s, cable=cable(length=1.1)), "length"),

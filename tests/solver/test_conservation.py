@@ -1,9 +1,23 @@
 """Laws that every motion keeps: energy, momentum, free fall, balance of forces."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from dlocore import ControlPoints, Environment, Grasp, Load, Move, Points, Prediction, Scene, Straight, predict
+from dlocore import (
+    ControlPoints,
+    Environment,
+    Grasp,
+    Load,
+    Move,
+    Points,
+    Prediction,
+    Scene,
+    Straight,
+    energies,
+    predict,
+)
 from dlocore.answer.report import elastic_energy
 from dlocore.problem.discretisation import make_grid
 from dlocore.problem.problem import pose
@@ -53,6 +67,21 @@ def swing(drag: float, hold: str = "point", damping: float = 0.0) -> Prediction:
     prediction = predict(scene)
     assert prediction.status == "converged"
     return prediction
+
+
+@pytest.mark.parametrize(("effect", "kind"), [("inertia", "kinetic"), ("gravity", "gravity")])
+def test_what_is_off_has_no_energy(effect, kind):
+    lifted = Scene(
+        cable=cable(),
+        shape=Straight(direction=(0.0, 0.0, -1.0)),
+        grasps=(Grasp(u=0.0, path=Move(displacement=(0.2, 0.0, 0.1), duration=0.5)),),
+        environment=Environment(drag=0.1),
+        quality=march(9, 13),
+    )
+    off = replace(lifted, effects={effect: "off"})
+    found, without = (energies(s, predict(s).surface, [0.0, 0.25])[kind][1] for s in (lifted, off))
+    assert found > 5e-3
+    assert without == 0.0
 
 
 @pytest.mark.parametrize("hold", ["point", "tangent"])
