@@ -15,7 +15,7 @@ from dlocore.problem.grid import Grid
 from dlocore.problem.holding import Starts, close_grasps, hold
 from dlocore.problem.problem import Problem, firmer, stiffer_for
 from dlocore.solvers.monitor import Monitor, TimeIsUp
-from dlocore.statics.settling import RESTING, Rest
+from dlocore.statics.settling import RESTING, STIFFER, Rest
 
 Floats = NDArray[np.float64]
 
@@ -24,7 +24,6 @@ _FIRST, _LONG, _LAST = 1e-3, 1e2, 1e3  # steps [s]: the first, long enough to te
 _STEPS = 2000  # at most
 _PATIENCE = 64  # steps at most until a length that has failed is tried again: twice as many each time it fails
 _FARTHEST = 0.05  # of the length, in a step: farther the cable might pass through what is in its way
-_STIFFER = 6  # times that contact is made stiffer
 _RATES = (
     laws.DAMPING, laws.TWIST_DAMPING, laws.STRETCH_DAMPING, laws.QUADRATIC_DRAG,
     laws.BENDING_MEMORY, laws.TWIST_MEMORY, laws.STRETCH_MEMORY,
@@ -44,7 +43,7 @@ def slide_to_rest(problem: Problem, grid: Grid, monitor: Monitor) -> tuple[Float
     """
     allowed = DEEPEST * problem.scene.cable.diameter
     q, rest, history, deepest = _slid(problem, grid, monitor)
-    for _ in range(_STIFFER if problem.contact is not None else 0):
+    for _ in range(STIFFER if problem.contact is not None else 0):
         if rest == "time" or deepest <= allowed:
             break
         problem = stiffer_for(problem, deepest)

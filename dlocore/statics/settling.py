@@ -1,13 +1,14 @@
 """Bring a held cable to rest: relaxations held back by springs, ever weaker ones."""
 
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.answer.reactions import WindowForces
+from dlocore.effects.contact import DEEPEST
 from dlocore.kernels.assembly import NO_RATES, History, assemble
-from dlocore.kernels.contact import passes
+from dlocore.kernels.contact import passes, remember
 from dlocore.kernels.entry import remember_start
 from dlocore.kernels.relax import descend, relax
 from dlocore.kernels.tension import COLUMNS
@@ -15,9 +16,9 @@ from dlocore.problem.discretisation import applied_forces
 from dlocore.problem.events import closed_grasps
 from dlocore.problem.grid import Grid
 from dlocore.problem.holding import Held, Starts, close_grasps, hold
-from dlocore.problem.problem import Problem
-from dlocore.scene.paths import held_at
-from dlocore.scene.scene import Grasp
+from dlocore.problem.problem import Problem, stiff_as_taut, stiffer_for
+from dlocore.scene.paths import Waypoints, held_at
+from dlocore.scene.scene import Grasp, Scene
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.spline import greville
 
@@ -30,6 +31,7 @@ UNDRIVEN = 1e-6  # of what weighs on the cable and bends it: a force that drives
 ROUNDS = 400  # of relaxations, each held back by where it started
 PATH_STEPS = 24  # that bring the grasps to their poses at a later time
 PATH_ROUNDS = 4  # of relaxations at each of them but the last
+STIFFER = 6  # times that contact is made stiffer
 _ROUNDING = 1e-15  # of the axial stiffness: what it makes of a force
 _SPRINGS = 10.0  # times what weighs on the cable and bends it, per length: the springs of the first relaxation
 _CLOSE = 0.05  # of the first update of a relaxation, on the last: the next one follows it
@@ -40,12 +42,15 @@ _STRONGER = 4.0  # times, where it fails
 _COMES_TO_REST = 0.5  # of the relaxation before: a cable that moves less by so much is on its way to rest
 _ITERATIONS = 60  # of a relaxation with a line search
 _ROUGH = 1e-5  # of the length: the tolerance of the first of those, which others follow
+_YIELDING = 0.8  # of the depth, at most, is left by a stiffer contact where it is one of stiffness
+_SHORTEST = 1e-9  # of the time: no shorter are the steps that bring the grasps to their poses
 
 
 class Settled(NamedTuple):
     """Where a cable came to rest, or not.
 
     Attributes:
+        problem: what was solved: contact may have been made stiffer.
         q: control points (n_u, nc) [m].
         rest: how they rest.
         held: what is held of them.
@@ -54,6 +59,7 @@ class Settled(NamedTuple):
         starts: where the paths of the grasps begin.
     """
 
+    problem: Problem
     q: Floats
     rest: Rest
     held: Held
@@ -66,7 +72,7 @@ def settle(
     problem: Problem, grid: Grid, at: float, monitor: Monitor, begin: tuple[Floats, History] | None = None,
     starts: Starts | None = None,
 ) -> Settled:  # fmt: skip
-    """Bring the cable to rest with the grasps at their poses of time `at` [s].
+    """Bring the cable to rest from where it is, with the grasps at their poses of time `at` [s].
 
     Relaxations held back by a spring towards where they started: the first strongly, later ones less, so that a cable
     without a stable tangent (buckling, free rotation) walks downhill instead of jumping. Each is Newton's method alone,
@@ -75,32 +81,63 @@ def settle(
 
     Args:
         begin: control points and history at t = 0 that are near the equilibrium; the start of the grid without.
-        starts: where the paths of the grasps begin, of a cable that has been brought to their poses already; without,
-            it is brought there along the paths.
+        starts: where the paths of the grasps begin; without, on the start.
 
     Raises:
         Cancelled: the caller asked to stop.
     """
     q, history = (grid.start.copy(), grid.past()) if begin is None else begin
-    if len(history.tension) == 0:
-        history = history._replace(tension=np.zeros((len(grid.tables.axial.w), COLUMNS)))
-    carried = at > 0.0 and starts is None
-    starts = {} if starts is None else starts
-    before_t = 0.0 if carried else at
-    times = np.linspace(0.0, at, PATH_STEPS + 1)[1:] if carried else np.array([at])
-    for t in times:
-        grasps = closed_grasps(problem.scene, t, t)
+    history, starts = _with_tension(grid, history), {} if starts is None else starts
+    grasps = closed_grasps(problem.scene, at, at)
+    close_grasps(problem, grid, grasps, starts, q)
+    held = hold(problem, grid, grasps, np.full(2, at), starts, q if at > 0.0 else grid.start)
+    applied = applied_forces(problem, grid, np.array([at]))[0]
+    rest = _relaxed(problem, grid, q, history, held, applied, ROUNDS, 1.0 if begin is None else _NEARBY, monitor)
+    return Settled(problem, q, rest, held, history._replace(tension=grid.history.tension), at, starts)
+
+
+def settle_along(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> Settled:
+    """Bring the cable from its start along the paths of its grasps, and to rest at their poses of time `at` [s].
+
+    On the way it is relaxed a little at some times, at more of them where it would be carried through an obstacle, and
+    comes to rest before a gripper closes on it. What nothing holds stays where it is, unless it may touch something.
+    Contact is made stiffer where the cable sinks in by more than DEEPEST.
+
+    Raises:
+        Cancelled: the caller asked to stop.
+    """
+    scene, q, history = problem.scene, grid.start.copy(), _with_tension(grid, grid.past())
+    starts, before, restless = Starts(), 0.0, False
+    ahead = _times(scene, at)
+    while True:
+        t = ahead.pop()
+        grasps = closed_grasps(scene, before, t)
         close_grasps(problem, grid, grasps, starts, q)
-        held = hold(problem, grid, grasps, np.array([before_t, t]), starts, q if t > 0.0 else grid.start)
-        if carried:
-            _carry(problem, grid, grasps, starts, t, q)
-        before_t = t
-        applied = applied_forces(problem, grid, np.array([t]))[0]
-        rounds = ROUNDS if t == times[-1] else PATH_ROUNDS
-        rest = _relaxed(problem, grid, q, history, held, applied, rounds, 1.0 if begin is None else _NEARBY, monitor)
-        if rest == "time":
-            break
-    return Settled(q, rest, held, history._replace(tension=grid.history.tension), before_t, starts)
+        carried = q if t == before else _carried(problem, grid, grasps, starts, t, q)
+        if t - before > _SHORTEST * at and _is_through(problem, grid, q, carried):
+            ahead += [t, 0.5 * (before + t)]
+            continue
+        held = hold(problem, grid, grasps, np.array([before, t]), starts, q)
+        q, before = carried, t
+        wholly = not ahead or any(g.start == t and g not in starts for g in scene.grasps)
+        if grasps or not ahead or problem.contact is not None:
+            applied = applied_forces(problem, grid, np.array([t]))[0]
+            rounds = ROUNDS if wholly else PATH_ROUNDS
+            problem, rest = _relaxed_firmly(problem, grid, q, history, held, applied, rounds, monitor)
+            restless |= wholly and rest == "restless"
+            if not ahead or rest == "time":
+                break
+    if restless and rest == "settled":
+        rest = "restless"
+    return Settled(problem, q, rest, held, history._replace(tension=grid.history.tension), t, starts)
+
+
+def depth(problem: Problem, grid: Grid, q: Floats) -> float:
+    """Return how deep control points q (n_u, nc) lie in the table or an obstacle, at most; 0 in none [m]."""
+    if problem.contact is None:
+        return 0.0
+    nodes, unrubbed = grid.tables.contact, np.zeros((0, 3))
+    return float(remember(problem.nc, q, nodes, problem.laws[1], unrubbed, np.empty_like(nodes.w), True))
 
 
 def holding(problem: Problem, grid: Grid, settled: Settled) -> WindowForces:
@@ -108,6 +145,13 @@ def holding(problem: Problem, grid: Grid, settled: Settled) -> WindowForces:
     q, at = settled.q, np.array([settled.at])
     forces = _unbalanced(problem, grid, settled.history, q, applied_forces(problem, grid, at)[0])
     return WindowForces(settled.held, at, forces.reshape(1, -1)[:, settled.held.elimination.held], q[None])
+
+
+def _with_tension(grid: Grid, history: History) -> History:
+    """Return a history with room for the tension that relaxations take."""
+    if len(history.tension):
+        return history
+    return history._replace(tension=np.zeros((len(grid.tables.axial.w), COLUMNS)))
 
 
 def _relaxed(
@@ -176,6 +220,35 @@ def _relaxed(
     return "restless"
 
 
+def _relaxed_firmly(
+    problem: Problem, grid: Grid, q: Floats, history: History, held: Held, applied: Floats, rounds: int,
+    monitor: Monitor,
+) -> tuple[Problem, Rest]:  # fmt: skip
+    """Do what `_relaxed` does, again with stiffer contact as long as the cable sinks in too deep and that helps.
+
+    Returns:
+        what was solved, and how the control points rest.
+    """
+    rest, tried = _relaxed(problem, grid, q, history, held, applied, rounds, 1.0, monitor), problem
+    for _ in range(STIFFER if problem.contact is not None else 0):
+        deepest = depth(problem, grid, q)
+        if rest == "time" or deepest <= DEEPEST * problem.scene.cable.diameter:
+            break
+        tried = stiffer_for(tried, deepest)
+        before = q.copy(), *(x.copy() for x in history)
+        again = _relaxed(tried, grid, q, history, held, applied, rounds, 1.0, monitor)
+        if again != "time" and depth(tried, grid, q) <= _YIELDING * deepest:
+            problem, rest = tried, again
+            continue
+        for x, old in zip((q, *history), before, strict=True):
+            x[:] = old
+        taut = stiff_as_taut(tried)
+        if again == "time" or taut is None:  # what is this deep was not pushed in
+            return problem, again if again == "time" else rest
+        tried = taut  # of what is pulled in, a soft contact stops nothing
+    return problem, rest
+
+
 def _only_turns(problem: Problem, grid: Grid, history: History, before: Floats, q: Floats, applied: Floats) -> bool:
     """Tell whether a relaxation turned the cable as a whole, from `before` to q (n_u, nc), and no force drives that.
 
@@ -206,13 +279,28 @@ def _moved_rigidly(before: Floats, after: Floats, tolerance: float) -> bool:
     return bool(np.abs(x @ (left @ right) - y).max() <= tolerance)
 
 
-def _carry(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, t: float, q: Floats) -> None:
-    """Shift the control points q (n_u, nc) with the grasps, evenly in between, where they move to at time `t` [s].
+def _times(scene: Scene, at: float) -> list[float]:
+    """Return the times [s] at which a cable relaxes on its way to the poses of time `at`, the last first.
+
+    Where a gripper closes or opens there are two: with what held until then, and what does from then on.
+    """
+    sudden = [t for g in scene.grasps for t in (g.start, g.release_time) if t is not None and 0.0 < t <= at]
+    turns = [g.start + g.path.duration for g in scene.grasps]
+    turns += [t for g in scene.grasps if isinstance(g.path, Waypoints) for t in (g.start + g.path.stops).tolist()]
+    turns += [t for load in scene.loads if load.times is not None for t in cast(Floats, load.times).tolist()]
+    even = np.linspace(0.0, min(at, max([*sudden, *turns], default=0.0)), PATH_STEPS + 1)
+    once = {t for t in (*even.tolist(), *sudden, *turns, at) if 0.0 < t <= at} or {at}
+    return sorted([*once, *set(sudden)], reverse=True)
+
+
+def _carried(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, t: float, q: Floats) -> Floats:
+    """Return control points q (n_u, nc) shifted with the grasps, evenly in between, where they move to at `t` [s].
 
     A grasp that moves alone by more than a span folds the cable there, and a fold finer than the quadrature stays.
     """
+    carried = q.copy()
     if not grasps:
-        return
+        return carried
     order = sorted(grasps, key=lambda g: g.u)
     dimensions = problem.plane.dimensions
     shift = np.array(
@@ -224,7 +312,17 @@ def _carry(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, t:
     )
     middle = greville(grid.knots)  # of the control points
     for d in range(dimensions):
-        q[:, d] += np.interp(middle, [g.u for g in order], shift[:, d])
+        carried[:, d] += np.interp(middle, [g.u for g in order], shift[:, d])
+    return carried
+
+
+def _is_through(problem: Problem, grid: Grid, before: Floats, carried: Floats) -> bool:
+    """Tell whether control points (n_u, nc) were carried past the middle of an obstacle, or nearly.
+
+    Twice as far they would be through it: from within its near half contact pushes the cable back to where it was.
+    """
+    nodes = grid.tables.contact
+    return bool(passes(problem.nc, before, 2.0 * carried - before, nodes, problem.laws[1], nodes.w))
 
 
 def _unbalanced(problem: Problem, grid: Grid, history: History, q: Floats, applied: Floats) -> Floats:

@@ -12,8 +12,10 @@ from dlocore.answer.parts import Status, with_notes
 from dlocore.answer.reactions import reactions
 from dlocore.answer.report import elastic_energy
 from dlocore.compiling.interrupts import interruptible
+from dlocore.effects.contact import DEEPEST
 from dlocore.errors import SceneError, number, whole
 from dlocore.problem.buckling import UNSTABLE, side_notes
+from dlocore.problem.checks import TOO_DEEP
 from dlocore.problem.discretisation import make_grid, smallest_n_u
 from dlocore.problem.events import closed_grasps
 from dlocore.problem.grid import Grid
@@ -26,7 +28,7 @@ from dlocore.stability.determined import UNDETERMINED, bend_in_words, bent
 from dlocore.stability.sideways import WITH_TWIST, is_unstable, lacks_twist, solved_in_space
 from dlocore.statics.regrid import begin_on, starts_folded
 from dlocore.statics.resting import slide_to_rest
-from dlocore.statics.settling import Settled, holding, settle
+from dlocore.statics.settling import Settled, depth, holding, settle, settle_along
 from dlocore.statics.tipping import tip_notes, tipped
 from dlocore.words import in_mm
 
@@ -87,8 +89,8 @@ def equilibrium(
     """Find the static equilibrium of a scene's cable with its grasps at their poses of time `at`.
 
     The cable is brought there from its start shape along the grasps' paths, so that of several equilibria the one is
-    found that it would slowly reach. Without a given `n_u` grids are refined until two agree to a tenth of a per mille
-    of the length, or to the scene's `target_error`.
+    found that it would slowly reach; a gripper that closes later holds it where it has come to rest. Without a given
+    `n_u` grids are refined until two agree to a tenth of a per mille of the length, or to the scene's `target_error`.
 
     Args:
         scene: its horizon, inertia, drag, damping and friction play no part.
@@ -116,7 +118,7 @@ def equilibrium(
         sizes = [whole("n_u", n_u, at_least=least, at_most=max(least, LEVELS[-1]))]
     rest, notes = _refined(problem, sizes, at, target, monitor), cable_notes(scene)
     found = rest.settled
-    if rest.status == "converged" and is_unstable(problem, rest.grid, found.q, at, found.history):
+    if rest.status == "converged" and is_unstable(found.problem, rest.grid, found.q, at, found.history):
         if lacks_twist(problem):
             notes.append(solved_in_space([WITH_TWIST]))
         else:
@@ -126,7 +128,10 @@ def equilibrium(
     notes += sides
     if problem.friction is not None:
         notes.append("friction is left out, which holds a cable where it came to lie")
-    grid, q, history = rest.grid, rest.settled.q, rest.settled.history
+    grid, q, history, problem = rest.grid, rest.settled.q, rest.settled.history, rest.settled.problem
+    sunk = _sunk(grid, rest.settled)
+    if DEEPEST < sunk <= TOO_DEEP:
+        notes.append(f"the cable is pressed {sunk:.0%} of its diameter into what it touches")
     apart = _rests_apart(problem, rest, at, monitor) if rest.status == "converged" and not sides else 0.0
     if apart > UNDETERMINED * scene.cable.length:
         bend = bend_in_words(problem, apart)
@@ -168,7 +173,7 @@ def _refined(problem: Problem, sizes: list[int], at: float, target: float, monit
             u = np.linspace(0.0, problem.scene.cable.length, 65)
             before = design_matrix(found[0].knots, u) @ found[1].q[:, :3]
             change = float(np.linalg.norm(design_matrix(grid.knots, u) @ settled.q[:, :3] - before, axis=1).max())
-        found = grid, settled
+        found, problem = (grid, settled), settled.problem
         if settled.rest == "time":
             break
         one = len(sizes) == 1
@@ -180,14 +185,24 @@ def _refined(problem: Problem, sizes: list[int], at: float, target: float, monit
     if settled.rest == "restless":
         status = "stalled"
         message = "The relaxation did not come to rest. The scene may have no equilibrium, or many side by side."
+    elif _sunk(grid, settled) > TOO_DEEP:
+        status = "stalled"
+        message = (
+            f"The cable is pressed {_sunk(grid, settled):.0%} of its diameter into what it touches. Press it less."
+        )
     elif status == "converged" and len(sizes) > 1 and not change <= target:
         status, message = "max_iterations", f"The finest grid still moved the shape by {in_mm(change)}."
     return _Rest(grid, settled, status, message, change)
 
 
+def _sunk(grid: Grid, settled: Settled) -> float:
+    """Return how deep a cable that has settled lies in what it touches, in parts of its diameter."""
+    return depth(settled.problem, grid, settled.q) / settled.problem.scene.cable.diameter
+
+
 def _rested(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> tuple[Grid, Settled]:
     """Return a grid, and the rest that its start comes to and stays in, under the grasps and loads of the time `at`."""
-    settled = settle(problem, grid, at, monitor)
+    settled = settle_along(problem, grid, at, monitor)
     if settled.rest != "settled":
         return grid, settled
     stays = tipped(problem, grid.changed(start=settled.q, history=settled.history), monitor, at, settled.starts)

@@ -1,0 +1,179 @@
+"""An equilibrium at a later time: grippers close where the cable is by then, and it is carried through nothing."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dlocore import (
+    Cable,
+    Capsule,
+    Cylinder,
+    Environment,
+    Grasp,
+    Load,
+    Move,
+    PointMass,
+    Points,
+    Scene,
+    Straight,
+    Table,
+    Waypoints,
+    equilibrium,
+)
+from tests.solver.scenes import Floats
+
+DIAMETER = 0.004
+_TURN = np.linspace(-1.0, 1.0, 41)
+ARC = 0.5 * np.column_stack([np.sin(_TURN), np.cos(_TURN) - np.cos(1.0)])  # of 1 m
+
+
+def cable(**changes: Any) -> Cable:
+    return Cable(**{"length": 1.0, "diameter": DIAMETER, "linear_density": 0.05, "bending_stiffness": 1e-3} | changes)
+
+
+# --- grippers that close later ---
+
+
+def let_down_by(late: float, ways: tuple[Grasp, ...] = ()) -> Scene:
+    """Return a cable that hangs from a gripper that moves by 0.6 m in 1 s, and is grasped at its end meanwhile."""
+    moved = Grasp(u=0.0, path=Move(displacement=(0.6, 0.0, 0.0), duration=1.0, profile="linear"))
+    down = Straight(direction=(0.0, 0.0, -1.0), settle=True)
+    grasps = (moved, *ways, Grasp(u=1.0, grasp_time=late))
+    return Scene(cable=cable(bending_stiffness=2e-3), shape=down, grasps=grasps, horizon=2.0)
+
+
+@pytest.mark.parametrize("late", [0.07, 0.5, 0.52])
+def test_a_gripper_that_closes_later_holds_the_cable_where_it_hung_then(late: float) -> None:
+    for at in (late, 1.0, 4.0):  # it had been where it was a 24th of this before
+        end = equilibrium(let_down_by(late), at=at, n_u=17).positions([1.0])[0]
+        np.testing.assert_allclose(end, [0.6 * late, 0.0, -1.0001], rtol=0.0, atol=1e-4)
+
+
+def test_what_comes_after_the_last_move_changes_nothing() -> None:
+    # it had been carried in 24 steps of all the time, so that a long one went over the move in a step
+    found = [equilibrium(let_down_by(0.4), at=at, n_u=17) for at in (1.0, 100.0)]
+    np.testing.assert_allclose(found[0].reactions, found[1].reactions, rtol=1e-9)
+
+
+@pytest.mark.parametrize("overlap", [0.0, 0.01])
+def test_a_cable_that_is_handed_over_stays_where_the_first_gripper_had_it(overlap: float) -> None:
+    # which lets go as the second closes, or so soon after it that both are within a 24th of the time
+    way = Move(displacement=(0.0, 0.0, 0.3), duration=0.1)
+    gives = Grasp(u=1.0, path=way, release_time=0.2 + overlap)
+    shape = Points(points=np.column_stack([ARC[:, 0], 0.0 * ARC[:, 0], -ARC[:, 1]]))
+    held = Scene(cable=cable(), shape=shape, grasps=(Grasp(u=0.0), gives), horizon=10.0)
+    handed = replace(held, grasps=(*held.grasps, Grasp(u=0.6, grasp_time=0.2)))
+    there, later = (equilibrium(scene, at=at) for scene, at in ((held, 0.15), (handed, 6.0)))
+    np.testing.assert_allclose(later.positions([0.6]), there.positions([0.6]), atol=1e-4)
+
+
+def test_stops_between_waypoints_are_gone_through() -> None:
+    # the way of the first leads up to 0.4 m and down again within a 24th of the time, the second closes at its top
+    way = Waypoints(times=(0.0, 0.1, 0.11, 0.2, 10.0), positions=[(0.0, 0.0, z) for z in (0.0, 0.4, 0.4, 0.0, 0.0)],
+                    profile="minimum_jerk")  # fmt: skip
+    grasps = (Grasp(u=0.0, path=way), Grasp(u=1.0, grasp_time=0.105))
+    scene = Scene(cable=cable(), shape=Straight(direction=(0.0, 0.0, -1.0)), grasps=grasps, horizon=10.0)
+    end = equilibrium(scene, at=10.0, n_u=17).positions([1.0])[0]
+    np.testing.assert_allclose(end, [0.0, 0.0, -0.6], atol=1e-3)
+
+
+def test_a_cable_that_nothing_holds_yet_stays_where_it_lies() -> None:
+    points = np.column_stack([ARC, 0.0 * ARC[:, 0]])
+    lies = Scene(
+        cable=cable(),
+        shape=Points(points=points),
+        grasps=(Grasp(u=0.0, grasp_time=0.5), Grasp(u=1.0, grasp_time=0.5)),
+        environment=Environment(table=Table()),
+        horizon=1.0,
+    )
+    found = equilibrium(lies, at=1.0, n_u=17)
+    np.testing.assert_allclose(found.positions([0.0, 1.0]), points[[0, -1]], atol=1e-4)
+
+
+# --- what is in the way ---
+
+
+def sagging(way: Move, obstacle: Capsule) -> Scene:
+    """Return a cable that hangs in an arc between two grippers 0.6 m apart that go the same way, across a bar."""
+    s = np.linspace(0.0, 1.0, 101)
+    points = np.column_stack([0.6 * s, 0.0 * s, -1.49 * s * (1.0 - s)])
+    return Scene(
+        cable=cable(diameter=0.006),
+        shape=Points(points=points, settle=True),
+        grasps=(Grasp(u=0.0, path=way), Grasp(u=1.0, path=way)),
+        environment=Environment(drag=0.5, obstacles=(obstacle,)),
+        horizon=10.0,
+    )
+
+
+@pytest.mark.parametrize("radius", [0.002, 0.01])
+def test_a_cable_is_not_carried_through_a_bar_to_its_equilibrium(radius: float) -> None:
+    bar = Capsule(start=(-0.3, 0.2, -0.2), end=(0.9, 0.2, -0.2), radius=radius)
+    way = Move(displacement=(0.0, 0.3, 0.0), duration=6.0)
+    found = equilibrium(sagging(way, bar), at=6.0, n_u=17)
+    assert found.status == "converged"
+    r = found.positions(np.linspace(0.0, 1.0, 401))
+    lowest = r[np.argmin(r[:, 2])]
+    assert lowest[1] < 0.18  # it hangs on the bar, from which grippers have gone on; it had hung beside them, at 0.3 m
+    assert np.hypot(r[:, 1] - 0.2, r[:, 2] + 0.2).min() > radius + (0.5 - 0.02) * 0.006
+
+
+# --- how deep it is pressed in ---
+
+
+@pytest.mark.parametrize("load", [0.5, 50.0])
+def test_a_load_presses_a_cable_into_a_table_no_deeper_than_motions_are(load: float) -> None:
+    lifted = Grasp(u=0.0, path=Move(displacement=(0.0, 0.0, 0.05), duration=1.0))
+    scene = Scene(
+        cable=cable(),
+        shape=Straight(),
+        grasps=(lifted,),
+        loads=(Load(u=0.6, force=(0.0, 0.0, -load)),),
+        environment=Environment(table=Table()),
+        horizon=1.5,
+    )
+    found = equilibrium(scene, at=1.0, n_u=33)
+    assert found.status == "converged"
+    lowest = found.positions(np.linspace(0.0, 1.0, 2001))[:, 2].min()
+    assert -lowest < 0.021 * DIAMETER  # it had been 0.055 and 5.2 of it
+
+
+def over_a_peg(mass: float) -> Scene:
+    """Return a cable that is held at one end and hangs over a peg, with a mass at its other end."""
+    radius, begin = 0.03 + 0.5 * DIAMETER, 0.5
+    u = np.linspace(0.0, 1.0, 401)
+    angle = np.clip((u - begin) / radius, 0.0, 0.5 * np.pi)
+    x, z = radius * np.sin(angle), radius * np.cos(angle)
+    straight = np.column_stack([np.minimum(u - begin, 0.0), -np.maximum(u - begin - 0.5 * np.pi * radius, 0.0)])
+    points = np.column_stack([x + straight[:, 0], 0.0 * u, z + straight[:, 1]])
+    peg = Cylinder(center=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0), radius=0.03, height=0.3)
+    return Scene(
+        cable=cable(bending_stiffness=1e-4, axial_stiffness=1e4, point_masses=(PointMass(u=1.0, mass=mass),)),
+        shape=Points(points=points, settle=True),
+        grasps=(Grasp(u=0.0),),
+        environment=Environment(obstacles=(peg,)),
+        horizon=0.5,
+    )
+
+
+def deepest_in_the_peg(r: Floats) -> float:
+    return 0.03 + 0.5 * DIAMETER - float(np.hypot(r[:, 0], r[:, 2]).min())
+
+
+def test_a_heavy_end_does_not_pull_the_cable_into_a_peg() -> None:
+    found = equilibrium(over_a_peg(0.5), n_u=49)
+    assert found.status == "converged"
+    assert deepest_in_the_peg(found.positions(np.linspace(0.0, 1.0, 2001))) < 0.02 * DIAMETER  # it had been 1.5 of it
+
+
+@pytest.mark.parametrize(("way", "status"), [(0.0004, "converged"), (0.01, "stalled")])
+def test_a_gripper_that_presses_the_cable_into_something_is_told(way: float, status: str) -> None:
+    down = Grasp(u=0.5, grasp_time=0.5, path=Move(displacement=(0.0, 0.0, -way), duration=0.5))
+    lifted = Grasp(u=0.0, path=Move(displacement=(0.0, 0.0, 0.05), duration=0.4))
+    table = Environment(table=Table())
+    scene = Scene(cable=cable(), shape=Straight(), grasps=(lifted, down), environment=table, horizon=1.0)
+    found = equilibrium(scene, at=1.0, n_u=17)
+    assert found.status == status
+    assert f"pressed {way / DIAMETER:.0%} of its diameter into what it touches" in found.message
