@@ -38,6 +38,7 @@ from dlocore.stability.sideways import WITH_TWIST, lacks_twist, leaves_plane, so
 from dlocore.statics.statics import settles_elsewhere
 from dlocore.statics.tipping import tip_notes
 from dlocore.statics.turning import turn_notes
+from dlocore.statics.yielding import yield_notes
 from dlocore.words import in_mm
 
 Floats = NDArray[np.float64]
@@ -131,6 +132,8 @@ def objections(level: Level) -> list[str]:
     found += side_notes(problem.start)
     found += turn_notes(problem, level.motion.grid)
     found += tip_notes(level.motion.grid.tipped, problem.scene.cable.length)
+    if problem.scene.shape.settle and problem.choices["plasticity"].active:
+        found += yield_notes(problem, level.motion.grid, level.motion.states[0], level.motion.grid.history)
     kept = [
         *([WITH_TWIST] if lacks_twist(problem) else []),
         *(["without a given grid"] if problem.scene.quality.n_u is not None else []),

@@ -19,6 +19,7 @@ from dlocore.problem.checks import TOO_DEEP
 from dlocore.problem.discretisation import make_grid, smallest_n_u
 from dlocore.problem.events import closed_grasps
 from dlocore.problem.grid import Grid
+from dlocore.problem.held_ends import held_back
 from dlocore.problem.notes import cable_notes
 from dlocore.problem.problem import Problem, pose
 from dlocore.scene.scene import Scene
@@ -30,6 +31,7 @@ from dlocore.statics.regrid import begin_on, starts_folded
 from dlocore.statics.resting import slide_to_rest
 from dlocore.statics.settling import Settled, depth, holding, settle, settle_along
 from dlocore.statics.tipping import tip_notes, tipped
+from dlocore.statics.yielding import yield_notes
 from dlocore.words import in_mm
 
 Floats = NDArray[np.float64]
@@ -41,6 +43,7 @@ _COARSE = 12  # control points: on so few a start may settle to another of sever
 _ELSEWHERE = 0.02  # of the length: farther apart starts may lie in two equilibria
 _FAR = 0.05  # of the length: a start that settles no farther away has hardly passed by another equilibrium
 _TELLING = 13  # control points, of a start that is settled twice to see whether it tells to which side it goes
+_IN_SPANS = np.array([0.0, 0.25, 0.5, 0.75])  # parts of each span of both grids at which they are compared
 _FINER = (1.5, 2.0)  # times the control points, with which a start that finds no rest may
 
 
@@ -56,7 +59,8 @@ class Equilibrium:
         reactions: force of each grasp, in the scene's order (grasps, 3) [N]; zero where it is open.
         moments: moment of each grasp (grasps, 3) [N m].
         energy: elastic energy [J].
-        error_estimate: largest distance to the grid before [m]; None where n_u was given.
+        error_estimate: largest distance to the grid before, and how far unit length at its ends keeps a stretched
+            cable from where it would be [m]; None where n_u was given.
     """
 
     status: Status
@@ -93,7 +97,7 @@ def equilibrium(
     `n_u` grids are refined until two agree to a tenth of a per mille of the length, or to the scene's `target_error`.
 
     Args:
-        scene: its horizon, inertia, drag, damping and friction play no part.
+        scene: its horizon, inertia, drag, damping, friction and plasticity play no part.
         at: time of the grasps' poses and of the loads [s].
         n_u: number of control points, as many as the scene needs at least, 385 at most; None: chosen.
         deadline: time allowed [s].
@@ -132,6 +136,7 @@ def equilibrium(
     sunk = _sunk(grid, rest.settled)
     if DEEPEST < sunk <= TOO_DEEP:
         notes.append(f"the cable is pressed {sunk:.0%} of its diameter into what it touches")
+    notes += yield_notes(problem, grid, q, history)
     apart = _rests_apart(problem, rest, at, monitor) if rest.status == "converged" and not sides else 0.0
     if apart > UNDETERMINED * scene.cable.length:
         bend = bend_in_words(problem, apart)
@@ -170,9 +175,7 @@ def _refined(problem: Problem, sizes: list[int], at: float, target: float, monit
         if settled.rest == "time" and found is not None:
             break
         if found is not None:
-            u = np.linspace(0.0, problem.scene.cable.length, 65)
-            before = design_matrix(found[0].knots, u) @ found[1].q[:, :3]
-            change = float(np.linalg.norm(design_matrix(grid.knots, u) @ settled.q[:, :3] - before, axis=1).max())
+            change = _apart(found[0], found[1].q, grid, settled)
         found, problem = (grid, settled), settled.problem
         if settled.rest == "time":
             break
@@ -185,7 +188,7 @@ def _refined(problem: Problem, sizes: list[int], at: float, target: float, monit
     if settled.rest == "restless":
         status = "stalled"
         message = "The relaxation did not come to rest. The scene may have no equilibrium, or many side by side."
-    elif _sunk(grid, settled) > TOO_DEEP:
+    elif status == "converged" and _sunk(grid, settled) > TOO_DEEP:
         status = "stalled"
         message = (
             f"The cable is pressed {_sunk(grid, settled):.0%} of its diameter into what it touches. Press it less."
@@ -193,6 +196,19 @@ def _refined(problem: Problem, sizes: list[int], at: float, target: float, monit
     elif status == "converged" and len(sizes) > 1 and not change <= target:
         status, message = "max_iterations", f"The finest grid still moved the shape by {in_mm(change)}."
     return _Rest(grid, settled, status, message, change)
+
+
+def _apart(coarse: Grid, q: Floats, grid: Grid, settled: Settled) -> float:
+    """Return how far a cable that has settled lies from its control points q on a coarser grid, at most [m].
+
+    What unit length at held ends takes counts besides: two grids tell a part of that only.
+    """
+    cuts, dimensions = np.union1d(coarse.knots, grid.knots), settled.problem.plane.dimensions
+    u = (cuts[:-1, None] + np.diff(cuts)[:, None] * _IN_SPANS).ravel()
+    one, other = (design_matrix(g.knots, u) @ x[:, :dimensions] for g, x in ((coarse, q), (grid, settled.q)))
+    r = settled.q[None, :, :dimensions]
+    lacking = held_back(settled.problem.scene, grid, r, grid.largest_strain(r))
+    return float(np.linalg.norm(other - one, axis=1).max()) + lacking
 
 
 def _sunk(grid: Grid, settled: Settled) -> float:
