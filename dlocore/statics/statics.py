@@ -14,6 +14,7 @@ from dlocore.answer.report import elastic_energy
 from dlocore.compiling.interrupts import interruptible
 from dlocore.effects.contact import DEEPEST
 from dlocore.errors import SceneError, number, whole
+from dlocore.kernels.assembly import History
 from dlocore.problem.buckling import UNSTABLE, side_notes
 from dlocore.problem.checks import TOO_DEEP
 from dlocore.problem.discretisation import make_grid, smallest_n_u
@@ -44,6 +45,7 @@ _ELSEWHERE = 0.02  # of the length: farther apart starts may lie in two equilibr
 _FAR = 0.05  # of the length: a start that settles no farther away has hardly passed by another equilibrium
 _TELLING = 13  # control points, of a start that is settled twice to see whether it tells to which side it goes
 _IN_SPANS = np.array([0.0, 0.25, 0.5, 0.75])  # parts of each span of both grids at which they are compared
+_LEFT = 1.5  # times its distance to the force on the grid before is the error of a force, as in motions
 _FINER = (1.5, 2.0)  # times the control points, with which a start that finds no rest may
 
 
@@ -58,6 +60,9 @@ class Equilibrium:
         knots_u: (n_u + 4,) [m].
         reactions: force of each grasp, in the scene's order (grasps, 3) [N]; zero where it is open.
         moments: moment of each grasp (grasps, 3) [N m].
+        reaction_errors: how far each of the reactions may be off, as the grid before tells (grasps,) [N]; None where
+            n_u was given.
+        moment_errors: the same of the moments (grasps,) [N m].
         energy: elastic energy [J].
         error_estimate: largest distance to the grid before, and how far unit length at its ends keeps a stretched
             cable from where it would be [m]; None where n_u was given.
@@ -69,6 +74,8 @@ class Equilibrium:
     knots_u: Floats
     reactions: Floats
     moments: Floats
+    reaction_errors: Floats | None
+    moment_errors: Floats | None
     energy: float
     error_estimate: float | None
 
@@ -128,6 +135,8 @@ def equilibrium(
         else:
             problem = pose(scene, {"side": UNSTABLE}, at_rest=True)
             rest = _refined(problem, sizes, at, target, monitor)
+    if problem.start.bow and problem.start.material is None and rest.status == "converged":
+        rest = _without_bow(rest, at, target, monitor)
     sides = [*side_notes(problem.start), *tip_notes(rest.grid.tipped, scene.cable.length)]
     notes += sides
     if problem.friction is not None:
@@ -142,49 +151,65 @@ def equilibrium(
         bend = bend_in_words(problem, apart)
         notes.append(f"which of several equilibria it comes to is not determined: {bend}")
     world = problem.world(free_of_frames(problem, grid, q[None], history.past[None])[0])
-    held = reactions(problem, grid, (holding(problem, grid, rest.settled),))
+    forces, *before = [np.array(_held(*one)) for one in rest.found[::-1]]
+    errors = _LEFT * np.linalg.norm(forces - before[0], axis=2) if before else (None, None)
     return Equilibrium(
         status=rest.status,
         message=with_notes(rest.message, notes),
         control_points=world,
         knots_u=grid.knots,
-        reactions=np.array([g.reaction[-1] for g in held]).reshape(-1, 3),
-        moments=np.array([g.moment[-1] for g in held]).reshape(-1, 3),
+        reactions=forces[0],
+        moments=forces[1],
+        reaction_errors=errors[0],
+        moment_errors=errors[1],
         energy=elastic_energy(problem, grid, q, history),
         error_estimate=None if n_u is not None or not np.isfinite(rest.change) else rest.change,
     )
 
 
 class _Rest(NamedTuple):
-    """What `settle` found on the last of some grids, what to say of it, and how far it is from the one before [m]."""
+    """What `settle` found on the last of some grids, and on the one before it if there is one, and what to say of it.
 
-    grid: Grid
-    settled: Settled
+    Attributes:
+        found: the grids and what they settled to, the finest last.
+        status, message: of that.
+        change: how far it is from the one before [m].
+    """
+
+    found: tuple[tuple[Grid, Settled], ...]
     status: Status
     message: str
     change: float
 
+    @property
+    def grid(self) -> Grid:
+        """The last grid."""
+        return self.found[-1][0]
+
+    @property
+    def settled(self) -> Settled:
+        """What it settled to."""
+        return self.found[-1][1]
+
 
 def _refined(problem: Problem, sizes: list[int], at: float, target: float, monitor: Monitor) -> _Rest:
     """Settle on finer and finer grids until two agree to the target [m]."""
-    found: tuple[Grid, Settled] | None = None
+    found: tuple[tuple[Grid, Settled], ...] = ()
     change, status = np.inf, cast(Status, "time_limit")
     message = "The time limit passed. Allow more time or a smaller n_u."
     for n in sizes:
         grid, settled = _rested(problem, make_grid(problem, n), at, monitor)
-        if settled.rest == "time" and found is not None:
+        if settled.rest == "time" and found:
             break
-        if found is not None:
-            change = _apart(found[0], found[1].q, grid, settled)
-        found, problem = (grid, settled), settled.problem
+        if found:
+            change = _apart(*found[-1], grid, settled)
+        found, problem = (*found[-1:], (grid, settled)), settled.problem
         if settled.rest == "time":
             break
-        one = len(sizes) == 1
-        status, message = "converged", "Forces balance." if one else f"Two grids agree to {in_mm(change)}."
+        status, message = "converged", "Forces balance." if len(sizes) == 1 else _agreed(change)
         if change <= target:
             break
-    assert found is not None, "every list of sizes has a first"
-    grid, settled = found
+    grid, settled = found[-1]
     if settled.rest == "restless":
         status = "stalled"
         message = "The relaxation did not come to rest. The scene may have no equilibrium, or many side by side."
@@ -195,17 +220,47 @@ def _refined(problem: Problem, sizes: list[int], at: float, target: float, monit
         )
     elif status == "converged" and len(sizes) > 1 and not change <= target:
         status, message = "max_iterations", f"The finest grid still moved the shape by {in_mm(change)}."
-    return _Rest(grid, settled, status, message, change)
+    return _Rest(found, status, message, change)
 
 
-def _apart(coarse: Grid, q: Floats, grid: Grid, settled: Settled) -> float:
-    """Return how far a cable that has settled lies from its control points q on a coarser grid, at most [m].
+def _agreed(change: float) -> str:
+    return f"Two grids agree to {in_mm(change)}."
+
+
+def _without_bow(rest: _Rest, at: float, target: float, monitor: Monitor) -> _Rest:
+    """Return what a cable comes to from its rest without the stress-free bow that showed it a side to buckle to.
+
+    It is the rest itself where grids find none without, or do not agree on it to the target [m].
+    """
+    found = []
+    for grid, settled in rest.found:
+        history = History(*(x.copy() for x in settled.history))
+        history.memory[:] = 0.0  # a cable that is given a bow is straight without stress
+        straight = settle(settled.problem, grid, at, monitor, (settled.q.copy(), history), settled.starts)
+        if straight.rest != "settled":
+            return rest
+        found.append((grid, straight))
+    if len(found) == 1:
+        return rest._replace(found=tuple(found))
+    change = _apart(*found[0], *found[1])
+    return rest._replace(found=tuple(found), message=_agreed(change), change=change) if change <= target else rest
+
+
+def _held(grid: Grid, settled: Settled) -> tuple[Floats, Floats]:
+    """Return the force [N] and the moment [N m] of each grasp on a cable that has settled, (grasps, 3) each."""
+    held = reactions(settled.problem, grid, (holding(settled.problem, grid, settled),))
+    force, moment = ([getattr(g, name)[-1] for g in held] for name in ("reaction", "moment"))
+    return np.array(force).reshape(-1, 3), np.array(moment).reshape(-1, 3)
+
+
+def _apart(coarse: Grid, before: Settled, grid: Grid, settled: Settled) -> float:
+    """Return how far a cable that has settled on a grid lies from where it did on a coarser one, at most [m].
 
     What unit length at held ends takes counts besides: two grids tell a part of that only.
     """
     cuts, dimensions = np.union1d(coarse.knots, grid.knots), settled.problem.plane.dimensions
     u = (cuts[:-1, None] + np.diff(cuts)[:, None] * _IN_SPANS).ravel()
-    one, other = (design_matrix(g.knots, u) @ x[:, :dimensions] for g, x in ((coarse, q), (grid, settled.q)))
+    one, other = (design_matrix(g.knots, u) @ x[:, :dimensions] for g, x in ((coarse, before.q), (grid, settled.q)))
     r = settled.q[None, :, :dimensions]
     lacking = held_back(settled.problem.scene, grid, r, grid.largest_strain(r))
     return float(np.linalg.norm(other - one, axis=1).max()) + lacking

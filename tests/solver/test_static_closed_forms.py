@@ -255,3 +255,47 @@ def test_an_equilibrium_tells_of_errors_in_its_end_spans(hold: str, target: floa
     off = np.abs(found.positions(u)[:, 2] + u + 0.05 * 9.81 * (u - 0.5 * u**2) / EA).max()
     assert found.error_estimate is not None
     assert off < 1.2 * found.error_estimate
+
+
+def test_a_column_that_buckles_ends_where_it_would_without_the_bow_that_made_it() -> None:
+    # 1.03 times as heavy as it bears, mu g L^3/EI = 7.8373 of Greenhill: theta'' = -mu g/EI (L - u) sin theta from the
+    # vertical, solved as a boundary value problem; with the bow of 1 mm its tip had been 14 mm off
+    heavy = cable(bending_stiffness=MU * G / 7.8373 / 1.03, axial_stiffness=1e5)
+    scene = Scene(cable=heavy, shape=Straight(direction=(0.0, 0.0, 1.0)), grasps=(CLAMPED,), horizon=1.0)
+    tip = equilibrium(scene).positions([1.0])[0]
+    np.testing.assert_allclose([np.hypot(tip[0], tip[1]), tip[2]], [0.35398, 0.92291], atol=5e-4)
+
+
+@pytest.mark.parametrize("closer", [0.05, 0.3])
+def test_a_cable_whose_ends_come_closer_is_an_elastica_to_what_two_grids_tell(closer: float) -> None:
+    # as high as k/K(k), in parts of its length; it had been up to 0.19 mm off as it kept its bow
+    nearer = Grasp(u=1.0, path=Move(displacement=(-closer, 0.0, 0.0), duration=1.0))
+    scene = Scene(
+        cable=cable(axial_stiffness=1e5),
+        shape=Straight(),
+        grasps=(Grasp(u=0.0), nearer),
+        environment=WEIGHTLESS,
+        horizon=1.0,
+    )
+    found = equilibrium(scene, at=1.0)
+    assert "has no side to buckle to" in found.message
+    height = float(np.linalg.norm(found.positions([0.5])[0, 1:]))
+    assert found.error_estimate is not None
+    k, _ = elastica_column(closer)
+    assert height == pytest.approx(k / ellipk(k * k), abs=found.error_estimate)
+
+
+def test_an_equilibrium_tells_how_far_forces_and_moments_may_be_off() -> None:
+    # between two clamps, a limp cable: its moment there is of a boundary layer, and 7 % off where positions are not
+    nearer = Grasp(u=1.0, hold="tangent", path=Move(displacement=(-0.1, 0.0, 0.0), duration=1.0))
+    opened = Grasp(u=0.5, release_time=0.5)
+    scene = Scene(cable=cable(bending_stiffness=1e-5), shape=Straight(), grasps=(CLAMPED, nearer, opened), horizon=1.0)
+    found, exact = equilibrium(scene, at=1.0), equilibrium(scene, at=1.0, n_u=257)
+    assert exact.reaction_errors is None
+    assert exact.moment_errors is None
+    for name in ("reaction", "moment"):
+        off = np.linalg.norm(getattr(found, f"{name}s") - getattr(exact, f"{name}s"), axis=1)
+        told = getattr(found, f"{name}_errors")
+        assert (off <= told).all()
+        assert (told[:2] < 0.1 * np.linalg.norm(getattr(exact, f"{name}s")[:2], axis=1)).all()
+        assert told[2] == 0.0
