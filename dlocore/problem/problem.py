@@ -316,7 +316,7 @@ def pose(scene: Scene, called_for: Mapping[str, str] | None = None, *, at_rest: 
     Args:
         scene: the scene.
         called_for: effects that a result of this scene has called for, and the reason for each.
-        at_rest: only an equilibrium is asked for, see `with_side`.
+        at_rest: only an equilibrium is asked for, see `with_side` and `reached`.
 
     Raises:
         SceneError: the scene asks what no cable can follow, or switches off what the rest of it needs.
@@ -330,7 +330,7 @@ def pose(scene: Scene, called_for: Mapping[str, str] | None = None, *, at_rest: 
     with_table = table is not None and switch("table", "auto") != "off"
     if with_table:
         check_above(scene, start)
-    met = reached(scene, start, called_for)
+    met = reached(scene, start, called_for, at_rest)
     check_outside(scene, start, met)
     start = cleared(scene, start, met, with_table)
     leaves = off_the_table(scene, start, met) if with_table else "there is no table"

@@ -144,12 +144,12 @@ def _self_contact(scene: Scene, start: StartCurve, lies_over: bool) -> Choice:
     return Choice(True, f"two strands of the start are {in_mm(apart)} apart")
 
 
-def reached(scene: Scene, start: StartCurve, called_for: Mapping[str, str]) -> tuple[int, ...]:
+def reached(scene: Scene, start: StartCurve, called_for: Mapping[str, str], at_rest: bool = False) -> tuple[int, ...]:
     """Return the obstacles that the cable may touch: those near its start, or carried off with its grasps.
 
     Every point of the cable follows its grasps about as far as they go; what a result shows to come near is called
     for by it. A start that settles has come from where it was given: it may have touched all that the cable reaches
-    from the grasps that hold it.
+    from the grasps that hold it, and one that is brought to rest (`at_rest`) all that it reaches from their paths.
     """
     obstacles = scene.environment.obstacles
     switch = scene.effects.get("obstacles", "auto")
@@ -159,20 +159,23 @@ def reached(scene: Scene, start: StartCurve, called_for: Mapping[str, str]) -> t
         return tuple(range(len(obstacles)))
     u = np.linspace(0.0, scene.cable.length, 41)
     points = start(u)
-    shifts = [np.zeros((1, 3))]
-    for grasp in scene.grasps:
-        t = np.linspace(0.0, grasp.path.duration, 17)
-        shifts.append(grasp.path.at(t, start(grasp.u)[0]) - start(grasp.u)[0])
+    shifts = [np.zeros((1, 3)), *(_way(grasp, start) - start(grasp.u)[0] for grasp in scene.grasps)]
     moved = (points[:, None] + np.concatenate(shifts)[None]).reshape(-1, 3)
     rows = obstacle_rows(scene, obstacles)
     radius = 0.5 * scene.cable.diameter
     near = distances(rows, np.ascontiguousarray(moved)).min(axis=0) - radius < NEAR * scene.cable.length
-    holding = [g.u for g in scene.grasps if g.start == 0.0]
-    if scene.shape.settle and holding:
-        away = distances(rows, start(np.array(holding))) - radius  # of each obstacle from each grasp
-        along = np.abs(u[:, None] - np.array(holding))
+    holding = [g for g in scene.grasps if g.start == 0.0]
+    if (scene.shape.settle or at_rest) and holding:
+        held = [np.ascontiguousarray(_way(g, start)) if at_rest else start(g.u) for g in holding]
+        away = np.array([distances(rows, r).min(axis=0) for r in held]) - radius  # of each obstacle from each grasp
+        along = np.abs(u[:, None] - np.array([g.u for g in holding]))
         near |= (along[:, :, None] >= away).all(axis=1).any(axis=0)
     return tuple(int(i) for i in np.flatnonzero(near))
+
+
+def _way(grasp: Grasp, start: StartCurve) -> Floats:
+    """Return points (k, 3) [m] on the path of a grasp, where it holds a start from the beginning."""
+    return grasp.path.at(np.linspace(0.0, grasp.path.duration, 17), start(grasp.u)[0])
 
 
 def _twist(scene: Scene, start: StartCurve, dimensions: int, bent: bool, plastic: bool, damped: bool) -> Choice:

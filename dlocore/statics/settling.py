@@ -80,7 +80,7 @@ def settle(
     is one with a line search.
 
     Args:
-        begin: control points and history at t = 0 that are near the equilibrium; the start of the grid without.
+        begin: control points and history that are near the equilibrium; the start of the grid without.
         starts: where the paths of the grasps begin; without, on the start.
 
     Raises:

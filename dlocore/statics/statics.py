@@ -14,7 +14,7 @@ from dlocore.answer.report import elastic_energy
 from dlocore.compiling.interrupts import interruptible
 from dlocore.effects.contact import DEEPEST
 from dlocore.errors import SceneError, number, whole
-from dlocore.kernels.assembly import History
+from dlocore.kernels.assembly import History, slopes
 from dlocore.problem.buckling import UNSTABLE, side_notes
 from dlocore.problem.checks import TOO_DEEP
 from dlocore.problem.discretisation import make_grid, smallest_n_u
@@ -46,6 +46,7 @@ _FAR = 0.05  # of the length: a start that settles no farther away has hardly pa
 _TELLING = 13  # control points, of a start that is settled twice to see whether it tells to which side it goes
 _IN_SPANS = np.array([0.0, 0.25, 0.5, 0.75])  # parts of each span of both grids at which they are compared
 _LEFT = 1.5  # times its distance to the force on the grid before is the error of a force, as in motions
+_FOLDED = 0.4  # of |r'| at the points of the curvature: less is a fold within a span
 _FINER = (1.5, 2.0)  # times the control points, with which a start that finds no rest may
 
 
@@ -207,12 +208,14 @@ def _refined(problem: Problem, sizes: list[int], at: float, target: float, monit
         if settled.rest == "time":
             break
         status, message = "converged", "Forces balance." if len(sizes) == 1 else _agreed(change)
-        if change <= target:
+        if change <= target and not _is_folded(grid, settled):
             break
     grid, settled = found[-1]
     if settled.rest == "restless":
         status = "stalled"
         message = "The relaxation did not come to rest. The scene may have no equilibrium, or many side by side."
+    elif status == "converged" and _is_folded(grid, settled):
+        status, message = "stalled", "The cable is folded finer than its control points can show. Take more of them."
     elif status == "converged" and _sunk(grid, settled) > TOO_DEEP:
         status = "stalled"
         message = (
@@ -251,6 +254,12 @@ def _held(grid: Grid, settled: Settled) -> tuple[Floats, Floats]:
     held = reactions(settled.problem, grid, (holding(settled.problem, grid, settled),))
     force, moment = ([getattr(g, name)[-1] for g in held] for name in ("reaction", "moment"))
     return np.array(force).reshape(-1, 3), np.array(moment).reshape(-1, 3)
+
+
+def _is_folded(grid: Grid, settled: Settled) -> bool:
+    """Tell whether a cable came to rest folded within a span, which no energy sees."""
+    points = grid.tables.curvature
+    return not slopes(settled.q[None], 1, points.first, points.b1)[0] >= _FOLDED
 
 
 def _apart(coarse: Grid, before: Settled, grid: Grid, settled: Settled) -> float:

@@ -17,6 +17,7 @@ from dlocore import (
     PointMass,
     Points,
     Scene,
+    Sphere,
     Straight,
     Table,
     Waypoints,
@@ -92,6 +93,19 @@ def test_a_cable_that_nothing_holds_yet_stays_where_it_lies() -> None:
     np.testing.assert_allclose(found.positions([0.0, 1.0]), points[[0, -1]], atol=1e-4)
 
 
+def test_a_cable_that_is_folded_on_few_control_points_is_told_and_refined() -> None:
+    # pushed along itself in steps as long as its spans; 25 control points were called at rest in such a fold
+    along = Move(displacement=(-0.5, 0.0, 0.3), duration=0.1)
+    grasps = (Grasp(u=0.0), Grasp(u=1.0, path=along), Grasp(u=0.6, grasp_time=5.0))
+    scene = Scene(cable=cable(), shape=Straight(), grasps=grasps, horizon=10.0)
+    few = equilibrium(scene, at=0.2, n_u=25)
+    assert few.status == "stalled"
+    assert few.message.startswith("The cable is folded")
+    enough = equilibrium(scene, at=0.2)
+    assert enough.status == "converged"
+    np.testing.assert_allclose(enough.positions([0.6])[0], [0.41264, 0.0, -0.08911], atol=1e-4)
+
+
 # --- what is in the way ---
 
 
@@ -118,6 +132,19 @@ def test_a_cable_is_not_carried_through_a_bar_to_its_equilibrium(radius: float) 
     lowest = r[np.argmin(r[:, 2])]
     assert lowest[1] < 0.18  # it hangs on the bar, from which grippers have gone on; it had hung beside them, at 0.3 m
     assert np.hypot(r[:, 1] - 0.2, r[:, 2] + 0.2).min() > radius + (0.5 - 0.02) * 0.006
+
+
+@pytest.mark.parametrize("way", [0.0, 1.0])
+def test_a_cable_comes_to_rest_on_what_is_far_from_its_start_and_in_its_reach(way: float) -> None:
+    # it falls from the horizontal on to a ball half its length below the gripper, and had come to rest within it
+    ball = Sphere(center=(way, 0.0, -0.5), radius=0.1)
+    moved = Grasp(u=0.0, path=Move(displacement=(way, 0.0, 0.0), duration=1.0))
+    around = Environment(obstacles=(ball,))
+    scene = Scene(cable=cable(), shape=Straight(), grasps=(moved,), environment=around, horizon=1.0)
+    found = equilibrium(scene, at=1.0, n_u=25)
+    assert found.status == "converged"
+    gaps = np.linalg.norm(found.positions(np.linspace(0.0, 1.0, 401)) - ball.center, axis=1) - 0.1 - 0.5 * DIAMETER
+    assert gaps.min() == pytest.approx(0.0, abs=0.03 * DIAMETER)  # 2 % at the nodes of contact
 
 
 # --- how deep it is pressed in ---
