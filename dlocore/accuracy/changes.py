@@ -120,8 +120,15 @@ class Changes:
         self.since: dict[str, float] = {}
 
     def note(self, direction: str, level: Level, before: Level) -> None:
-        """Note that a refinement in a direction took one level to the next."""
-        self.last[direction] = weighed(level, before, self.last.get(direction), not self.last)
+        """Note that a refinement in a direction took one level to the next.
+
+        The first one in a direction alone is no longer on the way to a limit if it moves the surface by more than the
+        last one in both did.
+        """
+        last, both = self.last.get(direction), self.last.get("both")
+        if last is None and both is not None and both.moved < level.change:
+            last = both
+        self.last[direction] = weighed(level, before, last, not self.last)
         self.since = {d: max(self.since.get(d, 0.0), level.change) for d in self.last if d != direction}
 
     @property

@@ -181,18 +181,30 @@ def test_grids_that_agree_by_chance_on_a_cable_that_yields_are_not_believed():
     assert error < 0.01
 
 
-def test_a_change_that_falls_after_one_that_had_risen_is_not_believed():
-    """Changes of 3, 39 and 4 mm: strong damping ended with the second. The answer was 10.9 mm off at 1.7."""
-    angle = np.linspace(-1.32, 1.32, 60)
-    arc = np.column_stack([np.sin(angle), 0.0 * angle, -np.cos(angle)]) / 2.64
-    scene = Scene(
+def let_go(half: float, diameter: float, EI: float, release: float) -> Scene:
+    """Return a hanging arc with a mass at its end, which is held near the other one, and then let go."""
+    angle = np.linspace(-half, half, 60)
+    arc = np.column_stack([np.sin(angle), 0.0 * angle, -np.cos(angle)]) / (2.0 * half)
+    return Scene(
         cable=Cable(
-            length=1.0, diameter=0.00557, linear_density=0.076, bending_stiffness=4.38e-3, rest_shape="straight",
+            length=1.0, diameter=diameter, linear_density=0.076, bending_stiffness=EI, rest_shape="straight",
             point_masses=(PointMass(u=1.0, mass=0.033),),
         ),
-        shape=Points(points=arc), grasps=(Grasp(u=0.1, release_time=0.412),), environment=Environment(drag=0.076),
-        horizon=0.655,
+        shape=Points(points=arc), grasps=(Grasp(u=0.1, release_time=release),), environment=Environment(drag=0.076),
+        horizon=0.655, quality=Quality(target_error=5e-3),
     )  # fmt: skip
-    found, fine = (predict(replace(scene, quality=Quality(target_error=target))) for target in (5e-3, 2e-3))
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        # changes of 3, 39 and 4 mm, the second without strong damping; 10.9 mm off at 1.7
+        pytest.param(let_go(1.32, 0.00557, 4.38e-3, 0.412), id="that falls after a rise"),
+        # of 2 mm by both, and 5 by steps alone; 9.0 mm off at 2.7
+        pytest.param(let_go(1.3, 0.0056, 4.4e-3, 0.41), id="in one direction, above that in both"),
+    ],
+)
+def test_a_change_that_is_in_no_order_is_not_believed(scene: Scene):
+    found, fine = predict(scene), predict(replace(scene, quality=Quality(target_error=1.5e-3)))
     assert found.status == fine.status == "converged"
     assert apart(found.surface, fine.surface).max() < found.accuracy.error_estimate < 5e-3
