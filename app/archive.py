@@ -35,6 +35,7 @@ class Run:
         document: the response.
         surface: the predicted surface.
         material: what the sections of the cable remember over the motion, if anything.
+        stretch: how far it is stretched over the motion; None of a run stored before it was noted.
         iterations: the iterates.
         start: the start shape where it was given by control points, also as the end of another run.
         machine: what it was solved on.
@@ -44,6 +45,7 @@ class Run:
     document: dict[str, Any]
     surface: SplineSurface
     material: MaterialMotion | None
+    stretch: StretchMotion | None
     iterations: tuple[Iteration, ...]
     start: ControlPoints | None
     machine: str
@@ -53,9 +55,8 @@ class Run:
         """Return a run that was just solved here."""
         shape = prediction.scene.shape
         start = shape if isinstance(shape, ControlPoints) else None
-        return Run(
-            request, document, prediction.surface, prediction.material, prediction.iterations, start, machine_line()
-        )
+        parts = prediction.surface, prediction.material, prediction.stretch, prediction.iterations
+        return Run(request, document, *parts, start, machine_line())
 
     @cached_property
     def scene(self) -> Scene:
@@ -111,7 +112,7 @@ def _motion(arrays: Any) -> Motion:
     return Motion(
         _surface(arrays, 0),
         MaterialMotion(**material) if material else None,
-        StretchMotion(**stretch) if stretch else None,  # of a run stored before it was noted
+        StretchMotion(**stretch) if stretch else None,
     )
 
 
@@ -145,7 +146,7 @@ def unpack(request: dict[str, Any], document: dict[str, Any], nets: bytes) -> Ru
     if start:
         material = Material(**remembered) if remembered else None
         shape = ControlPoints(**{**start, "settle": bool(start["settle"])}, material=material)
-    return Run(request, document, motion.surface, motion.material, iterations, shape, machine)
+    return Run(request, document, *motion, iterations, shape, machine)
 
 
 def surface_npz(document: dict[str, Any], material: MaterialMotion | None) -> bytes:

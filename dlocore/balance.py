@@ -1,10 +1,12 @@
 """Energies of a predicted motion, and how large the forces of each effect are in it."""
 
+from typing import cast
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.answer.frames import directors
-from dlocore.answer.parts import MaterialMotion
+from dlocore.answer.parts import MaterialMotion, StretchMotion
 from dlocore.compiling.interrupts import interruptible
 from dlocore.effects import laws
 from dlocore.errors import SceneError, instance
@@ -31,14 +33,22 @@ _LAWS = {
 
 @interruptible
 def energies(
-    scene: Scene, surface: SplineSurface, times: ArrayLike, material: MaterialMotion | None = None
+    scene: Scene,
+    surface: SplineSurface,
+    times: ArrayLike,
+    material: MaterialMotion | None = None,
+    stretch: StretchMotion | None = None,
 ) -> dict[str, Floats]:
-    """Return the energies of the motion at `times` (k,) [s]; each (k,) [J].
+    """Return the energies of the motion at `times` (k,) [s]; each (k,) [J]. Of a prediction: `Prediction.energies`.
 
     Keys: "kinetic", mu/2 (|r_t|^2 + D^2/8 theta_t^2), "stretch", "bend" and "twist", docs/model.md eq. 7, and
     "gravity", -mu g . r relative to the first of the times; point masses add m/2 |r_t|^2 and -m g . r. Each is
     integrated over the cable as the solver does it. What is off in the scene is zero. `material` is what the sections
     remember (`Prediction.material`), for a cable that yields.
+
+    The energy of stretch is that of the strain that balances the forces, `stretch` (`Prediction.stretch`). Without it,
+    it is that of the surface's own strain, which is no measure of it where a cable hardly stretches: what the time
+    spline misses may strain the cable by 1e-4, and counts with the whole axial stiffness.
 
     Raises:
         SceneError: a time is outside the predicted time, or the surface is of a cable of another length.
@@ -58,6 +68,10 @@ def energies(
             only = parameters.copy()
             only[[row for row in range(laws.COUNT) if row != _LAWS[name]], 0] = 0.0
             found[name][k] = stored_energy(axes, q, grid.tables, active, only, histories[k])
+    if stretch is not None:
+        axial = grid.tables.axial
+        strain = stretch.along(axial.u, times) - np.array([history.axial[:, 0] for history in histories])
+        found["stretch"] = 0.5 * cast(float, scene.cable.axial_stiffness) * strain**2 @ axial.w
     return found
 
 
@@ -67,7 +81,8 @@ def effect_forces(
 ) -> dict[str, float]:
     """Return how large the generalised forces of each active effect are in the motion [N].
 
-    It is the root mean square over `times` (k,) [s] of the norm of the forces at the control points.
+    It is the root mean square over `times` (k,) [s] of the norm of the forces at the control points. Those of stretch
+    are of the surface's own strain, see `energies`.
 
     Raises:
         SceneError: as `energies`.

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dlocore.answer.parts import (
     Accuracy,
@@ -167,6 +167,16 @@ class Prediction:
     def stretch(self) -> StretchMotion:
         """How far the cable is stretched over time, to the accuracy of a tension."""
         return self.report_stretch()
+
+    def energies(self, times: ArrayLike) -> dict[str, Floats]:
+        """Return the energies of the motion at `times` (k,) [s]; each (k,) [J], by the keys of `dlocore.energies`.
+
+        Raises:
+            SceneError: a time is outside the predicted time.
+        """
+        from dlocore.balance import energies  # it needs the compiler
+
+        return energies(self.scene, self.surface, times, self.material, self.stretch)
 
     def __getstate__(self) -> dict[str, Any]:
         state = state_with(

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 
-from dlocore.balance import energies
 from dlocore.compiling.caching import is_kept
 from dlocore.compiling.interrupts import interruptible
 from dlocore.errors import Cancelled
@@ -165,7 +164,7 @@ def _read_all(answer: Prediction) -> None:
     """Read all that is found only as it is read, and ask for its energies, so that what that takes is compiled, too."""
     _ = answer.message, answer.grasps, answer.contacts, answer.effects, answer.material, answer.start_energy
     _ = [(iteration.surface, iteration.energy) for iteration in answer.iterations]
-    energies(answer.scene, answer.surface, [0.0])
+    answer.energies([0.0])
 
 
 def _reference() -> None:

@@ -62,7 +62,7 @@ def motion_chunks(run: Run) -> "list[Chunk]":
     for k in range(len(run.document.get("contacts", []))):
         chunks += _contact(run, k)
     chunks += _masses(run, times, thick)
-    for name, values in energies(run.scene, run.surface, surface["t"], run.material).items():
+    for name, values in energies(run.scene, run.surface, surface["t"], run.material, run.stretch).items():
         entity = f"/over_time/energy/{name}"
         chunks += [line_style(entity, f"{name} [J]", ENERGIES.get(name, GREY)), scalars(entity, times, values)]
     return chunks

@@ -228,7 +228,7 @@ def test_the_forces_are_those_of_every_active_effect(chunks: list[Any], run: Run
 def test_energies_and_reactions_are_plotted_over_the_motion(
     chunks: list[Any], run: Run, answer: dict[str, Any]
 ) -> None:
-    for name, expected in energies(run.scene, run.surface, answer["surface"]["t"]).items():
+    for name, expected in energies(run.scene, run.surface, answer["surface"]["t"], stretch=run.stretch).items():
         times, values = rows(chunks, f"/over_time/energy/{name}", "scalars", "motion")
         assert times == pytest.approx(answer["surface"]["t"], abs=2e-9)
         np.testing.assert_allclose([value for (value,) in values], expected, rtol=1e-12)

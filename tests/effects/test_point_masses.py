@@ -23,7 +23,6 @@ from dlocore import (
     Still,
     Straight,
     Table,
-    energies,
     equilibrium,
     plan,
     predict,
@@ -155,7 +154,7 @@ def test_no_energy_comes_from_nothing() -> None:
     )
     found = converged(swings)
     t = np.linspace(0.0, 1.0, 41)
-    parts = energies(swings, found.surface, t)
+    parts = found.energies(t)
     total = sum(parts.values())
     most = parts["kinetic"].max()
     assert most > 0.3  # [J]: of 0.6 that all of it may fall to

@@ -19,7 +19,6 @@ from dlocore import (
     Scene,
     Straight,
     Waypoints,
-    energies,
     equilibrium,
     predict,
 )
@@ -176,7 +175,7 @@ def test_sections_turn_smoothly_about_a_double_knot(hold: str, n_u: int):
     u, t = samples(found.surface, 201, 13)
     theta = found.surface(u, t)[..., 3]
     assert np.ptp(theta, axis=1).max() < 0.05
-    stored = energies(found.scene, found.surface, t, found.material)
+    stored = found.energies(t)
     assert max(stored["bend"].max(), stored["kinetic"].max()) < 0.1 * 0.5 * 0.05 * 2.0**2
 
 

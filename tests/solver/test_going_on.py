@@ -165,7 +165,7 @@ def test_sections_that_were_turned_as_the_start_settled_go_on_turned() -> None:
     part = rest(whole, 0.4)
     assert part.status == "converged"
     assert apart(whole, 0.4, part) < (whole.accuracy.error_estimate or 0.0) + (part.accuracy.error_estimate or 0.0)
-    found = energies(whole.scene, whole.surface, [0.4], whole.material)
+    found = whole.energies([0.4])
     assert found["bend"][0] + found["twist"][0] + found["stretch"][0] == pytest.approx(part.start_energy, rel=0.02)
     assert whole.material is not None
     without = energies(whole.scene, whole.surface, [0.4])  # about, as the way on which it settled is not known

@@ -117,3 +117,17 @@ def test_beside_a_held_direction_the_tension_is_what_its_gripper_pulls_with(n_u:
     if inside:
         middle = found.scene.cable.axial_stiffness * found.stretch.along([0.28, 0.3, 0.32], [0.05])[0]
         assert middle[1] == pytest.approx(0.5 * (middle[0] + middle[2]), abs=0.01)
+
+
+def test_the_energy_of_stretch_is_that_of_the_tension() -> None:
+    """A bar that spins has the tension mu w^2 (L^2/4 - s^2)/2: a millionth of its motion, which the surface hides."""
+    spin, x = 6.0, np.linspace(0.0, 1.0, 5)
+    rod = Cable(length=1.0, diameter=0.007, linear_density=0.07, bending_stiffness=1.0)
+    across = np.column_stack([0.0 * x, spin * (x - 0.5), 0.0 * x])
+    shape = Points(points=np.column_stack([x, 0.0 * x, 0.0 * x]), velocity=across)
+    quality = Quality(n_u=17, n_t=49, keep_grid=True)
+    prediction = predict(Scene(cable=rod, shape=shape, environment=NOWHERE, horizon=1.0, quality=quality))
+    t = np.linspace(0.1, 1.0, 19)  # it begins unstretched, and rings until then
+    expected = (0.07 * spin**2) ** 2 / (240.0 * rod.axial_stiffness)  # type: ignore[operator]
+    np.testing.assert_allclose(prediction.energies(t)["stretch"], expected, rtol=0.01)
+    np.testing.assert_allclose(prediction.energies(t)["kinetic"], 0.07 * spin**2 / 24.0, rtol=0.01)

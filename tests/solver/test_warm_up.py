@@ -17,7 +17,7 @@ import sys
 from dataclasses import replace
 from numba.core.dispatcher import Dispatcher
 from benchmarks.catalogue import catalogue
-from dlocore import Quality, SceneError, energies, predict, sensitivities, warm_up
+from dlocore import Quality, SceneError, predict, sensitivities, warm_up
 
 def compiled():
     modules = [m for name, m in list(sys.modules.items()) if name.startswith("dlocore")]
@@ -27,7 +27,7 @@ def compiled():
 def read(answer):
     answer.message, answer.grasps, answer.effects, answer.material, answer.start_energy
     [(i.surface, i.energy) for i in answer.iterations]
-    energies(answer.scene, answer.surface, [0.0, answer.surface.horizon])
+    answer.energies([0.0, answer.surface.horizon])
 
 warm_up()
 before = compiled()

@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks.hard import curves
 from benchmarks.hard.cases.base import WEIGHTLESS, at_end, case, cord, move, samples
 from benchmarks.hard.laws import energy_gain
-from dlocore import Environment, Grasp, Load, Points, Prediction, Scene, Straight, energies, predict
+from dlocore import Environment, Grasp, Load, Points, Prediction, Scene, Straight, predict
 
 AROUND = Environment(drag=0.1)
 
@@ -107,7 +107,7 @@ def torsion_a_hundred_times_bending() -> Scene:
 def _lost_energy(p: Prediction) -> float:
     """Return the energy that is gained, or lost beyond the little that the scheme damps, of that of the swing."""
     t = np.linspace(0.0, p.surface.horizon, 33)
-    parts = energies(p.scene, p.surface, t)
+    parts = p.energies(t)
     lost = float(-sum(x[-1] - x[0] for x in parts.values())) / float(parts["kinetic"].max())
     return max(float(energy_gain(p) or 0.0), lost - 0.05)
 
