@@ -26,6 +26,7 @@ from dlocore.problem.discretisation import axial_strain
 from dlocore.problem.events import closed_grasps, moments
 from dlocore.problem.notes import edge_notes, start_notes
 from dlocore.problem.problem import Problem
+from dlocore.problem.selection import turned_by_grasps
 from dlocore.problem.standing import obstacle_rows
 from dlocore.problem.strands import nearest_strands
 from dlocore.scene.obstacles import Obstacle
@@ -156,9 +157,9 @@ def objections(level: Level) -> list[str]:
         found += [
             f"{reason}: one lies over the other; effects.self_contact on keeps them apart" for reason in crossings
         ]
-    clamps = sum(g.hold == "clamp" for g in problem.scene.grasps)
-    if "twist" in off and problem.plane.dimensions == 3 and clamps > 1:
-        found.append("twist is off, though two grasps hold the orientation of the sections")
+    turned = turned_by_grasps(problem.scene, problem.start)
+    if "twist" in off and problem.plane.dimensions == 3 and turned:
+        found.append(f"twist is off, though {turned}")
     allowed = MATTERS * problem.scene.cable.length
     for name in _forces(problem) if off else ():
         if name in off:

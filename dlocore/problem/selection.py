@@ -19,6 +19,8 @@ from dlocore.words import in_mm
 Floats = NDArray[np.float64]
 
 SLOW = 30.0  # times the first natural period: so slow a motion goes through equilibria
+ROLL = 0.01  # [rad]: what a clamp turns its section by about the cable, from which on it is told how all are turned
+_ROLL_TIMES = 33  # at which it is looked for
 NEAR = 0.1  # of the length: an obstacle nearer than this to the cable and its way may be touched
 
 
@@ -194,9 +196,30 @@ def _twist(scene: Scene, start: StartCurve, dimensions: int, bent: bool, plastic
         return Choice(True, "bends that the sections remember turn with them")
     if damped:
         return Choice(True, "internal damping acts on bends as the sections see them, which twist lets turn")
-    if _held_together([g for g in scene.grasps if g.hold == "clamp"]):
-        return Choice(True, "two grasps hold the orientation of the sections")
-    return Choice(False, "nothing holds an orientation at two places")
+    turned = turned_by_grasps(scene, start)
+    return Choice(bool(turned), turned or "nothing holds an orientation at two places, or turns it about the cable")
+
+
+def turned_by_grasps(scene: Scene, start: StartCurve) -> str:
+    """Return how grasps turn sections about the cable, or hold them against each other, in words; "" if they do not."""
+    clamps = [g for g in scene.grasps if g.hold == "clamp"]
+    if _held_together(clamps):
+        return "two grasps hold the orientation of the sections"
+    return "a grasp turns the sections about the cable" if any(_rolls(g, start) for g in clamps) else ""
+
+
+def _rolls(grasp: Grasp, start: StartCurve) -> bool:
+    """Tell whether a clamp turns its section about the cable: what closes later, and turns at all, may do so."""
+    path = grasp.path
+    t = np.linspace(0.0, path.duration, _ROLL_TIMES)
+    turned = path.rotation_at(t)
+    if turned is None:
+        return False
+    if grasp.start > 0.0:  # where the cable will point to is not known
+        return bool(np.abs(turned - np.eye(3)).max() > ROLL)
+    tangent = start(grasp.u, 1)[0]
+    spins = path.spin(t, turned @ (tangent / np.linalg.norm(tangent)))
+    return bool(np.abs(np.cumsum(spins)).max() > ROLL)
 
 
 def _held_together(grasps: list[Grasp]) -> bool:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from dlocore import (
     Environment,
     Grasp,
     Move,
+    Plan,
     Points,
     Prediction,
     Quality,
@@ -21,6 +23,7 @@ from dlocore import (
     Sphere,
     Straight,
     Table,
+    Waypoints,
     plan,
     predict,
 )
@@ -43,7 +46,7 @@ QUICK = [
 SIDE = Move(displacement=(0.0, 0.3, 0.0), duration=1.5)
 
 
-def effect(prediction: Prediction, name: str) -> tuple[bool, str]:
+def effect(prediction: Prediction | Plan, name: str) -> tuple[bool, str]:
     found = next(e for e in prediction.effects if e.name == name)
     return found.active, found.reason
 
@@ -77,6 +80,52 @@ def test_plasticity_is_switched_on_by_a_motion_that_yields_only():
     elastic = bent(0.5)
     assert not effect(elastic, "plasticity")[0]
     assert not np.any(elastic.material.memory)
+
+
+def turned(rotation: tuple[float, float, float], **grasp: Any) -> Scene:
+    """Return the scene of a straight rod, along x, of which one end is turned, with nothing at the other."""
+    turns = Move(displacement=(0.0, 0.1, 0.1), rotation=rotation, duration=0.5)
+    return Scene(
+        cable=cable(bending_stiffness=1.0),
+        shape=Straight(),
+        grasps=(Grasp(**{"u": 0.0, "hold": "clamp", "path": turns, **grasp}),),
+        horizon=0.7,
+        quality=Quality(n_u=9, n_t=19, keep_grid=True),
+    )
+
+
+def test_a_clamp_that_turns_the_cable_about_itself_turns_all_of_it():
+    rolled = turned((3.0, 0.0, 0.0))
+    found = predict(rolled)
+    assert effect(found, "twist") == (True, "a grasp turns the sections about the cable")
+    np.testing.assert_allclose(found.surface([0.0, 0.5, 1.0], [0.7])[0, :, 3], 3.0, atol=0.01)
+    assert np.abs(found.grasps[0].moment[:, 0]).max() > 0.0
+    without = predict(replace(rolled, effects={"twist": "off"}))
+    assert "twist is off, though a grasp turns the sections about the cable" in without.notes
+
+
+@pytest.mark.parametrize(
+    ("scene", "twists"),
+    [
+        (turned((3.0, 0.0, 0.0)), True),
+        (turned((0.0, 0.4, 0.4)), False),  # the tangent goes along
+        (turned((0.0, 0.4, 0.4), grasp_time=0.1), True),  # who knows where it points to by then
+        (turned((3.0, 0.0, 0.0), hold="tangent"), False),
+        (
+            turned(
+                (0.0, 0.0, 0.0),
+                path=Waypoints(
+                    times=(0.0, 0.2, 0.4),
+                    positions=((0.0, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.1, 0.1)),
+                    orientations=((1.0, 0.0, 0.0, 0.0), (0.96, 0.28, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)),
+                ),
+            ),
+            True,
+        ),
+    ],
+)
+def test_twist_is_called_for_where_a_clamp_rolls(scene: Scene, twists: bool):
+    assert effect(plan(scene), "twist")[0] == twists
 
 
 def test_where_one_obstacle_is_in_reach_a_motion_that_comes_to_others_calls_for_them():
