@@ -54,7 +54,8 @@ class Prediction:
             when they are first read.
         iterations: how the solve went.
         accuracy: method, estimated error, time.
-        start_fit: root mean square distance of the start from the given points [m]; 0 where it was given exactly.
+        start_fit: root mean square distance of the start from the given points [m], which no error estimate counts; 0
+            where it was given exactly.
         level: the march behind it, on whose grid another may go on (`predict(..., like=...)`); None of a reference.
         judged: the prediction like it whose error estimate it took on; None where its own error was estimated.
     """

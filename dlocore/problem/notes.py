@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from dlocore.scene.obstacles import Box, Cylinder, Obstacle
 from dlocore.scene.paths import Move, Waypoints
-from dlocore.scene.scene import Grasp, Points, Scene
+from dlocore.scene.scene import AUTO_TARGET, Grasp, Points, Scene
 from dlocore.shape.shape import StartCurve, start_curve
 from dlocore.words import in_mm
 
@@ -46,7 +46,7 @@ def scene_notes(scene: Scene) -> list[str]:
 
 def cable_notes(scene: Scene) -> list[str]:
     """Return what is to be known of a scene's cable and how it lies, in words."""
-    return [*_of_units(scene), *_of_lengths(scene)]
+    return [*_of_units(scene), *_of_points(scene)]
 
 
 def start_notes(scene: Scene, start: StartCurve) -> list[str]:
@@ -100,19 +100,26 @@ def _of_units(scene: Scene) -> list[str]:
     return [f"the cable is {thick}, more than any metal does: linear_density is its mass per length in kg/m"]
 
 
-def _of_lengths(scene: Scene) -> list[str]:
-    """Return what is told of points that were made as long as the cable."""
+def _of_points(scene: Scene) -> list[str]:
+    """Return what is told of points that were made as long as the cable, or that the start does not go through."""
     if not isinstance(scene.shape, Points):
         return []
     length = scene.cable.length
     start = start_curve(scene.shape, length)
     differ = abs(start.length_given - length) > SAME_LENGTH * length
-    if not (differ and start.ends_moved > SAME_ENDS * length):
-        return []
-    return [
-        f"the points of the shape are {start.length_given:.4g} m long and the cable {length:.4g} m: they are scaled "
-        f"to it about their middle, which moves an end by up to {in_mm(start.ends_moved)}, and a gripper that holds it"
-    ]
+    if differ and start.ends_moved > SAME_ENDS * length:
+        return [
+            f"the points of the shape are {start.length_given:.4g} m long and the cable {length:.4g} m: they are "
+            f"scaled to it about their middle, which moves an end by up to {in_mm(start.ends_moved)}, and a gripper "
+            "that holds it"
+        ]
+    if start.fit_missed > (scene.quality.target_error or AUTO_TARGET * length):
+        return [
+            f"the start is a smooth curve that misses the points of the shape by {in_mm(start.fit_missed)}, beside "
+            "their noise, which the estimated error does not count: give points as long as the cable, more of them at "
+            "sharp bends, or the control points of a spline"
+        ]
+    return []
 
 
 def _of_times(scene: Scene) -> list[str]:

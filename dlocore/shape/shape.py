@@ -53,6 +53,7 @@ class StartCurve(SplineCurve):
         velocity: v(u) [m/s], or None at rest.
         fit_rms: root mean square distance of the given points from the curve [m]; 0 where it is given exactly.
         fit_max: the largest of these distances [m].
+        fit_missed: root mean square of what neighbouring points share of theirs, which is no noise [m].
         length_given: length of the curve, its strain taken off, before it was made as long as the cable [m].
         ends_moved: by how much that moved the end that it moved farther [m]; 0 where the curve is given exactly.
         theta: angle of the sections, a spline with control points (n, 1) [rad], or None where it is the same
@@ -70,6 +71,7 @@ class StartCurve(SplineCurve):
     velocity: SplineCurve | None = None
     fit_rms: float = 0.0
     fit_max: float = 0.0
+    fit_missed: float = 0.0
     length_given: float = 0.0
     ends_moved: float = 0.0
     theta: SplineCurve | None = None
@@ -225,22 +227,25 @@ def _fitted(shape: Points, length: float) -> StartCurve:
     knots[-DEGREE - 1 :] = length
     control = middle + centre + scale * (fit.curve.c - centre)
     ends = np.linalg.norm(fit.curve.c[[0, -1]] - centre, axis=1)
-    distance = _distance(SplineCurve(knots=knots, control_points=control), at, points)
+    off = _offsets(SplineCurve(knots=knots, control_points=control), at, points)
+    distance = np.sqrt((off**2).sum(axis=1))
+    alike = float((off[1:] * off[:-1]).sum(axis=1).mean())
     return StartCurve(
         knots=knots,
         control_points=control,
         velocity=_velocity(shape.velocity, length, lambda rows: at, exact=False),
         fit_rms=float(np.sqrt((distance**2).mean())),
         fit_max=float(distance.max()),
+        fit_missed=math.sqrt(max(alike, 0.0)),
         length_given=fit.length_given,
         ends_moved=abs(scale - 1.0) * float(ends.max()),
     )
 
 
-def _distance(curve: SplineCurve, at: Floats, points: Floats) -> Floats:
-    """Return the distances (n,) [m] of points from a unit-speed curve, from parameters near their feet."""
+def _offsets(curve: SplineCurve, at: Floats, points: Floats) -> Floats:
+    """Return how far points are from a unit-speed curve (n, 3) [m], from parameters near their feet."""
     foot = at + ((points - curve(at)) * curve(at, 1)).sum(axis=1)
-    return np.sqrt(((points - curve(np.clip(foot, 0.0, curve.knots[-1]))) ** 2).sum(axis=1))
+    return points - curve(np.clip(foot, 0.0, curve.knots[-1]))
 
 
 def _velocity(

@@ -1,5 +1,7 @@
 """Notes on a scene as it was given, whatever its motion."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -32,6 +34,16 @@ def along(points: Floats) -> Scene:
 
 def straight(length: float) -> Floats:
     return np.linspace(0.0, length, 40)[:, None] * [1.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(("target", "told"), [(5e-4, True), (None, False)])
+def test_a_start_that_misses_what_its_points_show_is_told_of(target: float | None, told: bool) -> None:
+    # more waves of 1 mm than a fit has spans, at twenty points each: it goes through their middle, 0.7 mm from them
+    s = np.linspace(0.0, 1.0, 2000)
+    waves = np.column_stack([s, 1e-3 * np.sin(200.0 * np.pi * s), 0.0 * s])
+    notes = scene_notes(replace(along(waves), quality=Quality(target_error=target)))
+    assert len(notes) == told
+    assert all("a smooth curve that misses the points of the shape by 0.69 mm" in note for note in notes)
 
 
 @pytest.mark.parametrize("length", [0.91, 1.05])
