@@ -118,7 +118,8 @@ class QualityModel(Model):
         ge=5,
         le=MAX_N_U,
         description="Control points along the cable. Where a solve on the grid errs by more than 1 % of the length, as "
-        "it estimates, or does not come to its end, finer grids that reach 1 % are the answer. The message says so.",
+        "it estimates, or does not come to its end, finer grids that reach 1 % are the answer. The message says so. "
+        "Where no grids settle the motion that takes until the time limit of the service; keep_grid leaves it out.",
         examples=[9],
     )
     n_t: CountOrNone = Field(default=None, ge=5, le=MAX_N_T, description="Control points in time.", examples=[13])

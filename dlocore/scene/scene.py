@@ -329,7 +329,8 @@ class Quality:
         n_u: control points along the cable, 5 to 129.
         n_t: control points in time, 5 to 513. Where a solve on such a grid errs by more than 1 % of the length, as it
             estimates, or does not come to its end, finer grids are solved, and where these reach that 1 % they are the
-            answer, which says so.
+            answer, which says so. That takes what a `target_error` of 1 % takes, where no grid settles the motion a
+            minute or more: a deadline bounds it, `keep_grid` leaves it out.
         delta: threshold of a least squares on the norm of its control-point update, paper eq. (25) [m], 1e-10 to 1e-2;
             without it 1e-5.
         method: "march", "spacetime", "paper", "reference" (docs/reference.md), or "auto": `march`, which is nearer to
