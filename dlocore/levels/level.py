@@ -16,6 +16,7 @@ from dlocore.problem.events import JUMP, moments, swings
 from dlocore.problem.grid import Grid
 from dlocore.problem.held_ends import held_back
 from dlocore.problem.problem import Problem, firmer, stiff_as_taut, stiffer, stiffer_for
+from dlocore.problem.stopping import unresolved_way
 from dlocore.problem.time_grid import smallest_n_t, time_knots
 from dlocore.problem.trembling import trembles
 from dlocore.scene.scene import AUTO_TARGET
@@ -108,8 +109,9 @@ class Level:
 
     @cached_property
     def unseen(self) -> float:
-        """How far the cable is taken by what the steps do not see of paths through waypoints [m], see `trembles`."""
-        return trembles(self.problem, self.problem.horizon / self.motion.steps)
+        """How far the cable is taken by what the steps do not see [m], see `trembles` and `unresolved_way`."""
+        step = self.problem.horizon / self.motion.steps
+        return max(trembles(self.problem, step), unresolved_way(self.problem, step))
 
     @cached_property
     def held_back(self) -> float:

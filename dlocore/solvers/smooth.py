@@ -18,7 +18,7 @@ from dlocore.problem.time_grid import marks_of
 from dlocore.scene.scene import Grasp
 from dlocore.solvers.march import March, chunk_of, every_of, tolerance_of
 from dlocore.solvers.monitor import Monitor, TimeIsUp
-from dlocore.solvers.stretch import JUMPS, NEAR
+from dlocore.solvers.stretch import NEAR, least_jump
 
 Floats = NDArray[np.float64]
 
@@ -64,7 +64,7 @@ def march_smooth(
         problem.axes, grid.knots, *free_ends(problem.scene), *GAUSS_2, *GAUSS_3, *GAUSS_4, problem.masses, grid.start,
         grid.velocity, memory, times, len(NEAR), rows, sampled, problem.plane.origin, problem.plane.axes, knots_t,
         *problem.laws, problem.mass_density(), problem.drag_coefficient(), problem.weight(), rho,
-        tolerance_of(problem, grid, problem.horizon / (steps + 1)), JUMPS * problem.scene.cable.length,
+        tolerance_of(problem, grid, problem.horizon / (steps + 1)), least_jump(problem, h),
         every_of(steps + 1), looks, info,
     )  # fmt: skip
     if info[FAILED_STEP] >= 0:

@@ -10,11 +10,13 @@ from dlocore.kernels.entry import after_jump, begin_stretch, lasting
 from dlocore.problem.grid import Grid
 from dlocore.problem.holding import Held, Starts, close_grasps, hold
 from dlocore.problem.problem import Problem
+from dlocore.problem.stopping import stopping_time
 from dlocore.scene.scene import Grasp
 
 Floats = NDArray[np.float64]
 
 JUMPS = 1e-6  # of the length, on what a jump of the velocity is in a step: less is rounding
+_STOPPED = 4.0  # times that drag takes to stop it: a velocity of the start that lasts for no step, as what jumps
 NEAR = 1e-3 * np.arange(3.0)  # of a step: for velocity and acceleration of the paths at the beginning
 
 
@@ -82,8 +84,16 @@ def enter(
         problem.plane.dimensions,
     )  # fmt: skip
     started = closed.copy() if inertial else np.zeros_like(closed)
-    sudden = h * jump > JUMPS * problem.scene.cable.length
+    sudden = h * jump > (JUMPS * problem.scene.cable.length if last > 0.0 else least_jump(problem, h))
     return Entry(held, held.offsets[3:], closed, started, a, G, sudden, sudden and inertial)
+
+
+def least_jump(problem: Problem, h: float) -> float:
+    """Return from which size on a jump of the velocity at the start counts, as what it is in a step `h` [s] long [m].
+
+    Where drag stops within the step what moves then, it is less than any: the motion begins with a jump.
+    """
+    return -1.0 if h > _STOPPED * stopping_time(problem) else JUMPS * problem.scene.cable.length
 
 
 def with_what_lasts(
