@@ -157,9 +157,9 @@ def objections(level: Level) -> list[str]:
         found += [
             f"{reason}: one lies over the other; effects.self_contact on keeps them apart" for reason in crossings
         ]
-    turned = turned_by_grasps(problem.scene, problem.start)
-    if "twist" in off and problem.plane.dimensions == 3 and turned:
-        found.append(f"twist is off, though {turned}")
+    if "twist" in off and problem.plane.dimensions == 3:
+        turned = turned_by_grasps(problem.scene, problem.start)
+        found += [f"twist is off, though {turned}"] if turned else []
     allowed = MATTERS * problem.scene.cable.length
     for name in _forces(problem) if off else ():
         if name in off:
