@@ -152,9 +152,15 @@ def material_of(
 
 
 def stretch_of(problem: Problem, grid: Grid, times: Floats, states: Floats) -> StretchMotion:
-    """Return how far a cable is stretched in the states (k, n_u, nc) at the times (k,) [s] of a motion."""
+    """Return how far a cable is stretched in the states (k, n_u, nc) at the times (k,) [s] of a motion.
+
+    Where a force acts in a point, at which the tension jumps, it is told on both sides too.
+    """
     kept = np.unique(np.linspace(0, len(times) - 1, STRETCH_TIMES).round().astype(int))
-    u = np.unique(np.concatenate([[0.0], grid.tables.axial.u, grid.knots[-1:]]))
+    length = float(grid.knots[-1])
+    at = np.array([g for g in problem.scene.places if 0.0 < g < length])
+    sides = [np.nextafter(at, 0.0), at, np.nextafter(at, length)]
+    u = np.unique(np.concatenate([[0.0], grid.tables.axial.u, *sides, [length]]))
     at_points = axial_strain(grid.tables, states[kept][..., : problem.plane.dimensions])
     return StretchMotion(times=times[kept], u=u, strain=at_points @ balanced(problem.scene, grid, u).T)
 

@@ -186,7 +186,7 @@ class StretchMotion(Answered):
 
     Attributes:
         times: (m,) [s].
-        u: (k,) [m], with both ends.
+        u: (k,) [m], with both ends, and both sides of where something holds, loads or weighs down the cable.
         strain: axial strain (m, k) that balances the forces on the cable (docs/model.md, selective reduced
             integration). In an elastic cable without axial damping EA times it is the tension [N]; where a force acts
             in a point, the mean of both sides.

@@ -6,7 +6,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dlocore import Cable, Environment, Grasp, Load, Move, Points, Prediction, Quality, Scene, Straight, predict
+from dlocore import (
+    Cable,
+    Environment,
+    Grasp,
+    Load,
+    Move,
+    PointMass,
+    Points,
+    Prediction,
+    Quality,
+    Scene,
+    Straight,
+    predict,
+)
 from tests.solver.scenes import Floats, G
 
 CABLE = Cable.preset("black-electric-cable")  # of 1 m and 1 kg
@@ -52,6 +65,17 @@ def test_the_tension_of_a_cable_that_is_pulled_at_its_end_is_the_pull(hold: str,
 def test_the_tension_jumps_where_a_weight_hangs_on_the_cable(hold: str, grid: str) -> None:
     u, found = tension(predict(held(hold, grid, loads=[Load(u=0.5, force=PULL)])), 1.0)
     np.testing.assert_allclose(found, G * (1.0 - u) + 20.0 * np.heaviside(0.5 - u, 0.5), atol=1e-6 * G)
+
+
+@pytest.mark.parametrize("hold", ["point", "clamp"])
+def test_the_tension_jumps_at_the_places_themselves(hold: str) -> None:
+    """Between the places at which it was told, on either side, it had been read along a slope of a whole span."""
+    cable = replace(CABLE, point_masses=(PointMass(u=0.7, mass=1.0),))
+    scene = held(hold, "free", cable=cable, loads=[Load(u=0.4, force=PULL)], horizon=0.1)
+    u = np.array([0.38, 0.399, 0.4, 0.401, 0.42, 0.68, 0.699, 0.7, 0.701, 0.72])
+    found = CABLE.axial_stiffness * predict(scene).stretch.along(u, [0.1])[0]  # type: ignore[operator]
+    expected = G * (1.0 - u) + 20.0 * np.heaviside(0.4 - u, 0.5) + G * np.heaviside(0.7 - u, 0.5)
+    np.testing.assert_allclose(found, expected, atol=1e-6 * G)
 
 
 @pytest.mark.parametrize("grid", GRIDS)
