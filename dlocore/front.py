@@ -23,10 +23,11 @@ from dlocore.accuracy.fallback import (
 )
 from dlocore.accuracy.refinement import climb
 from dlocore.answer.contacts import contact_forces, contacts_taken_on, with_contact_errors
-from dlocore.answer.frames import material_of, stretch_of
-from dlocore.answer.parts import Accuracy, ContactForce, GraspReaction, MaterialMotion, OnIteration
+from dlocore.answer.frames import material_of
+from dlocore.answer.parts import Accuracy, ContactForce, GraspReaction, MaterialMotion, OnIteration, StretchMotion
 from dlocore.answer.reactions import Windows, reactions, taken_on, with_reaction_errors
 from dlocore.answer.report import effect_reports, elastic_energy
+from dlocore.answer.stretch import stretch_of
 from dlocore.compiling.interrupts import interruptible
 from dlocore.errors import SceneError, flag, instance
 from dlocore.levels.given import evenly_fitted, given_status, march_given
@@ -265,7 +266,7 @@ def _answer(
     surface = surface_at(problem, level, level.control)
     left_out = neglected(level)
     find_once: FindForces = partial(getattr, level.motion, "forces") if find_forces is None else cache(find_forces)
-    stretch = partial(stretch_of, problem, grid, level.motion.times, level.motion.states)
+    stretch = partial(_stretch, level)
     material = partial(_material, problem, level)
     pressing = cache(partial(_pressing, level, find_once, find_forces is None))
     errors: dict[str, float] = {}
@@ -333,6 +334,11 @@ def _beside(level: Level) -> list[tuple[Problem, Grid, Windows]]:
 def _start_energy(level: Level) -> float:
     grid = level.motion.grid
     return elastic_energy(level.problem, grid, grid.start, grid.history)
+
+
+def _stretch(level: Level) -> StretchMotion:
+    motion = level.motion
+    return stretch_of(level.problem, motion, reactions(level.problem, motion.grid, motion.forces))
 
 
 def _material(problem: Problem, level: Level) -> MaterialMotion | None:

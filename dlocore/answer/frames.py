@@ -9,24 +9,22 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.answer.parts import MaterialMotion, StretchMotion
+from dlocore.answer.parts import MaterialMotion
 from dlocore.kernels.angles import angles_with
 from dlocore.kernels.basis import spline_values
 from dlocore.kernels.timefit import fit_time
 from dlocore.kernels.twisted import twist_rates
 from dlocore.kernels.twisted_rows import DIRECTOR, FRAME, TANGENT
-from dlocore.problem.discretisation import axial_strain, start_director
+from dlocore.problem.discretisation import start_director
 from dlocore.problem.grid import Grid
 from dlocore.problem.plane import turned_about
 from dlocore.problem.problem import Problem
-from dlocore.problem.tension import balanced
 from dlocore.shape.transport import transported
 from dlocore.spline import DEGREE, SplineSurface
 
 Floats = NDArray[np.float64]
 
 MATERIAL_TIMES = 33  # at most, at which the memory of a motion is kept
-STRETCH_TIMES = 257  # the same of its stretch
 _INSIDE = 1e-3  # of a span of the time knots: how far from its ends a time is inside
 _SMOOTH = 0.03  # times the bends of an angle over a span count as its slopes do: little where these decide
 
@@ -149,20 +147,6 @@ def material_of(
         times=times[kept], director=directors, u=u, memory=sections,
         stretch=stretch, natural=np.array(natural),
     )  # fmt: skip
-
-
-def stretch_of(problem: Problem, grid: Grid, times: Floats, states: Floats) -> StretchMotion:
-    """Return how far a cable is stretched in the states (k, n_u, nc) at the times (k,) [s] of a motion.
-
-    Where a force acts in a point, at which the tension jumps, it is told on both sides too.
-    """
-    kept = np.unique(np.linspace(0, len(times) - 1, STRETCH_TIMES).round().astype(int))
-    length = float(grid.knots[-1])
-    at = np.array([g for g in problem.scene.places if 0.0 < g < length])
-    sides = [np.nextafter(at, 0.0), at, np.nextafter(at, length)]
-    u = np.unique(np.concatenate([[0.0], grid.tables.axial.u, *sides, [length]]))
-    at_points = axial_strain(grid.tables, states[kept][..., : problem.plane.dimensions])
-    return StretchMotion(times=times[kept], u=u, strain=at_points @ balanced(problem.scene, grid, u).T)
 
 
 def _first_director(problem: Problem, grid: Grid, tangent: Floats) -> Floats:

@@ -6,10 +6,11 @@ It is the quadratic spline e on the knots of the grid with
 
 of which the b_i' are combinations, so that the forces on all control points are those of the e_p (docs/model.md,
 selective reduced integration). Where a force acts in a point a step is added, where a direction is held, with unit
-length, a force on phi_j(u_g): both are as large as leaves e least curved.
+length, a force on phi_j(u_g). At an end whose direction is held e is what its gripper tells; else both are as large as
+leaves e least curved.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,31 +25,56 @@ Floats = NDArray[np.float64]
 _SAME = 1e-9  # of the largest singular value: what two sides of a place differ by where they are one
 
 
-def balanced(scene: Scene, grid: Grid, u: Floats) -> Floats:
-    """Return the matrix (k, p) that makes the axial strain at u (k,) [m] of that at the axial points (p,) of a grid."""
+def told_ends(scene: Scene) -> list[float]:
+    """Return the ends [m] whose direction is held and whose gripper tells the strain there: no mass is between them."""
+    heavy = {mass.u for mass in scene.cable.point_masses}
+    return [u for u in (0.0, scene.cable.length) if u not in heavy and u in _held(scene)]
+
+
+def balanced(scene: Scene, grid: Grid, u: Floats, ends: Sequence[float] = ()) -> Floats:
+    """Return the matrix (k, p + ends) that makes the axial strain at u (k,) [m] of what is known of it.
+
+    That is the strain at the axial points (p,) of a grid and that at some of its `told_ends` (ends,) [m].
+    """
     tables, knots, length = grid.tables, grid.knots[1:-1], float(grid.knots[-1])
     points, weights = gauss_points(np.array(grid.knots), *GAUSS_3)
     over = _basis(knots, points)
     mass = over.T @ (weights[:, None] * over)
     sides = _held_sides(scene)
-    inside = sorted({u for u in scene.places if 0.0 < u < length})
-    steps = np.array([np.heaviside(points - g, 0.5) for g in inside]).reshape(-1, len(points))
+    inside = np.unique([u for u in scene.places if 0.0 < u < length])
+
+    def steps(at: Floats) -> Floats:
+        return np.heaviside(at[:, None] - inside, 0.5)
+
     given = np.hstack(
         [
             _basis(knots, tables.axial.u).T * tables.axial.w,
             _basis(knots, np.array(sides)).T,
-            -over.T @ (weights * steps).T,
+            -over.T @ (weights[:, None] * steps(points)),
         ]
     )
     found = np.linalg.solve(mass, given)
     count = len(tables.axial.w)
     own, others = found[:, :count], found[:, count:]
-    begins, ends = np.unique(knots)[:-1], np.unique(knots)[1:]
-    curved = (ends - begins)[:, None] ** 2 * _basis(knots, 0.5 * (begins + ends), 2)
+
+    def read(at: Floats) -> tuple[Floats, Floats]:
+        """Return what the points and the other forces make of the strain at some places."""
+        there = _basis(knots, at)
+        return there @ own, there @ others + np.hstack([np.zeros((len(at), len(sides))), steps(at)])
+
+    of_points, of_forces = read(np.array(ends))
+    to_ends = np.linalg.pinv(of_forces)
+    forces = np.hstack([-to_ends @ of_points, to_ends])  # that make of the strain at the ends what is told
+    free = np.linalg.qr(of_forces.T, "complete")[0][:, len(ends) :]  # what they may be besides
+    begins, ends_of = np.unique(knots)[:-1], np.unique(knots)[1:]
+    curved = (ends_of - begins)[:, None] ** 2 * _basis(knots, 0.5 * (begins + ends_of), 2)
+    left = curved @ (np.hstack([own, np.zeros((len(own), len(ends)))]) + others @ forces)
     # the two sides of a held place may be the same but for rounding, of which no force is to be made
-    forces = -np.linalg.pinv(curved @ others, rcond=_SAME) @ (curved @ own)
-    jumps = np.array([np.heaviside(u - g, 0.5) for g in inside]).reshape(-1, len(u)).T
-    return _basis(knots, u) @ (own + others @ forces) + jumps @ forces[len(sides) :]
+    forces -= free @ np.linalg.pinv(curved @ others @ free, rcond=_SAME) @ left
+    of_points, of_forces = read(u)
+    strain = of_forces @ forces
+    strain[:, :count] += of_points
+    return strain
 
 
 def at_points(scene: Scene, grid: Grid, strain: Callable[[Floats], Floats]) -> Floats:
@@ -68,9 +94,18 @@ def at_points(scene: Scene, grid: Grid, strain: Callable[[Floats], Floats]) -> F
 
 
 def _held_sides(scene: Scene) -> list[float]:
-    """Return both sides of each place whose direction is held [m]: not the same where the knot is triple."""
-    held = sorted({g.u for g in scene.grasps if g.hold != "point"})
-    return [float(np.nextafter(u, to)) for u in held for to in (0.0, scene.cable.length)]
+    """Return both sides of each place whose direction is held [m], which are not the same where the knot is triple.
+
+    An end has one.
+    """
+    length = scene.cable.length
+    sides = [[u] if u in (0.0, length) else [np.nextafter(u, 0.0), np.nextafter(u, length)] for u in _held(scene)]
+    return [float(u) for of_one in sides for u in of_one]
+
+
+def _held(scene: Scene) -> list[float]:
+    """Return where a direction is held [m], rising, each place once."""
+    return sorted({g.u for g in scene.grasps if g.hold != "point"})
 
 
 def _basis(knots: Floats, u: Floats, derivative: int = 0) -> Floats:
