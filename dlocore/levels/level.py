@@ -25,7 +25,7 @@ from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.smooth import march_smooth
 from dlocore.solvers.timefit import fit, largest, missed, refined
 from dlocore.solvers.watched import watched
-from dlocore.spline import design_matrix, spline_at
+from dlocore.spline import spline_at
 from dlocore.statics.statics import start_grid
 
 Floats = NDArray[np.float64]
@@ -157,11 +157,12 @@ class Level:
             found += jumps[np.linalg.norm(moved, axis=2).max(axis=1) > far].tolist()
         return found
 
-    def at(self, times: Floats) -> Floats:
-        """Return the surface at times (k,) [s] and 33 places along the cable (k, 33, nc) [m]."""
+    def at(self, times: Floats, u: Floats | None = None) -> Floats:
+        """Return the surface at times (k,) [s] and at places `u` (m,) [m], else those of `samples`; (k, m, nc) [m]."""
         knots = self.motion.grid.knots
-        over = design_matrix(knots, np.linspace(0.0, knots[-1], _SAMPLES))
-        return np.ascontiguousarray(over @ spline_at(self.knots_t, self.control, times))
+        u = np.linspace(0.0, knots[-1], _SAMPLES) if u is None else u
+        states = np.swapaxes(spline_at(self.knots_t, self.control, times), 0, 1)
+        return np.ascontiguousarray(np.swapaxes(spline_at(knots, states, u), 0, 1))
 
 
 def stretched(problem: Problem, level: int) -> Size:
@@ -370,11 +371,20 @@ def credible_after(level: Level) -> float:
 
 
 def distance(a: Level, b: Level, problem: Problem) -> float:
-    """Return the largest distance between the surfaces of two levels [m], also soon after they set out at once."""
+    """Return the largest distance between the surfaces of two levels [m], also soon after they set out at once.
+
+    On fine grids their knots are looked at too: in the short spans at an end there may be none of the even places.
+    """
     dimensions = problem.plane.dimensions
     most = float(farthest(a.samples, b.samples, dimensions))
     times = np.union1d(a.between, b.between)
-    return max(most, float(farthest(a.at(times), b.at(times), dimensions))) if len(times) else most
+    if len(times):
+        most = max(most, float(farthest(a.at(times), b.at(times), dimensions)))
+    if max(a.motion.grid.n_u, b.motion.grid.n_u) > _SAMPLES:
+        u = np.union1d(a.motion.grid.knots, b.motion.grid.knots)
+        times = np.linspace(0.0, problem.horizon, len(a.samples))
+        most = max(most, float(farthest(a.at(times, u), b.at(times, u), dimensions)))
+    return most
 
 
 def turned(a: Level, b: Level, problem: Problem) -> float:

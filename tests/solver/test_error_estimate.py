@@ -208,3 +208,22 @@ def test_a_change_that_is_in_no_order_is_not_believed(scene: Scene):
     found, fine = predict(scene), predict(replace(scene, quality=Quality(target_error=1.5e-3)))
     assert found.status == fine.status == "converged"
     assert apart(found.surface, fine.surface).max() < found.accuracy.error_estimate < 5e-3
+
+
+@pytest.mark.parametrize("target", [1e-4, 4e-5])
+def test_an_error_in_the_short_spans_at_an_end_is_told(target: float):
+    """A soft cable hangs from its end, beside which most of its error is: there had been no place to compare it at."""
+    EA, weight, end = 20.0, 0.05 * 9.81, 0.05 * 9.81
+    cable = Cable(
+        length=1.0, diameter=0.004, linear_density=0.05, bending_stiffness=1e-3, axial_stiffness=EA,
+        point_masses=[PointMass(u=1.0, mass=0.05)],
+    )  # fmt: skip
+    down = Straight(direction=(0.0, 0.0, -1.0), settle=True)
+    found = predict(
+        Scene(cable=cable, shape=down, grasps=[Grasp(u=0.0)], horizon=0.1, quality=Quality(target_error=target))
+    )
+    u = np.linspace(0.0, 1.0, 2001)
+    true = -u - (weight * (u - u**2 / 2.0) + end * u) / EA
+    error = np.abs(found.surface.positions(u, [0.1])[0, :, 2] - true).max()
+    assert found.accuracy.error_estimate is not None
+    assert error < 1.1 * found.accuracy.error_estimate  # it was 4 times as large
