@@ -45,7 +45,8 @@ from dlocore.statics.statics import start_grid
 Floats = NDArray[np.float64]
 
 STEP = 1e-4  # relative, of the parameter: the difference's own error is its square
-COARSE_STEP = 1e-2  # where whole marches are compared, whose tolerance would drown a smaller one
+COARSE_STEP = 1e-2  # where whole marches are compared, whose kinks would drown a smaller one
+SETTLED_STEP = 1e-3  # where they are as the start settles: nearly to rounding, but a taut one far from linearly
 LEAST = 0.01  # of the natural scale of a number that may be 0: a smaller one is changed as if it were that
 SLIGHT = 0.1  # the natural scale of a strain
 _FITTED = ("shape.points[", "cable.rest_shape[")  # numbers that a curve is fitted through
@@ -279,11 +280,15 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
         return watched(grid) if motion.grid.watched else grid
 
     reason = objection(problem, motion)
-    known = None
+    known, coarse = None, COARSE_STEP
     if not reason and not scene.shape.settle:
         known = factored(problem, motion)
     elif not reason:
-        reason = "the start is an equilibrium that is found by iteration"
+        coarse = SETTLED_STEP
+        reason = (
+            "the start is an equilibrium that is found by iteration, so that whole marches are compared, with the "
+            f"number {100.0 * coarse:g} % larger and smaller"
+        )
 
     def around(name: str, value: float, changes: tuple[float, float]) -> list[tuple[float, Problem, Grid]]:
         """Return the scene with a number changed, and by how much; as it is where no scene has that."""
@@ -318,7 +323,7 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
         except ValueError as error:
             followed, reason = False, str(error)
         if not followed:
-            width = _FITTED_STEP * scene.cable.length if fitted else COARSE_STEP * size
+            width = _FITTED_STEP * scene.cable.length if fitted else coarse * size
             sides = around(name, value, _changes(scene, name, width))
             marched = [(p, g, march(p, g, motion.asked, monitor, rho=motion.rho)) for _, p, g in sides]
             surfaces = [
