@@ -129,7 +129,11 @@ class SplineSurface(Answered):
         return u, t, self(u, t)
 
     def curvature(self, u: ArrayLike, t: ArrayLike) -> Floats:
-        """Return the curvature |r' x r''| / |r'|^3 on the grid; (k_t, k_u) [1/m]. Where r' is zero it is 0."""
+        """Return the curvature |r' x r''| / |r'|^3 on the grid; (k_t, k_u) [1/m]. Where r' is zero it is 0.
+
+        It is least sure at clamps and free ends: where a clamp bends a limp cable sharply the moment of its gripper
+        tells it better (docs/api.md).
+        """
         first, second = self(u, t, du=1)[..., :3], self(u, t, du=2)[..., :3]
         cross = np.linalg.norm(np.cross(first, second), axis=-1)
         return cross / np.maximum(np.linalg.norm(first, axis=-1) ** 3, _TINY)
