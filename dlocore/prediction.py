@@ -23,7 +23,7 @@ from dlocore.compiling.interrupts import interruptible
 from dlocore.errors import number
 from dlocore.pickling import state_with
 from dlocore.scene.scene import MAX_STRAIN, ControlPoints, Scene
-from dlocore.spline import SplineSurface, greville
+from dlocore.spline import SplineSurface, greville, nearest_line
 from dlocore.words import in_mm, in_ms, in_newtons
 
 if TYPE_CHECKING:
@@ -225,7 +225,7 @@ def continued(
     control, velocity = (surface.states(at, order)[0] for order in (0, 1))
     strain = None
     if stretch is not None:
-        strain = np.interp(greville(surface.knots_u), stretch.u, stretch.at(at)).clip(-MAX_STRAIN, MAX_STRAIN)
+        strain = nearest_line(greville(surface.knots_u), stretch.u, stretch.at(at)).clip(-MAX_STRAIN, MAX_STRAIN)
     return ControlPoints(
         control_points=control,
         knots=surface.knots_u,

@@ -11,6 +11,7 @@ from dlocore.pickling import Answered
 Floats = NDArray[np.float64]
 DEGREE = 3
 _TINY = 1e-300  # the least |r'|^3 that is divided by
+_GAUSS = 1.0 / 3.0**0.5  # of half an interval: where its two points are
 _MOST_SAMPLES = 1_000_000  # evenly spaced, in either direction
 _ROUNDING = 1e-9  # of the length, or of the time: how far beyond its ends a surface is read
 
@@ -38,6 +39,28 @@ def spline_at(knots: Floats, control_points: Floats, x: ArrayLike, derivative: i
     from scipy.interpolate import BSpline  # slow to import, and not needed to make a scene
 
     return np.asarray(BSpline(knots, control_points, DEGREE)(np.asarray(x, dtype=float), derivative))
+
+
+def nearest_line(x: Floats, u: Floats, values: Floats) -> Floats:
+    """Return the values (n,) at x (n,), linear between, that are nearest to values (k,) at u (k,), linear between.
+
+    Both x and u rise from the same place to the same one. The two have the same integral, also where one jumps.
+    """
+    from scipy.linalg import solveh_banded  # slow to import
+
+    cuts = np.union1d(x, u)
+    half = 0.5 * np.diff(cuts)
+    at = np.concatenate([cuts[:-1] + (1.0 + side) * half for side in (-_GAUSS, _GAUSS)])
+    weights, known = np.tile(half, 2), np.interp(at, u, values)
+    k = np.clip(np.searchsorted(x, at) - 1, 0, len(x) - 2)
+    after = (at - x[k]) / (x[k + 1] - x[k])
+    before = 1.0 - after
+
+    def sums(places: NDArray[np.intp], of: Floats) -> Floats:
+        return np.asarray(np.bincount(places, weights * of, len(x)), dtype=float)
+
+    band = np.stack([sums(k, before**2) + sums(k + 1, after**2), sums(k, before * after)])
+    return np.asarray(solveh_banded(band, sums(k, before * known) + sums(k + 1, after * known), lower=True))
 
 
 def in_range(name: str, x: ArrayLike, end: float, unit: str) -> Floats:

@@ -17,6 +17,7 @@ from dlocore import (
     Grasp,
     Load,
     Move,
+    PointMass,
     Points,
     Prediction,
     Quality,
@@ -219,6 +220,28 @@ def test_the_strain_of_a_start_is_that_of_the_tension_that_its_weight_calls_for(
     inner = (u > 0.12) & (u < 0.8)
     np.testing.assert_allclose(np.asarray(shape.strain)[inner], largest * (1.0 - u[inner]), rtol=0.01)
     assert np.trapezoid(shape.strain, u) == pytest.approx(0.5 * largest, rel=0.01)  # how much longer it is
+
+
+def test_a_cable_goes_on_as_long_as_it_was_where_its_tension_jumps() -> None:
+    """Read at the places of the strain itself, on one side of each jump or the other, it was 2 mm shorter."""
+    weights = (PointMass(u=0.33, mass=0.05), PointMass(u=0.7, mass=0.05))
+    cable = Cable(
+        length=1.0, diameter=0.004, linear_density=0.05, bending_stiffness=1e-3, axial_stiffness=20.0,
+        point_masses=weights,
+    )  # fmt: skip
+    down = Straight(direction=(0.0, 0.0, -1.0), settle=True)
+    hung = Scene(cable=cable, shape=down, grasps=(Grasp(u=0.0),), horizon=0.3, quality=Quality(n_u=13, n_t=13))
+    first = predict(hung, keep_grid=True)
+    shape = first.shape_at()
+    assert shape.strain is not None
+    longer = np.trapezoid(first.stretch.at(0.3), first.stretch.u)
+    assert np.trapezoid(shape.strain, greville(np.asarray(shape.knots))) == pytest.approx(longer, rel=1e-9)
+    second = predict(replace(hung, shape=shape), keep_grid=True)
+    u = np.linspace(0.0, 1.0, 65)
+    left, begun = (found.surface.positions(u, [t]) for found, t in ((first, 0.3), (second, 0.0)))
+    assert np.linalg.norm(begun - left, axis=2).max() < 2e-4
+    force = first.grasps[0].reaction[-1, 2]
+    np.testing.assert_allclose(second.grasps[0].reaction[:, 2], force, rtol=0.015)
 
 
 def test_a_least_squares_goes_on_with_the_stretch_of_the_true_cable() -> None:
