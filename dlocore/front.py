@@ -337,8 +337,9 @@ def _start_energy(level: Level) -> float:
 
 
 def _stretch(level: Level) -> StretchMotion:
-    motion = level.motion
-    return stretch_of(level.problem, motion, reactions(level.problem, motion.grid, motion.forces))
+    problem, motion = level.problem, level.motion
+    grasps = reactions(problem, motion.grid, motion.forces)
+    return stretch_of(problem, motion.grid, motion.times, motion.states, grasps)
 
 
 def _material(problem: Problem, level: Level) -> MaterialMotion | None:

@@ -9,40 +9,45 @@ from numpy.typing import NDArray
 from dlocore.answer.frames import unit
 from dlocore.answer.parts import GraspReaction, StretchMotion
 from dlocore.problem.discretisation import axial_strain
+from dlocore.problem.grid import Grid
 from dlocore.problem.problem import Problem
 from dlocore.problem.tension import balanced, told_ends
-from dlocore.solvers.march import March
 
 Floats = NDArray[np.float64]
 
 STRETCH_TIMES = 257  # at most, at which the stretch of a motion is kept
 
 
-def stretch_of(problem: Problem, motion: March, grasps: Sequence[GraspReaction]) -> StretchMotion:
-    """Return how far a cable is stretched in a motion, of which `grasps` tell what grippers give to the cable.
+def stretch_of(
+    problem: Problem, grid: Grid, times: Floats, states: Floats, grasps: Sequence[GraspReaction]
+) -> StretchMotion:
+    """Return how far a cable is stretched in the states (k, n_u, nc) at the times (k,) [s] of a motion.
 
-    Where a force acts in a point, at which the tension jumps, it is told on both sides too.
+    Where a force acts in a point, at which the tension jumps, it is told on both sides too. `grasps` tell what grippers
+    give to the cable.
     """
-    grid, scene = motion.grid, problem.scene
-    kept = np.unique(np.linspace(0, len(motion.times) - 1, STRETCH_TIMES).round().astype(int))
+    scene = problem.scene
+    kept = np.unique(np.linspace(0, len(times) - 1, STRETCH_TIMES).round().astype(int))
     length = float(grid.knots[-1])
     at = np.array([g for g in scene.places if 0.0 < g < length])
     sides = [np.nextafter(at, 0.0), at, np.nextafter(at, length)]
     u = np.unique(np.concatenate([[0.0], grid.tables.axial.u, *sides, [length]]))
     elastic = problem.stretch_memory is None and not np.any(grid.history.axial[:, 0])
     ends = told_ends(scene) if elastic else []
-    at_points = axial_strain(grid.tables, motion.states[kept][..., : problem.plane.dimensions])
-    at_ends = [_pulled(problem, motion, grasps, end)[kept] for end in ends]
+    at_points = axial_strain(grid.tables, states[kept][..., : problem.plane.dimensions])
+    at_ends = [_pulled(problem, grid, times, states, grasps, end)[kept] for end in ends]
     known = np.column_stack([at_points, *at_ends])
-    return StretchMotion(times=motion.times[kept], u=u, strain=known @ balanced(scene, grid, u, ends).T)
+    return StretchMotion(times=times[kept], u=u, strain=known @ balanced(scene, grid, u, ends).T)
 
 
-def _pulled(problem: Problem, motion: March, grasps: Sequence[GraspReaction], end: float) -> Floats:
-    """Return the elastic axial strain (k,) at an `end` [m], at the times of a motion, that what grips and loads it has.
+def _pulled(
+    problem: Problem, grid: Grid, times: Floats, states: Floats, grasps: Sequence[GraspReaction], end: float
+) -> Floats:
+    """Return the elastic axial strain (k,) that what grips and loads an `end` [m] pulls it with at the times (k,) [s].
 
     The force along the cable is EA e + eta_e e_t (docs/model.md eq. 7a): the strain follows it a little later.
     """
-    times, force = motion.times, np.zeros((len(motion.times), 3))
+    force = np.zeros((len(times), 3))
     for grasp in grasps:
         if grasp.u == end:
             until = np.searchsorted(grasp.times, times)  # where an event is, before it
@@ -50,7 +55,7 @@ def _pulled(problem: Problem, motion: March, grasps: Sequence[GraspReaction], en
     for load in problem.scene.loads:
         if load.u == end:
             force += load.at(times)
-    slopes = motion.grid.at(motion.states, end, 1)[:, : problem.plane.dimensions]
+    slopes = grid.at(states, end, 1)[:, : problem.plane.dimensions]
     outwards = 1.0 if end > 0.0 else -1.0
     pull = outwards * (force * unit(problem.plane.world_vectors(slopes))).sum(axis=1)
     strain = pull / problem.stretch.axial_stiffness

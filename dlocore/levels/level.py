@@ -373,7 +373,8 @@ def credible_after(level: Level) -> float:
 def distance(a: Level, b: Level, problem: Problem) -> float:
     """Return the largest distance between the surfaces of two levels [m], also soon after they set out at once.
 
-    On fine grids their knots are looked at too: in the short spans at an end there may be none of the even places.
+    On fine grids it is looked for beside the ends, and beside what holds, loads or weighs down the cable, too: in the
+    short spans there, in which a stretched cable is worst, there may be none of the even places.
     """
     dimensions = problem.plane.dimensions
     most = float(farthest(a.samples, b.samples, dimensions))
@@ -381,10 +382,17 @@ def distance(a: Level, b: Level, problem: Problem) -> float:
     if len(times):
         most = max(most, float(farthest(a.at(times), b.at(times), dimensions)))
     if max(a.motion.grid.n_u, b.motion.grid.n_u) > _SAMPLES:
-        u = np.union1d(a.motion.grid.knots, b.motion.grid.knots)
+        u = np.union1d(_beside(problem, a.motion.grid), _beside(problem, b.motion.grid))
         times = np.linspace(0.0, problem.horizon, len(a.samples))
         most = max(most, float(farthest(a.at(times, u), b.at(times, u), dimensions)))
     return most
+
+
+def _beside(problem: Problem, grid: Grid) -> Floats:
+    """Return two knots of a grid to either side of each end, and of what holds, loads or weighs down the cable [m]."""
+    breaks = np.unique(grid.knots)
+    at = np.searchsorted(breaks, [0.0, *problem.scene.places, problem.scene.cable.length])
+    return breaks[(at[:, None] + np.arange(-2, 3)).clip(0, len(breaks) - 1)].ravel()
 
 
 def turned(a: Level, b: Level, problem: Problem) -> float:
