@@ -18,10 +18,11 @@ _MOST_FALL = 20.0  # times less than the refinement before, at most, is believed
 # before has, so that these two may agree as they err alike. A third of what that was moved by is left in both.
 _MOST_FALL_DAMPED = 3.0 * _LEFT_KINKED
 _MOST_FALL_YIELDING = 4.0  # ... where the cable yields: it is bent for good within a span, which coarse grids lack
-_MOST_FALL_RISEN = 3.0  # ... where the one before it had risen: such changes are in no order yet
+_MOST_FALL_RISEN = 3.0  # ... of one in both directions where that before it had risen: they are in no order yet
 MORE = 1.1  # times as many steps, or control points: fewer are as many
 _STALE = 2.0  # times what a refinement in one direction moved the surface by: once those in the other moved it by more,
 # what the first has left is measured again
+_RISES = 2.0  # times as far as the last refinement in both directions: the first one in one of them is in no order
 DIRECTIONS = "space", "time"
 
 
@@ -71,7 +72,7 @@ def weighed(level: Level, before: Level, last: Change | None, first: bool = Fals
     falls = [_MOST_FALL]
     if yields:
         falls.append(_MOST_FALL_YIELDING)
-    if last is not None and last.before < last.moved:
+    if last is not None and last.before < last.moved and refined(level, before) == "both":
         falls.append(_MOST_FALL_RISEN)
     if more <= MORE:
         return Change(level.change, moved_before, _LEFT_ALONG, min(falls))
@@ -122,11 +123,11 @@ class Changes:
     def note(self, direction: str, level: Level, before: Level) -> None:
         """Note that a refinement in a direction took one level to the next.
 
-        The first one in a direction alone is no longer on the way to a limit if it moves the surface by more than the
+        The first one in a direction alone is not yet on the way to a limit if it moves the surface by far more than the
         last one in both did.
         """
         last, both = self.last.get(direction), self.last.get("both")
-        if last is None and both is not None and both.moved < level.change:
+        if last is None and both is not None and _RISES * both.moved < level.change:
             last = both
         self.last[direction] = weighed(level, before, last, not self.last)
         self.since = {d: max(self.since.get(d, 0.0), level.change) for d in self.last if d != direction}

@@ -14,14 +14,13 @@ from dlocore import predict
 README = (Path(__file__).parents[2] / "README.md").read_text()
 
 
-def block(language: str) -> str:
-    """Return the only block of a language."""
-    (found,) = re.findall(rf"^```{language}\n(.*?)^```", README, re.DOTALL | re.MULTILINE)
-    return str(found)
+def blocks(language: str) -> list[str]:
+    """Return the blocks of a language."""
+    return re.findall(rf"^```{language}\n(.*?)^```", README, re.DOTALL | re.MULTILINE)
 
 
 def test_python_example_runs_and_has_fifteen_lines_at_most(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code = block("python")
+    code = blocks("python")[0]
     assert len(code.splitlines()) <= 15
     script = tmp_path / "example.py"
     script.write_text(code)
@@ -30,9 +29,18 @@ def test_python_example_runs_and_has_fifteen_lines_at_most(tmp_path: Path, capsy
     assert capsys.readouterr().out.strip()
 
 
+def test_what_a_planner_asks_for_runs_on_the_scene_of_the_python_example(tmp_path: Path) -> None:
+    scene, planner = blocks("python")
+    script = tmp_path / "example.py"
+    script.write_text(f"{scene}\nother = scene\nscenes = [scene, scene]\n{planner}")
+    names = runpy.run_path(str(script))
+    assert [names["near"].status, *(found.status for found in names["many"])] == ["converged"] * 3
+    assert names["slope"].shape == (1, len(names["t"]), len(names["u"]), 3)
+
+
 def test_curl_example_is_the_scene_of_the_python_example(tmp_path: Path) -> None:
     script = tmp_path / "example.py"
-    script.write_text(block("python"))
+    script.write_text(blocks("python")[0])
     expected = runpy.run_path(str(script))["prediction"].surface
     body = re.search(r"-d '(\{.*?\})'", README, re.DOTALL)
     assert body is not None
