@@ -10,8 +10,8 @@ ROOT = Path(__file__).parents[2]
 LAYERS = {
     "dlocore": [
         "errors", "words", "machine", "files", "array_files", "pickling", "compiling", "effects", "kernels", "spline",
-        "scene", "shape", "problem", "answer", "solvers", "stability", "statics", "levels", "prediction", "accuracy",
-        "reference", "front", "many", "planning", "balance", "sensitivity", "warming", "calibration", "study",
+        "scene", "shape", "problem", "answer", "solvers", "stability", "statics", "levels", "balance", "prediction",
+        "accuracy", "reference", "front", "many", "planning", "sensitivity", "warming", "calibration", "study",
         "recordings", "identify",
     ],
     "app": [
