@@ -390,6 +390,11 @@ def applied_forces(problem: Problem, grid: Grid, t: Floats, end: float = np.inf)
     return applied
 
 
+def applied_at_rest(problem: Problem, grid: Grid, t: float) -> Floats:
+    """Return the applied forces (n_u, nc) [N] under which a cable rests at `t` [s]: of a load that jumps, before it."""
+    return applied_forces(problem, grid, np.array([t]), t)[0]
+
+
 def applied_in_steps(problem: Problem, grid: Grid, times: Floats, begin: float, end: float) -> Floats:
     """Return the applied forces (1 or k, n_u, nc) [N] with which a march steps to evenly spaced times (k,) [s].
 

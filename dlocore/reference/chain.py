@@ -50,7 +50,7 @@ class Chain:
 
     def guide(self, t: Floats) -> Guide:
         """Return what grippers and loads prescribe at times t (s,) [s]."""
-        rod, held = self.rod, [k for k in range(len(self.node_of)) if self._grip_at(self.node_of[k]) is not None]
+        held = [k for k in range(len(self.node_of)) if self._grip_at(self.node_of[k]) is not None]
         virtual = np.flatnonzero(self.body.kind != REAL)
         delta = min(DIFFERENCE, 1e-3 * (self.end - self.begin))
         near = np.clip(t, self.begin + delta, self.end - delta)[:, None] + delta * np.array([-1.0, 1.0])
@@ -71,12 +71,17 @@ class Chain:
             rate = (around[:, 1] - around[:, 0]) / (2 * delta)
             rates[:, j] = rate[:, 0]
             spin[:, j] = (rate[:, 1] * np.cross(now[:, 0], now[:, 1])).sum(axis=1)
-        load = np.zeros((len(t), len(self.node_of), 3))
-        for given in rod.problem.scene.loads:
-            load[:, int(np.argmax(self.node_of == rod.node(given.u)))] += given.at(t, self.end) @ rod.axes.T
         stack = np.array([places[int(self.node_of[k])] for k in held]).reshape(len(held), 2, len(t), 3)
         position, velocity = (np.ascontiguousarray(stack[:, d].transpose(1, 0, 2)) for d in (0, 1))
+        load = self.loads(t, self.end)
         return Guide(np.array(held, np.int64), position, velocity, virtual, tangent, director, rates, spin, load)
+
+    def loads(self, t: Floats, end: float) -> Floats:
+        """Return what loads give to the nodes (s, n, 3) [N] at times t (s,) [s], as `dlocore.Load.at` does."""
+        load = np.zeros((len(t), len(self.node_of), 3))
+        for given in self.rod.problem.scene.loads:
+            load[:, int(np.argmax(self.node_of == self.rod.node(given.u)))] += given.at(t, end) @ self.rod.axes.T
+        return load
 
     def _grip_at(self, node: int) -> Grip | None:
         return next((grip for grip in self.grips if grip.node == node), None)

@@ -260,7 +260,7 @@ def _window(link: Chain, state: State, tolerance: float, watch: Watch, record: _
 def settled(rod: Rod, watch: Watch) -> tuple[Snapshot, float]:
     """Return the rod in equilibrium under the grasps' first poses, and the largest depth on its way there [m].
 
-    Backward Euler downhill, in ever longer steps.
+    Backward Euler downhill, in ever longer steps, under loads as they are before a jump at t = 0.
 
     The velocity is forgotten after each step, so that the rod goes where its energy falls; nothing yields on the way.
     """
@@ -279,6 +279,7 @@ def settled(rod: Rod, watch: Watch) -> tuple[Snapshot, float]:
         guide = link.guide(np.zeros(1))
         for rate in (guide.velocity, guide.tangent_rate, guide.spin):
             rate[:] = 0.0
+        guide.load[:] = link.loads(np.zeros(1), 0.0)
         flag = take_step(
             link.body, BACKWARD_EULER, h, 0.0, state, guide, 0.1 * SETTLED * length, after, np.zeros_like(state.q),
             np.zeros_like(state.t), told,

@@ -67,8 +67,8 @@ class Straight(Checked):
     """A straight cable from `start` (3,) [m] along `direction` (3,), which need not have unit length.
 
     Args (of every start shape):
-        settle: relax to static equilibrium under the grasps' first poses before t = 0; on something rough to where
-            friction holds it.
+        settle: relax to static equilibrium before t = 0, under the grasps' first poses, and the force of a load before
+            it jumps there; on something rough to where friction holds it.
         velocity: initial velocity [m/s]: None (rest), (3,) for all points, or (n, 3) at points evenly spaced along
             the cable (for `Points`: at the points themselves; for `ControlPoints`: control points of the velocity,
             (n, 4) with the rate of theta [rad/s]; without it the sections do not spin about their tangent).

@@ -9,7 +9,7 @@ from dlocore.kernels.assembly import History
 from dlocore.kernels.march import DEEPEST as DEEPEST_PLACE
 from dlocore.kernels.march import FAILED_STEP, march_steps
 from dlocore.kernels.tension import COLUMNS
-from dlocore.problem.discretisation import applied_forces
+from dlocore.problem.discretisation import applied_at_rest
 from dlocore.problem.events import closed_grasps
 from dlocore.problem.grid import Grid
 from dlocore.problem.holding import Starts, close_grasps, hold
@@ -63,7 +63,7 @@ def _slid(problem: Problem, grid: Grid, monitor: Monitor) -> tuple[Floats, Rest,
     close_grasps(problem, grid, grasps, starts, None)
     held = hold(problem, grid, grasps, np.zeros(2), starts, grid.start)
     offsets = np.ascontiguousarray(held.offsets)
-    applied, nothing, log = applied_forces(problem, grid, np.zeros(1)), np.zeros_like(offsets), np.zeros((0, 0, 0))
+    applied, nothing, log = applied_at_rest(problem, grid, 0.0)[None], np.zeros_like(offsets), np.zeros((0, 0, 0))
     q, h, deepest = grid.start.copy(), _FIRST, 0.0
     longest, wait, patience = _LAST, 0, 1
     rest: Rest = "restless"

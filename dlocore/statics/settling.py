@@ -12,7 +12,7 @@ from dlocore.kernels.contact import passes, remember
 from dlocore.kernels.entry import remember_start
 from dlocore.kernels.relax import descend, relax
 from dlocore.kernels.tension import COLUMNS
-from dlocore.problem.discretisation import applied_forces
+from dlocore.problem.discretisation import applied_at_rest
 from dlocore.problem.events import closed_grasps
 from dlocore.problem.grid import Grid
 from dlocore.problem.holding import Held, Starts, close_grasps, hold
@@ -91,7 +91,7 @@ def settle(
     grasps = closed_grasps(problem.scene, at, at)
     close_grasps(problem, grid, grasps, starts, q)
     held = hold(problem, grid, grasps, np.full(2, at), starts, q if at > 0.0 else grid.start)
-    applied = applied_forces(problem, grid, np.array([at]))[0]
+    applied = applied_at_rest(problem, grid, at)
     rest = _relaxed(problem, grid, q, history, held, applied, ROUNDS, 1.0 if begin is None else _NEARBY, monitor)
     return Settled(problem, q, rest, held, history._replace(tension=grid.history.tension), at, starts)
 
@@ -121,7 +121,7 @@ def settle_along(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> S
         q, before = carried, t
         wholly = not ahead or any(g.start == t and g not in starts for g in scene.grasps)
         if grasps or not ahead or problem.contact is not None:
-            applied = applied_forces(problem, grid, np.array([t]))[0]
+            applied = applied_at_rest(problem, grid, t)
             rounds = ROUNDS if wholly else PATH_ROUNDS
             problem, rest = _relaxed_firmly(problem, grid, q, history, held, applied, rounds, monitor)
             restless |= wholly and rest == "restless"
@@ -142,9 +142,9 @@ def depth(problem: Problem, grid: Grid, q: Floats) -> float:
 
 def holding(problem: Problem, grid: Grid, settled: Settled) -> WindowForces:
     """Return what holds a cable that has settled."""
-    q, at = settled.q, np.array([settled.at])
-    forces = _unbalanced(problem, grid, settled.history, q, applied_forces(problem, grid, at)[0])
-    return WindowForces(settled.held, at, forces.reshape(1, -1)[:, settled.held.elimination.held], q[None])
+    q, at = settled.q, settled.at
+    forces = _unbalanced(problem, grid, settled.history, q, applied_at_rest(problem, grid, at))
+    return WindowForces(settled.held, np.array([at]), forces.reshape(1, -1)[:, settled.held.elimination.held], q[None])
 
 
 def _with_tension(grid: Grid, history: History) -> History:

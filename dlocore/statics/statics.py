@@ -106,7 +106,7 @@ def equilibrium(
 
     Args:
         scene: its horizon, inertia, drag, damping, friction and plasticity play no part.
-        at: time of the grasps' poses and of the loads [s].
+        at: time of the grasps' poses and of the loads [s]; of a load that jumps then, the force before it.
         n_u: number of control points, as many as the scene needs at least, 385 at most; None: chosen.
         deadline: time allowed [s].
         cancelled: asked between relaxations; where it returns True the solve stops.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, times_scalar_band
 from dlocore.kernels.banded import solve_free
 from dlocore.problem.buckling import BOW
-from dlocore.problem.discretisation import applied_forces
+from dlocore.problem.discretisation import applied_at_rest
 from dlocore.problem.events import closed_grasps
 from dlocore.problem.grid import Grid
 from dlocore.problem.holding import Starts, close_grasps, hold
@@ -98,7 +98,7 @@ def falls(problem: Problem, grid: Grid, at: float = 0.0, starts: Starts | None =
     close_grasps(problem, grid, grasps, starts, q)
     elimination = hold(problem, grid, grasps, np.full(2, at), starts, q).elimination
     active, parameters = problem.law_table()
-    pull = float(np.abs(applied_forces(problem, grid, np.array([at]))).max())  # of any control point [N]
+    pull = float(np.abs(applied_at_rest(problem, grid, at)).max())  # of any control point [N]
 
     def pushed(springs: float, right: Floats) -> Floats | None:
         f, K = np.empty_like(q), np.empty((q.size, 4 * nc))

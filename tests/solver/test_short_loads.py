@@ -7,7 +7,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dlocore import Cable, Environment, Grasp, Load, Move, Quality, Scene, SceneError, Straight, predict
+from dlocore import (
+    Cable,
+    Environment,
+    Grasp,
+    Load,
+    Move,
+    Quality,
+    Scene,
+    SceneError,
+    Straight,
+    Table,
+    equilibrium,
+    predict,
+)
 from dlocore.problem.discretisation import applied_forces, applied_in_steps, make_grid
 from dlocore.problem.problem import pose
 
@@ -112,6 +125,40 @@ def test_a_load_that_is_linear_meanwhile_stays_what_it_is() -> None:
     np.testing.assert_allclose(stepped(load, times), load.at(times), atol=1e-12)
     steady = Load(u=0.3, force=[[1.0, -2.0, 0.5]], times=[0.5])
     np.testing.assert_allclose(stepped(steady, times), steady.at(times), atol=1e-12)
+
+
+@pytest.mark.parametrize("friction", [None, 0.3], ids=["hanging", "on a rough table"])
+@pytest.mark.parametrize("method", ["march", "reference"])
+def test_a_start_settles_under_the_force_before_a_jump(method: str, friction: float | None) -> None:
+    """It had settled under the force after it, and nothing moved."""
+    tugged = Scene(
+        cable=Cable(length=1.0, diameter=0.006, linear_density=0.05, bending_stiffness=2e-3),
+        shape=Straight(direction=(0, 0, -1) if friction is None else (1, 0, 0), settle=True),
+        grasps=[Grasp(u=0.0)],
+        loads=[Load(u=1.0, force=[[0, 0, 0], [0, 0.2, 0]], times=[0.0, 0.0])],
+        environment=Environment(table=None if friction is None else Table(friction=friction)),
+        horizon=0.05,
+        quality=Quality(method=method, target_error=1e-2),
+    )
+    given = replace(tugged, shape=replace(tugged.shape, settle=False))  # it lies at rest as it is
+    settles, begins = (predict(scene).surface.positions([0.5, 1.0], [0.0, 0.05]) for scene in (tugged, given))
+    np.testing.assert_allclose(settles, begins, atol=2e-3)  # of which its weight stretches it by 0.3 mm
+    assert settles[1, 1, 1] > 0.05
+
+
+def test_an_equilibrium_is_that_under_the_force_before_a_jump() -> None:
+    before, then, after = [0.0, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, -0.1, 0.0]
+    hanging = Scene(
+        cable=Cable(length=1.0, diameter=0.006, linear_density=0.05, bending_stiffness=2e-3),
+        shape=Straight(direction=(0, 0, -1)),
+        grasps=[Grasp(u=0.0)],
+        loads=[Load(u=1.0, force=[before, then, then, after], times=[0.0, 0.0, 0.5, 0.5])],
+    )
+    for at, force in ((0.0, before), (0.25, then), (0.5, then), (0.6, after)):
+        found = equilibrium(hanging, at=at, n_u=17)
+        expected = equilibrium(replace(hanging, loads=[Load(u=1.0, force=force)]), n_u=17)
+        np.testing.assert_allclose(found.positions([1.0]), expected.positions([1.0]), atol=1e-6)
+        np.testing.assert_allclose(found.reactions, expected.reactions, atol=1e-6)
 
 
 def test_a_load_is_constant_before_its_times_and_after_them() -> None:
