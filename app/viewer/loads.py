@@ -40,9 +40,9 @@ class LoadsPicture:
         """Show the forces that act at `time` [s]."""
         if self._prediction is None:
             return
-        t = np.array([time])
+        t, end = np.array([time]), self._prediction.surface.horizon
         loads = self._prediction.scene.loads
-        forces = np.array([load.at(t)[0] for load in loads]).reshape(-1, 3) / self._newtons
+        forces = np.array([load.at(t, end)[0] for load in loads]).reshape(-1, 3) / self._newtons
         points = self._prediction.surface.positions([load.u for load in loads], t)[0] if loads else np.zeros((0, 3))
         self._arrows.draw(points, forces, self._shown)
 

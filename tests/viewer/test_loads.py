@@ -1,6 +1,7 @@
 """Known forces of a scene: arrows while they act, a row among the largest forces, and a form."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,8 +11,8 @@ from app.viewer import load_edits
 from app.viewer.arrows import ARROW_LENGTH
 from app.viewer.draft import start_draft
 from app.viewer.load_edits import Pull
-from app.viewer.loads import forces_over
-from dlocore import Load
+from app.viewer.loads import LoadsPicture, forces_over
+from dlocore import Cable, Grasp, Load, Quality, Scene, Straight, predict
 
 LOAD = {"u": 0.5, "force": [0.0, 0.5, 0.0]}
 
@@ -47,6 +48,27 @@ def test_a_force_that_jumps_is_shown_before_and_after_the_jump():
     times, forces = forces_over(load, 2.0)
     np.testing.assert_array_equal(times, [0.0, 0.5, 0.5, 1.0, 1.0, 2.0])
     np.testing.assert_array_equal(forces[:, 1], [0, 3, 1, 0, 0, 0])
+
+
+@pytest.mark.parametrize(("before", "after"), [(0.1, 15.0), (0.1, 0.0), (0.0, 15.0)], ids=["rises", "ends", "begins"])
+def test_a_force_that_jumps_as_the_motion_ends_is_drawn_as_before_it(before, after):
+    """What came after the jump was drawn at a scale without it, 3e12 m long."""
+    hanging = Scene(
+        cable=Cable(length=0.5, diameter=0.005, linear_density=0.05, bending_stiffness=1e-3),
+        shape=Straight(direction=(0, 0, -1)),
+        grasps=[Grasp(u=0)],
+        loads=[Load(u=0.5, force=[[0, 0.1, 0], [0, before, 0], [0, after, 0]], times=[0.0, 0.1, 0.1])],
+        horizon=0.1,
+        quality=Quality(n_u=9, n_t=9, keep_grid=True),
+    )
+    arrow = SimpleNamespace(visible=False, points=None)
+    picture = LoadsPicture(SimpleNamespace(add_arrows=lambda *_, **__: arrow), 0.005, 0.5)
+    picture.take(predict(hanging))
+    picture.pose(0.1)
+    assert arrow.visible == (before > 0.0)
+    if arrow.visible:
+        start, end = arrow.points[0]
+        np.testing.assert_allclose(end - start, [0.0, ARROW_LENGTH * 0.5, 0.0], atol=1e-6)
 
 
 def test_a_new_force_acts_where_no_gripper_is():
