@@ -54,7 +54,7 @@ def _pulled(
             force += grasp.reaction[until.clip(max=len(grasp.times) - 1)]
     for load in problem.scene.loads:
         if load.u == end:
-            force += load.at(times)
+            force += load.at(times, problem.horizon)
     slopes = grid.at(states, end, 1)[:, : problem.plane.dimensions]
     outwards = 1.0 if end > 0.0 else -1.0
     pull = outwards * (force * unit(problem.plane.world_vectors(slopes))).sum(axis=1)

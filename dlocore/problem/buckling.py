@@ -341,7 +341,7 @@ def _loaded(scene: Scene, start: StartCurve, along: Floats, part: _Part, t: Floa
     aside = np.full(len(t), around.drag)
     first, second = part.grasps
     length = part.end - part.begin
-    loads = [(load.u, load.at(t) @ along) for load in scene.loads if part.begin <= load.u <= part.end]
+    loads = [(load.u, load.at(t, t[-1]) @ along) for load in scene.loads if part.begin <= load.u <= part.end]
     fall = float(_gravity(scene, start) @ along)
     weight = cable.linear_density * fall
     holder = first or second

@@ -80,7 +80,7 @@ def solve_as_printed(
     )
     times = np.linspace(0.0, problem.horizon, n_u * n_t + 1)[1:]
     first, table = basis_rows(knots_t, times, 2)
-    applied = applied_forces(problem, grid, times)
+    applied = applied_forces(problem, grid, times, problem.horizon)
     histories = motion.behind(times)
     control = window.constrain(np.tile(grid.start, (n_t, 1, 1)))
     Z = np.array([window.expand(row)[2].ravel() for row in np.eye(window.free)]).T

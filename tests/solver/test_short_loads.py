@@ -161,6 +161,32 @@ def test_an_equilibrium_is_that_under_the_force_before_a_jump() -> None:
         np.testing.assert_allclose(found.reactions, expected.reactions, atol=1e-6)
 
 
+@pytest.mark.parametrize("u", [0.0, 1.0])
+@pytest.mark.parametrize("method", ["march", "spacetime", "paper", "reference"])
+def test_what_a_load_jumps_to_as_the_motion_ends_is_nothing_to_it(method: str, u: float) -> None:
+    pulled = Scene(
+        cable=Cable(length=1.0, diameter=0.006, linear_density=0.05, bending_stiffness=2e-3, axial_stiffness=100.0),
+        shape=Straight(direction=(0, 0, -1)),
+        grasps=[Grasp(u=0.0, hold="tangent")],
+        loads=[Load(u=u, force=[0, 0, -1])],
+        horizon=0.3,
+        quality=Quality(method=method, **({} if method == "reference" else {"n_u": 9, "n_t": 13, "keep_grid": True})),
+    )
+    jumps = replace(pulled, loads=[Load(u=u, force=[[0, 0, -1], [0, 0, 9]], times=[0.3, 0.3])])
+    found, expected = predict(jumps), predict(pulled)
+    assert found.status == expected.status
+    np.testing.assert_allclose(found.surface.control_points, expected.surface.control_points, atol=1e-9)
+    np.testing.assert_allclose(found.grasps[0].reaction, expected.grasps[0].reaction, atol=1e-6)
+    np.testing.assert_allclose(found.stretch.strain, expected.stretch.strain, atol=1e-7)
+
+
+def test_a_push_that_comes_as_the_motion_ends_buckles_nothing() -> None:
+    pushed = bar(Load(u=0.0, force=[[0, 0, 0], [1e5, 0, 0]], times=[HORIZON, HORIZON]))
+    assert pose(pushed).start.bow == 0.0
+    earlier = replace(pushed, loads=[Load(u=0.0, force=[[0, 0, 0], [1e5, 0, 0]], times=[1.0, 1.0])])
+    assert pose(earlier).start.bow > 0.0
+
+
 def test_a_load_is_constant_before_its_times_and_after_them() -> None:
     load = Load(u=0.3, force=[[1.0, -2.0, 0.5], [-3.0, 1.0, 0.0]], times=[0.5, 1.0])
     expected = [load.force[0], load.force[0], [-1.0, -0.5, 0.25], load.force[1], load.force[1]]
