@@ -103,7 +103,8 @@ class GraspReaction(Answered):
         u: material coordinate of the grasp [m].
         times: (k,) [s], those of the prediction's reactions; twice where these may jump, as a grasp closes or opens, as
             `dlocore.Load` takes them.
-        reaction: (k, 3) [N]; zero while the gripper is open.
+        reaction: (k, 3) [N]; zero while the gripper is open. The impulse that the cable gets where the velocity of a
+            gripper jumps, or it closes on a moving cable, is no part of it.
         moment: (k, 3) [N m]; zero for a grasp that holds only the position.
         reaction_error: estimated error of the force at those times (k,) [N], of the discretisation, from its distance
             to the force on another grid (docs/accuracy.md, forces); None where none was computed.
