@@ -28,7 +28,7 @@ from dlocore.kernels.timefit import fit_time
 from dlocore.prediction import Prediction
 from dlocore.problem.discretisation import applied_forces, applied_in_steps
 from dlocore.problem.events import closed_grasps
-from dlocore.problem.features import longest_tip
+from dlocore.problem.features import SAME, longest_tip
 from dlocore.problem.grid import Grid
 from dlocore.problem.holding import Starts
 from dlocore.problem.problem import Problem, pose, stiffer
@@ -52,6 +52,7 @@ SLIGHT = 0.1  # the natural scale of a strain
 _FITTED = ("shape.points[", "cable.rest_shape[")  # numbers that a curve is fitted through
 _FITTED_STEP = 3e-3  # of the length, of theirs: the choice of smoothness moves the curve by a millionth, at any change
 _OFF_END = 1e-3  # of the length, at least: how far from an end places are that are compared in place of one there
+_OF_WAY = 0.25  # of the way to the next place that holds, loads or weighs down the cable: the largest change of a place
 _FOLLOWED = 1e-12  # of the length, on the last update of a followed step
 _STRAYED = 1e-8  # of the length: a step left with more than this was not followed
 
@@ -255,7 +256,8 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     other side only: the derivative then errs by about the relative change of it over that of the parameter, a millionth
     of its natural scale.
     What is held, loaded or heavy at an end of the cable has other knots than what is a little away from it. There the
-    motions with it at a thousandth of the length from the end, and at twice that, are compared.
+    motions with it at a thousandth of the length from the end, and at twice that, are compared; nearer to the end where
+    something else holds, loads or weighs down the cable beside it.
 
     Args:
         prediction: of the scene.
@@ -310,7 +312,7 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
         surfaces: list[SplineSurface] = []
         fitted = name.startswith(_FITTED)
         changes = _changes(scene, name, STEP * size)
-        others = changes != (STEP * size, -STEP * size)
+        others = changes[0] != -changes[1]
         followed = known is not None and not fitted and not others
         if fitted:
             reason = "a fit through points chooses its smoothness anew"
@@ -418,15 +420,18 @@ def _changes(scene: Scene, path: str, width: float) -> tuple[float, float]:
     """Return the changes of the number at a path of which the motions are compared: by `width` up and down.
 
     But of a place so near to an end that the tip beyond it would have a span of its own in one of them alone, or bend
-    with a held direction as it has one in none, which doubles the derivative: to where it has one in both.
+    with a held direction as it has one in none, which doubles the derivative: to where it has one in both. No place
+    passes what else holds, loads or weighs down the cable, or comes near to it: the motion has a kink there.
     """
     if path.endswith(".u"):
         part, length = _part(scene, path.removesuffix(".u")), scene.cable.length
+        between = min((d for v in scene.places if (d := abs(v - part.u)) > SAME * length), default=math.inf)
+        width = min(width, _OF_WAY * between)
         directed = isinstance(part, Grasp) and part.hold != "point"
         tip, longest = min(part.u, length - part.u), longest_tip(scene, part.u, directed)
         shorter = tip - width if width <= tip else tip
         if shorter <= longest and (directed or tip + width > longest):
-            off = max(_OFF_END * length, 2.0 * longest)
+            off = min(max(_OFF_END * length, 2.0 * longest), _OF_WAY * (tip + between))
             inward = (2.0 * off - tip, off - tip)
             return inward if part.u < 0.5 * length else (-inward[1], -inward[0])
     return width, -width

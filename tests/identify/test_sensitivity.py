@@ -215,6 +215,28 @@ def test_by_the_place_of_a_grasp_at_an_end_it_is_nearly_that_a_little_away_from_
     assert np.linalg.norm(difference) < 0.05 * np.linalg.norm(inside(U, T))
 
 
+@pytest.mark.parametrize("gap", [1e-3, 2e-3])
+def test_by_the_place_of_a_grasp_at_an_end_no_place_beyond_the_next_grasp_is_compared(gap: float) -> None:
+    """Places at 0.1 % and 0.2 % of the length lie to both sides of it, or one on it."""
+
+    def pair(u: float) -> Scene:
+        path = Move(displacement=(0.0, 0.2, 0.0), duration=1.5)
+        return scene(grasps=(Grasp(u=u, path=path), Grasp(u=gap, path=path)))
+
+    at_end, inside = (sensitivities(predict(pair(u)), ["grasps[0].u"]) for u in (0.0, 0.25 * gap))
+    assert (at_end.exact, inside.exact) == ((False,), (True,))
+    difference = at_end(U, T) - inside(U, T)
+    assert np.linalg.norm(difference) < 0.05 * np.linalg.norm(inside(U, T))
+    assert at_end.steps == pytest.approx((gap / 8.0,))
+
+
+def test_a_place_is_changed_by_less_than_what_parts_it_from_the_next() -> None:
+    """As by 1 % where whole marches are compared, which would take it past a grasp 2 mm away."""
+    near = scene(grasps=(Grasp(u=0.5), Grasp(u=0.502)), loads=(Load(u=0.5, force=(0.0, 0.01, 0.0)),))
+    assert sensitivity._changes(near, "grasps[0].u", 5e-3) == pytest.approx((5e-4, -5e-4))
+    assert sensitivity._changes(near, "grasps[0].u", 5e-5) == (5e-5, -5e-5)
+
+
 @pytest.mark.parametrize("name", ["grasps[0].path.displacement[0]", "shape.start[0]", "environment.drag_quadratic"])
 def test_a_number_that_is_tiny_by_chance_is_changed_as_zero_is(name: str) -> None:
     """As 0.5 cos(pi/2) is 3e-17, by a share of which nothing moves: derivatives were 0, or rounding."""
