@@ -210,7 +210,7 @@ class Sensitivities:
     Attributes:
         names: the parameters.
         exact: by parameter: differentiated step by step; else by differences of whole marches.
-        reason: why not, "" where all are.
+        reason: by parameter: why it is not exact, "" where it is.
         steps: half the change of each parameter on which the derivative rests.
         above, below: the motions with each parameter a little larger and smaller; one of them is the motion itself
             where the parameter ends there, as a drag of zero does, and the derivative is that to the other side; by a
@@ -219,7 +219,7 @@ class Sensitivities:
 
     names: tuple[str, ...]
     exact: tuple[bool, ...]
-    reason: str
+    reason: tuple[str, ...]
     steps: tuple[float, ...]
     above: tuple[SplineSurface, ...]
     below: tuple[SplineSurface, ...]
@@ -281,13 +281,13 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
         grid = start_grid(problem, accuracy.n_u, monitor)
         return watched(grid) if motion.grid.watched else grid
 
-    reason = objection(problem, motion)
+    objected = objection(problem, motion)
     known, coarse = None, COARSE_STEP
-    if not reason and not scene.shape.settle:
+    if not objected and not scene.shape.settle:
         known = factored(problem, motion)
-    elif not reason:
+    elif not objected:
         coarse = SETTLED_STEP
-        reason = (
+        objected = (
             "the start is an equilibrium that is found by iteration, so that whole marches are compared, with the "
             f"number {100.0 * coarse:g} % larger and smaller"
         )
@@ -306,25 +306,24 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
             raise SceneError("wrt", name, "a number that can be changed a little", str(refused[0]).rstrip("."))
         return found
 
-    above, below, exact, widths = [], [], [], []
+    above, below, reasons, widths = [], [], list[str](), []
     for name, value in zip(wrt, values, strict=True):
         size = max(abs(value), LEAST * _scale(scene, name))
         surfaces: list[SplineSurface] = []
         fitted = name.startswith(_FITTED)
         changes = _changes(scene, name, STEP * size)
-        others = changes[0] != -changes[1]
-        followed = known is not None and not fitted and not others
+        reason = objected
         if fitted:
             reason = "a fit through points chooses its smoothness anew"
-        elif others:
+        elif changes[0] != -changes[1]:
             reason = "a place at an end has other knots than one beside it"
-        sides = around(name, value, changes) if followed else []
+        sides = [] if reason else around(name, value, changes)
         try:
-            if known is not None and followed:
+            if known is not None and not reason:
                 surfaces = [_surface(p, g, *beside(known, p, g), _moved(knots_t, problem, p)) for _, p, g in sides]
         except ValueError as error:
-            followed, reason = False, str(error)
-        if not followed:
+            reason = str(error)
+        if reason:
             width = _FITTED_STEP * scene.cable.length if fitted else coarse * size
             sides = around(name, value, _changes(scene, name, width))
             marched = [(p, g, march(p, g, motion.asked, monitor, rho=motion.rho)) for _, p, g in sides]
@@ -333,11 +332,11 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
             ]
         above.append(surfaces[0])
         below.append(surfaces[1])
-        exact.append(followed)
+        reasons.append(reason)
         widths.append(0.5 * (sides[0][0] - sides[1][0]))
     return Sensitivities(
-        names=tuple(wrt), exact=tuple(exact), reason=reason, steps=tuple(widths), above=tuple(above),
-        below=tuple(below),
+        names=tuple(wrt), exact=tuple(not reason for reason in reasons), reason=tuple(reasons), steps=tuple(widths),
+        above=tuple(above), below=tuple(below),
     )  # fmt: skip
 
 
