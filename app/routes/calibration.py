@@ -119,4 +119,4 @@ async def follow(
     job = service.measurements.last(KIND)
     if job is None:
         raise ProblemError(404, "not-calibrating", "No calibration is under way.")
-    return events.of_job(job, events.seen_before(last_event_id))
+    return events.of_job(job, events.seen_before(last_event_id, job.mark))

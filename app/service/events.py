@@ -11,7 +11,7 @@ from app.http.streamed import Emit, Streamed
 from app.service.jobs import Job
 
 LastEventId = Annotated[
-    str | None, Header(description="Number of the last event seen, to go on after it.", examples=["3"])
+    str | None, Header(description="The `id` of the last event seen, to go on after it.", examples=["3"])
 ]
 # nothing may keep events back: no cache, and no proxy that collects them
 _HEADERS = {"Cache-Control": "no-store", "X-Accel-Buffering": "no", "Vary": "Accept"}
@@ -19,9 +19,9 @@ _DIGITS = 9  # of the number of an event, at most
 _LAST = 10**_DIGITS - 1  # number of the end where it is not known how many events came before
 
 
-def _event(kind: str, data: bytes, number: int | None = None) -> bytes:
+def _event(kind: str, data: bytes, number: int | None = None, mark: str = "") -> bytes:
     """Return one event; `data` is JSON, so it has no line breaks. Only a numbered one can be continued after."""
-    numbered = b"" if number is None else f"id: {number}\n".encode()
+    numbered = b"" if number is None else f"id: {mark}{number}\n".encode()
     return numbered + f"event: {kind}\ndata: ".encode() + data + b"\n\n"
 
 
@@ -40,7 +40,7 @@ def of_job(job: Job, seen: int = 0, *, cancel: bool = False) -> Response:
         cancel: whether the job ends when the client goes.
     """
     if job.finished.is_set() and seen > len(job.iterations):
-        return Response(status_code=204)
+        return Response(status_code=204, headers=_HEADERS)
 
     async def produce(emit: Emit) -> None:
         try:
@@ -60,11 +60,11 @@ async def _follow(job: Job, seen: int, emit: Emit) -> None:
         elif isinstance(news, str):
             await emit(_state(job.id, news))
         else:
-            await emit(_event(job.EVENT, orjson.dumps(news), news["number"]))
+            await emit(_event(job.EVENT, orjson.dumps(news), news["number"], job.mark))
     if job.problem is None:
-        await emit(_event("done", job.document or b"", len(job.iterations)))
+        await emit(_event("done", job.document or b"", len(job.iterations), job.mark))
     else:
-        await emit(_event("error", orjson.dumps(document_of(job.problem)), len(job.iterations)))
+        await emit(_event("error", orjson.dumps(document_of(job.problem)), len(job.iterations), job.mark))
 
 
 def of_document(document: bytes, seen: int = 0) -> Response:
@@ -82,12 +82,12 @@ def of_finished(id: str, document: bytes, seen: int = 0) -> Response:
 def _of_past(id: str, past: list[bytes], document: bytes, seen: int, last: int) -> Response:
     """Return the `past` events and a `done` with the number `last`, or 204 where that was seen, too."""
     if seen > last:
-        return Response(status_code=204)
+        return Response(status_code=204, headers=_HEADERS)
     pieces = [_state(id, "done"), *past, _event("done", document, last)]
     return Response(b"".join(pieces), media_type=EVENTS, headers=_HEADERS)
 
 
-def seen_before(last_event_id: str | None) -> int:
-    """Return how many events a client has seen by its ``Last-Event-ID``; 0 where that makes no sense."""
-    given = (last_event_id or "").strip()
+def seen_before(last_event_id: str | None, mark: str = "") -> int:
+    """Return how many events with a `mark` a client has seen by its ``Last-Event-ID``; 0 where that makes no sense."""
+    given = (last_event_id or "").strip().removeprefix(mark)
     return int(given) + 1 if given.isascii() and given.isdigit() and len(given) <= _DIGITS else 0

@@ -44,6 +44,11 @@ class Measurement(Job):
         """Where its answer is."""
         return "/v1/calibration" if self.kind == "calibration" else f"/v1/{self.kind}/{self.id}"
 
+    @property
+    def mark(self) -> str:
+        """What stands before the numbers of its events: its id, where others have the same address after it."""
+        return f"{self.id}-" if self.kind == "calibration" else ""
+
     def summary(self) -> dict[str, Any]:
         """Return its state as a document."""
         return {

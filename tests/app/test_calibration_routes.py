@@ -11,6 +11,7 @@ from fastapi.testclient import TestClient
 from app import cli
 from app.main import create_app
 from app.schemas.calibration import CalibrationResponse, MeasurementResponse
+from app.service.measurements import Tell
 from app.settings import Settings
 from dlocore import calibration
 from dlocore.calibration import Calibration
@@ -76,7 +77,29 @@ def test_its_progress_ends_with_what_is_then_read(fresh: TestClient) -> None:
     the_problem(fresh.get(ADDRESS, params={"dimensions": 4}), 422)
     again = parsed(fresh.get(f"{ADDRESS}/events", headers={"last-event-id": "2"}).text)
     assert [data["number"] for kind, _, data in again if kind == "progress"] == list(range(3, len(news)))
-    assert fresh.get(f"{ADDRESS}/events", headers={"last-event-id": again[-1][1] or ""}).status_code == 204
+    nothing = fresh.get(f"{ADDRESS}/events", headers={"last-event-id": again[-1][1] or ""})
+    assert nothing.status_code == 204
+    assert (nothing.headers["cache-control"], nothing.headers["vary"]) == ("no-store", "Accept")
+
+
+def test_the_next_one_is_told_whole_to_who_followed_the_last(
+    fresh: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It had nothing left to tell, or its beginning was swallowed: its events have the same numbers."""
+
+    def measured(*, on_progress: Tell, **options: object) -> Calibration:
+        on_progress(0, 1, "march")
+        found = calibration.load(_file(fresh))
+        assert found is not None
+        return found
+
+    monkeypatch.setattr(calibrating, "measure", measured)
+    told = [parsed(fresh.post(ADDRESS, headers={"accept": "text/event-stream"}).text) for _ in range(2)]
+    for _, id, _ in told[0]:
+        if id is not None:
+            again = fresh.get(f"{ADDRESS}/events", headers={"last-event-id": id})
+            assert again.status_code == 200
+            assert [kind for kind, _, _ in parsed(again.text)] == ["state", "progress", "done"]
 
 
 def test_one_that_cant_be_written_is_told_of_with_507(fresh: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
