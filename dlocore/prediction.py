@@ -199,7 +199,8 @@ class Prediction:
 
         Shape, velocity, stretch, twist, spin and memory go on, so that primitives chain: grasp, move, release, grasp
         elsewhere. Where the sections remember nothing, but twist, the motion is the same without `material`, which is
-        then but their director.
+        then but their director. A strain of more than 50 %, which no cable follows, is given as 50 %: such a cable may
+        be too long to go on.
 
         Raises:
             SceneError: `t` is outside the predicted time.

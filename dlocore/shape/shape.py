@@ -14,7 +14,7 @@ from dlocore.errors import SceneError
 from dlocore.kernels.basis import GAUSS_4, gauss_points, spline_values
 from dlocore.kernels.holding import place
 from dlocore.kernels.projection import on_knots
-from dlocore.scene.scene import ControlPoints, Material, Points, Shape, Straight
+from dlocore.scene.scene import MAX_STRAIN, ControlPoints, Material, Points, Shape, Straight
 from dlocore.spline import DEGREE, greville, uniform_knots
 
 Floats = NDArray[np.float64]
@@ -186,7 +186,7 @@ def _given(shape: ControlPoints, length: float) -> StartCurve:
     )
     speed, width = _speed(curve)
     given = float((speed * width).sum())
-    unstrained = "" if curve.strain is None else " without `strain`"
+    unstrained = "" if curve.strain is None else f" without `strain` ({MAX_STRAIN:.0%} at most)"
     check_length("shape.control_points", f"control points of the whole cable{unstrained}", given, length)
     slowest, fastest = float(speed.min()), float(speed.max())
     if not (slowest >= SPEED_RANGE[0] and fastest <= SPEED_RANGE[1]):

@@ -193,7 +193,7 @@ def test_a_cable_that_is_a_tenth_longer_than_without_load_goes_on() -> None:
     np.testing.assert_allclose(tip, -1.0 - (0.7 + 0.5 * 0.05 * 9.81) / 9.0, atol=1e-3)
 
 
-def test_a_cable_that_is_torn_goes_on_with_a_strain_that_a_start_may_have() -> None:
+def test_a_cable_that_is_torn_is_given_a_strain_that_a_start_may_have_and_refused_as_too_long() -> None:
     rubber = Cable(length=1.0, diameter=0.01, linear_density=0.05, bending_stiffness=1e-4, axial_stiffness=1.0)
     torn = predict(
         Scene(
@@ -208,6 +208,8 @@ def test_a_cable_that_is_torn_goes_on_with_a_strain_that_a_start_may_have() -> N
     assert torn.status != "converged"
     assert torn.stretch.at(0.5).max() > 3.0 * MAX_STRAIN
     assert np.max(torn.shape_at().strain) == MAX_STRAIN
+    with pytest.raises(SceneError, match=r"without `strain` \(50% at most\)"):
+        predict(replace(torn.scene, shape=torn.shape_at()))
 
 
 def test_the_strain_of_a_start_is_that_of_the_tension_that_its_weight_calls_for() -> None:

@@ -306,7 +306,7 @@ def test_the_length_of_stretched_control_points_is_told_without_their_strain() -
         with pytest.raises(SceneError, match=given) as error:
             start_curve(ControlPoints(control_points=points, strain=np.full(9, 0.4)), 1.0)
         assert error.value.field == "shape.control_points"
-        assert "without `strain`" in error.value.allowed
+        assert "without `strain` (50% at most)" in error.value.allowed
 
 
 def test_a_spline_of_the_same_space_is_transferred_exactly() -> None:
