@@ -204,7 +204,7 @@ def _refined(problem: Problem, sizes: list[int], at: float, target: float, monit
             break
         if found:
             change = _apart(*found[-1], grid, settled)
-        found, problem = (*found[-1:], (grid, settled)), settled.problem
+        found = (*found[-1:], (grid, settled))
         if settled.rest == "time":
             break
         status, message = "converged", "Forces balance." if len(sizes) == 1 else _agreed(change)
