@@ -57,6 +57,7 @@ class Settled(NamedTuple):
         history: what lies behind them.
         at: the grasps are at their poses of this time [s].
         starts: where the paths of the grasps begin.
+        deepest: how deep the control points lay in the table or an obstacle on their way, at most [m].
     """
 
     problem: Problem
@@ -66,6 +67,7 @@ class Settled(NamedTuple):
     history: History
     at: float
     starts: Starts
+    deepest: float
 
 
 def settle(
@@ -93,7 +95,8 @@ def settle(
     held = hold(problem, grid, grasps, np.full(2, at), starts, q if at > 0.0 else grid.start)
     applied = applied_at_rest(problem, grid, at)
     rest = _relaxed(problem, grid, q, history, held, applied, ROUNDS, 1.0 if begin is None else _NEARBY, monitor)
-    return Settled(problem, q, rest, held, history._replace(tension=grid.history.tension), at, starts)
+    history = history._replace(tension=grid.history.tension)
+    return Settled(problem, q, rest, held, history, at, starts, depth(problem, grid, q))
 
 
 def settle_along(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> Settled:
@@ -107,7 +110,7 @@ def settle_along(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> S
         Cancelled: the caller asked to stop.
     """
     scene, q, history = problem.scene, grid.start.copy(), _with_tension(grid, grid.past())
-    starts, before, restless = Starts(), 0.0, False
+    starts, before, restless, deepest = Starts(), 0.0, False, 0.0
     ahead = _times(scene, at)
     while True:
         t = ahead.pop()
@@ -125,11 +128,12 @@ def settle_along(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> S
             rounds = ROUNDS if wholly else PATH_ROUNDS
             problem, rest = _relaxed_firmly(problem, grid, q, history, held, applied, rounds, monitor)
             restless |= wholly and rest == "restless"
+            deepest = max(deepest, depth(problem, grid, q))
             if not ahead or rest == "time":
                 break
     if restless and rest == "settled":
         rest = "restless"
-    return Settled(problem, q, rest, held, history._replace(tension=grid.history.tension), t, starts)
+    return Settled(problem, q, rest, held, history._replace(tension=grid.history.tension), t, starts, deepest)
 
 
 def depth(problem: Problem, grid: Grid, q: Floats) -> float:

@@ -221,6 +221,12 @@ def _refined(problem: Problem, sizes: list[int], at: float, target: float, monit
         message = (
             f"The cable is pressed {_sunk(grid, settled):.0%} of its diameter into what it touches. Press it less."
         )
+    elif status == "converged" and settled.deepest > TOO_DEEP * problem.scene.cable.diameter:
+        status = "stalled"
+        message = (
+            f"On its way the cable was pressed {settled.deepest / problem.scene.cable.diameter:.0%} of its diameter "
+            "into something, and may have gone through. Press it less."
+        )
     elif status == "converged" and len(sizes) > 1 and not change <= target:
         status, message = "max_iterations", f"The finest grid still moved the shape by {in_mm(change)}."
     return _Rest(found, status, message, change)

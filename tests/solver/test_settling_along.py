@@ -174,6 +174,14 @@ def test_contact_that_a_coarse_grid_made_stiffer_is_not_that_of_finer_ones() -> 
     np.testing.assert_allclose(right, [0.0868, 0.0, -0.0535], atol=1e-3)  # as on 129 control points and on 385
 
 
+def test_a_cable_that_goes_through_a_bar_on_its_way_is_told() -> None:
+    # pulled taut over it, and then through: it hangs 0.36 m below, and had been called converged
+    found = equilibrium(arc_over_a_bar(0.8, 0.003, 0.1, axial_stiffness=500.0), at=2.0, n_u=49)
+    assert found.status == "stalled"
+    assert found.message.startswith("On its way the cable was pressed 12")  # % of its diameter
+    assert equilibrium(arc_over_a_bar(0.8, 0.003, 0.1, axial_stiffness=500.0), at=2.0, n_u=33).status == "converged"
+
+
 # --- how deep it is pressed in ---
 
 
