@@ -1,5 +1,6 @@
 """Bring a held cable to rest: relaxations held back by springs, ever weaker ones."""
 
+from itertools import pairwise
 from typing import Literal, NamedTuple, cast
 
 import numpy as np
@@ -29,7 +30,7 @@ TOLERANCE = 1e-10  # of the length, on the last Newton update
 RESTING = 1e-8  # of the length, as near to the equilibrium as a march solves its steps
 UNDRIVEN = 1e-6  # of what weighs on the cable and bends it: a force that drives nothing
 ROUNDS = 400  # of relaxations, each held back by where it started
-PATH_STEPS = 24  # that bring the grasps to their poses at a later time
+PATH_STEPS = 24  # at least, that bring a grasp to its pose at a later time, or a load to its force
 PATH_ROUNDS = 4  # of relaxations at each of them but the last
 STIFFER = 6  # times that contact is made stiffer
 _ROUNDING = 1e-15  # of the axial stiffness: what it makes of a force
@@ -43,6 +44,9 @@ _COMES_TO_REST = 0.5  # of the relaxation before: a cable that moves less by so 
 _ITERATIONS = 60  # of a relaxation with a line search
 _ROUGH = 1e-5  # of the length: the tolerance of the first of those, which others follow
 _YIELDING = 0.8  # of the depth, at most, is left by a stiffer contact where it is one of stiffness
+_FAR = 0.1  # of the length: no farther a grasp moves in one of those steps
+_TURNED = 0.5  # [rad]: nor turns
+_PLACES = 384  # on its path, at least, at which that is looked for
 _SHORTEST = 1e-9  # of the time: no shorter are the steps that bring the grasps to their poses
 
 
@@ -289,12 +293,44 @@ def _times(scene: Scene, at: float) -> list[float]:
     Where a gripper closes or opens there are two: with what held until then, and what does from then on.
     """
     sudden = [t for g in scene.grasps for t in (g.start, g.release_time) if t is not None and 0.0 < t <= at]
-    turns = [g.start + g.path.duration for g in scene.grasps]
-    turns += [t for g in scene.grasps if isinstance(g.path, Waypoints) for t in (g.start + g.path.stops).tolist()]
-    turns += [t for load in scene.loads if load.times is not None for t in cast(Floats, load.times).tolist()]
-    even = np.linspace(0.0, min(at, max([*sudden, *turns], default=0.0)), PATH_STEPS + 1)
-    once = {t for t in (*even.tolist(), *sudden, *turns, at) if 0.0 < t <= at} or {at}
+    turns = [t for g in scene.grasps if isinstance(g.path, Waypoints) for t in (g.start + g.path.stops).tolist()]
+    steps = [t for g in scene.grasps for t in _steps(g, at, scene.cable.length)]
+    for load in scene.loads:
+        if load.times is not None:
+            times = cast(Floats, load.times)
+            turns += times.tolist()
+            steps += np.linspace(times[0], min(at, times[-1]), PATH_STEPS + 1).tolist()
+    once = {t for t in (*steps, *sudden, *turns, at) if 0.0 < t <= at} or {at}
     return sorted([*once, *set(sudden)], reverse=True)
+
+
+def _steps(grasp: Grasp, at: float, length: float) -> list[float]:
+    """Return times [s] on the way of a grasp until `at`: PATH_STEPS even steps, and more where it goes far in one.
+
+    In none it moves by more than _FAR of the length, or turns by more than _TURNED.
+    """
+    path, lasts = grasp.path, min(at, grasp.release_time or np.inf) - grasp.start
+    lasts = min(lasts, path.duration)
+    if lasts <= 0.0:
+        return []
+    even = np.linspace(0.0, lasts, PATH_STEPS + 1)
+    knots = np.append(0.0, cast(Floats, path.times)) if isinstance(path, Waypoints) else np.array([0.0, path.duration])
+    parts = max(1, _PLACES // (len(knots) - 1))
+    t = np.interp(np.arange(parts * (len(knots) - 1) + 1) / parts, np.arange(len(knots)), knots)
+    t = np.union1d(even, t[t < lasts])
+    r, turned = path.at(t, np.zeros(3)), path.rotation_at(t)
+    found = even.tolist()
+    for k, last in pairwise(np.searchsorted(t, even).tolist()):
+        while True:
+            far = np.linalg.norm(r[k : last + 1] - r[k], axis=1) > _FAR * length
+            if turned is not None:  # rotations by an angle a apart are 8^0.5 sin(a/2) apart
+                apart = np.linalg.norm(turned[k : last + 1] - turned[k], axis=(1, 2))
+                far |= apart > 8.0**0.5 * np.sin(0.5 * _TURNED)
+            if not far.any():
+                break
+            k += max(1, int(np.argmax(far)) - 1)
+            found.append(float(t[k]))
+    return [grasp.start + x for x in found]
 
 
 def _carried(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, t: float, q: Floats) -> Floats:
