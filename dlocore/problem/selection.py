@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from dlocore.effects.distance import distances
 from dlocore.effects.selfcontact import NEAR_START
+from dlocore.problem.events import closed_grasps
 from dlocore.problem.standing import obstacle_rows
 from dlocore.problem.strands import nearest_strands
 from dlocore.scene.paths import Move, Waypoints
@@ -151,7 +153,8 @@ def reached(scene: Scene, start: StartCurve, called_for: Mapping[str, str], at_r
 
     Every point of the cable follows its grasps about as far as they go; what a result shows to come near is called
     for by it. A start that settles has come from where it was given: it may have touched all that the cable reaches
-    from the grasps that hold it, and one that is brought to rest (`at_rest`) all that it reaches from their paths.
+    from the grasps that hold it, and one that is brought to rest (`at_rest`) all that it reaches from the paths of
+    those that hold it at some time.
     """
     obstacles = scene.environment.obstacles
     switch = scene.effects.get("obstacles", "auto")
@@ -167,12 +170,43 @@ def reached(scene: Scene, start: StartCurve, called_for: Mapping[str, str], at_r
     radius = 0.5 * scene.cable.diameter
     near = distances(rows, np.ascontiguousarray(moved)).min(axis=0) - radius < NEAR * scene.cable.length
     holding = [g for g in scene.grasps if g.start == 0.0]
-    if (scene.shape.settle or at_rest) and holding:
-        held = [np.ascontiguousarray(_way(g, start)) if at_rest else start(g.u) for g in holding]
-        away = np.array([distances(rows, r).min(axis=0) for r in held]) - radius  # of each obstacle from each grasp
-        along = np.abs(u[:, None] - np.array([g.u for g in holding]))
-        near |= (along[:, :, None] >= away).all(axis=1).any(axis=0)
+    if at_rest:
+        near |= _in_reach(scene, start, rows, u)
+    elif scene.shape.settle and holding:
+        away = np.array([distances(rows, start(g.u)).min(axis=0) for g in holding]) - radius  # of each from each grasp
+        near |= _all_reach(u, holding, away)
     return tuple(int(i) for i in np.flatnonzero(near))
+
+
+def _in_reach(scene: Scene, start: StartCurve, rows: Floats, u: Floats) -> NDArray[np.bool_]:
+    """Return which obstacles places u (k,) [m] reach, at some time, from the paths of all that holds the cable then.
+
+    Where a gripper closes later is known where it has waypoints, or is the first; else it is as far from what holds the
+    cable by then as the cable between them, at most.
+    """
+    grasps = sorted(scene.grasps, key=lambda g: g.start)
+    away: dict[Grasp, Floats] = {}  # of each obstacle from the path of a grasp, at least
+    for g in grasps:
+        way = np.ascontiguousarray(_way(g, start))
+        if g.start == grasps[0].start or isinstance(g.path, Waypoints):
+            away[g] = distances(rows, way).min(axis=0) - 0.5 * scene.cable.diameter
+            continue
+        until = [h for h in away if h.start < g.start <= (h.release_time or np.inf)]
+        least = np.array([np.full(len(rows), -np.inf), *(away[h] - abs(h.u - g.u) for h in until)]).max(axis=0)
+        away[g] = least - np.linalg.norm(way - way[0], axis=1).max()
+    near = np.zeros(len(rows), dtype=bool)
+    times = sorted({t for g in grasps for t in (g.start, g.release_time) if t is not None})
+    for begin, end in pairwise([*times, np.inf]):
+        holding = closed_grasps(scene, begin, end)
+        if holding:
+            near |= _all_reach(u, holding, np.array([away[g] for g in holding]))
+    return near
+
+
+def _all_reach(u: Floats, holding: list[Grasp], away: Floats) -> NDArray[np.bool_]:
+    """Return which obstacles, `away` (grasps, obstacles) [m], any of the places u (k,) [m] reaches from all grasps."""
+    along = np.abs(u[:, None] - np.array([g.u for g in holding]))
+    return np.asarray((along[:, :, None] >= away).all(axis=1).any(axis=0))
 
 
 def _way(grasp: Grasp, start: StartCurve) -> Floats:

@@ -24,6 +24,7 @@ from dlocore import (
     Waypoints,
     equilibrium,
 )
+from dlocore.problem.problem import pose
 from tests.solver.scenes import Floats
 
 DIAMETER = 0.004
@@ -173,6 +174,37 @@ def test_a_cable_comes_to_rest_on_what_is_far_from_its_start_and_in_its_reach(wa
     assert found.status == "converged"
     gaps = np.linalg.norm(found.positions(np.linspace(0.0, 1.0, 401)) - ball.center, axis=1) - 0.1 - 0.5 * DIAMETER
     assert gaps.min() == pytest.approx(0.0, abs=0.03 * DIAMETER)  # 2 % at the nodes of contact
+
+
+HANDED = (  # over what it falls on to, and pulled over that
+    Grasp(u=0.0, release_time=1.0),
+    Grasp(u=1.0, grasp_time=0.5, path=Move(displacement=(1.8, 0.0, 1.2), duration=2.0)),
+)
+HUNG = Straight(direction=(0.0, 0.0, -1.0))
+
+
+@pytest.mark.parametrize(
+    ("shape", "grasps", "center"),
+    [(Straight(), (Grasp(u=0.0), Grasp(u=1.0, release_time=0.5)), (0.0, 0.0, -0.5)), (HUNG, HANDED, (1.8, 0.0, -0.3))],
+)
+def test_a_cable_comes_to_rest_on_what_it_reaches_only_by_then(
+    shape: Straight, grasps: tuple[Grasp, ...], center: tuple[float, float, float]
+) -> None:
+    # released at one end, or taken by a second gripper, it had come to rest within the ball
+    around = Environment(obstacles=(Sphere(center=center, radius=0.1),))
+    found = equilibrium(Scene(cable=cable(), shape=shape, grasps=grasps, environment=around, horizon=4.0), at=4.0)
+    assert found.status == "converged"
+    gaps = np.linalg.norm(found.positions(np.linspace(0.0, 1.0, 401)) - center, axis=1) - 0.1 - 0.5 * DIAMETER
+    assert gaps.min() == pytest.approx(0.0, abs=0.03 * DIAMETER)
+
+
+def test_what_is_beyond_reach_whenever_it_is_held_is_left_out() -> None:
+    ends = (Grasp(u=0.0), Grasp(u=1.0), Grasp(u=0.9, grasp_time=2.0))
+    around = Environment(obstacles=(Sphere(center=(0.0, 0.0, -0.5), radius=0.1),))
+    scene = Scene(cable=cable(), shape=Straight(), grasps=ends, environment=around, horizon=4.0)
+    assert pose(scene, at_rest=True).contact is None
+    scene = replace(scene, grasps=(ends[0], Grasp(u=1.0, release_time=1.0), ends[2]))
+    assert pose(scene, at_rest=True).contact is not None
 
 
 def arc_over_a_bar(gap: float, radius: float, down: float, **changes: Any) -> Scene:
