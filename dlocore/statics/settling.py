@@ -1,5 +1,6 @@
 """Bring a held cable to rest: relaxations held back by springs, ever weaker ones."""
 
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Literal, NamedTuple, cast
 
@@ -19,11 +20,12 @@ from dlocore.problem.grid import Grid
 from dlocore.problem.holding import Held, Starts, close_grasps, hold
 from dlocore.problem.problem import Problem, stiff_as_taut, stiffer_for
 from dlocore.scene.paths import Waypoints, held_at
-from dlocore.scene.scene import Grasp, Scene
+from dlocore.scene.scene import Grasp, Load, Scene
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.spline import greville
 
 Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 Rest = Literal["settled", "restless", "time"]  # at rest; no rest found; the time was up
 
 TOLERANCE = 1e-10  # of the length, on the last Newton update
@@ -46,6 +48,7 @@ _ROUGH = 1e-5  # of the length: the tolerance of the first of those, which other
 _YIELDING = 0.8  # of the depth, at most, is left by a stiffer contact where it is one of stiffness
 _FAR = 0.1  # of the length: no farther a grasp moves in one of those steps
 _TURNED = 0.5  # [rad]: nor turns
+_CHANGED = 0.25  # of all that a load changes by: by no more it does
 _PLACES = 384  # on its path, at least, at which that is looked for
 _SHORTEST = 1e-9  # of the time: no shorter are the steps that bring the grasps to their poses
 
@@ -295,11 +298,7 @@ def _times(scene: Scene, at: float) -> list[float]:
     sudden = [t for g in scene.grasps for t in (g.start, g.release_time) if t is not None and 0.0 < t <= at]
     turns = [t for g in scene.grasps if isinstance(g.path, Waypoints) for t in (g.start + g.path.stops).tolist()]
     steps = [t for g in scene.grasps for t in _steps(g, at, scene.cable.length)]
-    for load in scene.loads:
-        if load.times is not None:
-            times = cast(Floats, load.times)
-            turns += times.tolist()
-            steps += np.linspace(times[0], min(at, times[-1]), PATH_STEPS + 1).tolist()
+    steps += [t for load in scene.loads if load.times is not None for t in _load_steps(load, at)]
     once = {t for t in (*steps, *sudden, *turns, at) if 0.0 < t <= at} or {at}
     return sorted([*once, *set(sudden)], reverse=True)
 
@@ -319,18 +318,42 @@ def _steps(grasp: Grasp, at: float, length: float) -> list[float]:
     t = np.interp(np.arange(parts * (len(knots) - 1) + 1) / parts, np.arange(len(knots)), knots)
     t = np.union1d(even, t[t < lasts])
     r, turned = path.at(t, np.zeros(3)), path.rotation_at(t)
+
+    def far(k: int, last: int) -> Bools:
+        goes = np.linalg.norm(r[k : last + 1] - r[k], axis=1) > _FAR * length
+        if turned is None:
+            return np.asarray(goes)
+        # rotations by an angle a apart are 8^0.5 sin(a/2) apart
+        apart = np.linalg.norm(turned[k : last + 1] - turned[k], axis=(1, 2))
+        return np.asarray(goes | (apart > 8.0**0.5 * np.sin(0.5 * _TURNED)))
+
+    return [grasp.start + x for x in _divided(even, t, far)]
+
+
+def _load_steps(load: Load, at: float) -> list[float]:
+    """Return times [s] at which a load has changed, until `at`: even ones, and more where one is by _CHANGED of all."""
+    times = cast(Floats, load.times)
+    begin, end = max(0.0, times[0]), min(at, times[-1])
+    if end < begin:
+        return []
+    even = np.linspace(begin, end, PATH_STEPS + 1)
+    t = np.union1d(even, times[(begin < times) & (times < end)])
+    force = load.at(t)
+    change = _CHANGED * np.linalg.norm(force - force[0], axis=1).max()
+    return _divided(even, t, lambda k, last: np.linalg.norm(force[k : last + 1] - force[k], axis=1) > change)
+
+
+def _divided(even: Floats, t: Floats, far: Callable[[int, int], Bools]) -> list[float]:
+    """Return `even` times, which are among t (k,), and others of these between which nothing goes too `far`, if it can.
+
+    `far(k, last)` tells of each of the times t[k] to t[last] whether it is that from the first.
+    """
     found = even.tolist()
     for k, last in pairwise(np.searchsorted(t, even).tolist()):
-        while True:
-            far = np.linalg.norm(r[k : last + 1] - r[k], axis=1) > _FAR * length
-            if turned is not None:  # rotations by an angle a apart are 8^0.5 sin(a/2) apart
-                apart = np.linalg.norm(turned[k : last + 1] - turned[k], axis=(1, 2))
-                far |= apart > 8.0**0.5 * np.sin(0.5 * _TURNED)
-            if not far.any():
-                break
-            k += max(1, int(np.argmax(far)) - 1)
+        while (beyond := far(k, last)).any():
+            k += max(1, int(np.argmax(beyond)) - 1)
             found.append(float(t[k]))
-    return [grasp.start + x for x in found]
+    return found
 
 
 def _carried(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, t: float, q: Floats) -> Floats:

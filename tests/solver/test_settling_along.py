@@ -135,6 +135,38 @@ def test_a_cable_that_is_folded_on_few_control_points_is_told_and_refined() -> N
     np.testing.assert_allclose(enough.positions([0.6])[0], [-0.23429, 0.0, -0.09854], atol=1e-4)
 
 
+# --- loads on the way ---
+
+
+def test_a_measured_load_takes_hardly_more_steps_than_a_rough_one() -> None:
+    def relaxations(entries: int) -> int:
+        t = np.linspace(0.0, 10.0, entries)
+        load = Load(u=0.5, force=np.column_stack([0.05 * np.sin(t), 0.0 * t, 0.0 * t - 0.05]), times=t)
+        grasps = (Grasp(u=0.0), Grasp(u=1.0, path=Move(displacement=(-0.3, 0.0, 0.0), duration=2.0)))
+        scene = Scene(cable=cable(), shape=Straight(), grasps=grasps, loads=(load,), horizon=10.0)
+        asked: list[int] = []
+        equilibrium(scene, at=10.0, n_u=9, cancelled=lambda: bool(asked.append(1)))
+        return len(asked)
+
+    assert relaxations(1000) < 2 * relaxations(25)  # it had been many times as many: each entry was a step
+
+
+def test_a_short_push_between_even_steps_is_gone_through() -> None:
+    # an arch without weight snaps through and stays there; 24 even steps of the minute miss the push
+    shape = Points(points=np.column_stack([ARC[:, 0], 0.0 * ARC[:, 0], ARC[:, 1]]))
+    push = Load(u=0.5, force=[(0.0, 0.0, -z) for z in (0.0, 0.0, 5.0, 0.0, 0.0)], times=(0.0, 20.1, 20.2, 20.3, 60.0))
+    arch = Scene(
+        cable=cable(),
+        shape=shape,
+        grasps=(Grasp(u=0.0), Grasp(u=1.0)),
+        environment=Environment(gravity=(0.0, 0.0, 0.0)),
+        horizon=60.0,
+    )
+    heights = [equilibrium(s, at=60.0, n_u=17).positions([0.5])[0, 2] for s in (arch, replace(arch, loads=(push,)))]
+    assert heights[0] > 0.2
+    assert heights[1] == pytest.approx(-heights[0], rel=1e-3)
+
+
 # --- what is in the way ---
 
 
