@@ -196,38 +196,35 @@ class _Rest(NamedTuple):
 def _refined(problem: Problem, sizes: list[int], at: float, target: float, monitor: Monitor) -> _Rest:
     """Settle on finer and finer grids until two agree to the target [m]."""
     found: tuple[tuple[Grid, Settled], ...] = ()
-    change, status = np.inf, cast(Status, "time_limit")
-    message = "The time limit passed. Allow more time or a smaller n_u."
+    change, status = np.inf, cast(Status, "converged")
     for n in sizes:
         grid, settled = _rested(problem, make_grid(problem, n), at, monitor)
-        if settled.rest == "time" and found:
-            break
+        if settled.rest == "time":
+            message = "The time limit passed. Allow more time or a smaller n_u."
+            return _Rest(found or ((grid, settled),), "time_limit", message, change)
         if found:
             change = _apart(*found[-1], grid, settled)
         found = (*found[-1:], (grid, settled))
-        if settled.rest == "time":
-            break
-        status, message = "converged", "Forces balance." if len(sizes) == 1 else _agreed(change)
         if change <= target and not _is_folded(grid, settled):
             break
-    grid, settled = found[-1]
+    message = "Forces balance." if len(sizes) == 1 else _agreed(change)
     if settled.rest == "restless":
         status = "stalled"
         message = "The relaxation did not come to rest. The scene may have no equilibrium, or many side by side."
-    elif status == "converged" and _is_folded(grid, settled):
+    elif _is_folded(grid, settled):
         status, message = "stalled", "The cable is folded finer than its control points can show. Take more of them."
-    elif status == "converged" and _sunk(grid, settled) > TOO_DEEP:
+    elif _sunk(grid, settled) > TOO_DEEP:
         status = "stalled"
         message = (
             f"The cable is pressed {_sunk(grid, settled):.0%} of its diameter into what it touches. Press it less."
         )
-    elif status == "converged" and settled.deepest > TOO_DEEP * problem.scene.cable.diameter:
+    elif settled.deepest > TOO_DEEP * problem.scene.cable.diameter:
         status = "stalled"
         message = (
             f"On its way the cable was pressed {settled.deepest / problem.scene.cable.diameter:.0%} of its diameter "
             "into something, and may have gone through. Press it less."
         )
-    elif status == "converged" and len(sizes) > 1 and not change <= target:
+    elif len(sizes) > 1 and not change <= target:
         status, message = "max_iterations", f"The finest grid still moved the shape by {in_mm(change)}."
     return _Rest(found, status, message, change)
 

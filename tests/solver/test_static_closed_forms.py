@@ -1,5 +1,6 @@
 """Static equilibria against closed forms (docs/model.md; Love, Timoshenko and Gere, Bisshopp and Drucker)."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -299,3 +300,20 @@ def test_an_equilibrium_tells_how_far_forces_and_moments_may_be_off() -> None:
         assert (off <= told).all()
         assert (told[:2] < 0.1 * np.linalg.norm(getattr(exact, f"{name}s")[:2], axis=1)).all()
         assert told[2] == 0.0
+
+
+def test_a_time_limit_that_passes_on_a_finer_grid_is_told():
+    scene = Scene(cable=cable(), shape=Straight(), grasps=(CLAMPED,), horizon=1)
+    asked = []
+    equilibrium(scene, n_u=9, cancelled=lambda: bool(asked.append(1)))
+    first = len(asked)
+
+    def late():
+        asked.append(1)
+        if len(asked) == 2 * first + 2:  # on the second or third grid
+            time.sleep(0.6)
+        return False
+
+    found = equilibrium(scene, deadline=0.5, cancelled=late)
+    assert found.status == "time_limit"  # it had been max_iterations, as of the finest grid
+    assert found.message.startswith("The time limit passed")
