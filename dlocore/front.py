@@ -35,10 +35,11 @@ from dlocore.levels.iterated import ended, out_of_time
 from dlocore.levels.level import Level
 from dlocore.levels.progress import record, record_level, surface_at
 from dlocore.levels.review import neglected, objections
-from dlocore.levels.whole_march import TORN, Outcome, march_status, sided
+from dlocore.levels.whole_march import Outcome, march_status, sided
 from dlocore.prediction import Prediction
 from dlocore.problem.grid import Grid
 from dlocore.problem.problem import Problem, pose
+from dlocore.problem.strained import TORN
 from dlocore.problem.time_grid import smallest_n_t
 from dlocore.scene.scene import Method, Quality, Scene
 from dlocore.solvers import paper

@@ -28,6 +28,7 @@ from dlocore.problem.notes import edge_notes, start_notes
 from dlocore.problem.problem import Problem
 from dlocore.problem.selection import turned_by_grasps
 from dlocore.problem.standing import obstacle_rows
+from dlocore.problem.strained import STRAINED, strain_notes
 from dlocore.problem.strands import nearest_strands
 from dlocore.scene.obstacles import Obstacle
 from dlocore.solvers.monitor import Monitor
@@ -48,8 +49,6 @@ CLOSE = 0.01  # of the length: a cable that comes this near to an obstacle left 
 MATTERS = 0.001  # of the length: what a neglected effect may move the cable before it is worth a word
 _SHARE = 0.2  # of a target that was asked for: what the inertia that is left out may move it
 _TURNS = 0.1  # of that, and of the target: what the sections' spin may move it, which a motion that snaps enlarges
-STRAINED = 0.05  # axial strain: few cables bear more
-RUBBER = 0.01  # axial strain: few cables bear more without harm, of one whose axial stiffness is assumed
 FAR_MORE = 2.0  # times the strain of the march: what its spline adds is worth a word
 TURNED, OF_TURN = 0.2, 0.05  # [rad], and of the largest angle of its sections: what grids may differ by without a word
 _PLACES, _MOMENTS = 4, 33  # in a span, and in time while it swings once, at which a surface is searched for strain
@@ -124,7 +123,7 @@ def objections(level: Level) -> list[str]:
     that few bear, and one that is pulled taut.
     """
     problem, found = level.problem, []
-    found += _strained(level)
+    found += strain_notes(level.problem.scene.cable, level.motion.largest_strain, "the motion")
     found += taut_notes(level)
     found += _stretched(level)
     found += _twisted(level)
@@ -203,16 +202,6 @@ def _twisted(level: Level) -> list[str]:
         "the angle of its sections, and the torque with it, is not as sure as its positions, as two grids differ by up "
         f"to {level.turned:.2g} rad: a given grid with larger n_u and n_t shows waves of twist"
     ]
-
-
-def _strained(level: Level) -> list[str]:
-    """Return what is told of a motion that strains the cable by more than few bear, by less where EA is assumed."""
-    cable, strain = level.problem.scene.cable, level.motion.largest_strain
-    solid = cable.axial_stiffness == cable.solid_axial_stiffness  # assumed, or given like that
-    if not strain > (RUBBER if solid else STRAINED):
-        return []
-    soft = f", with the {cable.axial_stiffness:.3g} N of a solid section of its bending stiffness: give axial_stiffness"
-    return [f"the motion strains the cable by up to {strain:.0%} along itself{soft if solid else ''}"]
 
 
 def _stretched(level: Level) -> list[str]:

@@ -23,6 +23,7 @@ from dlocore.problem.grid import Grid
 from dlocore.problem.held_ends import held_back
 from dlocore.problem.notes import cable_notes
 from dlocore.problem.problem import Problem, pose
+from dlocore.problem.strained import TORN, strain_notes
 from dlocore.scene.scene import Scene
 from dlocore.solvers.monitor import Monitor, time_allowed
 from dlocore.spline import design_matrix, in_range
@@ -146,6 +147,8 @@ def equilibrium(
     sunk = _sunk(grid, rest.settled)
     if DEEPEST < sunk <= TOO_DEEP:
         notes.append(f"the cable is pressed {sunk:.0%} of its diameter into what it touches")
+    if rest.settled.rest == "settled" and _strain(grid, rest.settled) <= TORN:
+        notes += strain_notes(scene.cable, _strain(grid, rest.settled), "the equilibrium")
     notes += yield_notes(problem, grid, q, history)
     apart = _rests_apart(problem, rest, at, monitor) if rest.status == "converged" and not sides else 0.0
     if apart > UNDETERMINED * scene.cable.length:
@@ -213,6 +216,10 @@ def _refined(problem: Problem, sizes: list[int], at: float, target: float, monit
         message = "The relaxation did not come to rest. The scene may have no equilibrium, or many side by side."
     elif _is_folded(grid, settled):
         status, message = "stalled", "The cable is folded finer than its control points can show. Take more of them."
+    elif _strain(grid, settled) > TORN:
+        status = "stalled"
+        message = f"The cable is strained along itself by {_strain(grid, settled):.0%}, which no cable follows. "
+        message += _loosened(problem.scene, at)
     elif _sunk(grid, settled) > TOO_DEEP:
         status = "stalled"
         message = (
@@ -276,6 +283,19 @@ def _apart(coarse: Grid, before: Settled, grid: Grid, settled: Settled) -> float
     r = settled.q[None, :, :dimensions]
     lacking = held_back(settled.problem.scene, grid, r, grid.largest_strain(r))
     return float(np.linalg.norm(other - one, axis=1).max()) + lacking
+
+
+def _strain(grid: Grid, settled: Settled) -> float:
+    """Return the largest axial strain of a cable that has settled."""
+    return grid.largest_strain(settled.q[None, :, : settled.problem.plane.dimensions])
+
+
+def _loosened(scene: Scene, at: float) -> str:
+    """Return in words what strains a cable less under the grasps of the time `at`."""
+    if len(closed_grasps(scene, at, at)) > 1:
+        return "Bring the grasps no farther apart than the cable between them."
+    stiffness = cast(float, scene.cable.axial_stiffness)
+    return f"Its axial stiffness is {stiffness:.3g} N: give it more, or less mass, weight or load."
 
 
 def _sunk(grid: Grid, settled: Settled) -> float:

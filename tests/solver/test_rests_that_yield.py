@@ -1,4 +1,7 @@
-"""A cable settles as if it did not yield; where at rest it would, an equilibrium and a motion from it say so."""
+"""A cable settles as if it did not yield; where at rest it would, an equilibrium and a motion from it say so.
+
+So does an equilibrium in which the cable is stretched by more than few bear.
+"""
 
 from dataclasses import replace
 from typing import Any
@@ -72,3 +75,42 @@ def test_a_motion_from_such_a_rest_tells() -> None:
     assert any(TOLD in note for note in predict(settled).notes)
     assert not any(TOLD in note for note in predict(replace(settled, cable=cable(yield_strain=0.006))).notes)
     assert not any(TOLD in note for note in predict(replace(settled, shape=Straight())).notes)
+
+
+# --- cables that are stretched by more than few bear ---
+
+DOWN = Straight(direction=(0.0, 0.0, -1.0))
+
+
+def elastic(**changes: Any) -> Cable:
+    return cable(memory_rate=None, **changes)
+
+
+@pytest.mark.parametrize(
+    ("far", "status", "words"),
+    [
+        (0.001, "converged", "Two grids agree"),
+        (0.02, "converged", "the equilibrium strains the cable by up to 10% along itself, with the 2e+04 N of a solid"),
+        (0.2, "stalled", "strained along itself by 101%, which no cable follows. Bring the grasps no farther apart"),
+    ],
+)
+def test_an_equilibrium_tells_that_grippers_stretch_the_cable(far: float, status: str, words: str) -> None:
+    # the second closes where the cable hangs from the first, 0.2 m below, and takes it on
+    on = Grasp(u=0.3, grasp_time=1.0, path=Move(displacement=(0.0, 0.0, -far), duration=1.0))
+    found = equilibrium(Scene(cable=elastic(), shape=DOWN, grasps=(Grasp(u=0.1), on), horizon=2.0), at=2.0)
+    assert found.status == status
+    assert words in found.message
+    assert ("strain" in found.message) == (far > 0.01)
+
+
+def test_it_tells_that_its_own_weight_does() -> None:
+    soft = Scene(cable=elastic(axial_stiffness=1.0), shape=DOWN, grasps=(Grasp(u=0.0),), horizon=1.0)
+    torn = equilibrium(soft, n_u=17)
+    assert torn.status == "stalled"
+    assert "which no cable follows. Its axial stiffness is 1 N: give it more, or less mass" in torn.message
+    assert "by up to" not in torn.message
+    firmer = equilibrium(replace(soft, cable=elastic(axial_stiffness=3.0)), n_u=17)
+    assert firmer.status == "converged"
+    assert (
+        "the equilibrium strains the cable by up to 9% along itself." in firmer.message
+    )  # 8.2 %, and beside the grasp
