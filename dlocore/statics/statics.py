@@ -118,10 +118,9 @@ def equilibrium(
     """
     at = number("at", at, at_least=0.0, at_most=1e4, unit="s")
     problem = pose(scene, at_rest=True)
-    if not closed_grasps(scene, at, at) and (np.any(problem.weight() != 0) or scene.loads):
-        raise SceneError(
-            "primitives", "no grasp", "a grasp that holds the cable", "Nothing holds it against its forces"
-        )
+    if not closed_grasps(scene, at, at) and _is_driven(problem, at):
+        given = f"no grasp that is closed at {at:g} s" if scene.grasps else "no grasp"
+        raise SceneError("primitives", given, "a grasp that holds the cable", "Nothing holds it against its forces")
     monitor = Monitor(None, time_allowed(deadline), cancelled)
     target = scene.quality.target_error or 1e-4 * scene.cable.length
     least = smallest_n_u(problem)
@@ -169,6 +168,15 @@ def equilibrium(
         energy=elastic_energy(problem, grid, q, history),
         error_estimate=None if n_u is not None or not np.isfinite(rest.change) else rest.change,
     )
+
+
+def _is_driven(problem: Problem, at: float) -> bool:
+    """Tell whether forces act on a cable at the time `at` [s] other than such as press it on to the table."""
+    weight = problem.plane.world_vectors(problem.weight()[None, : problem.plane.dimensions])
+    forces = np.vstack([weight, *(load.at(np.array([at])) for load in problem.scene.loads)])
+    if problem.on_table or problem.table is not None:
+        forces[:, 2] = forces[:, 2].clip(min=0.0)
+    return bool(forces.any())
 
 
 class _Rest(NamedTuple):

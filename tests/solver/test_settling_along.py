@@ -18,6 +18,7 @@ from dlocore import (
     PointMass,
     Points,
     Scene,
+    SceneError,
     Sphere,
     Straight,
     Table,
@@ -133,6 +134,47 @@ def test_a_cable_that_is_folded_on_few_control_points_is_told_and_refined() -> N
     enough = equilibrium(scene, at=0.2)
     assert enough.status == "converged"
     np.testing.assert_allclose(enough.positions([0.6])[0], [-0.23429, 0.0, -0.09854], atol=1e-4)
+
+
+# --- what nothing holds at the end ---
+
+FREE = Environment(gravity=(0.0, 0.0, 0.0))
+OVER = Load(u=0.5, force=[(0.0, 0.0, 1.0), (0.0, 0.0, 0.0)], times=(0.0, 1.0))
+
+
+def test_a_cable_that_is_lifted_off_a_table_and_released_comes_to_rest_on_it() -> None:
+    lifted = Grasp(u=0.0, path=Move(displacement=(0.0, 0.0, 0.2), duration=1.0), release_time=1.5)
+    pressed = Load(u=0.5, force=(0.0, 0.0, -0.1))
+    scene = Scene(
+        cable=cable(), shape=Straight(), grasps=(lifted,), loads=(pressed,), environment=Environment(table=Table())
+    )
+    found = equilibrium(scene, at=3.0, n_u=17)
+    assert found.status == "converged"
+    np.testing.assert_allclose(found.positions(np.linspace(0.0, 1.0, 9))[:, 2], 0.0, atol=0.03 * DIAMETER)
+
+
+@pytest.mark.parametrize(("load", "at"), [(Load(u=0.5, force=(0.0, 0.0, 0.0)), 0.0), (OVER, 2.0)])
+def test_a_cable_that_no_force_drives_needs_no_grasp(load: Load, at: float) -> None:
+    scene = Scene(cable=cable(), shape=Straight(), loads=(load,), environment=FREE, horizon=2.0)
+    found = equilibrium(scene, at=at, n_u=9)
+    assert found.status == "converged"
+    np.testing.assert_allclose(found.positions([0.0, 1.0]), [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("environment", "loads", "at"),
+    [
+        (FREE, (OVER,), 0.75),
+        (Environment(), (), 3.0),
+        (Environment(table=Table()), (Load(u=0.5, force=(0.1, 0.0, 0.0)),), 3.0),
+        (Environment(table=Table(), gravity=(1.0, 0.0, -9.0)), (), 3.0),
+    ],
+)
+def test_grasps_that_are_open_then_hold_nothing(environment: Environment, loads: tuple[Load, ...], at: float) -> None:
+    opened = Grasp(u=0.0, path=Move(displacement=(0.0, 0.0, 0.2), duration=0.4), release_time=0.5)
+    scene = Scene(cable=cable(), shape=Straight(), grasps=(opened,), loads=loads, environment=environment, horizon=3.0)
+    with pytest.raises(SceneError, match=f"primitives: got no grasp that is closed at {at:g} s. Nothing holds it"):
+        equilibrium(scene, at=at, n_u=17)
 
 
 # --- loads on the way ---
