@@ -325,7 +325,7 @@ def _contacts(
     windows, found = find_forces(), pressing()
     if judged is not None:
         return contacts_taken_on(found, level.problem.scene, judged.contacts, judged.scene)
-    return with_contact_errors(found, windows, _beside(level))
+    return with_contact_errors(found, level.marched, windows, _beside(level))
 
 
 def _beside(level: Level) -> list[tuple[Problem, Grid, Windows]]:

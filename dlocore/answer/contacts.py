@@ -27,6 +27,7 @@ _NEAR = 0.05  # of the length: obstacles that lie closer are the same one, moved
 _AT_ONCE = 1_000_000  # nodes that are looked at together, over all times
 _STRIDE = 16  # of so many nodes one is looked at first
 _LONGER = 1.1  # times as long as it is the cable may be strained
+_SWINGS = 2.0  # in which a cable that was not pressed against what it lies on comes to rest there
 _SIDE = 0.01  # of the depth at which contact is as stiff as it gets: way by which a normal is found
 
 
@@ -73,15 +74,13 @@ def contact_forces(problem: Problem, grid: Grid, windows: Windows, marched: bool
 
 
 def with_contact_errors(
-    found: tuple[ContactForce, ...], windows: Windows, beside: Sequence[tuple[Problem, Grid, Windows]]
+    found: tuple[ContactForce, ...], problem: Problem, windows: Windows, beside: Sequence[tuple[Problem, Grid, Windows]]
 ) -> tuple[ContactForce, ...]:
     """Return contact forces with their errors, from those of the same motion marched on other grids.
 
-    A cable that lies on an obstacle as the motion begins has not been pressed against it yet, on any grid: there the
-    error is the distance to the next force at least.
-
     Args:
         found: of the `windows`.
+        problem: as it was marched.
         windows: between events.
         beside: problem, grid and windows of each other march.
     """
@@ -93,13 +92,26 @@ def with_contact_errors(
                 of.times, parts_of([len(at) for at in _kept([len(w.times) for w in windows])]), getattr(of, kind)
             )
 
-        found = errors(series(own, windows), [series(*other) for other in others if other[0].name == own.name])
-        if found is not None:
-            first, second = getattr(own, kind)[:2]
-            found[0] = max(found[0], np.linalg.norm(second - first))
-        return found
+        known = errors(series(own, windows), [series(*other) for other in others if other[0].name == own.name])
+        return None if known is None else _until_it_rests(problem, own.times, getattr(own, kind), known)
 
     return tuple(replace(own, force_error=error(own, "force"), friction_error=error(own, "friction")) for own in found)
+
+
+def _until_it_rests(problem: Problem, times: Floats, values: Floats, known: Floats) -> Floats:
+    """Return the errors (k,) of forces (k, 3) at `times` [s] from those `known` of grids, until the cable rests on it.
+
+    A cable that lies on an obstacle as the motion begins has not been pressed against it yet, on any grid. It swings on
+    it, as on a spring, until the force is what it should have been from the beginning. Until then a force is off by
+    its distance to those that come, and to the last of them with what that one is off.
+    """
+    if problem.contact is None:
+        return known
+    swing = 2.0 * np.pi * np.sqrt(problem.contact.linear_density / problem.contact.stiffness)
+    last = min(max(1, int(np.searchsorted(times, times[0] + _SWINGS * swing))), len(times) - 1)
+    apart = np.linalg.norm(values[:last, None] - values[: last + 1], axis=2)
+    swung = np.maximum(np.triu(apart).max(axis=1), apart[:, -1] + known[last])
+    return np.concatenate([np.maximum(known[:last], swung), known[last:]])
 
 
 def contacts_taken_on(

@@ -148,14 +148,18 @@ def test_the_error_of_a_force_holds_against_a_much_finer_march() -> None:
     assert own.force_error.mean() < 0.1 * WEIGHT
 
 
-def test_a_cable_that_begins_on_a_box_is_borne_by_it_from_the_beginning_within_the_error() -> None:
-    """It gave nothing at t = 0, where it had not been pressed yet, with an error of a fifth of the weight."""
+@pytest.mark.parametrize("horizon", [0.02, 0.3, 0.5, 2.0])
+def test_a_cable_that_begins_on_a_box_is_borne_by_it_from_the_beginning_within_the_error(horizon: float) -> None:
+    """It gives nothing at t = 0, where it has not been pressed yet, and swings on the box for some milliseconds."""
     box = Box(center=(0.5, 0.0, -0.5 * CABLE.diameter - 0.25), size=(4.0, 4.0, 0.5))
-    lifts = Grasp(u=0.0, path=Move(displacement=(0.0, 0.0, 0.2), duration=1.0))
+    lifts = Grasp(u=0.0, path=Move(displacement=(0.0, 0.0, 0.2 * min(1.0, horizon) ** 2), duration=horizon))
     around = Environment(drag=0.05, obstacles=[box])
-    (contact,) = predict(Scene(cable=CABLE, shape=Straight(), grasps=[lifts], environment=around)).contacts
+    scene = Scene(cable=CABLE, shape=Straight(), grasps=[lifts], environment=around, horizon=horizon)
+    (contact,) = predict(scene).contacts
     assert contact.force_error is not None
-    assert abs(contact.force[0, 2] - WEIGHT) < contact.force_error[0]
+    off = np.abs(contact.force[:, 2] - WEIGHT)
+    assert off[0] < contact.force_error[0]
+    assert np.all((off < contact.force_error + 0.02 * WEIGHT)[contact.times < 0.01])  # as little is lifted by then
     assert np.median(contact.force_error) < 0.02 * WEIGHT
 
 
