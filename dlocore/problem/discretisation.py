@@ -41,6 +41,7 @@ _REACH = round(BEND * (_PLACES - 1))  # of them, to either side
 _MOST_CORNERS = 4
 _ROUNDING = 1e-9  # of what is remembered: less has not yielded
 _THREE = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+_LYING = 2.0  # times the depth at which contact bears the weight: one that lies is deeper beside what is lifted of it
 _APART = 0.25 * BEND  # of the length: what is nearer to a sharp bend shares its knot
 
 
@@ -351,7 +352,8 @@ def _planar_memory(problem: Problem, sections: Floats, director: Floats, tangent
 def consistent_start(problem: Problem, grid: Grid, *, touches: bool = True) -> Floats:
     """Return start control points (n_u, nc) that pass exactly through the held points of the curve, strained as it is.
 
-    What the knots leave inside the table or an obstacle is pushed out, unless it `touches` neither. The angle of the
+    What the knots leave deeper inside the table or an obstacle than a cable lies there (_LYING) is pushed out, unless
+    it `touches` neither: one that goes on from another motion is pressed against them already. The angle of the
     sections plays no part.
     """
     line = problem.line
@@ -362,6 +364,10 @@ def consistent_start(problem: Problem, grid: Grid, *, touches: bool = True) -> F
     close_grasps(problem, grid, grasps, starts, None)
     held = hold(line, grid, grasps, np.zeros(1), starts, start)
     active, parameters = line.law_table()
+    if line.contact is not None:
+        deep = _LYING * line.contact.depth_under(float(np.linalg.norm(line.weight())))
+        parameters[laws.TABLE, 0] -= deep
+        parameters[laws.CONTACT, 0] -= deep  # the radius with which it touches obstacles
     kept = [laws.STRETCH, *([laws.CONTACT, laws.TABLE] if touches else [])]
     active[[row for row in range(laws.COUNT) if row not in kept]] = 0
     history.axial[:, 0] = _start_strain(problem, grid)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from dlocore import (
+    Box,
     Cable,
     ControlPoints,
     Environment,
@@ -24,6 +25,7 @@ from dlocore import (
     Scene,
     SceneError,
     Straight,
+    Table,
     energies,
     predict,
 )
@@ -117,6 +119,24 @@ def test_a_motion_of_the_reference_goes_on_stretched() -> None:
     first = predict(replace(SOFT, horizon=1.0, quality=Quality(method="reference", target_error=TARGET)))
     whole = predict(SOFT)
     assert apart(whole, 1.0, rest(whole, 1.0, first.shape_at())) < 0.3 * TARGET
+
+
+TABLE = Environment(drag=0.05, table=Table())
+ON_BOX = Environment(drag=0.05, obstacles=[Box(center=(0.5, 0.0, -0.0025 - 0.25), size=(4.0, 4.0, 0.5))])
+
+
+@pytest.mark.parametrize("environment", [TABLE, ON_BOX])
+def test_a_cable_that_lies_goes_on_pressed_against_what_bears_it(environment: Environment) -> None:
+    """It was pushed out by as much as its weight presses it in, gave nothing at the join, and fell."""
+    wire = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-3)
+    lifts = Grasp(u=0.0, path=Move(displacement=(0.0, 0.0, 0.1), duration=1.0))
+    whole = predict(Scene(cable=wire, shape=Straight(), grasps=[lifts], environment=environment, horizon=1.5))
+    (before,), (after,) = whole.contacts, rest(whole, 1.2).contacts
+    off = np.abs(after.force[:, 2] - np.interp(1.2 + after.times, before.times, before.force[:, 2]))
+    assert after.force_error is not None
+    assert np.all(off < after.force_error)
+    assert off.max() < 0.25 * before.force[-1, 2]
+    assert after.force_error[0] < 0.6 * before.force[-1, 2]
 
 
 @pytest.mark.parametrize("t", [0.8, 0.95])
