@@ -1,6 +1,5 @@
 """Bring a held cable to rest: relaxations held back by springs, ever weaker ones."""
 
-from collections.abc import Callable
 from itertools import pairwise
 from typing import Literal, NamedTuple, cast
 
@@ -48,8 +47,8 @@ _ROUGH = 1e-5  # of the length: the tolerance of the first of those, which other
 _YIELDING = 0.8  # of the depth, at most, is left by a stiffer contact where it is one of stiffness
 _FAR = 0.1  # of the length: no farther a grasp moves in one of those steps
 _TURNED = 0.5  # [rad]: nor turns
-_CHANGED = 0.25  # of all that a load changes by: by no more it does
 _PLACES = 384  # on its path, at least, at which that is looked for
+_CHANGED = 0.25  # of all that a load changes by: a push in between that is no stronger is left out
 _SHORTEST = 1e-9  # of the time: no shorter are the steps that bring the grasps to their poses
 
 
@@ -64,7 +63,7 @@ class Settled(NamedTuple):
         history: what lies behind them.
         at: the grasps are at their poses of this time [s].
         starts: where the paths of the grasps begin.
-        deepest: how deep the control points lay in the table or an obstacle on their way, at most [m].
+        deepest: how deep the control points lay in the table or an obstacle as they were carried there, at most [m].
     """
 
     problem: Problem
@@ -74,7 +73,7 @@ class Settled(NamedTuple):
     history: History
     at: float
     starts: Starts
-    deepest: float
+    deepest: float = 0.0
 
 
 def settle(
@@ -102,8 +101,7 @@ def settle(
     held = hold(problem, grid, grasps, np.full(2, at), starts, q if at > 0.0 else grid.start)
     applied = applied_at_rest(problem, grid, at)
     rest = _relaxed(problem, grid, q, history, held, applied, ROUNDS, 1.0 if begin is None else _NEARBY, monitor)
-    history = history._replace(tension=grid.history.tension)
-    return Settled(problem, q, rest, held, history, at, starts, depth(problem, grid, q))
+    return Settled(problem, q, rest, held, history._replace(tension=grid.history.tension), at, starts)
 
 
 def settle_along(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> Settled:
@@ -327,11 +325,19 @@ def _steps(grasp: Grasp, at: float, length: float) -> list[float]:
         apart = np.linalg.norm(turned[k : last + 1] - turned[k], axis=(1, 2))
         return np.asarray(goes | (apart > 8.0**0.5 * np.sin(0.5 * _TURNED)))
 
-    return [grasp.start + x for x in _divided(even, t, far)]
+    found = even.tolist()
+    for k, last in pairwise(np.searchsorted(t, even).tolist()):
+        while (beyond := far(k, last)).any():
+            k += max(1, int(np.argmax(beyond)) - 1)
+            found.append(float(t[k]))
+    return [grasp.start + x for x in found]
 
 
 def _load_steps(load: Load, at: float) -> list[float]:
-    """Return times [s] at which a load has changed, until `at`: even ones, and more where one is by _CHANGED of all."""
+    """Return even times [s] until `at` while a load changes, and when in between it is farthest from what it was.
+
+    The latter only where that is _CHANGED of all that it changes by, or more.
+    """
     times = cast(Floats, load.times)
     begin, end = max(0.0, times[0]), min(at, times[-1])
     if end < begin:
@@ -340,19 +346,11 @@ def _load_steps(load: Load, at: float) -> list[float]:
     t = np.union1d(even, times[(begin < times) & (times < end)])
     force = load.at(t)
     change = _CHANGED * np.linalg.norm(force - force[0], axis=1).max()
-    return _divided(even, t, lambda k, last: np.linalg.norm(force[k : last + 1] - force[k], axis=1) > change)
-
-
-def _divided(even: Floats, t: Floats, far: Callable[[int, int], Bools]) -> list[float]:
-    """Return `even` times, which are among t (k,), and others of these between which nothing goes too `far`, if it can.
-
-    `far(k, last)` tells of each of the times t[k] to t[last] whether it is that from the first.
-    """
     found = even.tolist()
     for k, last in pairwise(np.searchsorted(t, even).tolist()):
-        while (beyond := far(k, last)).any():
-            k += max(1, int(np.argmax(beyond)) - 1)
-            found.append(float(t[k]))
+        changed = np.linalg.norm(force[k : last + 1] - force[k], axis=1)
+        if changed.max() > change:
+            found.append(float(t[k + int(np.argmax(changed))]))
     return found
 
 
