@@ -352,9 +352,9 @@ def _planar_memory(problem: Problem, sections: Floats, director: Floats, tangent
 def consistent_start(problem: Problem, grid: Grid, *, touches: bool = True) -> Floats:
     """Return start control points (n_u, nc) that pass exactly through the held points of the curve, strained as it is.
 
-    What the knots leave deeper inside the table or an obstacle than a cable lies there (_LYING) is pushed out, unless
-    it `touches` neither: one that goes on from another motion is pressed against them already. The angle of the
-    sections plays no part.
+    What the knots leave inside the table or an obstacle is pushed out, unless it `touches` neither; of one that goes
+    on from another motion, strained as it was, only what is deeper than a cable lies there (_LYING): it is pressed
+    against them already. The angle of the sections plays no part.
     """
     line = problem.line
     history = _no_history(line, grid.tables)
@@ -364,7 +364,7 @@ def consistent_start(problem: Problem, grid: Grid, *, touches: bool = True) -> F
     close_grasps(problem, grid, grasps, starts, None)
     held = hold(line, grid, grasps, np.zeros(1), starts, start)
     active, parameters = line.law_table()
-    if line.contact is not None:
+    if line.contact is not None and problem.start.strain is not None:
         deep = _LYING * line.contact.depth_under(float(np.linalg.norm(line.weight())))
         parameters[laws.TABLE, 0] -= deep
         parameters[laws.CONTACT, 0] -= deep  # the radius with which it touches obstacles
