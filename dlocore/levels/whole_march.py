@@ -21,13 +21,12 @@ from dlocore.levels.progress import record_level
 from dlocore.levels.review import FAR_MORE, called_for, called_for_by_fine
 from dlocore.problem.discretisation import smallest_n_u
 from dlocore.problem.problem import Problem, pose
-from dlocore.problem.strained import STRAINED, TORN
+from dlocore.problem.strained import FOLDED, STRAINED, TORN
 from dlocore.problem.time_grid import smallest_n_t
 from dlocore.solvers.march import RHO
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.stability.sideways import may_leave_plane
 
-FOLDED = 0.4  # of |r'| between the points that watch over the length: less is a fold that no energy sees
 _LOOKS = (1, 2, 3)  # grids on which a motion is looked at for whether it leaves its plane
 
 

@@ -4,6 +4,7 @@ from dlocore.scene.cable import Cable
 
 TORN = 0.2  # axial strain: no cable of this kind follows
 STRAINED = 0.05  # axial strain: few cables bear more
+FOLDED = 0.4  # of |r'| within a span: less is a fold that no energy sees
 RUBBER = 0.01  # axial strain: few cables bear more without harm, of one whose axial stiffness is assumed
 
 

@@ -23,7 +23,7 @@ from dlocore.problem.grid import Grid
 from dlocore.problem.held_ends import held_back
 from dlocore.problem.notes import cable_notes
 from dlocore.problem.problem import Problem, pose
-from dlocore.problem.strained import TORN, strain_notes
+from dlocore.problem.strained import FOLDED, TORN, strain_notes
 from dlocore.scene.scene import Scene
 from dlocore.solvers.monitor import Monitor, time_allowed
 from dlocore.spline import design_matrix, in_range
@@ -47,7 +47,6 @@ _FAR = 0.05  # of the length: a start that settles no farther away has hardly pa
 _TELLING = 13  # control points, of a start that is settled twice to see whether it tells to which side it goes
 _IN_SPANS = np.array([0.0, 0.25, 0.5, 0.75])  # parts of each span of both grids at which they are compared
 _LEFT = 1.5  # times its distance to the force on the grid before is the error of a force, as in motions
-_FOLDED = 0.4  # of |r'| at the points of the curvature: less is a fold within a span
 _FINER = (1.5, 2.0)  # times the control points, with which a start that finds no rest may
 
 
@@ -277,7 +276,7 @@ def _held(grid: Grid, settled: Settled) -> tuple[Floats, Floats]:
 def _is_folded(grid: Grid, settled: Settled) -> bool:
     """Tell whether a cable came to rest folded within a span, which no energy sees."""
     points = grid.tables.curvature
-    return not slopes(settled.q[None], 1, points.first, points.b1)[0] >= _FOLDED
+    return not slopes(settled.q[None], 1, points.first, points.b1)[0] >= FOLDED
 
 
 def _apart(coarse: Grid, before: Settled, grid: Grid, settled: Settled) -> float:

@@ -24,9 +24,10 @@ from dlocore import (
 )
 from dlocore.levels.given import MISSED, evenly_fitted, given_status
 from dlocore.levels.level import Size, given_steps
-from dlocore.levels.whole_march import FOLDED, is_folded, march_level
+from dlocore.levels.whole_march import is_folded, march_level
 from dlocore.problem.discretisation import make_grid
 from dlocore.problem.problem import pose
+from dlocore.problem.strained import FOLDED
 from dlocore.problem.time_grid import time_knots
 from dlocore.solvers.monitor import Monitor
 from dlocore.solvers.watched import watched
