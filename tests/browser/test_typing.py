@@ -1,7 +1,6 @@
 """What is typed into the panel of the 3D scene, key by key."""
 
 import json
-import re
 
 import pytest
 from playwright.sync_api import Page, expect
@@ -51,7 +50,7 @@ def test_a_power_of_ten_is_typed_and_what_is_out_of_range_is_told(service, witne
     stiffness = typed(page, "EI [10⁻³ N m²]", 0, "1e-1")
     solved_target(page)
     expect(stiffness).to_have_value("1e-1")
-    typed(page, "EI [10⁻³ N m²]", 0, "1e20")
+    stiffness.fill("1e20")  # pasted: key by key, 1 and 1e2 are numbers, too, which are taken where the keys come slowly
     expect(page.get_by_text("Got 1e20, allowed: a number from 1e-6 to 1e9.")).to_be_visible()
-    expect(stiffness).to_have_value(re.compile("^(0.1|100)$"))  # 1e2 is a number, too, where the keys come slowly
+    expect(stiffness).to_have_value("0.1")
     assert witness.errors == []
