@@ -1,1 +1,1 @@
-"""The effects, one small file each: a frozen dataclass with the parameters and the compiled pointwise law beside it."""
+"""The effects, one small file each: a frozen dataclass with the parameters, and the compiled pointwise law."""

@@ -1,25 +1,29 @@
-"""The one contract that all effects meet.
+"""The contract that every effect meets.
 
-An effect is a frozen dataclass of parameters with a `site`, the place where its compiled law acts:
+An effect is a frozen dataclass of parameters. Its `site` says where its compiled law acts:
 
 ========== ============================== ============================================================================
-site       the law is given               the law gives
+site       arguments of the law           results of the law
 ========== ============================== ============================================================================
 field      -                              constant coefficients of linear terms: density, drag, weight per unit length
 axial      strain e, its rate, its memory tension N, modulus dN/de, viscosity dN/d(rate)
 curvature  kappa, its rate, its memory    moment M, stiffness dM/dkappa, viscosity dM/d(rate)
 twist      tau, its rate, its memory      torque T, stiffness dT/dtau, viscosity dT/d(rate)
 body       position, velocity             force per unit length, minus its derivatives by position and by velocity
-contact    position, velocity, the last   as body, at points as close as the obstacles are small
+contact    position, velocity, anchor     the same as body, at nodes spaced by the size of the obstacles
 ========== ============================== ============================================================================
 
-Curvature is a vector: in the plane its signed value and two zeros, in space three world components across the tangent,
-with a twist coordinate the two components in the frame of the sections and a zero; a law is written once for all.
-Vectors and symmetric tangents are tuples of scalars, which compilers keep in registers.
-Laws at strain sites know nothing of splines or of geometry: `kernels/strain.py` turns stress into generalised forces.
-Memory is the paper's eps_0, the curvature of the stress-free shape at the point: state that
-belongs to the solve, not to the law. Effects at one site superpose.
-`effects/laws.py` is the one list of them: adding an effect is adding a file and its line there.
+Curvature is always a vector, so that a law is written once for all cases: in the plane it has the signed value and two
+zeros; in space, three world components perpendicular to the tangent; with a twist coordinate, the two components in the
+frame of the sections and a zero. Vectors and symmetric tangents are tuples of scalars, which compilers keep in
+registers.
+
+Laws at strain sites know nothing of splines or geometry: `kernels/strain.py` turns stress into generalised forces.
+
+Memory is the paper's eps_0, the strain of the stress-free shape at the point. It is state that belongs to the solve,
+not to the law. Effects at the same site superpose.
+
+`effects/laws.py` is the one list of the compiled laws: to add an effect, add a file here and its line there.
 """
 
 from dataclasses import dataclass
@@ -32,11 +36,11 @@ Symmetric = tuple[float, float, float, float, float, float]  # xx, yy, zz, xy, x
 
 @dataclass(frozen=True)
 class Effect:
-    """Base of the effects: a name, a site, and up to four parameters for the compiled law."""
+    """Base class of the effects: a name, a site, and the parameters of the compiled law."""
 
     name: ClassVar[str]
     site: ClassVar[Site]
 
     def parameters(self) -> tuple[float, ...]:
-        """Return the numbers that the compiled law reads, in its order."""
+        """Return the numbers that the compiled law reads, in the order in which it reads them."""
         return ()

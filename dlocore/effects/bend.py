@@ -1,6 +1,7 @@
-"""Bending: energy density EI/2 |kappa - kappa_0|^2 [J/m] of the curvature kappa = dt/du (paper eq. 8).
+"""Bending: energy density EI/2 |kappa - kappa_0|^2 [J/m] (docs/model.md eq. 7, paper eq. 8).
 
-kappa_0 is the paper's strain memory eps_0 at the point: the curvature of the stress-free shape.
+kappa = dt/du is the curvature of the centreline per rest length [1/m] (docs/model.md eq. 4 and 5). kappa_0 is the
+curvature of the stress-free shape, the paper's strain memory eps_0. The moment is M = EI (kappa - kappa_0) [N m].
 """
 
 from dataclasses import dataclass

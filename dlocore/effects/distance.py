@@ -1,13 +1,15 @@
-"""Signed distance from the true surface of an obstacle, with its gradient and Hessian.
+"""Signed distance d [m] from the exact surface of an obstacle, with its gradient n and Hessian H [1/m].
 
-The nearest point of a sphere, a capsule, a cylinder or a box is known in closed form in the frame of the body. Where it
-lies on a face, an edge or a corner, x - nearest = q has components only in the coordinates that the nearest point does
-not follow; with D = 1 in those and 0 in the others,
+The depth in docs/model.md eq. 21 is the radius of the cable minus this distance of its centreline.
+
+The nearest point of a sphere, capsule, cylinder or box is known in closed form in the frame of the body. Where it lies
+on a face, an edge or a corner, q = x - nearest has components only in the coordinates that the nearest point does not
+follow. With D = 1 in those coordinates and 0 in the others,
 
     d = |q| - radius,   n = q / |q|,   H = (D - n n') / |q|.
 
-The layout of a row is here, beside the compiled code that reads it: numba freezes these numbers into its cache, which
-follows the source of this file but not that of `dlocore/scene/obstacles.py`.
+The layout of a row is defined here, beside the compiled code that reads it: numba freezes these numbers into its cached
+code, and the cache follows the source of this file but not that of `dlocore/scene/obstacles.py`.
 """
 
 from typing import Any
@@ -20,7 +22,7 @@ from dlocore.effects.kinds import CAPSULE, CYLINDER, SPHERE
 
 ROW = 17  # numbers in a row: kind, centre 3, axes of the body's frame 9, half sizes 3, friction
 
-_NEAR = 1e-12  # [m] from a centre, an axis or an edge: the direction from there is rounding
+_NEAR = 1e-12  # [m]: nearer than this to a centre, an axis or an edge, the direction from it is only rounding
 _FLAT = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -39,7 +41,7 @@ def _from_nearest(q: Vector, free: Vector, radius: float) -> tuple[float, Vector
 
 @law
 def _capsule(p: Vector, radius: float, half: float) -> tuple[float, Vector, Symmetric]:
-    """Return distance, gradient and Hessian at p, in the frame of the body."""
+    """Return the distance, its gradient and its Hessian at p, in the frame of the body."""
     x, y, z = p
     if z > half:
         return _from_nearest((x, y, z - half), (1.0, 1.0, 1.0), radius)
@@ -50,7 +52,7 @@ def _capsule(p: Vector, radius: float, half: float) -> tuple[float, Vector, Symm
 
 @law
 def _cylinder(p: Vector, radius: float, half: float) -> tuple[float, Vector, Symmetric]:
-    """Return distance, gradient and Hessian at p, in the frame of the body."""
+    """Return the distance, its gradient and its Hessian at p, in the frame of the body."""
     x, y, z = p
     rho = np.sqrt(x * x + y * y)
     side = 1.0 if z >= 0.0 else -1.0
@@ -59,10 +61,10 @@ def _cylinder(p: Vector, radius: float, half: float) -> tuple[float, Vector, Sym
     if rho >= _NEAR:
         bend = 1.0 / rho
         c, s = bend * x, bend * y
-    if out > _NEAR and up > _NEAR:  # the edge, a circle
+    if out > _NEAR and up > _NEAR:  # the edge, which is a circle
         length = np.sqrt(out * out + up * up)
         a, b = out / length, side * up / length
-        # in the half plane of rho and z the curvature is 1/d across n; along the circle it is n_rho/rho
+        # in the half plane of rho and z the curvature across n is 1/d; along the circle it is n_rho/rho
         across, around = b * b / length, a * bend
         diagonal = (across * c * c + around * s * s, across * s * s + around * c * c, a * a / length)
         slope = -a * b / length
@@ -74,7 +76,7 @@ def _cylinder(p: Vector, radius: float, half: float) -> tuple[float, Vector, Sym
 
 @law
 def _box(p: Vector, half: Vector) -> tuple[float, Vector, Symmetric]:
-    """Return distance, gradient and Hessian at p, in the frame of the body."""
+    """Return the distance, its gradient and its Hessian at p, in the frame of the body."""
     i = 1.0 if p[0] >= 0.0 else -1.0
     j = 1.0 if p[1] >= 0.0 else -1.0
     k = 1.0 if p[2] >= 0.0 else -1.0
@@ -109,9 +111,9 @@ def _dot(a: Vector, b: Vector) -> float:
 def signed_distance(rows: Any, k: int, x: Vector) -> tuple[float, Vector, Symmetric]:
     """Return the distance [m] of x from the surface of obstacle k, its gradient and its Hessian [1/m].
 
-    `rows` (m, ROW). The distance is negative inside; the gradient is the unit normal outwards. Inside a cylinder or a
-    box the nearest face counts. Where several points of the surface are nearest, as at the centre of a sphere, the
-    gradient points to one of them; where they are a whole circle or sphere, the Hessian is zero.
+    `rows` is (m, ROW). The distance is negative inside; the gradient is the outward unit normal. Inside a cylinder or a
+    box, the nearest face counts. Where several points of the surface are equally near, as at the centre of a sphere,
+    the gradient points to one of them; where these are a whole circle or sphere, the Hessian is zero.
     """
     kind = rows[k, 0]
     q = (x[0] - rows[k, 1], x[1] - rows[k, 2], x[2] - rows[k, 3])
@@ -138,7 +140,10 @@ def signed_distance(rows: Any, k: int, x: Vector) -> tuple[float, Vector, Symmet
 
 @law
 def to_edge(rows: Any, k: int, x: Vector) -> float:
-    """Return how far [m] what obstacle k has nearest to x is from an edge of it; below zero where that is an edge."""
+    """Return the distance [m] from an edge of obstacle k of its surface point nearest to x.
+
+    It is negative where that point is on an edge, and infinite for spheres and capsules, which have none.
+    """
     if rows[k, 0] == SPHERE or rows[k, 0] == CAPSULE:
         return np.inf
     q = (x[0] - rows[k, 1], x[1] - rows[k, 2], x[2] - rows[k, 3])

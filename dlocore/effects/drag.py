@@ -1,4 +1,7 @@
-"""Drag of the surrounding air: force per unit length -c v - c2 |v| v [N/m] (docs/model.md eq. 8)."""
+"""Drag of the surrounding air: force per unit length f = -c v - c2 |v| v [N/m] (docs/model.md eq. 8).
+
+v is the velocity of the centreline [m/s]; c [N s/m^2] and c2 [N s^2/m^3] are the same along and across the cable.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -11,20 +14,20 @@ from dlocore.effects.base import Effect, Site, Symmetric, Vector
 
 @dataclass(frozen=True)
 class LinearDrag(Effect):
-    """Linear drag c [N s/m^2]: the matrix N of the paper's eq. (13)."""
+    """Linear drag -c v with the coefficient c [N s/m^2]: the matrix N of the paper's eq. (13)."""
 
     name: ClassVar[str] = "drag"
     site: ClassVar[Site] = "field"
     drag: float
 
     def coefficient(self) -> float:
-        """Return the coefficient of the drag matrix [N s/m^2]."""
+        """Return c, the coefficient of the drag matrix [N s/m^2]."""
         return self.drag
 
 
 @dataclass(frozen=True)
 class QuadraticDrag(Effect):
-    """Quadratic drag c2 [N s^2/m^3]."""
+    """Quadratic drag -c2 |v| v with the coefficient c2 [N s^2/m^3]."""
 
     name: ClassVar[str] = "drag"
     site: ClassVar[Site] = "body"

@@ -1,12 +1,16 @@
-"""Coulomb friction that sticks: force per length against a small elastic slip s (docs/model.md eq. 22).
+"""Coulomb friction with sticking: force per unit length f [N/m] against a small elastic slip s (docs/model.md eq. 22).
 
-    f = -mu N s/max(|s|, s_0),
+    f = -mu N s/max(|s|, s_0)
 
-with s the displacement along the surface from an anchor. Where |s| passes s_0 the anchor is dragged behind, so that a
-cable at rest stays at rest under any force below mu N, and moves by less than s_0 while it sticks. Coulomb's law is
-the limit of a small s_0, which goes with the square of the step: so its refinement is part of that of the steps. N is
-the whole normal force (eq. 21); that it changes is left out of the tangent, which stays symmetric. Where there is no
-step (space-time least squares) the law is -mu N v/sqrt(v^2 + v_0^2).
+s [m] is the displacement along the surface from an anchor, mu the coefficient of friction and N the normal force per
+unit length [N/m], all of it (eq. 21). When |s| exceeds s_0, the anchor is dragged along. So a cable at rest stays at
+rest under any force below mu N, and moves by less than s_0 while it sticks.
+
+Coulomb's law is the limit of a small s_0. As s_0 is proportional to the square of the time step, refining the steps
+refines it too. The tangent leaves out that N changes, and so stays symmetric.
+
+The space-time least squares has no steps; there the law is f = -mu N v/sqrt(v^2 + v_0^2), with the velocity v along the
+surface [m/s].
 """
 
 import math
@@ -21,15 +25,15 @@ from dlocore.effects.base import Effect, Site, Symmetric, Vector
 
 Floats = NDArray[np.float64]
 
-STICK = 0.02  # of the diameter: s_0 of steps of COARSE and longer ones
-COARSE = 0.05  # [s] for a cable of 1 m; with the root of the length, as the period of one that swings
-LEAST_STICK = 1e-7  # of the length: ten times what Newton's method leaves of a step
+STICK = 0.02  # in diameters: s_0 where the step is COARSE or longer
+COARSE = 0.05  # [s] for a cable of 1 m; proportional to the root of the length, as is the period of a swinging cable
+LEAST_STICK = 1e-7  # in lengths of the cable: ten times the error that Newton's method leaves in a step
 SLIP_SPEED = 0.005  # [m/s]: v_0
 
 
 @dataclass(frozen=True)
 class Friction(Effect):
-    """The slip s_0 [m], and the friction per length mu N [N/m] of a cable lying in the plane of the motion, or 0."""
+    """Slip s_0 [m], and friction per unit length mu N [N/m] of a cable that lies in the plane of the motion, else 0."""
 
     name: ClassVar[str] = "friction"
     site: ClassVar[Site] = "contact"
@@ -42,7 +46,7 @@ class Friction(Effect):
 
 
 def slip_of(diameter: float, length: float, step: float) -> float:
-    """Return the slip s_0 [m] of steps of `step` [s], for a cable of a diameter and a length [m]."""
+    """Return the slip s_0 [m] for a cable of this diameter and length [m] in time steps of `step` [s]."""
     most = STICK * diameter
     return min(most, max(LEAST_STICK * length, most * (step / (COARSE * math.sqrt(length))) ** 2))
 
@@ -51,15 +55,17 @@ def slip_of(diameter: float, length: float, step: float) -> float:
 def friction(
     limit: float, n: Vector, slip: Vector, v: Vector, stick: float, slow: float, steps: bool
 ) -> tuple[Vector, Symmetric, Symmetric]:
-    """Return the force per length and minus its derivatives by position and by velocity, both positive semidefinite.
+    """Return the force per unit length [N/m] and minus its derivatives by position and by velocity.
+
+    Both of these are positive semidefinite.
 
     Args:
         limit: mu N [N/m].
-        n: unit normal of the surface; zero where slip and velocity have no part along it.
+        n: unit normal of the surface; zero where slip and velocity have no component along it.
         slip: displacement from the anchor [m].
         v: velocity [m/s].
         stick, slow: s_0 [m] and v_0 [m/s].
-        steps: whether the displacement counts, or the velocity.
+        steps: True to use the displacement, False to use the velocity.
     """
     if steps:
         x, floor = slip, stick
@@ -88,7 +94,7 @@ def friction(
 def friction_forces(
     limit: Floats, n: Floats, slip: Floats, v: Floats, stick: float, slow: float, steps: bool
 ) -> Floats:
-    """Return the force that `friction` does (k, 3) [N/m], of nodes with limits (k,), and n, slip and v (k, 3)."""
+    """Return the forces (k, 3) [N/m], as `friction` gives them, of nodes with limits (k,) and n, slip and v (k, 3)."""
     x = slip if steps else v
     x = x - np.einsum("kd,kd->k", x, n)[:, None] * n
     size = np.linalg.norm(x, axis=1)

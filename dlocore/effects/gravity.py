@@ -1,4 +1,8 @@
-"""Weight: force per unit length mu g [N/m]."""
+"""Weight: force per unit length mu g [N/m], part of the applied forces F of docs/model.md eq. 10.
+
+mu is the linear density [kg/m], to which point masses add (docs/model.md eq. 9a), and g the acceleration of gravity
+[m/s^2].
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -19,5 +23,5 @@ class Gravity(Effect):
     gravity: NDArray[np.float64]
 
     def weight(self) -> NDArray[np.float64]:
-        """Return the force per unit length (3,) [N/m]."""
+        """Return the weight per unit length mu g (3,) [N/m]."""
         return self.linear_density * self.gravity

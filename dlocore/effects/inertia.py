@@ -1,4 +1,8 @@
-"""Inertia of the moving cable: kinetic energy density mu/2 |r_t|^2 [J/m] (paper eq. 5-7)."""
+"""Inertia of the moving cable: kinetic energy density mu/2 |r_t|^2 [J/m] (paper eq. 5-7).
+
+mu is the linear density [kg/m] and r_t the velocity of the centreline [m/s]. The force per unit length is mu r_tt
+[N/m], the term M q_tt of docs/model.md eq. 10. Point masses add to mu (docs/model.md eq. 9a).
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -8,12 +12,12 @@ from dlocore.effects.base import Effect, Site
 
 @dataclass(frozen=True)
 class Inertia(Effect):
-    """Linear density mu [kg/m]. The rotary inertia of a thin cable is negligible (docs/model.md)."""
+    """Linear density mu [kg/m]; rotary inertia against bending is left out (docs/model.md, Forces)."""
 
     name: ClassVar[str] = "inertia"
     site: ClassVar[Site] = "field"
     linear_density: float
 
     def density(self) -> float:
-        """Return the coefficient of the mass matrix [kg/m]."""
+        """Return mu, the coefficient of the mass matrix [kg/m]."""
         return self.linear_density

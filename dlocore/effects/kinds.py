@@ -1,7 +1,7 @@
-"""Kinds of obstacles: the first number of the row that `distance.py` reads.
+"""Kinds of obstacles: the first number of each row that `distance.py` reads.
 
-They stand apart from the compiled code, so that scenes can be made without the compiler, and in this folder, as numba
-freezes them into its cache, which follows the sources here.
+They are apart from the compiled code, so that scenes can be made without loading the compiler. They are in this folder
+because numba freezes them into its cached code, and the cache follows the sources in this folder.
 """
 
 SPHERE, CAPSULE, CYLINDER, BOX = range(4)

@@ -1,7 +1,7 @@
 """The one list of compiled laws: which of them act at each site.
 
-`active[EFFECT]` switches a law, `p[EFFECT]` holds its parameters. A law that is not active costs one untaken branch.
-Rows of `p` from COUNT on are obstacles (`dlocore/scene/obstacles.py`).
+`active[EFFECT]` switches a law on, and `p[EFFECT]` holds its parameters. An inactive law costs one untaken branch. Rows
+of `p` from COUNT on are obstacles (`dlocore/scene/obstacles.py`).
 """
 
 from typing import Any
@@ -20,10 +20,10 @@ from dlocore.effects.twist import torque
     STRETCH, BEND, DAMPING, QUADRATIC_DRAG, TWIST, TWIST_DAMPING, BENDING_MEMORY, TWIST_MEMORY, STRETCH_MEMORY, CONTACT,
     TABLE, FRICTION, SELF_CONTACT, STRETCH_DAMPING,
 ) = range(14)  # fmt: skip
-COUNT = 14  # of compiled laws
-PARAMETERS = ROW  # room for parameters of one law, or for an obstacle
+COUNT = 14  # compiled laws
+PARAMETERS = ROW  # columns for the parameters of one law, or for an obstacle
 
-# what reads the curvature or the frames of earlier steps, and what reads anything that earlier steps left behind
+# laws that read the curvature or the frames of earlier steps, and laws that read any state of earlier steps
 READ_CURVATURE = (DAMPING, TWIST, BENDING_MEMORY)
 READ_HISTORY = (*READ_CURVATURE, STRETCH_MEMORY, STRETCH_DAMPING, FRICTION, CONTACT)
 
@@ -33,7 +33,7 @@ _NO_TANGENT = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 @law
 def keeps_curvature(active: Any) -> bool:
-    """Tell whether a law reads the curvature or the frames of earlier steps."""
+    """Tell whether an active law reads the curvature or the frames of earlier steps."""
     acting = 0
     for row in READ_CURVATURE:
         acting += active[row]
@@ -42,7 +42,7 @@ def keeps_curvature(active: Any) -> bool:
 
 @law
 def keeps_history(active: Any) -> bool:
-    """Tell whether a law reads what earlier steps left behind."""
+    """Tell whether an active law reads any state of earlier steps."""
     acting = 0
     for row in READ_HISTORY:
         acting += active[row]
@@ -51,7 +51,7 @@ def keeps_history(active: Any) -> bool:
 
 @law
 def has_kinks(active: Any) -> bool:
-    """Tell whether the force of a law has kinks: where something yields, touches or slips."""
+    """Tell whether the force of an active law has kinks, as where something yields, touches or slips."""
     return bool(
         active[BENDING_MEMORY] or active[TWIST_MEMORY] or active[STRETCH_MEMORY] or active[CONTACT] or active[FRICTION]
     )
@@ -59,13 +59,13 @@ def has_kinks(active: Any) -> bool:
 
 @law
 def has_jumps(active: Any) -> bool:
-    """Tell whether a law has a force that jumps as a step begins with it: what touches, and what sticks."""
+    """Tell whether the force of an active law may jump at the start of a step, as in contact or friction."""
     return bool(active[CONTACT] or active[FRICTION])
 
 
 @law
 def has_viscosity(active: Any) -> bool:
-    """Tell whether a law depends on velocities, or rates of strain, other than by the drag matrix."""
+    """Tell whether an active law depends on velocities or rates of strain other than through the drag matrix."""
     return bool(
         active[DAMPING]
         or active[QUADRATIC_DRAG]
@@ -88,7 +88,8 @@ def axial_memory(
 ) -> tuple[float, float]:
     """Return the stress-free axial strain after a step h, and its derivative by the strain.
 
-    At a point with `share` times the strain that the tension calls for it yields at as many times the threshold.
+    `share` is the ratio of the strain at this point to the strain that the tension calls for; the threshold is scaled
+    by it.
     """
     if not active[STRETCH_MEMORY] or h == 0.0:
         return memory, 0.0
@@ -112,7 +113,7 @@ def axial_stress(
 
 @law
 def axial_energy(active: Any, p: Any, strain: float, memory: float) -> float:
-    """Return the stored energy density [J/m] of the axial strain."""
+    """Return the stored energy density of the axial strain [J/m]."""
     return 0.5 * p[STRETCH, 0] * (strain - memory) * (strain - memory)
 
 

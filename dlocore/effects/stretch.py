@@ -1,8 +1,11 @@
-"""Stretch: energy density EA/2 e^2 [J/m] of the axial strain e = |r'| - 1 (paper eq. 8, first row), and what damps it.
+"""Stretch: energy density EA/2 e^2 [J/m] of the axial strain e, and its damping (docs/model.md eq. 3, 7 and 7a).
 
-Waves of stretch are a thousand times as fast as those of bending. Undamped they ring on after every jump, and carry the
-cable with them in a way that only steps as short as theirs could follow. The tension eta_e e_t on the rate of the axial
-strain lets them die out (docs/model.md eq. 7a).
+e = |r'| - 1 (paper eq. 8, first row, has the energy). The tension is N = EA (e - e_0) + eta_e e_t [N], where the
+stress-free strain e_0 is zero unless the cable has yielded.
+
+The default of eta_e [N s] is docs/model.md eq. 7a. Waves of stretch are a thousand times as fast as those of bending.
+Without damping they would continue to ring after every jump and carry the cable along, in a way that only time steps as
+short as their period could follow.
 """
 
 from dataclasses import dataclass
@@ -27,7 +30,7 @@ class Stretch(Effect):
 
 @dataclass(frozen=True)
 class StretchDamping(Effect):
-    """Axial damping eta_e [N s] on the rate of the axial strain."""
+    """Axial damping eta_e [N s], on the rate of the axial strain."""
 
     name: ClassVar[str] = "stretch"
     site: ClassVar[Site] = "axial"
@@ -40,5 +43,5 @@ class StretchDamping(Effect):
 
 @law
 def tension(EA: float, strain: float) -> tuple[float, float]:
-    """Return N = EA e and dN/de = EA."""
+    """Return N = EA e and dN/de = EA, where `strain` is the elastic strain."""
     return EA * strain, EA

@@ -1,8 +1,11 @@
-"""Twist: energy density GJ/2 (tau - tau_0)^2 [J/m] of the twist rate tau of the sections (paper eq. 8).
+"""Twist: energy density GJ/2 (tau - tau_0)^2 [J/m] of the twist rate tau [rad/m] of the sections (paper eq. 8).
 
-tau = theta' against a frame without twist (docs/model.md eq. 19). The solve's fourth coordinate is not theta but
-theta times the polar radius of gyration of the section, D/sqrt(8) for a solid round one: a length, whose inertia per
-length is that of the other coordinates.
+tau = theta', where theta is the angle of the sections against a frame without twist; docs/model.md eq. 19 gives tau
+against the frames that the solve uses. tau_0 is the twist rate of the stress-free shape. The torque is T = GJ (tau -
+tau_0) [N m].
+
+The fourth coordinate of the solve is not theta but theta times the polar radius of gyration of the section, D/sqrt(8)
+for a solid round section. That is a length whose inertia per unit length is the same as that of the other coordinates.
 """
 
 from dataclasses import dataclass
@@ -23,7 +26,7 @@ class Twist(Effect):
 
     @property
     def radius(self) -> float:
-        """Polar radius of gyration of the section [m]."""
+        """Polar radius of gyration of the section, D/sqrt(8) [m]."""
         return self.diameter / 8.0**0.5
 
     def parameters(self) -> tuple[float, ...]:
