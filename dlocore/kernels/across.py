@@ -9,10 +9,11 @@ from dlocore.compiling.kernel import brief
 
 @brief
 def stiffness_across(states: Any, tables: Any, bending: float, axial: float) -> Any:
-    """Return the stiffness of planar states (k, n, 2) against a displacement w out of the plane: lower bands (k, n, 4).
+    """Return the stiffness of planar states (k, n, 2) against an out-of-plane displacement w, as lower bands (k, n, 4).
 
-    Of its energy, with a = r', c = r'' and T the tension, the integral over two of
-    EI [(|a|^2 w''^2 + |c|^2 w'^2 - 2 a.c w' w'')/|a|^4 - 2 |a x c|^2 w'^2/|a|^6] + T w'^2/|a|.
+    With a = r', c = r'' and the tension T, it is the stiffness of half the integral of
+
+        EI [(|a|^2 w''^2 + |c|^2 w'^2 - 2 a.c w' w'')/|a|^4 - 2 |a x c|^2 w'^2/|a|^6] + T w'^2/|a|.
 
     Args:
         states: (k, n, 2) [m].

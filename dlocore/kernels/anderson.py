@@ -1,4 +1,4 @@
-"""A step of the space-time least squares from its factors, and what the last steps teach (Anderson acceleration)."""
+"""A step of the space-time least squares from its factors, combined with the last steps (Anderson acceleration)."""
 
 from typing import Any, NamedTuple
 
@@ -8,11 +8,11 @@ from dlocore.compiling.kernel import kernel
 from dlocore.kernels.banded import expand_vector
 from dlocore.kernels.blocks import dot, solve_blocks
 
-_PARALLEL = 1e-8  # of a difference of steps: what is left of it beside the others that teaches nothing
+_PARALLEL = 1e-8  # a difference of steps is dropped where less than this share of it is independent of the others
 
 
 class Steps(NamedTuple):
-    """The last iterates and their steps, the newest first (depth + 1, n), and room for their differences (depth, n)."""
+    """The last iterates and their steps, newest first (depth + 1, n), and workspace for differences (depth, n)."""
 
     iterates: Any
     steps: Any
@@ -22,23 +22,23 @@ class Steps(NamedTuple):
 
 @kernel
 def room(depth: int, n: int) -> Any:
-    """Return room for iterates of n numbers, of which so many differences are combined."""
+    """Allocate `Steps` for iterates of n numbers, with up to `depth` differences to combine."""
     return Steps(np.empty((depth + 1, n)), np.empty((depth + 1, n)), np.empty((depth, n)), np.empty((depth, n)))
 
 
 @kernel
 def advance(e: Any, factors: Any, right: Any, control: Any, last: Any, known: int, limit: float, delta: float) -> Any:
-    """Take the step -A^-1 right from the iterate `control` (n_t, n, nc), and note both in `last`.
+    """Take the step -A^-1 right from the iterate `control` (n_t, n, nc), and store both in `last`.
 
-    A step of which a component is above `limit` is shortened; those before are combined with it (Walker and Ni, 2011).
-    One whose norm is below `delta` is the last, and is taken as it is.
+    A step with a component above `limit` is shortened. The step is combined with those before it (Walker and Ni, 2011).
+    A step whose norm is below `delta` is the last one, and is taken as it is.
 
     Args:
         factors: of A, see `blocks.py`.
-        last: `Steps`, of which `known` are known.
+        last: `Steps`, of which the newest `known` are set.
 
     Returns:
-        the norm of the step over all control points, the share of it that counts, and the next iterate.
+        the norm of the step over all control points, the factor by which it was shortened, and the next iterate.
     """
     n_t, n, nc = control.shape
     size, free = n * nc, factors.shape[1]
@@ -67,10 +67,10 @@ def advance(e: Any, factors: Any, right: Any, control: Any, last: Any, known: in
 
 @kernel
 def _combined(last: Any, depth: int) -> Any:
-    """Return the newest iterate and its step, corrected by the `depth` differences to those before.
+    """Return the newest iterate plus its step, corrected by the last `depth` differences.
 
-    The combination of differences of steps that comes next to the newest step is taken off it, and what they did to
-    the iterate with it.
+    The combination of step differences that is closest to the newest step is subtracted from it, together with the
+    change of the iterate that belongs to it.
     """
     f = last.steps[0]
     following = last.iterates[0] + f

@@ -1,4 +1,4 @@
-"""The angle of the sections that has given twist rates: a least squares whose rows reach over four control points."""
+"""Angles of the sections that have given twist rates: a least squares whose rows span four control points."""
 
 from typing import Any
 
@@ -10,17 +10,16 @@ from dlocore.kernels.lanes import FIRSTS, LEVER, POINTS, SECONDS, SHARE, SLOPE, 
 
 @kernel
 def angles_with(tables: Any, slopes: Any, given: Any, smooth: float) -> Any:
-    """Return the values (k, n) at the control points that have given slopes, and of all of them the smoothest.
+    """Return the smoothest values (k, n) at the control points that have the given slopes.
 
-    Slopes are those that the twist rate has: their mean over a span, or the straight line through them. The factors of
-    the rows come from Givens rotations, row by row, which leave nothing outside the band and do not square its
-    condition.
+    Slopes are treated as the twist rate is: by their mean over a span, or by the straight line through them. Givens
+    rotations factor the matrix row by row; they leave nothing outside the band and do not square the condition number.
 
     Args:
         tables: `basis.Tables`, of n control points.
         slopes: (k, points) at the curvature points.
         given: (k,) the value at the first control point.
-        smooth: times the second derivatives over a span count as the slopes do.
+        smooth: weight of the second derivatives times the span, relative to the slopes.
     """
     n, count = len(tables.span), len(slopes)
     R, right = np.zeros((n, 4)), np.zeros((n, count))
@@ -54,9 +53,9 @@ def angles_with(tables: Any, slopes: Any, given: Any, smooth: float) -> Any:
 
 @leaf
 def _add_row(first: int, row: Any, own: Any, given: Any, R: Any, right: Any) -> None:
-    """Rotate a row (4,) over the control points from `first`, with its right sides (k,), into the factor R (n, 4)."""
+    """Rotate a row (4,) over the control points from `first` on, with right sides (k,), into the factor R (n, 4)."""
     for i in range(4):
-        if first + i == 0:  # its value is known
+        if first + i == 0:  # the value of this control point is known
             for k in range(len(own)):
                 own[k] -= row[0] * given[k]
         elif row[i] != 0.0:

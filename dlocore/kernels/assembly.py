@@ -1,12 +1,16 @@
 """Assembly of forces and tangents over the quadrature points: the only place that knows the sparsity.
 
-Control points q are (n, nc): nc = 2 in the plane, 3 in space, 4 in space with twist; `axes` is the tuple (0, 1),
-(0, 1, 2) or (0, 1, 2, 3), so that the compiler knows nc and unrolls. A symmetric banded matrix is stored by column
-below its diagonal, A[j, i - j], with degree of freedom i * nc + d and half-bandwidth 4 nc - 1.
+Control points q are (n, nc): nc = 2 in the plane, 3 in space, 4 in space with twist. `axes` is the tuple (0, 1), (0, 1,
+2) or (0, 1, 2, 3), so that the compiler knows nc and unrolls. A symmetric banded matrix is stored by column below its
+diagonal, A[j, i - j], with the degree of freedom i * nc + d and the half-bandwidth 4 nc - 1.
 
-A tangent is asked for as `scales` = (stiffness, viscosity, geometric): the factors of dF/dstrain, dF/d(strain rate) and
-of the part that comes from the stress at hand. (1, c, 1) is the full tangent of a step where dv/dq = c, (1, c, 0) its
-positive semidefinite part, (0, 1, 0) the damping matrix alone, (0, 0, 0) forces only.
+`scales` = (stiffness, viscosity, geometric) selects a tangent. These are the factors of dF/dstrain, of dF/d(strain
+rate) and of the part due to the current stress:
+
+- (1, c, 1): the full tangent of a step where dv/dq = c
+- (1, c, 0): its positive semidefinite part
+- (0, 1, 0): the damping matrix alone
+- (0, 0, 0): forces only
 """
 
 from typing import Any, NamedTuple
@@ -30,26 +34,27 @@ from dlocore.kernels.basis import row_of
 from dlocore.kernels.strain import space_curvature, squared_slope
 from dlocore.kernels.twisted_rows import PAST
 
-PAST_IN_PLANE, PAST_IN_SPACE = 2, 9  # columns of `History.past`, in space without twist
+PAST_IN_PLANE, PAST_IN_SPACE = 2, 9  # columns of `History.past`, in the plane and in space without twist
 MEMORY_IN_PLANE, MEMORY_IN_SPACE = 2, 6  # columns of `History.memory`
-NO_RATES = (0.0, 0.0, 0.0, 0.0)  # `rates` of `assemble` where the rate of strain comes from v and nothing yields
+NO_RATES = (0.0, 0.0, 0.0, 0.0)  # `rates` of `assemble` where the strain rate comes from v and nothing yields
 
 
 class History(NamedTuple):
-    """What earlier steps left behind, at the quadrature points.
+    """State that earlier steps left behind, at the quadrature points.
 
     Attributes:
-        memory: (points, 2 m) stress-free strain, and what it was before anything yielded: m = 1 in the plane
-            (curvature), 3 in space (two curvatures of the sections and the twist rate) [1/m].
+        memory: (points, 2 m) stress-free strain, and its value before anything yielded: m = 1 in the plane (curvature),
+            3 in space (two curvatures of the sections and the twist rate) [1/m].
         past: (points, 2, 9 or 16) strain, and with twist frames, of the last steps: see `plane.remember`,
             `space.remember`, `twisted.py`; (0, ...) where no law reads it.
-        axial: (axial points, 3) stress-free axial strain, and the axial strain of the two last steps.
-        stick: (contact nodes, 3) anchor of the friction there [m]; (0, 3) without.
-        slide: (lying points, 2) anchor of the friction of a cable that lies on the table [m]; (0, 2) without.
-        pressing: (contact nodes,) weights [m] of the contact at its nodes, zero where another node stands for one.
+        axial: (axial points, 3) stress-free axial strain, and the axial strain of the last two steps.
+        stick: (contact nodes, 3) anchors of friction [m]; (0, 3) without friction.
+        slide: (lying points, 2) anchors of the friction of a cable that lies on the table [m]; (0, 2) without it.
+        pressing: (contact nodes,) weights [m] of contact at its nodes, zero where another node stands for this one.
         tension: (axial points, 4) what the tangent of a march knows of the tension, see `tension.py`; (0, 4) elsewhere.
-        room: what assemblies in space write over and keep nothing in, of `ROOM` numbers in `space` or `twisted_rows`
-            and so many for each point; (0,) in the plane. Kernels that hand the GIL over need one of their own.
+        room: workspace of assemblies in space, where nothing is kept: `ROOM` numbers in `space` or `twisted_rows`, and
+            `ROOM_OF_POINT` for each point; (0,) in the plane. A kernel that releases the GIL needs a workspace of its
+            own.
     """
 
     memory: Any
@@ -64,7 +69,7 @@ class History(NamedTuple):
 
 @kernel
 def history_at(histories: Any, k: int) -> Any:
-    """Return the `History` of time k from one with arrays (1 or more times, ...)."""
+    """Return the `History` of time k from one whose arrays hold one or more times (1 or more, ...)."""
     at = min(k, len(histories.memory) - 1)
     h = histories
     axial = h.axial[min(k, len(h.axial) - 1)]
@@ -84,8 +89,8 @@ def assemble(
         active: switches of the laws (laws.COUNT,).
         p: parameters of the laws, and obstacles (laws.COUNT + obstacles, laws.PARAMETERS).
         history: `History`.
-        rates: (now, last, before, h): the rate of a strain as a combination of its values now and at the two last
-            steps, and the step in which strain yields; zeros: the rate comes from v, and nothing yields.
+        rates: (now, last, before, h): coefficients that give the rate of a strain from its values now and at the last
+            two steps, and the time step in which strain yields. Zeros: the rate comes from v, and nothing yields.
         scales: (stiffness, viscosity, geometric) factors of the tangent.
         f, K: outputs; K is untouched where all scales are zero.
     """
@@ -121,9 +126,10 @@ def assemble(
 
 @part
 def remember(axes: Any, q: Any, tables: Any, active: Any, p: Any, history: Any, h: float, loose: bool) -> float:
-    """Note in `history` the strain of q (n, nc) as that of the last step, of length h, what yielded and slipped in it.
+    """Record in `history` the strain of q (n, nc) as that of the last step, and what yielded and slipped in that step.
 
-    With h = 0 nothing yields; `loose` puts the anchors of friction under the cable, as at the start.
+    The step has the length h; with h = 0 nothing yields. `loose` places the anchors of friction at the cable, as at the
+    start.
 
     Returns:
         the largest depth of the cable in an obstacle or the table [m].
@@ -155,7 +161,7 @@ def remember(axes: Any, q: Any, tables: Any, active: Any, p: Any, history: Any, 
 
 @leaf
 def note(axes: Any, history: Any, out: Any) -> None:
-    """Write to out (points, columns) the frames, in space with twist, and then the memory.
+    """Write to out (points, columns) the memory, preceded in space with twist by the frames.
 
     Rows beyond the curvature points hold the stress-free axial strain in their first column.
     """
@@ -189,9 +195,10 @@ def contact_energy(axes: Any, q: Any, tables: Any, active: Any, p: Any) -> float
 
 @leaf
 def slopes(states: Any, every: int, first: Any, b1: Any) -> tuple[float, float]:
-    """Return the least and the largest |r'| over every so many of the states (k, n, nc).
+    """Return the smallest and the largest |r'| over every `every`-th of the states (k, n, nc).
 
-    It is taken at points with the derivatives b1 (points, 4) of the basis functions from `first` (points,).
+    The points are given by the derivatives b1 (points, 4) of the basis functions from control point `first` (points,)
+    on.
     """
     least, largest = np.inf, 0.0
     for s in range(0, len(states), every):
@@ -205,7 +212,7 @@ def slopes(states: Any, every: int, first: Any, b1: Any) -> tuple[float, float]:
 def largest_curvature(axes: Any, states: Any, points: Any, memory: Any) -> float:
     """Return the largest |kappa - kappa_0| [1/m] at the curvature points over the states (k, n, nc).
 
-    In space without twist the stress-free shape is straight; with twist, what it is bent by is left out.
+    In space without twist the stress-free shape is straight. With twist, kappa_0 is left out.
     """
     largest = 0.0
     for s in range(len(states)):
@@ -223,7 +230,7 @@ def largest_curvature(axes: Any, states: Any, points: Any, memory: Any) -> float
 
 @leaf
 def multiply_scalar_band(band: Any, x: Any, scale: float, out: Any) -> None:
-    """Add scale * B x to out (n, nc) for the symmetric banded B (n, 4), which acts alike on every coordinate."""
+    """Add scale * B x to out (n, nc) for the symmetric banded B (n, 4), which is the same for every coordinate."""
     n, nc = x.shape
     for i in range(n):
         for d in range(nc):
@@ -237,7 +244,7 @@ def multiply_scalar_band(band: Any, x: Any, scale: float, out: Any) -> None:
 
 @kernel
 def times_scalar_band(band: Any, x: Any) -> Any:
-    """Return B x (n, nc) for the symmetric banded B (n, 4), which acts alike on every coordinate."""
+    """Return B x (n, nc) for the symmetric banded B (n, 4), which is the same for every coordinate."""
     out = np.zeros_like(x)
     multiply_scalar_band(band, x, 1.0, out)
     return out
@@ -245,7 +252,7 @@ def times_scalar_band(band: Any, x: Any) -> Any:
 
 @leaf
 def add_scalar_band(nc: int, band: Any, scale: float, K: Any) -> None:
-    """Add scale * B to K (n nc, 4 nc) for the symmetric banded B (n, 4), which acts alike on every coordinate."""
+    """Add scale * B to K (n nc, 4 nc) for the symmetric banded B (n, 4), which is the same for every coordinate."""
     for i in range(len(band)):
         for o in range(min(4, len(band) - i)):
             factor = scale * band[i, o]

@@ -20,7 +20,7 @@ def clear(A: Any) -> None:
 
 @leaf
 def factor(A: Any) -> int:
-    """Factor A = L D L' in place; return -1, or the column where a pivot is not positive (A is then spoilt)."""
+    """Factor A = L D L' in place; return -1, or the column of a pivot that is not positive (A is then invalid)."""
     n, width = A.shape
     for j in range(n):
         pivot = A[j, 0]
@@ -31,7 +31,7 @@ def factor(A: Any) -> int:
             ratio = A[j, i] / pivot
             for k in range(i, last):
                 A[j + i, k - i] -= ratio * A[j, k]
-            # the loop above still needs the unscaled entries of this column to the right of i only
+            # the loop above needs only the unscaled entries to the right of i in this column
             A[j, i] = ratio
     return -1
 
@@ -89,11 +89,11 @@ class Elimination(NamedTuple):
         index: (n nc,) number of a free degree of freedom among the free ones, or -1 - k for the k-th held one.
         held: (m,) the held degrees of freedom.
         start: (m + 1,) where the terms of the k-th held one begin.
-        dof: terms' degrees of freedom (all free).
-        coefficient: terms' coefficients.
-        width: columns of the reduced band: what follows others couples them beyond the band.
-        entry, place, share: (k,) of each entry of a flattened band (n nc, 4 nc) its places in the flattened reduced
-            one (free, width), and what it counts there.
+        dof: degrees of freedom of the terms (all free).
+        coefficient: coefficients of the terms.
+        width: columns of the reduced band; held degrees of freedom couple the ones that they follow beyond the band.
+        entry, place, share: (k,) for each contribution an entry of the flattened band (n nc, 4 nc), its place in the
+            flattened reduced band (free, width), and its factor there.
     """
 
     index: Any
@@ -112,7 +112,7 @@ def elimination(n: int, nc: int, dimensions: int, pivots: Any, follow: Any, turn
     """Return the `Elimination` of held control points among n.
 
     Args:
-        n, nc: control points, and coordinates of each.
+        n, nc: number of control points, and of coordinates of each.
         dimensions: of the centreline, 2 or 3.
         pivots: (rows,) control points that are held in each dimension.
         follow: (rows, n) how they follow the others, 0 for the pivots themselves.
@@ -159,7 +159,7 @@ def elimination(n: int, nc: int, dimensions: int, pivots: Any, follow: Any, turn
 
 @part
 def reduce_vector(e: Any, f: Any, out: Any) -> None:
-    """Write Z' f for the full vector f (n nc,)."""
+    """Write Z' f (free,) for the full vector f (n nc,)."""
     out[:] = 0.0
     for i in range(len(f)):
         k = e.index[i]
@@ -211,9 +211,10 @@ def place_rows(e: Any, offsets: Any, C: Any, begin: int) -> None:
 
 @part
 def holding(e: Any, A: Any, x: Any, R: Any, forces: Any, at: int, out: Any) -> None:
-    """Write A x (n nc,), where x solves Z' A x = -Z' R, and to a row of `forces` what holds the held ones, R + A x.
+    """Write A x to `out` (n nc,) and the reaction forces R + A x of the held ones to row `at` of `forces`.
 
-    Only their rows of the banded A (n nc, 4 nc) are multiplied: the others are what makes Z' (R + A x) = 0.
+    x solves Z' A x = -Z' R. Only the rows of the banded A (n nc, 4 nc) that belong to held degrees of freedom are
+    multiplied; the other rows follow from Z' (R + A x) = 0.
     """
     n, width = A.shape
     for i in range(n):
@@ -233,9 +234,9 @@ def holding(e: Any, A: Any, x: Any, R: Any, forces: Any, at: int, out: Any) -> N
 
 @brief
 def solve_free(e: Any, K: Any, right: Any) -> Any:
-    """Return Z x, the change (n nc,) with Z' K Z x = Z' right, and whether the banded K (n nc, 4 nc) is positive.
+    """Return the change Z x (n nc,) with Z' K Z x = Z' right, and whether Z' K Z is positive definite.
 
-    Where it is not the change is zero.
+    K (n nc, 4 nc) is banded. If Z' K Z is not positive definite, the change is zero.
     """
     free = len(right) - len(e.held)
     A, x, change = np.empty((free, e.width)), np.empty(free), np.zeros(len(right))
@@ -259,9 +260,9 @@ def reduce_matrix(e: Any, A: Any, out: Any) -> None:
 
 @kernel
 def _folded(index: Any, start: Any, dof: Any, coefficient: Any, band: int, width: int) -> Any:
-    """Return the entries of a band (n, band), their places in the reduced one, of `width`, and their shares there.
+    """Return entries of a band (n, band), their places in the reduced band of `width` columns, and their factors there.
 
-    An entry of a held degree of freedom counts for all those that it follows.
+    An entry of a held degree of freedom contributes to all degrees of freedom that it follows.
     """
     n = len(index)
     count = 0
@@ -284,9 +285,9 @@ def _folded(index: Any, start: Any, dof: Any, coefficient: Any, band: int, width
                     column = b if b >= 0 else index[dof[r]]
                     value = of_row if b >= 0 else of_row * coefficient[r]
                     if i == j and row < column:
-                        continue  # the diagonal block of what is held is symmetric: its lower half is enough
+                        continue  # diagonal blocks of held degrees of freedom are symmetric: half is enough
                     if i != j and row == column:
-                        value *= 2.0  # of A[i, j] and A[j, i]
+                        value *= 2.0  # for A[i, j] and A[j, i]
                     entry[k] = j * band + i - j
                     place[k] = min(row, column) * width + abs(row - column)
                     share[k] = value

@@ -1,4 +1,4 @@
-"""Knots, cubic B-spline basis tables and Gauss points, compiled: they are rebuilt for every scene."""
+"""Knots, cubic B-spline basis tables and Gauss points; compiled, because they are rebuilt for every scene."""
 
 from typing import Any, NamedTuple
 
@@ -11,19 +11,19 @@ from dlocore.kernels.pairs import pair_products
 GAUSS_2 = np.polynomial.legendre.leggauss(2)
 GAUSS_3 = np.polynomial.legendre.leggauss(3)
 GAUSS_4 = np.polynomial.legendre.leggauss(4)
-_ITERATIONS = 60  # for the place of a knot
-_ROUNDING = 1e-15  # of the length
+_ITERATIONS = 60  # at most, for the position of a knot
+_ROUNDING = 1e-15  # relative to the length
 
 
 @leaf
 def basis(knots: Any, span: int, x: float, order: int, out: Any) -> None:
-    """Write the four cubic basis functions of `span` at `x`, with derivatives to `order`, to out (order + 1, 4).
+    """Write the four cubic basis functions of `span` at `x`, with derivatives up to `order`, to out (order + 1, 4).
 
     `span` is the index k with knots[k] <= x <= knots[k+1] (Cox-de Boor; Piegl and Tiller, The NURBS Book, A2.3).
     """
     h1, h2, h3 = x - knots[span], x - knots[span - 1], x - knots[span - 2]
     g1, g2, g3 = knots[span + 1] - x, knots[span + 2] - x, knots[span + 3] - x
-    # over the length of their support, functions of degree 0, 1 and 2
+    # functions of degree 0, 1 and 2, divided by the length of their support
     w = 1.0 / (g1 + h1)
     w0, w1 = g1 * w / (g1 + h2), h1 * w / (g2 + h1)
     b0, b1, b2 = g1 * w0 / (g1 + h3), (h2 * w0 + g2 * w1) / (g2 + h2), h1 * w1 / (g3 + h1)
@@ -41,7 +41,7 @@ def basis(knots: Any, span: int, x: float, order: int, out: Any) -> None:
 
 @law
 def _write_differences(a: float, b: float, c: float, out: Any) -> None:
-    """Write the derivatives of the cubic functions, from the quadratic ones over their support."""
+    """Write the derivatives of the cubic functions, from the quadratic ones divided by the length of their support."""
     out[0], out[1], out[2], out[3] = -3.0 * a, 3.0 * (a - b), 3.0 * (b - c), 3.0 * c
 
 
@@ -56,7 +56,7 @@ def find_span(knots: Any, x: float) -> int:
 
 @brief
 def basis_rows(knots: Any, x: Any, order: int) -> Any:
-    """Return first control points (len(x),) and tables (len(x), order + 1, 4) of the basis at the points `x`."""
+    """Return first control points (len(x),) and basis tables (len(x), order + 1, 4) at the points `x`."""
     first = np.empty(len(x), np.int64)
     table = np.empty((len(x), order + 1, 4))
     for p in range(len(x)):
@@ -68,7 +68,7 @@ def basis_rows(knots: Any, x: Any, order: int) -> Any:
 
 @brief
 def spline_values(knots: Any, control: Any, u: Any, derivative: int) -> Any:
-    """Return the value, or a derivative, (len(u), m) of the spline with control points (n, m) at the points `u`."""
+    """Return values (len(u), m), or a derivative, of the spline with control points (n, m) at the points `u`."""
     first, table = basis_rows(knots, u, derivative)
     out = np.zeros((len(u), control.shape[1]))
     for p in range(len(u)):
@@ -80,7 +80,7 @@ def spline_values(knots: Any, control: Any, u: Any, derivative: int) -> Any:
 
 @leaf
 def _integrated(u: float, length: float, features: Any, power: Any, width: Any) -> tuple[float, float]:
-    """Return the integral of the density of knots up to u [m], but for a constant, and the density there."""
+    """Return the integral of the knot density up to u [m], apart from a constant, and the density there."""
     total, density = u, 1.0
     for f in range(len(features)):
         x = (u - features[f]) / length
@@ -97,17 +97,17 @@ def _integrated(u: float, length: float, features: Any, power: Any, width: Any) 
 
 @brief
 def graded_knots(n: int, length: float, features: Any, multiplicity: Any, power: Any, width: Any) -> Any:
-    """Return clamped knots for `n` control points on [0, length] with knots at, and graded towards, the features.
+    """Return clamped knots for `n` control points on [0, length], with knots at the features and denser towards them.
 
-    The density of knots is 1 + sum_f ((w_f + 1) / (w_f + |u - u_f| / L))^p_f: features are grasps and loads. A feature
-    inside becomes a knot of its multiplicity. Spans are shared among the segments between features in proportion to the
-    integral of the density (each at least one), and spread within each by it.
+    Features are grasps and loads. The knot density is 1 + sum_f ((w_f + 1) / (w_f + |u - u_f| / L))^p_f. A feature
+    inside the cable becomes a knot of its multiplicity. Spans are divided among the segments between features in
+    proportion to the integral of the density, at least one each, and are spread by the density within each segment.
 
     Args:
         n: number of control points, at least 4 + the multiplicities inside.
         length: L [m].
         features: sorted material coordinates (m,) [m].
-        multiplicity: of the knot at each feature (m,), 1 to 3; at the ends of the cable ignored.
+        multiplicity: of the knot at each feature (m,), 1 to 3; ignored at the ends of the cable.
         power: grading exponent p_f (m,).
         width: grading width w_f (m,), fraction of L.
 
@@ -150,7 +150,7 @@ def graded_knots(n: int, length: float, features: Any, multiplicity: Any, power:
         for j in range(1, share[s]):
             target, high = before + total[s] * j / share[s], b
             u = low + (b - low) / (share[s] - j + 1)
-            for _ in range(_ITERATIONS):  # Newton's, within what the signs leave
+            for _ in range(_ITERATIONS):  # Newton's method, safeguarded by bisection
                 value, density = _integrated(u, length, features, power, width)
                 if value < target:
                     low = u
@@ -179,16 +179,16 @@ def row_of(table: Any, i: int) -> tuple[float, float, float, float]:
 
 
 class AxialPoints(NamedTuple):
-    """Quadrature points of the stretch: one a span and two in an end span whose end direction is free.
+    """Quadrature points of stretch: one a span, and two in an end span whose end direction is free.
 
-    That is selective reduced integration, docs/model.md.
+    This is selective reduced integration, see docs/model.md.
 
     Attributes:
         u: (p,) [m].
         first: (p,) index of the first of the four control points at each.
         b1: (p, 4) first derivatives of their basis functions [1/m].
         w: (p,) weights [m].
-        share: (p,) of the strain of a cable that is strained alike everywhere, see `shares`.
+        share: (p,) strain at each point of a uniformly strained cable, relative to that strain, see `shares`.
     """
 
     u: Any
@@ -199,7 +199,7 @@ class AxialPoints(NamedTuple):
 
 
 class CurvaturePoints(NamedTuple):
-    """Quadrature points of bending, twist and forces on the body of the cable: three a span.
+    """Quadrature points of bending, twist and body forces on the cable: three a span.
 
     Attributes:
         u: (p,) [m].
@@ -221,15 +221,17 @@ class CurvaturePoints(NamedTuple):
 
 
 class ContactNodes(NamedTuple):
-    """Nodes of contact: every span in parts of one length, with their ends, twice; none where contact is off.
+    """Nodes of contact: the ends of equal parts of every span, once for the table and once for obstacles.
+
+    Without contact there are none.
 
     Attributes:
         u: (p,) [m].
         first: (p,) index of the first of the four control points at each.
         b0: (p, 4) values of their basis functions.
         w: (p,) weights [m].
-        table_nodes: how many of them, the first, are for the table; the others are for the obstacles.
-        cell: of how many of the latter one is enough away from edges.
+        table_nodes: number of nodes for the table, which come first; the others are for the obstacles.
+        cell: number of obstacle nodes that one node can stand for where edges are far.
     """
 
     u: Any
@@ -241,7 +243,7 @@ class ContactNodes(NamedTuple):
 
 
 class StrandNodes(NamedTuple):
-    """Ends of the segments, as long on every grid, that contact of the cable with itself looks at; none without it.
+    """Ends of the segments for contact of the cable with itself, equally long on every grid; none without that contact.
 
     Attributes:
         u: (p,) [m].
@@ -255,12 +257,12 @@ class StrandNodes(NamedTuple):
 
 
 class LyingPoints(NamedTuple):
-    """Points at which the friction of a cable that lies on the table acts: those of bending, and its point masses.
+    """Points where friction acts on a cable that lies on the table: those of bending, and its point masses.
 
     Attributes:
         first: (p,) index of the first of the four control points at each.
         b0: (p, 4) values of their basis functions.
-        w: (p,) weights [m]; of a point mass the length of the cable that is as heavy.
+        w: (p,) weights [m]; for a point mass, the length of cable of the same mass.
     """
 
     first: Any
@@ -269,17 +271,17 @@ class LyingPoints(NamedTuple):
 
 
 class Tables(NamedTuple):
-    """Basis functions of a set of knots at the points that kernels look at: each kernel is given those it needs.
+    """Basis functions of a set of knots at all points that kernels use; each kernel takes the ones it needs.
 
     A point mass m at u counts as m/mu of the cable's length in one place (docs/model.md eq. 9a).
 
     Attributes:
         axial, curvature, lying: quadrature points.
         contact, strands: nodes.
-        unit: (n, 4) integrals of b_i b_{i+d} du [m], of linear drag.
-        inertia: (n, 4) the same with the point masses, (m/mu) b_i b_{i+d} of each [m]: the mass matrix over mu.
+        unit: (n, 4) integrals of b_i b_{i+d} du [m], for linear drag.
+        inertia: (n, 4) the same plus (m/mu) b_i b_{i+d} of each point mass [m]: the mass matrix divided by mu.
         span: (n,) integrals of b_i du [m].
-        weight: (n,) the same with the point masses, (m/mu) b_i of each [m].
+        weight: (n,) the same plus (m/mu) b_i of each point mass [m].
     """
 
     axial: AxialPoints
@@ -315,10 +317,11 @@ def gauss_points(knots: Any, rule: Any, weights: Any) -> Any:
 
 @kernel
 def _axial_points(knots: Any, free_start: bool, free_end: bool, rule: Any, weights: Any) -> Any:
-    """Return points u (k,) [m] of the stretch and their weights: as many as the control points have strains.
+    """Return quadrature points u (k,) [m] of stretch and their weights, as many as the control points have strains.
 
-    One a span, two in an end span whose direction is free, and one at a double knot, to which the spans beside it give
-    a sixth of their length. Fewer leave a mode without energy, in which the cable folds; more lock its bending.
+    There is one point a span, two in an end span whose direction is free, and one at a double knot, which takes a sixth
+    of the length of each adjacent span. Fewer points leave a mode without energy, in which the cable folds; more lock
+    its bending.
     """
     last = len(knots) - 4
     spans = 0
@@ -360,13 +363,13 @@ def _axial_points(knots: Any, free_start: bool, free_end: bool, rule: Any, weigh
 
 @brief
 def shares(knots: Any, first: Any, b1: Any, w: Any, free_start: bool, free_end: bool) -> Any:
-    """Return the strain (p,) at the axial points of a cable whose tension strains it by one, whatever its sign.
+    """Return the magnitude of the strain (p,) at the axial points of a cable whose tension calls for the strain one.
 
-    It is r with sum_p w_p r_p phi_j(u_p) = int phi_j du for the quadratic basis functions phi_j, of which the b_i' are
-    combinations (docs/model.md, selective reduced integration): without the first where the direction of the start is
-    held, which bears what it lacks, without the last where that of the end is, and with the sum of the two that end
-    and begin at a triple knot, which are held together. Splines at increasing places are totally positive: nothing is
-    to be exchanged as they are eliminated.
+    It is |r| where sum_p w_p r_p phi_j(u_p) = int phi_j du for the quadratic basis functions phi_j, of which the b_i'
+    are combinations (docs/model.md, selective reduced integration). Left out are the first function where the direction
+    of the start is held, and the last where that of the end is held: the grasp carries the difference. The two
+    functions that end and begin at a triple knot are held together and count as their sum. Splines at increasing points
+    are totally positive, so elimination needs no pivoting.
     """
     count = len(w)
     begin, end = 0 if free_start else 1, len(knots) - 5 if free_end else len(knots) - 6
@@ -380,7 +383,7 @@ def shares(knots: Any, first: Any, b1: Any, w: Any, free_start: bool, free_end: 
             rows += 0 if joins else 1
             row[j] = rows - 1
             r[rows - 1] += (knots[j + 4] - knots[j + 1]) / 3.0
-    A = np.zeros((count, 5))  # two diagonals to both sides
+    A = np.zeros((count, 5))  # two diagonals on either side
     for p in range(count):
         phi = 0.0
         for i in range(3):
@@ -403,7 +406,7 @@ def shares(knots: Any, first: Any, b1: Any, w: Any, free_start: bool, free_end: 
 
 @kernel
 def _nodes(knots: Any, spacing: float) -> Any:
-    """Return nodes u (k,) [m] at most `spacing` apart, the knots among them, and their trapezoidal weights [m]."""
+    """Return nodes u (k,) [m] at most `spacing` apart, which include the knots, and their trapezoidal weights [m]."""
     if not np.isfinite(spacing):
         return np.empty(0), np.empty(0)
     last = len(knots) - 4
@@ -444,10 +447,14 @@ def build_tables(
 ) -> Any:
     """Return `Tables` of the clamped cubic `knots`.
 
-    `free_*`: the direction at that end of the cable is free; `above`, `spacing`: largest distance of contact nodes for
-    the table and for obstacles [m]; `cell`: see `ContactNodes`; `segment`: largest distance of strand nodes [m]. A
-    distance is infinite for none. `masses` (k, 2): place [m] of each point mass, and the length of cable that is as
-    heavy [m]. Contact presses it with the stiffness of that length, so that it sinks in no deeper than the cable.
+    Args:
+        free_start, free_end: the direction at that end of the cable is free.
+        rule2, w2, rule3, w3, rule4, w4: Gauss rules on [-1, 1] and their weights.
+        above, spacing: largest distance of contact nodes for the table and for obstacles [m]; infinite for no nodes.
+        cell: see `ContactNodes`.
+        segment: largest distance of strand nodes [m]; infinite for no nodes.
+        masses: (k, 2) position of each point mass [m], and the length of cable of the same mass [m]. Contact presses it
+            with the stiffness of that length, so that it sinks in no deeper than the cable.
     """
     u, axial_w = _axial_points(knots, free_start, free_end, rule2, w2)
     axial_first, table = basis_rows(knots, u, 1)

@@ -1,12 +1,13 @@
-"""The rate of curvature that sections without twist see (docs/model.md eq. 9).
+"""The rate of curvature seen by sections that do not twist (docs/model.md eq. 9).
 
-A cable that does not twist turns its sections as one: along it they are a frame without twist (a Bishop frame) at every
-time, and only the spin of all of them together about the tangent is free. It is the one that damping resists least.
+All sections of a cable without twist turn together: at every time their frames along the cable are a frame without
+twist (a Bishop frame), and only their common spin about the tangent is free. The spin taken is the one that damping
+resists least.
 
-Between two neighbouring points the frames are carried by the smallest rotation that brings one tangent to the other,
-and so is in time every frame at its point. What carrying along the cable and in time differ by is an angle, the area
-that the four tangents enclose on the unit sphere, and the sections have to spin by it: exactly, for steps of any size.
-So a rigid motion costs nothing, to rounding. `state` (points, 8) is l, h, t and kappa of the curvature points.
+Between two neighbouring points, the smallest rotation from one tangent to the other carries the frames. The same holds
+in time at each point. Carrying along the cable and carrying in time differ by an angle: the area that the four tangents
+enclose on the unit sphere. The sections must spin by this angle, exactly, for steps of any size. So a rigid motion
+dissipates nothing, to rounding. `state` (points, 8) holds l, h, t and kappa of the curvature points.
 """
 
 from typing import Any
@@ -28,13 +29,13 @@ def _dot(a: Vector, b: Vector) -> float:
 
 @law
 def _half_area(a: Vector, b: Vector, c: Vector) -> tuple[float, float]:
-    """Return a vector whose angle is half the area of a triangle on the unit sphere."""
+    """Return a vector (cos, sin, up to a factor) whose angle is half the area of a triangle on the unit sphere."""
     return 1.0 + _dot(a, b) + _dot(b, c) + _dot(c, a), _dot(a, cross(b, c))
 
 
 @law
 def _spun(x: float, y: float, a0: Vector, b0: Vector, a: Vector, b: Vector) -> tuple[float, float]:
-    """Return the spin at b, as (cos, sin), from that at a, (x, y): tangents were a0 and b0 and are now a and b."""
+    """Return the spin (cos, sin) at b from the spin (x, y) at a; the tangents were a0 and b0 and are now a and b."""
     c1, s1 = _half_area(a0, a, b)
     c2, s2 = _half_area(a0, b, b0)
     c, s = c1 * c2 - s1 * s2, c1 * s2 + s1 * c2
@@ -47,11 +48,11 @@ def _spun(x: float, y: float, a0: Vector, b0: Vector, a: Vector, b: Vector) -> t
 
 @leaf
 def carry(weights: Any, state: Any, past: Any, now: float, last: float, before: float, out: Any) -> None:
-    """Write to out (points, 3) the combination of the two last curvatures in `past`, carried with the sections.
+    """Write to out (points, 3) the combination of the last two curvatures in `past`, carried with the sections.
 
-    The spin of all sections is the one that brings it nearest to `now` times the curvature of `state`. Where the cable
-    passes through a straight line within the steps at hand, that would be to turn its bend over: with the share of the
-    curvature that the spin can't explain, it goes smoothly to none.
+    All sections spin together such that the result is closest to `now` times the curvature of `state`. If the cable
+    passes through a straight line within the steps at hand, this would turn its bend over. The result therefore goes
+    smoothly to zero with the share of the curvature that the spin cannot explain.
     """
     x, y = 1.0, 0.0
     along, across, squares = 0.0, 0.0, 0.0
@@ -88,7 +89,7 @@ def carry(weights: Any, state: Any, past: Any, now: float, last: float, before: 
 
 @leaf
 def rate_by_steps(weights: Any, state: Any, past: Any, rates: Any, rate: Any) -> None:
-    """Write the rate of curvature (points, 3) as the combination `rates` of its values now and at the last steps."""
+    """Write the rate of curvature (points, 3): the combination `rates` of its values now and at the last two steps."""
     carry(weights, state, past, rates[0], -rates[1], -rates[2], rate)
     for n in range(len(weights)):
         for d in range(3):
@@ -97,10 +98,10 @@ def rate_by_steps(weights: Any, state: Any, past: Any, rates: Any, rate: Any) ->
 
 @leaf
 def rate_by_velocity(weights: Any, state: Any, turning: Any, rate: Any) -> None:
-    """Take the spin out of the rate of curvature (points, 3) of sections that do not spin.
+    """Turn the rate of curvature (points, 3) of sections that do not spin into that of sections that do not twist.
 
-    The spin sigma obeys sigma' = t . (t_t x kappa) with t_t = `turning` (points, 3), and sigma(0) is such that the rate
-    is least. Where all of the cable is straight, the spin means nothing.
+    The spin sigma obeys sigma' = t . (t_t x kappa) with t_t = `turning` (points, 3), and sigma(0) minimises the rate.
+    Where the whole cable is straight, the spin has no meaning.
     """
     spin, across, square = 0.0, 0.0, 0.0
     for n in range(len(weights)):
@@ -132,8 +133,10 @@ def _binormal(a: Vector, b: Vector) -> Vector:
 
 @leaf
 def torques(weights: Any, state: Any, eta: float, rate: Any, out: Any) -> None:
-    """Write the generalised forces (points, 3) by r' of the torque that keeps sections with the moment eta rate from
-    twisting: its rate along the cable is the moment's part about t x kappa, and it is zero at both ends.
+    """Write the generalised forces by r' (points, 3) of the torque that keeps the sections from twisting.
+
+    The sections have the moment eta `rate`. The rate of this torque along the cable is the component of the moment
+    along t x kappa; it is zero at both ends.
     """
     torque = 0.0
     out[:] = 0.0

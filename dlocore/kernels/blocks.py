@@ -1,7 +1,7 @@
-"""Factorisation of symmetric matrices of square blocks, each coupled with the three next ones.
+"""Factorisation of symmetric matrices of square blocks, each coupled with the next three.
 
-A (count, m, 4 m) holds in A[t, c] what couples unknown c of block t with those of the blocks t to t + 3. Of a block
-with itself what is left of the diagonal is not read, nor what would lie beyond the last block.
+A (count, m, 4 m) holds in A[t, c] the coupling of unknown c of block t with the unknowns of blocks t to t + 3. Entries
+left of the diagonal within a block, and entries beyond the last block, are not read.
 """
 
 from typing import Any
@@ -10,21 +10,21 @@ import numpy as np
 
 from dlocore.compiling.kernel import kernel, law, leaf
 
-REACH = 4  # blocks that the row of one is coupled with, itself among them
-_PANEL = 8  # rows that are subtracted from those below them in one go
-_STRIP = 256  # columns of them that stay in the cache meanwhile
+REACH = 4  # blocks coupled with a block, including itself
+_PANEL = 8  # rows that are subtracted from the rows below in one go
+_STRIP = 256  # columns of these that stay in the cache meanwhile
 
 
 @kernel
 def factor_rows(A: Any, start: int, stop: int) -> int:
-    """Factor the rows `start` to `stop` of A = U' D U in place, those before them being factored.
+    """Factor the rows `start` to `stop` of A = U' D U in place; the rows before them are already factored.
 
-    Rows are counted over all blocks. Two rows at a time take what a panel of rows above gives them: what is read once
-    serves sixteen products. The strip lies in one array with rows at a distance that the compiler knows, which spares
-    it to find out whether they are the same as what is written.
+    Rows are counted over all blocks. A panel of rows is applied to two rows below at a time: each value read serves
+    sixteen products. The strip is one array whose rows are at a distance known to the compiler, which therefore need
+    not check whether they overlap with what is written.
 
     Returns:
-        -1, or the row where a pivot is not positive; A is then spoilt.
+        -1, or the row of a pivot that is not positive; A is then invalid.
     """
     count, m, _ = A.shape
     strip = np.zeros(_PANEL * _STRIP)
@@ -87,7 +87,7 @@ def _column(above: Any, k: int) -> tuple[float, float, float, float, float, floa
 
 @law
 def _ratios(rows: Any, begin: int, size: int, c: int) -> tuple[float, float, float, float, float, float, float, float]:
-    """Return what a panel's rows count in the elimination of column c, 0 where there are fewer."""
+    """Return the multipliers of a panel's rows in the elimination of column c, 0 for missing rows."""
     return (
         _ratio(rows, begin, size, c, 0), _ratio(rows, begin, size, c, 1), _ratio(rows, begin, size, c, 2),
         _ratio(rows, begin, size, c, 3), _ratio(rows, begin, size, c, 4), _ratio(rows, begin, size, c, 5),
@@ -122,7 +122,7 @@ def solve_blocks(A: Any, x: Any) -> None:
 
 @leaf
 def dot(a: Any, b: Any) -> float:
-    """Return a' b (n,), of b the first n; in eight sums, which do not wait for each other."""
+    """Return a' b of the first n (length of a) entries of b, in eight sums that do not wait for each other."""
     n = len(a)
     s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = 0.0
     whole = n - n % 8

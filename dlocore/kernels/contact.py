@@ -1,10 +1,12 @@
 """Assembly of contact and friction, in the plane and in space.
 
-Contact acts at nodes: with the table at the first `table_nodes` of them, with obstacles at the others, which lie
-closer, as an obstacle may be thin or have edges. Away from edges they needn't: there one node of a `cell` of them
-stands for all (`pressing`: the weights [m] of the nodes until the next step). The distance to an obstacle grows at most
-as fast as one goes along the cable, so from a node that is far away the next ones are skipped. `stick` (nodes, 3) holds
-the anchor of the friction, `slide` (lying points, 2) that of a cable that lies on the table.
+Contact acts at nodes: the first `table_nodes` of them are for the table, the others for obstacles. These lie closer, as
+an obstacle may be thin or have edges. Away from edges that is not needed, and one node stands for a whole `cell` of
+nodes. `pressing` holds the weights [m] of the nodes until the next step.
+
+The distance to an obstacle grows at most as fast as the length along the cable, so after a node that is far away the
+next ones are skipped. `stick` (nodes, 3) holds the anchors of friction, `slide` (lying points, 2) those of a cable that
+lies on the table.
 """
 
 from typing import Any
@@ -24,13 +26,13 @@ from dlocore.kernels.strands import dot
 _UP = (0.0, 0.0, 1.0)
 _ANY = (0.0, 0.0, 0.0)
 _FLAT = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-_SLACK = 0.9  # of the distance that is skipped: a strained cable is longer
-_THROUGH = 0.5  # of the way to the middle of an obstacle: a node that was deeper on its way went through it
-_LEAVES = 0.05  # of it: by so much it has to have come out again
-_INSIDE = 2.0  # lengths of a cell: so far from an edge, at least, one node stands for those of a cell
-_TILT = 0.04  # of the radius: deeper than the middle of a cell, at most, may its ends be
-_PASSED = 2.0  # times as far as it slides are the nodes from a node that were where it comes to, at most
-_SEARCH = 24  # times that the deepest place of such a way is looked for, each in two thirds of the last part
+_SLACK = 0.9  # of the length that is skipped: a strained cable is longer
+_THROUGH = 0.5  # of the way to the middle of an obstacle: a node that was deeper on its way went through
+_LEAVES = 0.05  # of that depth: by at least this much the node must have come out again
+_INSIDE = 2.0  # lengths of a cell: least distance from an edge at which one node stands for a cell
+_TILT = 0.04  # of the radius: how much deeper than its middle the ends of a cell may be
+_PASSED = 2.0  # times the sliding distance: how far from a node others are searched that were at its new place
+_SEARCH = 24  # rounds of the search for the deepest place of a path; each leaves two thirds of the interval
 
 
 @law
@@ -45,13 +47,13 @@ def _point(nc: int, q: Any, k: int, b: tuple[float, float, float, float]) -> Vec
 
 @law
 def _met_at(nodes: Any, p: Any, n: int) -> tuple[int, int]:
-    """Return the first contact that node n may meet, and the one after the last: the table, or the obstacles."""
+    """Return the range of contacts that node n may touch, first and last + 1: the table, or the obstacles."""
     return (COUNT - 1, COUNT) if n < nodes.table_nodes else (COUNT, len(p))
 
 
 @law
 def _gap(p: Any, i: int, x: Vector) -> tuple[float, Vector, Symmetric, float]:
-    """Return the gap of contact i at x (below COUNT: the table), its gradient and Hessian, and the friction there."""
+    """Return the gap of contact i at x, its gradient, Hessian and coefficient of friction; below COUNT is the table."""
     if i < COUNT:
         return x[2] - p[TABLE, 0], _UP, _FLAT, p[TABLE, 1]
     d, n, H = signed_distance(p, i, x)
@@ -101,14 +103,14 @@ def contact(
     nc: int, q: Any, v: Any, nodes: Any, active: Any, p: Any, stick: Any, weights: Any, h: float, scales: Any,
     tangent: bool, f: Any, K: Any,
 ) -> None:  # fmt: skip
-    """Subtract the forces, and add the tangents, of contact with table and obstacles and of friction on them.
+    """Subtract the forces and add the tangents of contact with table and obstacles, and of friction on them.
 
-    `weights` (nodes,) [m]: of the nodes, zero where another stands for one.
+    `weights` (nodes,) are those of the nodes [m], zero where another node stands for this one.
     """
     elastic, viscous, geometric = scales
     firsts, b0, places = nodes.first, nodes.b0, nodes.u
     k_n, width, damping = p[CONTACT, 1], p[CONTACT, 2], p[CONTACT, 3]
-    reach = 0.0  # up to where nothing can touch
+    reach = 0.0  # material coordinate up to which nothing can touch
     for n in range(len(weights)):
         if n == nodes.table_nodes:
             reach = 0.0
@@ -147,7 +149,7 @@ def contact(
 
 @leaf
 def energy(nc: int, q: Any, nodes: Any, active: Any, p: Any) -> float:
-    """Return the potential of the contact [J]."""
+    """Return the potential of contact [J]."""
     total = 0.0
     k, w = p[CONTACT, 1], p[CONTACT, 2]
     for n in range(len(nodes.w)):
@@ -164,7 +166,7 @@ def energy(nc: int, q: Any, nodes: Any, active: Any, p: Any) -> float:
 
 @law
 def _nearest_within(nc: int, q: Any, nodes: Any, p: Any, i: int, n: int, way: float) -> float:
-    """Return the smallest gap [m] from contact i of its nodes within `way` [m] of node n; one below 0 will do."""
+    """Return the smallest gap [m] to contact i of its nodes within `way` [m] of node n, or the first below 0."""
     first, last = (0, nodes.table_nodes) if i < COUNT else (nodes.table_nodes, len(nodes.u))
     nearest = np.inf
     for side in (-1, 1):
@@ -178,9 +180,9 @@ def _nearest_within(nc: int, q: Any, nodes: Any, p: Any, i: int, n: int, way: fl
 
 @leaf
 def strikes(nc: int, q0: Any, q1: Any, nodes: Any, p: Any, weights: Any, least: float) -> bool:
-    """Tell whether a node comes by more than `least` [m], from q0 to q1 (n, nc), towards what it newly touches.
+    """Tell whether a node, from q0 to q1 (n, nc), approaches something that it newly touches by more than `least` [m].
 
-    It does not come towards it by sliding to where others were, as around an edge.
+    Sliding to a place where other nodes already were, as around an edge, is no approach.
     """
     reach = 0.0
     for n in range(len(weights)):
@@ -210,7 +212,7 @@ def strikes(nc: int, q0: Any, q1: Any, nodes: Any, p: Any, weights: Any, least: 
 
 @law
 def _thickness(p: Any, i: int) -> float:
-    """Return how deep the middle of obstacle i lies, for the axis of the cable [m]."""
+    """Return the depth [m] of the middle of obstacle i, seen by the axis of the cable."""
     if p[i, 0] == CYLINDER:
         return min(p[i, 13], p[i, 15]) + p[CONTACT, 0]
     if p[i, 0] == BOX:
@@ -225,9 +227,9 @@ def _between(x: Vector, y: Vector, s: float) -> Vector:
 
 @leaf
 def passes(nc: int, q0: Any, q1: Any, nodes: Any, p: Any, weights: Any) -> bool:
-    """Tell whether a node goes through an obstacle on its straight way from q0 to q1 (n, nc), as a step too long may.
+    """Tell whether a node goes through an obstacle on the straight path from q0 to q1 (n, nc), as in too long a step.
 
-    The distance from a convex body is convex along a straight way, so that its least is found by thirds.
+    The distance from a convex body is convex along a straight path, so ternary search finds its minimum.
     """
     if len(p) == COUNT:
         return False
@@ -238,7 +240,7 @@ def passes(nc: int, q0: Any, q1: Any, nodes: Any, p: Any, weights: Any) -> bool:
             square += (q1[i, d] - q0[i, d]) ** 2
         longest = max(longest, square)
     longest = np.sqrt(longest)
-    reach = 0.0  # up to where nothing is near enough
+    reach = 0.0  # material coordinate up to which nothing is near enough
     for n in range(nodes.table_nodes, len(weights)):
         if nodes.u[n] < reach or weights[n] == 0.0:
             continue
@@ -271,11 +273,11 @@ def passes(nc: int, q0: Any, q1: Any, nodes: Any, p: Any, weights: Any) -> bool:
 
 @law
 def _met(nodes: Any, p: Any, n: int, x: Vector, near: float) -> tuple[float, float, Vector, float]:
-    """Return what node n at x meets.
+    """Return what node n at x touches.
 
     Returns:
-        the smallest gap [m]; the depth [m] and the normal where it touches what is rough, the deepest; and how far it
-        is from an edge of what is nearer than `near` [m].
+        the smallest gap [m]; the depth [m] and the normal of the deepest contact with friction; and the distance from
+        an edge of anything nearer than `near` [m].
     """
     nearest, depth, normal, inside = np.inf, 0.0, _ANY, np.inf
     begin, end = _met_at(nodes, p, n)
@@ -291,7 +293,7 @@ def _met(nodes: Any, p: Any, n: int, x: Vector, near: float) -> tuple[float, flo
 
 @law
 def _drag(p: Any, stick: Any, n: int, x: Vector, depth: float, normal: Vector) -> None:
-    """Drag the anchor of node n at x behind it; where it touches nothing rough, put it under it."""
+    """Drag the anchor of node n behind its position x; without contact with friction, place it at x."""
     if len(stick) == 0:
         return
     s, kept = _ANY, 0.0
@@ -307,9 +309,10 @@ def _drag(p: Any, stick: Any, n: int, x: Vector, depth: float, normal: Vector) -
 
 @law
 def _lies_along(nc: int, q: Any, nodes: Any, p: Any, n: int, cell: int, gap: float) -> bool:
-    """Tell whether the ends of the cell of nodes from n on come hardly nearer to anything than its middle at `gap` [m].
+    """Tell whether the ends of the cell of nodes from n on come hardly nearer to anything than its middle.
 
-    Where the cable stands on a face with its end, or is bent around, the middle tells nothing of what touches.
+    `gap` [m] is the smallest gap of the middle node. Where the cable stands on a face with its end, or is bent around
+    something, the middle does not show what touches.
     """
     least = gap - _TILT * p[CONTACT, 0]
     for m in (n, n + cell - 1):
@@ -323,9 +326,9 @@ def _lies_along(nc: int, q: Any, nodes: Any, p: Any, n: int, cell: int, gap: flo
 
 @leaf
 def remember(nc: int, q: Any, nodes: Any, p: Any, stick: Any, pressing: Any, loose: bool) -> float:
-    """Drag the anchors of the friction behind q, note where few nodes will do, and return the largest depth [m].
+    """Drag the anchors of friction behind q, note where few nodes suffice, and return the largest depth [m].
 
-    Where the cable is `loose`, as at the start, the anchors are put under it.
+    If `loose`, as at the start, the anchors are placed at the cable.
     """
     deepest = 0.0
     reach = 0.0
@@ -352,7 +355,7 @@ def remember(nc: int, q: Any, nodes: Any, p: Any, stick: Any, pressing: Any, loo
             if few and (m == middle or len(stick) == 0):
                 continue
             y = _point(nc, q, first[m], row_of(b0, m))
-            if few:  # as far behind it as that of the middle
+            if few:  # as far behind it as the anchor of the middle node
                 for d in range(3):
                     stick[m, d] = y[d] + stick[middle, d] - x[d]
                 continue
@@ -391,7 +394,7 @@ def lying(
 
 @leaf
 def drag_anchors(nc: int, q: Any, points: Any, p: Any, slide: Any, loose: bool) -> None:
-    """Drag the anchors of a lying cable behind q; put them under it where it is `loose`, as at the start."""
+    """Drag the anchors of a lying cable behind q; if `loose`, as at the start, place them at the cable."""
     for n in range(len(slide)):
         x = _point(nc, q, points.first[n], row_of(points.b0, n))
         a, b = x[0] - slide[n, 0], x[1] - slide[n, 1]
@@ -414,10 +417,10 @@ def follow(
     stick: Any,
     slide: Any,
 ) -> None:
-    """Drag the anchors of friction in `history` behind states (m, n, nc), one after the other, as a march does.
+    """Drag the anchors of friction in `history` behind the states (m, n, nc) one after the other, as a march does.
 
-    What it is behind some of them, `until` (k,), in order, is written to pressing (k, contact nodes), stick
-    (k, contact nodes, 3) and slide (k, lying points, 2), see `History`.
+    After each of the states with the numbers `until` (k,), in order, the history is written to pressing (k, contact
+    nodes), stick (k, contact nodes, 3) and slide (k, lying points, 2), see `History`.
     """
     row = 0
     for m in range(until[-1] + 1):

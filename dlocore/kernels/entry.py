@@ -1,6 +1,6 @@
 """How a motion and its smooth stretches begin and end: brief steps around the march, which keep the GIL.
 
-To hand it over for microseconds would let another thread's solve take it for as long as its Python lasts.
+Releasing the GIL for microseconds would let another thread take it, for as long as its Python code runs.
 """
 
 from typing import Any
@@ -22,12 +22,12 @@ from dlocore.kernels.march import constrained_mass_solve
 from dlocore.kernels.nearby import nothing_known
 from dlocore.kernels.selfcontact import press
 
-_LASTS = 0.25  # (h w)^2 of a wave of which a step keeps half the acceleration that it begins with, inverse
+_LASTS = 0.25  # c of `lasting`: the inverse of (h w)^2 of a wave that keeps half of its initial acceleration
 
 
 @brief
 def remember_start(axes: Any, q: Any, tables: Any, active: Any, p: Any, history: Any) -> None:
-    """Note in `history` the strain of the start q (n, nc), with the anchors of friction under the cable."""
+    """Record in `history` the strain of the start q (n, nc), with the anchors of friction at the cable."""
     remember(axes, q, tables, active, p, history, 0.0, True)
 
 
@@ -36,19 +36,21 @@ def begin_stretch(
     axes: Any, q: Any, v: Any, density: float, dragged: float, tables: Any, active: Any, p: Any,
     history: Any, rates: Any, load: Any, e: Any, near: Any, h: float, inertial: bool, dimensions: int,
 ) -> Any:  # fmt: skip
-    """Return velocity, acceleration and G = f + C v - load, each (n, nc), where a smooth stretch begins, and its jump.
+    """Return velocity, acceleration, G = f + C v - load, each (n, nc), and the jump at the start of a smooth stretch.
 
-    The velocity is what the last one, v, becomes as the grasps close; the acceleration is consistent with the forces.
-    The jump is the largest change of a component of the centreline's velocity [m/s]; strain resists at the rate before.
+    The velocity is what the previous velocity v becomes as the grasps close. The acceleration is consistent with the
+    forces, for which the strain rates are those before the jump. The jump is the largest change of a component of the
+    centreline's velocity [m/s].
 
     Args:
         q: (n, nc) [m] the state.
-        density, dragged: of the mass matrix [kg/m] and of the drag matrix [N s/m^2].
+        density, dragged: factors of the mass matrix [kg/m] and of the drag matrix [N s/m^2].
         rates: of strain, see `assemble`: from v, or from the last step.
-        near: (3, held) [m] prescribed part of what is held at the beginning, h and 2 h later.
-        h: [s], short.
+        near: (3, held) [m] prescribed part of the held degrees of freedom at the beginning, h and 2 h later.
+        h: short time [s].
+        inertial: False where the cable goes through equilibria: its velocity does not count, and it has no
+            acceleration.
         dimensions: of the centreline.
-        inertial: False where the cable goes through equilibria: it has no velocity that counts, and no acceleration.
     """
     nc = len(axes)
     rate = (4.0 * near[1] - 3.0 * near[0] - near[2]) / (2.0 * h)
@@ -80,14 +82,16 @@ def begin_stretch(
 
 @brief
 def after_jump(e: Any, near: Any, short: float, q: Any, later: Any, h: float) -> Any:
-    """Return the velocity (n, nc) that a jump at the state q leaves: that to the state h [s] later, held as it is held.
+    """Return the velocity (n, nc) after a jump at the state q: the one that leads to the state `later`, h [s] later.
 
-    As the grasps close only what they hold has their speed. The next moment a cable that hardly stretches has set out
-    with them, as far as it is pulled along itself: a time spline that began without would be late by that for a span.
+    Held degrees of freedom get their prescribed velocity. When grasps close, only the held points have the velocity of
+    the grippers. A moment later, a cable that hardly stretches has started to move with them wherever it is pulled
+    along its axis. A time spline that began without this velocity would lag behind for a time span.
 
     Args:
+        e: elimination of the held degrees of freedom.
+        near: (3, held) [m] prescribed part of the held degrees of freedom at the jump, `short` and 2 `short` [s] later.
         q, later: (n, nc) [m] the states.
-        near: (3, held) [m] prescribed part of what is held at the jump, `short` and 2 `short` [s] later.
     """
     v = (later - q) / h
     rate = np.empty((1, near.shape[1]))
@@ -101,16 +105,16 @@ def lasting(
     axes: Any, q: Any, a: Any, G: Any, density: float, h: float, tables: Any, active: Any, p: Any,
     history: Any, e: Any,
 ) -> Any:  # fmt: skip
-    """Return what lasts for a step of the acceleration a (n, nc) that a stretch begins with, and a G that balances it.
+    """Return the part of a stretch's initial acceleration a (n, nc) that lasts for a step, and a G that balances it.
 
-    What a cable is let go from, or springs away with, acts at one point, or at an end: the shorter the spans, the more
-    of its acceleration is of waves faster than any step. A step turns that into speeds which the cable never has, and
-    drag and damping of these hold it back. So (M + c h^2 K) a' = M a, which leaves alone what is slower than the step,
-    with the positive semidefinite part of K; G' = G + M (a - a').
+    A released cable is accelerated at one point or at an end. The shorter the spans, the more of this acceleration
+    belongs to waves faster than any step. A step would turn it into velocities that the cable never has, and drag and
+    damping of these would hold the cable back. So (M + c h^2 K) a' = M a, with the positive semidefinite part of K,
+    which keeps everything slower than the step; G' = G + M (a - a') (docs/model.md eq. 13a).
 
     Args:
-        q, a, G: (n, nc) what `begin_stretch` was given and returned.
-        density: of the mass matrix [kg/m].
+        q, a, G: (n, nc) the state given to `begin_stretch`, and the acceleration and G that it returned.
+        density: factor of the mass matrix [kg/m].
         h: time step [s].
     """
     nc = len(axes)
@@ -129,9 +133,9 @@ def lasting(
 
 @brief
 def to_ends_of_steps(reactions: Any, first: int, last: int, lag: float) -> None:
-    """Bring the reactions (steps + 1, held) of the steps after `first` to `last` to their times, in place.
+    """Move the reactions (steps + 1, held) of the steps after `first` to `last` to the ends of the steps, in place.
 
-    A generalised-alpha step balances its forces `lag` steps before its end (alpha_f).
+    A generalised-alpha step balances its forces `lag` (alpha_f) steps before its end.
     """
     for i in range(reactions.shape[1] if last - first > 1 else 0):
         rate = 0.0

@@ -8,17 +8,17 @@ from dlocore.compiling.kernel import brief, kernel
 from dlocore.kernels.assembly import NO_RATES, add_scalar_band, assemble, history_at
 from dlocore.kernels.banded import factor, reduce_matrix
 
-LOOKS = 6  # states of a motion, at least
-AT_ONCE = 64  # steps from one state that is looked at to the next, at most: what is unstable for less is not looked for
-SLOWEST = 1.0  # rate of growth that counts, over the time of the motion
-_DOUBLINGS = 12  # of a rate, at most
+LOOKS = 6  # least number of states at which a motion is checked
+AT_ONCE = 64  # most steps between two checked states: a shorter instability may be missed
+SLOWEST = 1.0  # least rate of growth that counts, per duration of the motion
+_DOUBLINGS = 12  # largest number of doublings of a rate
 
 
 @brief
 def looked_at(last: int, looks: int) -> Any:
-    """Return the numbers (k + 1,) of states, the last of which is `last`, between which a motion is looked at.
+    """Return the numbers (k + 1,) of states, from 0 to `last`, between which a motion is checked.
 
-    The first is 0. They are evenly spaced, so many `looks` or more: a motion of minutes may be unstable for seconds.
+    They are evenly spaced, with at least `looks` intervals: a motion of minutes may be unstable for seconds.
     """
     looks = max(looks, -(-last // AT_ONCE))
     return np.round(np.linspace(0.0, last, looks + 1)).astype(np.int64)
@@ -29,18 +29,18 @@ def fastest_growth(
     axes: Any, states: Any, velocities: Any, histories: Any, tables: Any, active: Any, p: Any, density: float,
     dragged: float, e: Any, slowest: float,
 ) -> Any:  # fmt: skip
-    """Return rates (k,) [1/s] that no disturbance of the states (k, n, nc) exceeds, each up to twice too large.
+    """Return rates (k,) [1/s] that no disturbance of the states (k, n, nc) exceeds, each at most twice too large.
 
-    A disturbance that grows like exp(s t) has (s^2 M + s (C + D) + K) x = 0, of symmetric matrices: where these add up
-    to a positive definite one it is slower than s. That is tried at `slowest`, below which it is none (0), and then at
-    twice and twice as much.
+    A disturbance that grows like exp(s t) obeys (s^2 M + s (C + D) + K) x = 0, with symmetric matrices. Where the sum
+    is positive definite, every disturbance grows more slowly than s. This is tested at `slowest`, below which the rate
+    is 0, and then for s doubled again and again.
 
     Args:
         axes: (0, 1), (0, 1, 2) or (0, 1, 2, 3).
         states: (k, n, nc) [m].
-        velocities: with which they are gone through (k, n, nc) [m/s]: friction mu N of what slides at a speed v resists
-            what goes across by mu N/v, and of what is at rest by as much as holds it.
-        histories: what lies behind the states, a `History` with arrays (1 or k, ...).
+        velocities: (k, n, nc) [m/s] in these states. Friction mu N of a part that slides at a speed v resists sideways
+            motion by mu N/v; of a part at rest it resists by as much as holds it.
+        histories: what earlier steps left behind at the states, a `History` with arrays (1 or k, ...).
         density: linear density [kg/m].
         dragged: drag coefficient [N s/m^2].
         e: elimination of the held degrees of freedom.

@@ -1,4 +1,4 @@
-"""What grasps hold, compiled: their rows, the control points that are solved for them, and where their paths begin."""
+"""What grasps hold, compiled: their rows, the control points eliminated for them, and the starts of their paths."""
 
 from typing import Any
 
@@ -10,8 +10,8 @@ from dlocore.kernels.banded import elimination
 from dlocore.kernels.basis import basis, find_span
 from dlocore.kernels.strain import cross, transport, vector
 
-ROW = 17  # numbers that describe a row
-_JUMP = 2  # in place of a derivative: what the slope jumps by
+ROW = 17  # numbers in a row
+_JUMP = 2  # in place of the order of a derivative: the jump of the slope
 
 
 @brief
@@ -38,32 +38,33 @@ def hold_rows(
     knots: Any, nc: int, times: Any, rows: Any, sampled: Any, origin: Any, axes: Any, clamps: Any, spins: Any, q: Any,
     radius: float,
 ) -> Any:  # fmt: skip
-    """Solve what grasps hold for one control point each (docs/model.md eq. 11, 12).
+    """Solve each condition that grasps impose for one control point (docs/model.md eq. 11, 12).
 
-    At a triple knot inside a spline may have a kink. The angle of the sections has one, where a gripper turns them or
-    their bends jump; the centreline has none, so that a row more holds the jump of its slope at zero, grasp or no
-    grasp.
+    At an interior triple knot a spline may have a kink. The angle of the sections has one there, where a gripper turns
+    them or their bends jump. The centreline has none: an additional row keeps the jump of its slope at zero, whether
+    there is a grasp or not.
 
     Args:
         knots: (n + 4,) [m].
         nc: number of coordinates of a control point.
         times: (k,) [s].
-        rows: (r, ROW) what acts on every coordinate of the centreline: where [m], whether it is a direction, whether
-            its grasp holds the direction, the number of its path in `sampled` or -1, begin [s], the straight move of
-            a point or the turn about one axis of a direction (`dlocore.scene.paths.Move.line` and `turn`: duration [s],
-            profile (5), and displacement [m] or rotation vector [rad] (3)) and value at the beginning (3) in the world.
-            `dlocore/problem/holding.py` writes them.
+        rows: (r, ROW) conditions on every coordinate of the centreline. Each has: the place [m], whether it holds a
+            direction, whether its grasp holds the direction, the number of its path in `sampled` or -1, the start of
+            the path [s], the straight move of a point or the turn about one axis of a direction
+            (`dlocore.scene.paths.Move.line` and `turn`: duration [s], profile (5), and displacement [m] or rotation
+            vector [rad] (3)), and the value at the start (3) in the world. `dlocore/problem/holding.py` writes them.
         sampled: (m, k, 3) points [m] or unit tangents over time of other paths, in the world.
         origin, axes: (3,) [m] and (dimensions, 3), of the coordinates of the solve.
-        clamps: (c, 2) which of the rows holds the direction where the angle of the section is held, too, and the number
-            of its spin in `spins` or -1.
-        spins: (m, k) [rad] how much a gripper has turned about the cable since the first of the times, of other paths.
-        q: (n, nc) the state at the first of the times, whose angles the sections have there.
-        radius: of the fourth coordinate [m], which is an angle times that.
+        clamps: (c, 2) for each clamp, which also holds the angle of the section: the row of its direction, and the
+            number of its spin in `spins` or -1.
+        spins: (m, k) [rad] rotation of a gripper about the cable since the first of the times, for other paths.
+        q: (n, nc) the state at the first of the times, which gives the angles of the sections there.
+        radius: factor of the fourth coordinate [m], which is an angle times this radius.
 
     Returns:
         The `Elimination`, the prescribed part (k, held) [m] of the held degrees of freedom, and the inverses (rows,
-        rows) and (c, c) of the rows' pivot blocks; rows are those given, then one for each triple knot.
+        rows) and (c, c) of the pivot blocks of the rows. The rows are the given ones, followed by one for each triple
+        knot.
     """
     given, nd = len(rows), len(axes)
     kinks = _triple_knots(knots)
@@ -116,14 +117,14 @@ def hold_rows(
 
 @law
 def _done(row: Any, t: float) -> float:
-    """Return the share of its way that the path of a row, of those of `hold_rows`, has done at time t [s]."""
+    """Return the share of its way that the path of a row of `hold_rows` has covered at time t [s]."""
     x = min(max((t - row[4]) / row[5], 0.0), 1.0)
     return float(x * (row[6] + x * (row[7] + x * (row[8] + x * (row[9] + x * row[10])))))
 
 
 @law
 def _turned(row: Any, done: float, x: Vector) -> Vector:
-    """Return x turned by a share of the rotation of a row, of those of `hold_rows` (Rodrigues)."""
+    """Return x turned by the share `done` of the rotation of a row of `hold_rows` (Rodrigues)."""
     full = np.sqrt(row[11] * row[11] + row[12] * row[12] + row[13] * row[13])
     if full == 0.0:
         return x
@@ -141,9 +142,9 @@ def _turned(row: Any, done: float, x: Vector) -> Vector:
 
 @kernel
 def _spin_of(row: Any, times: Any) -> Any:
-    """Return by how much a gripper has turned about the cable at `times`, by its row of `hold_rows`; see `spun`.
+    """Return how far the gripper of a row of `hold_rows` has turned about the cable at `times`; see `spun`.
 
-    It turns about one axis, to which the angle of the tangent stays.
+    It turns about one axis, and the angle between this axis and the tangent stays the same.
     """
     tangent = (row[14], row[15], row[16])
     about = row[11] * tangent[0] + row[12] * tangent[1] + row[13] * tangent[2]
@@ -167,15 +168,15 @@ def _spin_of(row: Any, times: Any) -> Any:
 
 @brief
 def spun(tangents: Any, directors: Any, expected: Any) -> Any:
-    """Return by how much a gripper has turned about the cable since the first of some times (k,) [rad].
+    """Return how far a gripper has turned about the cable since the first of the times (k,) [rad].
 
-    It is measured against a frame that the smallest rotations carry from each tangent to the next, and counts full
-    turns.
+    The angle is measured against a frame that the smallest rotations carry from each tangent to the next; full turns
+    count.
 
     Args:
         tangents: (k, 3) unit tangents of the cable, fixed in the gripper, over time.
-        directors: (k, 3) a unit vector across them, fixed in the gripper.
-        expected: (k - 1,) turn between each two of the times, to less than half a turn [rad].
+        directors: (k, 3) unit vectors perpendicular to them, fixed in the gripper.
+        expected: (k - 1,) rotation between consecutive times, correct to less than half a turn [rad].
     """
     out = np.zeros(len(tangents))
     for k in range(1, len(tangents)):
@@ -190,7 +191,7 @@ def spun(tangents: Any, directors: Any, expected: Any) -> Any:
 
 @kernel
 def _triple_knots(knots: Any) -> Any:
-    """Return the places (k,) [m] of the triple knots inside."""
+    """Return the places (k,) [m] of the interior triple knots."""
     places = np.empty(len(knots))
     count = 0
     for k in range(4, len(knots) - 6):
@@ -204,8 +205,8 @@ def _triple_knots(knots: Any) -> Any:
 def _solved_for(knots: Any, u: Any, order: Any, first: Any) -> Any:
     """Return the pivots of the rows at `u`, the inverse of their block, and how they follow the other control points.
 
-    Pivots are chosen by Gauss elimination, the rows `first` before the others: a held direction has just two control
-    points to choose from, so it chooses before its neighbours do.
+    Pivots are chosen by Gauss elimination, for the rows `first` before the others: a held direction has only two
+    control points to choose from, so it chooses before its neighbours do.
     """
     rows, n = len(u), len(knots) - 4
     A = np.zeros((rows, n))
@@ -242,7 +243,7 @@ def _solved_for(knots: Any, u: Any, order: Any, first: Any) -> Any:
 
 @kernel
 def _inverse(block: Any) -> Any:
-    """Return the inverse of a small matrix by Gauss-Jordan elimination with row pivoting; `block` is spoilt."""
+    """Return the inverse of a small matrix by Gauss-Jordan elimination with row pivoting; `block` is overwritten."""
     n = len(block)
     inverse = np.eye(n)
     for c in range(n):

@@ -1,7 +1,7 @@
-"""Inertia and drag of a time step: what mass and drag matrix add to residual and tangent.
+"""Inertia and drag of a time step: the contributions of the mass and drag matrices to residual and tangent.
 
-The drag matrix is the unit matrix of the basis, the integrals of b_i b_j du, times a density; the mass matrix that with
-the point masses (`basis.Tables.inertia`), times another; both are alike in every coordinate.
+The drag matrix is a density times the unit matrix of the basis, the integrals of b_i b_j du. The mass matrix is another
+density times the same matrix with the point masses (`basis.Tables.inertia`). Both are the same for every coordinate.
 """
 
 from typing import Any
@@ -10,12 +10,12 @@ import numpy as np
 
 from dlocore.compiling.kernel import kernel, part
 
-_REACH = 3  # control points to either side that a control point shares a span with
+_REACH = 3  # control points on either side that share a span with a control point
 
 
 @kernel
 def both_sides(unit: Any) -> Any:
-    """Return the rows (n, 7) of a symmetric matrix, whose lower band is `unit` (n, 4) [m], from left to right."""
+    """Return the rows (n, 7), from left to right, of the symmetric matrix with the lower band `unit` (n, 4) [m]."""
     n = len(unit)
     rows = np.zeros((n, 2 * _REACH + 1))
     for i in range(n):
@@ -27,7 +27,7 @@ def both_sides(unit: Any) -> Any:
 
 @kernel
 def padded(n: int, nc: int) -> Any:
-    """Return room (n + 6, 2 nc) for what `residual` multiplies by matrices, with rows of zeros at both ends."""
+    """Allocate workspace (n + 6, 2 nc) for vectors that `residual` multiplies by matrices; its end rows are zero."""
     return np.zeros((n + 2 * _REACH, 2 * nc))
 
 
@@ -42,13 +42,13 @@ def residual(
 
     Args:
         nc: coordinates of a control point.
-        heavy, rows: of the matrices of inertia and of drag, see `both_sides`.
-        density: of the mass matrix [kg/m].
-        dragged: that of the drag matrix [N s/m^2].
-        alpha_m, alpha_f: shares of the step's beginning.
-        a, a1, v1: accelerations at its beginning and its end, and velocity at its end.
-        load, G: applied forces, and G at its beginning.
-        stacked: of `padded`; overwritten.
+        heavy, rows: rows of the matrices of inertia and of drag, see `both_sides`.
+        density: factor of the mass matrix [kg/m].
+        dragged: factor of the drag matrix [N s/m^2].
+        alpha_m, alpha_f: weights of the beginning of the step.
+        a, a1, v1: accelerations at the beginning and the end of the step, and velocity at its end.
+        load, G: applied forces, and G at the beginning of the step.
+        stacked: workspace of `padded`; overwritten.
     """
     n = len(rows)
     for i in range(n):
@@ -69,15 +69,15 @@ def residual(
 def follow(
     nc: int, heavy: Any, inertia: float, share: float, change: Any, moved: Any, f: Any, stacked: Any
 ) -> None:  # fmt: skip
-    """Add to the forces f (n, nc) [N], to first order, what a change (n, nc) [m] of the control points makes of them.
+    """Add to the forces f (n, nc) [N] their change, to first order, due to a change (n, nc) [m] of the control points.
 
     Args:
         nc: coordinates of a control point.
         heavy: rows of the matrix of inertia, see `both_sides`.
-        inertia: what the step makes of its density [N/m^2], see `effective`.
-        share: of the forces in the tangent of the step.
-        moved: that tangent times the change (n nc,) [N].
-        stacked: of `padded`; overwritten.
+        inertia: factor of the matrix of inertia in the tangent of the step [N/m^2], see `effective`.
+        share: factor of the forces in the tangent of the step.
+        moved: the tangent of the step times the change (n nc,) [N].
+        stacked: workspace of `padded`; overwritten.
     """
     n = len(heavy)
     for i in range(n):
@@ -95,8 +95,8 @@ def follow(
 def effective(nc: int, K: Any, heavy: Any, unit: Any, inertia: float, share: float, drag: float) -> None:
     """Turn the tangent K (n nc, 4 nc) of the forces into that of a step: share K + inertia H + drag U.
 
-    `heavy` and `unit` (n, 4) are the lower bands of the matrices of inertia H and of drag U, `inertia` and `drag`
-    [N/m^2] what the step makes of their densities.
+    `heavy` and `unit` (n, 4) are the lower bands of the matrices of inertia H and of drag U; `inertia` and `drag`
+    [N/m^2] are their factors.
     """
     size, width = K.shape
     for j in range(size):

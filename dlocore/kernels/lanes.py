@@ -1,10 +1,9 @@
-"""Knot spans side by side: what a compiler makes vector instructions of.
+"""Knot spans side by side, in a layout that a compiler turns into vector instructions.
 
-Spans are taken SPANS at a time, a group. A number of a span is at SPANS places in a row, one for each of them, a number
-of its curvature points, of which it has POINTS, at LANES places: that of point m of span s is at SPANS m + s. Rows of
-one kind lie in one array, at places that the compiler knows: it would else have to find out each time which of them are
-the same. Loops over less than sixteen places it would not make vectors of. Where a cable has no more spans, its last
-one is repeated.
+Spans are processed in groups of SPANS. A row holds one number of every span in SPANS places, or one number of every
+curvature point, POINTS in each span, in LANES places: point m of span s is at the lane SPANS m + s. The rows of a kind
+are in one array, at places known to the compiler; otherwise it would have to check each time which of them overlap. It
+would not vectorise loops over fewer than sixteen places. Where a cable has no more spans, its last one is repeated.
 """
 
 from typing import Any
@@ -17,18 +16,19 @@ from dlocore.effects.base import Vector
 SPANS, POINTS = 16, 3
 LANES = SPANS * POINTS
 # rows of `side_by_side`: four basis functions, their first and their second derivatives; weight [m]; share of a point
-# in the mean of its span; place from the middle [m] and share in the slope [1/m], zero where a span has none
+# in the mean of its span; distance from the middle [m] and share in the slope [1/m], both zero where a span has only a
+# mean
 VALUES, FIRSTS, SECONDS, WEIGHT, SHARE, LEVER, SLOPE = 0, 4, 8, 12, 13, 14, 15
 _ROWS = 16
-TRIPLE = 3  # control points on from one span to the next across a triple knot
+TRIPLE = 3  # control points by which the next span's first one is ahead across a triple knot
 
 
 @kernel
 def side_by_side(first: Any, u: Any, weights: Any, b0: Any, b1: Any, b2: Any) -> Any:
-    """Return the basis functions at the curvature points (groups, 16 LANES), and how their values are smoothed.
+    """Return the basis functions at the curvature points (groups, 16 LANES), and how values there are smoothed.
 
-    In a span they become the mean, sum SHARE x, and in the two end spans and beside a triple knot the straight line
-    through them, sum SHARE x + LEVER sum SLOPE x.
+    In a span the values x become their mean, sum SHARE x. In the two end spans and beside a triple knot they become the
+    straight line through them, sum SHARE x + LEVER sum SLOPE x.
     """
     spans = len(first) // POINTS
     out = np.zeros((-(-spans // SPANS), _ROWS * LANES))
@@ -61,25 +61,25 @@ def side_by_side(first: Any, u: Any, weights: Any, b0: Any, b1: Any, b2: Any) ->
 
 @law
 def at(W: Any, row: int, lane: int) -> float:
-    """Return what a row has at a lane."""
+    """Return the number of a row at a lane."""
     return W[row * LANES + lane]
 
 
 @law
 def put(W: Any, row: int, lane: int, x: float) -> None:
-    """Set what a row has at a lane."""
+    """Set the number of a row at a lane."""
     W[row * LANES + lane] = x
 
 
 @law
 def vector_at(W: Any, row: int, lane: int) -> Vector:
-    """Return what three rows have at a lane."""
+    """Return the vector in three rows at a lane."""
     return W[row * LANES + lane], W[(row + 1) * LANES + lane], W[(row + 2) * LANES + lane]
 
 
 @law
 def put_vector(W: Any, row: int, lane: int, x: Vector) -> None:
-    """Set what three rows have at a lane."""
+    """Set the vector in three rows at a lane."""
     W[row * LANES + lane] = x[0]
     W[(row + 1) * LANES + lane] = x[1]
     W[(row + 2) * LANES + lane] = x[2]
@@ -93,16 +93,17 @@ def added(W: Any, row: int, s: int) -> float:
 
 @law
 def over(T: Any, share: int, W: Any, row: int, s: int) -> float:
-    """Return the sum of a row of W over the points of span s, each times what the row `share` of T has there."""
+    """Return the sum of a row of W over the points of span s, weighted by the row `share` of T."""
     a, b = share * LANES + s, row * LANES + s
     return T[a] * W[b] + T[a + SPANS] * W[b + SPANS] + T[a + 2 * SPANS] * W[b + 2 * SPANS]
 
 
 @law
 def combined(W: Any, place: int, T: Any, row: int, lane: int) -> float:
-    """Return the combination of the coordinate at `place` of four control points, by four rows of T at a lane.
+    """Return the combination of a coordinate of four control points, weighted by four rows of T at a lane.
 
-    Control points of a span, four coordinates each, are at 16 rows of SPANS places.
+    The control points of a span, with four coordinates each, are in 16 rows of SPANS places; `place` is that of the
+    coordinate of the first one.
     """
     own = T[row * LANES + lane] * W[place] + T[(row + 1) * LANES + lane] * W[place + 4 * SPANS]
     more = T[(row + 2) * LANES + lane] * W[place + 8 * SPANS]

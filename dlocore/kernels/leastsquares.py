@@ -23,12 +23,13 @@ class Equations(NamedTuple):
         first, table: (k,), (k, 3, 4): time basis functions and two derivatives at the points, POINTS in each span.
         weights: (k,) [s].
         h: length of a time span [s].
-        density: of the mass matrix [kg/m].
-        dragged: of linear drag [N s/m^2], where its matrix is like the mass matrix: there are no point masses.
-        beside: the same where it isn't; one of the two is zero.
+        density: factor of the mass matrix [kg/m].
+        dragged: coefficient of linear drag [N s/m^2] without point masses, where the drag matrix is proportional to the
+            mass matrix.
+        beside: the same coefficient with point masses; one of the two is zero.
         tables: `basis.Tables`.
         active, p: switches and parameters of the laws.
-        histories: `History` with arrays (1 or k, ...), what lies behind each point.
+        histories: `History` with arrays (1 or k, ...), what earlier steps left behind at each point.
         applied: (1 or k, n, nc) [N].
         e: elimination of the held degrees of freedom.
     """
@@ -55,7 +56,8 @@ def collocation(knots: Any) -> Any:
 
     Returns:
         the points (k,) [s], POINTS in each span, their weights (k,) [s], first control points (k,) and basis functions
-        with two derivatives (k, 3, 4) there; and even times (6 k / POINTS + 1,) from the first to the last knot.
+        with two derivatives (k, 3, 4) there; and evenly spaced times (6 k / POINTS + 1,) from the first to the last
+        knot.
     """
     times, weights = np.empty(POINTS * len(knots)), np.empty(POINTS * len(knots))
     k = 0
@@ -80,17 +82,17 @@ def _strain(points: Any, n: int, q: Any) -> float:
 def resting_strains(
     times: Any, states: Any, at: Any, tables: Any, behind: Any, stiffness: float, viscosity: float, soft: float
 ) -> Any:
-    """Return `behind` with the stress-free strain with which a softer cable bears the tension of a march.
+    """Return `behind` with stress-free strains for which a softer cable has the tension of a march.
 
-    That is N_m + EA_b (e - e_m) of the strain e, where the march has the strain e_m and, with the damping of stretch,
-    the tension N_m (docs/model.md eq. 15b).
+    At the strain e the tension is then N_m + EA_b (e - e_m), where the march has the strain e_m and, including the
+    damping of stretch, the tension N_m (docs/model.md eq. 15b).
 
     Args:
         times, states: of the march, (s,) [s] and (s, n, nc).
         at: (k,) [s].
         tables: `basis.Tables`.
         behind: `History.axial` of the march at these times (1 or k, points, 3).
-        stiffness, viscosity: EA [N] and what damps stretch [N s] in the march.
+        stiffness, viscosity: EA [N] and damping of stretch [N s] in the march.
         soft: EA_b [N].
     """
     out = np.empty((len(at), behind.shape[1], 3))
@@ -119,7 +121,7 @@ def band_to_dense(A: Any, out: Any) -> None:
 
 
 class Sparse(NamedTuple):
-    """A symmetric matrix: its diagonal (n,), and rows, columns and values (m,) of what is right of it and not zero."""
+    """A symmetric matrix: its diagonal (n,), and row, column and value (m,) of each nonzero entry right of it."""
 
     diagonal: Any
     row: Any
@@ -172,8 +174,8 @@ def _times_rows(B: Any, X: Any, out: Any) -> None:
 def _products(X: Any, Y: Any, out: Any) -> None:
     """Write X' Y (m, m).
 
-    Four rows at a time, to pass less often over the result, and whole rows also where it is symmetric: half rows, that
-    begin anywhere, take longer up to 40 columns and hardly less beyond.
+    Four rows are added at a time, to pass over the result less often. Rows are computed in full even where the result
+    is symmetric: half rows that begin anywhere take longer up to 40 columns, and hardly less beyond.
     """
     n, m = X.shape
     out[:] = 0.0
@@ -193,7 +195,7 @@ def _products(X: Any, Y: Any, out: Any) -> None:
 
 @leaf
 def states_at(first: Any, table: Any, C: Any, out: Any) -> None:
-    """Write q, v and a (3, n, nc) of the control points C (n_t, n, nc) with basis `table` (3, 4) from `first`."""
+    """Write q, v and a (3, n, nc) of control points C (n_t, n, nc) by the time basis `table` (3, 4) from `first` on."""
     for o in range(3):
         b0, b1, b2, b3 = table[o, 0], table[o, 1], table[o, 2], table[o, 3]
         for i in range(out.shape[1]):
@@ -205,7 +207,7 @@ def states_at(first: Any, table: Any, C: Any, out: Any) -> None:
 
 @leaf
 def _add_inertia(eq: Any, k: int, state: Any, moved: Any, f: Any) -> None:
-    """Add inertia, linear drag and applied forces of the point k to the internal forces f (n, nc) [N]."""
+    """Add inertia, linear drag and applied forces at point k to the internal forces f (n, nc) [N]."""
     load = eq.applied[min(k, len(eq.applied) - 1)]
     for i in range(f.shape[0]):
         for d in range(f.shape[1]):
@@ -218,7 +220,7 @@ def _add_inertia(eq: Any, k: int, state: Any, moved: Any, f: Any) -> None:
 
 @kernel
 def holding_forces(eq: Any, C: Any) -> Any:
-    """Return what holds the cable at the collocation points (k, held) [N], and their states (k, n, nc) [m]."""
+    """Return the reaction forces (k, held) [N] at the collocation points, and the states (k, n, nc) [m] there."""
     nc, n, held = len(eq.axes), C.shape[1], eq.e.held
     forces, states = np.empty((len(eq.first), len(held))), np.empty((len(eq.first), n, nc))
     f, K, moved, state = np.empty((n, nc)), np.empty((1, 1)), np.empty((n, nc)), np.empty((3, n, nc))
@@ -237,20 +239,21 @@ def holding_forces(eq: Any, C: Any) -> Any:
 def normal_equations(eq: Any, C: Any, A: Any, right: Any, matrix: bool, begin: int, end: int) -> float:
     """Add time spans to the normal equations of the weighted least squares at C; return their part of the objective.
 
-    The objective [J] is (1/T) sum_k w_k |W_k Z' R_k|^2 with the residual R = M a + C v + f(q, v) - F of the motion at
-    the collocation point k and W'W = G^-1 B G^-1, B = 12/h^2 M + 2/h C, G = B + K+ + 2/h N (docs/model.md eq. 16).
+    The objective [J] is (1/T) sum_k w_k |W_k Z' R_k|^2, with the residual R = M a + C v + f(q, v) - F of the motion at
+    the collocation point k and W'W = G^-1 B G^-1, B = 12/h^2 M + 2/h C, G = B + K+ + 2/h N (docs/model.md eq. 16, where
+    N is V).
 
-    Masses, and linear drag where it is no part of N, are parts of B, and K+ = G - B - 2/h N, so that by the control
-    point with basis function c G^-1 dR = c I + d S + e V, with S = G^-1 B, V = G^-1 N and numbers d, e. The products
-    of three matrices serve all pairs of control points, and B S and S' B S are symmetric. The right side alone takes
-    none: S' y = B G^-1 y.
+    Mass, and linear drag where it is not part of N, belong to B. With K+ = G - B - 2/h N, the derivative by the control
+    point with the time basis function c is G^-1 dR = c I + d S + e V, with S = G^-1 B, V = G^-1 N and numbers d and e.
+    So the products of three matrices serve all pairs of control points; B S and S' B S are symmetric. The right side
+    alone needs no products: S' y = B G^-1 y.
 
     Args:
         eq: `Equations`.
         C: control points (n_t, n, nc) [m]; the first two are given.
-        A, right: normal matrix, (n_t - 2, free, 4 free), see `blocks.py`, and right side, which are added to.
-        matrix: whether A is wanted; else it is left alone.
-        begin, end: time spans to add.
+        A, right: normal matrix, (n_t - 2, free, 4 free), see `blocks.py`, and right side; both are added to.
+        matrix: whether A is wanted; otherwise it is left unchanged.
+        begin, end: range of the time spans to add.
     """
     nc, n, e, h = len(eq.axes), C.shape[1], eq.e, eq.h
     size = n * nc
@@ -332,14 +335,14 @@ def normal_equations(eq: Any, C: Any, A: Any, right: Any, matrix: bool, begin: i
 def _parts(basis: Any, mass: float, drag: float, h: float) -> tuple[float, float, float]:
     """Return c, d and e of G^-1 dR = c I + d S + e V for `basis` (3,), a basis function and its derivatives.
 
-    `mass` and `drag` are density and drag coefficient over that of B.
+    `mass` and `drag` are the density and the drag coefficient divided by that of B.
     """
     return basis[0], mass * basis[2] + drag * basis[1] - basis[0], basis[1] - 2.0 / h * basis[0]
 
 
 @leaf
 def _add_span(A: Any, t: int, shares: Any, parts: Any, B: Any, P: Any, Q: Any) -> None:
-    """Add what the two points of a span count in the blocks of its four control points, from the t-th unknown on.
+    """Add the contribution of the two points of a span to the blocks of its four control points, from unknown t on.
 
     P and Q (2, free, free) are B S and S' B S at the points.
     """
@@ -361,7 +364,7 @@ def _add_span(A: Any, t: int, shares: Any, parts: Any, B: Any, P: Any, Q: Any) -
 
 @kernel
 def _add_viscous(A: Any, t: int, share: float, parts: Any, BV: Any, SBV: Any, VBV: Any) -> None:
-    """Add what damping counts at a point, as `_add_span` adds the rest."""
+    """Add the contribution of damping at a point, in the same way as `_add_span`."""
     free = len(BV)
     VB, VBS = BV.T.copy(), SBV.T.copy()
     for j in range(max(0, -t), 4):

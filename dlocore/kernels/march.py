@@ -33,23 +33,23 @@ from dlocore.kernels.selfcontact import closing, factor_wide, press, solve_wide,
 from dlocore.kernels.tension import assume_last, keep, point_on
 
 FAILED_STEP, LEFT, DEEPEST, DIVIDED_FROM, STRUCK = range(5)  # places in `info`
-_REFRESH = 0.2  # contraction of the updates above which the old factors no longer serve
-_UNMEASURED = 8  # steps in a row that end with their first update, as the contraction that was last measured allows
-_DOUBT = 3.0  # times that contraction it may be
-_PLAIN_ITERATIONS = 8  # Newton iterations before a step is done again with a line search
-_MIXED_ITERATIONS = 80  # with mixing, which learns from iterations with the same factors
+_REFRESH = 0.2  # contraction of the updates above which the tangent is factored anew
+_UNMEASURED = 8  # most consecutive steps that may end with their first update, judged by the last measured contraction
+_DOUBT = 3.0  # safety factor on that contraction
+_PLAIN_ITERATIONS = 8  # Newton iterations before a step is repeated with a line search
+_MIXED_ITERATIONS = 80  # the same with mixing, which learns from iterations with the same factors
 _ROBUST_ITERATIONS = 60
-_STRIKE = 0.02  # [m/s]: a node that comes faster to what it touches would bounce, by an amount that steps decide
-_DULL = 3  # steps by backward Euler, of which the cable does not bounce
-_LINE_SEARCH = 12  # looks along a step
+_STRIKE = 0.02  # [m/s]: a node that approaches faster would bounce, by an amount that depends on the steps
+_DULL = 3  # steps by backward Euler, in which the cable does not bounce
+_LINE_SEARCH = 12  # most evaluations along a step
 
 
 @brief
 def constrained_mass_solve(nc: int, mass: Any, e: Any, held: Any, right: Any) -> Any:
-    """Return x (n, nc) with Z' M x = Z' right and the held degrees of freedom placed by `held`.
+    """Return x (n, nc) with Z' M x = Z' right, where `held` places the held degrees of freedom.
 
-    With right = M v this is the velocity after the grasps close (the paper's initial conditions made compatible); with
-    right = forces, the consistent acceleration.
+    With right = M v this is the velocity after the grasps close (the paper's initial conditions made compatible). With
+    right = forces it is the consistent acceleration.
     """
     n = len(mass)
     x = np.zeros((n, nc))
@@ -68,35 +68,35 @@ def march_steps(
     a: Any, G: Any, density: float, dragged: float, tables: Any, active: Any, p: Any, history: Any, applied: Any,
     e: Any, offsets: Any, reactions: Any, log: Any, info: Any,
 ) -> None:  # fmt: skip
-    """Advance from step `start` to `stop` by the generalised-alpha method, see `newmark.py`.
+    """Advance from step `start` to `stop` by the generalised-alpha method (docs/model.md eq. 13; `newmark.py`).
 
     M [(1 - alpha_m) a1 + alpha_m a0] + (1 - alpha_f) G1 + alpha_f G0 = 0 with G = f(q, v) + C v - F, and Newmark's
-    relations between q, v and a. The first Newton step of a time step has the full tangent, later ones its factors, and
-    are corrected by earlier ones where the band can't hold all of the tangent. A step that does not converge so, or
-    whose tangent is not positive, is done again with the positive semidefinite part of the tangent where needed and a
-    line search on the work of the residual.
+    relations between q, v and a. The first Newton iteration of a time step uses the full tangent, later ones its
+    factors. Earlier iterations correct them where the band cannot hold the whole tangent. If a step does not converge,
+    or its tangent is not positive definite, it is repeated with a line search on the work of the residual, and with the
+    positive semidefinite part of the tangent where needed.
 
     Args:
         axes: (0, 1), (0, 1, 2) or (0, 1, 2, 3).
         start, stop: step numbers.
-        begin: first step of the smooth stretch of motion that `start` lies in.
-        jumps: whether that stretch begins with a jump or a strike: a and G tell nothing of it that lasts for a step.
+        begin: first step of the smooth stretch of motion that contains `start`.
+        jumps: whether that stretch begins with a jump or a strike, whose a and G do not last for a step.
         h: time step [s].
-        rho: spectral radius at infinite frequency, 0 (strong damping of the unresolved) to 1 (none).
+        rho: spectral radius at infinite frequency, 0 (strong damping of what is not resolved) to 1 (no damping).
         tolerance: on the estimated error of the Newton iteration [m], largest component.
         Q: (steps + 1, n, nc) control points; written from start + 1 to stop.
-        v, a, G: (n, nc) velocity, acceleration and G at step `start`; at `stop` on return.
-        density: linear density [kg/m], of the mass matrix.
-        dragged: drag coefficient [N s/m^2], of the drag matrix.
+        v, a, G: (n, nc) velocity, acceleration and G at step `start`; on return, at `stop`.
+        density: linear density [kg/m], factor of the mass matrix.
+        dragged: drag coefficient [N s/m^2], factor of the drag matrix.
         history: what earlier steps left behind; read and written where a law keeps it.
         applied: (1 or steps + 1, n, nc) applied forces [N].
         e: elimination of the held degrees of freedom.
-        offsets: (steps + 1, held) their prescribed part [m].
-        reactions: (steps + 1, held) forces that hold them [N]; written.
+        offsets: (steps + 1, held) prescribed part of the held degrees of freedom [m].
+        reactions: (steps + 1, held) reaction forces [N]; written.
         log: (steps + 1, points, columns) frames and memory, see `note`; or (0, 0, 0).
-        info: (5,) the step that found no equilibrium or is to be divided, or -1, the largest error that Newton's
-            iterations left [m], the largest depth in an obstacle or the table [m], read: the first step that is to be
-            divided if the cable strikes something in it, and 1 where that is why a step is to be divided.
+        info: (5,) in this order: the step that found no equilibrium or is to be divided, or -1; the largest error that
+            Newton's iterations left [m]; the largest depth in an obstacle or the table [m]; as input, the first step
+            that is to be divided if the cable strikes something in it; 1 if a strike is why a step is to be divided.
     """
     nc = len(axes)
     keeps = keeps_history(active)
@@ -108,15 +108,15 @@ def march_steps(
     to_v = gamma / (beta * h)
     touches = bool(active[CONTACT])
     tight = bool(active[SELF_CONTACT])
-    # steps to come by backward Euler; the first one, where the acceleration at the start knows of no contact yet, or
-    # is that of the instant of a jump or a strike
+    # remaining steps by backward Euler: the first step is one if the acceleration at the start does not include contact
+    # yet, or is that of the instant of a jump or a strike
     dull = 1 if (touches or jumps) and start == begin else 0
-    # the tangent of this damping is not complete; across kinks earlier iterations teach nothing
+    # the tangent of this damping is incomplete; across kinks earlier iterations teach nothing
     mixes = nc == 3 and bool(active[DAMPING]) and not exact and not tight
     smooth = not mixes and not exact
     plain_iterations = _MIXED_ITERATIONS if mixes else _PLAIN_ITERATIONS
     free = size - len(e.held)
-    largest = 10.0 * np.sum(tables.span)  # an update of ten lengths is divergence
+    largest = 10.0 * np.sum(tables.span)  # an update of more than ten lengths is divergence
     K = np.empty((size, 4 * nc))
     A = np.zeros((free + ROOM, e.width))
     f = np.empty((n, nc))
@@ -141,8 +141,8 @@ def march_steps(
     S = np.zeros((free if tight else 0, free if tight else 0))
     filled, columns = np.empty_like(row_end), np.empty(S.shape, np.int32)
     pairs, wide, depth, share = 0, False, 0.0, 1.0
-    first_contraction, first_update, unmeasured = 1.0, 1.0, _UNMEASURED  # of the first update of a step, as measured
-    # the acceleration at the start knows of no damping yet, which would make too much of it
+    first_contraction, first_update, unmeasured = 1.0, 1.0, _UNMEASURED  # measured for first updates
+    # the acceleration at the start does not include this damping yet: a prediction with it would go too far
     bent = 0.0 if mixes else 0.5
     mixing, differences = room(free if mixes else 0), -1
     past = differences_of(Q[begin : start + 1])
@@ -150,14 +150,14 @@ def march_steps(
         load = applied[min(k, len(applied) - 1)]
         q0 = Q[k - 1]
         order = predict_by(past, k - begin)
-        # backward differences for the rate of curvature: in the plane its force has a potential, and an exact tangent
+        # rates of curvature are backward differences: in the plane their force has a potential, and an exact tangent
         rates = (1.5 / h, -2.0 / h, 0.5 / h, h) if k - begin > 1 else (1.0 / h, -1.0 / h, 0.0, h)
         first = 2 if dull > 0 else 0
         attempts = 4 if touches or tight or dull > 0 else 2
         dull -= 1
         converged = False
-        # plain and robust; where the cable strikes something, both by backward Euler; plain ones first with the tension
-        # of the last step, then, where nothing touches, with that at hand
+        # attempts: plain, then robust; where the cable strikes something, both again by backward Euler. Plain attempts
+        # first use the tension of the last step; then, where nothing touches, the current one
         for turn in range(2 * attempts):
             attempt = turn // 2
             robust = attempt % 2 == 1
@@ -192,7 +192,7 @@ def march_steps(
                 share = clear(q0, q1, tables.strands, p, x0, x1, near)
                 if share < 1.0:
                     converged = False
-                    continue  # what is held passes through a strand
+                    continue  # a held point or direction would pass through a strand
             assume_last(history.tension, assumes)
             # --- iterate
             limit = plain_iterations if not robust else _ROBUST_ITERATIONS
@@ -237,7 +237,7 @@ def march_steps(
                 if mixes:
                     differences = mixed(mixing, -1 if refactor else differences, trial_x[:free])
                 expand_vector(e, trial_x, change)
-                update = 0.0  # largest step of a control point, the same in every frame
+                update = 0.0  # largest step of a control point, the same in every frame of reference
                 for i in range(n):
                     square = 0.0
                     for d in range(nc):
@@ -254,7 +254,8 @@ def march_steps(
                     for i in range(free):
                         work += trial_x[i] * x[i]
                 if work < 0.0:
-                    # the work of the residual along the step rises through zero where the step's potential is least
+                    # along the step, the work of the residual rises through zero where the potential of the step is
+                    # smallest
                     low, low_work, high, high_work = 0.0, work, length, 0.0
                     for search in range(_LINE_SEARCH):
                         q2 = q1 + length * step_change
@@ -282,12 +283,12 @@ def march_steps(
                         q1[i, d] += s
                         v1[i, d] += tv * s
                         a1[i, d] += ta * s
-                # with contraction c the error left after this update is c/(1-c) of it
+                # with the contraction c, the error left after this update is c/(1-c) times it
                 left = update
                 if it > 0:
                     contraction = min(update / previous, 1.0)
                     left *= min(1.0, contraction / (1.0 - contraction + 1e-300))
-                else:  # as that of a first update lately was; of Newton's method it is in proportion to the update
+                else:  # as recently measured for first updates; in Newton's method it is proportional to the update
                     contraction = min(first_contraction * max(1.0, update / first_update), 0.5)
                     if not robust and smooth and pairs == 0 and unmeasured < _UNMEASURED:
                         left *= _DOUBT * contraction / (1.0 - contraction)
@@ -329,7 +330,7 @@ def march_steps(
             return
         keep(history.tension)
         unmeasured += 1
-        anew = exact or pairs > 0 or work < 0.0  # where the law has kinks, or a line search has looked farther
+        anew = exact or pairs > 0 or work < 0.0  # where a law has kinks, or a line search has evaluated elsewhere
         if anew:
             assemble(axes, q1, v1, tables, active, p, history, rates, (0.0, 0.0, 0.0), f, K)
             if tight:
@@ -340,12 +341,12 @@ def march_steps(
             info[DEEPEST] = max(info[DEEPEST], remember(axes, q1, tables, active, p, history, h, False))
             if len(log) > 0:
                 note(axes, history, log[k])
-        # the last update is not in R and f yet
+        # R and f do not include the last update yet
         if anew:
             for i in range(len(e.held)):
                 reactions[k, i] = flat[e.held[i]]
         else:
-            # its first order is that of the tangent
+            # to first order, the tangent gives its effect
             if mixes:
                 multiply_band(K, change, moved)
                 for i in range(len(e.held)):

@@ -1,9 +1,9 @@
-"""Newton's steps with an incomplete tangent, corrected by what the last ones taught (Anderson's mixing).
+"""Newton's steps with an incomplete tangent, corrected by the last ones (Anderson mixing).
 
-The tangent of bending damping in space leaves out what the spin of the sections owes to all of the cable. It does not
-fit into the band, but few motions feel it. From iterates x and their plain steps f = -A^-1 R(x), the differences of f
-tell how far the tangent A was right along the differences of x, and the next step is corrected by it: the few motions
-that A misjudges converge as the others do.
+The tangent of bending damping in space leaves out how the spin of the sections depends on the whole cable. That does
+not fit into the band, but affects few motions. From iterates x and their plain steps f = -A^-1 R(x), the differences of
+f show how far the tangent A was right along the differences of x, and the next step is corrected accordingly: the few
+motions that A misjudges converge as fast as the others.
 """
 
 from typing import Any, NamedTuple
@@ -13,13 +13,11 @@ import numpy as np
 from dlocore.compiling.kernel import kernel
 
 DEPTH = 40  # differences that are kept
-_PARALLEL = 1e-10  # of a difference: what is left of it beside the others that is only rounding
+_PARALLEL = 1e-10  # a difference is dropped if the share of it that is independent of the others is less: rounding
 
 
 class Mixing(NamedTuple):
-    """Room for the differences of plain steps, made orthonormal, and of iterates (DEPTH, n), and for the last of both
-    steps (2, n).
-    """
+    """Workspace: differences of plain steps, made orthonormal, and of iterates (DEPTH, n); the last of both (2, n)."""
 
     steps: Any
     iterates: Any
@@ -28,15 +26,15 @@ class Mixing(NamedTuple):
 
 @kernel
 def room(n: int) -> Any:
-    """Return room for iterates of n numbers."""
+    """Allocate `Mixing` for iterates of n numbers."""
     return Mixing(np.empty((DEPTH, n)), np.empty((DEPTH, n)), np.empty((2, n)))
 
 
 @kernel
 def mixed(mixing: Any, known: int, f: Any) -> int:
-    """Correct the plain step f (n,) in place; return how many differences are known after it.
+    """Correct the plain step f (n,) in place; return how many differences are known afterwards.
 
-    `known` is the number before, negative at the first step with a tangent.
+    `known` is their number before, negative at the first step with a tangent.
     """
     steps, iterates, last = mixing
     n = len(f)

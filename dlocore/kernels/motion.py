@@ -1,4 +1,4 @@
-"""A whole smooth motion without twist in one call: much of the time of a short march goes into what passes between."""
+"""A whole smooth motion without twist in one call, as a short march spends much of its time between its parts."""
 
 from typing import Any
 
@@ -25,7 +25,7 @@ from dlocore.kernels.space import ROOM, ROOM_OF_POINT
 from dlocore.kernels.tension import COLUMNS
 from dlocore.kernels.timefit import fitted
 
-# places in `info` after those of `march_steps`, and their number
+# places in `info` after those of `march_steps`, and the total number of places
 STRAIN, LEAST_SLOPE, MOST_SLOPE, GROWTH, SEEN = 5, 6, 7, 8, 9
 
 
@@ -38,29 +38,29 @@ def smooth_motion(
 ) -> Any:  # fmt: skip
     """March a smooth motion without twist from its start, and fit the time spline to it.
 
-    It is `build_tables`, `remember_start`, `hold_rows`, `begin_stretch`, `lasting`, `march_steps`, `to_ends_of_steps`,
-    `after_jump` and `fitted` one after the other: see there for what is not said here.
+    Calls `build_tables`, `remember_start`, `hold_rows`, `begin_stretch`, `lasting`, `march_steps`, `to_ends_of_steps`,
+    `after_jump` and `fitted` in this order; see there for arguments that are not described here.
 
     Args:
         axes: (0, 1) or (0, 1, 2).
         masses: point masses, as `build_tables` takes them.
         start, velocity: (n, nc) [m, m/s] of the control points at t = 0.
         memory: (points, 2) stress-free curvature and its natural value [1/m], in the plane; (0, 2) for a straight one.
-        times: (steps + 1 + near,) [s] `near` times at the beginning, for velocity and acceleration of the paths, and
-            those of the steps.
-        rows, sampled: what is held at `times`.
+        times: (steps + 1 + near,) [s] `near` times at the beginning, for velocity and acceleration of the paths,
+            followed by those of the steps.
+        rows, sampled: conditions of the grasps at `times`.
         origin, directions: (3,) [m] and (nc, 3), of the coordinates of the solve.
         weight: (nc,) [N/m] per unit length.
-        least_jump: of the velocity, in a step, that counts as a jump [m].
-        every: of how many states one is searched for folds.
-        looks: how many states are looked at, at least, for whether a disturbance may grow.
-        info: (SEEN,) as in `march_steps`, and the largest axial strain of the motion, the least and the largest |r'| at
-            the curvature points, and the logarithm of what a disturbance grows by at most, about.
+        least_jump: least jump of the velocity, times a step, that counts as a jump [m].
+        every: every this many states, one is searched for folds.
+        looks: least number of states at which the growth of a disturbance is checked; 0 for no check.
+        info: (SEEN,) as in `march_steps`, followed by the largest axial strain of the motion, the least and the largest
+            |r'| at the curvature points, and an approximate bound on the logarithm of the growth of a disturbance.
 
     Returns:
-        The states (steps + 1, n, nc) [m], the velocity (n, nc) [m/s] just after t = 0, the forces (steps + 1, held)
-        [N] that hold them, what lies behind the motion at its end, the control points (n_t, n, nc) [m] of the time
-        spline and what it misses each state by (steps + 1,) [m].
+        The states (steps + 1, n, nc) [m], the velocity (n, nc) [m/s] just after t = 0, the reaction forces (steps + 1,
+        held) [N], the `History` at the end of the motion, the control points (n_t, n, nc) [m] of the time spline, and
+        the distance by which it misses each state (steps + 1,) [m].
     """
     one = np.int64(1)
     tables = build_tables(
@@ -89,7 +89,7 @@ def smooth_motion(
         for d in range(nc):
             load[0, i, d] = tables.weight[i] * weight[d]
     steps = len(times) - near - 1
-    first, inertial = np.int64(0), np.bool_(True)  # as constants they would have kernels of their own compiled
+    first, inertial = np.int64(0), np.bool_(True)  # passed as constants, they would have separate kernels compiled
     h = times[near + 1] - times[near]
     closed, a, G, jump = begin_stretch(
         axes, start, velocity, density, dragged, tables, active, p, history, NO_RATES, load[0], e,
@@ -116,7 +116,7 @@ def smooth_motion(
     info[STRAIN] = max(0.0, most - 1.0, 1.0 - least)
     info[LEAST_SLOPE], info[MOST_SLOPE] = slopes(states, every, tables.curvature.first, tables.curvature.b1)
     if looks > 0:
-        # by np.expand_dims they would be arrays of another kind, for which the rest would be compiled anew
+        # np.expand_dims would give another array type, for which the rest would be compiled again
         m, past, axial = history.memory, history.past, history.axial
         kept = m.reshape((1, *m.shape)), past.reshape((1, *past.shape)), axial.reshape((1, *axial.shape))
         behind = History(*kept, history.stick, history.slide, history.pressing, np.zeros((0, COLUMNS)), history.room)

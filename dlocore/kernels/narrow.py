@@ -1,8 +1,8 @@
-"""Factorisation and solution of the bands of a march, of a width that the compiler knows.
+"""Factorisation and solution of the bands of a march, whose width the compiler knows.
 
-They are those of `banded.py`. The plane's band of eight is written out, so that rows are kept in registers, which is
-three to four times as fast; the loops of wider ones are unrolled. The matrix is followed by ROOM rows of zeros and the
-vector by ROOM zeros, which takes the place of a look whether a column ends early.
+The bands are those of `banded.py`. The plane's band of eight is written out, so that rows stay in registers; this is
+three to four times as fast. The loops of wider bands are unrolled. ROOM rows of zeros follow the matrix and ROOM zeros
+follow the vector, so that no check is needed whether a column ends early.
 """
 
 from typing import Any
@@ -12,7 +12,7 @@ from dlocore.kernels.banded import factor, solve
 
 ROOM = 16  # rows beyond the last
 WIDTH = 8  # of the band that is written out: two coordinates of four control points
-SPACE, TWISTED = 12, 16  # of those in space: three and four coordinates
+SPACE, TWISTED = 12, 16  # of the bands in space: three and four coordinates
 
 
 @law
@@ -96,7 +96,7 @@ def solve_step(A: Any, n: int, x: Any) -> None:
     x1 = x2 = x3 = x4 = x5 = x6 = x7 = 0.0
     for j in range(n - 1, -1, -1):
         _, a1, a2, a3, a4, a5, a6, a7 = _row(A, j)
-        # the newest one last: the others do not wait for it
+        # the newest one last: the others need not wait for it
         s = x[j] - (a7 * x7 + a6 * x6 + a5 * x5 + a4 * x4 + a3 * x3 + a2 * x2) - a1 * x1
         x[j] = s
         x1, x2, x3, x4, x5, x6, x7 = s, x1, x2, x3, x4, x5, x6
@@ -118,7 +118,7 @@ def _factor_columns(A: Any, n: int, width: int) -> int:
             ratio = A[j, i] * inverse
             for k in range(i, width):
                 A[j + i, k - i] -= ratio * A[j, k]
-            # the loop above still needs the unscaled entries of this column to the right of i only
+            # the loop above needs only the unscaled entries to the right of i in this column
             A[j, i] = ratio
     return -1
 
@@ -134,6 +134,6 @@ def _solve_columns(A: Any, n: int, x: Any, width: int) -> None:
         x[i] = 0.0
     for j in range(n - 1, -1, -1):
         total = x[j]
-        for i in range(width - 1, 0, -1):  # the newest one last: the others do not wait for it
+        for i in range(width - 1, 0, -1):  # the newest one last: the others need not wait for it
             total -= A[j, i] * x[j + i]
         x[j] = total

@@ -1,8 +1,8 @@
-"""Pairs of the cable's strands that are near each other, known as long as the cable moves little.
+"""Pairs of the cable's strands that are near each other, kept as long as the cable moves little.
 
-To place all strand nodes of a long thin cable and look for pairs takes longer than the rest of an assembly. So pairs
-are looked for up to `_ROOM` diameters farther apart than where strands meet; until two points of the cable have moved
-that far against each other, all that meet are among them.
+For a long thin cable, placing all strand nodes and searching for pairs takes longer than the rest of an assembly.
+Therefore the search includes pairs up to `_ROOM` diameters farther apart than where strands meet. Until two points of
+the cable have moved by that distance against each other, all pairs that meet are among those found.
 """
 
 from typing import Any, NamedTuple
@@ -14,19 +14,20 @@ from dlocore.effects.laws import SELF_CONTACT
 from dlocore.kernels.strands import clear_way, clear_way_of, near_pairs
 
 _ROOM = 2.0  # diameters
-_FIRST = 64  # pairs that there is room for at first
+_FIRST = 64  # pairs that fit into the first array
 
 
 class Nearby(NamedTuple):
-    """What is known of pairs of segments between neighbouring strand nodes.
+    """The known pairs of segments between neighbouring strand nodes.
 
-    Arrays of pairs that may be replaced by larger ones are in lists: as variables they cost counts in every step.
+    Arrays of pairs may be replaced by larger ones. They are in lists, as variables would cost reference counts in every
+    step.
 
     Attributes:
-        pairs, count: a list of one array (room, 2) of those near each other, and how many (1,) they are; -1 before the
-            first look.
-        seen: control points (n, nc) [m] at the last look.
-        met: a list of one array (room, 2) of those that touch.
+        pairs, count: a list with one array (room, 2) of the pairs near each other, and their number (1,), -1 before the
+            first search.
+        seen: control points (n, nc) [m] at the last search.
+        met: a list with one array (room, 2) of the pairs in contact.
     """
 
     pairs: Any
@@ -37,7 +38,7 @@ class Nearby(NamedTuple):
 
 @kernel
 def nothing_known(n: int, nc: int) -> Any:
-    """Return a `Nearby` for n control points."""
+    """Return an empty `Nearby` for n control points."""
     count, seen = np.full(1, -1, np.int64), np.zeros((n, nc))
     return Nearby([np.empty((_FIRST, 2), np.int64)], count, seen, [np.empty((_FIRST, 2), np.int64)])
 
@@ -61,7 +62,7 @@ def place_nodes(q: Any, nodes: Any, x: Any) -> None:
 
 @leaf
 def place_pairs(q: Any, nodes: Any, pairs: Any, count: int, x: Any) -> None:
-    """Do what `place_nodes` does for the ends of `count` pairs of segments; other nodes may stay as they are."""
+    """Do the same as `place_nodes` for the ends of `count` pairs of segments only; other nodes may stay as they are."""
     if 2 * count > len(x):
         place_nodes(q, nodes, x)
         return
@@ -90,7 +91,7 @@ def _is_known(q: Any, seen: Any, count: int, nd: int, D: float) -> bool:
 
 @kernel
 def look(q: Any, nodes: Any, p: Any, x: Any, near: Any) -> None:
-    """Place the nodes x of the pairs that may meet at the control points q (n, nc), of which `near` has all then."""
+    """Update `near` to include all pairs that may meet at the control points q (n, nc), and place their nodes x."""
     D = p[SELF_CONTACT, 0]
     if _is_known(q, near.seen, near.count[0], x.shape[1], D):
         place_pairs(q, nodes, near.pairs[0], near.count[0], x)
@@ -102,9 +103,9 @@ def look(q: Any, nodes: Any, p: Any, x: Any, near: Any) -> None:
 
 @kernel
 def clear(q0: Any, q1: Any, nodes: Any, p: Any, x0: Any, x1: Any, near: Any) -> float:
-    """Return how far, 0 to 1, the cable may go from q0 straight to q1 (n, nc) without strands passing strands.
+    """Return how far, 0 to 1, the cable may move straight from q0 to q1 (n, nc) before strands pass through strands.
 
-    x0, x1 (nodes, 2 or 3) are written, for pairs at least that are near each other.
+    x0, x1 (nodes, 2 or 3) are written, at least for pairs that are near each other.
     """
     D = p[SELF_CONTACT, 0]
     pairs, seen, count, nd = near.pairs[0], near.seen, near.count[0], x0.shape[1]

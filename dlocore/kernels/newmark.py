@@ -1,4 +1,4 @@
-"""The coefficients of a time step, shared by all that steps through a motion."""
+"""The coefficients of a time step, shared by everything that steps through a motion."""
 
 from dlocore.compiling.kernel import law
 
@@ -7,9 +7,9 @@ from dlocore.compiling.kernel import law
 def coefficients(rho: float, jumps: bool) -> tuple[float, float, float, float]:
     """Return (alpha_m, alpha_f, gamma, beta) of a step of spectral radius `rho` at infinite frequency.
 
-    The generalised-alpha method (Chung and Hulbert, 1993). Where forces jump, as those of contact do, they are balanced
-    at the end of the step, alpha_f = 0: the method of Wood, Bossak and Zienkiewicz (1980), which has the same gamma and
-    beta. Both are of second order, and the same for rho = 0.
+    This is the generalised-alpha method (Chung and Hulbert, 1993). Where forces jump, as those of contact do, they are
+    balanced at the end of the step, alpha_f = 0: the method of Wood, Bossak and Zienkiewicz (1980), with the same gamma
+    and beta. Both methods are of second order, and they are identical for rho = 0.
     """
     apart = (rho - 1.0) / (rho + 1.0)
     alpha_f = 0.0 if jumps else rho / (rho + 1.0)

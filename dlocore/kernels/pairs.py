@@ -1,10 +1,10 @@
-"""Tangents of the curvature points of a knot span, added up before they go into the band.
+"""Tangents of the curvature points of a knot span, summed before they are added to the band.
 
-What a point adds to the block of the tangent between control points i and j is a sum of blocks of the point, each times
-a product of a derivative of a basis function of i and one of j. `Tables.curvature.pairs` (points, PAIRS, 4) has these
-products. The blocks of a point and the sums of its span lie in one array, a row each, so that whole rows are added: a
-compiler that sees them in two would have to find out each time that they are not the same. With twist there are too
-many blocks for that, and spans are taken side by side, see `lanes.py`.
+A point adds to the tangent's block of control points i and j a sum of blocks of the point, each times a product of a
+derivative of the basis function of i and one of j. `Tables.curvature.pairs` (points, PAIRS, 4) holds these products.
+The blocks of a point and the sums of its span are rows of one array, so that whole rows are added: with two arrays, a
+compiler would have to check each time whether they overlap. With twist there are too many blocks for that, and spans
+are processed side by side, see `lanes.py`.
 """
 
 from typing import Any
@@ -13,10 +13,10 @@ import numpy as np
 
 from dlocore.compiling.kernel import kernel, part
 
-# of control point i, then of j: B the first and C the second derivative of its basis function
+# of control point i, then of j: B is the first and C the second derivative of its basis function
 BB, BC, CB, CC = range(4)
 PAIRS = 10  # i >= j of four control points, column by column
-SUMS = 4  # the first row of sums; those before are the blocks of a point, by BB, BC, CB and CC
+SUMS = 4  # the first row of sums; the rows before are the blocks of a point, by BB, BC, CB and CC
 
 
 @kernel
@@ -40,7 +40,7 @@ def add_point(blocks: Any, products: Any) -> None:
 
     Column nc e + d is the entry of coordinate d of control point i and coordinate e of j.
     """
-    columns = blocks.shape[1]  # a number that the compiler knew would be unrolled, not made vectors of
+    columns = blocks.shape[1]  # a number known to the compiler would be unrolled instead of vectorised
     for pair in range(PAIRS):
         bb, bc, cb, cc = products[pair, BB], products[pair, BC], products[pair, CB], products[pair, CC]
         for c in range(columns):

@@ -1,6 +1,6 @@
 """Assembly in the plane: two coordinates, one signed curvature.
 
-All that is local to a point is scalars and tuples, never small arrays: the compiler then keeps it in registers, which
+Everything local to a point is scalars and tuples, never small arrays, so that the compiler keeps it in registers. This
 is more than twice as fast (docs/model.md, cost).
 """
 
@@ -50,7 +50,7 @@ def axial(
 ) -> None:  # fmt: skip
     """Add the forces and tangents of the axial site.
 
-    `past` holds the stress-free strain and that of two steps, `kept` what the tangent of a march knows of the tension.
+    `past` holds the stress-free strain and the strain of the last two steps; `kept` is `History.tension`.
     """
     elastic, viscous, geometric = scales
     if viscous != 0.0 and rates[0] != 0.0:
@@ -79,7 +79,7 @@ def axial(
             f[k + i, 0] += b[i] * gx
             f[k + i, 1] += b[i] * gy
         if tangent:
-            # the part of the stress is positive only in tension
+            # the part due to the stress is positive only in tension
             pull = assumed(kept, n, tension) if geometric != 0.0 else tension
             stress = w * (geometric * pull if geometric != 0.0 else elastic * max(pull, 0.0)) * inverse
             along = (w * (elastic * modulus + viscous * viscosity) - stress) * inverse * inverse
@@ -95,7 +95,7 @@ def curvature(
     q: Any, v: Any, points: Any, active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any, tangent: bool,
     f: Any, K: Any,
 ) -> None:  # fmt: skip
-    """Add the forces and tangents of the curvature site; `past` holds kappa of the two last steps (points, 2)."""
+    """Add the forces and tangents of the curvature site; `past` holds kappa of the last two steps (points, 2)."""
     elastic, viscous, geometric = scales
     if viscous != 0.0 and rates[0] != 0.0:
         viscous = rates[0]
@@ -134,7 +134,7 @@ def curvature(
             cc, cd, dd = s2 * J[2], s2 * J[3], s3 * J[3]
             for j in range(4):
                 bj, cj = b[j], c[j]
-                # of the forces by r' and by r'', with respect to control point j: rows, columns x, y
+                # derivatives of the forces by r' and by r'' with respect to control point j: rows, columns x, y
                 pxx, pxy, pyx, pyy = bj * aa + cj * ac, bj * ab + cj * ad, bj * ab + cj * bc, bj * bb + cj * bd
                 rxx, rxy, ryx, ryy = bj * ac + cj * cc, bj * bc + cj * cd, bj * ad + cj * cd, bj * bd + cj * dd
                 for i in range(j, 4):
@@ -156,7 +156,7 @@ def curvature_at(q: Any, points: Any, n: int) -> float:
 
 @leaf
 def remember(q: Any, points: Any, active: Any, p: Any, memory: Any, past: Any, h: float) -> None:
-    """Make kappa of q the last one in `past` (points, 2), the last one the one before; let what yielded be memory."""
+    """Shift `past` (points, 2) so that kappa of q is its last entry, and let what yielded in a step h become memory."""
     for n in range(len(past)):
         kappa = curvature_at(q, points, n)
         free, _ = curvature_memory(

@@ -1,4 +1,4 @@
-"""Where a motion goes in the next step, by the differences of its last states."""
+"""Prediction of the next step of a motion from the differences of its last states."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from dlocore.compiling.kernel import kernel, leaf
 
-ORDERS = 5  # differences at most: of states that are known to a tolerance, higher ones are noise
+ORDERS = 5  # differences at most: states are known to a tolerance, so higher ones are noise
 
 
 @kernel
@@ -20,7 +20,7 @@ def differences_of(states: Any) -> Any:
 
 @leaf
 def shift(past: Any, q: Any) -> None:
-    """Move the differences on to the next state q (n, nc): past[m] is its m-th backward difference."""
+    """Advance the differences to the next state q (n, nc): past[m] is its m-th backward difference."""
     for i in range(q.shape[0]):
         for d in range(q.shape[1]):
             x = q[i, d]
@@ -34,11 +34,12 @@ def shift(past: Any, q: Any) -> None:
 def predict_by(past: Any, known: int) -> int:
     """Return how many differences predict the next state best, 0 where fewer than four states are known.
 
-    A prediction q_k + ... + past[m - 1] erred by past[m] in the last step: the order is taken that erred least.
+    In the last step, a prediction q_k + ... + past[m - 1] had the error past[m]; the order with the smallest error is
+    taken.
     """
     best, least = 0, np.inf
     for order in range(2, min(known, len(past))):
-        square = 0.0  # the same in every frame
+        square = 0.0  # the same in every frame of reference
         for i in range(past.shape[1]):
             for d in range(past.shape[2]):
                 square += past[order, i, d] * past[order, i, d]

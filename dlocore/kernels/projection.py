@@ -1,4 +1,4 @@
-"""Splines on other knots, and control points in the solve's and in the world's coordinates."""
+"""Splines on other knots, and control points in coordinates of the solve and of the world."""
 
 from typing import Any
 
@@ -13,8 +13,8 @@ from dlocore.kernels.basis import basis_rows, gauss_points
 def on_knots(given: Any, control: Any, knots: Any, rule: Any, weights: Any) -> Any:
     """Return control points (n, m) on clamped cubic `knots` (n + 4,) of a spline on the knots `given`.
 
-    A single polynomial is carried over exactly, and so is a spline to its own knots; else it is the least squares fit
-    over the length, by the Gauss `rule` with `weights` in each span.
+    A single polynomial is transferred exactly, and so is a spline to its own knots. Otherwise the result is the least
+    squares fit over the length, by the Gauss `rule` with `weights` in each span.
     """
     if len(control) == 4:
         return _blossom(given, control, knots)
@@ -44,7 +44,7 @@ def on_knots(given: Any, control: Any, knots: Any, rule: Any, weights: Any) -> A
 
 @kernel
 def _blossom(given: Any, control: Any, knots: Any) -> Any:
-    """Return the control points of a single cubic polynomial on any knots: its blossom at each three of them; exact."""
+    """Return control points of a single cubic polynomial on any knots, exactly: its blossom at every three knots."""
     length = given[-1]
     n, m = len(knots) - 4, control.shape[1]
     out = np.empty((n, m))

@@ -1,9 +1,9 @@
-"""Minimise the stored energy of a held cable: start shapes and static equilibria.
+"""Minimise the stored energy of a held cable, for start shapes and static equilibria.
 
-A step that bends a cable which hardly stretches by more than a thousandth of its length stretches it, to second order,
-by an energy that is more than all else: a line search on the energy creeps. Newton's method with the tension as an
-unknown of its own (`tension.py`) does not, so `descend` has none; `relax` has one, for what has kinks or no tangent to
-rely on.
+A step that bends a nearly inextensible cable by more than a thousandth of its length also stretches it, to second
+order. The energy of that stretch exceeds everything else, so that a line search on the energy creeps. Newton's method
+with the tension as an unknown of its own (`tension.py`) does not creep, so `descend` has no line search. `relax` has
+one, for energies that have kinks or no reliable tangent.
 """
 
 from typing import Any
@@ -24,9 +24,9 @@ from dlocore.kernels.tension import point_on
 from dlocore.kernels.twisted import remember as carry
 
 _PLAIN_ITERATIONS = 8
-_SHRINKS = 0.5  # of the update before, from the third on: more is no convergence
+_SHRINKS = 0.5  # of the previous update, from the third on: an update above this is not converging
 _HALVINGS = 30
-_DROWNED = 1e-9  # of the energy: differences of it that rounding may make where the cable hardly stretches
+_DROWNED = 1e-9  # relative to the energy: differences that rounding may cause where the cable hardly stretches
 
 
 @kernel
@@ -61,9 +61,9 @@ def relax(
     """Minimise energy over q (n, nc) in place by Newton steps with a line search; return (update [m], iterations).
 
     The energy is the stored one, minus the work of the applied forces, plus a spring of `strength` [N/m^2] towards
-    `target`. Where the tangent is not positive its positive semidefinite part is taken. The work of the
-    residual, not the energy, decides where energy differences drown in rounding. Frames of the sections are carried
-    along with every step: the tangent is exact at the carried frame alone.
+    `target`. Where the tangent is not positive definite, its positive semidefinite part is used. Where energy
+    differences drown in rounding, the work of the residual decides instead of the energy. Every step carries the frames
+    of the sections along: the tangent is exact only at the carried frame.
 
     Args:
         e, offset: elimination and prescribed part of the held degrees of freedom.
@@ -135,7 +135,7 @@ def relax(
             carry(q, tables.curvature, active, p, history.memory, history.past, 0.0, history.room)
         if update <= tolerance:
             return update, it + 1
-        if np.isfinite(after):  # carried frames change nothing but rounding
+        if np.isfinite(after):  # carrying the frames changes nothing but rounding
             energy = after
         else:
             energy = _merit(axes, q, target, strength, applied, tables, active, p, history, w)
@@ -147,17 +147,17 @@ def descend(
     axes: Any, q: Any, strength: float, applied: Any, tables: Any, active: Any, p: Any, history: Any, e: Any,
     offset: Any, close: float, tolerance: float, resting: float,
 ) -> Any:  # fmt: skip
-    """Minimise what `relax` does, with the spring towards q itself, by Newton's method alone; return the same.
+    """Minimise the energy of `relax`, with the spring towards q itself, by Newton's method alone; return the same.
 
-    Every tangent has to be positive, so that the cable walks downhill, and updates have to shrink. Where one is not, or
-    they don't, q (n, nc) and `history` are left as they were, and the update is infinite. `history.tension` holds the
-    tension that the first tangent takes, and on return that of q.
+    Every tangent must be positive definite, so that the cable moves downhill, and updates must shrink. Otherwise q (n,
+    nc) and `history` are left as they were, and the update is infinite. `history.tension` holds the tension that the
+    first tangent uses, and on return the tension at q.
 
     Args:
         e, offset: elimination and prescribed part of the held degrees of freedom.
-        close: share of the first update, on the last one.
-        tolerance: on the last update, where that is less [m].
-        resting: updates below that need not shrink [m].
+        close: tolerance on the last update as a share of the first.
+        tolerance: on the last update, where that is smaller [m].
+        resting: updates below this need not shrink [m].
     """
     nc = len(axes)
     n = q.shape[0]

@@ -1,16 +1,16 @@
 """Contact of the cable with itself: pairs of segments between neighbouring nodes, and the tangent they widen.
 
-A pair's distance rho is that of its closest points, slightly drawn to the segments' middles, so that it has a gradient
-and a Hessian also where the segments are parallel:
+The distance rho of a pair is that of its closest points, slightly drawn to the middles of the segments, so that it has
+a gradient and a Hessian even where the segments are parallel:
 
     rho^2 = min over s, t in [0, 1] of |x_i(s) - x_j(t)|^2 + eps [h_i^2 (s - 1/2)^2 + h_j^2 (t - 1/2)^2]
 
-with the segments' lengths h, at most D. It is too large by at most eps (h_i^2 + h_j^2)/(8 rho). Every pair of segments
-that are more than `separation` apart along the cable has the potential w phi(D - rho), w the shorter length: force and
-tangent are its exact derivatives.
+h are the lengths of the segments, at most D. rho is too large by at most eps (h_i^2 + h_j^2)/(8 rho). Every pair of
+segments more than `separation` apart along the cable has the potential w phi(D - rho), where w is the shorter length
+and phi is that of docs/model.md eq. 21. Force and tangent are its exact derivatives.
 
-A pair couples control points that are far apart along the cable. The reduced tangent is then kept by rows above its
-diagonal, each with the end of what a factorisation fills.
+A pair couples control points that are far apart along the cable. The reduced tangent is then stored by rows right of
+its diagonal, each up to the last entry that a factorisation fills.
 """
 
 from typing import Any
@@ -26,13 +26,13 @@ from dlocore.kernels.strands import between, between_nodes, closest, dot
 
 _DRAWN = 0.05  # eps
 _WINDOW = 8  # control points of a segment, at most
-_GATHERED = 3  # times as long takes an entry that is looked up as one that is next
+_GATHERED = 3  # cost of an indexed entry relative to a consecutive one
 _ROOM = 4096  # reduced entries of a pair, at most: held control points may follow many free ones
 
 
 @law
 def _pair(x: Any, u: Any, D: float, i: int, j: int) -> tuple[Vector, float, float, float, Vector, Vector, float, float]:
-    """Return the vector between the closest points of segments i and j, rho, s, t and the segments' vectors."""
+    """Return the vector between the closest points of segments i and j, rho, s, t, the segments' vectors and pulls."""
     a, b, r = between_nodes(x, i + 1, i), between_nodes(x, j + 1, j), between_nodes(x, i, j)
     pull_a, pull_b = _DRAWN * min(u[i + 1] - u[i], D) ** 2, _DRAWN * min(u[j + 1] - u[j], D) ** 2
     s, t = closest(r, a, b, pull_a, pull_b)
@@ -43,8 +43,8 @@ def _pair(x: Any, u: Any, D: float, i: int, j: int) -> tuple[Vector, float, floa
 
 @law
 def _spread_one(first: Any, b0: Any, i: int, s: float, sign: float, begin: int, point: Any, c: Any) -> int:
-    """Write the control points of segment i from place `begin` on and how they weigh in its point s; return the end."""
-    shift = min(first[i + 1] - first[i], 4)  # control points between those of its ends have no part in it
+    """Write the control points of segment i and their weights at its point s, from place `begin` on; return the end."""
+    shift = min(first[i + 1] - first[i], 4)  # control points between those of its ends have no weight
     for o in range(4 + shift):
         point[begin + o] = first[i] + o if o < shift else first[i + 1] + o - shift
         c[begin + o] = 0.0
@@ -56,10 +56,10 @@ def _spread_one(first: Any, b0: Any, i: int, s: float, sign: float, begin: int, 
 
 @kernel
 def _spread(first: Any, b0: Any, i: int, j: int, s: float, t: float, point: Any, c: Any) -> Any:
-    """Write the control points of segments i and j and how they weigh in point s of i minus point t of j.
+    """Write the control points of segments i and j and their weights in point s of i minus point t of j.
 
     Returns:
-        how many control points belong to i, and how many to both.
+        the number of control points of i, and that of both.
     """
     ni = _spread_one(first, b0, i, s, 1.0, 0, point, c)
     return ni, _spread_one(first, b0, j, t, -1.0, ni, point, c)
@@ -67,7 +67,7 @@ def _spread(first: Any, b0: Any, i: int, j: int, s: float, t: float, point: Any,
 
 @law
 def _rate(v: Any, point: Any, c: Any, m: int, y: Vector) -> float:
-    """Return y . (velocity of the one closest point minus that of the other)."""
+    """Return y . (velocity of the closest point of the first segment minus that of the second)."""
     total = 0.0
     for o in range(m):
         k = point[o]
@@ -79,11 +79,13 @@ def _rate(v: Any, point: Any, c: Any, m: int, y: Vector) -> float:
 
 @kernel
 def press(q: Any, v: Any, nodes: Any, p: Any, x: Any, near: Any, f: Any) -> Any:
-    """Subtract the forces of the contact from f (n, nc); return how many pairs touch, `near.met`, and how deep [m].
+    """Subtract the forces of the contact from f (n, nc); return the number of touching pairs and the depth [m].
+
+    The pairs are written to `near.met`.
 
     Args:
         q, v: control points and their velocities (n, nc) [m, m/s].
-        x: (nodes, 2 or 3), written: the positions of the nodes of these pairs at least [m].
+        x: (nodes, 2 or 3) positions of the nodes [m]; written, at least for these pairs.
         near: see `Nearby`.
     """
     look(q, nodes, p, x, near)
@@ -120,7 +122,7 @@ def press(q: Any, v: Any, nodes: Any, p: Any, x: Any, near: Any, f: Any) -> Any:
 def _pair_tangent(
     v: Any, u: Any, first: Any, b0: Any, push: Any, x: Any, i: int, j: int, scales: Any, point: Any, H: Any
 ) -> int:
-    """Write the control points of a pair to `point`, its tangent to H (m nd, m nd), and return their number m."""
+    """Write the control points of a pair to `point` and its tangent to H (m nd, m nd); return their number m."""
     elastic, viscous, geometric = scales
     nd = x.shape[1]
     y, rho, s, t, a, b, pull_a, pull_b = _pair(x, u, push[0], i, j)
@@ -130,7 +132,7 @@ def _pair_tangent(
     total, stiffness, viscosity = normal_force(push[1], push[2], push[3], push[0] - rho, leaving)
     w = min(u[i + 1] - u[i], u[j + 1] - u[j])
     size = m * nd
-    # derivatives of half rho^2: by the control points (g), and of its derivatives by s and t (vs, vt)
+    # derivatives of rho^2/2 by the control points (g), and of its derivatives by s and t (vs, vt)
     along = np.empty(2 * _WINDOW)
     _spread(first, b0, i, j, s + 1.0, t + 1.0, point, along)  # linear in s and t
     g = np.empty(size)
@@ -142,7 +144,7 @@ def _pair_tangent(
             g[o * nd + d] = c[o] * y[d]
             vs[o * nd + d] = c[o] * a[d] + (turn if o < ni else 0.0)
             vt[o * nd + d] = -c[o] * b[d] + (turn if o >= ni else 0.0)
-    # s and t follow where they are free, and stay where they are clamped
+    # s and t follow where they are free, and stay where they are at a bound
     A, B, C = dot(a, a) + pull_a, dot(b, b) + pull_b, -dot(a, b)
     free_s, free_t = 0.0 < s < 1.0, 0.0 < t < 1.0
     ss = tt = st = 0.0
@@ -168,14 +170,14 @@ def _pair_tangent(
 def widen(
     nc: int, v: Any, nodes: Any, p: Any, x: Any, found: Any, count: int, scales: Any, e: Any, A: Any, end: Any, S: Any
 ) -> None:
-    """Write the banded reduced tangent A (free, width) plus that of the pairs to S (free, free), above its diagonal.
+    """Write the banded reduced tangent A (free, width) plus that of the pairs to S (free, free), right of its diagonal.
 
     Args:
-        found, count: of `press`.
-        scales: of `assemble`, times what the tangent counts in a step.
+        found, count: pairs in contact and their number, from `press`.
+        scales: of `assemble`, times the factor of the tangent in a step.
         e: elimination of the held degrees of freedom.
-        S, end: what the last call wrote, and its factorisation, or zeros. `end` (free,) is the place after the last
-            column of each row that the factorisation fills.
+        S, end: what the last call wrote, and its factorisation, or zeros. `end` (free,) is one past the last column
+            that the factorisation fills in each row.
     """
     free, width = A.shape
     nd = x.shape[1]
@@ -218,11 +220,11 @@ def widen(
 
 @leaf
 def factor_wide(S: Any, end: Any, filled: Any, columns: Any) -> int:
-    """Factor S = U' D U in place, within its rows' ends; return -1, or the row where a pivot is not positive.
+    """Factor S = U' D U in place, up to the ends of its rows; return -1, or the row of a pivot that is not positive.
 
     Args:
-        filled, columns: (free,) and (free, free), written: how many columns of each row beyond the diagonal are not
-            zero, and which.
+        filled, columns: (free,) and (free, free), written: number and indices of the nonzero columns of each row beyond
+            the diagonal.
     """
     for j in range(len(end)):
         pivot = S[j, j]
@@ -266,7 +268,7 @@ def solve_wide(S: Any, filled: Any, columns: Any, x: Any) -> None:
 
 @kernel
 def closing(q0: Any, q1: Any, nodes: Any, p: Any, x0: Any, x1: Any, found: Any, count: int) -> float:
-    """Return how far, from q0 to q1, a pair that newly touches has come towards each other [m], the largest."""
+    """Return the largest approach [m], from q0 to q1, of a pair that comes into contact."""
     place_pairs(q0, nodes, found, count, x0)
     place_pairs(q1, nodes, found, count, x1)
     u, D = nodes.u, p[SELF_CONTACT, 0]

@@ -1,8 +1,8 @@
-"""Follow a motion beside a marched one: the same steps with the factors of the known motion.
+"""Follow a motion next to a marched one: the same steps, with the factors of the known motion.
 
-The derivative of a motion by a parameter is the difference of two motions beside it. They lie so near that the
-factorised tangent of the known motion serves every Newton step of theirs: no tangent is assembled, none factorised, and
-they are followed to rounding, which no march with a tolerance of its own could be told apart from.
+The derivative of a motion by a parameter is the difference of two neighbouring motions. They are so close that the
+factorised tangent of the known motion serves all their Newton steps: no tangent is assembled or factored. They are
+followed to rounding; a march with its own tolerance could not tell them apart.
 """
 
 from typing import Any
@@ -24,7 +24,7 @@ _ITERATIONS = 40
 def newmark(rho: float, h: float, late: bool) -> Any:
     """Return (alpha_m, alpha_f, gamma, to_a, to_v, carry) of a step, as in `march_steps` without forces that jump.
 
-    It is one of generalised alpha, or where it is `late` of backward Euler.
+    The step is of generalised alpha, or if `late` of backward Euler.
     """
     if late:
         return 0.0, 0.0, 1.0, 1.0 / (h * h), 1.0 / h, 0.0
@@ -39,11 +39,11 @@ def factor_steps(
 ) -> int:  # fmt: skip
     """Write the factors (steps, free, e.width) of the tangent of every step of a marched motion Q (steps + 1, n, nc).
 
-    v, a (n, nc) and `history` are those at its first state; at its last on return. Where it `jumps` there, the first
-    step is one by backward Euler. Where a tangent is not positive its positive semidefinite part is taken.
+    v, a (n, nc) and `history` are those of its first state; on return, of its last. If the motion `jumps` there, the
+    first step is by backward Euler. Where a tangent is not positive definite, its positive semidefinite part is used.
 
     Returns:
-        the number of steps at which that was so, or -1 where even that part could not be factorised.
+        the number of steps where that was the case, or -1 if even that part could not be factored.
     """
     nc = len(axes)
     n = Q.shape[1]
@@ -88,14 +88,14 @@ def follow_steps(
     G: Any, density: float, dragged: float, tables: Any, active: Any, p: Any, history: Any, applied: Any, e: Any,
     offsets: Any,
 ) -> float:  # fmt: skip
-    """Write to Q (steps + 1, n, nc) the motion beside the `known` one whose first state is Q[0].
+    """Write to Q (steps + 1, n, nc) the neighbouring motion of the `known` one that starts at Q[0].
 
-    The equations are those of `march_steps` with the arguments of the motion beside; `factors` are those of
-    `factor_steps` for the known motion. v, a, G (n, nc) and `history` are those at its first state; at its last on
-    return.
+    The equations are those of `march_steps` with the arguments of the neighbouring motion; `factors` are those of
+    `factor_steps` for the known motion. v, a, G (n, nc) and `history` are those of its first state; on return, of its
+    last.
 
     Returns:
-        the largest update [m] that was left at the end of a step's iteration, infinite where one did not converge.
+        the largest update [m] left at the end of a step's iteration, infinite where one did not converge.
     """
     nc = len(axes)
     n = Q.shape[1]
@@ -110,7 +110,7 @@ def follow_steps(
     x = np.empty(size - len(e.held))
     change = np.empty(size)
     keeps = keeps_history(active)
-    mixes = nc == 3 and bool(active[DAMPING])  # its tangent is not complete
+    mixes = nc == 3 and bool(active[DAMPING])  # the tangent is incomplete
     mixing, differences = room(len(x) if mixes else 0), -1
     worst = 0.0
     for k in range(1, len(Q)):

@@ -1,4 +1,4 @@
-"""How well each of many smoothnesses explains the data of a penalised spline."""
+"""How well each of many smoothing strengths explains the data of a penalised spline."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ import numpy as np
 from dlocore.compiling.kernel import brief
 from dlocore.kernels.banded import factor, solve
 
-LEAST_NOISE = 1e-6  # of the size of the data: below it rounding, not the data, would choose the smoothness
+LEAST_NOISE = 1e-6  # relative to the size of the data: below it, rounding would choose the smoothness, not the data
 TINY = 1e-300  # so that data that are all zero have a logarithm
 
 
@@ -15,9 +15,9 @@ TINY = 1e-300  # so that data that are all zero have a logarithm
 def scores(
     normal: Any, penalty: Any, right: Any, square: float, count: int, most_noise: float, strengths: Any
 ) -> Any:  # fmt: skip
-    """Return the restricted likelihood's -2 log (k,), up to a constant, for each lambda in `strengths` (k,).
+    """Return -2 log of the restricted likelihood (k,), up to a constant, for each lambda in `strengths` (k,).
 
-    It is infinite where lambda is so weak that rounding leaves a long gap between the data without a curve.
+    It is infinite where lambda is so weak that rounding leaves a long gap between the data undetermined.
 
     Args:
         normal, penalty: (n, 4) bands A and P, by column below their diagonals.
@@ -25,8 +25,8 @@ def scores(
         square: D + b . c, the sum w |y|^2 of the data.
         count: number of data.
         most_noise: bound on the standard deviation of a coordinate of the data.
-        strengths: (k,), growing. So does the least of the misfit and its penalty, but for rounding: where lambda is
-            so strong that rounding drowns that least, it counts as it was before.
+        strengths: (k,), increasing. The minimum of misfit plus penalty increases with them, apart from rounding; where
+            lambda is so strong that rounding drowns this minimum, its previous value is used.
     """
     n, width = normal.shape
     free = n - 3

@@ -1,6 +1,6 @@
-"""Assembly in space: three coordinates, a curvature vector across the tangent.
+"""Assembly in space: three coordinates, and a curvature vector perpendicular to the tangent.
 
-The axial and the body site serve four coordinates too, `nc` = 4 (`twisted.py`).
+The axial and body sites also serve four coordinates, `nc` = 4 (`twisted.py`).
 """
 
 from typing import Any
@@ -25,8 +25,8 @@ from dlocore.kernels.strain import space_curvature, space_curvature_rate, space_
 from dlocore.kernels.tension import AT_HAND, MODULUS, assumed
 
 STRAIGHT = (0.0, 0.0, 0.0)  # the stress-free curvature without a twist coordinate
-# Numbers that an assembly writes over: the blocks of a point and the sums of a span, see `pairs.py`, all zero to begin
-# with, as a span clears its sums; and for each curvature point.
+# Workspace of an assembly: the blocks of a point and the sums of a span, see `pairs.py`, which are zero at the start
+# because a span clears its sums; and the numbers for each curvature point.
 ROOM, ROOM_OF_POINT = 9 * (SUMS + PAIRS), 3 * STATE
 
 
@@ -62,7 +62,7 @@ def axial(
 ) -> None:  # fmt: skip
     """Add the forces and tangents of the axial site.
 
-    `past` holds the stress-free strain and that of two steps, `kept` what the tangent of a march knows of the tension.
+    `past` holds the stress-free strain and the strain of the last two steps; `kept` is `History.tension`.
     """
     elastic, viscous, geometric = scales
     if viscous != 0.0 and rates[0] != 0.0:
@@ -91,7 +91,7 @@ def axial(
             f[k + i, 1] += b[i] * g * y
             f[k + i, 2] += b[i] * g * z
         if tangent:
-            # the part of the stress is positive only in tension
+            # the part due to the stress is positive only in tension
             pull = assumed(kept, n, tension) if geometric != 0.0 else tension
             stress = w * (geometric * pull if geometric != 0.0 else elastic * max(pull, 0.0)) * inverse
             s = (w * (elastic * modulus + viscous * viscosity) - stress) * inverse * inverse
@@ -115,7 +115,7 @@ def _write_state(q: Any, points: Any, state: Any) -> None:
 
 @leaf
 def _write_rate(v: Any, points: Any, state: Any, turning: Any, rate: Any) -> None:
-    """Write the rates of the tangent and of the curvature as sections that do not spin see them (points, 3)."""
+    """Write the rate of the tangent, and that of the curvature seen by sections that do not spin (points, 3)."""
     for n in range(len(state)):
         k = points.first[n]
         a, c = combine(v, k, row_of(points.b1, n)), combine(v, k, row_of(points.b2, n))
@@ -134,10 +134,10 @@ def curvature(
 ) -> None:  # fmt: skip
     """Add the forces and tangents of the curvature site; `past` holds kappa of two steps and t of the last (points, 9).
 
-    With J = -h P / l^2 - kappa t' / l by r', and P / l by r'', the derivatives of kappa, the material part of the
-    tangent is J' S J, where S is a number, P kappa = kappa and P t = 0; the geometric part is M . d2kappa. Of damping,
-    what the spin of the sections depends on, all of the cable, and the torque that keeps them from twisting are in the
-    forces only. `room` is that of a `History`.
+    The derivatives of kappa are J = -h P / l^2 - kappa t' / l by r', and P / l by r''. The material part of the tangent
+    is J' S J, where S is a number, P kappa = kappa and P t = 0; the geometric part is M . d2kappa. Of damping, the
+    dependence on the spin of the sections, which couples the whole cable, and the torque that keeps the sections from
+    twisting are in the forces only. `room` is that of a `History`.
     """
     damped = len(points.w) if active[DAMPING] else 0
     blocks = room[:ROOM].reshape(SUMS + PAIRS, 9)
@@ -177,7 +177,7 @@ def curvature(
             f[k + i, 2] += bi * g[2] + ci * u[2]
         if not tangent:
             continue
-        # sections that have no orientation are alike across the tangent: J' J alone
+        # sections without orientation are alike in all directions across the tangent: J' J is enough
         stiff = w * (elastic * stiffness[0] + viscous * viscosity[0]) / (length * length)
         scale = w * geometric / (length * length)
         along = h / length

@@ -1,12 +1,13 @@
-"""Strain of the centreline and the generalised forces of stress: all geometry of the model lies here.
+"""Strain of the centreline and the generalised forces of stress: all geometry of the model is here.
 
 With l = |r'|, t = r'/l and P = I - t t' (docs/model.md eq. 3 to 6):
 
     axial strain  e = l - 1,
     curvature     kappa = dt/du = P r''/l; in the plane its signed value (r' x r'')/l^2.
 
-A moment M conjugate to kappa gives generalised forces g1, g2 conjugate to r', r''; its tangent has a material part
-J'SJ, positive semidefinite, and a geometric part M . d2kappa. In space M and kappa are vectors across the tangent.
+A moment M conjugate to kappa gives generalised forces g1, g2 conjugate to r', r''. Its tangent has a material part
+J'SJ, which is positive semidefinite, and a geometric part M . d2kappa. In space M and kappa are vectors perpendicular
+to the tangent.
 """
 
 from typing import Any
@@ -19,13 +20,13 @@ from dlocore.effects.base import Vector
 
 @law
 def vector(table: Any, n: int, at: int) -> Vector:
-    """Return three columns from `at` on of row n."""
+    """Return columns `at` to `at` + 2 of row n."""
     return table[n, at], table[n, at + 1], table[n, at + 2]
 
 
 @law
 def squared_slope(q: Any, first: int, b1: tuple[float, float, float, float], dimensions: int) -> float:
-    """Return |r'|^2 of the control points q (n, nc) where the functions of four of them have the derivatives b1."""
+    """Return |r'|^2 of control points q (n, nc) where the four basis functions from `first` have derivatives b1."""
     square = 0.0
     for d in range(dimensions):
         slope = b1[0] * q[first, d] + b1[1] * q[first + 1, d] + b1[2] * q[first + 2, d] + b1[3] * q[first + 3, d]
@@ -69,7 +70,7 @@ def space_curvature(a: Vector, c: Vector) -> tuple[float, float, Vector, Vector]
 
 @law
 def space_curvature_rate(length: float, h: float, t: Vector, kappa: Vector, da: Vector, dc: Vector) -> Vector:
-    """Return the rate of kappa seen by sections that do not spin, P kappa_t, of the rates da of r' and dc of r''."""
+    """Return the rate of kappa seen by sections that do not spin, P kappa_t, from the rates da of r' and dc of r''."""
     da_t = t[0] * da[0] + t[1] * da[1] + t[2] * da[2]
     dc_t = t[0] * dc[0] + t[1] * dc[1] + t[2] * dc[2]
     inverse = 1.0 / length
@@ -89,7 +90,7 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 @law
 def transport(t0: Vector, t1: Vector, x: Vector) -> Vector:
-    """Return x turned by the smallest rotation that brings the unit vector t0 to t1 (parallel transport)."""
+    """Return x after the smallest rotation that brings the unit vector t0 to t1 (parallel transport)."""
     cosine = t0[0] * t1[0] + t0[1] * t1[1] + t0[2] * t1[2]
     if cosine < -0.999999:
         return x
@@ -104,16 +105,16 @@ def transport(t0: Vector, t1: Vector, x: Vector) -> Vector:
 
 @law
 def twist_increment(t0: Vector, k0: Vector, t: Vector, kappa: Vector) -> tuple[float, Vector, Vector]:
-    """Return how much the twist of a frame grows that is carried from t0 to t, and its derivatives.
+    """Return the increase of the twist rate of a frame that is carried from t0 to t, and its derivatives.
 
-    A frame without twist along the cable, where the tangent is t0 with t0' = k0, is turned at every point by the
-    smallest rotation that brings t0 to t, where t' = kappa. Its twist rate is then (docs/model.md eq. 19)
+    A frame without twist along the cable has the tangent t0 with t0' = k0. At every point it is turned by the smallest
+    rotation that brings t0 to t, where t' = kappa. Its twist rate is then (docs/model.md eq. 19)
 
         s (t x t0) . (k0 + kappa),  s = 1/(1 + t . t0).
 
     Returns:
-        that twist rate [rad/m]; spin = s (t x t0), its derivative by kappa, which is also how much the carried frame
-        spins about t for each change of t; the derivative by t.
+        that twist rate [rad/m]; spin = s (t x t0), its derivative by kappa, which is also the spin of the carried frame
+        about t for each change of t; the derivative by t.
     """
     s = 1.0 / (1.0 + t[0] * t0[0] + t[1] * t0[1] + t[2] * t0[2])
     spin = (
@@ -137,7 +138,7 @@ def twist_increment(t0: Vector, k0: Vector, t: Vector, kappa: Vector) -> tuple[f
 
 @law
 def space_moment(length: float, h: float, t: Vector, kappa: Vector, M: Vector) -> tuple[Vector, Vector]:
-    """Return the generalised forces by r' and by r'' of the moment vector M across the tangent."""
+    """Return the generalised forces by r' and by r'' of the moment vector M perpendicular to the tangent."""
     inverse = 1.0 / length
     dot = (M[0] * kappa[0] + M[1] * kappa[1] + M[2] * kappa[2]) * inverse
     s = -h * inverse * inverse

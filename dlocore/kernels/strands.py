@@ -1,4 +1,4 @@
-"""Where strands of the cable are near each other, or meet: pairs of segments between neighbouring nodes."""
+"""Search for strands of the cable that are near each other or meet: pairs of segments between neighbouring nodes."""
 
 from typing import Any
 
@@ -7,15 +7,16 @@ import numpy as np
 from dlocore.compiling.kernel import kernel, law, leaf
 from dlocore.effects.base import Vector
 
-_SLACK = 0.9  # of a distance that is skipped along the cable: a strained cable is longer
+_SLACK = 0.9  # of a length that is skipped along the cable: a strained cable is longer
 _TOO_NEAR = 0.5  # of the diameter: no step brings strands from farther away nearer than this
-_LOOK = 1e-3  # diameters: the least way between two looks at a gap
+_LOOK = 1e-3  # diameters: the least distance between two evaluations of a gap
 _WIDE = 8.0  # times the distance of interest, or ...
-_WIDER = 0.3  # ... of the length between strands, up to which it is told how far apart they are
+_WIDER = 0.3  # ... of the length between strands: the larger is the distance up to which gaps are measured
 _KEPT = (
-    0.8  # of the length up to which strands can't be near, from which on they are looked at: states to come turn more
+    # strands are searched from this share of the length within which they can't be near: later states turn more
+    0.8
 )
-_BLOCK = 16  # segments that are looked at as one before each of them is
+_BLOCK = 16  # segments that are checked as one before each of them is
 
 
 @law
@@ -29,7 +30,7 @@ def between_nodes(x: Any, a: int, b: int) -> Vector:
 
 @law
 def dot(a: Vector, b: Vector) -> float:
-    """Return the product of two vectors."""
+    """Return the dot product of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
@@ -59,7 +60,7 @@ def between(r: Vector, a: Vector, b: Vector, s: float, t: float) -> Vector:
 
 @leaf
 def longest_part(u: Any) -> float:
-    """Return the largest distance of neighbours among u (k,)."""
+    """Return the largest distance between neighbours in u (k,)."""
     longest = 0.0
     for n in range(len(u) - 1):
         longest = max(longest, u[n + 1] - u[n])
@@ -68,7 +69,7 @@ def longest_part(u: Any) -> float:
 
 @kernel
 def _middles(x: Any) -> Any:
-    """Return the middles (k - 1, 3) of the segments between the nodes x (k, 2 or 3), and half their lengths."""
+    """Return the midpoints (k - 1, 3) of the segments between the nodes x (k, 2 or 3), and half their lengths."""
     middle = np.zeros((len(x) - 1, 3))
     half = np.empty(len(x) - 1)
     for i in range(len(half)):
@@ -82,14 +83,14 @@ def _middles(x: Any) -> Any:
 
 @law
 def _apart(x: Any, a: int, b: int) -> float:
-    """Return the distance of two of the points x (k, 3)."""
+    """Return the distance between two of the points x (k, 3)."""
     u, v, w = x[a, 0] - x[b, 0], x[a, 1] - x[b, 1], x[a, 2] - x[b, 2]
     return np.sqrt(u * u + v * v + w * w)
 
 
 @leaf
 def _hop(x: Any, moved: Any) -> float:
-    """Return the largest way, with the one they move against each other, between neighbours among x (k, 3)."""
+    """Return the largest sum, over neighbours in x (k, 3), of their distance and of their relative displacement."""
     most = 0.0
     for n in range(1, len(x)):
         most = max(most, _apart(x, n, n - 1) + _apart(moved, n, n - 1))
@@ -98,9 +99,10 @@ def _hop(x: Any, moved: Any) -> float:
 
 @kernel
 def _blocks(middle: Any, half: Any) -> Any:
-    """Return centres (k, 3) and radii (k,) [m] of balls around blocks of segments with these middles and half lengths.
+    """Return centres (k, 3) and radii (k,) [m] of balls around blocks of segments, from midpoints and half lengths.
 
-    Half lengths may hold more than that; the radii are sums of all they hold and the way from the centre.
+    Half lengths may include further margins; a radius is the largest sum of a half length and the distance from the
+    centre.
     """
     last = len(half)
     count = (last + _BLOCK - 1) // _BLOCK
@@ -120,7 +122,7 @@ def _blocks(middle: Any, half: Any) -> Any:
 
 @kernel
 def _ways(half: Any) -> Any:
-    """Return how far it is from the first segment to each block, and to the last's end, of these half lengths [m]."""
+    """Return the length [m] from the first segment to each block, and to the end of the last, from half lengths."""
     last = len(half)
     ways = np.zeros((last + _BLOCK - 1) // _BLOCK + 1)
     for i in range(last):
@@ -132,7 +134,7 @@ def _ways(half: Any) -> Any:
 
 @kernel
 def _stretches(u: Any, half: Any) -> Any:
-    """Return the least length (k,), by that of the cable, of the segments of each block; at most one.
+    """Return the least ratio of length to length along the cable (k,) of the segments of each block; at most one.
 
     Args:
         u: material coordinates of the nodes [m].
@@ -149,12 +151,12 @@ def _stretches(u: Any, half: Any) -> Any:
 def _is_open(x: Any, ways: Any, least: Any, a: int, b: int, separation: float, near: float) -> bool:
     """Tell whether the nodes x (k, 2 or 3) from block a to block b are so straight that no part of them meets another.
 
-    A part of length s of a stretch of length S and chord c has a chord of s - (S - c) at least.
+    In a stretch of length S and chord c, a part of length s has a chord of at least s - (S - c).
 
     Args:
         ways, least: see `_ways` and `_stretches`.
         separation: least distance along the cable of parts that may meet [m].
-        near: distance at which they do [m].
+        near: distance at which parts meet [m].
     """
     c = between_nodes(x, min((b + 1) * _BLOCK, len(x) - 1), a * _BLOCK)
     room = separation - near - (ways[b + 1] - ways[a] - np.sqrt(dot(c, c)))
@@ -169,12 +171,13 @@ def _blocks_near(
     x: Any, block: int, center: Any, way: Any, hop: float, around: Any, widest: float, ways: Any, least: Any,
     separation: float, near: float, found: Any,
 ) -> int:  # fmt: skip
-    """Write the blocks from `block` on whose segments its own may meet to `found` (blocks,), and return their number.
+    """Write to `found` (blocks,) the blocks from `block` on whose segments may meet its own; return their number.
 
     Args:
         x: the nodes (k, 2 or 3) [m].
-        center, around, widest: of the balls around the blocks, see `_blocks`, and the largest of their radii [m].
-        way, hop: by which the centres move (blocks, 3) [m], and their `_hop`.
+        center, around, widest: centres and radii of the balls around the blocks, see `_blocks`, and the largest radius
+            [m].
+        way, hop: displacements of the centres (blocks, 3) [m], and their `_hop`.
         ways, least, separation, near: see `_is_open`.
     """
     count, other = 0, block
@@ -192,7 +195,7 @@ def _blocks_near(
 
 @kernel
 def _noted(found: Any, count: int, i: int, j: int) -> Any:
-    """Return the pairs `found` (room, 2) of which `count` are known, or a larger copy, with one more."""
+    """Append a pair to the pairs `found` (room, 2), of which `count` are set; return them, or a larger copy."""
     if count == len(found):
         larger = np.empty((2 * len(found) + 16, 2), np.int64)
         larger[:count] = found
@@ -205,8 +208,8 @@ def _noted(found: Any, count: int, i: int, j: int) -> Any:
 def near_pairs(x: Any, u: Any, radius: float, separation: float, found: Any) -> Any:
     """Return (found, count): pairs of segments of the nodes x (k, 2 or 3) that may be nearer than `radius` [m].
 
-    The distance of two segments, or of two blocks of them, grows at most as fast as one goes along the cable, so that
-    from a far one the next are skipped. So are blocks between which the cable is nearly straight.
+    The distance of two segments, or of two blocks of them, grows at most as fast as the length along the cable, so
+    after a distant one the next are skipped. Blocks between which the cable is nearly straight are skipped too.
 
     Args:
         u: material coordinates of the nodes (k,) [m].
@@ -254,9 +257,9 @@ def near_pairs(x: Any, u: Any, radius: float, separation: float, found: Any) -> 
 def meeting_pairs(x0: Any, x1: Any, u: Any, near: float, separation: float, found: Any) -> Any:
     """Return (found, count): pairs of segments that may come nearer than `near` [m] as nodes go straight from x0 to x1.
 
-    Strands that move together stay apart: only how far two segments move against each other counts. That, as their
-    distance, grows at most so fast as one goes along the cable, so that from a clear one the next are skipped. The
-    count is -1 where the nodes go beyond all bounds.
+    Strands that move together stay apart: only the relative motion of two segments counts. Like their distance, it
+    grows at most as fast as the length along the cable, so after a segment with clearance the next are skipped. The
+    count is -1 where the displacement of the nodes is not finite.
 
     Args:
         x0, x1: nodes (k, 2 or 3) [m].
@@ -276,7 +279,7 @@ def meeting_pairs(x0: Any, x1: Any, u: Any, near: float, separation: float, foun
     way, stray = _blocks(moved, np.zeros(last))
     around += stray
     hop, widest = _hop(center, way), np.max(around)
-    # the longer a stretch, by what its segments move against each other, the less of its chord is left on the way
+    # lengths include the relative motion of the segments: it reduces how much of a chord is left on the way
     ways = _ways(half)
     near_by = np.empty(len(around), np.int64)
     count = 0
@@ -307,10 +310,10 @@ def meeting_pairs(x0: Any, x1: Any, u: Any, near: float, separation: float, foun
 
 @kernel
 def clear_way(x0: Any, x1: Any, u: Any, diameter: float, separation: float, found: Any) -> Any:
-    """Return (found, share): how far, 0 to 1, the nodes may go from x0 straight to x1 without strands passing strands.
+    """Return (found, share): how far, 0 to 1, nodes may go straight from x0 to x1 before strands pass through strands.
 
-    That is up to where a pair of segments comes nearer than `_TOO_NEAR` diameters; one that is nearer already, than a
-    fifth nearer still. `u`, `separation`, `found`: see `near_pairs`.
+    The limit is where a pair of segments comes nearer than the smaller of `_TOO_NEAR` diameters and 0.8 times its
+    distance at x0. `u`, `separation`, `found`: see `near_pairs`.
     """
     found, count = meeting_pairs(x0, x1, u, _TOO_NEAR * diameter, separation, found)
     return found, 0.0 if count < 0 else clear_way_of(x0, x1, diameter, found, count)
@@ -318,9 +321,9 @@ def clear_way(x0: Any, x1: Any, u: Any, diameter: float, separation: float, foun
 
 @leaf
 def clear_way_of(x0: Any, x1: Any, diameter: float, pairs: Any, count: int) -> float:
-    """Return the share of `clear_way` where no others can meet than these pairs of segments.
+    """Return the share of `clear_way` if only these pairs of segments can meet.
 
-    Distances change at most as fast as the nodes move against each other, which is how far one may look ahead.
+    Distances change at most as fast as the nodes move against each other, which limits how far ahead to evaluate next.
     """
     share = 1.0
     near = _TOO_NEAR * diameter
@@ -353,19 +356,19 @@ def clear_way_of(x0: Any, x1: Any, diameter: float, pairs: Any, count: int) -> f
             elif gap <= least:
                 share = z
                 break
-            # a look at least so far ahead that the gap changes by a tenth of what is kept
+            # go at least so far ahead that the gap changes by a tenth of its limit
             z += max(gap - least, 0.1 * least, _LOOK * diameter) / fastest
     return share
 
 
 @kernel
 def nearest(x: Any, u: Any, separation: float, cap: float) -> float:
-    """Return the smallest distance of segments of the nodes x (k, 2 or 3), at most `cap` [m].
+    """Return the smallest distance between segments of the nodes x (k, 2 or 3), at most `cap` [m].
 
     Args:
         u: material coordinates of the nodes (k,) [m].
         separation: segments closer than this along the cable are left out [m].
-        cap: what is returned where all are farther.
+        cap: returned where all are farther apart.
     """
     best = cap
     last = len(u) - 1
@@ -395,9 +398,10 @@ def nearest(x: Any, u: Any, separation: float, cap: float) -> float:
 
 @kernel
 def lengths_apart(states: Any, knots: Any, nd: int, angle: float) -> Any:
-    """Return the length [m] up to which no part of a cable turns by more than `angle` [rad], of each of the states.
+    """Return for each of the states the length [m] up to which no part of a cable turns by more than `angle` [rad].
 
-    A part turns by no more than the control polygon of the spans that it lies in. Infinite where all of it does not.
+    A part turns by no more than the control polygon of its spans. The length is infinite where the whole cable turns by
+    less.
 
     Args:
         states: control points (k, n, nc) [m].
@@ -418,7 +422,7 @@ def lengths_apart(states: Any, knots: Any, nd: int, angle: float) -> Any:
             turned[i] = turned[i - 1]
             if before > 0.0 and after > 0.0:
                 turned[i] += np.arccos(min(max(product / np.sqrt(before * after), -1.0), 1.0))
-        last = 0  # span up to which the cable turns by less, from `first` on
+        last = 0  # span up to which the cable turns by less than `angle`, from `first` on
         for first in range(n - 3):
             last = max(last, first)
             while last < n - 3 and turned[last + 2] - turned[first] <= angle:
@@ -435,15 +439,15 @@ def nearest_of(
 ) -> float:
     """Return the smallest `nearest` of the states `which` of (k, n, nc), at nodes with rows `first` (m,), b (m, 4).
 
-    No point moves farther than the control point that moves most. So states that lie so close to one whose strands are
-    far apart that they can't have come nearer than what was found are not looked at.
+    No point moves farther than the control point that moves most. A state is skipped if it is so close to one with a
+    large distance between strands that its strands can't be nearer than the smallest distance found.
 
     Args:
-        apart: (k,) [m] of each of all states: nodes nearer than this along the cable are not looked at.
+        apart: (k,) [m] for each of all states: nodes nearer than this along the cable are left out.
     """
     best = cap
     x = np.empty((len(u), nd))
-    # the state last looked at, how far apart along the cable, and then in space, its strands are at least
+    # the last evaluated state, and the least distance of its strands, along the cable and in space
     seen, along, gap = -1, 0.0, 0.0
     for k in which:
         if seen >= 0 and along <= max(separation, apart[k]):

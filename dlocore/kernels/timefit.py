@@ -1,4 +1,4 @@
-"""The time spline of a march: what it misses of the march, and where its surface is, in one call each."""
+"""The time spline of a march: its fit, how far it misses the march, and samples of its surface, in one call each."""
 
 from typing import Any
 
@@ -13,9 +13,9 @@ from dlocore.kernels.basis import basis_rows, row_of
 def fit_time(knots: Any, times: Any, Q: Any, v0: Any) -> Any:
     """Return control points (n_t, m) of the time spline fitted to the states Q (k, m) at `times`.
 
-    Least squares weighted by the time each state stands for; the first two control points give the initial position
-    and velocity exactly, the last the final position, and one at a triple knot, where the velocity may jump, the state
-    there: what the spline misses on one side of it does not move it on the other.
+    The fit is a least squares weighted by the time that each state stands for. The first two control points give the
+    initial position and velocity exactly, the last one the final position. A control point at a triple knot, where the
+    velocity may jump, gives the state there: errors of the spline on one side of it do not move it on the other.
     """
     first, table = basis_rows(knots, times, 0)
     return _fit(knots, first, table, times, Q, v0)
@@ -23,9 +23,9 @@ def fit_time(knots: Any, times: Any, Q: Any, v0: Any) -> Any:
 
 @brief
 def fit_missed(knots: Any, times: Any, Q: Any, C: Any, dimensions: int) -> Any:
-    """Return by how much the time spline of C (n_t, n, nc) misses each of the states Q (k, n, nc) at `times` [m].
+    """Return the distance [m] by which the time spline of C (n_t, n, nc) misses each state of Q (k, n, nc) at `times`.
 
-    The largest difference of the first so many coordinates counts.
+    It is the largest difference of the first `dimensions` coordinates.
     """
     first, table = basis_rows(knots, times, 0)
     return _missed(first, table, Q, C, dimensions)
@@ -33,7 +33,7 @@ def fit_missed(knots: Any, times: Any, Q: Any, C: Any, dimensions: int) -> Any:
 
 @kernel
 def fitted(knots: Any, times: Any, states: Any, v0: Any, dimensions: int) -> Any:
-    """Return control points (n_t, n, nc) as `fit_time` fits to the states (k, n, nc), and their `fit_missed` (k,)."""
+    """Return control points (n_t, n, nc) that `fit_time` fits to the states (k, n, nc), and their `fit_missed` (k,)."""
     steps, n, nc = states.shape
     first, table = basis_rows(knots, times, 0)
     flat = _fit(knots, first, table, times, states.reshape((steps, n * nc)), v0.reshape(n * nc))
@@ -103,7 +103,7 @@ def _missed(first: Any, table: Any, Q: Any, C: Any, dimensions: int) -> Any:
 
 @brief
 def sampled(knots_t: Any, knots_u: Any, control: Any, times: int, places: int) -> Any:
-    """Return the surface of control points (n_t, n, nc) at even times and places (times, places, nc) [m]."""
+    """Return the surface (times, places, nc) [m] of control points (n_t, n, nc) at evenly spaced times and places."""
     _, n, nc = control.shape
     first_t, over = basis_rows(knots_t, np.arange(times) / (times - 1) * knots_t[-1], 0)
     first_u, along = basis_rows(knots_u, np.arange(places) / (places - 1) * knots_u[-1], 0)
@@ -124,7 +124,7 @@ def sampled(knots_t: Any, knots_u: Any, control: Any, times: int, places: int) -
 
 @leaf
 def farthest(a: Any, b: Any, dimensions: int) -> float:
-    """Return the largest distance between the points of a and b (k, m, nc) [m], by the first so many coordinates."""
+    """Return the largest distance [m] of points of a from those of b (k, m, nc) in the first `dimensions` axes."""
     most, total = 0.0, 0.0
     for k in range(a.shape[0]):
         for s in range(a.shape[1]):

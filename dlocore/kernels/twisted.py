@@ -1,18 +1,19 @@
 """Assembly in space with twist: the fourth coordinate is theta times the polar radius of gyration of the section.
 
-At every curvature point a frame without spin is kept: `past` (points, 17) holds the tangent t0 of the last step, its
-derivative k0 along the cable, a director across it, the twist rate of these frames along the cable, the strain
-(two curvatures in the frame of the sections, twist rate) of the two last steps, and what theta misses of the angle of
-the section, see `twisted_angles.py`. A state is measured against the frame
-that the smallest rotation carries from t0 to its tangent: nothing is singular where the cable is straight, and theta
-counts turns without end (docs/model.md eq. 19).
+At every curvature point a frame without spin is kept. `past` (points, 17) holds the tangent t0 of the last step, its
+derivative k0 along the cable, a director perpendicular to it, the twist rate of these frames along the cable, the
+strain (two curvatures in the frame of the sections, twist rate) of the last two steps, and the difference of the
+section's angle from theta, see `twisted_angles.py`. A state is measured against the frame that the smallest rotation
+carries from t0 to its tangent: nothing is singular where the cable is straight, and theta counts any number of turns
+(docs/model.md eq. 19).
 
-The twist rate of a point is the mean over its knot span, and in the two end spans and beside a triple knot the straight
-line through those of the span: as many conditions as theta has freedoms. Where the curvature jumps, the twist rate of
-the carried frames jumps too as the cable swings about its own tangent. Theta can follow at a triple knot, where it may
-have a kink, but at no other: point by point the cable would be held back from swinging (membrane locking, of twist).
+The twist rate is smoothed over each knot span: by the mean of its points, and in the two end spans and beside a triple
+knot by the straight line through them. These are as many conditions as theta has freedoms. Where the curvature jumps,
+the twist rate of the carried frames jumps too as the cable swings about its own tangent. Theta can follow only at a
+triple knot, where it may have a kink. Without smoothing, the cable would be held back from swinging (membrane locking,
+of twist).
 
-A group of spans after the other is measured and assembled in one array W, see `lanes.py`.
+Spans are measured and assembled group by group in one array W, see `lanes.py`.
 """
 
 from typing import Any
@@ -105,12 +106,12 @@ from dlocore.kernels.twisted_rows import (
 )
 from dlocore.kernels.twisted_tangent import add_blocks, tangent_of, twist_tangent
 
-_STEPS = 8  # of the transport along the cable between two curvature points
+_STEPS = 8  # steps of the transport along the cable between two curvature points
 
 
 @part
 def _measure(q: Any, points: Any, past: Any, inverse: float, group: int, W: Any) -> None:
-    """Write the geometry of a group of spans and its twist rate, and what it is measured against."""
+    """Write the geometry of a group of spans, its twist rate, and what these are measured against."""
     _gather(q, points.first, past, group, W)
     _locate(points.lanes[group], inverse, W)
     _bend(W)
@@ -136,7 +137,7 @@ def _gather(q: Any, first: Any, past: Any, group: int, W: Any) -> None:
 
 @leaf
 def _locate(T: Any, inverse: float, W: Any) -> None:
-    """Write r' and r'' of the points, and add theta to their angle and its derivative to the twist rate."""
+    """Write r' and r'' of the points; add theta to their angle and its derivative to their twist rate."""
     _locate_points(0, T, inverse, W)
     _locate_points(1, T, inverse, W)
     _locate_points(2, T, inverse, W)
@@ -156,7 +157,7 @@ def _locate_points(m: int, T: Any, inverse: float, W: Any) -> None:
 
 @leaf
 def _bend(W: Any) -> None:
-    """Write the geometry of the points, and add what the carrying of the frames makes of their twist rate.
+    """Write the geometry of the points, and add to their twist rate the part due to carrying the frames.
 
     The derivatives of the twist rate are BY_FIRST by r' and spin/l by r''.
     """
@@ -181,7 +182,7 @@ def _bend(W: Any) -> None:
 
 @leaf
 def _smooth(T: Any, row: int, W: Any) -> None:
-    """Turn values at the points into those over their span: the mean, or the straight line."""
+    """Smooth the values at the points of each span: by their mean, or by the straight line."""
     for s in range(SPANS):
         mean, slope = over(T, SHARE, W, row, s), over(T, SLOPE, W, row, s)
         for m in range(POINTS):
@@ -192,7 +193,7 @@ def _smooth(T: Any, row: int, W: Any) -> None:
 def _measure_bends(active: Any, memory: Any, group: int, W: Any) -> None:
     """Write the directors of the sections, and the curvatures along them.
 
-    Sections that bend alike in all directions, and do not resist its rate, have any directors.
+    Where sections bend alike in all directions and do not resist the rate of bending, the choice of directors is free.
     """
     turns = bool(active[DAMPING] or active[BENDING_MEMORY])
     for s in range(count_of(len(memory), group)):
@@ -208,7 +209,7 @@ def _measure_bends(active: Any, memory: Any, group: int, W: Any) -> None:
 
 @leaf
 def _direct(W: Any) -> None:
-    """Carry the directors to the tangents at hand, turn those of the sections and write k1 and k2."""
+    """Carry the directors to the current tangents, write those of the sections, and write k1 and k2."""
     for n in range(LANES):
         t, kappa, c, s = vector_at(W, NOW, n), vector_at(W, KAPPA, n), at(W, COS, n), at(W, SIN, n)
         d = transport(vector_at(W, T0, n), t, vector_at(W, D0, n))
@@ -229,10 +230,10 @@ def curvature(
 ) -> None:  # fmt: skip
     """Add the forces and tangents of curvature and twist.
 
-    The derivatives of k1 and k2 are O by r', P by r'' and A by theta; that of the twist rate is the mean of its points'
-    over a span, or their straight line. The material part of the tangent is E' S E with the derivatives E by the
-    control points. The geometric part is that at the carried frame: what the carrying adds vanishes with the step.
-    `room` is that of a `History`.
+    The derivatives of k1 and k2 are O by r', P by r'' and A by theta. Those of the twist rate are smoothed over a span
+    as the twist rate is. The material part of the tangent is E' S E, with the derivatives E by the control points. The
+    geometric part is that at the carried frame: what the carrying adds vanishes with the step. `room` is that of a
+    `History`.
     """
     W, block = room[:SIZE], room[SIZE : SIZE + BLOCK]
     first, inverse = points.first, p[TWIST, 1]
@@ -256,7 +257,7 @@ def curvature(
 
 @leaf
 def _rate_by_steps(past: Any, rates: Any, group: int, W: Any) -> None:
-    """Write the rates of k1, k2 and twist as the combination `rates` of their values now and at the last steps."""
+    """Write the rates of k1, k2 and twist as the combination `rates` of their values now and at the last two steps."""
     for s in range(count_of(len(past), group)):
         for m in range(POINTS):
             n, lane = POINTS * (SPANS * group + s) + m, SPANS * m + s
@@ -269,7 +270,7 @@ def _rate_by_steps(past: Any, rates: Any, group: int, W: Any) -> None:
 
 @leaf
 def _rate_by_velocity(v: Any, points: Any, inverse: float, group: int, W: Any) -> None:
-    """Write the rates of k1, k2 and twist that the velocity v (n, 4) makes."""
+    """Write the rates of k1, k2 and twist that follow from the velocity v (n, 4)."""
     first = points.first
     for s in range(count_of(len(first), group)):
         for m in range(POINTS):
@@ -372,7 +373,7 @@ def _scatter_force(first: Any, count: int, group: int, W: Any, f: Any) -> None:
 
 @leaf
 def remember(q: Any, points: Any, active: Any, p: Any, memory: Any, past: Any, h: float, room: Any) -> None:
-    """Carry the frames to q, note its strain, and let what yielded in a step h become memory."""
+    """Carry the frames to q, record its strain, and let what yielded in a step h become memory."""
     W, knots = room[:SIZE], room[SIZE + BLOCK :].reshape((len(past) // POINTS + 1, KNOT))
     turns = bool(active[DAMPING] or active[BENDING_MEMORY])
     for n in range(len(memory)):
@@ -387,7 +388,7 @@ def remember(q: Any, points: Any, active: Any, p: Any, memory: Any, past: Any, h
 
 @leaf
 def _note(active: Any, p: Any, memory: Any, past: Any, h: float, group: int, W: Any) -> None:
-    """Do what `remember` does for a group of spans that is measured."""
+    """Do what `remember` does for a group of spans that is already measured."""
     for s in range(count_of(len(past), group)):
         for m in range(POINTS):
             n, lane = POINTS * (SPANS * group + s) + m, SPANS * m + s
@@ -430,7 +431,7 @@ def energy(q: Any, points: Any, active: Any, p: Any, memory: Any, past: Any) -> 
 
 @kernel
 def twist_rates(states: Any, points: Any, p: Any, frames: Any, out: Any) -> None:
-    """Write the twist rate (k, points) [rad/m] of the states (k, n, 4) measured against `frames` (k, points, PAST)."""
+    """Write the twist rates (k, points) [rad/m] of the states (k, n, 4) measured against `frames` (k, points, PAST)."""
     W = np.empty(SIZE)
     for k in range(len(states)):
         for group in range(len(points.lanes)):
@@ -442,7 +443,7 @@ def twist_rates(states: Any, points: Any, p: Any, frames: Any, out: Any) -> None
 
 @kernel
 def start_frames(knots: Any, q: Any, points: Any, director: Any, past: Any) -> None:
-    """Write frames without twist along the cable q (n, >= 3) to `past`, from `director` (3,) at u = 0."""
+    """Write frames without twist along the cable q (n, >= 3) to `past`, starting from `director` (3,) at u = 0."""
     row = np.empty((3, 4))
     before = 0.0
     u = 0.0

@@ -1,10 +1,11 @@
-"""The angle of the sections between the knots (docs/model.md eq. 19b): what the spline of theta can't follow.
+"""The angle of the sections between the knots (docs/model.md eq. 19b), which the spline of theta can't follow.
 
-Frames that are carried in time turn against each other as a bend swings. With R(u) the integral of their twist rate
-from u = 0, the angle of a section against its frame is S - R, where S' is the twist rate of the cable. S is smooth, as
-the torque is; R has the kinks of the curvature. Theta is right at the knots, as the twist rate of a span is the mean
-over it, and a spline between them: it would turn sharp bends against the sections, and hold them back from swinging.
-So what it misses at a point after each step is kept with the frame there, and counts in the next.
+Frames that are carried in time turn against each other as a bend swings. Let R(u) be the integral of their twist rate
+from u = 0. The angle of a section against its frame is then S - R, where S' is the twist rate of the cable. S is
+smooth, as the torque is; R has the kinks of the curvature. Theta is right at the knots, as the twist rate of a span is
+its mean, and a spline between them: it would turn sharp bends against the sections, and hold them back from swinging.
+So after each step the difference of S - R from theta at a point is stored with the frame there, and is added to theta
+in the next step.
 """
 
 from typing import Any
@@ -17,30 +18,30 @@ from dlocore.kernels.lanes import POINTS, TRIPLE
 from dlocore.kernels.twisted_rows import FRAME, LAST, OFFSET
 
 _ORDERS = np.arange(1, POINTS + 1)
-# integrals from the beginning of a span to its points, of values at these, in parts of its length
+# integrals from the start of a span to each of its points, as weights of values at the points, per length of the span
 _INTEGRALS = (
     (GAUSS_3[0][:, None] ** _ORDERS - (-1.0) ** _ORDERS)
     / (2.0 * _ORDERS)
     @ np.linalg.inv(np.vander(GAUSS_3[0], increasing=True))
 )
-_BETWEEN = float(GAUSS_3[0][-1])  # of its length, of a span between its first and its last point
-_Z = 0.5 + 0.5 / _BETWEEN  # where its end lies, in parts of that, from the first
-# of the values and the slopes at the first and the last point, of a cubic at the end
+_BETWEEN = float(GAUSS_3[0][-1])  # distance of the first and the last point of a span, per length of the span
+_Z = 0.5 + 0.5 / _BETWEEN  # end of the span, measured from the first point in units of that distance
+# weights of the values and slopes at the first and the last point in the value of a cubic at the end
 _V1, _D1 = 2.0 * _Z**3 - 3.0 * _Z**2 + 1.0, _Z**3 - 2.0 * _Z**2 + _Z
 _V3, _D3 = 3.0 * _Z**2 - 2.0 * _Z**3, _Z**3 - _Z**2
 
 
 @part
 def correct_angles(q: Any, points: Any, inverse: float, past: Any, knots: Any) -> None:
-    """Write what theta misses of the angles at the points, and turn the strain that is noted there with the sections.
+    """Write the differences of the angles at the points from theta, and turn the strain stored there with the sections.
 
-    S between two knots is the cubic through the four nearest, none of them beyond a triple knot.
+    Between two knots, S is the cubic through the four nearest knots, none of them beyond a triple knot.
 
     Args:
         q: (n, 4) the state that the frames have been carried to.
-        inverse: of the radius that theta is in q times [1/m].
+        inverse: inverse of the radius that is the factor of theta in q [1/m].
         past: (points, PAST).
-        knots: (spans + 1, KNOT), written over.
+        knots: (spans + 1, KNOT) workspace, overwritten.
     """
     first, w = points.first, points.w
     spans = len(past) // POINTS

@@ -1,4 +1,4 @@
-"""What the assembly with twist measures of a group of knot spans: places in its array W, and in what is remembered."""
+"""Measures of a group of knot spans in the assembly with twist: their places in its array W and in the stored state."""
 
 from dlocore.compiling.kernel import law
 from dlocore.effects.base import Vector
@@ -7,33 +7,33 @@ from dlocore.kernels.lanes import LANES, POINTS, SPANS
 TANGENT, BEND, DIRECTOR, FRAME, LAST, BEFORE, OFFSET = 0, 3, 6, 9, 10, 13, 16  # columns of `past`
 TWIST_RATE = LAST + 2
 PAST = 17
-# Rows of W, of numbers of points. What they are measured against: t0, k0, director, which is carried to t, theta;
-# r', r''; the strain: |r'|, t . r'', t, kappa, spin, derivative of the twist rate by r', cos and sin of theta, the
-# directors of the section, k1, k2, twist rate, their rates.
+# Rows of W with numbers of points. What they are measured against: t0, k0, the director, which is carried to t, theta;
+# then r', r''; the strain: |r'|, t . r'', t, kappa, spin, derivative of the twist rate by r', cos and sin of theta, the
+# directors of the section, k1, k2, twist rate, and their rates.
 T0, K0, D0, ANGLE, R1, R2 = 0, 3, 6, 9, 10, 13
 LENGTH, ALONG, NOW, KAPPA, SPIN, BY_FIRST = 16, 17, 18, 21, 24, 27
 COS, SIN, M1, M2, K1, K2, TAU, RATE = 30, 31, 32, 35, 38, 39, 40, 41
-# Stress, times weights: moments, torque, and the torque that the smoothing of the twist rate hands on to a point;
+# Stress times weights: moments, torque, and the torque that the smoothing of the twist rate transfers to a point;
 # forces by r', r'' and theta; stiffness of k1 and k2 and of the twist rate.
 B1, B2, TORQUE, HANDED, G1, G2, G0, S11, S22, S12, STIFF = 44, 45, 46, 47, 48, 51, 54, 55, 56, 57, 58
-# The tangent of a point, by r' (B), r'' (C) and theta (A): BB and CC are symmetric, (xx, xy, xz, yy, yz, zz).
+# The tangent of a point by r' (B), r'' (C) and theta (A): BB and CC are symmetric, (xx, xy, xz, yy, yz, zz).
 BB, BC, CC, AB, AC, AA = 59, 65, 74, 80, 83, 86
 _ROWS = 87
 # Places in W of the first numbers of spans: control points and forces by coordinate, and the twist rate in its span, as
-# mean and slope that are independent: their stiffnesses and their derivatives by the control points.
+# independent mean and slope: their stiffnesses and their derivatives by the control points.
 Q, F = _ROWS * LANES, _ROWS * LANES + 16 * SPANS
 OF_MEAN, OF_SLOPE, LEAN = F + 16 * SPANS, F + 17 * SPANS, F + 18 * SPANS
 MEAN, RISE = F + 19 * SPANS, F + 35 * SPANS
 SIZE = F + 51 * SPANS
-BLOCK = 16 * SPANS  # numbers of the blocks of the tangent that two control points have in each of the spans
+BLOCK = 16 * SPANS  # numbers of the tangent's blocks of two control points, in each of the spans
 KNOT = 3  # place [m], S and R [rad] of a knot, see `twisted_angles.py`
-# Numbers that an assembly writes over: W, a block and the first knot; and for each curvature point.
+# Workspace of an assembly: W, a block and the first knot; and the numbers for each curvature point.
 ROOM, ROOM_OF_POINT = SIZE + BLOCK + KNOT, KNOT // POINTS
 
 
 @law
 def count_of(points: int, group: int) -> int:
-    """Return how many spans a group has."""
+    """Return the number of spans in a group."""
     return min(SPANS, points // POINTS - SPANS * group)
 
 

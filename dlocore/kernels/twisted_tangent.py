@@ -1,4 +1,4 @@
-"""The tangent of the assembly with twist, of a group of spans that has been measured, see `twisted.py`."""
+"""The tangent of the assembly with twist, for a group of spans that is already measured, see `twisted.py`."""
 
 from typing import Any
 
@@ -57,7 +57,7 @@ from dlocore.kernels.twisted_rows import (
 
 @leaf
 def tangent_of(inverse: float, geometric: float, W: Any) -> None:
-    """Write the tangents of the points by r', r'' and theta, but for the stiffness of the twist rate."""
+    """Write the tangents of the points by r', r'' and theta, without the stiffness of the twist rate."""
     for n in range(LANES):
         length, h, k1, k2 = at(W, LENGTH, n), at(W, ALONG, n), at(W, K1, n), at(W, K2, n)
         t, kappa, spin = vector_at(W, NOW, n), vector_at(W, KAPPA, n), vector_at(W, SPIN, n)
@@ -129,8 +129,9 @@ def _mixed(d: int, e: int, t: Vector, M: Vector, O1: Vector, SP1: Vector, O2: Ve
 def twist_tangent(T: Any, inverse: float, W: Any) -> None:
     """Write the stiffness of the twist rate of each span, and its derivatives by the control points.
 
-    With stiffnesses S of the points and their places x the energy of its mean m and slope a is sum S (m + x a)^2/2, the
-    sum of those of m + LEAN a and of a alone, with LEAN = sum S x/sum S.
+    With the stiffnesses S of the points and their distances x from the middle, the energy of the mean m and the slope a
+    of the twist rate is sum S (m + x a)^2/2. It is the sum of the energies of m + LEAN a and of a alone, with LEAN =
+    sum S x/sum S.
     """
     for s in range(SPANS):
         stiff, lever = added(W, STIFF, s), over(T, LEVER, W, STIFF, s)
@@ -164,7 +165,7 @@ def _twist_of(i: int, d: int, m: int, T: Any, W: Any, s: int) -> float:
 
 @law
 def _put_twist(i: int, d: int, s: int, x0: float, x1: float, x2: float, T: Any, W: Any) -> None:
-    """Write the derivatives of mean and slope of a span, of those of its points."""
+    """Write the derivatives of the mean and the slope of a span from those of its points."""
     mean = at(T, SHARE, s) * x0 + at(T, SHARE, SPANS + s) * x1 + at(T, SHARE, 2 * SPANS + s) * x2
     rise = at(T, SLOPE, s) * x0 + at(T, SLOPE, SPANS + s) * x1 + at(T, SLOPE, 2 * SPANS + s) * x2
     W[MEAN + (4 * i + d) * SPANS + s] = mean + W[LEAN + s] * rise
@@ -197,7 +198,7 @@ def _block(Ti: Any, Tj: Any, Wi: Any, Wj: Any, W: Any, block: Any) -> None:
 
 @law
 def _column(e: int, Ti: Any, Tj: Any, Wi: Any, Wj: Any, W: Any, block: Any, s: int) -> None:
-    """Write what a block has of coordinate e of the centreline."""
+    """Write the entries of a block for coordinate e of the centreline."""
     block[4 * e * SPANS + s] = _of_place(0, e, Ti, Tj, W, s) + _of_twist(0, e, Wi, Wj, W, s)
     block[(4 * e + 1) * SPANS + s] = _of_place(1, e, Ti, Tj, W, s) + _of_twist(1, e, Wi, Wj, W, s)
     block[(4 * e + 2) * SPANS + s] = _of_place(2, e, Ti, Tj, W, s) + _of_twist(2, e, Wi, Wj, W, s)
@@ -239,7 +240,7 @@ def _of_angles(m: int, Ti: Any, Tj: Any, W: Any, s: int) -> float:
 
 @law
 def _of_twist(d: int, e: int, Wi: Any, Wj: Any, W: Any, s: int) -> float:
-    """Return what the stiffness of the twist rate adds to an entry."""
+    """Return the part of an entry that comes from the stiffness of the twist rate."""
     a, b = d * SPANS + s, e * SPANS + s
     return W[OF_MEAN + s] * Wi[MEAN + a] * Wj[MEAN + b] + W[OF_SLOPE + s] * Wi[RISE + a] * Wj[RISE + b]
 
