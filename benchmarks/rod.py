@@ -1,8 +1,8 @@
-"""An independent judge of the spline solver: a step-by-step explicit simulation of the same cable.
+"""An independent check of the spline solver: a step-by-step explicit simulation of the same cable.
 
-A discrete elastic rod: lumped masses at nodes, axial springs between them, bending springs on the turning angle
-(benchmarks/rod_kernel.py), position Verlet at a step below the stability limit. It is of second order in the node
-spacing, so that (4 fine - coarse)/3 is of fourth (Richardson), and the change from one such pair to the next estimates
+It is a discrete elastic rod: lumped masses at nodes, axial springs between them, bending springs on the turning angle
+(benchmarks/rod_kernel.py), and position Verlet with a step below the stability limit. It is of second order in the node
+spacing, so (4 fine - coarse)/3 is of fourth order (Richardson), and the change from one such pair to the next estimates
 the error. It shares no code with the solver; it reads the same `Scene`.
 
 Not covered, and refused: `Points` as start, given rest shapes, rest curvature in space, tables.
@@ -22,8 +22,8 @@ from dlocore.scene.scene import Load, Scene
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-COARSEST = 40  # elements; multiples of L/40 are nodes of every level
-CHUNK = 100_000  # steps whose paths are tabulated at once
+COARSEST = 40  # elements; multiples of L/40 are nodes on every level
+CHUNK = 100_000  # steps for which paths are tabulated at once
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Converged:
         t: (k,) [s].
         u: (n,) [m].
         positions: (k, n, 3) [m].
-        error_estimate: largest change of any position by the last refinement [m].
+        error_estimate: largest change of any position in the last refinement [m].
         elements: of the finest simulation.
         tolerance_met: whether the estimate is below the tolerance.
     """
@@ -82,12 +82,12 @@ def converged(
 ) -> Converged:
     """Refine until a refinement moves no position by more than `tolerance` [m], or would cost too much.
 
-    A refinement is left out that takes more than `most_updates` updates of a node, of 10 to 30 ns each: the step falls
-    with h, with bending damping as h^4. An undamped motion with jumps in its forces (gravity let loose on a straight
-    cable, a release under tension) is not smooth and converges slowly by nature.
+    A refinement is skipped if it takes more than `most_updates` updates of a node, of 10 to 30 ns each. The step is
+    proportional to h, and with bending damping to h^4. An undamped motion with jumps in its forces (gravity set free on
+    a straight cable, a release under tension) is not smooth, and by nature converges slowly.
 
-    The estimate is the change of the extrapolated motion, so it bounds the error of the coarser of the last two and
-    exaggerates that of the returned one.
+    The estimate is the change of the extrapolated motion. It bounds the error of the coarser of the last two, and
+    overestimates that of the returned one.
     """
     grid = material_grid(scene, COARSEST)
     u = np.linspace(0.0, scene.cable.length, samples_u)
@@ -104,7 +104,9 @@ def converged(
 
 
 def equilibrium(scene: Scene, *, elements: int = 200) -> tuple[Floats, Floats]:
-    """Settle `scene` under its first grasps and loads by heavily damped motion; u (n,) [m] and positions (n, 3) [m]."""
+    """Settle `scene` under its first grasps and loads by heavily damped motion; return u (n,) [m] and positions (n, 3)
+    [m].
+    """
     grid = material_grid(scene, elements)
     start = start_of(scene, grid)
     rod = Rod.of(scene, grid, start)
@@ -188,7 +190,9 @@ class _Motion:
     previous: float = 0.0
 
     def advance(self, stops: Floats, holds: list[Hold]) -> Floats:
-        """March from `stops[0]` with the grippers `holds`; the positions at the other stops (k - 1, n, dims) [m]."""
+        """March from `stops[0]` with the grippers `holds`; return the positions at the other stops (k - 1, n, dims)
+        [m].
+        """
         counts = np.maximum(1, np.ceil(np.diff(stops) / self.rod.step_limit)).astype(np.int64)
         out = np.empty((len(counts), len(self.rod.grid), len(self.rod.axes)))
         low = 0
@@ -205,7 +209,7 @@ class _Motion:
         turning = [hold for hold in holds if hold.turns]
         hinges = rod.hinges(turning)
 
-        def table(columns: list[Floats]) -> Floats:  # in one order, for which alone the march is compiled
+        def table(columns: list[Floats]) -> Floats:  # in the only memory order for which the march is compiled
             at = [c[:, axes] for c in columns]
             return np.ascontiguousarray(np.stack(at, axis=1)) if at else np.zeros((len(t), 0, len(axes)))
 
@@ -241,8 +245,8 @@ class _Motion:
 def _settled(scene: Scene, rod: Rod, start: Start) -> Floats:
     """Return the static equilibrium (dims, n) [m] under the first poses of the grasps and the first loads.
 
-    Drag critical for the slowest motion, estimated from gravity and bending, for as long as a period of that motion
-    still moves the cable by 1e-10 of its length.
+    The drag is critical for the slowest motion, which is estimated from gravity and bending. The simulation lasts until
+    one period of that motion moves the cable by less than 1e-10 of its length.
     """
     length = float(rod.grid[-1])
     slowest = np.sqrt(12.0 * rod.bending / (rod.density * length**4) + float(np.linalg.norm(rod.gravity)) / length)

@@ -1,12 +1,12 @@
 """Compiled inner loops of the explicit discrete elastic rod (benchmarks/rod.py); they share no code with the solver.
 
-Edges e_k = r_{k+1} - r_k have rest length h_k, direction t_k and 1/|e_k|. A hinge joins two directions a and b over the
-length l of cable between their middles. The energy is
+Edges e_k = r_{k+1} - r_k have the rest length h_k, the direction t_k and 1/|e_k|. A hinge joins two directions a and b
+over the length l of cable between their midpoints. The energy is
 
     sum_k EA/2 (|e_k|/h_k - 1)^2 h_k  +  sum_hinges EI/(2 l) (phi - phi0)^2,   phi the angle from t_a to t_b.
 
-A held direction is one more column of t with 1/|e| = 0, joined to the edges beside it over half an edge each. In the
-plane phi is signed; in space it is not, and the rest angle is zero.
+A held direction is one more column of t with 1/|e| = 0, joined to each adjacent edge over half the length of that edge.
+In the plane phi is signed; in space it is not, and the rest angle is zero.
 """
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ from numba import njit
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def turning_angle(sine: float, cosine: float) -> float:
-    """Return atan2(sine, cosine) of a unit pair; by the series of asin where that is exact to 1e-16 and faster."""
+    """Return atan2(sine, cosine) of a unit pair; by the series of asin where that is faster and exact to 1e-16."""
     x = sine * sine
     if cosine > 0.0 and x < 0.0064:  # 4.6 degrees
         tail = x * (5 / 112 + x * (35 / 1152 + x * (63 / 2816 + x * (231 / 13312 + x * (143 / 10240)))))
@@ -81,11 +81,11 @@ def _binormal(a: Any, b: Any, out: Any) -> None:
 def damp_space(t: Any, inverse: Any, rate: Any, q: Any, first: Any, second: Any, per_length: Any, eta: float) -> None:
     """Add to the edge forces `q` (3, e) [N] those of the damping of all hinges in space.
 
-    It is that of the model (docs/model.md eq. 9) on D = t_b - t_a, the discrete curvature times l, as sections see it
-    that do not twist: hinges stand across the mean tangent m, and from one to the next sections spin by the change of
-    the angle by which carrying along the rod and in time differ. The spin of all of them is that of the least power.
-    Along D the rate is that of the angle phi itself, across it that of a vector of this length. The torque that keeps
-    the sections from twisting acts on m.
+    The damping is that of the model (docs/model.md eq. 9) on D = t_b - t_a, the discrete curvature times l, as seen by
+    sections that do not twist. Hinges are perpendicular to the mean tangent m. From one hinge to the next, sections
+    spin by the change of the angle by which carrying along the rod and carrying in time differ. The common spin of all
+    sections is the one of least power. Along D the rate is that of the angle phi itself; across D it is that of a
+    vector of the length phi. The torque that keeps the sections from twisting acts on m.
     """
     hinges = len(first)
     m, dm = np.empty((hinges, 3)), np.empty((hinges, 3))  # mean tangent and its rate
@@ -132,7 +132,7 @@ def damp_space(t: Any, inverse: Any, rate: Any, q: Any, first: Any, second: Any,
             A[j, d] -= spin * side[d]
             less += D[j, d] ** 2
             radial += D[j, d] * A[j, d]
-        # 1/cos^2(phi/2) - (phi/|D|)^2, over |D|^2: phi^2/6 to second order
+        # 1/cos^2(phi/2) - (phi/|D|)^2, divided by |D|^2: phi^2/6 to second order
         more = (4.0 / size[j] ** 2 - stretch[j]) / less if less > 1e-8 else 1.0 / 6.0
         if j > 0:
             _binormal(m[j - 1], m[j], binormal)
@@ -141,7 +141,7 @@ def damp_space(t: Any, inverse: Any, rate: Any, q: Any, first: Any, second: Any,
                 for d in range(3):
                     along += binormal[d] * m[k, d]
                 for d in range(3):
-                    # the force on m, on to the two tangents and their edges
+                    # transfer the force on m to the two tangents and their edges
                     on = -0.5 * torque * (binormal[d] - along * m[k, d]) / size[k]
                     dm[k, d] = dm[k, d] + on if k < j else on
         else:
@@ -189,13 +189,13 @@ def _build(dims: int) -> Callable[..., float]:
         loads: Any,
         out: Any,
     ) -> float:
-        """March by leapfrog (position Verlet) through `len(counts)` intervals; returns the last step [s].
+        """March by leapfrog (position Verlet) through `len(counts)` intervals; return the last step [s].
 
-        Changes `x` (dims, n) [m] and `v` (dims, n) [m/s], which belongs half a step earlier. `counts[i]` steps of
-        `spans[i]` [s] are taken in interval i, and `out[i]` (n, dims) receives its last positions. `path`
-        (steps + 1, held, dims), `directions` (steps + 1, held directions, dims) and `loads` (steps + 1, loaded, dims)
-        [N] hold their values at every instant. Drag is taken at the centre of the step, bending damping half a
-        step late: a first-order error of a step a thousandth of the fastest motion that matters.
+        Changes `x` (dims, n) [m] and `v` (dims, n) [m/s]; v belongs half a step earlier. In interval i, `counts[i]`
+        steps of `spans[i]` [s] are taken, and `out[i]` (n, dims) receives the positions at its end. `path` (steps + 1,
+        held, dims), `directions` (steps + 1, held directions, dims) and `loads` (steps + 1, loaded, dims) [N] hold
+        their values at every instant. Drag is evaluated at the centre of the step, bending damping half a step late: a
+        first-order error, but the step is a thousandth of the time scale of the fastest motion that matters.
         """
         edges, turning = len(h), directions.shape[1]
         t = np.zeros((dims, edges + turning))

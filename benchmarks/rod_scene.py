@@ -1,4 +1,4 @@
-"""From a `Scene` to the arrays of the explicit discrete elastic rod: nodes, start, plane, hinges, prescribed motion."""
+"""Convert a `Scene` to arrays of the explicit discrete elastic rod: nodes, start, plane, hinges, prescribed motion."""
 
 from dataclasses import dataclass
 
@@ -25,7 +25,7 @@ class Start:
 
 @dataclass(frozen=True)
 class Hinges:
-    """What the bending acts on: joined columns, 1/l [1/m], and rest angles [rad]."""
+    """Where bending acts: pairs of joined columns, 1/l [1/m], and rest angles [rad]."""
 
     first: Integers
     second: Integers
@@ -58,7 +58,7 @@ class Hold:
 
 
 def breakpoints(scene: Scene) -> list[float]:
-    """Return the rising material coordinates [m] of the ends, the grasps and the loads."""
+    """Return the increasing material coordinates [m] of the ends, the grasps and the loads."""
     return sorted({0.0, scene.cable.length, *(g.u for g in scene.grasps), *(p.u for p in scene.loads)})
 
 
@@ -97,7 +97,7 @@ def start_of(scene: Scene, grid: Floats) -> Start:
 
 
 def plane_of(scene: Scene, start: Start) -> tuple[int, ...]:
-    """Return the coordinates that move: two where all happens in a coordinate plane, else all three."""
+    """Return the coordinates that move: two where everything happens in a coordinate plane, otherwise all three."""
     tolerance = 1e-12 * scene.cable.length
     for axis in (2, 1, 0):
         level = start.positions[0, axis]
@@ -135,10 +135,11 @@ class Rod:
 
     @staticmethod
     def of(scene: Scene, grid: Floats, start: Start) -> "Rod":
-        """Return the rod of `scene`; a switched-off effect has a zero coefficient, and so has the damping of stretch.
+        """Return the rod of `scene`; an effect that is switched off has a zero coefficient, and so has the damping of
+        stretch.
 
         Raises:
-            ValueError: the scene has something that this rod doesn't model.
+            ValueError: the scene has something that this rod does not model.
         """
         cable, around, axes = scene.cable, scene.environment, plane_of(scene, start)
         if around.table is not None:
@@ -191,7 +192,7 @@ class Rod:
         return out
 
     def hinges(self, holds: list[Hold]) -> Hinges:
-        """Return the hinges: one an inner node, and half an edge each side of a held direction (column edges + c)."""
+        """Return the hinges: one at each inner node, or one on either side of a held direction (column edges + c)."""
         edges = len(self.h)
         clamped = {hold.node: edges + c for c, hold in enumerate(holds)}
         joints: list[tuple[int, int, float]] = []

@@ -1,1 +1,1 @@
-"""Compiled functions, and what is kept of them on disk."""
+"""Compiled functions, and their cache on disk."""

@@ -1,4 +1,4 @@
-"""A cache of compiled code on disk that processes may fill at once."""
+"""A cache of compiled code on disk that several processes may fill at the same time."""
 
 import hashlib
 import pickle
@@ -11,26 +11,26 @@ from llvmlite import binding
 from numba.core.caching import CompileResultCacheImpl
 from numba.core.serialize import dumps
 
-FORMAT = 2  # of what is kept: counted up where it changes
+FORMAT = 2  # version of the saved data: increase it when they change
 _NO_BITCODE = binding.parse_assembly("").as_bitcode()
 
 
 class UnreadBitcode(CompileResultCacheImpl):  # type: ignore[misc]  # numba has no types
-    """What is kept of a compiled function: its code, the names in it, and its bitcode.
+    """The saved form of a compiled function: its code, the names in it, and its bitcode.
 
-    The bitcode is for compiling callers, into which it is inlined. numba parses it for each function that it loads, and
-    looks up all names in it, which takes three quarters of the time; here only what is called by something that has
-    to be compiled is parsed.
+    The bitcode serves to inline the function into callers that are compiled. numba parses it for every function that it
+    loads, and looks up all names in it, which takes three quarters of the loading time. Here it is parsed only if
+    something that must be compiled calls the function.
     """
 
     def reduce(self, result: Any) -> Any:
-        """Return what is to be written of a compiled function."""
+        """Return the data to save of a compiled function."""
         module = result.library._get_module_for_linking()
         defined = {v.name for v in (*module.functions, *module.global_variables) if not v.is_declaration}
         return defined, super().reduce(result)
 
     def rebuild(self, target_context: Any, payload: Any) -> Any:
-        """Return the compiled function of which `reduce` returned a payload."""
+        """Return the compiled function from the data that `reduce` returned."""
         defined, ((name, kind, (code, bitcode)), *rest) = payload
         target_context.codegen()._engine._defined_symbols.update(defined)
         result = super().rebuild(target_context, ((name, kind, (code, _NO_BITCODE)), *rest))
@@ -47,21 +47,21 @@ class UnreadBitcode(CompileResultCacheImpl):  # type: ignore[misc]  # numba has 
 
 
 class OverloadFiles:
-    """The files of one function's compiled code, one for each signature, in the place of numba's index of them.
+    """The files of one function's compiled code, one for each signature, in place of numba's index of them.
 
-    numba numbers them in its index. Of two processes that compile a function for two signatures at once both take the
-    same number: the index names one file for one of the two, and the file may hold the code of the other, which then
-    runs on arguments that it was not compiled for. Here the name follows from the signature, and whoever writes it last
-    writes the same.
+    numba numbers the files in its index. If two processes compile a function for two signatures at the same time, both
+    take the same number: the index names one file for one of the signatures, but that file may hold the code of the
+    other, which then runs on arguments that it was not compiled for. Here the signature determines the name of the
+    file, so that it does not matter which process writes last.
     """
 
     def __init__(self, folder: str, name: str, source: str) -> None:
-        """Keep what is compiled of `source`, a hash, in `folder`, in files whose names begin with `name`."""
+        """Keep code compiled from `source`, a hash, in `folder`, in files whose names begin with `name`."""
         self._folder, self._name = Path(folder), name
         self._stamp = f"{numba.__version__} {FORMAT} {source}\n".encode()
 
     def load(self, key: Any) -> Any:
-        """Return what was saved for `key`, or None where that is nothing, or of another source."""
+        """Return what was saved for `key`, or None if there is nothing, or only that of another source."""
         try:
             with self._path(key).open("rb") as file:
                 if not self._is_of_source(file):
@@ -72,7 +72,7 @@ class OverloadFiles:
         return data if saved_key == key else None
 
     def any(self) -> bool:
-        """Return whether something of the present source is kept."""
+        """Return whether anything compiled from the present source is saved."""
         for path in self._folder.glob(f"{self._name}.*.nbc"):
             with path.open("rb") as file:
                 if self._is_of_source(file):
@@ -80,7 +80,7 @@ class OverloadFiles:
         return False
 
     def save(self, key: Any, data: Any) -> None:
-        """Keep `data` for `key`: who reads meanwhile reads all of it or none."""
+        """Save `data` for `key`; a concurrent reader reads all of it or nothing."""
         path = self._path(key)
         written = path.with_suffix(f".{uuid.uuid4().hex[:16]}")
         try:
@@ -93,12 +93,12 @@ class OverloadFiles:
             raise
 
     def flush(self) -> None:
-        """Forget all that was saved."""
+        """Delete everything that was saved."""
         for path in self._folder.glob(f"{self._name}.*.nbc"):
             path.unlink(missing_ok=True)
 
     def _is_of_source(self, file: BinaryIO) -> bool:
-        """Read the stamp that a file begins with: what is of another source, or numba's own, is not unpickled."""
+        """Tell whether a file begins with the stamp of this source; others, as numba's own, are not unpickled."""
         return file.read(len(self._stamp)) == self._stamp
 
     def _path(self, key: Any) -> Path:
@@ -106,8 +106,8 @@ class OverloadFiles:
 
 
 def kept(compiled: Any, source: str) -> Any:
-    """Return `compiled`, a function of numba's with a cache, that keeps its code in `OverloadFiles` of `source`."""
-    if hasattr(compiled, "_cache"):  # not where compilation is switched off for debugging
+    """Return the cached numba function `compiled`, changed to keep its code in `OverloadFiles` of `source`."""
+    if hasattr(compiled, "_cache"):  # false where compilation is switched off for debugging
         cache = compiled._cache
         cache._impl = UnreadBitcode(compiled.py_func)
         cache._cache_file = OverloadFiles(cache.cache_path, cache._impl.filename_base, source)
@@ -115,5 +115,5 @@ def kept(compiled: Any, source: str) -> Any:
 
 
 def is_kept(compiled: Any) -> bool:
-    """Return whether code of `compiled` that its present source was compiled to is on disk, for any signature."""
+    """Return whether code of `compiled` for its present source is on disk, for any signature."""
     return not hasattr(compiled, "_cache") or compiled._cache._cache_file.any()

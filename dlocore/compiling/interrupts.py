@@ -1,11 +1,12 @@
-"""Interrupts of compiled code, as by Ctrl-C: they wait until it is left.
+"""Interrupts, as by Ctrl-C, wait until compiled code has returned.
 
-Where a compiled function hands back arrays and tuples, it calls Python, for their types. There the handler of a signal
-that came meanwhile is run, and an error that it raises, as Python's own does, is one that numba does not look for: the
-process ends by a segmentation fault. LLVM, as it loads a function, calls Python, too, and the error is forgotten.
+When a compiled function returns arrays and tuples, it calls Python for their types. Python then runs the handler of any
+signal that arrived meanwhile. numba does not check for an error that this handler raises, as Python's own handler does:
+the process would end with a segmentation fault. LLVM also calls Python while it loads a function, and such an error
+would be lost.
 """
 
-import _signal  # what `signal` wraps: its enumerations take longer than all else here
+import _signal  # which `signal` wraps: the enumerations there take longer than everything else here
 from collections.abc import Callable
 from functools import wraps
 from threading import current_thread, main_thread
@@ -16,12 +17,12 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 _SIGINT = cast(int, _signal.SIGINT)
-# what the globals are called, to begin with, of what finds types, makes named tuples, and is told of by LLVM
+# beginnings of the module names of code that is called by compiled code to find types and make named tuples, or by LLVM
 _CALLED = ("numba.core.serialize", "namedtuple_", "llvmlite.binding.executionengine")
 
 
 class _Deferring:
-    """A handler that stands for another, and keeps for later what comes while compiled code is run."""
+    """A signal handler that replaces another, and holds back interrupts while compiled code runs."""
 
     def __init__(self, handler: Callable[[int, FrameType | None], Any]) -> None:
         self.handler = handler
@@ -34,14 +35,14 @@ class _Deferring:
             self.handler(number, frame)
 
     def let_in(self) -> None:
-        """Call the other handler, where something was kept for it."""
+        """Call the other handler if an interrupt was held back."""
         if self.held:
             self.held = False
             self.handler(_SIGINT, None)
 
 
 def _is_compiled(frame: FrameType | None) -> bool:
-    """Tell whether what is run was called by compiled code, or by what loads it."""
+    """Tell whether the running code was called by compiled code, or by the loading of compiled code."""
     while frame is not None:
         if str(frame.f_globals.get("__name__")).startswith(_CALLED):
             return True
@@ -50,9 +51,9 @@ def _is_compiled(frame: FrameType | None) -> bool:
 
 
 def interruptible(function: Callable[P, T]) -> Callable[P, T]:
-    """Have a handler of interrupts in Python called outside of compiled code alone while `function` runs.
+    """Make Python's interrupt handler run only outside of compiled code while `function` runs.
 
-    That is in the main thread, no other runs handlers. It takes about a microsecond.
+    This applies to the main thread, the only one that runs handlers. It takes about a microsecond.
     """
 
     @wraps(function)
@@ -72,7 +73,7 @@ def interruptible(function: Callable[P, T]) -> Callable[P, T]:
 
 
 def let_in() -> None:
-    """Let in an interrupt that waits, where this is not compiled code: to be called now and then in what takes long."""
+    """Deliver a held-back interrupt, if this is not compiled code; to be called now and then during long work."""
     handler: Any = _signal.getsignal(_SIGINT)
     if isinstance(handler, _Deferring) and handler.held and current_thread() is main_thread():
         handler.let_in()

@@ -1,4 +1,4 @@
-"""The decorator of every compiled function, with an on-disk cache that follows the source of all of them."""
+"""Decorators of the compiled functions, with a cache on disk that depends on the source of all of them."""
 
 import hashlib
 from collections.abc import Callable
@@ -18,37 +18,37 @@ def _digest() -> str:
 
 
 _SOURCE = _digest()
-_njit: Any = numba.njit  # `_nrt`, the counting of references, is an option that it does not document
+_njit: Any = numba.njit  # `_nrt`, reference counting, is an option that numba does not document
 
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile `function` without the GIL and without fastmath, which would hide NaN.
 
-    numba's cache of a function looks only at the age of that function's own file, so a change of a law that is inlined
-    into a kernel would go unnoticed. The stamp is therefore the hash of all compiled sources.
+    numba's cache checks only the age of the function's own file, and so would miss a change of a law that is inlined
+    into a kernel. The stamp here is therefore the hash of all compiled sources.
     """
     return _compiled(function, nogil=True, _nrt=True)
 
 
 def brief(function: Callable[..., Any]) -> Any:
-    """Compile a kernel that takes microseconds, with the GIL: to hand it to another thread and back takes longer."""
+    """Compile a kernel that takes microseconds and keeps the GIL: releasing and retaking it would take longer."""
     return _compiled(function, nogil=False, _nrt=True)
 
 
 def leaf(function: Callable[..., Any]) -> Any:
-    """Compile a kernel that makes no array and returns none, and so need not count who refers to those it is handed.
+    """Compile a kernel that neither creates nor returns arrays, and so needs no reference counts of its arguments.
 
-    Atomic counts up and down, of every array of every table, take longer than the assembly for a short cable.
+    For a short cable, atomic counts of every array of every table take longer than the assembly.
     """
     return _compiled(function, nogil=False, _nrt=False)
 
 
 def law(function: Callable[..., Any]) -> Any:
-    """Compile a pointwise law that is inlined into the kernels, and makes no array either."""
+    """Compile a pointwise law that is inlined into the kernels; it creates no arrays either."""
     return _njit(error_model="numpy", forceinline=True, _nrt=False)(function)
 
 
-part = law  # of a kernel, into it: handing over a table, which is a hundred numbers, takes longer than some parts
+part = law  # a part of a kernel, inlined: passing a table, which is a hundred numbers, takes longer than some parts
 
 
 def _compiled(function: Callable[..., Any], **options: bool) -> Any:

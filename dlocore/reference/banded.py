@@ -1,4 +1,4 @@
-"""Factorisation of a symmetric band, without pivoting: the tangent of a rod's equations."""
+"""Factorisation, without pivoting, of a symmetric band: the tangent of a rod's equations."""
 
 from typing import Any
 
@@ -7,9 +7,9 @@ from dlocore.reference.compile import compiled
 
 @compiled
 def factor(K: Any) -> bool:
-    """Factor the band K (n, w + 1) as L D L' in place and tell whether D is positive.
+    """Factor the band K (n, w + 1) as L D L' in place and return whether D is positive.
 
-    K[i, o] is the element (i, i - o) before; after it D is K[:, 0] and L the rest.
+    Before, K[i, o] is the element (i, i - o); afterwards K[:, 0] is D and the rest is L.
     """
     n, w = K.shape[0], K.shape[1] - 1
     for i in range(n):

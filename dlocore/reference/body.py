@@ -1,4 +1,4 @@
-"""What the compiled equations of a rod read and write: its constants over a stretch of time, and its state."""
+"""Data of the compiled equations of a rod: its constants over a stretch of time, and its state."""
 
 from typing import NamedTuple
 
@@ -14,13 +14,13 @@ YIELD_BEND, YIELD_TWIST, YIELD_STRETCH, MEMORY_RATE, SOFTENED = range(7, 12)
 RADIUS, STIFFNESS, PASSAGE, CONTACT_DAMPING, STICK, LYING, GYRATION, DENSITY, AXIAL_DAMPING = range(12, 21)
 LAWS = 21
 
-REAL, DIRECTION, CLAMP = range(3)  # kinds of edges: of the cable, or the direction that a gripper holds
+REAL, DIRECTION, CLAMP = range(3)  # kinds of edges: part of the cable, or the direction that a gripper holds
 
 
 class Body(NamedTuple):
     """A chain of n nodes and n - 1 edges, with a hinge at each inner node.
 
-    A held direction is an edge without length between two nodes at one place; what a gripper prescribes is `fixed`.
+    A held direction is an edge without length between two nodes in one place; `fixed` marks what a gripper prescribes.
     The fourth coordinate of node i is the spin of edge i about its tangent.
 
     Attributes:
@@ -34,9 +34,9 @@ class Body(NamedTuple):
         width: length of cable that a hinge stands for (n - 2,) [m].
         natural: bends and twist rate of the stress-free cable (n - 2, 3) [1/m, 1/m, rad/m].
         law: coefficients of the laws, see the places above.
-        point_edge, point_along, point_length: where the cable touches surfaces: edge, part of the way along it, and
-            length of cable (p,) [m].
-        point_lies: whether it is the table that carries the cable there (p,), with the friction `LYING` per length.
+        point_edge, point_along, point_length: points that may touch surfaces: edge, fraction along it, and length of
+            cable (p,) [m].
+        point_lies: whether the table carries the cable there (p,), with the friction `LYING` per length.
         surfaces: (m, surface.ROW).
     """
 
@@ -66,8 +66,8 @@ class State(NamedTuple):
         t, a: unit tangents and directors of the edges (n - 1, 3).
         turn: twist of the hinges (n - 2,) [rad], full turns included.
         memory: strain about which a hinge is elastic (n - 2, 3) [1/m, 1/m, rad/m].
-        axial: the same of the edges (n - 1,).
-        anchor: displacement of what touches from its anchor (p, 3) [m].
+        axial: strain about which an edge is elastic (n - 1,).
+        anchor: displacement of each point in contact from its anchor (p, 3) [m].
     """
 
     q: Floats

@@ -1,4 +1,4 @@
-"""The energies of a rod: what its motion and its strains store."""
+"""The energies of a rod: of its motion and of its strains."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from dlocore.reference.hinge import cross, strains
 
 @compiled
 def energies(body: Any, state: Any) -> tuple[float, float, float, float]:
-    """Return the kinetic energy and that of stretch, bend and twist [J] of a state at the end of a step."""
+    """Return the kinetic energy and the energies of stretch, bend and twist [J] of a state at the end of a step."""
     kinetic = stretch = bend = twist = 0.0
     n = len(body.rest) + 1
     b = np.empty((n - 1, 3))

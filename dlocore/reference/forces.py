@@ -2,9 +2,9 @@
 
     M v' + internal forces + drag - weight - load - contact = 0
 
-with the internal forces of the energy: EA/2 e^2 h of each edge, (EI |kappa - kappa_0|^2 + GJ (tau - tau_0)^2) w/2 of
-each hinge, with damping on their rates (docs/model.md eq. 7, 7a and 9) and the memory of eq. 20, whose rate the same
-Runge-Kutta method integrates.
+The internal forces are those of the energy: EA/2 e^2 h of each edge and (EI |kappa - kappa_0|^2 + GJ (tau - tau_0)^2)
+w/2 of each hinge. Their rates are damped (docs/model.md eq. 7, 7a and 9). The same Runge-Kutta method integrates the
+rate of the memory (eq. 20).
 """
 
 from typing import Any
@@ -43,9 +43,9 @@ from dlocore.reference.surface import FRICTION, gap, press, rub, thickness
 
 @compiled
 def frames(body: Any, before: Any, q: Any, t: Any, a: Any, b: Any, lengths: Any) -> bool:
-    """Write tangents, directors (n - 1, 3) and lengths (n - 1,) of the edges; False where two of them fold up.
+    """Write tangents, directors (n - 1, 3) and lengths (n - 1,) of the edges; return False where two of them fold up.
 
-    Held tangents, and held directors, are in t and a already. `before` is the state at the start of the step.
+    Held tangents, and the directors of clamps, are already in t and a. `before` is the state at the start of the step.
     """
     d = np.empty(3)
     for e in range(len(body.rest)):
@@ -73,7 +73,7 @@ def frames(body: Any, before: Any, q: Any, t: Any, a: Any, b: Any, lengths: Any)
 
 @compiled
 def returned(trial: float, threshold: float, pace: float) -> tuple[float, float]:
-    """Return the size of the elastic strain after it has yielded, and its derivative by the `trial` size (eq. 20).
+    """Return the magnitude of the elastic strain after yielding, and its derivative by the `trial` magnitude (eq. 20).
 
     `pace` is the rate of the memory times the implicit part of the step: e + pace (e - threshold) = trial.
     """
@@ -86,10 +86,10 @@ def returned(trial: float, threshold: float, pace: float) -> tuple[float, float]
 def add_edges(
     body: Any, v: Any, axial: Any, implicit: float, t: Any, lengths: Any, memory: Any, R: Any, K: Any, mode: int
 ) -> None:
-    """Add the axial forces to R (n, 4), where `mode` > 0 their tangent to the band K, if it is 2 without thrust.
+    """Add the axial forces to R (n, 4), and their tangent to the band K: all of it (`mode` 1), or without thrust (2).
 
-    The tangent leaves out that the rate of strain changes as an edge with a velocity across it turns: that part is not
-    symmetric.
+    With `mode` 0 no tangent is added. The tangent leaves out that the rate of strain changes as an edge with a velocity
+    across it turns, because that part is not symmetric.
     """
     pace = body.law[MEMORY_RATE] * implicit
     for e in range(len(body.rest)):
@@ -123,7 +123,7 @@ def add_edges(
 
 @compiled
 def add(body: Any, K: Any, node: int, i: int, other: int, j: int, value: float) -> None:
-    """Add a value to the lower band, where both coordinates are free."""
+    """Add a value to the lower band K if both coordinates are free."""
     if body.fixed[node, i] or body.fixed[other, j]:
         return
     row, column = node * body.dims + i, other * body.dims + j
@@ -136,10 +136,10 @@ def add_hinges(
     body: Any, v: Any, turn: Any, memory: Any, implicit: float, t: Any, a: Any, b: Any, lengths: Any, tangent_rate: Any,
     turned: Any, remembered: Any, torque: Any, R: Any, K: Any, mode: int,
 ) -> None:  # fmt: skip
-    """Add the forces of bend and twist to R (n, 4), where `mode` > 0 their tangent to K, if it is 2 the definite part.
+    """Add bend and twist forces to R (n, 4), and their tangent to K: all of it (`mode` 1), or its definite part (2).
 
-    `turn` and `memory` are the twist of the last step and the memory before this stage; `turned` and `remembered` are
-    written. `torque` (n - 1, 3) receives the moment that each held direction takes.
+    With `mode` 0 no tangent is added. `turn` and `memory` are the twist of the last step and the memory before this
+    stage; `turned` and `remembered` are written. `torque` (n - 1, 3) receives the moment taken by each held direction.
     """
     law = body.law
     pace = law[MEMORY_RATE] * implicit
@@ -204,7 +204,7 @@ def add_hinges(
             R[last, 3] += g[6 + part]
         if mode == 0:
             continue
-        # C = d stress/d strain, over w as the strains here are not per length
+        # C = d stress/d strain, divided by w because the strains here are not per length
         soft = law[SOFTENED]
         for i in range(3):
             for j in range(3):
@@ -229,7 +229,7 @@ def add_hinges(
 
 @compiled
 def _to_edges(body: Any, e: int, t: Any, lengths: Any, g: Any, H: Any, mode: int) -> None:
-    """Turn H (8, 8) by the tangents into H by the edge vectors, in place.
+    """Turn H (8, 8), with derivatives by the tangents, into one by the edge vectors, in place.
 
     To second order, eta = P de/l - ((t.de) P de + t |P de|^2/2)/l^2.
     """
@@ -255,7 +255,7 @@ def _to_edges(body: Any, e: int, t: Any, lengths: Any, g: Any, H: Any, mode: int
 
 @compiled
 def _add_full(body: Any, k: int, H: Any, W: Any, full: Any, K: Any) -> None:
-    """Add H (8, 8) by the two edges and their spins to the band of the coordinates of three nodes."""
+    """Add H (8, 8), by the two edges and their spins, to the band K of the coordinates of three nodes."""
     for j in range(8):
         for i in range(3):
             W[i, j] = -H[i, j]
@@ -280,7 +280,7 @@ def _add_full(body: Any, k: int, H: Any, W: Any, full: Any, K: Any) -> None:
 
 @compiled
 def add_drag(body: Any, v: Any, implicit: float, R: Any, K: Any, mode: int) -> None:
-    """Add the drag of the nodes, and of the spins of the edges (eq. 8)."""
+    """Add the drag of the nodes and of the spins of the edges (eq. 8)."""
     c, c2 = body.law[DRAG], body.law[DRAG_QUADRATIC]
     for e in range(len(body.rest) if body.dims == 4 else 0):
         spins = c * body.law[GYRATION] ** 2 * body.rest[e]
@@ -304,7 +304,7 @@ def add_drag(body: Any, v: Any, implicit: float, R: Any, K: Any, mode: int) -> N
 def add_contact(
     body: Any, q: Any, v: Any, anchor: Any, implicit: float, slipped: Any, R: Any, K: Any, mode: int
 ) -> float:
-    """Add what surfaces do to the points of the cable, and friction; return the largest depth [m].
+    """Add the forces of surfaces on the points of the cable, with friction; return the largest depth [m].
 
     `anchor` (p, 3) is the displacement from the anchors before the implicit part of this stage; `slipped` is written.
     """
@@ -365,8 +365,10 @@ def add_contact(
 
 @compiled
 def goes_through(body: Any, q: Any, after: Any) -> bool:
-    """Tell whether a point of the cable, going straight from q to `after` (n, 4), is nearer to the middle of a solid on
-    its way than to its surface, and leaves it again: no step that sees the solid goes so.
+    """Tell whether a point of the cable passes through a solid on its straight path from q to `after` (n, 4).
+
+    It does if it is nearer to the middle of the solid than to its surface on the path, and leaves it again: no step
+    that sees the solid takes such a path.
     """
     n, x, y, z = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for p in range(len(body.point_edge)):

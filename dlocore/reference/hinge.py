@@ -1,15 +1,15 @@
 """The hinge of a discrete elastic rod: bend and twist between two edges, with first and second derivatives.
 
-Two edges with unit tangents t0, t1 and directors a, b across them (b = t x a) are bent by s_1, s_2 and twisted by s_3:
+The edges have unit tangents t0, t1 and directors a, b perpendicular to them (b = t x a). Their bends are
 
     s_1 = (t1.a0 - t0.a1)/chi,   s_2 = (t1.b0 - t0.b1)/chi,   chi = 1 + t0.t1,
 
-the components in the frame of the sections of the curvature binormal 2 t0 x t1/chi turned by a right angle (Bergou et
-al., Discrete viscous threads, 2010), and s_3 the angle from a0, carried to t1 by the smallest rotation, to a1. Divided
-by the length between the middles of the edges they are curvatures and twist rate.
+the components in the frame of the sections of the curvature binormal 2 t0 x t1/chi, turned by a right angle (Bergou et
+al., Discrete viscous threads, 2010). Their twist s_3 is the angle from a0, carried to t1 by the smallest rotation, to
+a1. Divided by the length between the midpoints of the edges they are curvatures and twist rate.
 
-Variations are those of the tangents, eta0 and eta1, with directors that do not spin, and spins alpha0, alpha1 about the
-tangents: y = (eta0, eta1, alpha0, alpha1), eight numbers.
+Variations are those of the tangents, eta0 and eta1, with directors that do not spin, and the spins alpha0, alpha1 about
+the tangents: y = (eta0, eta1, alpha0, alpha1), eight numbers.
 """
 
 from typing import Any
@@ -18,7 +18,7 @@ import numpy as np
 
 from dlocore.reference.compile import compiled
 
-FOLDED = 1e-3  # chi, below which an edge lies back on the one before it
+FOLDED = 1e-3  # chi below which an edge is folded back on the one before it
 
 
 @compiled
@@ -37,9 +37,9 @@ def cross(a: Any, b: Any, out: Any) -> None:
 
 @compiled
 def carry(before: Any, after: Any, x: Any, angle: float, first: Any, second: Any) -> None:
-    """Carry the director x (3,) across the unit vector `before` to `after` by the smallest rotation and spin it.
+    """Carry the director x (3,) from its tangent `before` to the tangent `after` by the smallest rotation, and spin it.
 
-    Writes the director and its companion after x director into `first` and `second` (3,), of unit length.
+    Write the director and `after` x director, both of unit length, into `first` and `second` (3,).
     """
     scale = dot(x, after) / (1.0 + dot(before, after))
     for d in range(3):
@@ -61,7 +61,7 @@ def carry(before: Any, after: Any, x: Any, angle: float, first: Any, second: Any
 
 @compiled
 def strains(t0: Any, a0: Any, b0: Any, t1: Any, a1: Any, b1: Any, turn: float, s: Any) -> None:
-    """Write the bends and the twist of a hinge into s (3,); the twist is the one nearest to `turn` [rad]."""
+    """Write bends and twist of a hinge into s (3,); the twist is the equivalent angle nearest to `turn` [rad]."""
     chi = 1.0 + dot(t0, t1)
     s[0] = (dot(t1, a0) - dot(t0, a1)) / chi
     s[1] = (dot(t1, b0) - dot(t0, b1)) / chi
@@ -99,7 +99,7 @@ def add_curvature_of_strains(
     c = dot(t0, t1)
     chi = 1.0 + c
     M1, M2, T = stress[0] / chi, stress[1] / chi, stress[2] / chi
-    tension = -(M1 * s[0] + M2 * s[1])  # of the second derivative of chi, which is the unit matrix
+    tension = -(M1 * s[0] + M2 * s[1])  # factor of the second derivative of chi, which is the unit matrix
     H[6, 6] -= M1 * dot(t1, a0) + M2 * dot(t1, b0)
     H[7, 7] += M1 * dot(t0, a1) + M2 * dot(t0, b1)
     for i in range(3):
@@ -122,7 +122,7 @@ def add_curvature_of_strains(
             mixed = -m0i * t0[j] + t1[i] * m1j - 0.5 * T * (k_i * t0[j] + t1[i] * k_j)
             if i == j:
                 mixed += tension
-            else:  # the matrix of (t0 + t1) x, over two
+            else:  # the matrix of (t0 + t1) x, halved
                 k = 3 - i - j
                 side = -1.0 if (j - i) % 3 == 1 else 1.0
                 mixed += 0.5 * T * side * (t0[k] + t1[k])

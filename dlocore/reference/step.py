@@ -1,11 +1,11 @@
-"""One step of a diagonally implicit Runge-Kutta method on a rod's equations, with an estimate of its error.
+"""One step of a diagonally implicit Runge-Kutta method on a rod's equations, with an error estimate.
 
-Stage i of a step h has the unknown rates V and the coordinates q = q_n + h sum_j a_ij V_j, and solves
+Stage i of a step h has the unknown rates V and the coordinates q = q_n + h sum_j a_ij V_j. It solves
 
     M (V - v_n - h sum_{j<i} a_ij A_j)/(h a_ii) + forces(q, V, t_n + c_i h) = 0
 
-by Newton's iteration on q, with one factorisation for as many stages as it serves. Strain memory and the anchors of
-friction are integrated by the same method, their implicit part in closed form.
+by Newton's iteration on q. One factorisation serves as many stages as possible. The same method integrates strain
+memory and the anchors of friction, with their implicit part in closed form.
 """
 
 from typing import Any
@@ -18,8 +18,8 @@ from dlocore.reference.compile import compiled
 from dlocore.reference.forces import add_contact, add_drag, add_edges, add_hinges, frames
 
 ITERATIONS = 12
-DOWNHILL = 40  # of a long step downhill, each with its own factors
-SHRINKS = 0.3  # of an update by the next: else the factors are too old
+DOWNHILL = 40  # iterations of a long step downhill, each with factors of its own
+SHRINKS = 0.3  # largest ratio of an update to the previous one: above it the factors are too old
 DONE, FAILED = 0, 1
 
 
@@ -33,7 +33,7 @@ def _scatter(body: Any, x: Any, out: Any) -> None:
 
 @compiled
 def _largest(body: Any, dx: Any) -> float:
-    """Return the largest coordinate of a displacement (n dims,), spins as lengths [m]."""
+    """Return the largest coordinate of a displacement (n dims,) [m], with spins converted to lengths."""
     found = 0.0
     for k in range(len(dx) // body.dims):
         for d in range(body.dims):
@@ -43,10 +43,10 @@ def _largest(body: Any, dx: Any) -> float:
 
 @compiled
 def _remains(body: Any, period: float, state: Any, end: Any, tangent_rate: Any, lengths: Any, b: Any, e: Any) -> float:
-    """Return how far an error e (n, 4) of the velocities moves the rod within `period` [s], about [m].
+    """Return approximately how far an error e (n, 4) of the velocities moves the rod within `period` [s], in m.
 
-    It is that of the impulse M e spread over the period, by one implicit step: T e where the rod is free, and e/(T w^2)
-    where it is held so stiffly that it swings at w.
+    It is the displacement due to the impulse M e spread over the period T, by one implicit step: T e where the rod is
+    free, and e/(T w^2) where it is held so stiffly that it swings at w.
     """
     n, dims = len(body.rest) + 1, body.dims
     K, dx = np.zeros((n * dims, 6 if dims == 2 else 11)), np.empty(n * dims)
@@ -76,16 +76,16 @@ def add_forces(
     body: Any, state: Any, after: Any, load: Any, pull: Any, memory: Any, axial: Any, anchor: Any, implicit: float,
     b: Any, lengths: Any, tangent_rate: Any, R: Any, torque: Any, K: Any, mode: int,
 ) -> float:  # fmt: skip
-    """Write what is left of the forces on each node (n, 4) [N] to `R`, that on what is held being what holds it.
+    """Write the residual force on each node (n, 4) [N] to `R`; on held coordinates it is the reaction force.
 
     Args:
         body: the rod.
-        state: in which the step begins.
-        after: the state of a stage; receives what it remembers.
+        state: at the start of the step.
+        after: state of the stage; receives what it remembers.
         load: on each node (n, 3) [N].
         pull: velocity (n, 4) that the stage would have without a force of its own.
-        memory, axial, anchor: what is remembered without a rate of the stage.
-        implicit: the time that the stage counts [s].
+        memory, axial, anchor: what would be remembered without the rates of this stage.
+        implicit: duration that the stage counts for [s].
         b, lengths, tangent_rate: second directors and lengths of the edges, and the rates of held tangents.
         R, torque: receive the forces and the moments of held directions (n - 1, 3) [N m].
         K, mode: the band to which the tangent is added: 0 none, 1 all of it, 2 its definite part.
@@ -119,15 +119,16 @@ def take_step(
     Args:
         body, tableau: the rod and the method.
         h: step [s].
-        period: for which an error of the velocity lasts [s]; 0: forget the velocity, so that the step goes downhill,
-            damped by inertia alone.
+        period: time for which an error of the velocity lasts [s]; 0 discards the velocity, so that the step goes
+            downhill, damped by inertia alone.
         state: at the beginning.
         guide: what is prescribed at the stages.
         tolerance: of Newton's iteration [m].
-        after: the state at the end.
-        reaction: mean over the step of the forces that hold the nodes in place (n, 4), without the inertia of what is
-            held [N]: that at the end is of waves of stretch, which no step of a smooth motion resolves.
-        torque: mean of the moments that held directions take (n - 1, 3) [N m].
+        after: receives the state at the end.
+        reaction: receives the mean over the step of the forces that hold the nodes (n, 4) [N], without the inertia of
+            the held coordinates. The force at the end of the step would be dominated by waves of stretch, which no step
+            of a smooth motion resolves.
+        torque: receives the mean of the moments taken by held directions (n - 1, 3) [N m].
         told: receives the estimated error [m], the last update [m] and the largest depth in a surface [m].
     """
     n, dims, static = len(body.rest) + 1, body.dims, period == 0.0
@@ -158,7 +159,7 @@ def take_step(
             memory += weight * memory_rate[j]
             axial += weight * axial_rate[j]
             anchor += weight * anchor_rate[j]
-        # a start for Newton: the rate of the stage before, extrapolated by its acceleration
+        # initial guess of Newton's iteration: the rate of the previous stage, extrapolated by its acceleration
         for k in range(n):
             for d in range(4):
                 if i == 0:
@@ -235,15 +236,16 @@ def take_step(
                 break
         if not converged:
             return FAILED
-        # what the last update changed: forces, memory and anchors of the very end of the stage
+        # geometry after the last update
         if not frames(body, state, q, after.t, after.a, b, lengths):
             return FAILED
-        # those of the last update are not those of the state that it led to: the cable hardly stretches
+        # forces, memory and anchors at the very end of the stage: those before the last update differ, as the cable
+        # hardly stretches
         add_forces(
             body, state, after, guide.load[i], pull, memory, axial, anchor, implicit, b, lengths, tangent_rate, R, T,
             K, 0,
         )  # fmt: skip
-        # the weights with which the stages make up the step: momentum is gained by the mean of the forces
+        # weights of the stages in the step: the mean of the forces changes the momentum
         share = tableau.coefficients[stages - 1, i]
         reaction += share * R
         torque += share * T
@@ -264,7 +266,8 @@ def take_step(
     told[0] = 0.0
     if static:
         return DONE
-    # the error of the step, less what the tangent says is stiff and hence decays, and where that of the velocity leads
+    # error of the step, filtered by the tangent because stiff parts decay, plus the displacement due to the error of
+    # the velocity
     error, slip = np.zeros((n, 4)), np.zeros((n, 4))
     implicit = h * tableau.coefficients[stages - 1, stages - 1]
     for j in range(stages):

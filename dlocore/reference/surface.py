@@ -1,4 +1,4 @@
-"""Surfaces that a rod touches: how far from them a point is, and what it feels there (docs/model.md eq. 21, 22)."""
+"""Surfaces that a rod touches: the distance of a point from them, and the force there (docs/model.md eq. 21, 22)."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ import numpy as np
 from dlocore.reference.compile import compiled
 
 # a row: kind, centre 3, axes of the body's frame 9, half sizes 3, rounding radius, friction
-PLANE, BOX, CYLINDER = range(3)  # a sphere is a rounded point, a capsule a rounded segment: boxes without width
+PLANE, BOX, CYLINDER = range(3)  # a sphere is a rounded point and a capsule a rounded segment: boxes without width
 ROW = 18
 _AXIS = 4
 _HALF = 13
@@ -65,7 +65,7 @@ def gap(row: Any, x: Any, n: Any) -> float:
 
 @compiled
 def thickness(row: Any) -> float:
-    """Return how deep the middle of the solid of `row` (ROW,) lies [m]; infinite for a plane."""
+    """Return the depth [m] of the middle of the solid of `row` (ROW,); infinite for a plane."""
     if row[0] == PLANE:
         return np.inf
     across = row[_HALF] if row[0] == CYLINDER else min(row[_HALF], row[_HALF + 1])
@@ -91,14 +91,14 @@ def rub(
 ) -> None:
     """Write Coulomb's friction against the slip (3,) from an anchor (eq. 22), and minus its derivative, (3,), (3, 3).
 
-    f = -mu N x/max(|x|, s_0) of x = s + lag v, so that what sticks does not swing about its anchor: the lag makes it
-    critically damped, and leaves the force of what slides as it is. The slip is cut to `stick` = s_0 [m] in place:
-    there the anchor is dragged behind. Neither slip nor speed counts along the normal n.
+    f = -mu N x/max(|x|, s_0) with x = s + lag v. The lag makes the sticking critically damped, so that what sticks does
+    not swing about its anchor, and leaves the force of what slides as it is. The slip is limited to `stick` = s_0 [m]
+    in place, by dragging the anchor along. Components of slip and velocity along the normal n do not count.
 
     Args:
         limit: mu N [N/m].
         density: of the cable [kg/m].
-        implicit: by how much the slip follows the velocity v (3,) [s].
+        implicit: derivative of the slip by the velocity v (3,) [s].
     """
     lag = 2.0 * np.sqrt(density * stick / limit)
     along = slip[0] * n[0] + slip[1] * n[1] + slip[2] * n[2]
