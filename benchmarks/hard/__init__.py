@@ -1,1 +1,1 @@
-"""Hard scenes: a seeded generator of them, the laws that every motion keeps, and what each method does on them."""
+"""Hard scenes: a seeded generator of them, the laws that every motion obeys, and the results of each method on them."""

@@ -1,11 +1,11 @@
-"""Print, and save, what each method does on each named hard case: the table of docs/hard-cases.md.
+"""Print and save the results of each method on each named hard case: the table of docs/hard-cases.md.
 
     python -m benchmarks.hard --json hard.json
 
-`march` is the method of quality "auto" with a target error of 0.5 % of the length, or on the grid of the case;
-`reference`, which takes no grid, always has that target; `spacetime` and `paper` are given grids, and nothing takes
-their place where they fail on these. The error is that against the case's true answer. `--cases TEXT` leaves out cases
-whose name does not contain TEXT.
+`march` is the method of quality "auto" with a target error of 0.5 % of the length, or on the grid of the case.
+`reference` takes no grid and always has that target. `spacetime` and `paper` are given grids; where they fail on these,
+no other method takes their place. The error is measured against the true answer of the case. `--cases TEXT` runs only
+cases whose name contains TEXT.
 """
 
 import argparse
@@ -34,7 +34,7 @@ def by_method(case: Case, method: str) -> Scene:
     """Return the scene of a case for a method.
 
     Raises:
-        SceneError: the case has to be refused.
+        SceneError: the case must be refused.
     """
     scene = posed(case)
     if method == "reference":
@@ -48,7 +48,7 @@ def by_method(case: Case, method: str) -> Scene:
 
 
 def row(case: Case, method: str) -> dict[str, Any]:
-    """Solve a case by a method; return what came of it."""
+    """Solve a case by a method; return the result."""
     began = time.process_time()
     try:
         scene = by_method(case, method)

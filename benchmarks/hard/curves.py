@@ -1,4 +1,4 @@
-"""Start shapes: curves of given length by their tangents, and what vision makes of them."""
+"""Start shapes: curves of given length from their tangents, and the faults of curves seen by a camera."""
 
 import numpy as np
 
@@ -6,17 +6,17 @@ from benchmarks.hard.draft import Draft, Floats, Rng, Room, chance, pick, spread
 from dlocore import Points, Straight
 
 SAMPLES = 96  # points on a curve
-FINE = 4 * SAMPLES  # ... with a sharp bend
+FINE = 4 * SAMPLES  # ... on a curve with a sharp bend
 
 
 def along(tangents: Floats, length: float) -> Floats:
-    """Return points (k + 1, 3) from the origin, with steps along unit tangents (k, 3)."""
+    """Return points (k + 1, 3) from the origin, in steps along unit tangents (k, 3)."""
     steps = tangents / np.linalg.norm(tangents, axis=1, keepdims=True) * (length / len(tangents))
     return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
 
 
 def turning(angle: Floats, room: Room, length: float) -> Floats:
-    """Return points of a plane curve by the angle of its tangent (k,) [rad]."""
+    """Return points of a plane curve from the angle of its tangent (k,) [rad]."""
     across = 2 if room == "upright" else 1
     tangents = np.zeros((len(angle), 3))
     tangents[:, 0], tangents[:, across] = np.cos(angle), np.sin(angle)
@@ -28,23 +28,23 @@ def _middles() -> Floats:
 
 
 def arc(length: float, angle: float, room: Room) -> Floats:
-    """Return an arc that turns by `angle` [rad], level at its middle."""
+    """Return an arc that turns by `angle` [rad] and is level at its middle."""
     return turning(angle * (_middles() - 0.5), room, length)
 
 
 def bend(length: float, angle: float, width: float, at: float) -> Floats:
-    """Return a straight curve that turns by `angle` [rad] to the left, along `width` [m] about `at` [m]."""
+    """Return a straight curve that turns left by `angle` [rad], over `width` [m] around `at` [m]."""
     middles = (np.arange(FINE) + 0.5) * length / FINE
     return turning(angle * np.clip((middles - at) / width + 0.5, 0.0, 1.0), "flat", length)
 
 
 def wave(length: float, angle: float, turns: float, room: Room) -> Floats:
-    """Return a curve with inflections whose tangent swings by -+ `angle` [rad]."""
+    """Return a curve with inflections whose tangent swings by +- `angle` [rad]."""
     return turning(angle * np.sin(2 * np.pi * turns * _middles()), room, length)
 
 
 def hairpin(length: float, width: float, room: Room) -> Floats:
-    """Return two straight strands `width` [m] apart and the half circle between them."""
+    """Return two straight strands `width` [m] apart, connected by a half circle."""
     s = (_middles() - 0.5) * length / (0.5 * np.pi * width)  # -0.5 to 0.5 on the half circle
     return turning(np.pi * (np.clip(s, -0.5, 0.5) + 0.5), room, length)
 
@@ -52,7 +52,7 @@ def hairpin(length: float, width: float, room: Room) -> Floats:
 def loop(length: float, share: float, gap: float, room: Room) -> Floats:
     """Return a straight curve with one full loop in its middle `share`, whose strands pass `gap` [m] apart.
 
-    The tangent turns as smoothly as minimum-jerk motion: a kink would be remembered by a cable that is bent by itself.
+    The tangent turns as smoothly as in minimum-jerk motion: a cable with a bent rest shape would remember a kink.
     """
     s = np.clip((_middles() - 0.5) / share + 0.5, 0.0, 1.0)
     angle = 2 * np.pi * s**3 * (10 - 15 * s + 6 * s**2)
@@ -74,7 +74,7 @@ def corner(length: float, angle: float, at: float, room: Room) -> Floats:
 
 
 def as_seen(r: Rng, d: Draft, points: Floats) -> Points:
-    """Return points as the start, sometimes with the faults of given points."""
+    """Return points as a start shape, sometimes with typical faults of measured points."""
     length = d.length
     fault = pick(r, {"none": 6, "stretched": 1, "repeated": 1, "uneven": 1, "noise": 1, "tiny": 1})
     if fault == "none":
@@ -104,7 +104,7 @@ def _scatter(r: Rng, count: int, room: Room) -> Floats:
 
 
 def apart(d: Draft) -> bool:
-    """Tell whether strands that cross have to keep apart: on a table one can lie over another."""
+    """Tell whether strands that cross must keep apart; on a table one can lie over another."""
     return d.room != "flat" or d.gravity == 0.0
 
 

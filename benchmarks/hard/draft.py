@@ -1,4 +1,4 @@
-"""A scene on the drawing board: its parts while they are drawn."""
+"""A scene while it is drawn: its parts, still changeable."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
@@ -23,11 +23,11 @@ class Draft:
 
     Attributes:
         length: of the cable [m].
-        gravity: size of it [m/s^2].
+        gravity: its magnitude [m/s^2].
         cable: fields of `Cable`.
-        room: where the motion goes.
+        room: directions in which the motion goes.
         families: kinds of hardness, "group: kind".
-        speed, acceleration, jump: the largest of the motion [m/s, m/s^2], and that of its velocity at once [m/s].
+        speed, acceleration, jump: the largest of the motion [m/s, m/s^2], and the largest jump of its velocity [m/s].
     """
 
     length: float
@@ -48,7 +48,7 @@ class Draft:
 
     @property
     def time(self) -> float:
-        """Return the unit of all durations: about half the time in which the cable swings once [s]."""
+        """Return the unit of all durations [s]: about half the period of the cable's swing."""
         return float(np.sqrt(10.0 * self.length / max(self.gravity, 10.0)))
 
     @property
@@ -59,7 +59,7 @@ class Draft:
         """Return the scene.
 
         Raises:
-            SceneError: it can't be.
+            SceneError: the parts do not make a valid scene.
         """
         assert self.shape is not None
         return Scene(
@@ -74,7 +74,7 @@ class Draft:
         )
 
     def move(self, displacement: Floats, duration: float, **changes: Any) -> Move:
-        """Return a move, and note how fast it is."""
+        """Return a move, and record how fast it is."""
         path = Move(displacement=displacement, duration=duration, **changes)
         turn = 0.0 if path.rotation is None else float(np.linalg.norm(path.rotation)) * 0.1 * self.length
         way = float(np.linalg.norm(displacement)) + turn
@@ -85,7 +85,7 @@ class Draft:
         return path
 
     def slower(self, factor: float) -> None:
-        """Shrink every displacement by a factor."""
+        """Scale every displacement by a factor."""
         self.grasps = [
             replace(g, path=replace(g.path, displacement=factor * np.asarray(g.path.displacement)))
             if isinstance(g.path, Move)
@@ -95,7 +95,7 @@ class Draft:
 
 
 def spread(r: Rng, low: float, high: float) -> float:
-    """Draw from a range on a logarithmic scale."""
+    """Draw from a range, evenly on a logarithmic scale."""
     return float(np.exp(r.uniform(np.log(low), np.log(high))))
 
 
@@ -104,12 +104,12 @@ def chance(r: Rng, share: float) -> bool:
 
 
 def pick(r: Rng, options: dict[str, float]) -> str:
-    """Draw a key by its weight."""
+    """Draw a key with the probability given by its weight."""
     weights = np.array(list(options.values()))
     return list(options)[int(np.searchsorted(np.cumsum(weights / weights.sum()), r.random(), side="right"))]
 
 
 def in_room(r: Rng, room: Room) -> Floats:
-    """Draw a direction (3,) of unit length."""
+    """Draw a unit vector (3,)."""
     x = r.normal(size=3) * {"flat": [1, 1, 0], "upright": [1, 0, 1], "space": [1, 1, 1]}[room]
     return np.asarray(x / np.linalg.norm(x))

@@ -1,4 +1,4 @@
-"""Random scenes, each from (seed, index) alone, and the scene as Python."""
+"""Random scenes, each determined by (seed, index) alone, and scenes as Python code."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,8 +24,8 @@ from dlocore.problem.problem import pose
 from dlocore.problem.time_grid import smallest_n_t
 
 IMPOSSIBLE = 0.05  # share of scenes that no cable can follow
-CROWDED = 1000  # seed from which scenes have several obstacles
-HEAVY = 2000  # seed from which cables carry point masses, and obstacles as below CROWDED
+CROWDED = 1000  # seed from which on scenes have several obstacles
+HEAVY = 2000  # seed from which on cables carry point masses; obstacles are as below CROWDED
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,10 +33,10 @@ class Drawn:
     """A drawn scene.
 
     Attributes:
-        seed, index: it is drawn from these alone.
+        seed, index: they alone determine the scene.
         families: kinds of hardness, "group: kind".
-        possible: a cable can follow, as far as is known before its motion (`judge.py`); else it has to
-            be refused, or to end with a status that says so.
+        possible: whether a cable can follow, as far as is known before the motion is solved (`judge.py`). If not, the
+            scene must be refused or end with a status that says so.
         make: returns the scene, or raises SceneError.
     """
 
@@ -48,10 +48,10 @@ class Drawn:
 
 
 def draw(seed: int, index: int, *, small: bool = False) -> Drawn:
-    """Draw the scene `index` of a seed; `small`: on a grid of some ten by twenty control points, for quick tests.
+    """Draw the scene `index` of a seed; `small` uses a grid of about ten by twenty control points, for quick tests.
 
-    Scenes of seeds from CROWDED on have two to four obstacles each, others one in some of them; from HEAVY on their
-    cables carry one to three point masses of a hundredth to three times their own mass.
+    Scenes of seeds from CROWDED to HEAVY - 1 have two to four obstacles each; of other seeds, some scenes have one.
+    From HEAVY on, the cables carry one to three point masses of a hundredth to three times their own mass.
     """
     r = np.random.default_rng([seed, index])
     length = 1.0 if chance(r, 0.6) else spread(r, 0.05, 50.0)
@@ -84,7 +84,7 @@ def _room(r: Rng) -> Room:
 
 
 def _bring_within_reach(d: Draft) -> None:
-    """Shorten the moves until no two grippers are farther apart than the cable between them."""
+    """Shorten the moves until no two grippers are farther apart than the cable between them is long."""
     if len(d.grasps) < 2 or "motion: pulled taut" in d.families or "motion: two grasps 1 mm apart" in d.families:
         return
     start, t = started(d), np.linspace(0.0, d.horizon, 257)
@@ -102,12 +102,12 @@ def _bring_within_reach(d: Draft) -> None:
 
 
 def _at_start(p: np.ndarray, q: np.ndarray, between: float) -> float:
-    """Return how far apart two grippers start, of the cable between them, and a hair."""
+    """Return the start distance of two grippers as a share of the cable between them, plus a hair."""
     return float(np.linalg.norm(p[0] - q[0])) / between + 1e-9
 
 
 def _draw_quality(r: Rng, d: Draft, small: bool) -> None:
-    """Draw what is asked: mostly a target error, else a grid and a method."""
+    """Draw the requested quality: mostly a target error, otherwise a grid and a method."""
     if small:
         problem = pose(d.scene())
         n_u, n_t = int(r.integers(9, 18)), int(r.integers(13, 26))
@@ -132,12 +132,12 @@ def _draw_quality(r: Rng, d: Draft, small: bool) -> None:
             n_u, n_t = min(n_u, 21), min(n_t, 33)
     problem = pose(d.scene())
     if method == "paper" and problem.events:
-        method = "march"  # the printed scheme has one smooth motion
+        method = "march"  # the printed scheme can only solve one smooth motion
     n_u, n_t = max(n_u, smallest_n_u(problem)), max(n_t, smallest_n_t(problem))
     d.quality = Quality(n_u=n_u, n_t=n_t, delta=max(delta, 1e-10), method=method)  # type: ignore[arg-type]
 
 
 def as_python(scene: Scene) -> str:
-    """Return the scene as Python that makes it again, for `from dlocore import *` and `from numpy import array`."""
+    """Return Python code that recreates the scene, after `from dlocore import *` and `from numpy import array`."""
     with np.printoptions(precision=17, threshold=1_000_000, linewidth=110):
         return repr(scene)

@@ -1,4 +1,4 @@
-"""The same scene seen differently: turned and shifted, in a mirror, from the cable's other end, in other units."""
+"""Images of a scene: turned and shifted, mirrored, with the cable reversed, or in other units."""
 
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -17,13 +17,13 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Image:
-    """r -> length (frame r) + shift, t -> time t, masses times mass, and u -> L - u where the cable is reversed.
+    """A map r -> length (frame r) + shift, t -> time t, masses times `mass`, and u -> L - u if the cable is reversed.
 
     Attributes:
-        frame: orthogonal (3, 3); a mirror where its determinant is -1.
+        frame: orthogonal (3, 3); a mirror if its determinant is -1.
         shift: (3,), in the new unit of length.
-        length, time, mass: of one old unit in new ones.
-        backwards: count u from the other end.
+        length, time, mass: one old unit, in new units.
+        backwards: whether u counts from the other end.
     """
 
     frame: Floats
@@ -40,17 +40,17 @@ class Image:
         return np.asarray(scale * (np.asarray(v) @ self.frame.T))
 
     def turns(self, w: Any) -> Floats:
-        """Return the images of rotation vectors, which a mirror turns the other way."""
+        """Return the images of rotation vectors; a mirror reverses their sense."""
         return np.asarray(np.linalg.det(self.frame) * (np.asarray(w) @ self.frame.T))
 
     def back(self, surface: SplineSurface, u: Floats, t: Floats, length: float) -> Floats:
-        """Return positions (k_t, k_u, 3) of the image's surface as the original scene sees them."""
+        """Return positions (k_t, k_u, 3) of the image's surface, transformed back to the original scene."""
         at = length - u if self.backwards else u
         return np.asarray((surface.positions(self.length * at, self.time * t) - self.shift) @ self.frame / self.length)
 
 
 def turned(angle: float, shift: Floats) -> Image:
-    """Return a turn about the vertical, which gravity and tables do not notice, and a shift."""
+    """Return a rotation about the vertical, which does not affect gravity and tables, and a shift."""
     return Image(frame=Rotation.from_rotvec([0.0, 0.0, angle]).as_matrix(), shift=shift)
 
 

@@ -1,4 +1,4 @@
-"""Scenes that no cable can follow, or that contradict themselves: what a sound scene becomes by one fault."""
+"""Scenes that no cable can follow, or that contradict themselves: sound scenes with one fault."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,12 +18,12 @@ def pulled_apart(r: Rng, d: Draft) -> Callable[[], Scene]:
     far = r.uniform(0.02, 0.5) * length
     path = Move(displacement=(far, 0, 0), duration=d.time)
     d.grasps = [Grasp(u=u[0]), Grasp(u=u[1], path=path)]
-    d.horizon = None  # that of the pull
+    d.horizon = None  # the horizon of the pull
     return d.scene
 
 
 def pulled_apart_late(r: Rng, d: Draft) -> Callable[[], Scene]:
-    """Close a second gripper in mid-motion and pull: only the solve can tell how far."""
+    """Close a second gripper in mid-motion and pull: only solving can tell how far."""
     d.shape, d.effects, d.environment = Straight(), {}, {"gravity": (0.0, 0.0, 0.0), "drag": 0.1}
     path = Move(displacement=(r.uniform(0.1, 0.6) * d.length, 0, 0), duration=d.time)
     d.grasps = [Grasp(u=0.1 * d.length), Grasp(u=0.8 * d.length, path=path, grasp_time=0.1 * d.time)]
@@ -116,7 +116,7 @@ FAULTS: tuple[Fault, ...] = (
 
 
 def spoil(r: Rng, d: Draft) -> Callable[[], Scene]:
-    """Give a sound draft one fault; the scene is made, or refused, when the result is called."""
+    """Give a sound draft one fault; calling the result makes the scene, or raises an error."""
     d.effects = {name: value for name, value in d.effects.items() if name != "obstacles"}
     d.quality = replace(d.quality) if d.quality.method != "paper" else Quality()
     fault = FAULTS[int(r.integers(len(FAULTS)))]

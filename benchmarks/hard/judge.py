@@ -1,4 +1,4 @@
-"""Run a drawn scene and judge what came back: a record of plain numbers and words, one line of JSON."""
+"""Run a drawn scene and judge the answer: a record of plain numbers and words, one line of JSON."""
 
 import itertools
 import time
@@ -26,15 +26,15 @@ from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.stability.determined import DISTURBED, UNSEEN, bent
 from dlocore.statics.statics import settles_elsewhere, start_grid
 
-WRONG = 0.01  # of the length: an error that an answer has to tell of
-SURE = 0.3  # of a distance from the refined march: within it the refined marches agree where they can tell
+WRONG = 0.01  # of the length: larger errors must be reported by the answer
+SURE = 0.3  # of the distance from the refined march: the error counts if the refined marches are less than this apart
 MOST_STRAIN = 0.02
 HELD = 1e-9  # [m]
-ASTRAY = 1e-4  # of the length: of a gripper's path by the time spline, between the ends
-GAINED = 0.02  # of the energy that was about
-LOST = 0.05  # of the impulses that were about
-OPEN = ("does not determine its motion", "mirror image", UNSEEN)  # words of an answer that may be one of several
-MIDWAY = (0.25, 0.5, 0.75)  # of the time of a motion
+ASTRAY = 1e-4  # of the length: deviation of the time spline from a gripper's path, between the ends
+GAINED = 0.02  # of the largest energy in the motion
+LOST = 0.05  # of the impulses in the motion
+OPEN = ("does not determine its motion", "mirror image", UNSEEN)  # words in an answer that may be one of several
+MIDWAY = (0.25, 0.5, 0.75)  # of the duration of a motion
 
 DRIVEN = "impossible: a gripper drives what it holds into something"
 
@@ -48,11 +48,11 @@ def run(
 
     Args:
         drawn: the scene.
-        deadline: time that a prediction is allowed [s].
-        checked: compare it with a refined march too.
-        patience: time that each further solve of the judge is allowed [s]; the same where it is None.
-        measured: whose start is disturbed, to tell whether it determines the motion: of scenes that do not converge
-            ("failed"), of "all", or, as always, only of those that are compared ("checked").
+        deadline: time limit of the prediction [s].
+        checked: whether to compare it with a refined march too.
+        patience: time limit of each further solve by the judge [s]; None for the same limit.
+        measured: which scenes are disturbed at the start, to tell whether they determine their motion: those that do
+            not converge ("failed"), "all", or only those that are compared ("checked"); the compared ones always are.
     """
     patience = deadline if patience is None else patience
     record: dict[str, Any] = {"index": drawn.index, "families": drawn.families, "possible": drawn.possible}
@@ -75,7 +75,7 @@ def run(
                 record["midway"] = disturbed_midway(prediction, scene, patience)
     except SceneError as error:
         record |= {"status": "refused", "message": str(error), "field": error.field}
-    except Exception as error:  # whatever it is, it is what this looks for
+    except Exception as error:  # any error: finding errors is the purpose of this run
         where = traceback.extract_tb(error.__traceback__)[-1]
         record |= {"status": "exception", "message": f"{type(error).__name__}: {error} at {where.name}:{where.lineno}"}
     record.setdefault("seconds", time.process_time() - cpu)
@@ -105,13 +105,13 @@ def _answer(prediction: Prediction, scene: Scene) -> dict[str, Any]:
 
 
 def compare(prediction: Prediction, scene: Scene, deadline: float) -> dict[str, Any]:
-    """Return the distance from a refined march, and how far two refined marches are apart, of the length."""
+    """Return the distance from a refined march, and that between two refined marches, relative to the length."""
     accuracy, surface, length = prediction.accuracy, prediction.surface, scene.cable.length
     u, t = np.linspace(0.0, length, 101), np.linspace(0.0, surface.horizon, moments(scene, 65))
     problem = _posed(prediction, scene)
     found = []
     for finer in (2.0, 3.0):
-        least = (finer + 2.0) / 3.0  # times what the answer has, however fine that is
+        least = (finer + 2.0) / 3.0  # least refinement relative to the answer, however fine that is
         n_u = max(int(np.clip(round(finer * accuracy.n_u), 33, 129 if finer > 2 else 97)), round(least * accuracy.n_u))
         n_t = max(int(np.clip(round(finer * accuracy.n_t), 65, 513 if finer > 2 else 385)), round(least * accuracy.n_t))
         steps = max(given_steps(n_t), round(finer * accuracy.steps))
@@ -131,11 +131,12 @@ def compare(prediction: Prediction, scene: Scene, deadline: float) -> dict[str, 
 
 
 def disturbed(prediction: Prediction, scene: Scene, deadline: float) -> float | None:
-    """Return how far a start that is bent by DISTURBED takes the motion, of the length; None where no march tells.
+    """Return how far a start bent by DISTURBED changes the motion, relative to the length; None if no march can tell.
 
-    More than WRONG: the scene does not determine its motion. Three marches on one grid, as fine as the finest that the
-    prediction tried, as coarse steps damp what would grow. Their start is as it is, or bent by some half waves; only
-    where each finds its equilibria and keeps the cable's length. A start that settles is bent before it does, too.
+    If it is more than WRONG, the scene does not determine its motion. Three marches run on one grid as fine as the
+    finest that the prediction tried, because coarse steps damp what would grow. The start is unchanged in the first,
+    and bent by a few half waves in the others. All three must find their equilibria and keep the length of the cable. A
+    start that settles is also bent before it settles.
     """
     problem = _posed(prediction, scene)
     n_u, steps = _finest(prediction, problem)
@@ -157,11 +158,11 @@ def disturbed(prediction: Prediction, scene: Scene, deadline: float) -> float | 
 
 
 def disturbed_midway(prediction: Prediction, scene: Scene, deadline: float) -> float | None:
-    """Return the same of a motion that is bent at a quarter, a half and three quarters of its time; None if none tells.
+    """Return the same for a motion that is bent at a quarter, a half and three quarters of its time.
 
-    A motion that goes through equilibria, or is damped strongly, forgets its start, and may snap, or be struck, all the
-    same: what decides on how is whatever disturbs it by then. The bend is that of `disturbed`, and so is the grid, but
-    for the steps that begin at those times in all of the marches. All of them share the deadline.
+    It is None where no march can tell. A motion that goes through equilibria or is damped strongly forgets its start,
+    and may still snap or be struck; what decides the outcome is whatever disturbs it at that time. The bend and the
+    grid are those of `disturbed`, but in all marches steps begin at those times. All marches share the deadline.
     """
     problem = _posed(prediction, scene)
     n_u, steps = _finest(prediction, problem)
@@ -184,10 +185,10 @@ def disturbed_midway(prediction: Prediction, scene: Scene, deadline: float) -> f
 
 
 def driven_into(prediction: Prediction, scene: Scene, deadline: float) -> str:
-    """Return where a gripper drives what it holds into something, as the motion shows, "" where none does.
+    """Return where a gripper drives what it holds into something, as the motion shows; "" if none does.
 
-    A grasp that closes late has its path begin where the cable is by then, which the generator does not know. A coarse
-    grid may have it elsewhere: a march on one as fine as the finest that the prediction tried has to show it, too.
+    The path of a grasp that closes late begins where the cable is at that time, which the generator does not know. On a
+    coarse grid this may be elsewhere, so a march as fine as the finest that the prediction tried must show it too.
     """
     level = prediction.level
     if level is None or prediction.status != "stalled" or driven(level.problem, level.motion) is None:
@@ -201,57 +202,57 @@ def driven_into(prediction: Prediction, scene: Scene, deadline: float) -> str:
 
 
 def _finest(prediction: Prediction, problem: Problem) -> tuple[int, int]:
-    """Return control points along the cable and steps: as many as the finest grid that a prediction tried, or more."""
+    """Return control points along the cable and steps, at least those of the finest grid that a prediction tried."""
     n_u = max(50, smallest_n_u(problem), prediction.accuracy.n_u)
     return n_u, max(8 * stretched(problem, 3).steps, prediction.accuracy.steps)
 
 
 def _posed(prediction: Prediction, scene: Scene) -> Problem:
-    """Return the problem with the effects that a prediction found to be needed."""
+    """Return the problem with the effects that a prediction found necessary."""
     called = {} if prediction.level is None else prediction.level.posed.called_for
     return pose(scene, {**called, **{e.name: e.reason for e in prediction.effects if e.active}})
 
 
 def by_a_march(record: dict[str, Any]) -> bool:
-    """Tell whether a scene converges by the march that takes the place of a least squares that was asked for.
+    """Tell whether a scene converges by the march that replaces a requested least squares.
 
-    Records made before there was that last resort tell of a march to 1 % of the length, "free".
+    Records made before that last resort existed report a march to 1 % of the length, as "free".
     """
     marched = record["status"] == "converged" and record.get("solved_by") == "march"
     return (marched and record.get("method") == "spacetime") or record.get("free") == "converged"
 
 
 def left_its_grid(record: dict[str, Any]) -> bool:
-    """Tell whether a scene was solved on finer grids than the one that it asks for."""
+    """Tell whether a scene was solved on other, finer grids than the one it requests."""
     asked = record.get("asked")
     return asked is not None and asked != [record["n_u"], record["n_t"]]
 
 
 def is_undetermined(record: dict[str, Any], growth: float = WRONG / DISTURBED) -> bool:
-    """Tell whether a scene was proven not to determine its motion: a change, at first or midway, grows by more."""
+    """Tell whether a scene was proven not to determine its motion: a change, at the start or midway, grows by more."""
     return max(record.get("disturbed") or 0.0, record.get("midway") or 0.0) > growth * DISTURBED
 
 
 def tells(record: dict[str, Any]) -> bool:
-    """Tell whether an answer says that it may be wrong by more than WRONG, or that another motion is as likely."""
+    """Tell whether an answer says that its error may exceed WRONG, or that another motion is equally possible."""
     told = record["status"] != "converged" or (record["estimate"] or 0.0) > WRONG
     return told or any(words in record["message"] for words in OPEN)
 
 
 def faults(record: dict[str, Any]) -> list[str]:
-    """Return what is wrong with an answer, in words; nothing where it is right."""
+    """Return what is wrong with an answer, in words; empty if it is right."""
     status, found = record["status"], []
     if status == "exception":
         return ["exception"]
     if status == "refused":
         return ["refused a possible scene"] if record["possible"] else []
     if not record["possible"]:
-        told = "strains the cable" in record["message"]  # a soft one may follow
+        told = "strains the cable" in record["message"]  # a soft cable may follow
         return ["converged on an impossible scene"] if status == "converged" and not told else []
     laws = record["laws"]
     if not laws["finite"]:
         return ["not finite"]
-    undetermined = is_undetermined(record)  # another motion is as right
+    undetermined = is_undetermined(record)  # another motion is just as right
     if undetermined:
         found.append(f"undetermined and told: {status}" if tells(record) else "undetermined and not told")
     if status == "converged":

@@ -1,4 +1,4 @@
-"""Laws that every predicted motion keeps, measured on its surface and the forces that it tells of."""
+"""Laws that every predicted motion obeys, measured on its surface and on the forces that it reports."""
 
 from dataclasses import dataclass
 
@@ -12,25 +12,25 @@ from dlocore.shape.shape import start_curve
 
 Floats = NDArray[np.float64]
 
-_LOOKS = 33  # times at which a law is looked at
-_NOTHING = 1e-3  # of a cable's own forces: what is smaller than that is no motion
-_BEFORE = 1e-9  # of a stretch between two events: how far before its end is still in it
-_SETTLE = 4  # steps after an event, in which the forces of what jumped die away
-_TOUCH = {"friction", "obstacles", "table"}  # of which the reference does not tell
+_LOOKS = 33  # times at which a law is evaluated
+_NOTHING = 1e-3  # of the cable's own forces: anything smaller is no motion
+_BEFORE = 1e-9  # of a stretch between two events: how far before its end the stretch is still evaluated
+_SETTLE = 4  # steps after an event in which the forces of a jump decay
+_TOUCH = {"friction", "obstacles", "table"}  # effects whose forces the reference does not report
 
 
 @dataclass(frozen=True, kw_only=True)
 class Measures:
-    """How far a motion is from its laws; each is zero where the law is kept exactly.
+    """Deviations of a motion from its laws; each is zero where the law holds exactly.
 
     Attributes:
-        finite: every number of the answer is.
-        strain: largest |axial strain| of the surface, the mean over a span.
+        finite: whether every number of the answer is finite.
+        strain: largest |axial strain| of the surface, averaged over a span.
         held: largest distance of a grasped point from its gripper, at the start and at the end of the motion [m].
-        held_between: the same in between, where the time spline only comes near to the path [m].
-        energy: largest gain of energy that no gripper and no load put in, of the energy that was about.
-        momentum: largest impulse that no force accounts for, of the impulses that were about; None where nobody holds
-            the cable, or an answer does not tell of all forces: what strikes, does so between the times of the others.
+        held_between: the same in between, where the time spline only approximates the path [m].
+        energy: largest gain of energy that no gripper or load supplied, relative to the energies in the motion.
+        momentum: largest impulse that no force accounts for, relative to the impulses in the motion. None where nothing
+            holds the cable, or where an answer does not report all forces: strikes happen between the reported times.
     """
 
     finite: bool
@@ -66,7 +66,7 @@ def is_finite(prediction: Prediction) -> bool:
 
 
 def strain(prediction: Prediction) -> float:
-    """Return the largest |axial strain|, the mean over a span: within one the derivative of a spline oscillates."""
+    """Return the largest |axial strain|, averaged over a span: within a span the derivative of a spline oscillates."""
     surface = prediction.surface
     u, w = along(surface.knots_u)
     slope = np.linalg.norm(surface(u, np.linspace(0.0, surface.horizon, _LOOKS), du=1)[..., :3], axis=-1)
@@ -75,7 +75,7 @@ def strain(prediction: Prediction) -> float:
 
 
 def held(prediction: Prediction) -> tuple[float, float]:
-    """Return how far grasped points are from their grippers at both ends of the motion, and in between [m]."""
+    """Return how far grasped points are from their grippers, at both ends of the motion and in between [m]."""
     scene, surface = prediction.scene, prediction.surface
     start = start_curve(scene.shape, scene.cable.length)
     worst_end, worst = 0.0, 0.0
@@ -85,7 +85,7 @@ def held(prediction: Prediction) -> tuple[float, float]:
             continue
         t = np.linspace(g.start, end, _LOOKS)
         if g.start > 0.0:
-            begin = surface.positions(g.u, g.start)[0, 0]  # as near as the spline comes to where the march closed it
+            begin = surface.positions(g.u, g.start)[0, 0]  # the spline's approximation of where the march closed it
         else:
             settled = getattr(scene.shape, "settle", False) or scene.environment.table is not None
             begin = surface.positions(g.u, 0.0)[0, 0] if settled else start(g.u)[0]
@@ -97,12 +97,12 @@ def held(prediction: Prediction) -> tuple[float, float]:
 
 
 def energy_gain(prediction: Prediction) -> float | None:
-    """Return the largest gain of energy beyond the work of grippers and loads, of the energy that was about.
+    """Return the largest gain of energy beyond the work of grippers and loads, relative to the energies in the motion.
 
-    It is looked for in each stretch between two events, a few steps after the first, as the impulse of a jump is no
-    part of the reactions. The energy of stretch, which is never negative, counts at the beginning alone: the strain of
-    a nearly inextensible cable is lost in what the time spline smooths. None where reactions don't tell: a path turns
-    more often than the steps.
+    It is evaluated in each stretch between two events, from a few steps after the first event on, as the impulse of a
+    jump is not part of the reactions. The energy of stretch, which is never negative, counts only at the beginning: the
+    time spline smooths out the strain of a nearly inextensible cable. None where the reactions are too coarse, because
+    a path turns more often than there are steps.
     """
     scene, surface = prediction.scene, prediction.surface
     windows = [np.linspace(0.0, surface.horizon, _LOOKS)]
@@ -128,9 +128,10 @@ def energy_gain(prediction: Prediction) -> float | None:
 
 
 def windows_of(times: Floats) -> list[Floats]:
-    """Return the stretches of smooth motion between events, at which the times of the reactions stand twice.
+    """Return the stretches of smooth motion between events; at an event the times of the reactions occur twice.
 
-    Each but the last ends a little before its event: at the event itself a surface has the velocity after it.
+    Each stretch except the last ends slightly before its event: at the event itself a surface has the velocity after
+    it.
     """
     windows = [times[part] for part in _parts(times)]
     for part in windows[:-1]:
@@ -139,12 +140,12 @@ def windows_of(times: Floats) -> list[Floats]:
 
 
 def _parts(times: Floats) -> list[NDArray[np.int64]]:
-    """Return which of the times are of each stretch between events."""
+    """Return the indices of the times in each stretch between events."""
     return np.split(np.arange(len(times)), np.flatnonzero(np.diff(times) <= 0.0) + 1)
 
 
 def _own(scene: Scene) -> tuple[float, float]:
-    """Return the forces that bend a cable to a circle, and that are its weight [N]."""
+    """Return the force that bends a cable to a circle, and its weight [N]."""
     cable = scene.cable
     assert cable.bending_stiffness is not None
     gravity = float(np.linalg.norm(np.asarray(scene.environment.gravity)))
@@ -168,7 +169,7 @@ def _work(prediction: Prediction, times: Floats) -> Floats:
 
 
 def _window(all_times: Floats, times: Floats) -> slice:
-    """Return where a window of times lies among all times."""
+    """Return the slice of a window of times among all times."""
     first = int(np.searchsorted(all_times, times[0], side="right")) - 1
     if all_times[first : first + len(times)].shape != times.shape:
         first = int(np.searchsorted(all_times, times[0], side="left"))
@@ -187,7 +188,7 @@ def _spin(grasp: Grasp, times: Floats) -> Floats:
 
 
 def lost_impulse(prediction: Prediction) -> float | None:
-    """Return the largest impulse that no force accounts for, of the impulses that were about."""
+    """Return the largest impulse that no force accounts for, relative to the impulses in the motion."""
     scene, surface = prediction.scene, prediction.surface
     active = {e.name for e in prediction.effects if e.active}
     strikes = prediction.contacts and prediction.level is not None and prediction.level.motion.split
@@ -198,7 +199,7 @@ def lost_impulse(prediction: Prediction) -> float | None:
     inertial = "inertia" in active
     places = np.concatenate([u, [one.u for one in cable.point_masses]])
     masses = np.concatenate([cable.linear_density * w, [one.mass for one in cable.point_masses]])
-    carried = "table" in active and prediction.accuracy.dimensions == 2  # by a table, which is told of
+    carried = "table" in active and prediction.accuracy.dimensions == 2  # by a table, whose force is reported
     weight = cable.mass * np.asarray(around.gravity) * ("gravity" in active or carried)
     worst, scale = 0.0, _NOTHING * sum(_own(scene)) * surface.horizon
     for k, times in enumerate(windows_of(prediction.grasps[0].times)):

@@ -11,17 +11,17 @@ from dlocore import Grasp, Load, Points, Still, Straight, Waypoints
 from dlocore.scene.scene import Hold
 from dlocore.shape.shape import StartCurve, start_curve
 
-SLACK = 0.97  # of the cable between two grasps: as far apart as they go, where they are not pulled taut
+SLACK = 0.97  # of the cable between two grasps: the farthest that they move apart if not pulled taut
 
 
 def started(d: Draft) -> StartCurve:
-    """Return the curve that the cable of a draft starts along."""
+    """Return the curve along which the cable of a draft starts."""
     assert d.shape is not None
     return start_curve(d.shape, d.length)
 
 
 def _place(r: Rng, d: Draft) -> float:
-    """Draw a material coordinate: often an end, or next to one."""
+    """Draw a material coordinate: often an end, or near one."""
     where = pick(r, {"end": 3, "inside": 4, "beside an end": 1})
     if where == "inside":
         return float(r.uniform(0.05, 0.95) * d.length)
@@ -37,7 +37,7 @@ def _hold(r: Rng) -> Hold:
 
 
 def _turn(r: Rng, d: Draft, hold: Hold, most: float) -> Floats | None:
-    """Draw a rotation vector of a gripper, none where it holds a point."""
+    """Draw a rotation vector of a gripper; None where it holds a point."""
     if hold == "point" or chance(r, 0.5):
         return None
     axis = {"flat": np.array([0.0, 0.0, 1.0]), "upright": np.array([0.0, 1.0, 0.0])}.get(d.room)
@@ -75,7 +75,7 @@ def one_gripper(r: Rng, d: Draft) -> None:
 
 
 def two_grippers(r: Rng, d: Draft) -> None:
-    """Move two grippers to another distance from each other, and both along."""
+    """Move two grippers to another distance from each other, and both together."""
     curves.start(r, d, straight=0.0)
     ends = chance(r, 0.5)
     u = np.array([0.0, 1.0] if ends else [r.uniform(0.0, 0.35), r.uniform(0.65, 1.0)]) * d.length
@@ -100,7 +100,7 @@ def two_grippers(r: Rng, d: Draft) -> None:
 
 
 def pulled_taut(r: Rng, d: Draft) -> None:
-    """Pull two grippers apart until the cable between them is straight, or a hair less."""
+    """Pull two grippers apart until the cable between them is straight, or almost."""
     d.families.append("motion: pulled taut")
     length = d.length
     d.shape = Points(points=curves.arc(length, r.uniform(0.5, 2.5), d.room))
@@ -138,9 +138,9 @@ def compressed(r: Rng, d: Draft) -> None:
 
 
 def snap_through(r: Rng, d: Draft) -> None:
-    """Push an arch with held ends through to its other side, beside its middle.
+    """Push an arch with held ends through to its other side, next to its middle.
 
-    In the middle itself the arch would choose between two mirror images.
+    Pushed exactly in the middle, the arch would choose between two mirror images.
     """
     d.families.append("motion: snap-through")
     length, angle = d.length, r.uniform(0.6, 2.0)
@@ -198,7 +198,7 @@ def tightened(r: Rng, d: Draft) -> None:
 
 
 def handed_over(r: Rng, d: Draft) -> None:
-    """Release at one place and grasp at another while the cable moves."""
+    """Release the cable at one place and grasp it at another while it moves."""
     d.families.append("motion: grasp and release in mid-motion")
     curves.start(r, d)
     first, second = float(r.uniform(0.0, 0.45) * d.length), float(r.uniform(0.55, 1.0) * d.length)
@@ -216,7 +216,7 @@ def handed_over(r: Rng, d: Draft) -> None:
 
 
 def close_together(r: Rng, d: Draft) -> None:
-    """Hold a cable at two points a millimetre apart, as one gripper with two fingers does."""
+    """Hold a cable at two points a millimetre apart, like one gripper with two fingers."""
     d.families.append("motion: two grasps 1 mm apart")
     curves.start(r, d)
     gap = 1e-3 * d.length

@@ -1,4 +1,4 @@
-"""What share of random scenes converges: from all of them in little time, a sample of the rest in more and more."""
+"""The share of random scenes that converges: all run with little time, and a sample of the rest with more and more."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -8,9 +8,10 @@ import numpy as np
 from benchmarks.hard.judge import WRONG, by_a_march, is_undetermined
 from dlocore.stability.determined import DISTURBED
 
-GROWTHS = (WRONG / DISTURBED, 0.1 * WRONG / DISTURBED)  # of a change of the start: beyond it a motion is not determined
+# factors by which a change of the start may grow: beyond them a motion counts as not determined
+GROWTHS = (WRONG / DISTURBED, 0.1 * WRONG / DISTURBED)
 _DRAWS = 200_000
-_PRIOR = 0.5  # Jeffreys'
+_PRIOR = 0.5  # Jeffreys' prior
 
 
 class Strata(NamedTuple):
@@ -18,11 +19,11 @@ class Strata(NamedTuple):
 
     Attributes:
         converged: scenes that converge in the first stage.
-        lost: that are refused, raise or hang in it: no more time helps.
-        left: the others.
-        again_converged: of those left that were drawn for the second stage: that converge in it, ...
-        again_failed: ... that do not, ...
-        again_excluded: ... and that do not determine their motion, or are shown by it to be impossible.
+        lost: scenes that are refused, raise or hang in the first stage: more time does not help.
+        left: the other scenes.
+        again_converged: scenes drawn from `left` for the second stage that converge in it.
+        again_failed: scenes drawn for the second stage that do not converge in it.
+        again_excluded: scenes drawn for the second stage that do not determine their motion, or prove impossible in it.
     """
 
     converged: int
@@ -34,26 +35,26 @@ class Strata(NamedTuple):
 
 
 def drawn_again(seed: int, left: Sequence[int], count: int) -> list[int]:
-    """Return the indices drawn from those left for the second stage, at most `count`, in the order of their running.
+    """Return at most `count` indices drawn from those left for the second stage, in the order in which they are run.
 
-    Each has its place from the seed and itself alone, so that what is first in the order is a fair sample, too.
+    The place of each depends only on the seed and the index itself, so the beginning of the order is a fair sample too.
     """
     return sorted(left, key=lambda index: (np.random.default_rng([seed, index, 2]).random(), index))[:count]
 
 
 def is_left(record: dict[str, Any]) -> bool:
-    """Tell whether a record of the first stage is of a scene that did not converge, though it may in more time."""
+    """Tell whether a scene did not converge in the first stage, but may with more time."""
     told = record["status"] in ("max_iterations", "stalled", "time_limit")
     return told and record["possible"] and record.get("method") != "paper"
 
 
 def has_failed(record: dict[str, Any]) -> bool:
-    """Tell whether a record of a later stage is of a scene that determines its motion and did not converge."""
+    """Tell whether a scene in a later stage determines its motion and did not converge."""
     return is_left(record) and not is_undetermined(record)
 
 
 def in_place_of(again: list[dict[str, Any]], last: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return the records of the second stage, in the place of each that of the third where there is one."""
+    """Return the records of the second stage, each replaced by that of the third stage if there is one."""
     newer = {r["index"]: r for r in last}
     return [newer.get(r["index"], r) for r in again]
 
@@ -63,12 +64,11 @@ def strata(
 ) -> Strata:
     """Count the records of the first stage and of a later one.
 
-    Left out are scenes that are shown to amplify a change by more than `growth`.
+    Scenes that are shown to amplify a change by more than `growth` are left out. With `as_asked`, a march in place of a
+    least squares counts as a failure.
 
-    With `as_asked` a march in the place of a least squares counts as a failure.
-
-    Of the second stage those count that were run before the first that was drawn and is missing: which ones are missing
-    where a run was interrupted is no chance.
+    Records of the second stage count up to the first drawn scene that is missing: which ones are missing after an
+    interrupted run is not random.
     """
     judged = [r for r in first if r["possible"] and r.get("method") != "paper"]
     left = {r["index"] for r in judged if is_left(r)}
@@ -96,11 +96,11 @@ def strata(
 
 
 def share(counts: Strata) -> tuple[float, float, float]:
-    """Return the share of the scenes that determine their motion which converges in the end, and its 95 % interval.
+    """Return the share that converges in the end, among scenes that determine their motion, and its 95 % interval.
 
-    The interval is that of scenes drawn in the same way. It has the chance of which scenes were drawn in it and that of
-    which of them were run again: quantiles of the share for shares of the strata drawn from their posteriors with
-    Jeffreys' prior.
+    The interval holds for scenes drawn in the same way. It includes the chance of which scenes were drawn and of which
+    ones were run again: it gives quantiles of the share when the shares of the strata are drawn from their posteriors
+    with Jeffreys' prior.
     """
     a, lost, left, *again = counts
     if left > 0 and sum(again) == 0:

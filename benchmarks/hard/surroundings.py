@@ -1,4 +1,4 @@
-"""What is around a drawn motion, and stiffness, damping and yield to suit it."""
+"""The surroundings of a drawn motion, and stiffness, damping and yield that suit it."""
 
 import numpy as np
 
@@ -7,12 +7,12 @@ from benchmarks.hard.motions import started
 from dlocore import Box, Capsule, Cylinder, PointMass, Sphere, Straight, Table
 from dlocore.effects.distance import distances
 
-STRAIN = 1 / 300  # the largest that weight and inertia may cause: such a cable keeps its length
+STRAIN = 1 / 300  # the largest strain by weight and inertia: such a cable keeps its length
 STIFFEST = 1e9  # EA L^2/EI
 
 
 def draw_gravity(r: Rng, room: Room) -> float:
-    """Draw the size of gravity [m/s^2]; none on a smooth table or far from any."""
+    """Draw the magnitude of gravity [m/s^2]; zero on a smooth table or far from any."""
     kinds = {
         "flat": {"0": 3, "9.81": 5},
         "upright": {"0": 1, "9.81": 8, "100": 1},
@@ -22,7 +22,7 @@ def draw_gravity(r: Rng, room: Room) -> float:
 
 
 def draw_environment(r: Rng, d: Draft, *, crowded: bool) -> None:
-    """Draw gravity, a table and obstacles: two to four where it is crowded, else one in some scenes."""
+    """Draw gravity, a table and obstacles: two to four obstacles if crowded, otherwise one in some scenes."""
     d.environment["gravity"] = (0.0, 0.0, -d.gravity)
     kind = {0.0: "weightless", 100.0: "gravity of 100 m/s^2"}.get(d.gravity, "gravity")
     if d.room == "flat" and d.gravity > 0:
@@ -70,11 +70,11 @@ def _add_obstacle(r: Rng, d: Draft, kind: str) -> None:
 
 
 def draw_stiffness(r: Rng, d: Draft) -> None:
-    """Draw the stiffnesses: EI over six decades, EA so that forces of the motion keep the length, GJ freely."""
+    """Draw the stiffnesses: EI over six decades, EA such that the forces of the motion keep the length, GJ freely."""
     cable, length = d.cable, d.length
     mu = cable["linear_density"]
     EI = spread(r, 1e-6, 4.0)
-    if chance(r, 0.75):  # as stiff as a wire, a cable, a pole are against their weight
+    if chance(r, 0.75):  # as stiff, relative to its weight, as a wire, a cable or a pole
         EI = float(np.clip(9.81 * mu * length**3 * spread(r, 1e-3, 3.0), 1e-6, 4.0))
     drag = d.environment.get("drag", 0.0) + d.environment.get("drag_quadratic", 0.0) * d.speed
     forces = mu * (length * (d.gravity + d.acceleration) + 9.0 * d.speed**2) + drag * d.speed * length
@@ -98,7 +98,7 @@ def draw_stiffness(r: Rng, d: Draft) -> None:
 
 
 def draw_masses(r: Rng, d: Draft) -> None:
-    """Draw one to three point masses, half of them at an end, and stiffen the cable along itself for their forces."""
+    """Draw one to three point masses, half of them at an end, and raise EA to suit their forces."""
     total = spread(r, 0.01, 3.0) * d.cable["linear_density"] * d.length
     shares = r.dirichlet(np.ones(int(r.integers(1, 4))))
     places = [d.length * (float(r.integers(0, 2)) if chance(r, 0.5) else r.uniform(0.0, 1.0)) for _ in shares]
@@ -109,8 +109,8 @@ def draw_masses(r: Rng, d: Draft) -> None:
 
 
 def draw_drag(r: Rng, d: Draft) -> str:
-    """Draw the drag, and return what kind of damping there is."""
-    # a cable that buckles without damping throws itself about, and no grid agrees with the next
+    """Draw the drag, and return the kind of damping."""
+    # a cable that buckles without damping throws itself about, and no two grids agree
     buckles = "motion: post-buckling" in d.families
     kind = pick(r, {"none": 0 if buckles else 1, "usual": 5, "heavy": 1, "quadratic": 1})
     mu, time = d.cable["linear_density"], d.time
@@ -134,9 +134,9 @@ def draw_damping(r: Rng, d: Draft, kind: str) -> None:
 
 
 def draw_memory(r: Rng, d: Draft) -> None:
-    """Draw how a bent start is kept as it is, and a threshold of yield near the curvatures of the motion.
+    """Draw how a bent start keeps its shape, and a yield threshold near the curvatures of the motion.
 
-    A stiff cable that is bent and let go at t = 0 springs away within milliseconds: few scenes begin so.
+    A stiff cable that is bent and released at t = 0 springs away within milliseconds, so few scenes begin like this.
     """
     if not isinstance(d.shape, Straight):
         weight = d.cable["linear_density"] * d.length**3 * max(d.gravity, 9.81)
@@ -160,7 +160,7 @@ def draw_memory(r: Rng, d: Draft) -> None:
 
 
 def _rests(d: Draft) -> bool:
-    """Tell whether what holds the cable determines where it comes to rest."""
+    """Tell whether the grippers and the weight determine where the cable comes to rest."""
     weight = d.gravity > 0 and "table" not in d.environment
     return weight or len(d.grasps) > 1 or d.grasps[0].hold != "point"
 
