@@ -104,8 +104,10 @@ def converged(
 
 
 def equilibrium(scene: Scene, *, elements: int = 200) -> tuple[Floats, Floats]:
-    """Settle `scene` under its first grasps and loads by heavily damped motion; return u (n,) [m] and positions (n, 3)
-    [m].
+    """Settle `scene` under its first grasps and loads by heavily damped motion.
+
+    Returns:
+        u (n,) [m] and positions (n, 3) [m].
     """
     grid = material_grid(scene, elements)
     start = start_of(scene, grid)
@@ -190,9 +192,7 @@ class _Motion:
     previous: float = 0.0
 
     def advance(self, stops: Floats, holds: list[Hold]) -> Floats:
-        """March from `stops[0]` with the grippers `holds`; return the positions at the other stops (k - 1, n, dims)
-        [m].
-        """
+        """March from `stops[0]` with the grippers `holds`; return positions at the other stops (k - 1, n, dims) [m]."""
         counts = np.maximum(1, np.ceil(np.diff(stops) / self.rod.step_limit)).astype(np.int64)
         out = np.empty((len(counts), len(self.rod.grid), len(self.rod.axes)))
         low = 0

@@ -135,8 +135,7 @@ class Rod:
 
     @staticmethod
     def of(scene: Scene, grid: Floats, start: Start) -> "Rod":
-        """Return the rod of `scene`; an effect that is switched off has a zero coefficient, and so has the damping of
-        stretch.
+        """Return the rod of `scene`; effects that are switched off and the damping of stretch have a zero coefficient.
 
         Raises:
             ValueError: the scene has something that this rod does not model.
