@@ -1,6 +1,8 @@
 """Drag of the surrounding air: force per unit length f = -c v - c2 |v| v [N/m] (docs/model.md eq. 8).
 
-v is the velocity of the centreline [m/s]; c [N s/m^2] and c2 [N s^2/m^3] are the same along and across the cable.
+v is the velocity of the centreline [m/s]; c [N s/m^2] and c2 [N s^2/m^3] are the same along and across the cable. Where
+twist is simulated, linear drag also resists the spin omega [rad/s] of the sections about their tangent, with the torque
+-c D^2/8 omega per unit length [N], where D is the diameter [m].
 """
 
 from dataclasses import dataclass

@@ -2,6 +2,9 @@
 
 mu is the linear density [kg/m] and r_t the velocity of the centreline [m/s]. The force per unit length is mu r_tt
 [N/m], the term M q_tt of docs/model.md eq. 10. Point masses add to mu (docs/model.md eq. 9a).
+
+Where twist is simulated, the sections also have the rotary inertia mu D^2/8 [kg m] about their tangent (docs/model.md,
+Twist), where D is the diameter [m].
 """
 
 from dataclasses import dataclass

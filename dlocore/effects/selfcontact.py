@@ -1,7 +1,10 @@
-"""Contact of the cable with itself: strands that come nearer than the diameter push each other off (docs/model.md).
+"""Contact of the cable with itself: strands nearer than the diameter D push each other apart (docs/model.md eq. 21).
 
-The force per length is that of eq. 21 with the depth D - rho, where rho is the distance of two strands. Strands less
-than `APART` diameters apart along the cable are one bend, which its bending stiffness keeps open.
+    N = k phi(d) - c phi'(d) n.v >= 0,   d = D - rho
+
+is the force per unit length [N/m], where rho is the distance of the two strands [m], n.v the speed at which they
+separate [m/s], and k, phi and c are as in `contact.py`. Strands less than `APART` diameters apart along the cable
+belong to one bend, which its bending stiffness keeps open.
 """
 
 from dataclasses import dataclass
@@ -10,7 +13,7 @@ from typing import ClassVar
 from dlocore.effects.base import Effect, Site
 from dlocore.effects.contact import PASSAGE, critical_damping
 
-APART = 4.0  # diameters along the cable from which on two parts of it are two strands
+APART = 4.0  # diameters along the cable: parts at least this far apart are two strands
 NEAR_START = 2.0  # diameters: strands of the start nearer than this call for the effect
 CLOSE = 1.2  # diameters: strands of a motion nearer than this call for the effect
 
@@ -26,6 +29,6 @@ class SelfContact(Effect):
     linear_density: float
 
     def parameters(self) -> tuple[float, ...]:
-        """Return (D, k, w, c, least distance along the cable)."""
+        """Return (D, k, w, c, least distance along the cable [m])."""
         damping = critical_damping(self.stiffness, self.linear_density)
         return (self.diameter, self.stiffness, PASSAGE * self.diameter, damping, APART * self.diameter)
