@@ -9,7 +9,7 @@ field      -                              constant coefficients of linear terms:
 axial      strain e, its rate, its memory tension N, modulus dN/de, viscosity dN/d(rate)
 curvature  kappa, its rate, its memory    moment M, stiffness dM/dkappa, viscosity dM/d(rate)
 twist      tau, its rate, its memory      torque T, stiffness dT/dtau, viscosity dT/d(rate)
-body       position, velocity             force per unit length, minus its derivatives by position and by velocity
+body       position, velocity             force per unit length f [N/m], -df/d(position), -df/d(velocity)
 contact    position, velocity, anchor     the same as body, at nodes spaced by the size of the obstacles
 ========== ============================== ============================================================================
 

@@ -55,7 +55,7 @@ def slip_of(diameter: float, length: float, step: float) -> float:
 def friction(
     limit: float, n: Vector, slip: Vector, v: Vector, stick: float, slow: float, steps: bool
 ) -> tuple[Vector, Symmetric, Symmetric]:
-    """Return the force per unit length [N/m] and minus its derivatives by position and by velocity.
+    """Return the force per unit length [N/m] and minus its derivatives with respect to position and velocity.
 
     Both of these are positive semidefinite.
 

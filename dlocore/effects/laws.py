@@ -86,7 +86,7 @@ def _origin(memory: float, natural: float, soft: float) -> float:
 def axial_memory(
     active: Any, p: Any, strain: float, memory: float, last: float, h: float, share: float
 ) -> tuple[float, float]:
-    """Return the stress-free axial strain after a step h, and its derivative by the strain.
+    """Return the stress-free axial strain after a step h, and its derivative with respect to the strain.
 
     `share` is the ratio of the strain at this point to the strain that the tension calls for; the threshold is scaled
     by it.
@@ -104,7 +104,7 @@ def axial_memory(
 def axial_stress(
     active: Any, p: Any, strain: float, rate: float, memory: float, last: float, h: float, share: float
 ) -> tuple[float, float, float]:
-    """Return the tension [N] of the active laws and its derivatives by the strain [N] and by its rate [N s]."""
+    """Return the tension N [N] of the active laws, dN/d(strain) [N] and dN/d(rate of strain) [N s]."""
     free, change = axial_memory(active, p, strain, memory, last, h, share)
     N, modulus = tension(p[STRETCH, 0], strain - free)
     viscosity = p[STRETCH_DAMPING, 0] if active[STRETCH_DAMPING] else 0.0
@@ -121,7 +121,7 @@ def axial_energy(active: Any, p: Any, strain: float, memory: float) -> float:
 def curvature_memory(
     active: Any, p: Any, kappa: Vector, memory: Vector, natural: Vector, last: Vector, h: float
 ) -> tuple[Vector, Symmetric]:
-    """Return the stress-free curvature after a step h, and its derivative by kappa."""
+    """Return the stress-free curvature after a step h, and its derivative with respect to kappa."""
     if not active[BENDING_MEMORY] or h == 0.0:
         return memory, _NO_TANGENT
     soft = p[BENDING_MEMORY, 2]
@@ -144,7 +144,7 @@ def curvature_memory(
 def curvature_stress(
     active: Any, p: Any, kappa: Vector, rate: Vector, memory: Vector, natural: Vector, last: Vector, h: float
 ) -> tuple[Vector, Symmetric, Symmetric]:
-    """Return the moment [N m] of the active laws and its derivatives by kappa [N m^2] and by its rate [N m^2 s]."""
+    """Return the moment M [N m] of the active laws, dM/dkappa [N m^2] and dM/d(rate of kappa) [N m^2 s]."""
     moment, stiffness, viscosity = _NO_VECTOR, _NO_TANGENT, _NO_TANGENT
     if active[BEND]:
         free, change = curvature_memory(active, p, kappa, memory, natural, last, h)
@@ -171,7 +171,7 @@ def curvature_energy(active: Any, p: Any, kappa: Vector, memory: Vector) -> floa
 def twist_memory(
     active: Any, p: Any, tau: float, memory: float, natural: float, last: float, h: float
 ) -> tuple[float, float]:
-    """Return the stress-free twist rate after a step h, and its derivative by tau."""
+    """Return the stress-free twist rate after a step h, and its derivative with respect to tau."""
     if not active[TWIST_MEMORY] or h == 0.0:
         return memory, 0.0
     soft = p[TWIST_MEMORY, 2]
@@ -184,7 +184,7 @@ def twist_memory(
 def twist_stress(
     active: Any, p: Any, tau: float, rate: float, memory: float, natural: float, last: float, h: float
 ) -> tuple[float, float, float]:
-    """Return the torque [N m] of the active laws and its derivatives by tau [N m^2] and by its rate [N m^2 s]."""
+    """Return the torque T [N m] of the active laws, dT/dtau [N m^2] and dT/d(rate of tau) [N m^2 s]."""
     if not active[TWIST]:
         return 0.0, 0.0, 0.0
     free, change = twist_memory(active, p, tau, memory, natural, last, h)
@@ -201,7 +201,7 @@ def twist_energy(active: Any, p: Any, tau: float, memory: float) -> float:
 
 @law
 def body_force(active: Any, p: Any, x: Vector, v: Vector) -> tuple[Vector, Symmetric, Symmetric]:
-    """Return the force per unit length [N/m] of the active laws and minus its derivatives by x and by v."""
+    """Return the force per unit length [N/m] of the active laws and minus its derivatives with respect to x and v."""
     force, stiffness, viscosity = _NO_VECTOR, _NO_TANGENT, _NO_TANGENT
     if active[QUADRATIC_DRAG]:
         force, viscosity = quadratic_drag(p[QUADRATIC_DRAG, 0], v)

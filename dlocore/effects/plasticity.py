@@ -62,7 +62,7 @@ class StretchMemory(Plasticity):
 
 @law
 def elastic_part(begin: float, end: float, h: float, threshold: float, k: float) -> tuple[float, float]:
-    """Return x(h), the elastic strain after a step h, and its derivative by `end`.
+    """Return x(h), the elastic strain after a step h, and its derivative with respect to `end`.
 
     `end` is what x would be if nothing yielded. From x(0) = begin,
 

@@ -243,10 +243,10 @@ def normal_equations(eq: Any, C: Any, A: Any, right: Any, matrix: bool, begin: i
     the collocation point k and W'W = G^-1 B G^-1, B = 12/h^2 M + 2/h C, G = B + K+ + 2/h N (docs/model.md eq. 16, where
     N is V).
 
-    Mass, and linear drag where it is not part of N, belong to B. With K+ = G - B - 2/h N, the derivative by the control
-    point with the time basis function c is G^-1 dR = c I + d S + e V, with S = G^-1 B, V = G^-1 N and numbers d and e.
-    So the products of three matrices serve all pairs of control points; B S and S' B S are symmetric. The right side
-    alone needs no products: S' y = B G^-1 y.
+    Mass, and linear drag where it is not part of N, belong to B. With K+ = G - B - 2/h N, the derivative with
+    respect to the control point of the time basis function c is G^-1 dR = c I + d S + e V, with S = G^-1 B, V = G^-1 N
+    and numbers d and e. So the products of three matrices serve all pairs of control points; B S and S' B S are
+    symmetric. The right side alone needs no products: S' y = B G^-1 y.
 
     Args:
         eq: `Equations`.

@@ -127,14 +127,14 @@ def curvature(
             S = w * (elastic * stiffness[0] + viscous * viscosity[0])
             H = plane_hessian(ax, ay, cx, cy, kappa)
             M *= geometric
-            # second derivatives of the energy by r', by r' (rows) and r'' and by r''
+            # second derivatives of the energy: r' and r', r' (rows) and r'', r'' and r''
             s0, s1, s2, s3 = S * J[0], S * J[1], S * J[2], S * J[3]
             aa, ab, bb = s0 * J[0] + M * H[0], s0 * J[1] + M * H[1], s1 * J[1] + M * H[2]
             ac, ad, bc, bd = s0 * J[2] + M * H[3], s0 * J[3] + M * H[4], s1 * J[2] + M * H[5], s1 * J[3] + M * H[6]
             cc, cd, dd = s2 * J[2], s2 * J[3], s3 * J[3]
             for j in range(4):
                 bj, cj = b[j], c[j]
-                # derivatives of the forces by r' and by r'' with respect to control point j: rows, columns x, y
+                # derivatives of the forces conjugate to r' and r'' with respect to control point j: rows, columns x, y
                 pxx, pxy, pyx, pyy = bj * aa + cj * ac, bj * ab + cj * ad, bj * ab + cj * bc, bj * bb + cj * bd
                 rxx, rxy, ryx, ryy = bj * ac + cj * cc, bj * bc + cj * cd, bj * ad + cj * cd, bj * bd + cj * dd
                 for i in range(j, 4):

@@ -132,7 +132,7 @@ def _pair_tangent(
     total, stiffness, viscosity = normal_force(push[1], push[2], push[3], push[0] - rho, leaving)
     w = min(u[i + 1] - u[i], u[j + 1] - u[j])
     size = m * nd
-    # derivatives of rho^2/2 by the control points (g), and of its derivatives by s and t (vs, vt)
+    # gradients, with respect to the control points, of rho^2/2 (g) and of its derivatives by s and t (vs, vt)
     along = np.empty(2 * _WINDOW)
     _spread(first, b0, i, j, s + 1.0, t + 1.0, point, along)  # linear in s and t
     g = np.empty(size)

@@ -1,8 +1,8 @@
 """Follow a motion next to a marched one: the same steps, with the factors of the known motion.
 
-The derivative of a motion by a parameter is the difference of two neighbouring motions. They are so close that the
-factorised tangent of the known motion serves all their Newton steps: no tangent is assembled or factored. They are
-followed to rounding; a march with its own tolerance could not tell them apart.
+The derivative of a motion with respect to a parameter is the difference of two neighbouring motions. They are so close
+that the factorised tangent of the known motion serves all their Newton steps: no tangent is assembled or factored. They
+are followed to rounding; a march with its own tolerance could not tell them apart.
 """
 
 from typing import Any

@@ -134,10 +134,10 @@ def curvature(
 ) -> None:  # fmt: skip
     """Add the forces and tangents of the curvature site; `past` holds kappa of two steps and t of the last (points, 9).
 
-    The derivatives of kappa are J = -h P / l^2 - kappa t' / l by r', and P / l by r''. The material part of the tangent
-    is J' S J, where S is a number, P kappa = kappa and P t = 0; the geometric part is M . d2kappa. Of damping, the
-    dependence on the spin of the sections, which couples the whole cable, and the torque that keeps the sections from
-    twisting are in the forces only. `room` is that of a `History`.
+    The derivatives of kappa with respect to r' and r'' are J = -h P / l^2 - kappa t' / l and P / l. The material part
+    of the tangent is J' S J, where S is a number, P kappa = kappa and P t = 0; the geometric part is M . d2kappa. Two
+    parts of damping are in the forces only: the dependence on the spin of the sections, which couples the whole cable,
+    and the torque that keeps the sections from twisting. `room` is that of a `History`.
     """
     damped = len(points.w) if active[DAMPING] else 0
     blocks = room[:ROOM].reshape(SUMS + PAIRS, 9)

@@ -36,7 +36,7 @@ def squared_slope(q: Any, first: int, b1: tuple[float, float, float, float], dim
 
 @law
 def plane_curvature(ax: float, ay: float, cx: float, cy: float) -> tuple[float, tuple[float, float, float, float]]:
-    """Return kappa [1/m] of r' = (ax, ay), r'' = (cx, cy), and its derivatives by r' and r''."""
+    """Return kappa [1/m] of r' = (ax, ay), r'' = (cx, cy), and its derivatives with respect to r' and r''."""
     inverse = 1.0 / (ax * ax + ay * ay)
     kappa = (ax * cy - ay * cx) * inverse
     twice = 2.0 * kappa
@@ -47,7 +47,7 @@ def plane_curvature(ax: float, ay: float, cx: float, cy: float) -> tuple[float, 
 def plane_hessian(
     ax: float, ay: float, cx: float, cy: float, kappa: float
 ) -> tuple[float, float, float, float, float, float, float]:
-    """Return the second derivatives of kappa: by r' twice (xx, xy, yy), then by r' and r'' (xx, xy, yx, yy)."""
+    """Return the second derivatives of kappa: r' and r' (xx, xy, yy), then r' and r'' (xx, xy, yx, yy)."""
     inverse = 1.0 / (ax * ax + ay * ay)
     n0, n1 = cy * inverse, -cx * inverse  # cross-product part of the derivative, over l^2
     n2, n3 = -ay * inverse, ax * inverse
@@ -113,8 +113,8 @@ def twist_increment(t0: Vector, k0: Vector, t: Vector, kappa: Vector) -> tuple[f
         s (t x t0) . (k0 + kappa),  s = 1/(1 + t . t0).
 
     Returns:
-        that twist rate [rad/m]; spin = s (t x t0), its derivative by kappa, which is also the spin of the carried frame
-        about t for each change of t; the derivative by t.
+        that twist rate tau [rad/m]; d tau/d kappa = spin = s (t x t0), which is also how much the carried frame spins
+        about t for each change of t; d tau/dt.
     """
     s = 1.0 / (1.0 + t[0] * t0[0] + t[1] * t0[1] + t[2] * t0[2])
     spin = (

@@ -20,7 +20,7 @@ from dlocore.compiling.kernel import part
 from dlocore.kernels.basis import row_of
 
 # columns of `History.tension` [N]: the tension that the tangent uses, NaN for the current one; the tension of the
-# strain at the last assembly, and its derivative by the strain; the tension of the last step
+# strain at the last assembly, and its derivative with respect to the strain; the tension of the last step
 ASSUMED, AT_HAND, MODULUS, LAST = range(4)
 COLUMNS = 4
 

@@ -159,7 +159,7 @@ def _locate_points(m: int, T: Any, inverse: float, W: Any) -> None:
 def _bend(W: Any) -> None:
     """Write the geometry of the points, and add to their twist rate the part due to carrying the frames.
 
-    The derivatives of the twist rate are BY_FIRST by r' and spin/l by r''.
+    The derivatives of the twist rate with respect to r' and r'' are BY_FIRST and spin/l.
     """
     for n in range(LANES):
         length, h, t, kappa = space_curvature(vector_at(W, R1, n), vector_at(W, R2, n))
@@ -230,10 +230,10 @@ def curvature(
 ) -> None:  # fmt: skip
     """Add the forces and tangents of curvature and twist.
 
-    The derivatives of k1 and k2 are O by r', P by r'' and A by theta. Those of the twist rate are smoothed over a span
-    as the twist rate is. The material part of the tangent is E' S E, with the derivatives E by the control points. The
-    geometric part is that at the carried frame: what the carrying adds vanishes with the step. `room` is that of a
-    `History`.
+    The derivatives of k1 and k2 with respect to r', r'' and theta are O, P and A. Those of the twist rate are smoothed
+    over a span as the twist rate is. The material part of the tangent is E' S E, where E are the derivatives with
+    respect to the control points. The geometric part is that at the carried frame: what the carrying adds vanishes with
+    the step. `room` is that of a `History`.
     """
     W, block = room[:SIZE], room[SIZE : SIZE + BLOCK]
     first, inverse = points.first, p[TWIST, 1]
@@ -297,7 +297,7 @@ def _angle(q: Any, k: int, b: tuple[float, float, float, float]) -> float:
 def _stress(
     active: Any, p: Any, memory: Any, past: Any, rates: Any, scales: Any, damped: bool, group: int, T: Any, W: Any
 ) -> None:
-    """Write moments, torques and their derivatives by the strain, all times the weights of the points."""
+    """Write moments, torques and their derivatives with respect to the strain, all times the weights of the points."""
     elastic, viscous = scales[0], rates[0] if scales[1] != 0.0 and rates[0] != 0.0 else scales[1]
     for s in range(count_of(len(past), group)):
         for m in range(POINTS):

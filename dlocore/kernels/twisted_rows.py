@@ -20,7 +20,7 @@ B1, B2, TORQUE, HANDED, G1, G2, G0, S11, S22, S12, STIFF = 44, 45, 46, 47, 48, 5
 BB, BC, CC, AB, AC, AA = 59, 65, 74, 80, 83, 86
 _ROWS = 87
 # Places in W of the first numbers of spans: control points and forces by coordinate, and the twist rate in its span, as
-# independent mean and slope: their stiffnesses and their derivatives by the control points.
+# independent mean and slope: their stiffnesses and their derivatives with respect to the control points.
 Q, F = _ROWS * LANES, _ROWS * LANES + 16 * SPANS
 OF_MEAN, OF_SLOPE, LEAN = F + 16 * SPANS, F + 17 * SPANS, F + 18 * SPANS
 MEAN, RISE = F + 19 * SPANS, F + 35 * SPANS
@@ -41,7 +41,7 @@ def count_of(points: int, group: int) -> int:
 def derivatives(
     length: float, h: float, director: Vector, by_spin: float, spin: Vector, by_t: float, t: Vector
 ) -> tuple[Vector, Vector]:
-    """Return the derivatives by r' and by r'' of a curvature along a director, which turns with the frames."""
+    """Return the derivatives of a curvature along a director, which turns with the frames: by r' and by r''."""
     inverse = 1.0 / length
     along = h * inverse
     first = (

@@ -127,7 +127,7 @@ def _mixed(d: int, e: int, t: Vector, M: Vector, O1: Vector, SP1: Vector, O2: Ve
 
 @leaf
 def twist_tangent(T: Any, inverse: float, W: Any) -> None:
-    """Write the stiffness of the twist rate of each span, and its derivatives by the control points.
+    """Write the stiffness of the twist rate of each span, and its derivatives with respect to the control points.
 
     With the stiffnesses S of the points and their distances x from the middle, the energy of the mean m and the slope a
     of the twist rate is sum S (m + x a)^2/2. It is the sum of the energies of m + LEAN a and of a alone, with LEAN =
@@ -147,7 +147,7 @@ def twist_tangent(T: Any, inverse: float, W: Any) -> None:
 
 @part
 def _twist_by(i: int, T: Any, inverse: float, W: Any) -> None:
-    """Write the derivatives of the twist rates of the spans by their i-th control points."""
+    """Write the derivatives of the twist rates of the spans with respect to their i-th control points."""
     for s in range(SPANS):
         _put_twist(i, 0, s, _twist_of(i, 0, 0, T, W, s), _twist_of(i, 0, 1, T, W, s), _twist_of(i, 0, 2, T, W, s), T, W)
         _put_twist(i, 1, s, _twist_of(i, 1, 0, T, W, s), _twist_of(i, 1, 1, T, W, s), _twist_of(i, 1, 2, T, W, s), T, W)
@@ -158,7 +158,7 @@ def _twist_by(i: int, T: Any, inverse: float, W: Any) -> None:
 
 @law
 def _twist_of(i: int, d: int, m: int, T: Any, W: Any, s: int) -> float:
-    """Return the derivative of the twist rate of point m by coordinate d of the i-th control point."""
+    """Return the derivative of the twist rate of point m with respect to coordinate d of the i-th control point."""
     n = SPANS * m + s
     return at(T, FIRSTS + i, n) * at(W, BY_FIRST + d, n) + at(T, SECONDS + i, n) * at(W, SPIN + d, n) / at(W, LENGTH, n)
 

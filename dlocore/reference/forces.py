@@ -73,7 +73,7 @@ def frames(body: Any, before: Any, q: Any, t: Any, a: Any, b: Any, lengths: Any)
 
 @compiled
 def returned(trial: float, threshold: float, pace: float) -> tuple[float, float]:
-    """Return the magnitude of the elastic strain after yielding, and its derivative by the `trial` magnitude (eq. 20).
+    """Return the magnitude e of the elastic strain after yielding, and de/d(`trial`), the trial magnitude (eq. 20).
 
     `pace` is the rate of the memory times the implicit part of the step: e + pace (e - threshold) = trial.
     """
@@ -229,7 +229,7 @@ def add_hinges(
 
 @compiled
 def _to_edges(body: Any, e: int, t: Any, lengths: Any, g: Any, H: Any, mode: int) -> None:
-    """Turn H (8, 8), with derivatives by the tangents, into one by the edge vectors, in place.
+    """Turn H (8, 8), with respect to the tangents, into one with respect to the edge vectors, in place.
 
     To second order, eta = P de/l - ((t.de) P de + t |P de|^2/2)/l^2.
     """

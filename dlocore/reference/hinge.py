@@ -75,7 +75,7 @@ def strains(t0: Any, a0: Any, b0: Any, t1: Any, a1: Any, b1: Any, turn: float, s
 
 @compiled
 def gradients(t0: Any, a0: Any, b0: Any, t1: Any, a1: Any, b1: Any, s: Any, B: Any) -> None:
-    """Write the derivatives of the strains s (3,) by y into B (3, 8)."""
+    """Write the derivatives of the strains s (3,) with respect to y into B (3, 8)."""
     c = dot(t0, t1)
     chi = 1.0 + c
     for d in range(3):
@@ -95,7 +95,7 @@ def gradients(t0: Any, a0: Any, b0: Any, t1: Any, a1: Any, b1: Any, s: Any, B: A
 def add_curvature_of_strains(
     t0: Any, a0: Any, b0: Any, t1: Any, a1: Any, b1: Any, s: Any, B: Any, stress: Any, H: Any
 ) -> None:
-    """Add the second derivatives of the strains by y, times `stress` (3,), to H (8, 8)."""
+    """Add the second derivatives of the strains with respect to y, times `stress` (3,), to H (8, 8)."""
     c = dot(t0, t1)
     chi = 1.0 + c
     M1, M2, T = stress[0] / chi, stress[1] / chi, stress[2] / chi

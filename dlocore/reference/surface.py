@@ -74,7 +74,7 @@ def thickness(row: Any) -> float:
 
 @compiled
 def press(stiffness: float, width: float, damping: float, depth: float, approach: float) -> tuple[float, float, float]:
-    """Return the normal force per length N [N/m] and its derivatives by depth and by speed of approach (eq. 21)."""
+    """Return the normal force per length N [N/m], dN/d(depth) and dN/d(speed of approach) (eq. 21)."""
     if depth <= 0.0:
         return 0.0, 0.0, 0.0
     slope = min(depth / width, 1.0)
@@ -98,7 +98,7 @@ def rub(
     Args:
         limit: mu N [N/m].
         density: of the cable [kg/m].
-        implicit: derivative of the slip by the velocity v (3,) [s].
+        implicit: derivative of the slip with respect to the velocity v (3,) [s].
     """
     lag = 2.0 * np.sqrt(density * stick / limit)
     along = slip[0] * n[0] + slip[1] * n[1] + slip[2] * n[2]
