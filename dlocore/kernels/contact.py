@@ -1,8 +1,8 @@
 """Assembly of contact and friction, in the plane and in space.
 
-Contact acts at nodes: the first `table_nodes` of them are for the table, the others for obstacles. These lie closer, as
-an obstacle may be thin or have edges. Away from edges that is not needed, and one node stands for a whole `cell` of
-nodes. `pressing` holds the weights [m] of the nodes until the next step.
+Contact acts at nodes: the first `table_nodes` of them are for the table, the others for obstacles. Nodes for obstacles
+lie closer together, as an obstacle may be thin or have edges. Away from edges that is not needed, and one node stands
+for a whole `cell` of nodes. `pressing` holds the weights [m] of the nodes until the next step.
 
 The distance to an obstacle grows at most as fast as the length along the cable, so after a node that is far away the
 next ones are skipped. `stick` (nodes, 3) holds the anchors of friction, `slide` (lying points, 2) those of a cable that

@@ -6,8 +6,8 @@ a gradient and a Hessian even where the segments are parallel:
     rho^2 = min over s, t in [0, 1] of |x_i(s) - x_j(t)|^2 + eps [h_i^2 (s - 1/2)^2 + h_j^2 (t - 1/2)^2]
 
 h are the lengths of the segments, at most D. rho is too large by at most eps (h_i^2 + h_j^2)/(8 rho). Every pair of
-segments more than `separation` apart along the cable has the potential w phi(D - rho), where w is the shorter length
-and phi is that of docs/model.md eq. 21. Force and tangent are its exact derivatives.
+segments more than `separation` apart along the cable has the potential w Phi(D - rho), where w is the shorter length
+and Phi' = k phi is the elastic part of docs/model.md eq. 21. The elastic force and its tangent are exact derivatives.
 
 A pair couples control points that are far apart along the cable. The reduced tangent is then stored by rows right of
 its diagonal, each up to the last entry that a factorisation fills.
@@ -59,7 +59,7 @@ def _spread(first: Any, b0: Any, i: int, j: int, s: float, t: float, point: Any,
     """Write the control points of segments i and j and their weights in point s of i minus point t of j.
 
     Returns:
-        the number of control points of i, and that of both.
+        the number of control points of i, and that of i and j together.
     """
     ni = _spread_one(first, b0, i, s, 1.0, 0, point, c)
     return ni, _spread_one(first, b0, j, t, -1.0, ni, point, c)
