@@ -45,7 +45,7 @@ class History(NamedTuple):
     Attributes:
         memory: (points, 2 m) stress-free strain, and its value before anything yielded: m = 1 in the plane (curvature),
             3 in space (two curvatures of the sections and the twist rate) [1/m].
-        past: (points, 2, 9 or 16) strain, and with twist frames, of the last steps: see `plane.remember`,
+        past: (points, 2, 9 or 17) strain, and with twist frames, of the last steps: see `plane.remember`,
             `space.remember`, `twisted.py`; (0, ...) where no law reads it.
         axial: (axial points, 3) stress-free axial strain, and the axial strain of the last two steps.
         stick: (contact nodes, 3) anchors of friction [m]; (0, 3) without friction.

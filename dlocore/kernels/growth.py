@@ -10,7 +10,7 @@ from dlocore.kernels.banded import factor, reduce_matrix
 
 LOOKS = 6  # least number of states at which a motion is checked
 AT_ONCE = 64  # most steps between two checked states: a shorter instability may be missed
-SLOWEST = 1.0  # least rate of growth that counts, per duration of the motion
+SLOWEST = 1.0  # least rate of growth that counts, times the duration of the motion
 _DOUBLINGS = 12  # largest number of doublings of a rate
 
 
@@ -38,8 +38,8 @@ def fastest_growth(
     Args:
         axes: (0, 1), (0, 1, 2) or (0, 1, 2, 3).
         states: (k, n, nc) [m].
-        velocities: (k, n, nc) [m/s] in these states. Friction mu N of a part that slides at a speed v resists sideways
-            motion by mu N/v; of a part at rest it resists by as much as holds it.
+        velocities: (k, n, nc) [m/s] in these states. Friction mu N on a part that slides at a speed v resists sideways
+            motion with the coefficient mu N/v; on a part at rest, with one large enough to hold it.
         histories: what earlier steps left behind at the states, a `History` with arrays (1 or k, ...).
         density: linear density [kg/m].
         dragged: drag coefficient [N s/m^2].
