@@ -11,13 +11,13 @@ from app.viewer.host import SceneHost, hosting
 
 
 def add_routes(app: FastAPI) -> None:
-    """Add the page and the websocket of the scene; they wait until `running` has started it."""
+    """Add the page and the websocket of the scene; they serve it once `running` has started it."""
     add_gateway(app)
 
 
 @contextlib.asynccontextmanager
 async def running(app: FastAPI, service: Service) -> AsyncIterator[SceneHost]:
-    """Run the scene while the context lasts; for the application's lifespan."""
+    """Run the scene while the context lasts. For the application's lifespan."""
     async with hosting(app, service) as host:
         yield host
 

@@ -1,4 +1,4 @@
-"""Arrows of forces in the scene."""
+"""Draw forces as arrows in the scene."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,22 +7,22 @@ from viser import SceneApi
 from app.viewer.palette import linear
 
 Floats = NDArray[np.float64]
-ARROW_LENGTH = 0.22  # of the largest force, as a fraction of the cable's length
-SMALLEST_ARROW = 0.02  # shorter ones, as a fraction of the longest, are not drawn
+ARROW_LENGTH = 0.22  # length of the arrow of the largest force, as a fraction of the cable's length
+SMALLEST_ARROW = 0.02  # shorter arrows, as a fraction of the longest, are not drawn
 
 
 class ForceArrows:
     """Arrows of one colour, a little above the places where forces act on the cable.
 
     Args:
-        scene: where they go.
-        name: of their node.
-        colour: of all.
+        scene: the scene that gets the arrows.
+        name: name of their node.
+        colour: colour of all arrows.
         cable_diameter: [m].
         cable_length: [m].
 
     Attributes:
-        lift: by which they are above the cable (3,) [m].
+        lift: offset of the arrows above the cable (3,) [m].
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class ForceArrows:
         )
 
     def draw(self, points: Floats, forces: Floats, shown: bool) -> None:
-        """Draw forces (k, 3) at points (k, 3) [m] of the cable, as parts of the largest of all times, where `shown`."""
+        """Draw forces (k, 3), as fractions of the largest of all times, at points (k, 3) [m] on the cable, or none."""
         long = (np.linalg.norm(forces, axis=1) > SMALLEST_ARROW) & shown
         if self._node.visible != bool(long.any()):
             self._node.visible = bool(long.any())
@@ -50,5 +50,5 @@ class ForceArrows:
             self._node.points = np.stack([starts, starts + self._longest * forces[long]], axis=1).astype(np.float32)
 
     def remove(self) -> None:
-        """Take them out of the scene."""
+        """Remove the arrows from the scene."""
         self._node.remove()

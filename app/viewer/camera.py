@@ -1,4 +1,4 @@
-"""Where the camera stands when a scene is opened."""
+"""Place the camera when a scene is opened."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,25 +9,25 @@ from dlocore.shape.shape import StartCurve
 
 Floats = NDArray[np.float64]
 FIELD_OF_VIEW = 0.7  # rad, vertical
-DISTANCE = 2.5  # from the middle, of the radius of what is to be seen
-SMALLEST = 0.2  # of the cable's length: half the room that is seen at least, to drag a target in
-WIDE = 1.35  # picture at least that much wider than high: a wide scene is in it from `DISTANCE`
-PANEL = 320  # px that the docked panel takes
-PHONE = 576  # px: a page no wider has its panel in a sheet over the lower part of the picture
-ROWS = 97  # times at which a motion is looked at
-SHEET = 0.6  # of the picture's height, that the sheet covers
+DISTANCE = 2.5  # distance from the middle, as a multiple of the radius of what is to be seen
+SMALLEST = 0.2  # of the cable's length: half the smallest extent to show, to leave room for dragging a target
+WIDE = 1.35  # width over height of a picture that shows a wide scene from `DISTANCE`; a narrower one needs more
+PANEL = 320  # px, width of the docked panel
+PHONE = 576  # px: on a page no wider than this, the panel is a sheet over the lower part of the picture
+ROWS = 97  # times at which a motion is sampled
+SHEET = 0.6  # share of the picture's height that the sheet covers
 FROM_ABOVE = np.array([0.0, 0.66, -0.75])  # from the camera to what it looks at: a table
-FROM_THE_SIDE = np.array([0.28, 0.90, -0.34])  # a cable that hangs
+FROM_THE_SIDE = np.array([0.28, 0.90, -0.34])  # the same: a hanging cable
 
 
 def extent(draft: Draft, start: StartCurve, shown: SplineSurface | None = None) -> Floats:
-    """Return points (n, 3) [m] that are to be seen: the start of the cable, where its grippers take it, and its motion.
+    """Return points (n, 3) [m] that should be visible: the start of the cable, the targets of its grippers, its motion.
 
-    A small motion gets room around it to drag a target in.
+    A small motion gets room around it for dragging a target.
 
     Args:
         draft: the scene.
-        start: its start curve.
+        start: start curve of the scene.
         shown: the motion that is shown, if any.
     """
     curve = start(np.linspace(0.0, draft.length, 33))
@@ -49,9 +49,9 @@ def start_pose(points: Floats, page_width: int, page_height: int, *, on_table: b
     """Return the camera's position and the point it looks at [m].
 
     Args:
-        points: what is to be seen (n, 3) [m].
-        page_width: of the whole page [px], the panel included.
-        page_height: of the whole page [px].
+        points: points that should be visible (n, 3) [m].
+        page_width: width of the whole page including the panel [px].
+        page_height: height of the whole page [px].
         on_table: whether there is a table, best seen from above.
     """
     low, high = points.min(axis=0), points.max(axis=0)
@@ -61,6 +61,6 @@ def start_pose(points: Floats, page_width: int, page_height: int, *, on_table: b
     view = view / np.linalg.norm(view)
     aspect = max(page_width if phone else page_width - PANEL, 1) / max(page_height, 1)
     distance = DISTANCE * 0.5 * float(np.linalg.norm(high - low)) * max(1.0, WIDE / aspect)
-    if phone:  # look at a nearer point, so that the cable comes to lie above the sheet
+    if phone:  # look at a nearer point, so that the cable appears above the sheet
         middle = middle - SHEET * np.tan(0.5 * FIELD_OF_VIEW) * distance * np.array([0.0, 1.0, 0.0])
     return middle - distance * view, middle

@@ -1,4 +1,4 @@
-"""viser's page, with what it lacks for a scene: a title, words where the service is gone, room beside the scrollbar."""
+"""viser's page with additions for the scene: a title, a message while the service is gone, room at the scrollbar."""
 
 from pathlib import Path
 
@@ -6,10 +6,11 @@ import viser
 
 _PAGE = Path(viser.__file__).parent / "client" / "build" / "index.html"
 TITLE = "dlo scene"
-FOLD = "told"  # class of what is folded to three lines until it is clicked
-GONE = "The service does not answer. This page connects again as soon as it does."
-# The client ignores what Number.isFinite calls no number, as "-", but takes "-0" for one and draws the field again, as
-# 0, before the rest of -0.2 is typed. Here that is no number while it is typed; who leaves the field at it means 0.
+FOLD = "told"  # CSS class of texts that are folded to three lines until they are clicked
+GONE = "The service does not respond. This page reconnects as soon as it does."
+# The client ignores texts that Number.isFinite rejects, such as "-". But it accepts "-0" and redraws the field as 0
+# before the rest of -0.2 is typed. So this script rejects "-0" while it is being typed, and puts 0 when the user leaves
+# the field.
 _NEGATIVE_NUMBERS = r"""<script>
 {
   const begun = (field) => field.inputMode === "decimal" && /^-\.?0[.0]*$/.test(field.value);
@@ -26,8 +27,8 @@ _NEGATIVE_NUMBERS = r"""<script>
 }
 </script>
 """
-# The client freezes the panel while there is no connection: each part of it, also one inside another, and pales it.
-# It does so while the page begins, too, of which nothing is told for a second.
+# Without a connection, the client freezes and dims the panel: each part of it, nested parts too. It does the same while
+# the page loads, so the message appears only after a second.
 _FROZEN = 'div[style*="opacity: 0.5"][style*="pointer-events: none"]'
 _STYLE = f"""<style>
 {_FROZEN}:not({_FROZEN} *)::before {{
@@ -61,6 +62,6 @@ _STYLE = f"""<style>
 
 
 def client_page() -> bytes:
-    """Return the page of the scene, as HTML."""
+    """Return the page of the scene as HTML."""
     page = _PAGE.read_text(encoding="utf-8").replace("<title>Viser</title>", f"<title>{TITLE}</title>")
     return page.replace("</head>", f"{_NEGATIVE_NUMBERS}{_STYLE}</head>").encode()

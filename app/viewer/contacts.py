@@ -1,4 +1,4 @@
-"""Where a predicted cable touches a table, an obstacle or itself, to be marked in the picture."""
+"""Find where a predicted cable touches a table, an obstacle or itself, to mark it in the picture."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,13 +8,13 @@ from dlocore.effects.distance import distances
 
 Floats = NDArray[np.float64]
 TOUCHING = 0.1  # of the diameter: a smaller gap between two surfaces counts as contact
-APART = 4.0  # diameters along the cable, within which its own bends are no contact
+APART = 4.0  # diameters along the cable: points closer than this are not in contact with each other
 
 
 def contact_points(prediction: Prediction, points: Floats) -> Floats:
-    """Return those of the points (n, 3) [m], evenly spaced along the cable, that touch something; (m, 3).
+    """Return the points that touch something (m, 3) [m], out of `points` (n, 3) [m] evenly spaced along the cable.
 
-    A cable that lies on the table all the time touches it everywhere, which needs no marks.
+    A cable that lies on the table all the time touches it everywhere; this is not marked.
     """
     scene = prediction.scene
     diameter = scene.cable.diameter
@@ -32,7 +32,7 @@ def contact_points(prediction: Prediction, points: Floats) -> Floats:
 
 
 def _itself(points: Floats, diameter: float, length: float) -> NDArray[np.bool_]:
-    """Tell which of the points touch another strand of the cable."""
+    """Return which of the points touch another strand of the cable."""
     skipped = int(np.ceil(APART * diameter / length * (len(points) - 1))) + 1
     gaps = np.linalg.norm(points[:, None] - points[None], axis=-1)
     index = np.arange(len(points))

@@ -1,4 +1,4 @@
-"""What each effect costs: the time of a march with it, less that of the same march without it."""
+"""The cost of each effect: the time of a march with it minus that of the same march without it."""
 
 import time
 from collections.abc import Callable
@@ -10,19 +10,19 @@ from dlocore import DloError, Prediction, Quality, Scene
 from dlocore.errors import Cancelled
 from dlocore.scene.scene import NEEDED, Switch
 
-REPEATS = 5  # of each march; the median counts
-LONGEST = 10.0  # s, of one march
+REPEATS = 5  # repetitions of each march; the median counts
+LONGEST = 10.0  # s, time limit of one march
 
 
 @dataclass(frozen=True, kw_only=True)
 class Costs:
-    """What effects cost, as far as it is measured.
+    """The costs of the effects that have been measured so far.
 
     Attributes:
-        seconds: by how much longer an effect makes a solve [s], negative where it saves time.
-        effect: that is being measured; "" at the end.
-        number: of this effect among those that are measured, from 1.
-        count: of those.
+        seconds: time that each effect adds to a solve [s], negative if it saves time.
+        effect: the effect being measured; "" at the end.
+        number: number of this effect among those to be measured, from 1.
+        count: number of effects to be measured.
     """
 
     seconds: dict[str, float] = field(default_factory=dict)
@@ -32,23 +32,23 @@ class Costs:
 
     @property
     def found_none(self) -> bool:
-        """Whether all that could be measured was, and it is nothing."""
+        """Whether the measurement has ended without a cost."""
         return not (self.effect or self.seconds)
 
 
 def measure_costs(prediction: Prediction, cancelled: Callable[[], bool], on_costs: Callable[[Costs], None]) -> None:
-    """Measure how much longer each active effect makes a solve of the scene of `prediction`.
+    """Measure the time that each active effect adds to a solve of the scene of `prediction`.
 
-    Each is switched off in turn, and everything else stays: the same grid, the same steps, the same choice of the other
-    effects. Effects without which the scene is not solvable are left out.
+    Each effect is switched off in turn. Everything else stays: the grid, the time steps, the choice of the other
+    effects. Effects without which the scene can't be solved are left out.
 
     Args:
-        prediction: of the scene.
-        cancelled: asked between and during the marches.
-        on_costs: called before the first effect, and whenever one more is measured.
+        prediction: prediction of the scene.
+        cancelled: checked between and during the marches.
+        on_costs: called before the first effect, and again whenever one more has been measured.
 
     Raises:
-        Cancelled: `cancelled` said so.
+        Cancelled: `cancelled` returned True.
     """
     accuracy, effects = prediction.accuracy, prediction.effects
     chosen: dict[str, Switch] = {effect.name: "on" if effect.active else "off" for effect in effects}
@@ -66,7 +66,7 @@ def measure_costs(prediction: Prediction, cancelled: Callable[[], bool], on_cost
 
 
 def _time(scene: Scene, cancelled: Callable[[], bool]) -> float | None:
-    """Return the median time of a march [s], None where it fails; the first one may have to be compiled."""
+    """Return the median time of a march [s], None if it fails; the first one may include compiling."""
     times = []
     for _ in range(REPEATS):
         if cancelled():

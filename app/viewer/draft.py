@@ -1,7 +1,7 @@
-"""The scene as a person edits it: the JSON that the API takes, valid or not, and which gripper is in hand.
+"""The scene as the user edits it: the JSON that the API takes, valid or not, and the selected gripper.
 
-`scene()` raises `SceneError` where the document makes no possible scene; the draft itself never does, so that a half
-finished edit is kept on the panel while the last good prediction stays in the picture.
+`scene()` raises `SceneError` if the document makes no possible scene. The draft itself never does, so that the panel
+keeps a half finished edit while the picture keeps the last good prediction.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ from dlocore.shape.shape import StartCurve, start_curve
 
 Floats = NDArray[np.float64]
 Path = Sequence[str | int]
-LENGTH = 1.0  # m, of a cable whose document names none yet
+LENGTH = 1.0  # m, of a cable whose document has no length yet
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,8 +32,8 @@ class Draft:
 
     Attributes:
         document: the scene as `POST /v1/predictions` takes it; never changed in place.
-        selected: the gripper in hand, of the document's `primitives`.
-        in_space: whether the gripper's target is dragged in all three directions, or at its height only.
+        selected: index of the selected gripper in the document's `primitives`.
+        in_space: whether the gripper's target is dragged in all three directions, or only at its height.
     """
 
     document: dict[str, Any]
@@ -42,7 +42,7 @@ class Draft:
 
     @staticmethod
     def of(document: dict[str, Any]) -> "Draft":
-        """Return the draft of a scene's document, with its first moving gripper in hand."""
+        """Return the draft of a scene's document, with its first moving gripper selected."""
         primitives = document.get("primitives") or []
         moving = [k for k, primitive in enumerate(primitives) if primitive["path"]["kind"] != "still"]
         path = primitives[moving[0]]["path"] if moving else {}
@@ -51,7 +51,7 @@ class Draft:
         return Draft(document=document, selected=moving[0] if moving else 0, in_space=table is None or lifts)
 
     def get(self, path: Path, default: Any = None) -> Any:
-        """Return the value at `path` of the document; `default` where it is absent or null."""
+        """Return the value at `path` of the document; `default` if it is absent or null."""
         node: Any = self.document
         for key in path:
             if isinstance(node, dict):
@@ -63,7 +63,7 @@ class Draft:
         return default if node is None else node
 
     def put(self, path: Path, value: Any) -> "Draft":
-        """Set the value at `path` of the document; None takes it out."""
+        """Set the value at `path` of the document; None removes it."""
         return replace(self, document=_put(self.document, path, value))
 
     @property
@@ -82,7 +82,7 @@ class Draft:
         return found
 
     def request(self) -> PredictionRequest:
-        """Return the document as a request, or raise SceneError for its first wrong field."""
+        """Return the document as a request, or raise SceneError for its first invalid field."""
         try:
             return PredictionRequest.model_validate(self.document)
         except ValidationError as error:
@@ -93,7 +93,7 @@ class Draft:
         """Return the scene for the solver.
 
         Args:
-            stored: finds the motion that a shape of kind "prediction" continues from.
+            stored: finds the motion that a shape of kind "prediction" continues.
 
         Raises:
             SceneError: the document makes no possible scene.
@@ -106,23 +106,23 @@ class Draft:
             return cable_of(self.request().cable)
 
     def obstacles(self) -> tuple[Obstacle, ...]:
-        """Return the obstacles for the solver; none where the document makes none, or is no request."""
+        """Return the obstacles for the solver; none if the document is invalid."""
         try:
             return environment_of(self.request().environment).obstacles
         except SceneError:
             return ()
 
     def start(self, stored: StoredMotion) -> StartCurve:
-        """Return the curve along which the cable lies at first, or raise SceneError."""
+        """Return the curve along which the cable lies at the start, or raise SceneError."""
         cable = self.cable()
         return start_curve(shape_of(self.request(), cable, stored), cable.length)
 
     def same_but_name(self, other: "Draft") -> bool:
-        """Say whether another draft is of the same scene, whatever it is called."""
+        """Return whether another draft has the same scene, whatever its name."""
         return self.put(("name",), None).document == other.put(("name",), None).document
 
     def shape_key(self) -> tuple[Any, ...]:
-        """Return what `start` depends on, to tell whether it has changed."""
+        """Return what `start` depends on, to detect changes."""
         return (self.get(("shape",)), self.get(("cable", "length")), self.get(("cable", "preset")))
 
 

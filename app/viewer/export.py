@@ -1,4 +1,4 @@
-"""What is taken away from the scene: a playback as one HTML page that opens offline, and a picture."""
+"""Export from the scene: a playback as one HTML page that opens offline, and a picture."""
 
 import contextlib
 from typing import Any
@@ -14,18 +14,18 @@ from dlocore import Prediction
 
 FRAMES = 30  # a second
 MOST_FRAMES = 600
-REST = 0.7  # s, at the end
+REST = 0.7  # s, pause at the end
 Pose = tuple[np.ndarray, np.ndarray]
 
 
 def playback_page(prediction: Prediction, look: Look, camera: Pose, *, fov: float, speed: float) -> bytes:
-    """Return a page that plays a prediction, with nothing to load from elsewhere.
+    """Return a self-contained page that plays a prediction.
 
-    A viser server of its own, on the loopback address and stopped at once, records what the picture draws.
+    A separate viser server records what the picture draws. It listens on the loopback address and is stopped at once.
 
     Args:
         prediction: what to play.
-        look: how.
+        look: how to draw it.
         camera: its position and the point it looks at [m].
         fov: field of view [rad].
         speed: predicted seconds per second.

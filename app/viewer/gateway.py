@@ -1,7 +1,7 @@
-"""The scene under the service's own port: its one page, and its websocket passed on to the viser server.
+"""Serve the scene on the service's own port: its single page, and its websocket, which is relayed to the viser server.
 
-viser listens on the loopback address only, and checks no origins. The gateway is the single way in, before which
-`app.http.access` refuses the pages of other sites.
+viser listens only on the loopback address and does not check origins. The gateway is the only way to reach it, and
+`app.http.access` refuses pages of other sites before a request gets to the gateway.
 """
 
 import asyncio
@@ -27,7 +27,7 @@ from app.viewer.client_page import client_page
 CONTENT_SECURITY_POLICY = "; ".join(
     [
         "default-src 'self'",
-        # the client builds the bindings of its WebAssembly modules by eval, whether they are used or not
+        # the client creates the bindings of its WebAssembly modules by eval, even if they are not used
         "script-src 'self' 'unsafe-inline' 'unsafe-eval' blob:",
         "worker-src 'self' blob:",
         "style-src 'self' 'unsafe-inline'",
@@ -53,8 +53,8 @@ KEY_HEADER = "X-Scene-Key"
 ADDRESS_HEADER = "X-Scene-Address"
 BEGIN_HEADER = "X-Scene-Begin"
 TAB_HEADER = "X-Scene-Tab"
-PLAIN = "new"  # in the place of a ready scene's name: none
-RUN = "run-"  # and before the id of a stored run
+PLAIN = "new"  # stands in an address for the name of a ready scene if there is none
+RUN = "run-"  # prefix of the id of a stored run in an address
 _HOST = re.compile(r"[A-Za-z0-9.\-_]+(:[0-9]{1,5})?|\[[0-9a-fA-F:.]+\](:[0-9]{1,5})?")
 
 
@@ -63,12 +63,12 @@ class Upstream:
     """The viser server behind the gateway.
 
     Attributes:
-        port: where it listens on the loopback address.
+        port: port on which it listens on the loopback address.
         key: proves to it that a connection came through the gateway.
-        open_scenes: says how many scenes are open.
-        most_scenes: that may be.
-        era: with which the names of its tabs begin: those of before a restart begin otherwise.
-        has_run: says whether a run is stored.
+        open_scenes: returns the number of open scenes.
+        most_scenes: largest allowed number of open scenes.
+        era: prefix of the names of its tabs. It changes with every restart, so that older tabs can be recognised.
+        has_run: returns whether a run is stored.
     """
 
     port: int
@@ -80,36 +80,36 @@ class Upstream:
 
     @property
     def is_full(self) -> bool:
-        """Whether as many scenes are open as may be."""
+        """Whether no further scene may be opened."""
         return self.open_scenes() >= self.most_scenes
 
 
 def address(socket: WebSocket) -> str:
-    """Return the address at which the client sees the service, e.g. ``http://127.0.0.1:8000``; empty if it is odd."""
+    """Return the service's address as the client sees it, e.g. ``http://127.0.0.1:8000``; "" if it is malformed."""
     host = socket.headers.get("host", "")
     scheme = "https" if socket.url.scheme == "wss" else "http"
     return f"{scheme}://{host}" if _HOST.fullmatch(host) else ""
 
 
 def add_gateway(app: FastAPI) -> None:
-    """Add `GET /scene/` and the websocket `/scene`, alone and followed by the name of a scene and of a tab.
+    """Add `GET /scene/` and the websocket `/scene`, each alone and followed by the names of a scene and a tab.
 
-    The client takes the address of its websocket from that of its page, without the query: so the name of the scene, a
-    ready one or that of a run, goes into the path, and with it one of the tab, by which a page that is loaded again, or
-    connects anew, finds its scene. `/scene/`, `?example=` and `?run=` lead there. Without a viser server, where as many
-    scenes are open as may be, and where a run is gone, the pages say so.
+    The client derives the address of its websocket from the path of its page, without the query. So the path contains
+    the name of the scene (a ready scene or a run), and a name of the tab, by which a page that reloads or reconnects
+    finds its scene again. `/scene/`, `?example=` and `?run=` redirect to such a path. The pages say so if there is no
+    viser server, if no further scene may be opened, or if a run is gone.
     """
     client = client_page()
 
     def found(request: Request, name: str) -> Upstream | Response:
-        """Return the server that shows a scene, or the page that says why none does."""
+        """Return the server that shows a scene, or a page that says why none does."""
         upstream = _upstream(request.app)
         if not _named(name):
             return _unknown()
         if upstream is None:
             return _notice("The scene is not running", "The service is stopping, or has not started yet.", 503)
         if upstream.is_full:
-            words = "As many scenes are open as this service allows. Close another tab, or try again later."
+            words = "This service allows no more open scenes. Close another tab, or try again later."
             return _notice("All scenes are taken", words, 503)
         return upstream
 
@@ -157,12 +157,14 @@ def add_gateway(app: FastAPI) -> None:
 
 
 def _named(name: str) -> bool:
-    """Return whether there may be a scene of this name."""
+    """Return whether a scene can have this name."""
     return name == PLAIN or name in examples() or bool(name.startswith(RUN) and ID.fullmatch(name.removeprefix(RUN)))
 
 
 def _gone() -> Response:
-    return _notice("There is no such run", "It was deleted, or made room for newer ones, or never was.", 404)
+    return _notice(
+        "There is no such run", "It was deleted, was removed to make room for newer runs, or never existed.", 404
+    )
 
 
 def _unknown() -> Response:
@@ -185,7 +187,7 @@ def _upstream(app: FastAPI) -> Upstream | None:
 
 
 async def _pass_on(socket: WebSocket, upstream: Upstream, asked: dict[str, str]) -> None:
-    """Connect `socket` with the viser server, for the scene that headers ask for, until either side closes."""
+    """Relay `socket` to the viser server until either side closes; the headers `asked` name the scene."""
     protocols = [Subprotocol(name) for name in socket.scope.get("subprotocols", [])]
     try:
         inner = await connect(

@@ -20,7 +20,7 @@ def segment_poses(points: Floats) -> tuple[Floats, Floats]:
     """
     steps = np.diff(points, axis=0)
     direction = steps / np.maximum(np.linalg.norm(steps, axis=1), 1e-12)[:, None]
-    # the shortest turn from z to the direction; straight down is half a turn about x
+    # the shortest rotation from z to the direction; for straight down, half a turn about x
     wxyz = np.column_stack([1.0 + direction[:, 2], -direction[:, 1], direction[:, 0], np.zeros(len(steps))])
     wxyz[direction[:, 2] < -1.0 + 1e-9] = (0.0, 1.0, 0.0, 0.0)
     wxyz /= np.linalg.norm(wxyz, axis=1, keepdims=True)
@@ -31,8 +31,8 @@ def upright(direction: Floats, approach: Floats | None = None) -> Floats:
     """Return axes (3, 3), in columns, with x along `direction` (3,) and z as near to `approach` as possible.
 
     Args:
-        direction: of the cable where it is held.
-        approach: where the gripper's stem points; upwards where absent, or where the cable itself goes there.
+        direction: direction of the cable where it is held.
+        approach: direction of the gripper's stem; if absent, upwards. If the cable runs along it, y takes its place.
     """
     x = direction / max(float(np.linalg.norm(direction)), 1e-12)
     z = np.array([0.0, 0.0, 1.0]) if approach is None else approach
@@ -64,7 +64,7 @@ def cylinder(radius: float, sides: int = 14) -> Mesh:
 
 
 def capsule(radius: float, length: float, sides: int = 14, rings: int = 4) -> Mesh:
-    """Return a cylinder of `length` [m] along z, centred, with half spheres at its ends: a link of a smooth chain."""
+    """Return a cylinder of `length` [m] along z, centred, with hemispheres at its ends: a link of a smooth chain."""
     angles = np.linspace(0.0, 2 * np.pi, sides, endpoint=False)
     latitudes = np.linspace(0.0, 0.5 * np.pi, rings, endpoint=False)
     upper = [(radius * np.cos(x), 0.5 * length + radius * np.sin(x)) for x in latitudes]
@@ -99,9 +99,9 @@ def joined(*meshes: Mesh) -> Mesh:
 
 
 def gripper(cable_diameter: float, scale: float = 1.0) -> Mesh:
-    """Return a parallel gripper around the origin: its fingers lie at both sides (y) of a cable along x.
+    """Return a parallel gripper at the origin, with its fingers on both sides (y) of a cable along x.
 
-    Its fingers are 52 mm long, times `scale`.
+    The fingers are 52 mm long, times `scale`.
     """
     half = 0.5 * cable_diameter / scale
     finger, reach, width = 0.006, 0.052, 0.020
@@ -116,7 +116,7 @@ def gripper(cable_diameter: float, scale: float = 1.0) -> Mesh:
 
 
 def strip_faces(rows: int, columns: int) -> Faces:
-    """Return the triangles of a grid of `rows` x `columns` vertices in row order; (2 (rows-1)(columns-1), 3)."""
+    """Return the triangles of a grid of `rows` x `columns` vertices in row-major order; (2 (rows-1)(columns-1), 3)."""
     index = np.arange(rows * columns).reshape(rows, columns)
     a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]))
     return np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])]).astype(np.uint32)

@@ -1,4 +1,4 @@
-"""The handle on the target of the gripper in hand, and what is written beside it."""
+"""The handle on the target of the selected gripper, and the texts next to it."""
 
 from collections.abc import Callable
 
@@ -13,13 +13,13 @@ WARNING_HEIGHT = 0.06  # of the cable's length above the target
 
 
 class Gizmo:
-    """Drags the target: in the plane or in space, and turns it where its gripper holds a direction.
+    """Moves the target in the plane or in space, and rotates it if its gripper holds a direction.
 
     Args:
-        scene: where it goes.
-        on_begin: called when the hand takes hold of it.
-        on_drag: called with its position (3,) [m] and quaternion wxyz (4,).
-        on_end: called when the hand lets go.
+        scene: the scene that gets the handle.
+        on_begin: called when a drag begins.
+        on_drag: called with the position (3,) [m] and the quaternion wxyz (4,) of the handle.
+        on_end: called when a drag ends.
     """
 
     def __init__(
@@ -47,14 +47,14 @@ class Gizmo:
                 on_end()
 
     def place(self, target: Floats, turn: Floats, *, size: float, in_space: bool, turns: bool) -> None:
-        """Put it on a target.
+        """Put the handle on a target.
 
         Args:
             target: (3,) [m].
             turn: rotation vector (3,) [rad].
             size: the cable's length [m].
-            in_space: whether it moves in height too.
-            turns: whether it turns.
+            in_space: whether the handle also moves vertically.
+            turns: whether the handle rotates.
         """
         self._position, self._size = target, size
         self._handle.position = target
@@ -66,13 +66,13 @@ class Gizmo:
                 setattr(self._handle, name, value)
 
     def show(self, *, visible: bool) -> None:
-        """Show it, or hide it while something else is dragged."""
+        """Show the handle, or hide it while something else is edited."""
         if self._handle.visible != visible:
             self._handle.visible = visible
             self._hint.visible = False
 
     def warn(self, text: str) -> None:
-        """Write a warning above the target; "" takes it away."""
+        """Show a warning above the target; "" removes it."""
         if not text:
             if self._warning.visible:
                 self._warning.visible = False

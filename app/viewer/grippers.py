@@ -1,4 +1,4 @@
-"""A gripper in the scene: its body, the path of the point it holds, and the force it gives."""
+"""Draw a gripper in the scene: its body, the path of the point it holds, and the force it exerts."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,25 +11,25 @@ from dlocore import Grasp, GraspReaction, Prediction
 
 Floats = NDArray[np.float64]
 DASHES = 24
-REACH = (0.03, 0.12)  # of the cable's length: the part of the body that is clearly above the cable
+REACH = (0.03, 0.12)  # of the cable's length: the part of the body that is well above the cable
 
 
 class GripperPicture:
     """The nodes of one gripper.
 
     Args:
-        scene: where they go.
-        number: of the gripper.
+        scene: the scene that gets the nodes.
+        number: index of the gripper.
         cable_diameter: [m].
         cable_length: [m].
 
     Attributes:
-        body: points along its axis, by which it is clicked (k, 3) [m]; none while it is open.
+        body: points along its axis, for picking by clicks (k, 3) [m]; none while the gripper is open.
     """
 
     def __init__(self, scene: SceneApi, number: int, cable_diameter: float, cable_length: float) -> None:
         vertices, faces = geometry.gripper(cable_diameter, cable_length)
-        # a batch of one: its pose then reaches the browser the same way as the cable's, and they are drawn in step
+        # a batch of one, so that its pose reaches the browser like the cable's, and both are drawn in step
         self._body = scene.add_batched_meshes_simple(
             f"/gripper/{number}",
             vertices,
@@ -51,7 +51,7 @@ class GripperPicture:
         self.body = np.zeros((0, 3))
 
     def take(self, prediction: Prediction, number: int, newtons: float) -> None:
-        """Belong to a grasp of a new prediction, in which the largest reaction of all is `newtons` [N]."""
+        """Take over grasp `number` of a new prediction, whose largest reaction of all grasps is `newtons` [N]."""
         self._prediction, self._newtons = prediction, newtons
         self._held = (prediction.scene.grasps[number], prediction.grasps[number])
         grasp, horizon = self._held[0], prediction.surface.horizon
@@ -61,11 +61,11 @@ class GripperPicture:
         self._path.visible = bool(np.ptp(track, axis=0).max() > 1e-6)
 
     def mark(self, selected: bool) -> None:
-        """Show whether it is the one in hand."""
+        """Show whether the gripper is selected."""
         self._body.batched_colors = linear(np.array(BRAND if selected else STEEL))
 
     def show_forces(self, shown: bool) -> None:
-        """Draw the reaction's arrow, or not."""
+        """Show or hide the arrow of the reaction."""
         self._reactions = shown
 
     def pose(self, time: float) -> None:
@@ -87,13 +87,13 @@ class GripperPicture:
         self._arrow.draw(point[None], force[None] / self._newtons, self._reactions and closed)
 
     def _axes(self, grasp: Grasp, time: float, along: Floats) -> Floats:
-        """Return the axes (3, 3) of the body: along the cable, and turned with the path where it turns."""
+        """Return the axes (3, 3) of the body: along the cable, and rotated with the path if that rotates."""
         turned = grasp.path.rotation_at(np.array([max(time - grasp.start, 0.0)]))
         if turned is None:
             return geometry.upright(along)
         return geometry.upright(along, turned[0] @ geometry.upright(turned[0].T @ along)[:, 2])
 
     def remove(self) -> None:
-        """Take the nodes out of the scene."""
+        """Remove the nodes from the scene."""
         for node in (self._body, self._path, self._arrow):
             node.remove()

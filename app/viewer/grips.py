@@ -1,4 +1,4 @@
-"""Edits of the grippers of a draft: where they hold the cable, how, and where they go."""
+"""Edit the grippers of a draft: where and how they hold the cable, and where they go."""
 
 import math
 from dataclasses import replace
@@ -21,12 +21,12 @@ Motion = Literal["moves", "stays", "follows waypoints"]
 HOLDS: tuple[Hold, ...] = get_args(Hold)
 PROFILES: tuple[Profile, ...] = get_args(Profile)
 DURATION = 1.5  # s, of a new motion
-REACH_SHARE = 0.9  # of the cable between two grippers, when a target is brought near
+REACH_SHARE = 0.9  # of the cable between two grippers: their distance after a target was brought within reach
 _KINDS: dict[str, Motion] = {"move": "moves", "still": "stays", "waypoints": "follows waypoints"}
 
 
 def gripper(draft: Draft) -> dict[str, Any] | None:
-    """Return the gripper in hand, if there is one."""
+    """Return the selected gripper, if there is one."""
     return draft.primitives[draft.selected] if draft.selected < len(draft.primitives) else None
 
 
@@ -36,17 +36,17 @@ def places(draft: Draft) -> list[float]:
 
 
 def changed(draft: Draft, name: str, value: Any) -> Draft:
-    """Set a field of the gripper in hand; None takes it out."""
+    """Set a field of the selected gripper; None removes it."""
     return draft if gripper(draft) is None else draft.put(("primitives", draft.selected, name), value)
 
 
 def path_changed(draft: Draft, name: str, value: Any) -> Draft:
-    """Set a field of the path of the gripper in hand; None takes it out."""
+    """Set a field of the path of the selected gripper; None removes it."""
     return draft if gripper(draft) is None else draft.put(("primitives", draft.selected, "path", name), value)
 
 
 def motion(draft: Draft) -> Motion:
-    """Return what the gripper in hand does."""
+    """Return what the selected gripper does."""
     held = gripper(draft)
     if held is None:
         return "stays"
@@ -54,7 +54,7 @@ def motion(draft: Draft) -> Motion:
 
 
 def with_motion(draft: Draft, wanted: Motion) -> Draft:
-    """Let the gripper in hand move, by nothing yet, or stay; waypoints come from a file only."""
+    """Let the selected gripper move (with no displacement yet) or stay; waypoints come only from files."""
     if gripper(draft) is None or wanted == motion(draft) or wanted == "follows waypoints":
         return draft
     path: dict[str, Any] = {"kind": "still"}
@@ -65,13 +65,13 @@ def with_motion(draft: Draft, wanted: Motion) -> Draft:
 
 
 def _with_horizon(draft: Draft) -> Draft:
-    """Give the scene a horizon where no path has a duration any more."""
+    """Give the scene a horizon if none of its paths has a duration any more."""
     moves = any(primitive["path"]["kind"] != "still" for primitive in draft.primitives)
     return draft if moves or draft.get(("horizon",)) is not None else draft.put(("horizon",), DURATION)
 
 
 def with_hold(draft: Draft, hold: str) -> Draft:
-    """Hold the position, the direction too, or the twist as well; a point can't turn."""
+    """Set how the selected gripper holds the cable: `point`, `tangent` or `clamp`; a point has no rotation."""
     edited = changed(draft, "hold", hold)
     if hold != "point":
         return edited
@@ -79,14 +79,14 @@ def with_hold(draft: Draft, hold: str) -> Draft:
 
 
 def selected(draft: Draft, number: int) -> Draft:
-    """Take another gripper in hand."""
+    """Select another gripper."""
     return replace(draft, selected=number) if 0 <= number < len(draft.primitives) else draft
 
 
 def added(draft: Draft, start: StartCurve) -> Draft:
-    """Add a gripper that stays, as far from the others as possible, and take it in hand.
+    """Add a gripper that stays, as far from the others as possible, and select it.
 
-    Targets of others that the cable could no longer reach are brought near.
+    Targets of other grippers that the cable could no longer reach are brought within reach.
     """
     length, count = draft.length, len(draft.primitives)
     places = np.linspace(0.0, length, 21)
@@ -101,7 +101,7 @@ def added(draft: Draft, start: StartCurve) -> Draft:
 
 
 def _in_reach(draft: Draft, k: int, u: float, start: StartCurve) -> Draft:
-    """Bring the target of gripper `k` near enough to the cable's point at `u`, held still, for the cable to follow."""
+    """Bring the target of gripper `k` within reach of the cable, whose point at `u` is held still."""
     primitive = draft.primitives[k]
     if primitive["path"]["kind"] != "move":
         return draft
@@ -116,18 +116,18 @@ def _in_reach(draft: Draft, k: int, u: float, start: StartCurve) -> Draft:
 
 
 def removed(draft: Draft) -> Draft:
-    """Take the gripper in hand away."""
+    """Remove the selected gripper."""
     rest = [primitive for k, primitive in enumerate(draft.primitives) if k != draft.selected]
     return _with_horizon(replace(draft.put(("primitives",), rest), selected=max(0, min(draft.selected, len(rest) - 1))))
 
 
 def origin(draft: Draft, start: StartCurve, shown: SplineSurface | None) -> Floats:
-    """Return where the path of the gripper in hand begins, (3,) [m]: where the cable is when the gripper closes.
+    """Return where the path of the selected gripper begins, (3,) [m]: where the cable is when the gripper closes.
 
     Args:
         draft: the draft.
-        start: its start curve.
-        shown: the last prediction, which tells it for grippers that close later.
+        start: start curve of the draft.
+        shown: the last prediction, needed for grippers that close later.
     """
     held = gripper(draft)
     if held is None:
@@ -139,7 +139,7 @@ def origin(draft: Draft, start: StartCurve, shown: SplineSurface | None) -> Floa
 
 
 def target(draft: Draft, begin: Floats) -> Floats:
-    """Return where the gripper in hand ends, (3,) [m], if its path begins at `begin`."""
+    """Return where the path of the selected gripper ends, (3,) [m], if it begins at `begin`."""
     held = gripper(draft)
     path = {"kind": "still"} if held is None else held["path"]
     if path["kind"] == "move":
@@ -150,7 +150,7 @@ def target(draft: Draft, begin: Floats) -> Floats:
 
 
 def with_target(draft: Draft, begin: Floats, point: Floats) -> Draft:
-    """Let the gripper in hand end at `point` (3,) [m]; one that stayed begins to move."""
+    """Let the path of the selected gripper end at `point` (3,) [m]; a gripper that stayed now moves."""
     held = gripper(draft)
     if held is None:
         return draft
@@ -161,7 +161,7 @@ def with_target(draft: Draft, begin: Floats, point: Floats) -> Draft:
 
 
 def with_next_move(draft: Draft, begin: Floats) -> Draft:
-    """Let the gripper in hand go on with another move, from its target on; its path begins at `begin` (3,) [m]."""
+    """Append a move, from its target on, to the path of the selected gripper, which begins at `begin` (3,) [m]."""
     held = gripper(draft)
     if held is None or not programs.can_go_on(held["path"]):
         return draft
@@ -169,7 +169,7 @@ def with_next_move(draft: Draft, begin: Floats) -> Draft:
 
 
 def without_last_move(draft: Draft) -> Draft:
-    """Take the last of several moves of the gripper in hand away."""
+    """Remove the last of several moves of the selected gripper."""
     held = gripper(draft)
     if held is None or not programs.is_program(held["path"]):
         return draft
@@ -177,21 +177,21 @@ def without_last_move(draft: Draft) -> Draft:
 
 
 def moves(draft: Draft) -> int:
-    """Return how many moves the gripper in hand makes."""
+    """Return the number of moves of the selected gripper."""
     held = gripper(draft)
     path = {"kind": "still"} if held is None else held["path"]
     return len(path["times"]) - 1 if programs.is_program(path) else int(path["kind"] == "move")
 
 
 def duration(draft: Draft) -> float:
-    """Return how long the last move of the gripper in hand takes [s]."""
+    """Return the duration of the last move of the selected gripper [s]."""
     held = gripper(draft)
     path = {} if held is None else held["path"]
     return programs.lasts(path) if moves(draft) > 1 else float(path.get("duration", DURATION))
 
 
 def with_duration(draft: Draft, value: float) -> Draft:
-    """Let the last move of the gripper in hand take `value` [s]."""
+    """Let the last move of the selected gripper take `value` [s]."""
     held = gripper(draft)
     if held is not None and programs.is_program(held["path"]):
         return changed(draft, "path", programs.lasting(held["path"], value))
@@ -199,18 +199,18 @@ def with_duration(draft: Draft, value: float) -> Draft:
 
 
 def have_programs(draft: Draft) -> bool:
-    """Say whether a gripper makes several moves."""
+    """Return whether any gripper makes several moves."""
     return any(programs.is_program(primitive["path"]) for primitive in draft.primitives)
 
 
 def carried(draft: Draft, start: StartCurve, before: Draft, start_before: StartCurve) -> Draft:
-    """Return an edited draft whose programs begin where what their grippers hold is now.
+    """Return an edited draft whose programs are shifted along with the points that their grippers hold.
 
     Args:
-        draft: the draft.
-        start: its start curve.
+        draft: the draft after the edit.
+        start: start curve of `draft`.
         before: the draft before the edit.
-        start_before: its start curve.
+        start_before: start curve of `before`.
     """
     for k, (now, then) in enumerate(zip(draft.primitives, before.primitives, strict=False)):
         late = now.get("grasp_time") or then.get("grasp_time")
@@ -223,13 +223,13 @@ def carried(draft: Draft, start: StartCurve, before: Draft, start_before: StartC
 
 
 def can_turn(draft: Draft) -> bool:
-    """Say whether the gripper in hand holds a direction that its path can turn."""
+    """Return whether the selected gripper holds a direction that its path can rotate."""
     held = gripper(draft)
     return held is not None and held.get("hold", "point") != "point" and motion(draft) != "follows waypoints"
 
 
 def turn(draft: Draft) -> Floats:
-    """Return the rotation vector of the gripper in hand (3,) [rad]."""
+    """Return the rotation vector of the selected gripper (3,) [rad]."""
     held = gripper(draft)
     if held is not None and programs.is_program(held["path"]):
         return programs.turned(held["path"])
@@ -237,7 +237,7 @@ def turn(draft: Draft) -> Floats:
 
 
 def with_turn(draft: Draft, rotation: Floats) -> Draft:
-    """Turn the gripper in hand by a rotation vector (3,) [rad]."""
+    """Set the rotation vector of the selected gripper (3,) [rad]."""
     if not can_turn(draft):
         return draft
     path = draft.primitives[draft.selected]["path"]
@@ -248,9 +248,9 @@ def with_turn(draft: Draft, rotation: Floats) -> Draft:
 
 
 def nearest_turn(wxyz: Floats, before: Floats) -> Floats:
-    """Return the rotation vector (3,) [rad] of a quaternion that lies nearest to the one `before`.
+    """Return the rotation vector (3,) [rad] of a quaternion that is nearest to the vector `before`.
 
-    A quaternion tells a turn only up to full ones, a gripper may be turned by several.
+    A quaternion gives a rotation only up to full turns, but a gripper may be rotated by several.
     """
     vector = Rotation.from_quat(np.roll(np.asarray(wxyz, dtype=float), -1)).as_rotvec()
     angle = float(np.linalg.norm(vector))

@@ -1,4 +1,4 @@
-"""The ground of the picture: the table, or a floor well below a cable that has none."""
+"""Draw the ground of the picture: the table, or without one a floor well below the cable."""
 
 import math
 from typing import Any
@@ -13,14 +13,14 @@ FLOOR = 0.15  # of the cable's length, from its lowest point down to the floor
 
 
 class Ground:
-    """A grid with shadows on it: drawn strongly for a table, weakly for a floor, which the cable never touches."""
+    """A grid that receives shadows: distinct for a table, faint for a floor, which the cable never touches."""
 
     def __init__(self, scene: SceneApi) -> None:
         self._scene = scene
         self._drawn: tuple[Any, ...] | None = None
 
     def show(self, prediction: Prediction) -> None:
-        """Draw the ground of `prediction`, unless it is the one that is drawn."""
+        """Draw the ground of `prediction`, unless it is already drawn."""
         scene = prediction.scene
         length, table = scene.cable.length, scene.environment.table
         size = 10.0 ** math.floor(math.log10(length) + 0.31)  # a round cell: 0.1 m for cables of 0.5 to 5 m
@@ -30,7 +30,7 @@ class Ground:
             points = prediction.surface.positions(
                 np.linspace(0.0, length, 17), np.linspace(0.0, prediction.surface.horizon, 9)
             )
-            step = 0.1 * size  # rounded down, so that it does not follow every move of the hand
+            step = 0.1 * size  # rounded down, so that the floor does not follow every small edit
             height = step * math.floor((float(points[..., 2].min()) - FLOOR * length) / step)
         start = prediction.surface.positions([0.0, length], [0.0])[0]
         middle = np.round(start.mean(axis=0) / (0.5 * size)) * 0.5 * size

@@ -1,4 +1,4 @@
-"""The viser server inside the service: started with it, stopped with it, one session a connected client."""
+"""The viser server inside the service: it starts and stops with the service and has one session for each client."""
 
 import asyncio
 import contextlib
@@ -20,15 +20,15 @@ from app.viewer.quiet import quiet_console
 from app.viewer.session import Session, Shared, Work, of_example, of_run
 from app.viewer.solver import ServiceSolver
 
-MOST_LEFT = 64  # closed tabs whose scenes are kept
+MOST_LEFT = 64  # most closed tabs whose scenes are kept
 
 
 class SceneHost:
     """A viser server on the loopback address with a session for each client.
 
     Args:
-        shared: what all sessions work with.
-        most: sessions that may be open at once.
+        shared: what all sessions share.
+        most: largest number of sessions that may be open at once.
     """
 
     def __init__(self, shared: Shared, most: int) -> None:
@@ -37,10 +37,10 @@ class SceneHost:
         self.key = secrets.token_urlsafe(32)
         self.era = secrets.token_hex(4)
         self.sessions: dict[int, Session] = {}
-        self._left: dict[str, Work] = {}  # of tabs that are closed, by their names, the newest last
+        self._left: dict[str, Work] = {}  # work of closed tabs by their names, the newest last
         with quiet_console():
             self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-        # any client could otherwise ask viser to publish itself on the internet
+        # otherwise any client could have viser publish itself on the internet
         for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
             self._server._websock_server.unregister_handler(message)
         self._server.on_client_connect(self._open)
@@ -66,10 +66,10 @@ class SceneHost:
         request = connection.request
         headers = {} if request is None else request.headers
         if not hmac.compare_digest(headers.get(KEY_HEADER, "").encode(), self.key.encode()):
-            await connection.close()  # not through the gateway, before which origins are checked
+            await connection.close()  # it did not come through the gateway, which is protected by a check of origins
             return
         if len(self.sessions) >= self._most:
-            await connection.close()  # two came in at once for the last place
+            await connection.close()  # two clients came at once, and only one place was left
             return
         tab = headers.get(TAB_HEADER, "")
         work, lost = self._found(tab), None
@@ -80,22 +80,22 @@ class SceneHost:
             if draft is None and name.startswith(RUN):
                 lost = (
                     "The run can't be opened",
-                    "It was deleted, or the one that it goes on from. This is another scene.",
+                    "It was deleted, or the run that it continues was deleted. Here is the paper's case.",
                 )
             elif tab and not tab.startswith(self.era):
-                lost = ("The service was restarted", "This scene begins anew; what was edited in it before is lost.")
+                lost = ("The service was restarted", "This scene starts from the beginning; earlier edits are lost.")
         self.sessions[client.client_id] = Session(client, self._shared, headers.get(ADDRESS_HEADER, ""), tab, work)
         if lost is not None:
             client.add_notification(*lost, color="yellow")
 
     async def _begin(self, name: str) -> Draft | None:
-        """Return the scene that a tab begins with by the name in its address."""
+        """Return the scene with which a tab begins, by the name in its address."""
         if name.startswith(RUN):
             return await asyncio.to_thread(of_run, name.removeprefix(RUN), self._shared.runs)
         return of_example(name)
 
     def _found(self, tab: str) -> Work | None:
-        """Return what was being done in a tab: it is loaded again, or another is a copy of it."""
+        """Return the earlier work of a tab that was reloaded or duplicated; None if there is none."""
         for session in self.sessions.values():
             if tab and session.tab == tab:
                 return session.work()

@@ -1,4 +1,4 @@
-"""Cables that were identified and kept: presets beside those of the library, for all tabs of a service."""
+"""Cables that were identified and kept: presets in addition to the library's, for all tabs of a service."""
 
 import json
 import logging
@@ -14,7 +14,7 @@ from dlocore.files import write_whole
 LONGEST_NAME = 60
 MOST = 200
 FILE = "cables.json"
-_OF_A_PIECE = ("length", "point_masses")  # of a cable, and not of its kind
+_OF_A_PIECE = ("length", "point_masses")  # properties of a single cable, not of its kind
 _log = logging.getLogger(__name__)
 
 
@@ -30,7 +30,7 @@ class KeptCables:
         self._lock = threading.Lock()
 
     def all(self) -> dict[str, dict[str, Any]]:
-        """Return what is kept: by name `cable` without its length and connectors, and `environment` with its drag."""
+        """Return the kept cables by name: `cable` without length and connectors, and `environment` with the drag."""
         try:
             found = json.loads(self._path.read_text())
         except FileNotFoundError:
@@ -43,7 +43,7 @@ class KeptCables:
         return {str(k): v for k, v in found.items() if isinstance(v, dict) and _is_cable(v.get("cable"))}
 
     def keep(self, name: str, cable: Mapping[str, Any], environment: Mapping[str, Any]) -> None:
-        """Keep a cable under a name, instead of one that was kept under it before.
+        """Keep a cable under a name; it replaces a cable kept under the same name.
 
         Raises:
             ProblemError: the name is empty or too long, or there are too many.

@@ -1,4 +1,4 @@
-"""Edits of the known forces of a draft, which act all the time, or from one time until another."""
+"""Edit the known forces of a draft, which act all the time or from one time until another."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -7,15 +7,15 @@ from app.viewer.draft import Draft
 from dlocore import SceneError
 
 PATH = ("loads",)
-RAMP = 1e-3  # s, in which a force comes, and goes
-SHARE = 0.1  # of the cable's weight: a new force
+RAMP = 1e-3  # s in which a force rises and falls
+SHARE = 0.1  # of the cable's weight: size of a new force
 GRAVITY = 9.81  # m/s^2
 Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Pull:
-    """A force `force` [N] that acts from `start` [s], until `end` [s] or, where that is 0, to the end."""
+    """A force `force` [N] that acts from `start` [s] until `end` [s], or to the end of the motion if `end` is 0."""
 
     force: Vector
     start: float = 0.0
@@ -29,7 +29,7 @@ def loads(draft: Draft) -> list[dict[str, Any]]:
 
 
 def pull(load: dict[str, Any]) -> Pull | None:
-    """Return a load of the document as a force that acts for a while; None where it changes otherwise."""
+    """Return a load of the document as a force that acts for a while; None if it changes in another way."""
     force = load["force"]
     if not isinstance(force, dict):
         return Pull(force=_vector(force))
@@ -43,7 +43,7 @@ def pull(load: dict[str, Any]) -> Pull | None:
 
 
 def _force(wanted: Pull) -> Any:
-    """Return a force as the document has it: a vector, or values over time."""
+    """Return a force in the form of the document: a vector, or values over time."""
     if wanted.start <= 0.0 and wanted.end <= 0.0:
         return list(wanted.force)
     times, values = [wanted.start - RAMP, wanted.start], [[0.0, 0.0, 0.0], list(wanted.force)]
@@ -54,10 +54,10 @@ def _force(wanted: Pull) -> Any:
 
 
 def added(draft: Draft) -> Draft:
-    """Add a pull sideways by a tenth of the cable's weight, in its middle or at an end, away from grippers."""
+    """Add a sideways pull of a tenth of the cable's weight, at its middle or at an end, away from the grippers."""
     try:
         weight = GRAVITY * draft.cable().mass
-    except SceneError:  # an impossible cable is mended first
+    except SceneError:  # an impossible cable has to be corrected first
         return draft
     held = [primitive["u"] for primitive in draft.primitives]
     places = [draft.length, 0.5 * draft.length, 0.0]
@@ -67,7 +67,7 @@ def added(draft: Draft) -> Draft:
 
 
 def removed(draft: Draft, number: int) -> Draft:
-    """Take a force away."""
+    """Remove a force."""
     return draft.put(PATH, [load for k, load in enumerate(loads(draft)) if k != number] or None)
 
 
@@ -78,7 +78,7 @@ def placed(draft: Draft, number: int, u: float) -> Draft:
 
 
 def changed(draft: Draft, number: int, **parts: Any) -> Draft:
-    """Change `force`, `start` or `end` of a force that acts for a while; another stays as it is."""
+    """Change `force`, `start` or `end` of a force that acts for a while; other loads stay as they are."""
     before = pull(loads(draft)[number]) if number < len(loads(draft)) else None
     return draft if before is None else draft.put((*PATH, number, "force"), _force(replace(before, **parts)))
 

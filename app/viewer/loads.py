@@ -1,4 +1,4 @@
-"""The known forces in the scene, as arrows at the places where they act."""
+"""Draw the known forces in the scene, as arrows at the places where they act."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ class LoadsPicture:
     """The arrows of all known forces.
 
     Args:
-        scene: where they go.
+        scene: the scene that gets the arrows.
         cable_diameter: [m].
         cable_length: [m].
     """
@@ -27,13 +27,13 @@ class LoadsPicture:
         self._arrows = ForceArrows(scene, "/loads", LOAD, cable_diameter, cable_length)
 
     def take(self, prediction: Prediction) -> None:
-        """Belong to a new prediction, in which the largest of them has the longest arrow."""
+        """Take over a new prediction; its largest known force has the longest arrow."""
         self._prediction = prediction
         over = [forces_over(load, prediction.surface.horizon)[1] for load in prediction.scene.loads]
         self._newtons = max([1e-12, *(float(np.linalg.norm(forces, axis=1).max()) for forces in over)])
 
     def show_forces(self, shown: bool) -> None:
-        """Draw the arrows, or not."""
+        """Show or hide the arrows."""
         self._shown = shown
 
     def pose(self, time: float) -> None:
@@ -48,9 +48,9 @@ class LoadsPicture:
 
 
 def forces_over(load: Load, horizon: float) -> tuple[Floats, Floats]:
-    """Return times (k,) [s] until `horizon` [s] between which a force changes evenly, and the force then (k, 3) [N].
+    """Return times (k,) [s] from 0 to `horizon` [s] between which a force is linear, and the force there (k, 3) [N].
 
-    Those in between are there twice, with the force before and after them.
+    Times between the first and the last appear twice, with the force before and after a possible jump.
     """
     given = np.zeros(0) if load.times is None else np.clip(load.times, 0.0, horizon)
     times = np.unique([0.0, *given, horizon])

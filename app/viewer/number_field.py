@@ -1,40 +1,39 @@
-"""A field of the panel for a number, in which one may write what viser's own field takes for another number."""
+"""A number field for the panel that reads notations which viser's own number field misreads."""
 
 import re
 from typing import Any
 
 from viser import GuiApi
 
-DIGITS = 7  # that are shown
-MOST = 40  # characters of what is no number that are told
+DIGITS = 7  # significant digits that are shown
+MOST = 40  # most characters of an invalid input that an error repeats
 _NUMBER = re.compile(r"[+-]?([0-9]+([.,][0-9]*)?|[.,][0-9]+)(e[+-]?[0-9]+)?", re.IGNORECASE)
 
 
 def read(text: str) -> float | None:
-    """Return the number that a text is, as `0.5`, `0,5` or `1e-4`; None where it is none."""
+    """Return the number in a text such as `0.5`, `0,5` or `1e-4`; None if it is no number."""
     bare = text.strip().replace("−", "-")
     return float(bare.replace(",", ".")) if _NUMBER.fullmatch(bare) else None
 
 
 def written(value: float) -> str:
-    """Return a number in a few characters, as `0.5` or `1e-6`."""
+    """Return a number in a few characters, such as `0.5` or `1e-6`."""
     mantissa, e, exponent = f"{value + 0.0:.{DIGITS}g}".partition("e")
     return f"{mantissa}e{int(exponent)}" if e else mantissa
 
 
 class NumberField:
-    """A text field that holds a number of a range.
+    """A text field that holds a number within a range.
 
-    viser's number field leaves out the `e` of `1e-4` and the comma of `0,5`, and puts what is out of range at its end,
-    without a word.
+    viser's number field drops the `e` of `1e-4` and the comma of `0,5`, and silently clips numbers to its range.
 
     Args:
-        gui: of the client.
-        label: name of the number, and its unit in brackets.
-        value: to begin with.
-        low: smallest number that is allowed.
-        high: the largest, which may change.
-        hint: shown on hover.
+        gui: the client's GUI.
+        label: name of the number, with its unit in brackets.
+        value: initial value.
+        low: smallest allowed number.
+        high: largest allowed number; it may change.
+        hint: text shown on hover.
     """
 
     def __init__(
@@ -48,19 +47,19 @@ class NumberField:
 
     @property
     def value(self) -> float:
-        """The number that it holds, whatever is being typed."""
+        """The number that the field holds, whatever is being typed."""
         return self._value
 
     @value.setter
     def value(self, value: float) -> None:
         self._value = value
         typed = self._typed
-        if typed is None or written(typed) != written(value):  # else it is shown as it was typed
+        if typed is None or written(typed) != written(value):  # otherwise leave it as it was typed
             self._field.value = written(value)
 
     @property
     def visible(self) -> bool:
-        """Whether it is shown."""
+        """Whether the field is shown."""
         return self._field.visible
 
     @visible.setter
@@ -69,11 +68,11 @@ class NumberField:
 
     @property
     def unclear(self) -> bool:
-        """Whether what was typed is no number that is allowed, or not yet."""
+        """Whether the typed text is not, or not yet, an allowed number."""
         return self._typed is None
 
     def settle(self) -> str:
-        """Hold what was typed; where that is not allowed, show again what is held, and say what is allowed."""
+        """Take over the typed number and return ""; if it is not allowed, restore the old one and say what is."""
         typed = self._typed
         if typed is not None:
             self._value = typed
@@ -84,6 +83,6 @@ class NumberField:
 
     @property
     def _typed(self) -> float | None:
-        """The allowed number that stands in the field, if there is one."""
+        """The number shown in the field, if it is an allowed one."""
         number = read(self._field.value)
         return number if number is not None and self._low <= number <= self.high else None

@@ -1,4 +1,4 @@
-"""Edits of the obstacles of a draft."""
+"""Edit the obstacles of a draft."""
 
 from typing import Any
 
@@ -9,8 +9,8 @@ from app.viewer.draft import Draft
 
 Floats = NDArray[np.float64]
 PATH = ("environment", "obstacles")
-PLACE = (0.55, 0.2)  # of a cable of 1 m that lies along x from the origin: where a new obstacle stands
-GAP = 0.02  # of the cable's length, at least, between a new obstacle and those beside it
+PLACE = (0.55, 0.2)  # x, y of a new obstacle, as shares of the cable's length
+GAP = 0.02  # of the cable's length: smallest gap between a new obstacle and its neighbours
 
 
 def obstacles(draft: Draft) -> list[dict[str, Any]]:
@@ -20,10 +20,10 @@ def obstacles(draft: Draft) -> list[dict[str, Any]]:
 
 
 def added(draft: Draft, kind: str) -> Draft:
-    """Add an obstacle of a size that suits the cable, standing on the table where there is one, beside all others.
+    """Add an obstacle of a size that suits the cable, on the table if there is one, clear of all others.
 
-    Round ones are sunk to half their height, so that the cable meets them where they are widest. Few fixed grids
-    resolve a contact: a new obstacle asks for automatic quality.
+    Spheres and capsules are sunk to half their height, so that the cable meets them where they are widest. Few given
+    grids resolve a contact, so a given grid is replaced by automatic quality.
     """
     size = draft.length
     x, y, z = PLACE[0] * size, PLACE[1] * size, float(draft.get(("environment", "table", "height"), 0.0))
@@ -41,7 +41,7 @@ def added(draft: Draft, kind: str) -> Draft:
 
 
 def _beside(others: list[dict[str, Any]], body: dict[str, Any], gap: float) -> Floats:
-    """Return the centre (3,) [m] nearest to that of `body` along y that leaves a gap [m] to all others."""
+    """Return the centre of `body` (3,) [m], moved along y until it leaves a gap [m] to all others."""
     place = centre(body)
     while True:
         ends = []
@@ -52,11 +52,11 @@ def _beside(others: list[dict[str, Any]], body: dict[str, Any], gap: float) -> F
                 ends.append(centre(other)[1] + np.sqrt(apart**2 - away[0] ** 2 - away[2] ** 2))
         if not ends:
             return place
-        place[1] = np.ceil(1e3 * max(ends)) / 1e3  # a whole millimetre, for who reads the document
+        place[1] = np.ceil(1e3 * max(ends)) / 1e3  # a whole millimetre, for readers of the document
 
 
 def _reach(body: dict[str, Any]) -> float:
-    """Return the radius of the sphere about the centre of an obstacle that has it inside [m]."""
+    """Return the radius of the sphere about the centre of an obstacle that encloses it [m]."""
     if body["kind"] == "box":
         return 0.5 * float(np.linalg.norm(body["size"]))
     if body["kind"] == "sphere":
@@ -67,7 +67,7 @@ def _reach(body: dict[str, Any]) -> float:
 
 
 def removed(draft: Draft, number: int) -> Draft:
-    """Take an obstacle away."""
+    """Remove an obstacle."""
     return draft.put(PATH, [body for k, body in enumerate(obstacles(draft)) if k != number])
 
 
@@ -104,9 +104,9 @@ def length(body: dict[str, Any]) -> float:
 
 
 def lengthened(draft: Draft, number: int, wanted: float) -> Draft:
-    """Give a cylinder, or the segment of a capsule, another length [m] about its centre.
+    """Change the length [m] of a cylinder, or of the segment of a capsule, about its centre.
 
-    One that is not positive changes nothing: a capsule without length has lost its direction.
+    A length that is not positive changes nothing, since a capsule of no length would lose its direction.
     """
     if number >= len(obstacles(draft)) or wanted <= 0.0:
         return draft

@@ -1,4 +1,4 @@
-"""Obstacles in the scene, by their true surfaces."""
+"""Draw the obstacles in the scene with their true surfaces."""
 
 import numpy as np
 from viser import SceneApi, SceneNodeHandle
@@ -9,8 +9,8 @@ from app.viewer.palette import OBSTACLE, WARNING
 from dlocore import Box, Capsule, Cylinder, Sphere
 from dlocore.scene.obstacles import Obstacle
 
-SIDES, RINGS = 48, 12  # of round ones
-REFUSED_OPACITY = 0.5  # through which the cable is seen that an obstacle stands in the way of
+SIDES, RINGS = 48, 12  # of round obstacles
+REFUSED_OPACITY = 0.5  # a refused obstacle lets the cable show through
 
 
 class ObstaclesPicture:
@@ -22,7 +22,7 @@ class ObstaclesPicture:
         self._nodes: list[SceneNodeHandle] = []
 
     def show(self, obstacles: tuple[Obstacle, ...], refused: frozenset[int] = frozenset()) -> None:
-        """Draw `obstacles`, unless they are those that stand there; the `refused` ones so that one sees it."""
+        """Draw `obstacles` unless they are already drawn; highlight the `refused` ones."""
         drawn = ([obstacle.row().tolist() for obstacle in obstacles], refused)
         if drawn == self._drawn:
             return

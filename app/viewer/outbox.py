@@ -1,4 +1,4 @@
-"""What leaves a tab: its scene, its playback and its picture as files, its run into the store."""
+"""Send what leaves a tab: its scene, its playback and its picture as files, its run to the store."""
 
 import asyncio
 import json
@@ -16,13 +16,13 @@ from app.viewer.picture import Look
 from dlocore import Prediction
 
 PICTURE_SIZE = (1080, 1920)  # px, height and width of a saved picture
-LONGEST_NAME = 60  # characters of a scene's name in that of a file
-PICTURE_WAIT = 20.0  # s, for the browser to draw it
+LONGEST_NAME = 60  # most characters of a scene's name in the name of a file
+PICTURE_WAIT = 20.0  # s that the browser gets to draw the picture
 _log = logging.getLogger(__name__)
 
 
 def file_name(draft: Draft, ending: str) -> str:
-    """Return what a file of a scene is called: `ending`, after the scene's name where it has one."""
+    """Return the name for a file of a scene: `ending`, preceded by the scene's name if it has one."""
     name = re.sub(r"\W+", "-", draft.get(("name",), "")).strip("-_")[:LONGEST_NAME]
     return f"{name}-{ending}" if name else ending
 
@@ -64,7 +64,7 @@ class Outbox:
         self._send(file_name(draft, "playback.html"), page)
 
     async def picture(self, draft: Draft) -> None:
-        """Have the browser draw the scene larger than it is on the screen, without the panel, and send that."""
+        """Send a picture of the scene, which the browser draws larger than on the screen and without the panel."""
         height, width = PICTURE_SIZE
         try:
             picture = await asyncio.to_thread(
@@ -76,7 +76,7 @@ class Outbox:
         self._send(file_name(draft, "picture.png"), await asyncio.to_thread(png, picture))
 
     async def keep(self, draft: Draft, prediction: Prediction) -> str | None:
-        """Store a run and return its id; None where it can't be, which is said to the client and in the log."""
+        """Store a run and return its id; if that fails, notify the client, log the reason, and return None."""
         name = draft.get(("name",), "")
         try:
             id, _ = await asyncio.to_thread(self._runs.save, draft.document, prediction, name=name)

@@ -1,4 +1,4 @@
-"""Colours: one ramp that reads on light and on dark ground, and the quantities it shows."""
+"""Colours: ramps that are legible on light and dark backgrounds, and the quantities that they show."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,10 +16,10 @@ BRAND = (46, 107, 214)
 STEEL = (128, 138, 154)
 WARNING = (222, 72, 50)
 REACTION = (213, 94, 0)
-LOAD = (0, 140, 95)  # Okabe-Ito's bluish green: no colour of the ramp
-OBSTACLE = (84, 152, 134)  # Okabe-Ito's bluish green, calmed down by grey
+LOAD = (0, 140, 95)  # Okabe-Ito's bluish green, which is not in the ramp
+OBSTACLE = (84, 152, 134)  # Okabe-Ito's bluish green, muted with grey
 CONTACT = (230, 159, 0)
-# from blue to amber, ever lighter, in about even steps of what the eye tells apart
+# from blue to amber, increasingly light, in steps that look about equal
 _RAMP = np.array(
     [(46, 82, 190), (96, 84, 212), (150, 82, 206), (203, 88, 172), (236, 113, 118), (248, 150, 84), (248, 196, 88)],
     dtype=float,
@@ -29,7 +29,7 @@ _DIVERGING = np.array([(0, 92, 160), (64, 148, 205), (205, 210, 214), (232, 138,
 
 
 def ramp(values: Floats, *, signed: bool = False) -> Colours:
-    """Return the colours of `values` (n,), 0 to 1; (n, 3). Where they are signed, 0.5 stands for zero."""
+    """Return the colours (n, 3) of `values` (n,), 0 to 1. If they are signed, 0.5 stands for zero."""
     stops = _DIVERGING if signed else _RAMP
     x = np.clip(np.nan_to_num(values), 0.0, 1.0) * (len(stops) - 1)
     channels = [np.interp(x, np.arange(len(stops)), stops[:, channel]) for channel in range(3)]
@@ -37,7 +37,7 @@ def ramp(values: Floats, *, signed: bool = False) -> Colours:
 
 
 def linear(colours: NDArray[np.integer]) -> Colours:
-    """Return sRGB colours as linear light, as the client takes those of instances and vertices."""
+    """Convert sRGB colours to linear light, which the client expects for instances and vertices."""
     share = colours / 255.0
     light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     return np.rint(255.0 * light).astype(np.uint8)
@@ -60,8 +60,8 @@ class Quantity:
     """What the cable's colour shows.
 
     Attributes:
-        name: as on the panel.
-        unit: of the values.
+        name: name on the panel.
+        unit: unit of the shown values.
         values: prediction, u (k_u,) [m], t (k_t,) [s] -> (k_t, k_u).
         signed: whether the scale is symmetric about zero.
         scale: factor from the values to the unit.
@@ -95,7 +95,7 @@ def _strain(prediction: Prediction, u: Floats, t: Floats) -> Floats:
 
 
 def _tension(prediction: Prediction, u: Floats, t: Floats) -> Floats:
-    """Return the axial force by which the cable passes the grippers' reactions on [N]."""
+    """Return the axial force by which the cable transmits the grippers' reactions [N]."""
     return cast(float, prediction.scene.cable.axial_stiffness) * prediction.stretch.along(u, t)
 
 
@@ -114,7 +114,7 @@ QUANTITIES = {
 
 @dataclass(frozen=True)
 class ColourScale:
-    """A quantity with the range that its colours span, in its own values (before `scale`)."""
+    """A quantity with the range that its colours span, in units before `scale`."""
 
     quantity: Quantity
     low: float

@@ -1,4 +1,4 @@
-"""The control panel: what a person sets, and what the last solve was worth."""
+"""The control panel: the settings of the scene, and the results of the last solve."""
 
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
@@ -29,30 +29,30 @@ from dlocore.shape.shape import StartCurve
 SPEEDS = {"¼×": 0.25, "½×": 0.5, "1×": 1.0, "2×": 2.0}
 SLIDER_STEPS = 160  # of the timeline
 CHOOSE = "choose …"
-TO_READ = 12.0  # s, for which a notification stays
+TO_READ = 12.0  # s that a notification stays visible
 
 
 @dataclass(frozen=True, kw_only=True)
 class Actions:
-    """What the panel has done.
+    """What the panel can have the session do.
 
     Attributes:
-        look: draw the picture in another way.
-        seek: draw the time at which the playback stands.
+        look: change how the picture is drawn.
+        seek: draw the current time of the playback.
         keep: store the run.
         download: send the scene as a file.
         open_file: open a file of this name and content.
         open_example: open the ready scene of this name.
         save_playback: send the playback as a page.
         save_picture: send a picture.
-        measure_costs: measure what the effects cost.
-        stop: end the solve that is under way.
-        solve: solve at the asked quality.
-        step_back: go back to the scene of before.
-        step_forward: and forward again.
-        edit_shape: show the beads of the start shape, or not.
-        straighten: start straight.
-        show_whole: look at the whole scene again.
+        measure_costs: measure the costs of the effects.
+        stop: stop the running solve.
+        solve: solve at the requested quality.
+        step_back: undo the last change.
+        step_forward: redo it.
+        edit_shape: show or hide the beads of the start shape.
+        straighten: make the start shape straight.
+        show_whole: move the camera so that the whole scene is visible.
     """
 
     look: Callable[[Look], None]
@@ -81,12 +81,12 @@ class Panel:
         draft: the scene to start with.
         start: its start curve.
         playback: the clock of the animation.
-        address: of the service, for the shell line.
+        address: address of the service, for the shell command.
         edits: makes the changes of the draft.
-        actions: what its controls do otherwise.
+        actions: what the controls do other than edit the draft.
         ready: whether the solver is compiled.
-        recording: what the tab of recordings does.
-        cables: that were kept as presets.
+        recording: what the controls of recordings do.
+        cables: cables that were kept as presets.
     """
 
     def __init__(
@@ -109,8 +109,8 @@ class Panel:
         self._actions = actions
         self._address = address
         self._earlier: list[tuple[float, float]] = []
-        self._measured: Prediction | None = None  # of whose effects the costs are being measured
-        self._stale = False  # whether the results are of a scene before
+        self._measured: Prediction | None = None  # the prediction whose effects are being measured
+        self._stale = False  # whether the results are those of the previous scene
         self._solve = SolveCard(self._gui, report.waiting_card(ready=ready), actions.stop, actions.solve)
         self._add_timeline()
         StepButtons(self._gui, actions.step_back, actions.step_forward)
@@ -148,7 +148,7 @@ class Panel:
 
         @self._slider.on_update
         async def _seek(event: GuiEvent[Any]) -> None:
-            if event.client is not None:  # set by the person, not by the animation
+            if event.client is not None:  # set by the user, not by the animation
                 self._playback.pause()
                 self._playback.seek(self._slider.value)
                 self._label_button()
@@ -173,7 +173,7 @@ class Panel:
             self.toggle()
 
     def toggle(self) -> None:
-        """Play where it stands still, pause where it plays."""
+        """Play if paused, pause if playing."""
         if self._playback.playing:
             self._playback.pause()
         else:
@@ -187,13 +187,13 @@ class Panel:
         self._play.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY
 
     def show_time(self) -> None:
-        """Let slider and button follow the playback."""
+        """Let slider and button show the state of the playback."""
         show_value(self._slider, min(self._playback.time, float(self._slider.max)))
         if (self._play.label == "Pause") != self._playback.playing:
             self._label_button()
 
     def show_error(self, html: str) -> None:
-        """Show how far the prediction is from a recording, if there is one."""
+        """Show the distance of the prediction from a recording; "" if there is none."""
         if self._error.content != html:
             self._error.content = html
 
@@ -210,10 +210,10 @@ class Panel:
         with self._gui.add_folder("Start shape", expand_by_default=False):
             self._editing = self._gui.add_checkbox("Drag its points", initial_value=False)
             self._settle = self._gui.add_checkbox(
-                "Let it settle first", initial_value=False, hint="It comes to rest under its grippers before they move"
+                "Let it settle first", initial_value=False, hint="The cable comes to rest before its grippers move"
             )
             straighten = self._gui.add_button("Make it straight", color="gray")
-            self._add_file_button("Open points …", "Points [m], in order or not: .csv, .txt, .json, .npz or .npy")
+            self._add_file_button("Open points …", "Points [m], ordered or unordered: .csv, .txt, .json, .npz or .npy")
 
         @self._editing.on_update
         async def _edit(event: GuiEvent[Any]) -> None:
@@ -238,7 +238,7 @@ class Panel:
 
     def _add_effects(self, draft: Draft) -> None:
         measure = self._gui.add_button(
-            "Measure what each costs", icon=viser.Icon.CLOCK, hint="Solves again with each effect switched"
+            "Measure what each costs", icon=viser.Icon.CLOCK, hint="Solves the scene without each effect in turn"
         )
         self._effects = EffectsForm(self._gui, draft, self._edits)
 
@@ -250,7 +250,7 @@ class Panel:
         colour = self._gui.add_dropdown("Colour", tuple(QUANTITIES), initial_value="time")
         surface = self._surface = self._gui.add_dropdown("Surface", SURFACE_STYLES)
         ghosts = self._ghosts = self._gui.add_checkbox("Shapes at intervals", initial_value=True)
-        forces = self._gui.add_checkbox("Forces", initial_value=True, hint="Of the grippers, and known ones")
+        forces = self._gui.add_checkbox("Forces", initial_value=True, hint="Forces of the grippers, and known forces")
         contacts = self._gui.add_checkbox("Contacts", initial_value=True)
         looping = self._gui.add_checkbox("Repeat", initial_value=self._playback.looping)
 
@@ -283,7 +283,7 @@ class Panel:
 
     def _add_share(self) -> None:
         actions = self._actions
-        self._name = self._gui.add_text("Name", "", hint="What to call the run in lists")
+        self._name = self._gui.add_text("Name", "", hint="Name of the run in lists")
         self._keep = self._gui.add_button("Keep this run", icon=viser.Icon.BOOKMARK, disabled=True)
         self._links = self._gui.add_html("")
         with self._gui.add_folder("Scene"):
@@ -329,7 +329,7 @@ class Panel:
                 self._actions.open_example(chosen.value)
 
     def follow(self, start: StartCurve, shown: SplineSurface | None) -> None:
-        """Measure targets from another start and prediction."""
+        """Measure targets from a new start curve and prediction."""
         self._gripper.follow(start, shown)
 
     def take_draft(self, draft: Draft) -> None:
@@ -340,7 +340,7 @@ class Panel:
         show_value(self._name, draft.get(("name",), ""))
 
     def show_scene(self, draft: Draft) -> None:
-        """Show the scene as JSON, and the shell line that posts it."""
+        """Show the scene as JSON, and the shell command that posts it."""
         self._json.content = report.json_block(draft.document)
         self._curl.content = report.curl_block(self._address, draft.document)
 
@@ -356,13 +356,13 @@ class Panel:
         *,
         preview: bool,
     ) -> None:
-        """Show a new prediction; a preview leaves out what nobody reads while dragging.
+        """Show a new prediction; a preview updates only the status card and the timeline.
 
         Args:
             prediction: the prediction.
-            scale: of the colours.
-            measured: what this machine was calibrated to.
-            preview: whether it is one.
+            scale: scale of the colours.
+            measured: the calibration of this machine.
+            preview: whether the prediction is a preview.
         """
         self._measured = None
         self._solve.show(report.status_card(prediction, preview=preview))
@@ -382,20 +382,20 @@ class Panel:
         self._keep.disabled = False
 
     def take_wait(self, elapsed: float, longest: float) -> None:
-        """Say that a solve is under way since `elapsed` [s], which takes `longest` [s] at most."""
+        """Show that a solve has been running for `elapsed` [s], and that it takes at most `longest` [s]."""
         self._measured = None
         self._solve.show(report.solving_card(elapsed, longest), offer="stop")
         self._mark_stale()
 
     def take_stop(self) -> None:
-        """Say that the solve was ended by hand; where costs were being measured, there is the answer."""
+        """Show that the user stopped the solve; if costs were being measured, show the state of the answer instead."""
         if self._measured is None:
             self._solve.show(report.stopped_card(), offer="solve")
         else:
             self._solve.show(report.status_card(self._measured, preview=False))
 
     def _mark_stale(self) -> None:
-        """Show the results so that nobody takes them for those of the scene on the panel."""
+        """Mark the results as those of the previous scene."""
         if not self._stale:
             self._stale = True
             for part in (self._accuracy, self._convergence, self._message, self._forces):
@@ -403,7 +403,7 @@ class Panel:
             self._effects.mark_stale()
 
     def take_costs(self, prediction: Prediction, costs: Costs) -> None:
-        """Show what the effects cost, as far as it is measured."""
+        """Show the costs of the effects measured so far."""
         self._effects.show(prediction.effects, costs.seconds)
         if costs.effect:
             self._measured = prediction
@@ -412,7 +412,7 @@ class Panel:
             self._solve.show(report.status_card(prediction, preview=False))
 
     def take_problem(self, problem: str, details: str, places: Sequence[float]) -> None:
-        """Say why there is no prediction of the edited scene, whose grippers hold the cable at `places` [m]."""
+        """Show why the edited scene has no prediction; its grippers hold the cable at `places` [m]."""
         self._solve.show(report.problem_card(problem, details, places))
         self._mark_stale()
         self._keep.disabled = True
@@ -422,7 +422,7 @@ class Panel:
         self._legend.content = report.legend(scale)
 
     def say_file(self, text: str, *, good: bool) -> None:
-        """Say what became of a file that was opened."""
+        """Show whether a file was opened."""
         self._file.content = report.note(text, good=good)
 
     def show_kept(self, run_id: str) -> None:
@@ -430,6 +430,6 @@ class Panel:
         self._links.content = report.run_links(run_id)
 
     def clear_kept(self) -> None:
-        """Take the link away, since the shown run is no longer the stored one."""
+        """Remove the links, since the shown run is no longer the stored one."""
         if self._links.content:
             self._links.content = ""

@@ -1,4 +1,4 @@
-"""What a click in the picture means: a gripper, a place on the cable, or nothing."""
+"""Find what a click in the picture hits: a gripper, a place on the cable, or nothing."""
 
 from dataclasses import dataclass
 
@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-NEAR_CABLE = 0.014  # rad between a click and the cable, as the camera sees them: about 18 of 900 pixels
-NEAR_GRIPPER = 0.022  # rad, to the axis of a gripper's body
+NEAR_CABLE = 0.014  # rad, largest angle between a click and the cable as the camera sees them: about 18 of 900 pixels
+NEAR_GRIPPER = 0.022  # rad, the same to the axis of a gripper's body
 
 
 @dataclass(frozen=True)
@@ -27,14 +27,14 @@ class GripperClick:
 def picked(
     origin: Floats, direction: Floats, cable: Floats, length: float, bodies: list[Floats]
 ) -> CableClick | GripperClick | None:
-    """Return what lies where a line of sight goes; a gripper, which hides the cable, before the cable.
+    """Return what a line of sight hits; a gripper takes precedence over the cable, which it hides.
 
     Args:
-        origin: the camera (3,) [m].
-        direction: of sight (3,).
+        origin: position of the camera (3,) [m].
+        direction: direction of the line of sight (3,).
         cable: points evenly spaced along the cable (n, 3) [m].
-        length: of the cable [m].
-        bodies: points along the axis of each gripper's body (k, 3) [m]; none where it is not shown.
+        length: length of the cable [m].
+        bodies: points along the axis of each gripper's body (k, 3) [m]; none for one that is not shown.
     """
     nearest = [(_angles(origin, direction, body).min(initial=np.inf), k) for k, body in enumerate(bodies)]
     if nearest and min(nearest)[0] < NEAR_GRIPPER:

@@ -1,4 +1,4 @@
-"""What stands in the 3D scene: table, obstacles, cable, space-time surface, ghosts, grippers, forces, contacts."""
+"""Draw the 3D scene: table, obstacles, cable, space-time surface, ghosts, grippers, forces, contacts."""
 
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -25,14 +25,14 @@ SURFACE_STYLES: tuple[SurfaceStyle, ...] = get_args(SurfaceStyle)
 
 CABLE_SEGMENTS = 120
 STRIPS = 8
-STRIP_ROWS = 13  # instants in a strip: more of them cost the browser more than they show
+STRIP_ROWS = 13  # instants in a strip: more would cost the browser time and show little more
 STRIP_COLUMNS = 49  # points along the cable
 GHOSTS = STRIPS + 1  # where strips begin and end
 GHOST_COLUMNS = 65
 LIFT = 0.45  # height of the raised surface, of the cable's length
 CONTACT_SIZE = 1.7  # of the cable's diameter
 MASS_SIZE = 3.5  # of the cable's diameter, of a point mass
-SKY_LIGHT = 2.5  # beside the viewer's lamps, so that no side is black
+SKY_LIGHT = 2.5  # in addition to the viewer's lamps, so that no side is black
 GROUND_LIGHT = (200, 205, 210)
 
 
@@ -51,7 +51,7 @@ class Picture:
     """The scene nodes of one client; every method runs on the viewer's event loop.
 
     Args:
-        scene: where they go.
+        scene: the scene that gets the nodes.
     """
 
     def __init__(self, scene: SceneApi) -> None:
@@ -62,7 +62,7 @@ class Picture:
         self._time = 0.0
         self._points = np.zeros((CABLE_SEGMENTS + 1, 3))
         self._instants = np.zeros(STRIPS * (STRIP_ROWS - 1) + 1)  # s, of the rows of the swept surface
-        self._size: tuple[float, float, int] | None = None  # length, diameter, grippers of what is drawn
+        self._size: tuple[float, float, int] | None = None  # length, diameter and number of grippers as drawn
         self._grippers: list[GripperPicture] = []
         self._strips = [
             self._scene.add_mesh_simple(
@@ -81,7 +81,7 @@ class Picture:
         self._ground = Ground(self._scene)
 
     def show(self, prediction: Prediction, time: float = 0.0, selected: int | None = None) -> ColourScale:
-        """Draw a new prediction at `time` [s], and mark the gripper in hand; return the scale of the colours."""
+        """Draw a new prediction at `time` [s], and mark the selected gripper; return the scale of the colours."""
         self._prediction = prediction
         self._scale = ColourScale.of(self._look.quantity, prediction)
         cable = prediction.scene.cable
@@ -103,23 +103,23 @@ class Picture:
         return self._scale
 
     def refuse(self, obstacles: tuple[Obstacle, ...], refused: frozenset[int]) -> None:
-        """Draw the obstacles of a scene that is not possible, beside the last prediction, and mark the `refused`."""
+        """Draw the obstacles of an impossible scene with the last prediction, and highlight the `refused` ones."""
         self._obstacles.show(obstacles, refused)
 
     def select(self, number: int | None) -> None:
-        """Mark the gripper in hand, if any."""
+        """Mark the selected gripper, if any."""
         for k, gripper in enumerate(self._grippers):
             gripper.mark(k == number)
 
     def picked(self, origin: Floats, direction: Floats) -> CableClick | GripperClick | None:
-        """Return what is seen from `origin` (3,) [m] in `direction` (3,): a gripper, a place on the cable, nothing."""
+        """Return what lies in `direction` (3,) from `origin` (3,) [m]: a gripper, a place on the cable, or nothing."""
         if self._prediction is None:
             return None
         bodies = [gripper.body for gripper in self._grippers]
         return picked(origin, direction, self._points, self._prediction.surface.length, bodies)
 
     def _rebuild(self, length: float, diameter: float, grippers: int) -> None:
-        """Make the nodes anew whose size depends on the cable or on the number of grippers."""
+        """Recreate the nodes that depend on the size of the cable or on the number of grippers."""
         self._u = np.linspace(0.0, length, CABLE_SEGMENTS + 1)
         straight = np.column_stack([self._u, np.zeros((len(self._u), 2))])
         centres, wxyz = geometry.segment_poses(straight)
@@ -153,7 +153,7 @@ class Picture:
         self._loads = LoadsPicture(self._scene, diameter, length)
 
     def restyle(self, look: Look) -> ColourScale | None:
-        """Show the same prediction in another way; return the scale of the colours, if there is a prediction."""
+        """Redraw the same prediction with another look; return the scale of the colours, if there is a prediction."""
         self._look = look
         if self._prediction is None:
             return None
@@ -191,7 +191,7 @@ class Picture:
             marks.visible = bool(len(points))
 
     def _height(self, t: Floats) -> Floats:
-        """Height at which the instants `t` are drawn above where they happen [m]."""
+        """Return by how much the instants `t` are drawn above their true height [m]."""
         assert self._prediction is not None
         surface = self._prediction.surface
         return (LIFT * surface.length if self._look.surface == "raised with time" else 0.0) * t / surface.horizon
@@ -208,7 +208,7 @@ class Picture:
             first = k * (STRIP_ROWS - 1)
             rows = points[first : first + STRIP_ROWS].copy()
             if not raised:
-                # strips that lie on each other must not be coplanar: later ones a little higher, all below the cable
+                # overlapping strips must not be coplanar: later ones lie a little higher, all below the cable
                 rows[..., 2] -= radius * (1.0 - 0.9 * k / STRIPS)
             strip.vertices = rows.reshape(-1, 3).astype(np.float32)
             middle = t[first + STRIP_ROWS // 2] / surface.horizon
@@ -232,10 +232,10 @@ class Picture:
 
 
 def light(scene: SceneApi) -> None:
-    """Light the scene of a client from the sky and its ground alone.
+    """Light the scene of a client by sky and ground only.
 
-    The viewer's own environment map delays the first picture by seconds where there is no GPU. A playback keeps it:
-    each time it begins again its lights are set anew, and with them all its materials.
+    The viewer's own environment map delays the first picture by seconds on machines without a GPU. A playback keeps
+    that map: lights of its own would be set anew, with all materials, whenever it starts again.
     """
     scene.configure_environment_map(hdri=None)
     scene.add_light_hemisphere("/sky", ground_color=GROUND_LIGHT, intensity=SKY_LIGHT)

@@ -12,8 +12,8 @@ class Playback:
     Attributes:
         horizon: predicted time [s].
         time: shown time [s].
-        speed: predicted seconds per second.
-        playing: whether the time runs.
+        speed: predicted seconds per second of real time.
+        playing: whether the animation is playing.
         looping: whether it starts again after the end.
     """
 
@@ -23,10 +23,10 @@ class Playback:
     playing: bool = True
     looping: bool = True
     _rested: float = 0.0
-    _held: tuple[bool, float] | None = None  # whether it ran, and where it stood, before it was held
+    _held: tuple[bool, float] | None = None  # whether it was playing, and its time, before it was held
 
     def play(self) -> None:
-        """Run, from the start where the end is shown."""
+        """Play; from the start if the end is shown."""
         if self.time >= self.horizon:
             self.time = 0.0
         self.playing = True
@@ -34,19 +34,19 @@ class Playback:
         self._held = None
 
     def pause(self) -> None:
-        """Stand still."""
+        """Pause."""
         self.playing = False
         self._held = None
 
     def hold(self, time: float) -> None:
-        """Stand still at `time` [s] while the hand is on something."""
+        """Hold the animation at `time` [s] while the user drags something."""
         held = (self.playing, self.time)
         self.pause()
         self.seek(time)
         self._held = held
 
     def resume(self) -> None:
-        """Run again, or stand where it stood, as before it was held; not where it was played or paused since."""
+        """Restore the state before `hold`, unless the animation was played or paused since then."""
         if self._held is not None:
             ran, time = self._held
             self._held = None
@@ -66,7 +66,7 @@ class Playback:
         self.time = min(self.time, horizon)
 
     def advance(self, elapsed: float) -> bool:
-        """Let `elapsed` [s] of real time pass; say whether the shown time changed."""
+        """Advance by `elapsed` [s] of real time; return whether picture and panel have to be updated."""
         if not self.playing:
             return False
         if self.time < self.horizon:

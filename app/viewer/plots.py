@@ -1,4 +1,4 @@
-"""Small plots for the panel, as SVG: they stay sharp, follow light and dark, and need nothing from elsewhere."""
+"""Small SVG plots for the panel: they stay sharp, follow the light or dark theme, and load nothing."""
 
 import math
 from collections.abc import Sequence
@@ -17,10 +17,10 @@ class Series:
     """Points of a plot.
 
     Attributes:
-        name: in the legend.
-        points: (x, y) of each.
-        colour: CSS.
-        line: whether to join them.
+        name: name in the legend.
+        points: (x, y) of each point.
+        colour: CSS colour.
+        line: whether to join the points.
         size: radius of the dots [px].
         titles: shown on hover, one for each point, or none.
     """
@@ -35,7 +35,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis from `low` to `high`, by decades where it is logarithmic."""
+    """An axis from `low` to `high`; powers of ten if it is logarithmic."""
 
     label: str
     low: float
@@ -44,7 +44,7 @@ class Axis:
 
     @staticmethod
     def of(label: str, values: Sequence[float], *, log: bool) -> "Axis":
-        """Return an axis that holds `values`: whole decades, or from the smallest to the largest."""
+        """Return an axis that spans `values`: in whole decades if logarithmic, else from smallest to largest."""
         low, high = min(values), max(values)
         if not log:
             return Axis(label, low, max(high, low + 1.0), log)
@@ -52,11 +52,11 @@ class Axis:
         return Axis(label, float(first), float(max(last, first + 1)), log)
 
     def place(self, value: float) -> float:
-        """Return where a value lies, 0 to 1."""
+        """Return the position of a value on the axis, 0 to 1."""
         return ((math.log10(value) if self.log else value) - self.low) / (self.high - self.low)
 
     def ticks(self) -> list[tuple[float, str]]:
-        """Return the places, 0 to 1, and labels of at most seven ticks."""
+        """Return the positions, 0 to 1, and the labels of at most seven ticks."""
         step = max(1, math.ceil((self.high - self.low) / 6))
         marks = np.arange(math.ceil(self.low), math.floor(self.high) + 1, step)
         return [((k - self.low) / (self.high - self.low), self._text(int(k))) for k in marks]
@@ -70,14 +70,14 @@ class Axis:
 
 
 def plot(x_label: str, y_label: str, series: Sequence[Series], *, log_x: bool, mark: str) -> str:
-    """Return an SVG with a logarithmic y axis, or "" where no series has points.
+    """Return an SVG with a logarithmic y axis, or "" if no series has points.
 
     Args:
         x_label: quantity and unit.
         y_label: quantity and unit.
-        series: what to draw, in this order; every value on a logarithmic axis is positive.
+        series: what to draw, in this order; all values on a logarithmic axis must be positive.
         log_x: whether the x axis is logarithmic too.
-        mark: name of the plot, for those who look for it in the page.
+        mark: name by which the plot can be found in the page.
     """
     drawn = [one for one in series if one.points]
     if not drawn:

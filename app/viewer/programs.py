@@ -1,7 +1,7 @@
-"""Programs: paths of several moves, one after another, as waypoints at which the gripper stops.
+"""Programs: paths of several moves in sequence, as waypoints at which the gripper stops.
 
-The paths are those of a scene's document. Positions of a program are in the world, unlike the displacement of a move:
-a program has to be `carried` along with what its gripper holds.
+Paths have the form of a scene's document. The positions of a program are world coordinates, unlike the displacement of
+a move. So a program has to be `carried` along when what its gripper holds is moved.
 """
 
 from collections.abc import Sequence
@@ -14,25 +14,25 @@ from scipy.spatial.transform import Rotation
 Floats = NDArray[np.float64]
 Path = dict[str, Any]
 DIGITS = 6  # of numbers in the document
-HALF_TURN = np.pi * (1.0 + 1e-9)  # rad: two orientations tell no longer way from one to the other
+HALF_TURN = np.pi * (1.0 + 1e-9)  # rad: two orientations can't express a larger rotation from one to the other
 _STAYS = [1.0, 0.0, 0.0, 0.0]
 
 
 def is_program(path: Path) -> bool:
-    """Tell whether a path stops at its waypoints."""
+    """Return whether a path is a program: it stops at its waypoints."""
     return path["kind"] == "waypoints" and path.get("profile", "spline") != "spline"
 
 
 def can_go_on(path: Path) -> bool:
-    """Tell whether a path can be followed by a move: a program, or a move that turns by half a turn at most."""
+    """Return whether a path can be followed by a move: it is a program, or a move with at most half a turn."""
     turns = float(np.linalg.norm(path.get("rotation") or (0.0, 0.0, 0.0)))
     return is_program(path) or (path["kind"] == "move" and turns <= HALF_TURN)
 
 
 def longer(path: Path, begin: Floats) -> Path:
-    """Return a path with a move more, that takes as long as the one before and goes nowhere yet.
+    """Return a path with one more move, which takes as long as the last one and goes nowhere yet.
 
-    `begin` (3,) [m] is where the path begins.
+    `begin` (3,) [m] is the point where the path begins.
     """
     program = path if is_program(path) else _of_move(path, begin)
     more = {name: [*program[name], program[name][-1]] for name in ("positions", "orientations") if program.get(name)}
@@ -40,7 +40,7 @@ def longer(path: Path, begin: Floats) -> Path:
 
 
 def shorter(path: Path) -> Path:
-    """Return a program without its last move; where one is left, that move."""
+    """Return a program without its last move; if only one move is left, return it as a plain move."""
     fewer = {name: path[name][:-1] for name in ("times", "positions", "orientations") if path.get(name)}
     if len(fewer["times"]) > 2:
         return {**path, **fewer}
@@ -56,7 +56,7 @@ def shorter(path: Path) -> Path:
 
 
 def lasts(path: Path) -> float:
-    """Return how long the last move of a program takes [s]."""
+    """Return the duration of the last move of a program [s]."""
     return round(float(path["times"][-1] - path["times"][-2]), 9)
 
 
@@ -66,7 +66,7 @@ def lasting(path: Path, duration: float) -> Path:
 
 
 def turned(path: Path) -> Floats:
-    """Return the rotation vector (3,) [rad] by which a program has turned its gripper in the end."""
+    """Return the rotation vector (3,) [rad] by which a program has rotated its gripper at its end."""
     if not path.get("orientations"):
         return np.zeros(3)
     w, x, y, z = path["orientations"][-1]
@@ -74,23 +74,23 @@ def turned(path: Path) -> Floats:
 
 
 def turning(path: Path, turn: Floats) -> Path:
-    """Return a program that has turned its gripper by a rotation vector (3,) [rad] in the end."""
+    """Return a program that has rotated its gripper by a rotation vector (3,) [rad] at its end."""
     before = path.get("orientations") or [_STAYS] * len(path["times"])
     return {**path, "orientations": [*before[:-1], _quaternion(turn)]}
 
 
 def carried(path: Path, by: Floats) -> Path:
-    """Return a program that is moved by a way (3,) [m] as a whole."""
+    """Return a program shifted as a whole by `by` (3,) [m]."""
     return {**path, "positions": [listed(np.add(position, by)) for position in path["positions"]]}
 
 
 def listed(vector: Sequence[float] | Floats) -> list[float]:
-    """Return numbers for the document, to the micrometre or microradian: finer digits mean nothing to a reader."""
+    """Return numbers for the document, rounded to the micrometre or microradian."""
     return [round(float(x), DIGITS) + 0.0 for x in vector]
 
 
 def _of_move(path: Path, begin: Floats) -> Path:
-    """Return a move as a program of one."""
+    """Return a move as a program of one move."""
     program = {
         "kind": "waypoints",
         "times": [0.0, path["duration"]],

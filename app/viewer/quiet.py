@@ -1,4 +1,4 @@
-"""Keep viser from announcing its inner ports, which are not for people to open."""
+"""Keep viser from announcing its internal ports, which users should not open."""
 
 import contextlib
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""A prediction in plain words and small pieces of HTML for the panel; every inserted text is escaped."""
+"""Describe a prediction in plain words, as small pieces of HTML for the panel. Every inserted text is escaped."""
 
 import json
 import re
@@ -26,12 +26,12 @@ _CARD = (
 )
 _GOOD = "rgba(46, 107, 214, 0.10)"
 _DOUBT = "rgba(235, 150, 30, 0.16)"
-SMALLEST_ERROR = 1e-9  # m: a smaller one is none, and has no place on a logarithmic axis
-EARLIER = 30  # solves that are shown beside the present one
-WAYPOINTS = 50  # that are listed
-UNFOLDED = 120  # characters: about as many as the lines hold that are left of a long text
-LABEL_WIDTH, LABEL_LINES = 48, 6  # of characters, and of lines, of a label in the picture
-OF_BEFORE = '<div style="margin: 0.2rem 0.75rem; font-size: 0.78rem;"><b>Of the scene before:</b></div>'
+SMALLEST_ERROR = 1e-9  # m: a smaller error counts as this one, since zero has no place on a logarithmic axis
+EARLIER = 30  # earlier solves that are shown with the present one
+WAYPOINTS = 50  # most waypoints that are listed
+UNFOLDED = 120  # characters: longer texts are folded; about what the visible lines of a folded text hold
+LABEL_WIDTH, LABEL_LINES = 48, 6  # characters a line, and lines, of a label in the picture
+OF_BEFORE = '<div style="margin: 0.2rem 0.75rem; font-size: 0.78rem;"><b>From the previous scene:</b></div>'
 _BAD = "rgba(222, 72, 50, 0.16)"
 _WORDS = {
     "converged": "Converged",
@@ -42,15 +42,15 @@ _WORDS = {
 
 
 def millimetres(metres: float | None) -> str:
-    """Return an estimated error [m] in millimetres, or say that there is none."""
+    """Return an estimated error [m] in millimetres, or "not estimated"."""
     return "not estimated" if metres is None else in_mm(metres)
 
 
 def status_card(prediction: Prediction, *, preview: bool) -> str:
-    """Return the state of the last solve: status, time and error large, the rest small.
+    """Return a card with the state of the last solve: status, time and error in large type, the rest small.
 
-    What is to be known of an answer is said here, where nobody overlooks it: all of the message where it is no success
-    or errs by much, else the notes on it.
+    The card also warns about the answer, where nobody overlooks it. If the answer has not converged or its error is
+    large, the card shows the whole message, otherwise only the notes.
     """
     accuracy = prediction.accuracy
     if preview:
@@ -86,7 +86,7 @@ def status_card(prediction: Prediction, *, preview: bool) -> str:
 
 
 def _folded(texts: Sequence[str]) -> str:
-    """Return paragraphs, of which the page shows a few lines where they are long, and all where that is clicked."""
+    """Return paragraphs; the page shows only a few lines of long ones until they are clicked."""
     words = "<br/>".join(escape(text) for text in texts)
     if sum(map(len, texts)) <= UNFOLDED:
         return f'<div style="margin-top: 0.3rem;">{words}</div>' if words else ""
@@ -94,7 +94,7 @@ def _folded(texts: Sequence[str]) -> str:
 
 
 def problem_card(problem: str, details: str, places: Sequence[float]) -> str:
-    """Return why there is no prediction, in words, of a scene whose grippers hold the cable at `places` [m]."""
+    """Return a card that says why there is no prediction; the scene's grippers hold the cable at `places` [m]."""
     problem, details = problem_in_labels(problem, details, places)
     headline = "This is not possible." if details else "No prediction."
     why, more = (details, "") if _name_the_field(problem, details) else (f"{problem}.", f"{details} ")
@@ -106,61 +106,61 @@ def problem_card(problem: str, details: str, places: Sequence[float]) -> str:
 
 
 def problem_label(problem: str, details: str, places: Sequence[float]) -> str:
-    """Return why there is no prediction, with value and what is allowed, in a few short lines for the picture."""
+    """Return why there is no prediction, with the value and what is allowed, in a few short lines for the picture."""
     problem, details = problem_in_labels(problem, details, places)
     words = details if _name_the_field(problem, details) else f"{problem}. {details}"
     return textwrap.fill(f"Not possible. {words}", LABEL_WIDTH, max_lines=LABEL_LINES, placeholder=" …")
 
 
 def named_obstacles(problem: str, details: str) -> frozenset[int]:
-    """Return the numbers of the obstacles that a problem is about."""
+    """Return the indices of the obstacles that a problem is about."""
     return frozenset(int(number) for number in re.findall(r"\bobstacles\[(\d+)\]", f"{problem} {details}"))
 
 
 def _name_the_field(problem: str, details: str) -> bool:
-    """Return whether a problem is but the field that its details begin with."""
+    """Return whether a problem is merely the field name with which its details begin."""
     return details.startswith(f"{problem}:")
 
 
 def status_label(prediction: Prediction) -> str:
-    """Return in a short line that an answer is no success; "" where it is one."""
+    """Return a short line that says that an answer has not converged; "" if it has."""
     return "" if prediction.status == "converged" else f"{_WORDS[prediction.status]}: see the panel."
 
 
 def waiting_card(*, ready: bool) -> str:
-    """Return what to show before the first prediction, from a solver that is `ready` or being compiled."""
-    return _waiting("Solving …" if ready else "The solver is being compiled, once …", "")
+    """Return the card to show before the first prediction; the solver is `ready` or still being compiled."""
+    return _waiting("Solving …" if ready else "The solver is being compiled, only this once …", "")
 
 
 def solving_card(elapsed: float, longest: float) -> str:
-    """Return what to show while a prediction is awaited since `elapsed` [s], of a solve that takes `longest` [s]."""
+    """Return the card to show while a solve has been running for `elapsed` [s]; it takes at most `longest` [s]."""
     return _waiting(f"Solving, {elapsed:.0f} s …", f"A solve takes at most {longest:g} s. ")
 
 
 def _waiting(words: str, limit: str) -> str:
     return _plain_card(
-        "waiting", words, f"{limit}The first scene with other effects than before takes some seconds more."
+        "waiting", words, f"{limit}The first scene with a new combination of effects takes a few seconds longer."
     )
 
 
 def measuring_card(costs: Costs) -> str:
-    """Return what to show while it is measured what the effects cost."""
+    """Return the card to show while the costs of the effects are being measured."""
     words = f"Measuring {costs.number} of {costs.count}: {escape(costs.effect.replace('_', ' '))} …"
-    return _plain_card("measuring", words, "The scene is solved again without each effect, a few times.")
+    return _plain_card("measuring", words, "The scene is solved again several times without each effect.")
 
 
 def stopped_card() -> str:
-    """Return what to show where a solve was ended by hand."""
-    return _plain_card("stopped", "Stopped.", "This scene is not solved: the picture shows what was predicted before.")
+    """Return the card to show after the user has stopped a solve."""
+    return _plain_card("stopped", "Stopped.", "This scene is not solved. The picture shows the previous prediction.")
 
 
 def stale(html: str) -> str:
-    """Return results, so that nobody takes them for those of a scene that has none yet."""
+    """Mark results as those of the previous scene, so that nobody takes them for those of the present one."""
     return dimmed(f"{OF_BEFORE}{html}") if html else ""
 
 
 def dimmed(html: str) -> str:
-    """Return what is of a scene before, so that it stands back."""
+    """Return HTML of the previous scene, dimmed."""
     return f'<div data-stale="" style="opacity: 0.45;">{html}</div>'
 
 
@@ -184,7 +184,7 @@ def legend(scale: ColourScale) -> str:
 
 
 def effect_note(effect: EffectReport, cost: float | None) -> str:
-    """Return whether an effect is simulated, why, how large it is, and how it changes the time of a solve [s]."""
+    """Return a note on an effect: whether it is simulated, why, how large it is, and its `cost` in solve time [s]."""
     size = "" if effect.magnitude is None else f" · {effect.magnitude:.2g} {escape(effect.unit)}"
     mark, opacity = ("●", 1.0) if effect.active else ("○", 0.6)
     price = ""
@@ -199,7 +199,7 @@ def effect_note(effect: EffectReport, cost: float | None) -> str:
 
 
 def forces_list(prediction: Prediction) -> str:
-    """Return the largest forces on the cable, of grippers, table, obstacles and known ones, and estimated errors."""
+    """Return the largest forces on the cable, with estimated errors: of grippers, table, obstacles and known forces."""
     given = [(f"u = {g.u:.2f} m", g.times, g.reaction, g.reaction_error) for g in prediction.grasps]
     for c in prediction.contacts:
         given += [(c.name, c.times, c.force, c.force_error)] if c.force.any() else []
@@ -216,7 +216,7 @@ def forces_list(prediction: Prediction) -> str:
 
 
 def convergence(prediction: Prediction) -> str:
-    """Return the plot of update and residual by iteration (the paper's Fig. 2), as far as they are positive."""
+    """Return the plot of update and residual over the iterations (the paper's Fig. 2); only positive values show."""
     names = (("update [m]", "update", plots.BLUE), ("residual [m]", "residual", plots.ORANGE))
     if prediction.accuracy.method == "paper":
         names = (names[0], ("residual [N]", "residual", plots.ORANGE))
@@ -229,12 +229,12 @@ def convergence(prediction: Prediction) -> str:
 
 
 def accuracy_plot(prediction: Prediction, earlier: list[tuple[float, float]], measured: tuple[Measured, ...]) -> str:
-    """Return the plot of error against time, with the present solve as a dot, and add it to those `earlier`.
+    """Return the plot of error against time, with the present solve as a dot, and append that solve to `earlier`.
 
     Args:
         prediction: the present solve.
-        earlier: (time [ms], estimated error [mm]) of solves before it, the newest kept.
-        measured: what this machine was calibrated to.
+        earlier: (time [ms], estimated error [mm]) of earlier solves. The newest `EARLIER` are kept.
+        measured: the calibration of this machine.
     """
     grey = "rgba(128, 138, 154, 0.55)"
     places = [(1e3 * p.wall_time, 1e3 * max(p.error, SMALLEST_ERROR)) for p in measured]
@@ -250,12 +250,15 @@ def accuracy_plot(prediction: Prediction, earlier: list[tuple[float, float]], me
         here = (1e3 * accuracy.wall_time, 1e3 * accuracy.error_estimate)
         series.append(plots.Series(name="this solve", points=[here], colour=plots.ORANGE, size=5.0))
         earlier[:] = [*earlier, here][-EARLIER:]
-    hint = "" if measured else note("What accuracy costs on this machine is not measured yet: dlo calibrate", good=True)
+    hint = "" if measured else note("To see what accuracy costs on this machine, run dlo calibrate.", good=True)
     return plots.plot("time [ms]", "error [mm]", series, log_x=True, mark="accuracy") + hint
 
 
 def waypoints(path: Mapping[str, Any]) -> str:
-    """Return how many waypoints a path has, how long it takes, and, unfolded, when it is where; "" of another path."""
+    """Return the number of waypoints of a path and its duration; unfolded, their times and positions.
+
+    Paths of other kinds give "".
+    """
     if path.get("kind") != "waypoints":
         return ""
     times, positions = path["times"], path["positions"]
@@ -272,7 +275,7 @@ def waypoints(path: Mapping[str, Any]) -> str:
 
 
 def message(prediction: Prediction) -> str:
-    """Return what the solver says about its answer."""
+    """Return the solver's message about its answer."""
     return note(_in_labels(prediction.message, prediction), good=True)
 
 
@@ -281,7 +284,7 @@ def _in_labels(text: str, prediction: Prediction) -> str:
 
 
 def note(text: str, *, good: bool) -> str:
-    """Return a small paragraph; one of bad news stands out."""
+    """Return a small paragraph; one that is not `good` is highlighted."""
     ground = "" if good else f" background: {_BAD}; border-radius: 0.4rem; padding: 0.4rem 0.6rem;"
     return f'<div style="margin: 0.2rem 0.75rem; font-size: 0.78rem; line-height: 1.35;{ground}">{escape(text)}</div>'
 
@@ -292,13 +295,13 @@ def json_block(document: dict[str, Any]) -> str:
 
 
 def curl_block(address: str, document: dict[str, Any]) -> str:
-    """Return the shell line that asks the service at `address` for the prediction, as a Markdown code block."""
+    """Return the shell command that requests the prediction from the service at `address`, as a Markdown code block."""
     body = json.dumps(document, separators=(",", ":"))
     return f"```sh\ncurl -s {address}/v1/predictions -H 'Content-Type: application/json' -d {shlex.quote(body)}\n```"
 
 
 def run_links(run_id: str) -> str:
-    """Return the links to a stored run: the 3D scene of it, its recording, its JSON and its scene."""
+    """Return the links to a stored run: its 3D scene, its recording, its JSON and its request."""
     path = f"/v1/predictions/{escape(run_id, quote=True)}"
     links = [
         (f"/scene/?run={escape(run_id, quote=True)}", "open in the scene"),

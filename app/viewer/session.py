@@ -1,4 +1,4 @@
-"""One browser tab: its draft, its solver thread, its picture and its panel."""
+"""The session of one browser tab: its draft, its solver thread, its picture and its panel."""
 
 import asyncio
 import contextlib
@@ -33,12 +33,12 @@ from app.viewer.tracking import Tracking, TrackingActions
 from dlocore import Prediction, SceneError, SplineSurface
 
 FRAME = 1 / 40  # s
-PANEL_FRAMES = 3  # pictures for one update of the timeline: redrawing the panel is what costs the browser most
-PATIENCE = 0.8  # s without an answer, after which the panel says that one is under way
-TICK = 1.0  # s between two signs of life while one is under way
-AFTER_DRAG = 0.4  # s, in which a click is the end of a drag
-SEEN = 2.0  # a cable that many times as long or as short as the one before asks for another place of the camera
-QUIET = 0.2  # s without an edit, after which the hand counts as still
+PANEL_FRAMES = 3  # frames for one update of the timeline: redrawing the panel costs the browser most
+PATIENCE = 0.8  # s without an answer after which the panel says that a solve is running
+TICK = 1.0  # s between two updates of that message
+AFTER_DRAG = 0.4  # s after a drag in which a click counts as its end
+SEEN = 2.0  # the camera is placed anew when the cable becomes longer or shorter by this factor
+QUIET = 0.2  # s without an edit after which the edited scene is solved at the requested quality
 
 
 @dataclass(frozen=True)
@@ -46,9 +46,9 @@ class Shared:
     """What all tabs share.
 
     Attributes:
-        runs: where runs are stored.
-        solver: solves their scenes.
-        cables: that were kept as presets.
+        runs: the store of the runs.
+        solver: solves the scenes of all tabs.
+        cables: cables that were kept as presets.
     """
 
     runs: Runs
@@ -58,25 +58,25 @@ class Shared:
 
 @dataclass(frozen=True)
 class Work:
-    """What a tab is at work on: its scene, and those before and after it."""
+    """The work of a tab: its scene, and the history of its edits."""
 
     draft: Draft
     history: History
 
     @staticmethod
     def begun(draft: Draft | None) -> "Work":
-        """Return the beginning with a scene; with the paper's case where there is none."""
+        """Return work that begins with a scene, or with the paper's case if there is none."""
         return Work(draft or start_draft(), History())
 
 
 def of_example(name: str) -> Draft | None:
-    """Return a ready scene, or None where there is none of this name."""
+    """Return the ready scene of this name, or None if there is none."""
     found = examples().get(name)
     return None if found is None else Draft.of(orjson.loads(found.document))
 
 
 def of_run(id: str, runs: Runs) -> Draft | None:
-    """Return the scene of a stored run, or None where it, or the one whose motion it goes on from, is gone."""
+    """Return the scene of a stored run, or None if the run, or the run that it continues, is gone."""
     found = runs.request(id)
     if found is None:
         return None
@@ -89,14 +89,14 @@ def of_run(id: str, runs: Runs) -> Draft | None:
 
 
 class Session:
-    """The state of one client. Everything but the solve runs on the viewer's event loop, so nothing is locked.
+    """The state of one client. Everything but the solve runs on the viewer's event loop, so no locks are needed.
 
     Args:
         client: the client.
         shared: what all tabs share.
-        address: at which the client sees the service.
-        tab: its name, by which a page that is loaded again finds its scene; "" for none.
-        work: what to begin with.
+        address: address of the service as the client sees it.
+        tab: name of the tab, by which a reloaded page finds its scene; "" for none.
+        work: the work to begin with.
     """
 
     def __init__(self, client: ClientHandle, shared: Shared, address: str, tab: str, work: Work) -> None:
@@ -114,19 +114,19 @@ class Session:
         self._busy_timer: asyncio.TimerHandle | None = None
         self._playback = Playback()
         self._history = work.history
-        self._seen_length = 0.0  # m, of the cable that the camera was placed for
+        self._seen_length = 0.0  # m, length of the cable for which the camera was placed
         self._set_up()
         self._outbox = Outbox(client, shared.runs)
         self._picture = Picture(client.scene)
         self._released_at = self._asked_at = -np.inf
 
-        # the type asks for a plain function, which viser would call on another thread
+        # the declared type is a plain function, but viser would call one of those on another thread
         client.scene.on_click()(self._clicked)  # type: ignore[arg-type]
         self._gizmo = Gizmo(client.scene, self._begin_drag, self._drag, self._end_drag)
         self._shape = ShapeEditor(client, self._shape_dragged)
         self._tell = partial(client.add_notification, auto_close_seconds=TO_READ)
         self._edits = Edits(lambda: self._draft, self._edited, self._tell)
-        # controls are not told of "0.0" after "0", on the way to 0.02
+        # viser calls no on_update for "0.0" after "0", on the way to 0.02: the value is the same
         client._websock_connection.register_handler(GuiUpdateMessage, lambda *_: self._edits.go_on())
         self._panel = Panel(
             client,
@@ -180,11 +180,11 @@ class Session:
         )
 
     def work(self) -> Work:
-        """Return the scene at hand, and those before, as a tab of its own may go on with them."""
+        """Return the present scene and a copy of its history, with which another session can continue."""
         return Work(self._draft, self._history.copy())
 
     def close(self) -> None:
-        """Free the solver thread and the animation."""
+        """Stop the solver thread, the animation and all timers."""
         self._solver.close()
         self._tracking.close()
         self._animation.cancel()
@@ -205,7 +205,7 @@ class Session:
         self._reset_camera()
 
     def _reset_camera(self, shown: SplineSurface | None = None) -> None:
-        """Look at the scene from where it is seen, and all of a motion that is `shown`."""
+        """Place the camera so that it sees the scene, and the whole motion that is `shown`, if any."""
         camera = self._client.camera
         points = extent(self._draft, self._start, shown)
         on_table = self._draft.get(("environment", "table")) is not None
@@ -220,7 +220,7 @@ class Session:
         self._client.flush()
 
     def _begin_drag(self) -> None:
-        """Show where the motion ends while the hand is on the target."""
+        """Show the end of the motion while the target is being dragged."""
         self._edits.finish()
         self._dragging = True
         self._playback.hold(self._playback.horizon)
@@ -228,7 +228,7 @@ class Session:
 
     def _drag(self, position: np.ndarray, wxyz: np.ndarray) -> None:
         begin = self._origin()
-        if not self._draft.in_space:  # the gizmo's height is single precision on the wire
+        if not self._draft.in_space:  # viser sends the gizmo's height in single precision
             position[2] = grips.target(self._draft, begin)[2]
         draft = grips.with_target(self._draft, begin, position)
         if grips.can_turn(draft):
@@ -246,7 +246,7 @@ class Session:
         return grips.origin(self._draft, self._start, None if self._latest is None else self._latest.surface)
 
     async def _clicked(self, event: SceneClickEvent) -> None:
-        """Take the clicked gripper in hand, or let the one in hand hold the cable where it was clicked."""
+        """Select the clicked gripper, or move the grasp of the selected one to the clicked place on the cable."""
         if self._dragging or self._shape.active or self._loop.time() - self._released_at < AFTER_DRAG:
             return
         found = self._picture.picked(np.array(event.ray_origin), np.array(event.ray_direction))
@@ -259,7 +259,7 @@ class Session:
             self._edited(grips.changed(draft, "u", round(found.u, 4)))
 
     def _edit_shape(self, wanted: bool) -> None:
-        """Show the beads of the start shape, or take them away."""
+        """Show or hide the beads of the start shape."""
         self._edits.finish()
         with self._client.atomic():
             if wanted:
@@ -282,12 +282,12 @@ class Session:
         self._edited(straightened(draft, self._start))
 
     def _current(self) -> Draft:
-        """Return the draft with what was typed until now."""
+        """Return the draft, including what has been typed so far."""
         self._edits.finish()
         return self._draft
 
     def edit(self, draft: Draft) -> None:
-        """Take over an edited draft: a preview at once, the asked quality as soon as the hand is still."""
+        """Take over an edited draft: solve a preview at once, and at the requested quality when the edits pause."""
         if draft == self._draft:
             return
         if draft.document != self._draft.document:
@@ -295,15 +295,15 @@ class Session:
         self._change(draft)
 
     def _edited(self, draft: Draft) -> None:
-        """Take over a draft that was edited by hand: programs of moves go with what their grippers hold."""
+        """Take over a draft that the user edited; programs of moves shift with what their grippers hold."""
         if grips.have_programs(draft):
-            with contextlib.suppress(SceneError):  # of an impossible start
+            with contextlib.suppress(SceneError):  # the start is impossible
                 start = draft.start(self._shared.runs.motion)
                 draft = grips.carried(draft, start, self._draft, self._start)
         self.edit(draft)
 
     def _step(self, name: str) -> None:
-        """Go a step back or forward to a scene of before, to undo or to redo; tell where there is none."""
+        """Undo or redo one step; notify the user if there is none."""
         self._edits.finish()
         back, forward = self._history.steps
         if not (back if name == UNDO else forward):
@@ -320,7 +320,7 @@ class Session:
         if moved:
             self._take_start()
         self._take_draft()
-        if draft.same_but_name(before):  # another gripper in hand, or another name: nothing to solve
+        if draft.same_but_name(before):  # another selected gripper or another name: nothing to solve
             self._panel.show_scene(draft)
             self._client.flush()
             return
@@ -330,7 +330,7 @@ class Session:
         self._refine_timer = self._loop.call_later(QUIET, self._refine)
 
     def _take_start(self) -> None:
-        """Take over the start curve of the draft; one that is impossible leaves the last good one."""
+        """Take over the start curve of the draft; if it is impossible, keep the last good one."""
         with contextlib.suppress(SceneError):
             self._start = self._draft.start(self._shared.runs.motion)
             self._shape.follow(self._start, self._draft.length)
@@ -366,21 +366,21 @@ class Session:
         self._ask("refined")
 
     def _measure_costs(self) -> None:
-        """Have the costs of the effects measured; an edit ends it."""
+        """Have the costs of the effects measured; an edit ends the measurement."""
         self._edits.finish()
         self._ask("costs")
 
     def _ask(self, kind: Kind) -> None:
-        """Have the draft solved; where that takes longer than a blink, say that it is under way."""
+        """Have the draft solved; if that takes longer than `PATIENCE`, say that it is running."""
         self._solver.ask(self._draft, kind)
-        if kind != "preview":  # nobody reads it while the hand moves
+        if kind != "preview":  # nobody reads it while editing
             self._panel.show_scene(self._draft)
         self._asked_at = self._loop.time()
         if self._busy_timer is None:
             self._busy_timer = self._loop.call_later(PATIENCE, self._say_busy)
 
     def _stop(self) -> None:
-        """End the solve that is under way; the picture stays as it is."""
+        """Stop the running solve; the picture stays as it is."""
         self._solver.stop()
         self._end_wait()
         with self._client.atomic():
@@ -405,11 +405,11 @@ class Session:
 
     def _deliver(self, outcome: Outcome) -> None:
         """Hand an outcome from the solver thread to the event loop."""
-        with contextlib.suppress(RuntimeError):  # the loop is closed: the service stops
+        with contextlib.suppress(RuntimeError):  # the loop is closed because the service is stopping
             self._loop.call_soon_threadsafe(self._take, outcome)
 
     def _take(self, outcome: Outcome) -> None:
-        if outcome.job.stopped.is_set():  # it was on its way here
+        if outcome.job.stopped.is_set():  # stopped while the outcome was on its way here
             return
         self._end_wait()
         if self._solver.waiting:
@@ -430,7 +430,7 @@ class Session:
         if outcome.costs is not None:
             self._panel.take_costs(prediction, outcome.costs)
             if outcome.costs.found_none:
-                self._tell("No costs", "With its effects held as they are this scene has no solve to compare with.")
+                self._tell("No costs", "With its effects fixed as they are, this scene has no solve to compare with.")
             return
         preview = outcome.job.kind == "preview"
         self._latest = prediction
@@ -479,8 +479,8 @@ class Session:
             before = now
 
     def _replace(self, draft: Draft) -> None:
-        """Show another scene from the beginning."""
-        self._edits.finish()  # it would be typed into the other one
+        """Show another scene, and play it from the beginning."""
+        self._edits.finish()  # what was typed would go into the other scene
         self._history.close_step()
         self._shape.hide()
         self._panel.show_editing(False)
@@ -502,7 +502,7 @@ class Session:
         self._replace(draft)
 
     def _show_recorded(self, draft: Draft) -> None:
-        """Show a scene beside its markers, which a surface would hide."""
+        """Show a scene with its markers, without the surface and the ghosts that would hide them."""
         look = replace(self._look, surface="hidden", ghosts=False)
         self._panel.show_look(look)
         self._restyle(look)
@@ -532,7 +532,7 @@ class Session:
             await self._outbox.picture(draft)
 
     async def _keep(self) -> None:
-        """Store the last refined prediction with its scene, and link to it, unless the scene was edited since."""
+        """Store the last refined prediction with its scene, and link to it; refuse if the scene was edited since."""
         draft = self._current()
         prediction = self._solved(draft, "Not kept")
         run_id = None if prediction is None else await self._outbox.keep(draft, prediction)
@@ -540,8 +540,8 @@ class Session:
             self._panel.show_kept(run_id)
 
     def _solved(self, draft: Draft, refusal: str) -> Prediction | None:
-        """Return the refined prediction of a scene; where there is none, say that under the title of a refusal."""
+        """Return the refined prediction of a scene; if there is none, notify the user, with the title `refusal`."""
         if self._shown is not None and self._shown[0].same_but_name(draft):
             return self._shown[1]
-        self._client.add_notification(refusal, "This scene is not solved.", auto_close_seconds=6.0)
+        self._client.add_notification(refusal, "This scene has not been solved.", auto_close_seconds=6.0)
         return None

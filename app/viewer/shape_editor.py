@@ -1,4 +1,4 @@
-"""Beads on the start shape, by which it is dragged."""
+"""Beads on the start shape, for dragging it."""
 
 from collections.abc import Callable
 from typing import Any
@@ -13,15 +13,15 @@ from dlocore.shape.shape import StartCurve
 
 Floats = NDArray[np.float64]
 BEAD = 0.016  # radius, of the cable's length
-FLATTEST = 0.05  # slope of a line of sight, below which it meets the table too far away
+FLATTEST = 0.05  # slope below which a line of sight meets the table too far away
 
 
 class ShapeEditor:
     """Shows the beads of a start shape while it is edited.
 
     Args:
-        client: whose scene they are in.
-        on_drag: called with the dragged points (n, 3) [m], and with whether the hand is still on one.
+        client: the client whose scene shows the beads.
+        on_drag: called with the dragged points (n, 3) [m], and with whether a bead is still held.
     """
 
     def __init__(self, client: ClientHandle, on_drag: Callable[[Floats, bool], None]) -> None:
@@ -76,18 +76,18 @@ class ShapeEditor:
             self._on_drag(self._points, event.phase != "end")
 
     def follow(self, start: StartCurve, length: float) -> None:
-        """Show the beads where another start shape has them, unless one is in the hand."""
+        """Move the beads to another start shape, unless one is being dragged."""
         if self.active and not self.held:
             self.show(start, length)
 
     def hide(self) -> None:
-        """Take the beads away."""
+        """Remove the beads."""
         if self._beads is not None:
             self._beads.remove()
         self._beads, self._begun = None, None
 
     def _reached(self, pointer: Floats, before: Floats) -> Floats:
-        """Return where the pointer takes a bead: on a plane that faces the camera, or at the bead's own height."""
+        """Return where the pointer moves a bead: in a plane that faces the camera, or at the bead's own height."""
         if self.in_space:
             return pointer
         eye = np.asarray(self._client.camera.position, dtype=float)

@@ -1,4 +1,4 @@
-"""Edits of the start shape of a draft: its points, its length."""
+"""Edit the start shape of a draft: its points, its length."""
 
 from typing import Any
 
@@ -11,18 +11,18 @@ from dlocore.shape.shape import StartCurve
 
 Floats = NDArray[np.float64]
 HANDLES = 13  # points that can be dragged
-STEP = 1e-5  # m, to which points are written into the document
+STEP = 1e-5  # m to which points are rounded in the document
 
 
 def handles(start: StartCurve, length: float) -> Floats:
-    """Return the points by which the start shape is dragged, evenly spaced along it; (HANDLES, 3) [m]."""
+    """Return the points for dragging the start shape, evenly spaced along it; (HANDLES, 3) [m]."""
     return start(np.linspace(0.0, length, HANDLES))
 
 
 def dragged(points: Floats, number: int, to: Floats) -> Floats:
-    """Move one point of a chain (n, 3) [m] and pull the others along, so that all its chords keep their lengths.
+    """Move one point of a chain (n, 3) [m] and pull the others along, so that all chords keep their lengths.
 
-    Each point follows its neighbour towards the dragged one, as the links of a chain do.
+    Each point follows its neighbour on the side of the dragged one, like the links of a chain.
     """
     moved = points.copy()
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -42,7 +42,7 @@ def _at_distance(near: Floats, far: Floats, distance: float) -> Floats:
 
 
 def with_points(draft: Draft, points: Floats) -> Draft:
-    """Let the cable start along points in order (n, 3) [m]; one that was to settle still is."""
+    """Let the cable start along ordered points (n, 3) [m]; settling stays as it was."""
     shape: dict[str, Any] = {"kind": "points", "points": _listed(points)}
     if draft.get(("shape", "settle")):
         shape["settle"] = True
@@ -50,7 +50,7 @@ def with_points(draft: Draft, points: Floats) -> Draft:
 
 
 def straightened(draft: Draft, start: StartCurve) -> Draft:
-    """Let the cable start straight, from where its end lies, along the line to its other end."""
+    """Let the cable start straight from its present first end, along the line to its other end."""
     begin, end = start([0.0, draft.length])
     along = end - begin
     if float(np.linalg.norm(along)) < 1e-6 * draft.length:
@@ -59,7 +59,7 @@ def straightened(draft: Draft, start: StartCurve) -> Draft:
 
 
 def between(draft: Draft, begin: Floats, end: Floats) -> Draft:
-    """Let the cable start straight from one point towards another, (3,) [m]; one that was to settle still is."""
+    """Let the cable start straight from one point towards another, (3,) [m]; settling stays as it was."""
     settles = {"settle": True} if draft.get(("shape", "settle")) else {}
     return draft.put(("shape",), {**_line(begin, end - begin), **settles})
 
@@ -70,15 +70,15 @@ def _line(begin: Floats, along: Floats) -> dict[str, Any]:
 
 
 def with_settling(draft: Draft, settle: bool) -> Draft:
-    """Let the cable come to rest under its grippers before the motion, or not."""
+    """Set whether the cable comes to rest in its grippers before the motion."""
     return draft.put(("shape", "settle"), True if settle else None)
 
 
 def scaled(draft: Draft, length: float) -> Draft:
-    """Give the cable another length [m].
+    """Change the length of the cable [m].
 
-    A straight one grows at its far end, with what is there; another shape grows in proportion about its first
-    point. A length that no cable may have changes nothing: from 0 nothing would grow back in proportion.
+    A straight cable grows at its far end, and what is attached there moves along. Any other shape is scaled about its
+    first point. A length that is not allowed changes nothing: a shape scaled to 0 could not be scaled back.
     """
     if not MIN_LENGTH <= length <= MAX_LENGTH:
         return draft

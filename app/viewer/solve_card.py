@@ -1,4 +1,4 @@
-"""The state of the solve on top of the panel, and the button that ends it, or begins it again."""
+"""The card at the top of the panel with the state of the solve, and the button that stops or restarts it."""
 
 from collections.abc import Callable
 from typing import Any, Literal
@@ -10,13 +10,13 @@ Offer = Literal["stop", "solve"]
 
 
 class SolveCard:
-    """The card, with one button below it or none.
+    """The card, with at most one button below it.
 
     Args:
-        gui: of the client.
-        html: to begin with.
-        stop: ends the solve that is under way.
-        solve: solves the scene that was stopped.
+        gui: the client's GUI.
+        html: the first content of the card.
+        stop: stops the running solve.
+        solve: solves the scene again after a stop.
     """
 
     def __init__(self, gui: GuiApi, html: str, stop: Callable[[], None], solve: Callable[[], None]) -> None:
@@ -34,7 +34,7 @@ class SolveCard:
             solve()
 
     def show(self, html: str, offer: Offer | None = None) -> None:
-        """Show the state of the solve, and the button to press, if any."""
+        """Show the state of the solve, and the button that is offered, if any."""
         self._card.content = html
         for name, button in self._buttons.items():
             if button.visible != (name == offer):

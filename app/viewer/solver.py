@@ -1,4 +1,4 @@
-"""How the scenes of the tabs are solved: by the service's workers, and counted with its other solves."""
+"""Solve the scenes of the tabs: by the service's workers, counted with its other solves."""
 
 import asyncio
 import threading
@@ -12,14 +12,14 @@ from dlocore.calibration import Measured
 from dlocore.identify import Candidate, Identification, Progress
 from dlocore.recordings import Recording
 
-LONGEST_PREVIEW = 20.0  # s; its time budget is far below, which a solver still to be compiled can't keep
+LONGEST_PREVIEW = 20.0  # s; far above its time budget, which can't be met while the solver is not yet compiled
 
 
 class ServiceSolver:
     """Solves scenes for the threads of all tabs.
 
-    A refined solve waits for a free worker as any request does. A preview does not: it takes about 10 ms, one a tab at
-    a time, and a hand that drags can't wait behind somebody's long solve.
+    A refined solve waits for a free worker like any request. A preview does not, because a drag can't wait behind
+    somebody else's long solve; it takes about 10 ms, and each tab solves only one at a time.
 
     Args:
         service: the service.
@@ -45,7 +45,7 @@ class ServiceSolver:
         return draft.scene(self._service.runs.motion)
 
     def measured(self, dimensions: int) -> tuple[Measured, ...]:
-        """Return what this machine was calibrated to, in the plane (2) or in space (3); nothing where it was not."""
+        """Return the calibration of this machine, in the plane (2) or in space (3); empty if it has none."""
         found = calibration.load(self._service.settings.calibration_file)
         return () if found is None else found.of_dimensions(dimensions)
 
@@ -57,7 +57,7 @@ class ServiceSolver:
         return prediction
 
     def refine(self, scene: Scene, cancelled: threading.Event) -> Prediction:
-        """Solve as one of the service's solves; the calling thread waits."""
+        """Solve like a request to the service; the calling thread waits."""
         solve = self._service.solve(scene, cancelled)
         return asyncio.run_coroutine_threadsafe(solve, self._loop).result()
 
@@ -68,6 +68,6 @@ class ServiceSolver:
         cancelled: Callable[[], bool],
         on_progress: Callable[[Progress], None],
     ) -> Identification:
-        """Identify a cable as one of the service's searches; the calling thread waits."""
+        """Identify a cable like a request to the service; the calling thread waits."""
         search = self._service.searches.identify(windows, cancelled, start=start, on_progress=on_progress)
         return asyncio.run_coroutine_threadsafe(search, self._loop).result()

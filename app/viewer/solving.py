@@ -1,4 +1,4 @@
-"""One solver thread a browser tab: the newest asked scene wins, nothing queues up."""
+"""One solver thread for each browser tab. It solves the newest requested scene; requests do not queue up."""
 
 import logging
 import threading
@@ -14,7 +14,7 @@ from dlocore.calibration import Measured
 from dlocore.identify import Candidate, Identification, Progress
 from dlocore.recordings import Recording
 
-PREVIEW = Quality(time_budget=0.01)  # while the hand moves
+PREVIEW = Quality(time_budget=0.01)  # while the user is editing
 Kind = Literal["preview", "refined", "costs"]
 _log = logging.getLogger(__name__)
 
@@ -34,13 +34,13 @@ class Solver(Protocol):
         """Return the scene of a draft, or raise SceneError."""
 
     def measured(self, dimensions: int) -> tuple[Measured, ...]:
-        """Return what this machine was calibrated to, in the plane (2) or in space (3)."""
+        """Return the calibration of this machine, in the plane (2) or in space (3)."""
 
     def preview(self, scene: Scene, cancelled: Callable[[], bool]) -> Prediction:
         """Solve at once, for at most a few ms."""
 
     def refine(self, scene: Scene, cancelled: threading.Event) -> Prediction:
-        """Solve as one of the service's solves, when a worker is free."""
+        """Solve like a request to the service, as soon as a worker is free."""
 
     def identify(
         self,
@@ -49,14 +49,15 @@ class Solver(Protocol):
         cancelled: Callable[[], bool],
         on_progress: Callable[[Progress], None],
     ) -> Identification:
-        """Identify a cable as one of the service's searches, when it is its turn."""
+        """Identify a cable like a request to the service, when it is its turn."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Job:
-    """A draft to solve as a quick preview or at the asked quality, or whose effects' costs are to be measured.
+    """A draft to solve as a quick preview or at the requested quality, or to measure the costs of its effects.
 
-    `superseded` ends its solve, and the service sets it itself when that has ended; `stopped`: nobody waits for it.
+    Setting `superseded` ends the solve; the service sets it too when the solve has ended. `stopped` says that the user
+    stopped the solve, so that its outcome is dropped.
     """
 
     draft: Draft
@@ -67,9 +68,10 @@ class Job:
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What became of a job: a prediction, or why there is none: in words, and with field, value and allowed range.
+    """The outcome of a job: a prediction, or why there is none.
 
-    `measured` is what this machine was calibrated to, for a refined prediction.
+    `problem` says why in words, and `details` gives the field, its value and the allowed range. `measured` is the
+    calibration of this machine, for a refined prediction.
     """
 
     job: Job
@@ -81,15 +83,15 @@ class Outcome:
 
 
 class SolverThread:
-    """Solves the newest job on a thread of its own and delivers the outcome from there.
+    """Solves the newest job on its own thread, and delivers the outcome from there.
 
-    A preview is finished once begun, so that a picture follows the hand however fast it moves; a refined solve gives
-    way to a newer job at the solver's next check.
+    Once begun, a preview is finished even if a newer job arrives, so that the picture follows even a fast drag. A
+    refined solve gives way to a newer job at the solver's next check.
 
     Args:
-        solver: solves.
+        solver: solves the scenes.
         deliver: called on the solver thread with every outcome.
-        name: of the thread.
+        name: name of the thread.
     """
 
     def __init__(self, solver: Solver, deliver: Callable[[Outcome], None], name: str) -> None:
@@ -103,7 +105,7 @@ class SolverThread:
         self._thread.start()
 
     def ask(self, draft: Draft, kind: Kind) -> None:
-        """Solve `draft` next, instead of whatever was waiting."""
+        """Solve `draft` next; it replaces a job that is still waiting."""
         with self._changed:
             self._newest = Job(draft=draft, kind=kind)
             if self._running is not None:
@@ -112,11 +114,11 @@ class SolverThread:
 
     @property
     def waiting(self) -> bool:
-        """Whether a job waits for the running one."""
+        """Whether a job is waiting for the running one to end."""
         return self._newest is not None
 
     def stop(self) -> None:
-        """End the running solve at the solver's next check, and forget what was waiting."""
+        """End the running solve at the solver's next check, and drop the waiting job."""
         with self._changed:
             for job in (self._newest, self._running):
                 if job is not None:
@@ -125,7 +127,7 @@ class SolverThread:
             self._newest = None
 
     def close(self) -> None:
-        """Stop the thread at the solver's next check; outcomes of a running solve are dropped."""
+        """Stop the thread at the solver's next check; the outcome of a running solve is dropped."""
         with self._changed:
             self._closed = True
             self._newest = None
@@ -147,13 +149,13 @@ class SolverThread:
                 self._deliver(outcome)
 
     def _measure(self, job: Job, prediction: Prediction) -> None:
-        """Deliver what the effects cost, as far as it is measured."""
+        """Measure the costs of the effects, and deliver them as they become known."""
 
         def on_costs(costs: Costs) -> None:
             if not self._closed:
                 self._deliver(Outcome(job=job, prediction=prediction, costs=costs))
 
-        def ended() -> bool:  # not `superseded`, which is set by now
+        def ended() -> bool:  # `superseded` is no use here: the service has set it by now
             return self._closed or self._newest is not None or job.stopped.is_set()
 
         measure_costs(prediction, ended, on_costs)

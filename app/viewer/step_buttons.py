@@ -9,18 +9,16 @@ UNDO, REDO = "Undo", "Redo"
 
 
 class StepButtons:
-    """Two buttons beside each other, and the keys that everybody knows for them.
+    """Two buttons next to each other, and their usual keys.
 
     Args:
-        gui: of the client.
-        back: goes back to the scene before.
-        forward: goes forward again.
+        gui: the client's GUI.
+        back: undoes the last change.
+        forward: redoes it.
     """
 
     def __init__(self, gui: GuiApi, back: Callable[[], None], forward: Callable[[], None]) -> None:
-        self._group = gui.add_button_group(
-            "Changes", (UNDO, REDO), hint="Ctrl+Z: the scene before; Ctrl+Shift+Z: forward again"
-        )
+        self._group = gui.add_button_group("Changes", (UNDO, REDO), hint="Ctrl+Z: undo; Ctrl+Shift+Z: redo")
         by_key = (
             (gui.add_command(f"{UNDO} the last change", hotkey="Z", modifier="cmd/ctrl"), back),
             (gui.add_command(f"{REDO} the last change", hotkey="Z", modifier="cmd/ctrl+shift"), forward),

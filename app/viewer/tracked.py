@@ -1,4 +1,4 @@
-"""A recording in the scene: the window that is shown as a scene of its own, and how far a prediction is from it."""
+"""A recording in the scene: the shown window as a scene, and the distance of a prediction from it."""
 
 import tempfile
 from dataclasses import dataclass, replace
@@ -20,9 +20,9 @@ from dlocore.scene.scene import ControlPoints
 
 Floats = NDArray[np.float64]
 LARGEST = 20_000_000  # bytes, of a file and of each of its arrays
-MOST_WINDOWS = 8  # that are identified from; the others are shown only
-STEP = 0.02  # s, of the grippers' waypoints in the document
-POINTS_IN_SECOND = 25  # control points in time; those of a cable that swings at 3 Hz
+MOST_WINDOWS = 8  # most windows that identification uses; further ones are only shown
+STEP = 0.02  # s between the grippers' waypoints in the document
+POINTS_IN_SECOND = 25  # control points in time for each second: enough for a cable that swings at 3 Hz
 MOST_IN_TIME = 129
 N_U = 13
 
@@ -32,9 +32,9 @@ class Tracked:
     """A recording, cut into windows, of which one is shown.
 
     Attributes:
-        windows: of about 5 s.
-        candidate: what is known or was found of the cable.
-        shown: number of the shown window.
+        windows: windows of about 5 s.
+        candidate: what is known about the cable, or was identified.
+        shown: index of the shown window.
     """
 
     windows: tuple[Recording, ...]
@@ -43,10 +43,10 @@ class Tracked:
 
     @staticmethod
     def of(recording: Recording) -> "Tracked":
-        """Return a recording that was just opened.
+        """Return a recording that was just opened, cut into windows.
 
         Raises:
-            SceneError: it holds shapes at rest, which have no motion to show.
+            SceneError: it contains shapes at rest, which have no motion to show.
         """
         if recording.static:
             raise SceneError("static", True, "a recording of a motion", "Shapes at rest have no motion to show")
@@ -59,7 +59,7 @@ class Tracked:
         return self.windows[self.shown]
 
     def draft(self) -> Draft:
-        """Return the scene of the shown window: its start, its grippers' paths, the cable as it is known."""
+        """Return the scene of the shown window: its start, its grippers' paths, and the cable as far as known."""
         scene = self._replay.scene(self.candidate)
         shape, cable, surroundings = cast(ControlPoints, scene.shape), scene.cable, scene.environment
         start: dict[str, Any] = {
@@ -92,25 +92,25 @@ class Tracked:
                     "n_u": N_U,
                     "n_t": min(MOST_IN_TIME, 13 + round(POINTS_IN_SECOND * self._replay.horizon)),
                     "method": "march",
-                    "keep_grid": True,  # on which the cable was identified
+                    "keep_grid": True,  # the cable was identified on this grid
                 },
             }
         )
 
     def edited(self, draft: Draft) -> "Tracked":
-        """Return the recording with the cable and the drag that were edited in its scene.
+        """Return the recording with the cable and the drag as edited in its scene.
 
         Raises:
-            SceneError: they are none, or the cable is one that yields, which a search in the scene has no twist for.
+            SceneError: the edited values are not valid, or the cable yields: a search in the scene is without twist.
         """
         if draft.cable().yields:
-            raise SceneError("cable", "a cable that yields", "an elastic one, to search for in the scene")
+            raise SceneError("cable", "a cable that yields", "an elastic one (the scene identifies no other)")
         cable, given = self._replay.span.to_whole(draft.cable()), draft.request().environment
         drag = replace(self.candidate.environment, drag=given.drag, drag_quadratic=given.drag_quadratic)
         return replace(self, candidate=replace(self.candidate, cable=cable, environment=drag))
 
     def markers_at(self, time: float) -> Floats:
-        """Return the measured markers (k, 3) [m] of the frame nearest to a time [s] of the scene that were seen."""
+        """Return the markers seen in the frame nearest to a time [s] of the scene, (k, 3) [m]."""
         x = cast(Floats, self.recording.markers)[int(np.argmin(np.abs(self.times - time)))]
         return x[np.isfinite(x[:, 0])]
 
@@ -124,7 +124,7 @@ class Tracked:
         return Replay(self.recording, Resolution(n_u=N_U, step=STEP))
 
     def distances(self, prediction: Prediction) -> Floats:
-        """Return the median distance of the free markers from a prediction at every frame (k,) [m]; NaN: unseen."""
+        """Return the median distance of the free markers from a prediction at every frame (k,) [m]; NaN if unknown."""
         recording, surface, span = self.recording, prediction.surface, self._replay.span
         u = np.clip(span.u[recording.free] * (surface.length / span.length), 0.0, surface.length)
         away = surface.positions(u, np.clip(self.times, 0.0, surface.horizon))[..., :3]
@@ -137,10 +137,10 @@ class Tracked:
 
 
 def opened(name: str, content: bytes, beside: dict[str, bytes]) -> Tracked:
-    """Return the recording of a file, with those uploaded before it (a .csv needs the .json of its name).
+    """Return the recording in a file; `beside` holds files uploaded before it (a .csv needs the .json of its name).
 
     Raises:
-        SceneError: it is none.
+        SceneError: the file is too large, or not a valid recording.
     """
     if len(content) > LARGEST:
         raise SceneError("file", f"{len(content)} bytes", f"at most {LARGEST} bytes")
@@ -163,7 +163,7 @@ def _path(path: Waypoints) -> dict[str, Any]:
 
 
 def _to_nine_digits(part: Any) -> Any:
-    """Return a part of the document with its numbers as exact as a panel can show them."""
+    """Return a part of the document with its numbers rounded to nine digits."""
     if isinstance(part, dict):
         return {name: _to_nine_digits(value) for name, value in part.items()}
     if isinstance(part, list):
@@ -172,5 +172,5 @@ def _to_nine_digits(part: Any) -> Any:
 
 
 def _rounded(values: Floats) -> list[Any]:
-    """Return numbers for the document, to the hundredth of a millimetre of what tracking can tell."""
+    """Return numbers for the document, rounded to 10⁻⁷ m, which is finer than tracking can measure."""
     return cast(list[Any], np.round(values, 7).tolist())

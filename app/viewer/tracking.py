@@ -1,4 +1,4 @@
-"""What a tab does with a recording: markers over the prediction, the error in time, the search for the cable."""
+"""A recording in a session: markers over the prediction, the error over time, the identification of the cable."""
 
 import asyncio
 import contextlib
@@ -23,20 +23,20 @@ from dlocore import Prediction, SceneError
 from dlocore.identify import Identification, Progress
 
 Floats = NDArray[np.float64]
-MARKER = (213, 94, 0)  # the colour of what was measured
+MARKER = (213, 94, 0)  # colour of measured markers
 SIZE = 0.012  # m, of a marker
 _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrackingActions:
-    """What a recording has the tab do.
+    """What a recording can have the session do.
 
     Attributes:
-        show: a scene from its beginning.
-        draft: the scene being edited.
-        flush: send what was changed.
-        kept: a preset was added.
+        show: show a scene from its beginning.
+        draft: return the scene being edited.
+        flush: send changes to the client.
+        kept: called when a preset was added.
     """
 
     show: Callable[[Draft], None]
@@ -49,11 +49,11 @@ class Tracking:
     """The recording of one client; every method runs on the viewer's event loop.
 
     Args:
-        scene: where the markers go.
-        form: the tab of the panel.
-        solver: searches for the cable.
-        cables: where presets are kept.
-        actions: what it has the tab do.
+        scene: the scene that gets the markers.
+        form: the controls on the panel.
+        solver: identifies the cable.
+        cables: the kept presets.
+        actions: what the recording has the session do.
     """
 
     def __init__(
@@ -77,14 +77,14 @@ class Tracking:
         )
 
     async def open(self, name: str, content: bytes) -> None:
-        """Show the recording of a file; a .json waits for the .csv that it belongs to, and the other way round."""
+        """Show the recording in a file; a .json waits for the .csv of the same name, and vice versa."""
         stem, _, kind = name.lower().rpartition(".")
         if kind in ("csv", "json"):
             other = "json" if kind == "csv" else "csv"
             fitting = next((n for n in self._beside if n.lower() == f"{stem}.{other}"), None)
             if fitting is None:
                 self._beside = {name: content}
-                self._form.say(f"{name} is here. Now open {stem}.{other} that belongs to it.", good=True)
+                self._form.say(f"{name} is uploaded. Now open {stem}.{other}, which belongs to it.", good=True)
                 return
             name, content, self._beside = (
                 (name, content, {fitting: self._beside[fitting]})
@@ -105,14 +105,14 @@ class Tracking:
         self._actions.show(draft)
 
     def leave(self) -> None:
-        """Forget the recording: another scene is shown."""
+        """Drop the recording, since another scene is shown."""
         self.close()
         self._tracked = self._distances = self._found = None
         self._markers.visible = False
         self._form.take([])
 
     def close(self) -> None:
-        """End a search."""
+        """End a running search."""
         if self._cancelled is not None:
             self._cancelled.set()
             self._cancelled = None
@@ -120,7 +120,7 @@ class Tracking:
     def window(self, number: int) -> None:
         """Show another window."""
         if self._tracked is not None and 0 <= number < len(self._tracked.windows):
-            with contextlib.suppress(SceneError):  # what makes no cable is edited no more
+            with contextlib.suppress(SceneError):  # an impossible cable is not taken over
                 self._tracked = self._tracked.edited(self._actions.draft())
             self._tracked = replace(self._tracked, shown=number)
             self._distances = None
@@ -142,13 +142,13 @@ class Tracking:
             self._markers.visible = bool(len(markers))
 
     def card(self, time: float) -> str:
-        """Return the error at `time` [s] as a number and over time as a plot; "" where there is no recording."""
+        """Return the error at `time` [s] as a number, and over time as a plot; "" if there is no recording."""
         if self._tracked is None or self._distances is None:
             return ""
         return say.error_card(self._tracked.times, self._distances, time)
 
     def search(self) -> None:
-        """Identify the cable from the recording, beginning with the edited one, or stop doing so."""
+        """Start identifying the cable from the recording, beginning with the edited cable; or stop a running search."""
         if self._tracked is None:
             return
         if self._cancelled is not None:
@@ -163,7 +163,7 @@ class Tracking:
             return
         self._cancelled = threading.Event()
         self._form.running(True)
-        self._form.found(report.note("Waiting for another search, or compiling …", good=True), keep=False)
+        self._form.found(report.note("Waiting for another search to end, or compiling …", good=True), keep=False)
         threading.Thread(target=self._search, args=(self._tracked, self._cancelled), daemon=True).start()
 
     def _search(self, tracked: Tracked, cancelled: threading.Event) -> None:
@@ -175,7 +175,7 @@ class Tracking:
                     work()
                     self._actions.flush()
 
-            with contextlib.suppress(RuntimeError):  # the loop is closed: the service stops
+            with contextlib.suppress(RuntimeError):  # the loop is closed because the service is stopping
                 self._loop.call_soon_threadsafe(unless_cancelled)
 
         def on_progress(progress: Progress) -> None:
@@ -198,7 +198,7 @@ class Tracking:
         self._form.found(report.note(words, good=False), keep=False)
 
     def _take(self, found: Identification) -> None:
-        """Show what was found, and the recording with it."""
+        """Show the result of a search, and the recording with the identified cable."""
         assert self._tracked is not None
         self._cancelled, self._found = None, found
         self._tracked = replace(self._tracked, candidate=found.candidate)
@@ -207,7 +207,7 @@ class Tracking:
         self._actions.show(self._tracked.draft())
 
     def keep(self, name: str) -> None:
-        """Keep the cable and drag that are shown now as a preset."""
+        """Keep the cable and the drag of the edited scene as a preset."""
         draft = self._actions.draft()
         drag = {key: draft.get(("environment", key), 0.0) for key in ("drag", "drag_quadratic")}
         try:

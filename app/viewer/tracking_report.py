@@ -1,4 +1,4 @@
-"""What a recording's tab says, in small pieces of HTML: the error, a search under way, what was found."""
+"""Texts about a recording, as small pieces of HTML: the error, the progress of a search, its result."""
 
 from html import escape
 
@@ -14,7 +14,7 @@ WIDTH, HEIGHT = 300, 84
 
 
 def progress(progress: Progress) -> str:
-    """Return where a search stands."""
+    """Return the progress of a search."""
     values = ", ".join(f"{name} {value:.3g}" for name, value in progress.values.items())
     return (
         f'<div style="margin: 0.2rem 0.75rem; font-size: 0.78rem;" data-identify="running"><b>Iteration '
@@ -23,7 +23,7 @@ def progress(progress: Progress) -> str:
 
 
 def result(found: Identification) -> str:
-    """Return what a search found: a table of the parameters with their intervals."""
+    """Return the result of a search: a table of the parameters with their intervals."""
     rows = "".join(
         f'<tr><td>{escape(p.name)}</td><td style="text-align: right;">'
         + (
@@ -45,8 +45,8 @@ def error_card(times: Floats, distances: Floats, time: float) -> str:
 
     Args:
         times: (k,) [s].
-        distances: (k,) [m], NaN where nothing is known.
-        time: [s] of the cursor.
+        distances: (k,) [m], NaN where unknown.
+        time: time of the cursor [s].
     """
     known = np.isfinite(distances)
     if not known.any():
@@ -64,7 +64,7 @@ def error_card(times: Floats, distances: Floats, time: float) -> str:
     x, y = place(float(np.clip(time, t[0], t[-1])), now)
     return (
         f'<div style="margin: 0 0.75rem 0.5rem; font-size: 0.78rem;" data-error="{now:.2f}"><b>{now:.1f} mm</b> '
-        f'from the measured markers <span style="opacity: 0.7;">(median of them; over time '
+        f'from the measured markers <span style="opacity: 0.7;">(median of the markers; over time: median '
         f"{np.median(mm):.1f}, at most {most:.0f} mm)</span>"
         f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="error over time" '
         'style="width: 100%; display: block;" '

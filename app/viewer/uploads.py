@@ -1,4 +1,4 @@
-"""Files that a person opens: a scene as JSON, or the points of a cable as JSON, CSV or NumPy arrays."""
+"""Read files that the user opens: a scene as JSON, or the points of a cable as JSON, CSV or NumPy arrays."""
 
 import io
 import json
@@ -19,8 +19,8 @@ from dlocore.shape.cloud import LEAST, fit_cloud
 from dlocore.shape.fit import MAX_LENGTH_MISMATCH
 
 Floats = NDArray[np.float64]
-LARGEST = 10_000_000  # bytes, of a file and of its array
-MOST_POINTS = 2000  # that a document keeps; of more, a curve is fitted
+LARGEST = 10_000_000  # bytes, of a file and of an array in it
+MOST_POINTS = 2000  # most points that a document keeps; more are replaced by samples of a fitted curve
 SAMPLES = 101  # of that curve
 _KINDS = "a .json scene, or points as .json, .csv, .txt, .npz or .npy"
 _ARRAYS = ("points", "positions", "control_points")
@@ -30,7 +30,7 @@ def opened(draft: Draft, name: str, content: bytes) -> Draft:
     """Return the draft that a file describes: its scene, or `draft` with the cable along its points.
 
     Raises:
-        SceneError: the file is none that can be opened, or what it holds is no scene.
+        SceneError: the file can't be opened, or it contains no valid scene or points.
     """
     if len(content) > LARGEST:
         raise SceneError("file", f"{len(content)} bytes", f"at most {LARGEST} bytes")
@@ -47,7 +47,7 @@ def opened(draft: Draft, name: str, content: bytes) -> Draft:
     found = readers[suffix](content)
     if isinstance(found, dict):
         scene = Draft.of(found) if _has_form(found) else Draft(document=found)
-        scene.request()  # raises where it is none
+        scene.request()  # raises if it is no valid request
         return Draft.of(found)
     return _along(draft, points_array("points", found))
 
@@ -63,7 +63,7 @@ def _json(content: bytes) -> Any:
     try:
         found = json.loads(content.decode("utf-8-sig"))
     except ValueError as error:
-        raise SceneError("file", f"text that ends JSON: {error}", "a scene, or points, as JSON in UTF-8") from None
+        raise SceneError("file", f"invalid JSON: {error}", "a scene, or points, as JSON in UTF-8") from None
     if isinstance(found, dict) and "cable" in found:
         return {key: value for key, value in found.items() if key != "output"}
     if isinstance(found, dict) and "points" in found:
@@ -74,11 +74,11 @@ def _json(content: bytes) -> Any:
 
 
 def _csv(content: bytes) -> Floats:
-    """Return the rows of numbers of a text; a first row of words is its heading."""
+    """Return the rows of numbers in a text; rows of words before the first numbers are headings."""
     try:
         lines = [line.strip() for line in content.decode("utf-8-sig").splitlines()]
     except UnicodeDecodeError:
-        raise SceneError("file", "bytes that are no text", "rows of 2 or 3 numbers [m], in UTF-8") from None
+        raise SceneError("file", "bytes that are not text", "rows of 2 or 3 numbers [m], in UTF-8") from None
     rows: list[list[float]] = []
     for number, line in enumerate(lines, 1):
         if not line or line.startswith("#"):
@@ -91,7 +91,7 @@ def _csv(content: bytes) -> Floats:
                 raise SceneError(f"file, line {number}", line, "2 or 3 numbers [m]") from None
             continue
         if len(row) not in (2, 3) or (rows and len(row) != len(rows[0])):
-            raise SceneError(f"file, line {number}", line, "2 or 3 numbers [m], as many in every line")
+            raise SceneError(f"file, line {number}", line, "2 or 3 numbers [m], the same count in every line")
         rows.append(row)
     if not rows:
         raise SceneError("file", "no row of numbers", "rows of 2 or 3 numbers, the points [m]")
@@ -99,9 +99,12 @@ def _csv(content: bytes) -> Floats:
 
 
 def _arrays(content: bytes) -> Floats:
-    """Return the points of a NumPy file: its array `points`, the last of its `positions`, or its only array."""
+    """Return the points of a NumPy file: its array `points`, `positions` or `control_points`, or its only array.
+
+    If the array is a motion, the points are those at its end.
+    """
     file = io.BytesIO(content)
-    if not content.startswith(b"PK"):  # no archive
+    if not content.startswith(b"PK"):  # not an archive
         name, found = "points", read_array(file, "file")
     else:
         arrays = ArrayFile(file, "file", LARGEST)
@@ -110,7 +113,7 @@ def _arrays(content: bytes) -> Floats:
         if not name:
             raise SceneError("file", ", ".join(names) or "no array", "an array called points, (n, 2) or (n, 3) [m]")
         found = arrays.read(name)
-    if found.ndim == 3 and len(found):  # a motion: where it ends
+    if found.ndim == 3 and len(found):  # a motion: take its end
         found = found[-1]
     if found.dtype.kind not in "fiu" or found.ndim != 2 or found.shape[1] not in (2, 3, 4):
         raise SceneError(f"file, {name}", f"{found.dtype} {found.shape}", "numbers, (n, 2) or (n, 3) [m]")
@@ -118,7 +121,7 @@ def _arrays(content: bytes) -> Floats:
 
 
 def _along(draft: Draft, points: Floats) -> Draft:
-    """Let the cable start along points, in order or not; its length follows theirs where it differs too much."""
+    """Let the cable start along ordered or unordered points; it takes over their length if its own differs too much."""
     if len(points) == 2:
         return _between(draft, *points)
     try:
@@ -143,7 +146,7 @@ def _between(draft: Draft, begin: Floats, end: Floats) -> Draft:
 
 
 def _as_long(draft: Draft, measured: float) -> Draft:
-    """Give the cable the length of its points [m], unless its own is about that."""
+    """Give the cable the measured length of its points [m], unless its own length is close to that."""
     if abs(measured - draft.length) <= 0.5 * MAX_LENGTH_MISMATCH * draft.length:
         return draft
     return scaled(draft, round(measured, 6))

@@ -1,11 +1,11 @@
-"""What the solver says of a scene, in the words of the panel: its labels for fields, its names of grippers."""
+"""Translate the solver's messages into the panel's words: its labels for fields, its names for grippers."""
 
 import re
 from collections.abc import Sequence
 
 from dlocore.errors import MILLIMETRES
 
-LABELS = {  # of the panel, by field of a scene's document; [] for any number
+LABELS = {  # the panel's labels by field of a scene's document; [] stands for any index
     "cable.preset": "Preset",
     "cable.length": "Length [m]",
     "cable.diameter": "Diameter [mm]",
@@ -52,13 +52,13 @@ LABELS = {  # of the panel, by field of a scene's document; [] for any number
     "quality.method": "Method",
     "quality.keep_grid": "Keep this grid",
 }
-_ALONE = [label.partition(" [")[0] for label in LABELS.values()]  # without their units, by which some differ
+_ALONE = [label.partition(" [")[0] for label in LABELS.values()]  # without units; some labels differ only in those
 _NAMES = {
     field: name if _ALONE.count(name) == 1 else label
     for (field, label), name in zip(LABELS.items(), _ALONE, strict=True)
 }
 _BARE = {field.rpartition(".")[2]: name for field, name in _NAMES.items()}
-_BARE = {field: name for field, name in _BARE.items() if "_" in field and field not in name}  # else a word of the prose
+_BARE = {field: name for field, name in _BARE.items() if "_" in field and field not in name}  # others are plain words
 _PART = r"[a-z_]+(?:\[\d+\])*"
 _FIELD = re.compile(
     rf"\b(?:(?:cable|environment|shape|quality|effects)(?:\.{_PART})+|(?:primitives|loads)\[\d+\](?:\.{_PART})*"
@@ -68,23 +68,23 @@ _FIELD = re.compile(
 
 
 def gripper_name(number: int, u: float) -> str:
-    """Return what the panel calls the gripper of this number, from 0, that holds the cable at `u` [m]."""
+    """Return the panel's name of gripper `number` (from 0), which holds the cable at `u` [m]."""
     return f"{number + 1} at {u:.3g} m"
 
 
 def in_labels(text: str, places: Sequence[float]) -> str:
-    """Return a text in which the panel's labels are in the place of fields of the API.
+    """Return a text in which the panel's labels replace the fields of the API.
 
     Args:
-        text: of the solver.
-        places: at which the grippers hold the cable [m].
+        text: message of the solver.
+        places: where the grippers hold the cable [m].
     """
     return _FIELD.sub(lambda found: _label(found[0], places), text)
 
 
 def problem_in_labels(problem: str, details: str, places: Sequence[float]) -> tuple[str, str]:
-    """Return what is wrong, and its field, value and what is allowed, likewise."""
-    if problem == MILLIMETRES and details.startswith("quality.target_error:"):  # which the panel has in millimetres
+    """Return a problem and its details (field, value, what is allowed) with the panel's labels."""
+    if problem == MILLIMETRES and details.startswith("quality.target_error:"):  # the panel takes it in millimetres
         problem = "quality.target_error"
     told = (in_labels(text, places) for text in (problem, details))
     problem, details = (new if new in (problem, details) else new[:1].upper() + new[1:] for new in told)

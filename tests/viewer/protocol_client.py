@@ -1,4 +1,4 @@
-"""A viewer client without a browser: the protocol of the scene's websocket, spoken by hand."""
+"""A viewer client without a browser, which speaks the protocol of the scene's websocket."""
 
 import contextlib
 import json
@@ -39,10 +39,10 @@ def decode(frame: bytes) -> list[dict[str, Any]]:
 
 
 class SceneClient:
-    """Connects, and keeps what the scene's nodes and controls were last told to be."""
+    """Connects to the scene, and keeps the last state of its nodes and controls that the server sent."""
 
     def __init__(self, url: str, **options: Any) -> None:
-        # frames that nobody reads hold up the closing handshake: don't wait for it
+        # unread frames delay the closing handshake: don't wait for it
         self.socket: ClientConnection = connect(
             url, subprotocols=[SUBPROTOCOL], max_size=None, proxy=None, close_timeout=0.3, **options
         )
@@ -81,7 +81,7 @@ class SceneClient:
         self.socket.send(msgspec.msgpack.encode(message))
 
     def wait_for(self, condition: Callable[[], Any], timeout: float = 20.0) -> Any:
-        """Take in messages until `condition` holds; return its value."""
+        """Process messages until `condition` holds; return its value."""
         give_up = time.monotonic() + timeout
         while not (value := condition()):
             remaining = give_up - time.monotonic()
@@ -93,12 +93,12 @@ class SceneClient:
         return value
 
     def take_one(self, seconds: float) -> None:
-        """Take in the next frame, if it comes in time."""
+        """Process the next frame, if it comes in time."""
         with contextlib.suppress(TimeoutError):
             self._take(self.socket.recv(timeout=seconds))
 
     def listen(self, seconds: float) -> None:
-        """Take in messages for a while."""
+        """Process messages for a while."""
         give_up = time.monotonic() + seconds
         while (remaining := give_up - time.monotonic()) > 0:
             try:
@@ -138,7 +138,7 @@ class SceneClient:
                 self.owners[name] = message.get("owner", "")
 
     def _take_part(self, message: dict[str, Any]) -> None:
-        """Add a part of a download, which is there once it is whole."""
+        """Add a part of a download, which is kept once it is complete."""
         uuid = message["transfer_uuid"]
         parts = self._parts.setdefault(uuid, {})
         parts[message["part_index"]] = bytes(message["content"])
@@ -151,7 +151,7 @@ class SceneClient:
         return next((uuid, state) for uuid, state in self.controls.items() if state.get("label") == label)
 
     def set(self, label: str, value: Any) -> None:
-        """Set a control, as a person would."""
+        """Set a control like a user."""
         self.send(type="GuiUpdateMessage", uuid=self.control(label)[0], updates={"value": value})
 
     def press(self, label: str) -> None:
@@ -180,7 +180,7 @@ class SceneClient:
         return json.loads(self.downloads[names[0]])
 
     def refined(self) -> None:
-        """Wait until the picture shows a prediction at the asked quality."""
+        """Wait until the picture shows a prediction at the requested quality."""
         self.wait_for(lambda: "control points" in self.card and "Preview" not in self.card)
 
     def upload(self, label: str, name: str, content: bytes) -> None:
@@ -249,7 +249,7 @@ class SceneClient:
 
 
 def connected(service: Any, example: str = "new", tab: str = "", **options: Any) -> SceneClient:
-    """Return a client that sees its first prediction, of a ready scene or of the paper's case, or goes on in a tab."""
+    """Return a client that sees its first prediction: of a ready scene, the paper's case, or the scene of a tab."""
     path = f"/scene/{example}/{tab}" if tab else httpx.get(f"{service.address}/scene/{example}/").headers["location"]
     return opened(service, path, **options)
 
@@ -257,7 +257,7 @@ def connected(service: Any, example: str = "new", tab: str = "", **options: Any)
 def opened(service: Any, path: str, **options: Any) -> SceneClient:
     """Return a client of the scene whose page is at `path`, which sees its first prediction."""
     client = SceneClient(service.address.replace("http", "ws") + path.rstrip("/"), **options)
-    # a frame has at most 128 messages: what is drawn may come in one after that of the card
+    # a frame has at most 128 messages: the picture may come in a later frame than the card
     client.wait_for(lambda: "control points" in client.card and "/cable" in client.nodes and client.final_shape.any())
     return client
 

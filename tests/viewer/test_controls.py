@@ -114,13 +114,13 @@ def test_an_edited_target_error_leaves_the_rest_of_the_asked_quality_as_it_was_g
         client.set("Target error [mm]", 30.0)
         assert client.document["quality"] == {"target_error": 0.03, "method": "reference", "delta": 1e-6}
         client.wait_for(lambda: "reference," in client.card, timeout=60)
-        client.set("Ask for", "grid")  # which no reference takes
+        client.set("Ask for", "grid")  # the method reference takes no grid
         assert "method" not in client.document["quality"]
         client.wait_for(lambda: "reference" not in client.control("Method")[1]["options"])
 
 
 def typed(client: SceneClient, label: str, texts: list[str], pause: float = 0.1) -> None:
-    """Type into a number field, which sends what it holds after every keystroke."""
+    """Type into a number field, which sends its content after every keystroke."""
     for text in texts:
         client.set(label, float(text))
         client.listen(pause)
@@ -141,7 +141,7 @@ def test_what_nobody_means_is_neither_solved_nor_called_impossible(service):
     with connected(service) as client:
         client.refined()
         cards = set()
-        for text in ("0", "0.", "0.0", "0.02"):  # in more than the time of a rest, to the end of which none comes
+        for text in ("0", "0.", "0.0", "0.02"):  # takes longer than REST, but no pause does
             typed(client, "Diameter [mm]", [text], pause=0.15)
             cards.add(client.card)
         assert len(cards) == 1
@@ -232,7 +232,7 @@ def test_what_is_being_measured_is_told_and_can_be_stopped(service):
 
 
 def test_where_no_effect_can_be_measured_that_is_told(service):
-    with connected(service, "keeps-its-bend") as client:  # plastic in its plane, which explicit switches do not allow
+    with connected(service, "keeps-its-bend") as client:  # plastic in the plane, where explicit switches are refused
         client.refined()
         client.press("Measure what each costs")
         client.wait_for(lambda: client.notifications == ["No costs"], timeout=60)
@@ -245,14 +245,14 @@ def test_an_obstacle_is_drawn_where_it_stands_and_taken_away(service):
         client.wait_for(lambda: "/obstacle/0" in client.nodes)
         client.set("Centre [m]", [0.6, -0.3, 0.03])
         client.wait_for(lambda: client.positions.get("/obstacle/0") == pytest.approx([0.6, -0.3, 0.03]))
-        assert client.control("Ask for")[1]["value"] == "automatic"  # a fixed grid would be too coarse for a contact
+        assert client.control("Ask for")[1]["value"] == "automatic"  # a given grid would be too coarse for a contact
         client.press("Remove obstacle")
         client.wait_for(lambda: "/obstacle/0" not in client.nodes)
 
 
 def test_a_cable_is_drawn_around_an_obstacle_in_its_way_and_touches_it(service):
     with connected(service) as client:
-        x, y = client.final_shape[24, :2].tolist()  # where the cable would come to lie
+        x, y = client.final_shape[24, :2].tolist()  # where the cable would lie in the end
         client.set("Add", "Cylinder")
         client.set("Centre [m]", [x, y, 0.05])
         client.wait_for(lambda: client.positions.get("/obstacle/0") == pytest.approx([x, y, 0.05]))
@@ -311,7 +311,7 @@ def test_a_click_on_the_cable_takes_hold_of_it_there(service):
         client.press("Pause")
         client.set("Time [s]", 0.0)
         client.wait_for(lambda: abs(client.cable[30, 1]) < 1e-6)
-        client.click((0.7, 0.2, 0.0))  # beside it: nothing happens
+        client.click((0.7, 0.2, 0.0))  # a click that misses the cable does nothing
         client.click((0.7, 0.005, 0.0))
         client.wait_for(lambda: client.control("Grasp u [m]")[1]["value"] == pytest.approx(0.7, abs=1 / 240))
 
@@ -342,7 +342,7 @@ def test_the_card_tells_what_is_to_be_known_of_a_converged_answer(service):
         assert 'data-status="converged"' in client.card
         client.set("inertia", "auto")
         client.wait_for(lambda: "Preview" not in client.card and "Note:" not in client.card)
-        # on the grid that was asked for it errs by a few centimetres, which is all that is said where that is kept
+        # on the given grid it errs by a few centimetres; if that grid is kept, the message says only that
         client.set("EI [10⁻³ N m²]", 0.1)
         client.set("Keep this grid", True)
         client.set("Grasp u [m]", 0.8)

@@ -1,4 +1,4 @@
-"""Edits of a draft, without a service: what a click, a turn, a new gripper and a number on the panel mean."""
+"""Edits of a draft, without a service: clicks, rotations, new grippers and numbers on the panel."""
 
 import xml.etree.ElementTree as ET
 
@@ -63,7 +63,7 @@ def test_the_last_waypoint_is_the_target_of_a_gripper_that_follows_some():
     draft = Draft.of(start_draft().put(("primitives", 0, "path"), path).document)
     moved = grips.with_target(draft, np.zeros(3), np.array([0.3, 0.2, 0.0]))
     assert moved.primitives[0]["path"]["positions"] == [[0.25, 0, 0], [0.3, 0.2, 0.0]]
-    assert draft.primitives[0]["path"]["positions"][1] == [0.25, 0.3, 0]  # the draft before it is what it was
+    assert draft.primitives[0]["path"]["positions"][1] == [0.25, 0.3, 0]  # the earlier draft is unchanged
 
 
 def test_a_second_gripper_leaves_a_scene_that_the_cable_can_follow():
@@ -89,7 +89,7 @@ def test_new_obstacles_stand_beside_each_other():
         draft = obstacle_edits.added(draft, kind)
     bodies = obstacle_edits.obstacles(draft)
     middles = np.array([obstacle_edits.centre(body) for body in bodies])
-    # half of what the largest of each kind measures across the table, [m]: round ones lie along x or stand
+    # half the largest extent of each kind across the table [m]: round ones lie along x or stand
     half = np.array([{"cylinder": 0.03, "box": 0.03, "capsule": 0.025, "sphere": 0.04}[kind] for kind in kinds])
     order = np.argsort(middles[:, 1])
     gaps = np.diff(middles[order, 1]) - half[order][1:] - half[order][:-1]
@@ -166,7 +166,7 @@ def test_the_present_solve_is_a_dot_among_what_the_machine_was_calibrated_to():
     )
     earlier: list[tuple[float, float]] = []
     tree = ET.fromstring(report.accuracy_plot(prediction, earlier, measured))
-    assert len(list(tree.iter("circle"))) == 3 + 2 + 1  # all, the two that no other one beats, and the solve
+    assert len(list(tree.iter("circle"))) == 3 + 2 + 1  # all points, the two on the front, and the solve
     assert earlier == [(1e3 * prediction.accuracy.wall_time, 1e3 * prediction.accuracy.error_estimate)]
 
 

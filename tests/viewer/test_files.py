@@ -1,4 +1,4 @@
-"""Scenes and points are opened from files, edited by hand and taken away again."""
+"""Scenes and points are opened from files, edited by hand and saved again."""
 
 import contextlib
 import io
@@ -126,7 +126,7 @@ def test_a_damaged_file_of_arrays_is_refused_wherever_it_is_damaged(ending, comp
     cut = [good[:k] for k in range(0, len(good), 7)]
     changed = [good[:k] + bytes([rng.integers(256)]) + good[k + 1 :] for k in range(0, len(good), 3)]
     for content in (*cut, *changed):
-        with contextlib.suppress(SceneError):  # else it is opened: what is damaged does not matter
+        with contextlib.suppress(SceneError):  # otherwise it is opened: the damage does not matter
             uploads.opened(start_draft(), f"points.{ending}", content)
 
 

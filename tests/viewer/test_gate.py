@@ -106,7 +106,7 @@ def test_solves_of_the_scene_are_counted_with_all_others(service):
         client.drag("start")
         client.drag("update", 0.3, 0.3)
         client.drag("end")
-        # the first one and a refined one; a drag as short as this may end before its preview is begun
+        # the first one and a refined one; a drag as short as this may end before its preview begins
         client.wait_for(lambda: solves() >= before + 2)
 
 

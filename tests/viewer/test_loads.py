@@ -52,7 +52,7 @@ def test_a_force_that_jumps_is_shown_before_and_after_the_jump():
 
 @pytest.mark.parametrize(("before", "after"), [(0.1, 15.0), (0.1, 0.0), (0.0, 15.0)], ids=["rises", "ends", "begins"])
 def test_a_force_that_jumps_as_the_motion_ends_is_drawn_as_before_it(before, after):
-    """What came after the jump was drawn at a scale without it, 3e12 m long."""
+    """The force after the jump used to be drawn 3e12 m long, at a scale that left it out."""
     hanging = Scene(
         cable=Cable(length=0.5, diameter=0.005, linear_density=0.05, bending_stiffness=1e-3),
         shape=Straight(direction=(0, 0, -1)),

@@ -1,4 +1,4 @@
-"""The number fields of the panel: what is typed is what is solved, or is told to be none."""
+"""The number fields of the panel: a typed number is solved, or reported as not allowed."""
 
 import pytest
 from protocol_client import SceneClient, connected
@@ -31,7 +31,7 @@ LABEL = "EI [10⁻³ N m²]"
 
 
 def typed(client: SceneClient, text: str) -> None:
-    """Type into the field, which shows it until it is told otherwise."""
+    """Type into the field, which shows the text until the server changes it."""
     client.control(LABEL)[1]["value"] = text
     client.set(LABEL, text)
 
@@ -59,7 +59,7 @@ def test_the_beginning_of_a_number_is_waited_for(service):
     with connected(service) as client:
         for text in ("1", "1e", "1e-", "1e-1"):
             typed(client, text)
-            client.listen(0.6)  # s: longer than the rest after which a number counts as typed
+            client.listen(0.6)  # s: longer than the pause after which a number counts as typed
         client.wait_for(lambda: '"bending_stiffness": 0.0001' in client.markdown("```json"))
         typed(client, "2e")
         client.wait_for(lambda: client.notifications == [f"{LABEL} is left at 0.1"])

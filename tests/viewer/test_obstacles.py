@@ -1,4 +1,4 @@
-"""What is drawn of an obstacle is its true surface."""
+"""Obstacles are drawn with their true surfaces."""
 
 import numpy as np
 import pytest

@@ -66,7 +66,7 @@ def test_moves_that_turn() -> None:
     assert grips.without_last_move(further).primitives[0]["path"] == {**MOVE, "rotation": [0.0, 0.0, 0.5]}
     assert "orientations" not in grips.with_hold(further, "point").primitives[0]["path"]
     whole = grips.with_turn(draft, np.array([0.0, 0.0, 2.0 * np.pi]))
-    assert grips.with_next_move(whole, BEGIN) == whole  # two orientations do not tell a full turn
+    assert grips.with_next_move(whole, BEGIN) == whole  # two orientations can't express a full turn
 
 
 @pytest.mark.parametrize("profile", [None, "spline"])
@@ -92,7 +92,7 @@ def test_a_program_goes_with_the_place_that_its_gripper_holds() -> None:
     end = grips.carried(longer, longer.start(NOTHING_STORED), grips.changed(before, "u", 1.0), start)
     assert end.primitives[0]["path"]["positions"][0] == [0.75, 0.0, 0.0]  # 0.5 m farther, as the end of the cable is
     assert grips.carried(before, start, before, start) is before
-    late = grips.changed(moved, "grasp_time", 0.5)  # begins where the cable is by then, which no start tells
+    late = grips.changed(moved, "grasp_time", 0.5)  # begins where the cable is by then: no start curve knows that
     assert grips.carried(late, start, before, start) == late
 
 
@@ -121,7 +121,7 @@ def test_moves_are_added_dragged_and_taken_away_on_the_panel(client: SceneClient
     path = client.wait_for(lambda: _path_that_ends_at(client, [0.4, 0.3, 0.0], 2.4))
     assert "3 waypoints in 2.4 s" in client.html("waypoints in")
     assert path["positions"][:2] == [[0.25, 0.0, 0.0], [0.25, 0.5, 0.0]]
-    client.set("Grasp u [m]", 0.3)  # what it holds begins elsewhere, and so do its moves
+    client.set("Grasp u [m]", 0.3)  # the held point starts elsewhere, and so do the moves
     path = client.wait_for(lambda: _path_that_ends_at(client, [0.45, 0.3, 0.0], 2.4))
     assert path["positions"][0] == [0.3, 0.0, 0.0]
     to_scene(PredictionRequest.model_validate(client.document), NOTHING_STORED)

@@ -1,4 +1,4 @@
-"""A recording in the scene: markers over the prediction, the error in time, the cable found from it and kept."""
+"""A recording in the scene: markers over the prediction, the error over time, the cable identified and kept."""
 
 import json
 import re

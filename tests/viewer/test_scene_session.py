@@ -165,7 +165,7 @@ def test_an_answer_that_is_no_success_is_told_in_the_picture(service):
         client.refined()
         assert not client.visible.get("/warning")
         client.set("Ask for", "time budget")
-        client.set("Time budget [ms]", 0.1)  # in which no grid is solved to 1 %
+        client.set("Time budget [ms]", 0.1)  # too short to solve any grid to 1 %
         client.wait_for(lambda: 'data-status="time_limit"' in client.card and "Preview" not in client.card)
         client.wait_for(lambda: client.visible.get("/warning"))
         assert client.nodes["/warning"]["text"] == "Out of time: see the panel."
@@ -256,7 +256,7 @@ def test_an_impossible_scene_leaves_nothing_of_the_scene_before_as_its_own(servi
         assert json.loads(client.markdown("curl -s").split(" -d '")[1].rsplit("'", 1)[0]) == written
         notes = [c["content"] for c in client.controls.values() if "data-effect" in c.get("content", "")]
         assert all("data-stale" in note for note in notes)
-        assert sum(c.get("content", "").count("Of the scene before") for c in client.controls.values()) == 5
+        assert sum(c.get("content", "").count("From the previous scene") for c in client.controls.values()) == 5
         client.press("Save playback.html")
         client.wait_for(lambda: client.notifications == ["No playback"])
         client.press("Save picture.png")

@@ -1,4 +1,4 @@
-"""What a person takes back: a change, a solve that lasts too long; and what a scene without an answer looks like."""
+"""Taking back a change or a solve that lasts too long; and the looks of a scene without an answer."""
 
 import numpy as np
 import pytest
@@ -147,7 +147,7 @@ def test_the_camera_goes_to_where_a_longer_cable_is_seen(service):
         near = np.linalg.norm(client.camera)
         client.set("Length [m]", 1.5)
         client.wait_for(lambda: '"length": 1.5' in client.markdown("```json"))
-        assert np.linalg.norm(client.camera) == near  # as a person has placed it
+        assert np.linalg.norm(client.camera) == near  # where the user has placed it
         client.set("Length [m]", 300.0)
         client.wait_for(lambda: np.linalg.norm(client.camera) > 100.0 * near)
 

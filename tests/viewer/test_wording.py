@@ -1,4 +1,4 @@
-"""What the solver says in terms of the API, said in terms of the panel."""
+"""Messages of the solver, translated from the terms of the API to those of the panel."""
 
 import html
 

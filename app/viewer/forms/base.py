@@ -1,4 +1,4 @@
-"""What all forms share: controls that show a draft and change it."""
+"""The common parts of all forms: controls that show a draft and change it."""
 
 from typing import Any, Protocol
 
@@ -9,25 +9,25 @@ from app.viewer.edits import Change, Edits
 
 
 def show_value(control: Any, value: Any) -> None:
-    """Let a control show `value`, unless it does."""
+    """Let a control show `value`, unless it already does."""
     if control.value != value:
         control.value = value
 
 
 def show_if(control: Any, visible: bool) -> None:
-    """Show or hide a control, unless it is so."""
+    """Show or hide a control, unless it already is shown or hidden."""
     if control.visible != visible:
         control.visible = visible
 
 
 def show_content(control: Any, content: str) -> None:
-    """Let an HTML control show `content`, unless it does."""
+    """Let an HTML control show `content`, unless it already does."""
     if control.content != content:
         control.content = content
 
 
 class Form:
-    """Controls that show a draft and change it; a change by the program is not taken for one by a person."""
+    """Controls that show a draft and change it. Updates by the program do not count as edits by the user."""
 
     def __init__(self, draft: Draft, edits: Edits) -> None:
         self._draft = draft
@@ -47,7 +47,7 @@ class Form:
 
 
 def _beyond(control: Any) -> bool:
-    """Return whether the number beside a slider is out of its range, as 0 is on the way to 0.5."""
+    """Return whether the number next to a slider is out of its range, as 0 is while 0.5 is typed."""
     return isinstance(control, GuiSliderHandle) and not control.min <= control.value <= control.max
 
 

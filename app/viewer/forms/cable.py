@@ -1,4 +1,4 @@
-"""The cable: its preset, its values, and what it remembers."""
+"""The form of the cable: its preset, its values, and what it remembers."""
 
 from typing import Any, Literal
 
@@ -15,7 +15,7 @@ from dlocore.scene.cable import MAX_LENGTH, MIN_LENGTH
 
 CUSTOM = "own values"
 Rest = Literal["straight", "initial", "as loaded"]
-PLASTIC_RATE = 50.0  # 1/s, of the memory, where a yield strain is set and no rate given
+PLASTIC_RATE = 50.0  # 1/s, memory rate if a yield strain is set but no rate
 
 
 class CableForm(Form):
@@ -38,17 +38,17 @@ class CableForm(Form):
             with gui.add_folder("More of the cable", expand_by_default=False):
                 self._torsion = NumberField(gui, "GJ [10⁻³ N m²]", 1.0, low=1e-6, high=1e9)
                 self._stretch = NumberField(gui, "EA [N]", 1.0, low=1e-3, high=1e12)
-                self._damping = NumberField(gui, "Damping [10⁻³ N m² s]", 0.0, low=0.0, high=1e9, hint="Of bending")
+                self._damping = NumberField(gui, "Damping [10⁻³ N m² s]", 0.0, low=0.0, high=1e9, hint="In bending")
                 self._torsion_damping = NumberField(gui, "Twist damping [10⁻³ N m² s]", 0.0, low=0.0, high=1e9)
                 self._stretch_damping = NumberField(
-                    gui, "Stretch damping [N s]", 0.0, low=0.0, high=1e9, hint="0: waves of stretch ring on"
+                    gui, "Stretch damping [N s]", 0.0, low=0.0, high=1e9, hint="0: waves of stretch do not die out"
                 )
                 self._yield = NumberField(
-                    gui, "Yields at strain [%]", 0.0, low=0.0, high=1000.0, hint="Of its outermost fibre; 0: never"
+                    gui, "Yields at strain [%]", 0.0, low=0.0, high=1000.0, hint="In its outermost fibre; 0: never"
                 )
                 self._rate = NumberField(gui, "Memory rate [1/s]", PLASTIC_RATE, low=1e-3, high=1e9)
                 self._rest = gui.add_dropdown(
-                    "Stress-free shape", ("straight", "initial", "as loaded"), hint="initial: that of its start"
+                    "Stress-free shape", ("straight", "initial", "as loaded"), hint="initial: the start shape"
                 )
         self._bind(self._preset, self._with_preset)
         self._bind(self._length, lambda d: scaled(d, self._length.value))
@@ -83,25 +83,25 @@ class CableForm(Form):
 
     @staticmethod
     def _as_it_is(draft: Draft) -> dict[str, Any]:
-        """Return what a cable keeps as it becomes another kind: its length and what hangs on it."""
+        """Return what a cable keeps when its preset changes: its length and its point masses."""
         masses = draft.get(("cable", "point_masses"))
         return {"length": draft.length, **({"point_masses": masses} if masses else {})}
 
     def _with_connector(self, draft: Draft) -> Draft:
-        """Give the first point mass its mass, a new one at the far end; of none it is taken away. Others stay."""
+        """Set the mass of the first point mass; a new one goes to the far end, and 0 removes it. Others stay."""
         masses = draft.get(("cable", "point_masses"), [])
         mass = float(f"{1e-3 * self._connector.value:.9g}")
         first = [{"u": masses[0]["u"] if masses else draft.length, "mass": mass}] if mass > 0.0 else []
         return draft.put(("cable", "point_masses"), [*first, *masses[1:]])
 
     def _with_place(self, draft: Draft) -> Draft:
-        """Put the first point mass, if there is one, where it is wanted."""
+        """Move the first point mass, if there is one."""
         u = float(f"{min(self._connector_u.value, draft.length):.9g}")
         there = draft.get(("cable", "point_masses"))
         return draft.put(("cable", "point_masses", 0, "u"), u) if there else draft
 
     def offer(self) -> None:
-        """Offer the cables that are kept now."""
+        """Offer the cables that are kept now among the presets."""
         self._kept = self._cables.all()
         self._preset.options = (*PRESETS, *self._kept, CUSTOM)
         show_value(self._preset, preset_of(self._draft.get(("cable",), {}), self._kept))
@@ -117,7 +117,7 @@ class CableForm(Form):
         return draft if wanted == "as loaded" else draft.put(("cable", "rest_shape"), wanted)
 
     def take(self, draft: Draft) -> None:
-        """Show `draft`, and the preset that it is, if it is one; numbers that make no cable stay as they were."""
+        """Show `draft` and the preset that it matches, if any; if it makes no cable, the controls stay as they are."""
         self._draft = draft
         try:
             cable = draft.cable()
@@ -158,7 +158,7 @@ def _shown(scale: float, value: float | None) -> float:
 def preset_of(cable: dict[str, Any], kept: dict[str, dict[str, Any]] | None = None) -> str:
     """Return the name of the preset or kept cable that has the values of `cable`, or `CUSTOM`.
 
-    Its length may be any, and so may what hangs on it.
+    Length and point masses are not compared.
     """
     values = {name: value for name, value in cable.items() if name not in ("length", "point_masses")}
     if set(values) == {"preset"}:

@@ -1,4 +1,4 @@
-"""The effects: each on, off or automatic, whether it is simulated, why, and what it costs."""
+"""The form of the effects: whether each is on, off or automatic, whether and why it is simulated, and its cost."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -17,7 +17,7 @@ SWITCHES: tuple[Switch, ...] = get_args(Switch)
 
 
 class EffectsForm(Form):
-    """Edits the switches of the effects, and shows what became of them."""
+    """Edits the switches of the effects, and shows which were simulated."""
 
     def __init__(self, gui: GuiApi, draft: Draft, edits: Edits) -> None:
         super().__init__(draft, edits)
@@ -46,13 +46,13 @@ class EffectsForm(Form):
             show_value(switch, "auto" if isinstance(given, str) else given.get(name, "auto"))
 
     def show(self, effects: tuple[EffectReport, ...], costs: Mapping[str, float]) -> None:
-        """Show what was simulated and why, and by how much an effect changes the time of a solve [s], where known."""
+        """Show what was simulated and why, and the known costs of effects in solve time [s]."""
         show_content(self._mark, "")
         for effect in effects:
             show_content(self._notes[effect.name], report.effect_note(effect, costs.get(effect.name)))
 
     def mark_stale(self) -> None:
-        """Show the notes so that nobody takes them for those of a scene that has none yet."""
+        """Mark the notes as those of the previous scene."""
         if self._mark.content or not any(note.content for note in self._notes.values()):
             return
         self._mark.content = report.dimmed(report.OF_BEFORE)

@@ -1,4 +1,4 @@
-"""The grippers: which one is in hand, where and how it holds the cable, and where it goes."""
+"""The form of the grippers: which one is selected, where and how it holds the cable, and where it goes."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -21,18 +21,18 @@ NONE = "no gripper"
 HOLDS = {"its place": "point", "place and direction": "tangent", "place, direction and twist": "clamp"}
 Notify = Callable[[str, str], object]
 ANOTHER, LAST = "Add", "Remove last"
-FARTHEST = 1000.0  # m, of a target's coordinates
+FARTHEST = 1000.0  # m, limit of a target's coordinates
 
 
 class GripperForm(Form):
-    """Edits the gripper in hand.
+    """Edits the selected gripper.
 
     Args:
-        gui: where the controls go.
+        gui: the GUI that gets the controls.
         draft: the scene to start with.
         start: its start curve.
         edits: makes the changes of the draft.
-        notify: shows a notification of this title and text.
+        notify: shows a notification with this title and text.
     """
 
     def __init__(self, gui: GuiApi, draft: Draft, start: StartCurve, edits: Edits, notify: Notify) -> None:
@@ -56,7 +56,7 @@ class GripperForm(Form):
         self._moves = gui.add_button_group(
             "Moves",
             (ANOTHER, LAST),
-            hint="One after another; target and duration are those of the last, a pause goes nowhere",
+            hint="Made one after another; target and duration belong to the last. A move that goes nowhere is a pause",
         )
         self._waypoints = gui.add_html("")
         with gui.add_folder("Timing", expand_by_default=False) as self._timing:
@@ -85,7 +85,7 @@ class GripperForm(Form):
         self._bind(self._horizon, lambda d: d.put(("horizon",), self._horizon.value or None))
 
     def _with_new(self, draft: Draft) -> Draft:
-        """Add a gripper, and say which targets that has changed."""
+        """Add a gripper, and notify the user of the targets that this changed."""
         edited = grips.added(draft, self._start)
         pairs = zip(draft.primitives, edited.primitives, strict=False)  # the new one is the last
         for number, (before, after) in enumerate(pairs, 1):
@@ -95,14 +95,14 @@ class GripperForm(Form):
         return edited
 
     def _with_moves(self, draft: Draft) -> Draft:
-        """Add a move after the last one, or take that away; say where that is not possible."""
+        """Add a move after the last one, or remove the last; notify the user if that is not possible."""
         if self._moves.value == LAST:
             if grips.moves(draft) < 2:
-                self._notify("One move is left", "To have none, choose that the gripper stays.")
+                self._notify("One move is left", "For no move at all, set Motion to stays.")
             return grips.without_last_move(draft)
         longer = grips.with_next_move(draft, self._begin(draft))
         if longer == draft:
-            self._notify("No move is added", "The last one turns by more than half a turn: make it two moves.")
+            self._notify("No move is added", "The last one rotates by more than half a turn. Make it two moves.")
         return longer
 
     @staticmethod
@@ -113,7 +113,7 @@ class GripperForm(Form):
         return grips.origin(draft, self._start, self._shown)
 
     def follow(self, start: StartCurve, shown: SplineSurface | None) -> None:
-        """Measure targets from another start, and where grippers close later from another prediction."""
+        """Measure targets from a new start curve and, for grippers that close later, from a new prediction."""
         self._start, self._shown = start, shown
 
     def take(self, draft: Draft) -> None:

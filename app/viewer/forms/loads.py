@@ -1,4 +1,4 @@
-"""The known forces on the cable: where they act, how, and when."""
+"""The form of the known forces on the cable: where, how and when they act."""
 
 from typing import Any
 
@@ -22,14 +22,14 @@ class LoadsForm(Form):
         super().__init__(draft, edits)
         self._chosen = 0
         with gui.add_folder("Known forces"):
-            self._add = gui.add_button("Add a force", color="gray", hint="Beside those of grippers and surroundings")
+            self._add = gui.add_button("Add a force", color="gray", hint="On top of grippers and surroundings")
             self._which = gui.add_dropdown("Force", (NONE,))
             self._u = NumberField(gui, "Acts at u [m]", 0.0, low=0.0, high=MAX_LENGTH)
             self._force = gui.add_vector3("Force [N]", (0.0, 0.0, 0.0), step=0.001)
             self._start = NumberField(gui, "From [s]", 0.0, low=0.0, high=LATEST)
             self._end = NumberField(gui, "Until [s]", 0.0, low=0.0, high=LATEST, hint="0: to the end")
             self._over_time = gui.add_html(
-                '<div style="margin: 0.2rem 0.75rem; font-size: 0.78rem;">It changes over time as its file tells.</div>'
+                '<div style="margin: 0.2rem 0.75rem; font-size: 0.78rem;">It changes over time as in its file.</div>'
             )
             self._remove = gui.add_button("Remove force", color="gray")
         self._on_click(self._add, self._with_new)
@@ -43,7 +43,7 @@ class LoadsForm(Form):
         async def _choose(event: GuiEvent[Any]) -> None:
             if event.client is not None and self._which.value in self._names(self._draft):
                 chosen = self._names(self._draft).index(self._which.value)
-                self._edits.finish()  # what was typed is of the force before
+                self._edits.finish()  # what was typed belongs to the previously chosen force
                 self._chosen = chosen
                 self.take(self._draft)
 

@@ -1,4 +1,4 @@
-"""What accuracy, time or grid is asked for; only the numbers of the chosen way are shown."""
+"""The form of the requested quality: accuracy, time or grid. Only the numbers of the chosen mode are shown."""
 
 from typing import Any, Literal, get_args
 
@@ -11,18 +11,18 @@ from app.viewer.number_field import NumberField
 
 Mode = Literal["automatic", "target error", "time budget", "grid"]
 QUALITY = ("quality",)
-METHODS: dict[Mode, tuple[str, ...]] = {  # that each way of asking allows
+METHODS: dict[Mode, tuple[str, ...]] = {  # methods that each mode allows
     "automatic": ("auto", "march", "reference"),
     "target error": ("auto", "march", "reference"),
     "time budget": ("auto", "march"),
     "grid": ("auto", "march", "spacetime", "paper"),
 }
-NONE = "none"  # that of the method, and no reason to take one that has a threshold
+NONE = "none"  # no threshold given: the method uses its own, and auto is not led to a method that has one
 DELTAS = {"10⁻⁴ m": 1e-4, "10⁻⁵ m": 1e-5, "10⁻⁶ m": 1e-6, "10⁻⁷ m": 1e-7, "10⁻⁸ m": 1e-8}
 
 
 class QualityForm(Form):
-    """Edits the asked quality."""
+    """Edits the requested quality."""
 
     def __init__(self, gui: GuiApi, draft: Draft, edits: Edits) -> None:
         super().__init__(draft, edits)
@@ -34,7 +34,7 @@ class QualityForm(Form):
         self._delta = gui.add_dropdown("Threshold δ", (NONE, *DELTAS))
         self._method = gui.add_dropdown("Method", METHODS["grid"])
         self._keep = gui.add_checkbox(
-            "Keep this grid", False, hint="Also where it errs by more than 1 % of the length, or does not converge"
+            "Keep this grid", False, hint="Even if it errs by more than 1 % of the length or does not converge"
         )
         self._bind(self._mode, self._asked)
         for control in (self._error, self._budget, self._method, *self._of_grid):
@@ -47,7 +47,7 @@ class QualityForm(Form):
     def _asked(self, draft: Draft) -> Draft:
         mode: Mode = self._mode.value
         given = _given(draft)
-        wanted: dict[str, Any] = given if mode == _mode(given) else {}  # with what has no control here
+        wanted: dict[str, Any] = given if mode == _mode(given) else {}  # keep what has no control here
         if mode == "target error":
             wanted["target_error"] = float(f"{1e-3 * self._error.value:.9g}")
         elif mode == "time budget":

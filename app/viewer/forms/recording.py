@@ -1,4 +1,4 @@
-"""The recording of a tracked cable: open one, choose its window, identify the cable, keep it as a preset."""
+"""The form of a recording of a tracked cable: open it, choose a window, identify the cable, keep it as a preset."""
 
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
@@ -10,18 +10,18 @@ from viser import GuiApi, GuiEvent
 from app.viewer import report
 from app.viewer.forms.base import show_value
 
-EXPLAINED = "Markers tracked along a cable that grippers move: .npz, or .csv and a .json (docs/identification.md)."
+EXPLAINED = "Markers tracked along a cable that grippers move: .npz, or .csv with .json (see docs/identification.md)."
 
 
 @dataclass(frozen=True, kw_only=True)
 class RecordingActions:
-    """What the tab has done.
+    """What the form can have the session do.
 
     Attributes:
-        open: a file of this name and content.
-        show: the window of this number.
-        identify: the cable, or stop doing so.
-        keep: the cable as a preset of this name.
+        open: open a file of this name and content.
+        show: show the window of this number.
+        identify: start or stop identifying the cable.
+        keep: keep the cable as a preset of this name.
     """
 
     open: Callable[[str, bytes], Awaitable[None]]
@@ -31,10 +31,10 @@ class RecordingActions:
 
 
 class RecordingForm:
-    """Controls of one client's recording.
+    """The controls of one client's recording.
 
     Args:
-        gui: of the client.
+        gui: the client's GUI.
         actions: what the controls do.
     """
 
@@ -65,11 +65,11 @@ class RecordingForm:
             actions.keep(self._name.value)
 
     def say(self, text: str, *, good: bool) -> None:
-        """Say what became of a file, or of a preset."""
+        """Show whether a file was opened, or a preset kept."""
         self._said.content = report.note(text, good=good)
 
     def take(self, windows: list[str]) -> None:
-        """Offer the windows of a recording that was opened; none: there is no recording in the scene."""
+        """Offer the windows of the open recording; an empty list means that there is no recording in the scene."""
         if windows:
             self._window.options = tuple(windows)
             show_value(self._window, windows[0])
@@ -79,11 +79,11 @@ class RecordingForm:
         self.found("", keep=False)
 
     def running(self, running: bool) -> None:
-        """Show whether a search runs."""
+        """Show whether a search is running."""
         self._identify.label = "Stop" if running else "Identify the cable"
         self._identify.icon = viser.Icon.PLAYER_STOP if running else viser.Icon.ADJUSTMENTS
 
     def found(self, html: str, *, keep: bool) -> None:
-        """Show what was found so far; offer to keep it."""
+        """Show what has been found so far; offer to keep it if `keep`."""
         self._found.content = html
         self._name.visible = self._keep.visible = keep

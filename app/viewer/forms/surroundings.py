@@ -1,4 +1,4 @@
-"""What surrounds the cable: gravity, air, a table, obstacles."""
+"""The form of the surroundings: gravity, air drag, a table, obstacles."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ from app.viewer.number_field import NumberField
 
 NONE = "no obstacle"
 ADDED = {"Cylinder": "cylinder", "Box": "box", "Sphere": "sphere", "Capsule": "capsule"}
-FAR = 1e4  # m, of coordinates
+FAR = 1e4  # m, limit of coordinates
 ENVIRONMENT = ("environment",)
 TABLE = ("environment", "table")
 
@@ -66,7 +66,7 @@ class SurroundingsForm(Form):
         async def _chosen(event: GuiEvent[Any]) -> None:
             if event.client is not None and self._which.value in self._names(self._draft):
                 chosen = self._names(self._draft).index(self._which.value)
-                self._edits.finish()  # what was typed is of the obstacle before
+                self._edits.finish()  # what was typed belongs to the previously chosen obstacle
                 self._chosen = chosen
                 self.take(self._draft)
 
