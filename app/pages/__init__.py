@@ -1,1 +1,1 @@
-"""Files of the pages: their assets, the ready scenes, the web viewer of recordings."""
+"""Files of the web pages: their assets, the ready scenes, the web viewer of recordings."""

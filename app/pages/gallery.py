@@ -1,4 +1,4 @@
-"""The ready scenes: files in ``static/gallery``, in the order of ``static/gallery.json``; the same for page and API."""
+"""The ready scenes of the page and the API: files in ``static/gallery``, in the order of ``static/gallery.json``."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -14,10 +14,10 @@ class Example:
     """A ready scene.
 
     Attributes:
-        name: in addresses, e.g. ``paper-25``.
-        description: what is to be seen, one sentence.
-        document: the scene as JSON, as it is in its file.
-        request: the same, read.
+        name: name in addresses, e.g. ``paper-25``.
+        description: one sentence that says what the scene shows.
+        document: the scene as JSON, unchanged from its file.
+        request: the same scene, parsed.
     """
 
     name: str
@@ -27,7 +27,7 @@ class Example:
 
     @property
     def title(self) -> str:
-        """What the run is called in lists."""
+        """The name of its runs in lists."""
         return self.request.name
 
 

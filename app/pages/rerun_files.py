@@ -1,7 +1,8 @@
-"""The web viewer that ships inside rerun's wheel, as files.
+"""Extract the web viewer that ships inside rerun's wheel, as files.
 
-The wheel has the viewer compiled into its command line program and no way to get at the files but to ask that program
-for them. So it is started once, on loopback and for less than a second, and the files are kept in the data directory.
+The viewer is compiled into the wheel's command line program, and the only way to get its files is to request them from
+that program. So the program is started once, on the loopback address and for less than a second, and the files are kept
+in the data directory.
 """
 
 import os
@@ -28,10 +29,10 @@ _lock = Lock()
 
 
 def viewer_files(data_dir: Path) -> Path:
-    """Return the directory with the viewer's files, made the first time.
+    """Return the directory with the viewer's files, which the first call creates.
 
     Raises:
-        RuntimeError: rerun's program did not serve them.
+        RuntimeError: rerun's program did not serve the files.
     """
     directory = data_dir / f"rerun-viewer-{version('rerun-sdk')}"
     with _lock:
@@ -51,7 +52,7 @@ def _program() -> Path:
     for file in files("rerun-sdk") or ():
         if str(file) == "rerun_cli/rerun":
             return Path(str(file.locate()))
-    raise RuntimeError("The installed rerun-sdk has no program of its own, so no web viewer either")
+    raise RuntimeError("The installed rerun-sdk has no command line program, and so no web viewer")
 
 
 def _free_port() -> int:
@@ -62,8 +63,8 @@ def _free_port() -> int:
 
 def _unpack(directory: Path) -> None:
     port = _free_port()
-    # Given an address to view it serves the viewer alone; nothing asks for that address. CI switches its telemetry
-    # off, and a home of its own keeps its settings out of the user's.
+    # With an address to view, it serves only the viewer; that address is never requested. CI switches its telemetry
+    # off, and a temporary home keeps its settings out of the user's home.
     arguments = ["--serve-web", "--bind", "127.0.0.1", "--web-viewer-port", str(port), "http://127.0.0.1:9/none.rrd"]
     with tempfile.TemporaryDirectory() as home:
         process = subprocess.Popen(

@@ -1,4 +1,4 @@
-"""A run as a rerun recording: how the solve went by iteration, and the motion it found, with the layout to see it in.
+"""Write a run as a rerun recording: the solve by iteration, the predicted motion, and the layout of the viewer.
 
 Timelines: `iteration` and `solver_time` for the solve, `motion` [s] for the predicted motion.
 """
@@ -21,11 +21,11 @@ __all__ = ["APPLICATION", "layout", "write_recording"]
 def write_recording(run: Run, path: Path, name: str = "") -> None:
     """Write the recording of `run` to `path` (.rrd).
 
-    It is called what the request calls the run; else `name`; else by what the scene has. A run that is not stored, and
-    so has no id, gets one of its own: the viewer takes recordings of one id for parts of one.
+    The recording has the name of the request, otherwise `name`, otherwise a description of the scene. A run that is not
+    stored has no id and gets a new one, since the viewer merges recordings with the same id.
 
     Raises:
-        OSError: it can't be written there.
+        OSError: the file can't be written.
     """
     import rerun as rr
     import rerun_bindings
@@ -41,7 +41,7 @@ def write_recording(run: Run, path: Path, name: str = "") -> None:
     stream.send_chunks(chunks)
     written = content.read() or b""
     del content, stream
-    rerun_bindings.flush_and_cleanup_orphaned_recordings()  # or its two threads would stay for ever
+    rerun_bindings.flush_and_cleanup_orphaned_recordings()  # otherwise its two threads would never end
     path.write_bytes(written)
 
 

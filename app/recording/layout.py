@@ -1,4 +1,4 @@
-"""How the viewer lays a recording out."""
+"""The layout of a recording in the viewer."""
 
 import tempfile
 from functools import cache
@@ -11,8 +11,8 @@ from app.recording.style import APPLICATION
 def layout() -> bytes:
     """Return the layout of the viewer for these recordings, as the bytes of an .rbl file.
 
-    One tab a kind of timeline: the viewer shows a single timeline at a time, so on the other tab there is no more than
-    what holds at every time.
+    The solve and the motion have a tab each, because they have different timelines. The viewer shows a single timeline
+    at a time, so the other tab shows only what holds at every time.
     """
     import rerun.blueprint as rrb
 
@@ -28,7 +28,7 @@ def layout() -> bytes:
         ),
         rrb.Vertical(
             rrb.TimeSeriesView(origin="/convergence", name="Update and residual, log10"),
-            rrb.TimeSeriesView(origin="/forces", name="Forces by effect but contact, log10"),
+            rrb.TimeSeriesView(origin="/forces", name="Forces by effect, without contact, log10"),
         ),
         rrb.Vertical(
             rrb.TextDocumentView(origin="/report", name="Report"),

@@ -1,4 +1,4 @@
-"""The predicted motion on its own timeline: cable, grasps, obstacles, the forces of the grippers, the energies."""
+"""The predicted motion on its own timeline: cable, grasps, obstacles, forces of grippers and contacts, energies."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -32,12 +32,12 @@ if TYPE_CHECKING:
     from rerun.chunk import Chunk
 
 _LARGEST_ARROW = 0.25  # of the cable's length
-_GRASPS = (VERMILION, PURPLE, BLUE, SKY, ORANGE)  # of the lines of their forces
-_BOUND = 0.8  # width of the lines that a force lies between
+_GRASPS = (VERMILION, PURPLE, BLUE, SKY, ORANGE)  # colours of the lines of their forces
+_BOUND = 0.8  # width of the lines of the bounds of a force
 
 
 def motion_chunks(run: Run) -> "list[Chunk]":
-    """Return everything on the timeline `motion`, with the trace of the motion that stays whatever the time."""
+    """Return everything on the timeline `motion`, and the trace of the motion, which shows at every time."""
     import rerun as rr
 
     surface = run.document["surface"]
@@ -69,7 +69,7 @@ def motion_chunks(run: Run) -> "list[Chunk]":
 
 
 def _grasp(run: Run, k: int, shown: Floats, thick: float) -> "list[Chunk]":
-    """Return a grasp and the force of its gripper at every time, how sure it is, and arrows at times `shown` [s]."""
+    """Return a grasp and the force of its gripper over time, with error bounds, and arrows at times `shown` [s]."""
     import rerun as rr
 
     grasp, t = run.document["grasps"][k], run.document["surface"]["t"]
@@ -100,7 +100,7 @@ def _grasp(run: Run, k: int, shown: Floats, thick: float) -> "list[Chunk]":
 
 
 def _masses(run: Run, times: list[Any], thick: float) -> "list[Chunk]":
-    """Return the point masses at every time."""
+    """Return the point masses over time."""
     import rerun as rr
 
     masses = run.scene.cable.point_masses
@@ -118,21 +118,21 @@ def _masses(run: Run, times: list[Any], thick: float) -> "list[Chunk]":
 
 
 def _contact(run: Run, k: int) -> "list[Chunk]":
-    """Return how hard the table or an obstacle presses and rubs at every time, and how sure that is."""
+    """Return the normal force and the friction of the table or an obstacle over time, with error bounds."""
     import rerun as rr
 
     contact, t = run.document["contacts"][k], run.document["surface"]["t"]
     times = [rr.TimeColumn("motion", duration=t)]
     entity = f"/over_time/reaction/contact_{k}"
     chunks = _with_bounds(entity, contact["name"], GREY, times, contact["force"], contact["force_error"])
-    if np.any(contact.get("friction")):  # which runs that were stored before it was noted don't have
+    if np.any(contact.get("friction")):  # missing in runs that were stored by older versions
         name, error = f"friction of {contact['name']}", contact["friction_error"]
         chunks += _with_bounds(f"{entity}_friction", name, EFFECTS["friction"], times, contact["friction"], error)
     return chunks
 
 
 def _with_bounds(entity: str, name: str, colour: Colour, times: list[Any], force: Any, errors: Any) -> "list[Chunk]":
-    """Return the lines of the size of a force [N], and of what it is at least and at most where its error is known."""
+    """Return the line of the magnitude of a force [N], and those of its bounds if its error is known."""
     sizes = np.linalg.norm(np.array(force, dtype=float), axis=1)
     chunks = [line_style(entity, f"{name} [N]", colour), scalars(entity, times, sizes)]
     if errors is None:
@@ -144,7 +144,7 @@ def _with_bounds(entity: str, name: str, colour: Colour, times: list[Any], force
 
 
 def arrow_scale(run: Run) -> float:
-    """Return the length of an arrow for 1 N [m/N]: the largest force gets a quarter of the cable's length."""
+    """Return the length of an arrow for 1 N [m/N]; the largest force gets a quarter of the cable's length."""
     forces = [np.linalg.norm(grasp["reaction"], axis=1).max() for grasp in run.document["grasps"]]
     largest = max(forces, default=0.0)
     return float(_LARGEST_ARROW * run.surface.length / largest) if largest > 0 else 1.0

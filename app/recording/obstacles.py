@@ -1,4 +1,4 @@
-"""The obstacles of a scene, as solids that hold on every timeline."""
+"""The obstacles of a scene, as solids that show on every timeline."""
 
 from typing import TYPE_CHECKING, Any, cast
 
@@ -30,7 +30,7 @@ def _solid(obstacle: Obstacle) -> Any:
     match obstacle:
         case Sphere():
             return rr.Ellipsoids3D.columns(centers=[centre], half_sizes=[[obstacle.radius] * 3], **look)
-        case Capsule():  # it stands on the end from which it extends
+        case Capsule():  # rerun places a capsule by the end from which it extends
             start, end = cast(Floats, obstacle.start), cast(Floats, obstacle.end)
             length = float(np.linalg.norm(end - start))
             return rr.Capsules3D.columns(translations=[start], lengths=[length], radii=[obstacle.radius], **look)

@@ -1,4 +1,4 @@
-"""The pages of words: status, settings, machine and scene; and the effects with their reasons."""
+"""The text pages: one with status, settings, machine and scene, and one with the effects and their reasons."""
 
 import json
 from typing import TYPE_CHECKING, Any
@@ -11,11 +11,11 @@ from dlocore.words import in_mm, in_ms
 if TYPE_CHECKING:
     from rerun.chunk import Chunk
 
-MAX_PART = 4_000  # characters of one part of the scene
+MAX_PART = 4_000  # most characters of one part of the scene
 
 
 def page_chunks(run: Run) -> "list[Chunk]":
-    """Return both pages, which hold on every timeline."""
+    """Return both pages, which show on every timeline."""
     return [_page("/report", report(run)), _page("/effects", effects(run))]
 
 
@@ -26,7 +26,7 @@ def _page(entity: str, text: str) -> "Chunk":
 
 
 def report(run: Run) -> str:
-    """Return the status, the settings, the machine and the scene as markdown."""
+    """Return the status, the settings, the machine and the scene as Markdown."""
     document, accuracy = run.document, run.document["accuracy"]
     error = accuracy["error_estimate"]
     return "\n".join(
@@ -44,7 +44,7 @@ def report(run: Run) -> str:
             f"- run: {document['id'] or 'not stored'}, {document['created']}",
             "",
             "## Settings",
-            f"- asked quality: `{json.dumps(run.request.get('quality', 'auto'))}`",
+            f"- requested quality: `{json.dumps(run.request.get('quality', 'auto'))}`",
             f"- net: {accuracy['n_u']} x {accuracy['n_t']} control points (cable x time), {accuracy['dimensions']}D, "
             f"{accuracy['steps']} time steps of the march",
             f"- delta: {accuracy['delta']:g} m",
@@ -59,7 +59,7 @@ def report(run: Run) -> str:
 
 
 def effects(run: Run) -> str:
-    """Return a table of the effects as markdown, those that were simulated first."""
+    """Return a table of the effects as Markdown; simulated effects come first."""
     ordered = sorted(run.document["effects"], key=lambda effect: not effect["active"])
     return "\n".join(["| effect | active | why | magnitude |", "|---|---|---|---|", *map(_row, ordered)])
 

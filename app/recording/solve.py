@@ -1,4 +1,4 @@
-"""The solve by iteration: the iterates, the norms, the steps, and the energies and forces that the iterates mean."""
+"""The solve by iteration: the iterates with their norms, steps, energies and forces."""
 
 import math
 from dataclasses import dataclass
@@ -35,12 +35,12 @@ if TYPE_CHECKING:
     from rerun.chunk import Chunk
 
 
-_SAME_ENERGY = 0.01  # of it: a memory with which an iterate has its elastic energy is that of the iterate
+_SAME_ENERGY = 0.01  # a memory is taken as that of an iterate if it gives its elastic energy within this share
 
 
 @dataclass(frozen=True)
 class Line:
-    """A quantity over the iterations; no row where it is not finite."""
+    """A quantity over the iterations; values that are not finite are left out."""
 
     entity: str
     name: str
@@ -73,7 +73,7 @@ def _indexes(run: Run, rows: NDArray[np.intp]) -> list[Any]:
 
 
 def _records(run: Run) -> list[Line]:
-    """Return what every iteration says of itself, log10 for norms."""
+    """Return the quantities that every iteration records, norms as log10."""
 
     def of(field: str) -> Floats:
         return np.array([getattr(iteration, field) for iteration in run.iterations], dtype=float)
@@ -92,10 +92,10 @@ def _log10(values: Floats) -> Floats:
 
 
 def _balances(run: Run, drawn: NDArray[np.intp]) -> list[Line]:
-    """Return the energies at the end of the motion and the forces by effect, log10, of every iterate.
+    """Return the energies at the end of the motion, and the log10 of the forces by effect, of every iterate.
 
-    Of a cable that yields only the memory of the answer is known: an iterate that has another, and isn't without any
-    either, has no row.
+    For a cable that yields, only the memory of the answer is known. Iterates with another memory are left out, unless
+    they have none.
     """
     kept: dict[str, Floats] = {}
     for k in drawn:
@@ -159,7 +159,7 @@ def _net(control: Floats) -> list[Floats]:
 
 
 def _log(run: Run) -> "Chunk":
-    """Return one line of words for every iteration."""
+    """Return one line of text for every iteration."""
     import rerun as rr
 
     rows = np.arange(len(run.iterations))

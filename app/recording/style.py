@@ -1,4 +1,4 @@
-"""What the parts of a recording share: names, colours (Okabe-Ito or darker, one an effect), and how chunks are made."""
+"""Common to all parts of a recording: names, colours (Okabe-Ito or darker, one for each effect), making of chunks."""
 
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,7 @@ Colour = tuple[int, int, int]
 APPLICATION = "dlo"
 STRIPS = 9  # times at which a whole motion is drawn
 SAMPLES_U = 65
-FORCE_TIMES = 17  # times of a motion that the forces of its effects are measured at
+FORCE_TIMES = 17  # times of a motion at which the forces of its effects are evaluated
 MAX_COORDINATE = 1e6  # m; a motion beyond it has diverged and isn't drawn
 
 BLUE: Colour = (0, 114, 178)
@@ -25,7 +25,7 @@ PURPLE: Colour = (204, 121, 167)
 SKY: Colour = (86, 180, 233)
 YELLOW: Colour = (240, 228, 66)
 GREY: Colour = (150, 150, 150)
-OBSTACLE: Colour = (118, 186, 166)  # green, lightened: solids are shaded
+OBSTACLE: Colour = (118, 186, 166)  # green, lightened because solids are shaded
 EFFECTS = {
     "inertia": BLUE,
     "damping": PURPLE,
@@ -44,7 +44,7 @@ EARLY, LATE = np.array([178, 214, 240.0]), np.array([0, 70, 140.0])  # ends of t
 
 
 def chunk(entity: str, indexes: Iterable[Any], columns: Any) -> "Chunk":
-    """Return one chunk; without indexes its data hold on every timeline."""
+    """Return one chunk; without indexes, its data show on every timeline."""
     import rerun as rr
 
     return rr.chunk.Chunk.from_columns(entity, indexes=indexes, columns=columns)
@@ -73,11 +73,11 @@ def scalars(entity: str, indexes: Iterable[Any], values: Floats) -> "Chunk":
 
 
 def drawable(positions: Floats) -> bool:
-    """Return whether positions [m] are finite and of a size that can be drawn."""
+    """Return whether positions [m] are finite and small enough to be drawn."""
     return bool(np.abs(positions).max() < MAX_COORDINATE)
 
 
 def time_ramp(share: Floats) -> NDArray[np.uint8]:
-    """Return the colours of instants by their `share` of the horizon (k,), light first and dark last; (k, 3)."""
+    """Return the colours (k, 3) of instants at a `share` (k,) of the horizon, from light to dark."""
     share = share[:, None]
     return np.rint((1 - share) * EARLY + share * LATE).astype(np.uint8)

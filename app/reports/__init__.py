@@ -1,1 +1,1 @@
-"""What an identification and a validation say, as pages and plots."""
+"""Results of identifications and validations, as pages and plots."""

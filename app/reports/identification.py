@@ -1,4 +1,4 @@
-"""What an identification says, as JSON and as one page of HTML: tables, plots, worst moments."""
+"""The result of an identification, as JSON and as one HTML page: tables, plots, worst moments."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from dlocore.words import counted
 Floats = NDArray[np.float64]
 
 _BLUE, _ORANGE, _GREY = "#0072b2", "#d55e00", "#8a8f98"  # Okabe-Ito
-_LYING = 0.2  # of its width: a cable that rises by less lies flat
+_LYING = 0.2  # of its width: a cable whose height is less than this lies flat
 _STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#1c2024}
 h1{font-size:1.5rem}h2{font-size:1.15rem;margin-top:2rem}table{border-collapse:collapse;width:100%}
 td,th{padding:.3rem .6rem;border-bottom:1px solid #dde;text-align:right}td:first-child,th:first-child{text-align:left}
@@ -24,7 +24,7 @@ figure{margin:1rem 0}figcaption{color:#555;font-size:.9rem}svg{width:100%;height
 
 
 def document_of_identification(found: Identification) -> dict[str, Any]:
-    """Return an identification as JSON-ready data: the cable and drag as scenes take them, and how they are known."""
+    """Return an identification as JSON-ready data: cable and drag as scenes take them, and how well they are known."""
     candidate = found.candidate
     document: dict[str, Any] = {
         "status": found.status,
@@ -69,7 +69,7 @@ def document_of_identification(found: Identification) -> dict[str, Any]:
 
 
 def report_of(found: Identification, title: str) -> str:
-    """Return one self-contained page: parameters with intervals, fits, errors over time, and the worst moments."""
+    """Return a self-contained page: parameters with intervals, fits, errors over time, and the worst moments."""
     rows = "".join(
         f"<tr{'' if p.identifiable else ' class=unknown'}><td>{escape(p.name)}</td>"
         + (
@@ -88,17 +88,17 @@ def report_of(found: Identification, title: str) -> str:
         for name, f in zip(names, found.fits, strict=True)
     )
     figures = "".join(_figures(*pair) for pair in zip(names[:8], found.fits[:8], strict=True))
-    more = f"<p>{len(found.fits) - 8} more windows are in the table.</p>" if len(found.fits) > 8 else ""
+    more = f"<p>The table lists {len(found.fits) - 8} more windows.</p>" if len(found.fits) > 8 else ""
     every = np.concatenate([f.distances.ravel() for f in found.fits])
     typical = 1e3 * float(np.nanmedian(every))
     return (
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
-        f"<style>{_STYLE}</style></head><body><h1>{escape(title)}: the prediction is within {typical:.1f} mm of half "
-        f"the markers</h1><p>{escape(found.message)}</p><h2>Parameters</h2><table><tr><th>parameter</th><th>value</th>"
-        f"<th>95 % interval</th><th>unit</th></tr>{rows}</table>{_correlations(found)}<h2>Distance of free markers "
-        f"from the prediction [mm]</h2><table><tr><th>recording</th><th>mean</th><th>median</th><th>worst</th>"
-        f"<th></th></tr>{fits}</table>{figures}{more}<p>{counted(found.iterations, 'iteration')} in "
-        f"{found.seconds:.1f} s.</p></body></html>"
+        f"<style>{_STYLE}</style></head><body><h1>{escape(title)}: half of the markers are within {typical:.1f} mm of "
+        f"the prediction</h1><p>{escape(found.message)}</p><h2>Parameters</h2><table><tr><th>parameter</th>"
+        f"<th>value</th><th>95 % interval</th><th>unit</th></tr>{rows}</table>{_correlations(found)}"
+        f"<h2>Distance of free markers from the prediction [mm]</h2><table><tr><th>recording</th><th>mean</th>"
+        f"<th>median</th><th>worst</th><th></th></tr>{fits}</table>{figures}{more}"
+        f"<p>{counted(found.iterations, 'iteration')} in {found.seconds:.1f} s.</p></body></html>"
     )
 
 
@@ -117,21 +117,21 @@ def _correlations(found: Identification) -> str:
 
 
 def _window_names(fits: Sequence[Fit]) -> list[str]:
-    """Return the name of each recording, with the time of the window where it has several."""
+    """Return the name of each fit's recording, with the times of the window if the recording has several."""
     several = Counter(fit.name for fit in fits)
     return [f"{f.name}, {f.begin:.4g} to {f.end:.4g} s" if several[f.name] > 1 else f.name for f in fits]
 
 
 def _figures(name: str, fit: Fit) -> str:
-    # the median of the markers, which outliers of the tracking do not make; NaN where all were lost
+    # the median over the markers, which is robust to outliers of the tracking; NaN where all markers were lost
     seen = np.asarray(np.isfinite(fit.distances).any(axis=1))
     distance = np.full(len(seen), np.nan)
     distance[seen] = 1e3 * np.nanmedian(fit.distances[seen], axis=1)
     worst = int(np.nanargmax(distance))
     overlay = _overlay(fit, worst)
-    when = f"of shape {worst + 1} of {len(seen)}" if fit.static else f"at {fit.times[worst]:.2f} s"
+    when = f"shape {worst + 1} of {len(seen)}" if fit.static else f"at {fit.times[worst]:.2f} s"
     what = "worst shape" if fit.static else "worst moment"
-    caption = f"{name}: {what}, {distance[worst]:.0f} mm in the median {when}"
+    caption = f"{name}: {what}, {when}, with a median distance of {distance[worst]:.0f} mm"
     if fit.static or len(fit.times) < 10:
         return f"<figure>{overlay}<figcaption>{escape(caption)}</figcaption></figure>"
     return (
@@ -165,7 +165,7 @@ def _over_time(times: Floats, distance: Floats) -> str:
 
 
 def _overlay(fit: Fit, frame: int) -> str:
-    """Return a view of the measured and the predicted markers of a frame."""
+    """Return a drawing of the measured and the predicted markers of a frame."""
     measured, predicted = fit.measured[frame], fit.predicted[frame]
     middle = predicted.mean(axis=0)
     right, up = _view(fit.gravity, predicted - middle)
@@ -195,9 +195,9 @@ def _overlay(fit: Fit, frame: int) -> str:
 
 
 def _view(gravity: Floats, points: Floats) -> tuple[Floats, Floats]:
-    """Return unit vectors (3,) to the right and upwards of a view of points (m, 3) about their middle.
+    """Return unit vectors (3,) that point right and up in a view of points (m, 3), given relative to their middle.
 
-    Upwards is against gravity, or z without it; of a cable that lies flat, seen from above, it is across that.
+    Up is against gravity, or z without gravity. A cable that lies flat is seen from above, and up is horizontal.
     """
     weight = float(np.linalg.norm(gravity))
     up = -gravity / weight if weight > 0.0 else np.array([0.0, 0.0, 1.0])

@@ -1,4 +1,4 @@
-"""Plots of a validation, as SVG files: errors of the predicted windows, and how they grow with time."""
+"""Plots of a validation, as SVG files: the errors of the predicted windows, and their growth over time."""
 
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 MODELS = {"scalars": "#d55e00", "bends": "#0072b2"}  # Okabe-Ito
-GREY, GROUND = "#8a8f98", "#ffffff"  # a ground of its own: pages may be dark
+GREY, GROUND = "#8a8f98", "#ffffff"  # the plots have their own background, since pages may be dark
 WIDTH, HEIGHT, LEFT, TOP, BOTTOM, GAP = 760.0, 300.0, 56.0, 34.0, 40.0, 14.0
 
 
 def plots_of(documents: Sequence[Mapping[str, Any]], published: Mapping[str, float]) -> dict[str, str]:
-    """Return the plots by file name; none where no cable was predicted.
+    """Return the plots by file name; none if no cable was predicted.
 
     Args:
-        documents: what `dlo validate --json` writes.
-        published: L1 of others by cable [m].
+        documents: the documents that `dlo validate --json` writes.
+        published: published L1 of other methods by cable [m].
     """
     cables = [one for one in documents if "cable" in one]
     if not cables:
@@ -28,7 +28,7 @@ def plots_of(documents: Sequence[Mapping[str, Any]], published: Mapping[str, flo
 
 
 def _windows(cables: Sequence[Mapping[str, Any]], published: Mapping[str, float]) -> str:
-    """Return L1 of every predicted window: a dot each, their mean as a line, by cable and model."""
+    """Return the plot of the L1 of every predicted window by cable and model: dots, and their mean as a line."""
     names = list(dict.fromkeys(str(one["cable"]) for one in cables))
     most = _round_up(1e3 * max(max(one["windows"].values()) for one in cables))
     parts = [*_axis(most, "L1 of a window [mm]"), *_legend(cables, "published")]
@@ -51,7 +51,7 @@ def _windows(cables: Sequence[Mapping[str, Any]], published: Mapping[str, float]
 
 
 def _over_time(cables: Sequence[Mapping[str, Any]]) -> str:
-    """Return the mean distance of the free markers over the windows of a cable, in time, a panel for each cable."""
+    """Return the plot of the mean distance of the free markers over time, averaged over windows, a panel per cable."""
     names = list(dict.fromkeys(str(one["cable"]) for one in cables))
     means = [1e3 * np.nanmean(np.array(list(one["over_time"].values()), dtype=float), axis=0) for one in cables]
     most = _round_up(max(float(np.nanmax(mean)) for mean in means))

@@ -164,7 +164,7 @@ def test_the_report_has_status_settings_machine_and_scene(chunks: list[Any], ans
     assert answer["message"] in text
     assert answer["accuracy"]["method"] in text
     assert answer["id"] in text
-    assert '`"auto"`' in text  # the asked quality
+    assert '`"auto"`' in text  # the requested quality
     assert machine_line() in text
     assert '"bending_stiffness": 0.001' in text
 

@@ -1,4 +1,4 @@
-"""A recording in rerun's viewer, which the service serves itself: what it shows, and that nothing else is asked."""
+"""A recording in rerun's viewer, which the service itself serves: what it shows, and that it requests nothing else."""
 
 import io
 import time
@@ -42,7 +42,7 @@ def coloured(picture: np.ndarray, colour: tuple[int, int, int], region: Region) 
 
 
 def dark(picture: np.ndarray, region: Region) -> int:
-    """Count the dark pixels of a region: those of letters."""
+    """Count the dark pixels of a region, those of letters."""
     top, bottom, left, right = region
     return int((picture[top:bottom, left:right].max(axis=-1) < 90).sum())
 
@@ -84,4 +84,4 @@ def test_the_link_of_an_answer_opens_its_recording(service, witness):
     path, reactions = (ORANGE, MOTION, 100), (VERMILION, MOTION, 100)  # of the grasp; along its path
     drawn(page, path, reactions, words=(0, dark(report, WORDS) / 2))  # the report is on the other tab
     here = urlsplit(service.address).netloc
-    assert {host for host in answered if host} == {here}  # what else the viewer asks for, the page's policy refuses
+    assert {host for host in answered if host} == {here}  # the page's policy refuses what else the viewer requests

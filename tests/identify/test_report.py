@@ -93,7 +93,7 @@ def test_shapes_at_rest_are_numbered() -> None:
     shapes = fit(static=True, times=np.arange(20.0))
     shapes.measured[3, 2:] += 0.05
     assert "worst shape" in _figures("rest", shapes)
-    assert "in the median of shape 4 of 20" in _figures("rest", shapes)
+    assert "worst shape, shape 4 of 20, with a median distance of " in _figures("rest", shapes)
     assert "over time" not in _figures("rest", shapes)
 
 
