@@ -1,4 +1,4 @@
-// Light or dark: as the system has it, unless the button says otherwise.
+// Light or dark: the theme of the system, unless the user chose another with the button.
 
 const system = window.matchMedia("(prefers-color-scheme: dark)");
 const root = document.documentElement;
@@ -15,7 +15,7 @@ export function offerThemes(button, changed) {
     try {
       window.localStorage.setItem("theme", root.dataset.theme);
     } catch {
-      // storage may be forbidden: the choice lasts as long as the page
+      // storage may be forbidden: the choice then lasts as long as the page
     }
     label();
     changed();

@@ -1,4 +1,4 @@
-// Examples to copy: with the address of this very service in them.
+// Examples to copy, with the address of this service in them.
 
 export function offerCopies() {
   for (const part of document.querySelectorAll(".origin")) part.textContent = window.location.origin;
@@ -9,7 +9,7 @@ export function offerCopies() {
         await navigator.clipboard.writeText(source.textContent);
         button.textContent = "Copied";
       } catch {
-        window.getSelection().selectAllChildren(source); // no clipboard without https: select it instead
+        window.getSelection().selectAllChildren(source); // there is no clipboard without https: select the text instead
         button.textContent = "Selected";
       }
       window.setTimeout(() => { button.textContent = "Copy"; }, 1600);

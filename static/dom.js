@@ -1,4 +1,4 @@
-// Elements and numbers, as every part of the page shows them.
+// Helpers for all parts of the page: elements, numbers, and reading JSON.
 
 export function make(tag, properties = {}, ...children) {
   const element = document.createElement(tag);
@@ -19,7 +19,7 @@ export function withUnit(value, unit) {
   return value === null || value === undefined ? "–" : `${short(value)} ${unit}`;
 }
 
-/** The JSON at an address; null where there is none. */
+/** The JSON at an address, or null if there is none (404). */
 export async function read(address) {
   const answer = await fetch(address, { headers: { Accept: "application/json" } });
   if (answer.status === 404) return null;

@@ -1,4 +1,4 @@
-// The gallery: a card for each ready scene, which opens it in the live scene.
+// The gallery: one card for each ready scene, which opens it in the live scene.
 
 import { make, read } from "./dom.js";
 import { showScene } from "./stage.js";
@@ -8,7 +8,7 @@ const note = document.getElementById("gallery-note");
 const caption = document.getElementById("caption");
 const curl = document.getElementById("example-curl");
 const stage = document.getElementById("stage");
-const FIRST = "paper-25"; // the scene that is shown where the address names none
+const FIRST = "paper-25"; // the scene to show if the address names none
 let chosen = null;
 
 function curlLine(example) {
@@ -36,7 +36,7 @@ function card(example) {
     make("span", {}, example.description),
   );
   open.addEventListener("click", (event) => {
-    if (event.ctrlKey || event.metaKey || event.shiftKey) return; // a tab of its own
+    if (event.ctrlKey || event.metaKey || event.shiftKey) return; // the browser opens a new tab
     event.preventDefault();
     if (example !== chosen) window.history.pushState(null, "", open.getAttribute("href"));
     choose(example);
@@ -54,11 +54,11 @@ export async function showGallery() {
     const named = (name) => examples.find((example) => example.name === name);
     const follow = () => {
       const asked = named(new URLSearchParams(window.location.search).get("example")) ?? named(FIRST);
-      if (asked !== chosen) choose(asked); // else it is a step on the page: what was changed in the scene stays
+      if (asked !== chosen) choose(asked); // the same scene: only a step on the page, edits in the scene stay
     };
     window.addEventListener("popstate", follow);
     follow();
   } catch {
-    note.textContent = "The gallery can't be read just now.";
+    note.textContent = "The gallery can't be loaded right now.";
   }
 }

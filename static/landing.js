@@ -1,4 +1,4 @@
-// The landing page, put together.
+// The parts of the landing page, put together.
 
 import { offerThemes } from "./appearance.js";
 import { offerCopies } from "./copy.js";

@@ -29,7 +29,7 @@ function show(index) {
   }
   plot.point(index);
   box.setAttribute("aria-valuenow", index + 1);
-  box.setAttribute("aria-valuetext", words(points[index]) + (points[index].best ? ", none is better in its time" : ""));
+  box.setAttribute("aria-valuetext", words(points[index]) + (points[index].best ? ", the best in its time" : ""));
 }
 
 function draw() {
@@ -72,7 +72,7 @@ function present(calibration) {
   document.getElementById("plot-finding").textContent = finding(points);
   const machine = Object.entries(calibration.machine).map(([name, value]) => `${name} ${value}`).join(", ");
   const measured = new Date(calibration.measured_at).toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
-  const stale = calibration.current === false ? "The machine or the program has changed since. " : "";
+  const stale = calibration.current === false ? "The machine or the program has changed since then. " : "";
   document.getElementById("plot-machine").textContent = `Measured ${measured}: ${machine}. ${stale}`;
   legend.replaceChildren(...METHODS.filter((method) => points.some((point) => point.method === method)).map(entry),
     make("li", { className: "best" }, "the best in its time"));
@@ -89,7 +89,7 @@ function tellHow() {
 async function load() {
   const { value: dimensions } = figure.querySelector("input:checked");
   try {
-    const health = await (await fetch("/health")).json(); // asked for in vain, the measurements would be an error in the log
+    const health = await (await fetch("/health")).json(); // a request for measurements that don't exist would log an error
     if (health.calibrated === false) {
       measuring.hidden = false;
       tellHow();
@@ -102,11 +102,11 @@ async function load() {
     if (answer.ok) present(found);
     tellHow();
   } catch {
-    note.textContent = "The measurements can't be read just now.";
+    note.textContent = "The measurements can't be loaded right now.";
   }
 }
 
-/** Measure, tell how far it is, and show what comes of it. */
+/** Measure this machine with a progress bar, and show the result. */
 async function measure() {
   button.disabled = true;
   bar.hidden = false;
@@ -117,7 +117,7 @@ async function measure() {
     bar.hidden = true;
     said.textContent = text;
   };
-  const failed = "It could not be measured. Try again later.";
+  const failed = "The measurement failed. Try again later.";
   const answer = await fetch(ADDRESS, { method: "POST" }).catch(() => null);
   if (answer === null || !answer.ok) {
     finish(failed);
@@ -135,7 +135,7 @@ async function measure() {
     load();
   });
   course.addEventListener("error", (event) => {
-    if (event.data === undefined && course.readyState !== EventSource.CLOSED) return; // it connects again by itself
+    if (event.data === undefined && course.readyState !== EventSource.CLOSED) return; // it reconnects by itself
     course.close();
     finish(failed);
   });

@@ -1,12 +1,12 @@
-// Error against time, log-log, as an SVG: the measured points, the best of them, and what the pointed one says.
+// Error against time, log-log, as an SVG: the measured points, the best of them, and a tip for the selected one.
 
 import { make, short } from "./dom.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const MARGIN = { left: 58, right: 18, top: 16, bottom: 50 };
-const REACH = 40; // px from a point within which the pointer means it
-const SHAPES = ["circle", "square"]; // a second sign beside the colour
-export const METHODS = ["march", "spacetime"]; // that a calibration measures
+const REACH = 40; // px: the pointer selects a point within this distance
+const SHAPES = ["circle", "square"]; // they tell methods apart in addition to the colour
+export const METHODS = ["march", "spacetime"]; // the methods that a calibration measures
 
 function svg(tag, attributes, ...children) {
   const element = document.createElementNS(SVG, tag);
@@ -20,13 +20,13 @@ function outline(shape, x, y, r) {
   return `M${x - r} ${y}a${r} ${r} 0 1 1 ${2 * r} 0a${r} ${r} 0 1 1 ${-2 * r} 0z`;
 }
 
-/** The sign of a method, `r` px in radius about (x, y). */
+/** The symbol of a method, `r` px in radius about (x, y). */
 export function sign(method, x, y, r, more = "") {
   const shape = SHAPES[Math.max(0, METHODS.indexOf(method))];
   return svg("path", { d: outline(shape, x, y, r), class: `sign ${method} ${more}` });
 }
 
-/** A scale from values to px, logarithmic, with its ticks: all of 1, 2, 5 where they have room, else powers of ten. */
+/** A logarithmic scale from values to px, with its ticks: at 1, 2, 5 if they have room, otherwise at powers of ten. */
 function logScale(values, from, to) {
   const low = Math.log10(Math.min(...values)) - 0.12;
   const high = Math.log10(Math.max(...values)) + 0.12;
@@ -45,7 +45,7 @@ function logScale(values, from, to) {
   return { place, ticks };
 }
 
-/** Draw `points` ({method, x [ms], y [mm], best, converged}), the fastest first, into `box`; `words` tells one of them. */
+/** Draw `points` ({method, x [ms], y [mm], best, converged}), the fastest first, into `box`; `words` describes a point. */
 export function drawPlot(box, points, words) {
   const width = Math.max(280, box.clientWidth);
   const height = Math.round(Math.min(440, Math.max(280, 0.5 * width)));
@@ -98,7 +98,7 @@ export function drawPlot(box, points, words) {
     tip.hidden = true;
   }
 
-  /** The index of the point that is meant at a place on the screen, or -1. */
+  /** The index of the point that a pointer event selects, or -1. */
   function meant(event) {
     const corner = drawing.getBoundingClientRect();
     const far = points.map((each) => Math.hypot(x.place(each.x) + corner.left - event.clientX, y.place(each.y) + corner.top - event.clientY));
@@ -109,7 +109,7 @@ export function drawPlot(box, points, words) {
   return { point, leave, meant };
 }
 
-/** What is reached: the quickest solves within 1 and 0.1 mm, or the best one. */
+/** The finding in words: the fastest solves within 1 and 0.1 mm, or else the most accurate one. */
 export function finding(points) {
   const solved = points.filter((point) => point.converged !== false);
   const said = [1, 0.1].flatMap((error) => {

@@ -42,7 +42,7 @@ async function refresh() {
     note.textContent = "No runs yet. Keep one in the scene, or post a scene to the API.";
     box.querySelector("tbody").replaceChildren(...runs.map(row));
   } catch {
-    if (shown === null) note.textContent = "The list of runs can't be read just now.";
+    if (shown === null) note.textContent = "The list of runs can't be loaded right now.";
   }
 }
 

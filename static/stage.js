@@ -1,12 +1,12 @@
-// The live scene: shown once the service can solve, with the chosen example.
+// The live scene with the chosen example, shown as soon as the service can solve.
 
 import { isDark } from "./appearance.js";
 
 const RETRY = 2000; // ms
 const COMPILING = "urn:dlo:problem:not-ready";
 const SAID = {
-  compiling: "The solver is being compiled or loaded. The first time that takes some minutes, later seconds; this page then comes alive by itself.",
-  silent: "The service does not answer. This page tries again by itself.",
+  compiling: "The solver is being compiled or loaded. The first time this takes a few minutes, later a few seconds. The scene then opens by itself.",
+  silent: "The service does not respond. This page keeps trying.",
 };
 const scene = document.getElementById("scene");
 const waiting = document.getElementById("waiting");
@@ -15,7 +15,7 @@ const note = document.getElementById("stage-note");
 let example = null;
 let awake = false;
 let dark = false; // the theme that the scene is shown in
-let touched = false; // whether someone was at work in the scene: to load it anew would undo that
+let touched = false; // whether the user has worked in the scene: loading it again would undo that
 
 scene.addEventListener("load", () => {
   touched = false;
@@ -34,10 +34,10 @@ export function showScene(name = example) {
   example = name;
   dark = isDark();
   full.href = address();
-  if (awake) scene.contentWindow.location.replace(full.href); // another src would be a step of its own for Back
+  if (awake) scene.contentWindow.location.replace(full.href); // a new src would add a step to the history of Back
 }
 
-/** Show the scene in the theme of the page, if nobody was at work in it. */
+/** Show the scene in the theme of the page, unless the user has worked in it. */
 export function showTheme() {
   if (!touched) return showScene();
   full.href = address();
@@ -54,7 +54,7 @@ async function state() {
   }
 }
 
-/** Wait until the service can solve, saying so meanwhile; then show the scene. */
+/** Wait until the service can solve, with a message meanwhile; then show the scene. */
 export async function whenReady() {
   for (let now = await state(); now !== "ready"; now = await state()) {
     waiting.hidden = false;

@@ -40,7 +40,7 @@ class Service:
 
 @dataclass
 class Witness:
-    """What a page did besides being shown."""
+    """What a page did besides being displayed."""
 
     page: Page
     errors: list[str] = field(default_factory=list)

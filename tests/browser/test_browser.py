@@ -45,7 +45,7 @@ def on_screen(page: Page, x: float, y: float) -> tuple[float, float]:
 
 
 def kept_run(page: Page | Frame) -> str:
-    """Keep the run on show; return its id."""
+    """Keep the shown run; return its id."""
     page.get_by_role("tab", name="Files").click()
     page.get_by_role("button", name="Keep this run").click()
     return page.locator("[data-run]").get_attribute("data-run") or ""
@@ -63,11 +63,11 @@ def test_dragging_the_gizmo_changes_the_prediction_to_that_of_the_python_api(ser
     offset = HANDLE * SIZE
     give_up, again = monotonic() + PATIENCE, 0.0
     away, dy = np.inf, 0.5
-    while away > 0.02:  # a pixel is about 2 mm; until the drag has arrived, the run on show is that of before
+    while away > 0.02:  # a pixel is about 2 mm; until the drag has arrived, the earlier run is shown
         assert monotonic() < give_up, f"the drag ends {away} m from where it was let go"
-        if dy == 0.5 and monotonic() > again:  # a slow renderer may not have seen what was hovered: once more
+        if dy == 0.5 and monotonic() > again:  # a slow renderer may have missed the hovering: try again
             x, y = on_screen(page, 0.25 + offset, 0.5 + offset)
-            for k in range(4):  # the gizmo takes hold of what it saw hovered in a picture before
+            for k in range(4):  # the gizmo grabs what was hovered in an earlier frame
                 page.mouse.move(x + k % 2, y)
                 page.wait_for_timeout(150 if again == 0.0 else 1000)
             page.mouse.down()
@@ -109,7 +109,7 @@ def test_playback_moves_the_cable_and_pause_holds_it(service, witness):
 
 
 def choose(page: Page, label: str, option: str) -> None:
-    """Choose an option of a list, which closes where the panel is drawn anew just then."""
+    """Choose an option of a list; a list closes if the panel is redrawn at that moment."""
     give_up = monotonic() + PATIENCE
     chosen = page.get_by_role("combobox", name=label)
     while chosen.input_value() != option:

@@ -33,7 +33,7 @@ CALIBRATED = re.compile(r"/v1/calibration\?")
 def open_page(
     witness, service, path: str = "/", size: tuple[int, int] = DESKTOP, scheme: str = "light", with_scene: bool = False
 ) -> Page:
-    """Open the landing page; without its scene where the test is not about it, which is slow to draw without a GPU."""
+    """Open the landing page; without the scene, which is slow to draw without a GPU, if the test does not need it."""
     page = witness.page
     if not with_scene:
         page.route("**/scene/*", lambda route: route.fulfill(body="", content_type="text/html"))
@@ -45,7 +45,7 @@ def open_page(
 
 
 def wait_for_scene(page: Page, address: str) -> None:
-    """Wait until the page shows the scene at an address; a running one leads from there to a tab of its own."""
+    """Wait until the page shows the scene at an address; a running scene redirects from there to a tab's address."""
     frame = page.locator("#scene").element_handle().content_frame()
     assert frame is not None
     name = re.search(r"example=([\w-]+)", address)
@@ -55,12 +55,12 @@ def wait_for_scene(page: Page, address: str) -> None:
 
 
 def asks_for_calibration(page: Page) -> None:
-    """Let the page ask for a calibration, whether or not the service has one."""
+    """Let the page request a calibration, whether or not the service has one."""
     page.route("**/health", lambda route: route.fulfill(json={"status": "ok", "calibrated": True}))
 
 
 def with_calibration(page: Page) -> None:
-    """Let the page read `CALIBRATION`: measuring one takes minutes."""
+    """Let the page read `CALIBRATION`, because measuring a calibration takes minutes."""
     asks_for_calibration(page)
     page.route(CALIBRATED, lambda route: route.fulfill(json=CALIBRATION))
 
@@ -112,7 +112,7 @@ def test_back_and_forward_lead_from_scene_to_scene(service, witness):
     for name in ("two-grippers", "twist-buckles"):
         page.get_by_role("link", name=example_of[name].title).first.click()
         is_chosen(name, f"example={name}")
-    page.get_by_role("button", name="Dark theme").click()  # shows the scene anew: no step of its own
+    page.get_by_role("button", name="Dark theme").click()  # loads the scene again, which adds no step to the history
     page.get_by_role("button", name="Dark theme").click()
     page.go_back()
     is_chosen("two-grippers", "example=two-grippers")
@@ -276,7 +276,7 @@ def test_pointing_at_a_point_and_walking_by_arrow_keys_tell_its_values(service, 
     expect(page.locator("#plot .tip")).to_be_hidden()
     plot = page.get_by_role("slider", name="Measured solves")
     plot.focus()
-    expect(plot).to_have_attribute("aria-valuetext", "march, 9 × 13: 1 ms, 3 mm, none is better in its time")
+    expect(plot).to_have_attribute("aria-valuetext", "march, 9 × 13: 1 ms, 3 mm, the best in its time")
     page.keyboard.press("End")
     expect(plot).to_have_attribute("aria-valuetext", "spacetime, 17 × 25: 100 ms, 3 mm")
     expect(page.locator("#plot .tip")).to_have_text("spacetime, 17 × 25: 100 ms, 3 mm")

@@ -1,4 +1,4 @@
-"""The 3D scene in a real browser: files, clicks, tabs beside each other, what is taken away from it."""
+"""The 3D scene in a real browser: files, clicks, several tabs, exports."""
 
 import json
 from pathlib import Path
@@ -29,7 +29,7 @@ ARC = {
 
 
 def field(page: Page, label: str) -> Locator:
-    """Return the text field beside a label of the panel."""
+    """Return the text field next to a label of the panel."""
     boxes = "[self::textarea or (self::input and not(@type = 'hidden' or @type = 'range'))]"
     return page.get_by_text(label, exact=True).locator(f"xpath=following::*{boxes}[1]")
 
@@ -60,7 +60,7 @@ def test_a_saved_playback_plays_offline_and_asks_nobody(service, witness):
     page.get_by_role("tab", name="Files").click()
     file = downloaded(page, "Save playback.html")
     context = page.context.browser.new_context(viewport={"width": 400, "height": 300}, offline=True)
-    page.close()  # two pictures at once are much for a renderer without a GPU
+    page.close()  # two scenes at once are too much for a renderer without a GPU
     asked: list[str] = []
     errors: list[str] = []
     offline = context.new_page()
@@ -80,7 +80,7 @@ def test_a_saved_playback_plays_offline_and_asks_nobody(service, witness):
             assert give_up, "nothing moves in the saved playback"
             offline.wait_for_timeout(500)
     finally:
-        context.close()  # a playback that goes on slows down all tests that follow
+        context.close()  # a running playback would slow down all later tests
     assert [url for url in asked if urlsplit(url).scheme not in ("file", "data", "blob")] == []
     assert errors == []
 
@@ -97,7 +97,9 @@ def test_a_picture_of_the_scene_is_saved_larger_than_it_is_on_the_screen(service
 def test_a_click_on_the_cable_takes_hold_of_it_there(service, witness):
     page = open_scene(witness, service)
     page.get_by_role("button", name="Pause").click()
-    page.get_by_role("button", name="Play", exact=True).wait_for()  # no time of the playback comes after that
+    page.get_by_role(
+        "button", name="Play", exact=True
+    ).wait_for()  # after that, the playback no longer changes the time
     time = page.locator("input[type=text]").first
     time.fill("0")
     time.press("Enter")

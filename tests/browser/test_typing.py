@@ -1,4 +1,4 @@
-"""What is typed into the panel of the 3D scene, key by key."""
+"""Typing into the panel of the 3D scene, key by key."""
 
 import json
 
@@ -8,11 +8,11 @@ from test_browser import open_scene
 from test_scene import downloaded
 
 pytestmark = pytest.mark.browser
-BETWEEN_KEYS = 150  # ms: that of a person, who sees the field drawn again between two
+BETWEEN_KEYS = 150  # ms: like a person, so that the field is redrawn between two keys
 
 
 def typed(page: Page, label: str, number: int, text: str):
-    """Type into one field of those beside a label, instead of what it holds; return it."""
+    """Replace the text in one of the fields next to a label by typing; return the field."""
     beside = page.get_by_text(label, exact=True).locator("xpath=ancestor::*[.//input][1]")
     field = beside.locator("input").nth(number)
     field.click()
@@ -22,7 +22,7 @@ def typed(page: Page, label: str, number: int, text: str):
 
 
 def solved_target(page: Page) -> list[float]:
-    """Return by how much the gripper of the scene moves, as it was solved."""
+    """Return the displacement of the gripper in the solved scene."""
     page.wait_for_timeout(1000)
     page.wait_for_selector('[data-status="converged"]:not(:has-text("Preview"))')
     page.get_by_role("tab", name="Files").click()
@@ -50,7 +50,7 @@ def test_a_power_of_ten_is_typed_and_what_is_out_of_range_is_told(service, witne
     stiffness = typed(page, "EI [10⁻³ N m²]", 0, "1e-1")
     solved_target(page)
     expect(stiffness).to_have_value("1e-1")
-    stiffness.fill("1e20")  # pasted: key by key, 1 and 1e2 are numbers, too, which are taken where the keys come slowly
+    stiffness.fill("1e20")  # pasted, because slow typing would also enter the numbers 1 and 1e2
     expect(page.get_by_text("Got 1e20, allowed: a number from 1e-6 to 1e9.")).to_be_visible()
     expect(stiffness).to_have_value("0.1")
     assert witness.errors == []
