@@ -238,7 +238,7 @@ class Panel:
 
     def _add_effects(self, draft: Draft) -> None:
         measure = self._gui.add_button(
-            "Measure what each costs", icon=viser.Icon.CLOCK, hint="Solves the scene without each effect in turn"
+            "Measure what each costs", icon=viser.Icon.CLOCK, hint="Solves again without each effect in turn"
         )
         self._effects = EffectsForm(self._gui, draft, self._edits)
 

@@ -128,7 +128,7 @@ def test_point_masses_move_along(client: TestClient, tmp_path: Path) -> None:
 
 
 def properties(chunks: list[Any]) -> dict[str, Any]:
-    """Return what a recording says of itself."""
+    """Return the properties of a recording."""
     found: dict[str, Any] = {}
     for chunk in chunks:
         if chunk.entity_path == "/__properties":
@@ -200,7 +200,7 @@ def test_the_energies_of_an_iterate_are_those_at_its_end(chunks: list[Any], run:
 
 
 def test_the_energies_of_iterates_of_a_cable_that_yields_add_up(client: TestClient, tmp_path: Path) -> None:
-    """The memory of the answer is not that of the iterates before it, of which the first have none at all."""
+    """The iterates before the answer have another memory than the answer, and the first ones have none."""
     bent = json.loads((ROOT / "static" / "gallery" / "keeps-its-bend.json").read_text())
     document = client.post("/v1/predictions", json=bent).json()
     assert "calls for plasticity" in document["iterations"][0]["note"]

@@ -1,4 +1,4 @@
-"""What an identification says as JSON and as a page."""
+"""The result of an identification as JSON and as a page."""
 
 from dataclasses import replace
 from typing import Any
@@ -30,7 +30,7 @@ def test_the_environment_has_the_gravity_of_the_recording(found: Identification)
 
 
 def fit(**changes: Any) -> Fit:
-    """Return how a window of a cable along x that sags along -y is met, a millimetre off."""
+    """Return a fit, off by a millimetre, to a window of a cable along x that sags along -y."""
     x = np.linspace(0.0, 1.0, 6)
     measured = np.tile(np.column_stack([x, -x * (1.0 - x), 0.0 * x]), (20, 1, 1))
     predicted = measured + np.array([0.0, 1e-3, 0.0])

@@ -56,7 +56,7 @@ class GripperForm(Form):
         self._moves = gui.add_button_group(
             "Moves",
             (ANOTHER, LAST),
-            hint="Made one after another; target and duration belong to the last. A move that goes nowhere is a pause",
+            hint="Target and duration belong to the last move. A move that goes nowhere is a pause",
         )
         self._waypoints = gui.add_html("")
         with gui.add_folder("Timing", expand_by_default=False) as self._timing:
@@ -98,7 +98,7 @@ class GripperForm(Form):
         """Add a move after the last one, or remove the last; notify the user if that is not possible."""
         if self._moves.value == LAST:
             if grips.moves(draft) < 2:
-                self._notify("One move is left", "For no move at all, set Motion to stays.")
+                self._notify("One move is left", "To have no move, set Motion to “stays”.")
             return grips.without_last_move(draft)
         longer = grips.with_next_move(draft, self._begin(draft))
         if longer == draft:

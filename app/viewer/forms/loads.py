@@ -22,7 +22,7 @@ class LoadsForm(Form):
         super().__init__(draft, edits)
         self._chosen = 0
         with gui.add_folder("Known forces"):
-            self._add = gui.add_button("Add a force", color="gray", hint="On top of grippers and surroundings")
+            self._add = gui.add_button("Add a force", color="gray", hint="In addition to grippers and surroundings")
             self._which = gui.add_dropdown("Force", (NONE,))
             self._u = NumberField(gui, "Acts at u [m]", 0.0, low=0.0, high=MAX_LENGTH)
             self._force = gui.add_vector3("Force [N]", (0.0, 0.0, 0.0), step=0.001)

@@ -34,7 +34,7 @@ class QualityForm(Form):
         self._delta = gui.add_dropdown("Threshold δ", (NONE, *DELTAS))
         self._method = gui.add_dropdown("Method", METHODS["grid"])
         self._keep = gui.add_checkbox(
-            "Keep this grid", False, hint="Even if it errs by more than 1 % of the length or does not converge"
+            "Keep this grid", False, hint="Even if its error exceeds 1 % of the length, or it does not converge"
         )
         self._bind(self._mode, self._asked)
         for control in (self._error, self._budget, self._method, *self._of_grid):
