@@ -29,7 +29,7 @@ function show(index) {
   }
   plot.point(index);
   box.setAttribute("aria-valuenow", index + 1);
-  box.setAttribute("aria-valuetext", words(points[index]) + (points[index].best ? ", the best in its time" : ""));
+  box.setAttribute("aria-valuetext", words(points[index]) + (points[index].best ? ", the best for its time" : ""));
 }
 
 function draw() {
@@ -75,7 +75,7 @@ function present(calibration) {
   const stale = calibration.current === false ? "The machine or the program has changed since then. " : "";
   document.getElementById("plot-machine").textContent = `Measured ${measured}: ${machine}. ${stale}`;
   legend.replaceChildren(...METHODS.filter((method) => points.some((point) => point.method === method)).map(entry),
-    make("li", { className: "best" }, "the best in its time"));
+    make("li", { className: "best" }, "the best for its time"));
   table.querySelector("tbody").replaceChildren(...points.map(row));
   box.setAttribute("aria-valuemax", points.length);
   draw();

@@ -256,7 +256,7 @@ def test_the_plot_is_logarithmic_in_both_directions_and_has_every_point(service,
 def test_the_table_tells_the_same_as_the_plot(service, witness):
     with_calibration(witness.page)
     page = open_page(witness, service)
-    page.get_by_text("The same as a table").click()
+    page.get_by_text("Show as a table").click()
     rows = [row.split("\t") for row in page.locator("#plot-table tbody tr").all_inner_texts()]
     assert rows == [
         ["march", "9", "13", "1", "3", "yes"],
@@ -276,7 +276,7 @@ def test_pointing_at_a_point_and_walking_by_arrow_keys_tell_its_values(service, 
     expect(page.locator("#plot .tip")).to_be_hidden()
     plot = page.get_by_role("slider", name="Measured solves")
     plot.focus()
-    expect(plot).to_have_attribute("aria-valuetext", "march, 9 × 13: 1 ms, 3 mm, the best in its time")
+    expect(plot).to_have_attribute("aria-valuetext", "march, 9 × 13: 1 ms, 3 mm, the best for its time")
     page.keyboard.press("End")
     expect(plot).to_have_attribute("aria-valuetext", "spacetime, 17 × 25: 100 ms, 3 mm")
     expect(page.locator("#plot .tip")).to_have_text("spacetime, 17 × 25: 100 ms, 3 mm")
