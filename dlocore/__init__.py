@@ -107,10 +107,10 @@ def __getattr__(name: str) -> Any:
     import importlib
 
     found = getattr(importlib.import_module(f"dlocore.{homes[name]}"), name)
-    globals()[name] = found  # so that it is asked for once
+    globals()[name] = found  # later look-ups do not come here
     return found
 
 
 def __dir__() -> list[str]:
-    """Return the public names, of which completion would miss those that are imported on first use."""
+    """Return all public names, so that completion also offers those that are imported on first use."""
     return __all__

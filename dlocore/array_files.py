@@ -1,4 +1,4 @@
-"""Arrays in NumPy's own files, which may be damaged, or far larger than they look."""
+"""Arrays in NumPy's own files, which may be damaged, or far larger once unpacked."""
 
 import lzma
 import math
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dlocore.errors import SceneError
 
-# what zipfile and numpy raise of damaged files; MemoryError, where a damaged heading tells of a huge array
+# what zipfile and numpy raise for damaged files; MemoryError if a damaged header announces a huge array
 _DAMAGED = (
     ValueError, OSError, EOFError, RuntimeError, MemoryError, SyntaxError, tokenize.TokenError,
     zipfile.BadZipFile, zlib.error, lzma.LZMAError,
@@ -35,28 +35,28 @@ def read_array(file: BinaryIO, name: str) -> NDArray[Any]:
 
     Args:
         file: its content.
-        name: what it is called in errors.
+        name: its name in errors.
 
     Raises:
-        SceneError: it is none, or damaged, or holds objects.
+        SceneError: it is not a `.npy`, is damaged, or holds objects.
     """
     with _unpacking(name, "a file that numpy.save or numpy.savez wrote"):
         return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
 
 
 class ArrayFile:
-    """The arrays of a `.npz`, each unpacked when it is read, while the file is open.
+    """The arrays of a `.npz`, each unpacked when it is read; the file must stay open for that.
 
     Args:
         file: its content.
-        name: what it is called in errors.
-        largest: bytes that an array may have once it is unpacked.
+        name: its name in errors.
+        largest: largest size of an unpacked array [bytes].
 
     Attributes:
         names: of the arrays.
 
     Raises:
-        SceneError: it is none, or damaged.
+        SceneError: it is not a `.npz`, or is damaged.
     """
 
     def __init__(self, file: BinaryIO, name: str, largest: float = math.inf) -> None:

@@ -39,16 +39,16 @@ def energies(
     material: MaterialMotion | None = None,
     stretch: StretchMotion | None = None,
 ) -> dict[str, Floats]:
-    """Return the energies of the motion at `times` (k,) [s]; each (k,) [J]. Of a prediction: `Prediction.energies`.
+    """Return the energies of a motion at `times` (k,) [s]; each (k,) [J]. A prediction has `Prediction.energies`.
 
-    Keys: "kinetic", mu/2 (|r_t|^2 + D^2/8 theta_t^2), "stretch", "bend" and "twist", docs/model.md eq. 7, and
-    "gravity", -mu g . r relative to the first of the times; point masses add m/2 |r_t|^2 and -m g . r. Each is
-    integrated over the cable as the solver does it. What is off in the scene is zero. `material` is what the sections
-    remember (`Prediction.material`), for a cable that yields.
+    Keys: "kinetic", mu/2 (|r_t|^2 + D^2/8 theta_t^2); "stretch", "bend" and "twist", docs/model.md eq. 7; and
+    "gravity", -mu g . r relative to the first of the times. Point masses add m/2 |r_t|^2 and -m g . r. Each is
+    integrated over the cable as in the solver. Effects that are off in the scene have zero energy. For a cable that
+    yields, `material` is what its sections remember (`Prediction.material`).
 
-    The energy of stretch is that of the strain that balances the forces, `stretch` (`Prediction.stretch`). Without it,
-    it is that of the surface's own strain, which is no measure of it where a cable hardly stretches: what the time
-    spline misses may strain the cable by 1e-4, and counts with the whole axial stiffness.
+    The energy of stretch belongs to `stretch`, the strain that balances the forces (`Prediction.stretch`). Without
+    `stretch` the surface's own strain is used. That is no measure of the energy in a cable that hardly stretches: the
+    error of the time spline may be a strain of 1e-4, which counts with the whole axial stiffness.
 
     Raises:
         SceneError: a time is outside the predicted time, or the surface is of a cable of another length.
@@ -79,10 +79,10 @@ def energies(
 def effect_forces(
     scene: Scene, surface: SplineSurface, times: ArrayLike, material: MaterialMotion | None = None
 ) -> dict[str, float]:
-    """Return how large the generalised forces of each active effect are in the motion [N].
+    """Return the size of the generalised forces of each active effect in the motion [N].
 
-    It is the root mean square over `times` (k,) [s] of the norm of the forces at the control points. Those of stretch
-    are of the surface's own strain, see `energies`.
+    The size is the root mean square over `times` (k,) [s] of the norm of the forces at the control points. For stretch
+    they are those of the surface's own strain, see `energies`.
 
     Raises:
         SceneError: as `energies`.
@@ -120,7 +120,7 @@ def _motion(
 ) -> tuple[Problem, Grid, Floats, Floats, Floats, list[History]]:
     """Return problem and grid, control points, velocities and accelerations (k, n_u, nc), and histories, at the times.
 
-    What had yielded by then is not in a surface but in `material`; without it the stress-free shape is the start's.
+    A surface does not say what had yielded by then, `material` does; without it the stress-free shape is the start's.
     """
     instance("scene", scene, Scene, "a Scene")
     instance("surface", surface, SplineSurface, "a SplineSurface, as Prediction.surface")

@@ -1,7 +1,7 @@
 """The calibration of a machine: what accuracy costs in time on it, measured once and stored.
 
-Times are those of one solve on a core of its own. Errors are the largest distances, over the cable and the time, to a
-march refined until it stands still.
+Times are those of one solve that has a core to itself. Errors are the largest distances, over the cable and the time,
+to a converged march, refined until its motion no longer changes.
 """
 
 import json
@@ -19,12 +19,12 @@ from dlocore.machine import machine, user_data_dir
 
 FORMAT = 1
 FILE = "calibration.json"
-_read: dict[Path, tuple[int, Cost | None]] = {}  # by file: when it was changed, and what it tells
+_read: dict[Path, tuple[int, Cost | None]] = {}  # by file: when it was changed, and the cost in it
 
 
 @dataclass(frozen=True, kw_only=True)
 class Measured:
-    """A method on one grid, over the calibration's scenes of one kind of motion.
+    """A method on one grid, measured over the calibration's scenes of one kind of motion.
 
     Attributes:
         dimensions: 2 in the plane (the paper's case, four grasps), 3 in space (a cable between two grippers).
@@ -32,10 +32,10 @@ class Measured:
         n_u, n_t: control points along the cable and in time.
         steps: time steps of the march.
         wall_time: time of a solve without error estimate [s], the median over repeats and scenes.
-        spread: half the width that holds half of the repeats [s], the largest of the scenes.
+        spread: median absolute deviation of the repeats [s], the largest of the scenes.
         error: largest distance to the converged motion [m], the largest of the scenes.
-        iterations: of the least squares, the largest of the scenes; 0 for a march.
-        converged: whether every scene did.
+        iterations: iterations of the least squares, the most of the scenes; 0 for a march.
+        converged: whether every scene converged.
     """
 
     dimensions: int
@@ -56,11 +56,11 @@ class Calibration:
 
     Attributes:
         machine: processor, cores, system, versions.
-        version: that of this package.
-        source: a mark of the program text that was measured.
+        version: version of this package.
+        source: hash of the source code that was measured.
         measured_at: when, ISO 8601 in UTC.
         duration: how long the measurement took [s].
-        points: what was measured.
+        points: the measured points.
         cost: the model of the time of a solve.
     """
 
@@ -74,11 +74,11 @@ class Calibration:
 
     @property
     def current(self) -> bool:
-        """Whether it was measured on this machine and with this program."""
+        """Whether it was measured on this machine and with this source code."""
         return self.machine == machine() and self.source == source_mark()
 
     def of_dimensions(self, dimensions: int) -> tuple[Measured, ...]:
-        """Return the points of motions in the plane, 2, or in space, 3."""
+        """Return the points of motions in the plane (2) or in space (3)."""
         return tuple(p for p in self.points if p.dimensions == dimensions)
 
     def as_json(self) -> bytes:
@@ -86,7 +86,7 @@ class Calibration:
         return json.dumps(to_document(self), indent=1).encode()
 
     def save(self, path: Path | None = None) -> Path:
-        """Write it whole or not at all, to the user's data directory by default, and return where."""
+        """Write it whole or not at all, by default to `default_path`, and return the path."""
         path = path or default_path()
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, self.as_json())
@@ -99,16 +99,16 @@ def front_of(points: tuple[Measured, ...]) -> list[int]:
 
 
 def default_path() -> Path:
-    """Return where the calibration of this user lies: ``calibration.json`` in the data directory of the service."""
+    """Return the path of this user's calibration: ``calibration.json`` in the data directory of the service."""
     given = os.environ.get("DLO_DATA_DIR")
     return (Path(given).expanduser() if given else user_data_dir()) / FILE
 
 
 def load(path: Path | None = None) -> Calibration | None:
-    """Return the stored calibration; None where there is none, or only one of another form.
+    """Return the stored calibration; None if there is none, or if its file is damaged or has another format.
 
     Args:
-        path: its file; that of the user's data directory by default.
+        path: its file, by default `default_path`.
     """
     try:
         return from_document(json.loads((path or default_path()).read_text()))
@@ -117,10 +117,10 @@ def load(path: Path | None = None) -> Calibration | None:
 
 
 def stored_cost(path: Path | None = None) -> Cost | None:
-    """Return what solves cost on this machine, from its stored calibration; None where there is none of this machine.
+    """Return what solves cost on this machine, from its stored calibration; None if there is none for this machine.
 
     Args:
-        path: its file; that of the user's data directory by default. It is read again only after it has changed.
+        path: its file, by default `default_path`. It is read again only after it has changed.
     """
     path = path or default_path()
     try:
@@ -133,7 +133,7 @@ def stored_cost(path: Path | None = None) -> Cost | None:
     return _read[path][1]
 
 
-STAR = "no other one is both faster and more accurate"  # of the table
+STAR = "no other one is both faster and more accurate"  # meaning of the star in the table
 
 
 def table(calibration: Calibration) -> str:
@@ -161,7 +161,7 @@ def from_document(document: dict[str, Any]) -> Calibration:
     """Return the calibration that `to_document` gave.
 
     Raises:
-        ValueError, KeyError, TypeError: it is of another form.
+        ValueError, KeyError, TypeError: the document has another format.
     """
     if document["format"] != FORMAT:
         raise ValueError(f"format: got {document['format']!r}. Allowed: {FORMAT}.")
@@ -179,7 +179,7 @@ def from_document(document: dict[str, Any]) -> Calibration:
 
 
 def source_mark() -> str:
-    """Return 12 digits that change with the text of this package: a calibration is of one program."""
+    """Return 12 hexadecimal digits, a hash of this package's source: a calibration is valid for one source only."""
     digest = sha256()
     root = Path(__file__).parent
     for file in sorted(root.rglob("*.py")):

@@ -29,7 +29,7 @@ class SceneError(DloError, ValueError):
         field: path of the field, e.g. ``primitives[0].u``.
         given: the value, shortened for reading.
         allowed: what would be accepted, in words.
-        reason: what is wrong, in words.
+        reason: what is wrong, in words; "" if `given` and `allowed` say enough.
     """
 
     def __init__(self, field: str, given: Any, allowed: str, reason: str = "") -> None:
@@ -59,12 +59,12 @@ def _shorten(value: Any) -> str:
 
 
 def _typed(value: Any) -> Any:
-    """Return a value of a wrong type as it is typed: text in quotes, as bare it would read like what is allowed."""
+    """Return a value of a wrong type as it is typed: text in quotes, since bare text could look like a valid value."""
     return repr(value) if isinstance(value, str) else value
 
 
 def repeated(values: Iterable[T]) -> T | None:
-    """Return the first of some values that was there before, None where each is there once."""
+    """Return the first value that occurs a second time, or None if all values differ."""
     seen = set()
     for value in values:
         if value in seen:
@@ -84,7 +84,7 @@ def within(prefix: str) -> Iterator[None]:
 
 @contextmanager
 def calculable(field: str, given: Any, allowed: str, reason: str) -> Iterator[None]:
-    """Raise such a SceneError where numbers of scales that no arithmetic holds together end in another error inside."""
+    """Turn arithmetic errors raised inside, as from numbers of extremely different scales, into this SceneError."""
     try:
         yield
     except SceneError:
@@ -137,7 +137,7 @@ def whole(field: str, value: Any, *, at_least: int, at_most: int) -> int:
 
 
 def unmasked(value: ArrayLike) -> ArrayLike:
-    """Return `value` with NaN for numbers that masked arrays, alone or in lists of any depth, hide; else as it is."""
+    """Return `value` with NaN for the masked numbers of masked arrays, alone or in lists of any depth."""
     if isinstance(value, np.ma.MaskedArray):
         return np.where(np.ma.getmaskarray(value), np.nan, value.data) if value.dtype.kind in "fiu" else value
     if not isinstance(value, list | tuple) or not value or isinstance(value[0], int | float):
@@ -149,7 +149,7 @@ def unmasked(value: ArrayLike) -> ArrayLike:
 def array(field: str, value: ArrayLike, *, shape: tuple[int | None, ...], unit: str = "") -> NDArray[np.float64]:
     """Return `value` as a read-only float array of `shape` (None: any length), or raise SceneError.
 
-    What a masked array hides is no number.
+    The masked values of a masked array count as NaN, and are refused.
     """
     sizes = " x ".join("n" if n is None else str(n) for n in shape)
     allowed = f"finite numbers, {sizes}" + (f" [{unit}]" if unit else "")
@@ -170,7 +170,7 @@ def array(field: str, value: ArrayLike, *, shape: tuple[int | None, ...], unit: 
 
 
 def columns_of(value: Any) -> int:
-    """Return the length of the rows of `value`, 0 where it is no table of equal rows."""
+    """Return the length of the rows of `value`, 0 if it is not a table of equal rows."""
     try:
         shape = np.shape(value)
     except ValueError:
@@ -188,13 +188,13 @@ def points_array(field: str, value: ArrayLike) -> NDArray[np.float64]:
 
 
 def instance(field: str, value: Any, kind: Kind, allowed: str) -> None:
-    """Raise SceneError unless `value` is of a `kind`, as `isinstance` takes it, which `allowed` says in words."""
+    """Raise SceneError unless `isinstance(value, kind)`; `allowed` says in words what is."""
     if not isinstance(value, kind):
         raise SceneError(field, _typed(value), allowed)
 
 
 def instances(field: str, values: Any, kind: Kind, allowed: str) -> tuple[Any, ...]:
-    """Return `values` as a tuple, or raise SceneError unless they are a list or the like of a `kind` (`instance`)."""
+    """Return the iterable `values` as a tuple, or raise SceneError unless each is of a `kind` (see `instance`)."""
     if isinstance(values, str) or not isinstance(values, Iterable):
         raise SceneError(field, _typed(values), f"a list of {allowed}")
     found = tuple(values)

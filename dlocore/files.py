@@ -9,14 +9,14 @@ from uuid import uuid4
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """Give a place beside `path` to write to, which takes its place at the end; whoever is interrupted leaves nothing.
+    """Yield a temporary path beside `path`, which replaces `path` at the end; an error or interrupt leaves no file.
 
-    A device or a pipe is written to itself.
+    A device or a pipe is yielded itself.
 
     Raises:
         OSError: the file can't be written.
     """
-    path = path.resolve()  # what a link leads to is written, not the link
+    path = path.resolve()  # the target of a link is replaced, not the link
     if path.exists() and not path.is_file():
         yield path
         return
@@ -32,6 +32,10 @@ def whole(path: Path) -> Iterator[Path]:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all; OSError where it can't be."""
+    """Write a file whole or not at all.
+
+    Raises:
+        OSError: it can't be written.
+    """
     with whole(path) as unfinished:
         unfinished.write_bytes(content)

@@ -64,24 +64,25 @@ def predict(
 
     Args:
         scene: what to predict.
-        like: a prediction of a scene much like this one, a target moved by centimetres say: its grid and its error
-            estimate are taken on, which saves the search for them. Where the two differ too much for that this one is
-            solved from the beginning, and `message` says why.
+        like: a prediction of a similar scene, for example one whose target is some centimetres away. Its grid and its
+            error estimate are reused, which saves the search for them. If the two scenes differ too much for that,
+            this one is solved from the beginning, and `message` says why.
         on_iteration: called after every iteration, or refinement level, with its record.
-        deadline: time allowed [s]; after it the best iterate is returned with status "time_limit". For a target that
-            is hard to meet more is done within it, or within `quality.time_budget`, than without either.
-        cancelled: asked between iterations; where it returns True the solve stops.
-        cost: what solves cost on this machine (`dlocore.calibration.stored_cost`), by which a time budget begins with a
-            grid that fits; without it with the coarsest.
-        keep_grid: as that of the scene's `quality`, whatever it is there. Without it finer grids, or a march, are the
-            answer where a given grid errs by more than 1 % of the length as it estimates, or a solve on it does not
-            converge, and they do better, which `message` tells.
+        deadline: time allowed [s]; after it the best iterate is returned with status "time_limit". If a target error
+            is hard to meet, a deadline or a `quality.time_budget` lets the solver refine further than it does by
+            default.
+        cancelled: called between iterations; the solve stops if it returns True.
+        cost: what solves cost on this machine (`dlocore.calibration.stored_cost`). A solve with a time budget then
+            begins with a grid that fits the budget; without `cost` it begins with the coarsest.
+        keep_grid: True sets `keep_grid` of the scene's `quality` for this solve. Otherwise, if the estimated error on
+            a given grid exceeds 1 % of the length, or a solve on it does not converge, finer grids or a march are
+            tried. If they do better they are the answer, and `message` says so.
 
     Returns:
         The prediction. Not converging is a status, not an exception.
 
     Raises:
-        SceneError: the scene can't be solved as it was given, or `deadline` is no time.
+        SceneError: the scene can't be solved as it was given, or an option is not valid, such as a negative `deadline`.
         Cancelled: `cancelled` returned True.
     """
     instance("scene", scene, Scene, "a Scene")
@@ -96,7 +97,7 @@ def predict(
     again = march_again(problem, like, monitor)
     if isinstance(again, Again):
         found = replace(_solved(problem, monitor, cost, again), scene=scene)
-        # where the one like it is on as coarse a grid finer ones were tried in vain, or not wanted
+        # if `like` errs as much on the same grid, finer ones were tried in vain for it, or not wanted
         if keep_grid or not falls_short(found) or (errs(found) and errs(like)):
             return found if asked is scene else replace(found, said=f"{found.said} {left_before(scene, asked)}")
         again = found.said
@@ -105,14 +106,14 @@ def predict(
 
 
 def check_options(like: Prediction | None, deadline: float | None, keep_grid: bool) -> None:
-    """Raise SceneError unless these options of `predict` are what it takes, whatever the scene."""
+    """Raise SceneError unless these options of `predict` are valid; the scene does not matter for that."""
     instance("like", like, Prediction | None, "a Prediction, or None")
     time_allowed(deadline)
     flag("keep_grid", keep_grid)
 
 
 def _shown(scene: Scene, monitor: Monitor, cost: Cost | None, keep_grid: bool) -> Prediction:
-    """Solve a scene; where what it asks for can't show its motion, by a march, or on finer grids."""
+    """Solve a scene. If the given grid or method can't resolve its motion, solve it by a march or on finer grids."""
     found = _solved(pose(scene), monitor, cost)
     if keep_grid or not falls_short(found):
         return found
@@ -125,15 +126,15 @@ def _shown(scene: Scene, monitor: Monitor, cost: Cost | None, keep_grid: bool) -
 
 
 def _tried(scene: Scene, quality: Quality, monitor: Monitor) -> Prediction | SceneError:
-    """Return the answer of a scene with another quality, or why it has none."""
+    """Return the answer for a scene with another quality, or the error that says why there is none."""
     try:
         return _solved(pose(replace(scene, quality=quality)), monitor, None)
-    except SceneError as error:  # a start that comes to rest on the given grid need not on others
+    except SceneError as error:  # a start that settles on the given grid need not settle on another
         return error
 
 
 def _last_resort(found: Prediction, monitor: Monitor) -> Prediction:
-    """Return the answer where a least squares did not converge: once more, or that of the march it started from."""
+    """Return the answer if a least squares did not converge: of a second try, or of the march that it started from."""
     scene, level, spent = found.scene, found.level, monitor.elapsed()
     assert level is not None
     tried: list[tuple[Quality, Prediction | SceneError]] = [(scene.quality, found)]
@@ -169,8 +170,8 @@ def _solved(problem: Problem, monitor: Monitor, cost: Cost | None, again: Again 
 def automatic_method(problem: Problem) -> Method:
     """Return the method of quality "auto": a march, or the least squares on a given grid with a threshold for it.
 
-    On the same grid a march is nearer to the motion and takes less time (`python -m benchmarks.methods`). What touches,
-    slips or yields does so at instants that a march steps over and collocation points miss.
+    On the same grid a march is nearer to the motion and takes less time (`python -m benchmarks.methods`). Contact, slip
+    and yielding set in at instants that a march steps through and collocation points miss.
     """
     jumps = ("plasticity", "self_contact")
     smooth = problem.contact is None and problem.friction is None and not any(problem.choices[j].active for j in jumps)
@@ -179,7 +180,7 @@ def automatic_method(problem: Problem) -> Method:
 
 
 def _as_before(again: Again, monitor: Monitor) -> Outcome:
-    """Return the march on the grid of one like it as an answer, with the estimate of that one."""
+    """Return, as an answer, the march on the grid of a similar prediction, with the error estimate of that one."""
     level = again.level
     record_level(level.problem, level, monitor)
     status, message = march_status(level.problem, level)
@@ -189,7 +190,7 @@ def _as_before(again: Again, monitor: Monitor) -> Outcome:
 def _least_squares(
     problem: Problem, quality: Quality, monitor: Monitor, method: str, again: Again | None
 ) -> Prediction:
-    """Solve on the given grid by the weighted least squares from a march, or by the printed scheme from rest."""
+    """Solve on the given grid: by weighted least squares started from a march, or by the printed scheme from rest."""
     assert quality.n_u is not None
     assert quality.n_t is not None
     if again is None:
@@ -223,14 +224,14 @@ def _least_squares(
     known = quality.estimate and (method != "paper" or solved.converged)
     compared = by_finer(problem, level, monitor) if known else Compared(None)
     estimate = compared.estimate
-    # what the time spline of the march misses is no error of the least squares
+    # what the time spline of the march misses is not an error of the least squares
     errors = None if estimate is None else {"grid": max(estimate, level.unseen, level.held_back), "iteration": end.left}
     outcome = Outcome(compared.on(level), end.status, end.message + compared.doubt, errors)
     return _answer(monitor, method, outcome, end.find_forces)
 
 
 def check_n_t(problem: Problem, n_t: int) -> None:
-    """Raise SceneError where a grid has fewer control points in time than `smallest_n_t`."""
+    """Raise SceneError if a grid has fewer control points in time than `smallest_n_t`."""
     least = smallest_n_t(problem)
     if n_t < least:
         reason = "Every jump in the grasps' motion needs knots in time"
@@ -238,7 +239,7 @@ def check_n_t(problem: Problem, n_t: int) -> None:
 
 
 def _given(problem: Problem, quality: Quality, monitor: Monitor, level: Level | None = None) -> Outcome:
-    """March on the given grid, where its march and time spline are not known."""
+    """Return the answer by a march on the given grid; `level` is that march with its time spline, if it is known."""
     assert quality.n_u is not None
     assert quality.n_t is not None
     if level is None:

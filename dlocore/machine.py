@@ -1,4 +1,4 @@
-"""What this program runs on, and where it keeps a user's data."""
+"""The machine that this program runs on, and the directory of a user's data."""
 
 import os
 import platform
@@ -7,7 +7,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 _PACKAGES = ("numpy", "scipy", "numba")
-_BARE = ("processor", "system")  # they name themselves
+_BARE = ("processor", "system")  # their values need no label
 
 
 def usable_cores() -> int:
@@ -16,7 +16,7 @@ def usable_cores() -> int:
 
 
 def program_version() -> str:
-    """Return the version of this program that is installed, "0" where it runs from a checkout."""
+    """Return the installed version of this program, "0" if it runs from a checkout."""
     try:
         return version("dlo")
     except PackageNotFoundError:
@@ -31,7 +31,7 @@ def user_data_dir() -> Path:
 
 @cache
 def machine() -> dict[str, str]:
-    """Return processor, cores that may be used, system and versions."""
+    """Return the processor, the number of usable cores, the system, and the versions of Python and packages."""
     return {
         "processor": _processor(),
         "cores": str(usable_cores()),

@@ -11,8 +11,8 @@ from dlocore.machine import usable_cores
 from dlocore.prediction import Prediction
 from dlocore.scene.scene import Scene
 
-_NEVER = 2**31 - 1  # looks at what is younger, after which what is old is looked at
-_MOST_AT_ONCE = 16  # scenes that a thread takes: to wake another for each takes longer than to solve a short one
+_NEVER = 2**31 - 1  # collections of a younger generation after which the oldest is collected
+_MOST_AT_ONCE = 16  # scenes that a thread takes at once: switching threads can take longer than a short solve
 
 
 def predict_many(
@@ -26,22 +26,22 @@ def predict_many(
 ) -> list[Prediction | SceneError]:
     """Predict the motions of many scenes, each as `predict` would, bit for bit.
 
-    The compiled part of a solve runs beside the others'; what Python does in between runs one at a time.
+    The compiled parts of the solves run in parallel; the Python code between them runs in one thread at a time.
 
     Args:
         scenes: what to predict.
-        like: a prediction of a scene much like them all, as in `predict`.
-        threads: solves at once; by default as many as there are processors for this process.
+        like: a prediction of a scene similar to all of them, as in `predict`.
+        threads: solves at once; by default the number of processors that this process may use.
         deadline: time allowed for each scene [s], as in `predict`.
-        cancelled: asked between iterations of every solve; where it returns True all stop.
-        keep_grid: answer with what given grids come to by themselves, however much that errs, as in `predict`.
+        cancelled: called between iterations of every solve; all solves stop if it returns True.
+        keep_grid: keep the answers of given grids however large their error, as in `predict`.
 
     Returns:
         For each scene, in order, its prediction, or the error that says why it can't be solved as it was given.
 
     Raises:
-        SceneError: `threads` is no positive whole number, another option is none that `predict` takes, or `scenes` are
-            none.
+        SceneError: `threads` is not a whole number from 1 to 1024, `predict` would refuse another option, or `scenes`
+            is not iterable.
         Cancelled: `cancelled` returned True.
     """
     wanted = usable_cores() if threads is None else whole("threads", threads, at_least=1, at_most=1024)
@@ -74,7 +74,7 @@ def predict_many(
             while not stop.is_set() and (indices := take()):
                 for index in indices:
                     answers[index] = solve(given[index])
-        except BaseException as failure:  # the caller's to see, whichever thread it is in
+        except BaseException as failure:  # raised in the caller's thread below
             failures.append(failure)
             stop.set()
 
@@ -87,7 +87,7 @@ def predict_many(
             for helper in helpers:
                 helper.join()
         finally:
-            stop.set()  # what still runs where this thread is interrupted
+            stop.set()  # stops the other solves if this thread is interrupted
             for helper in helpers:
                 if helper.is_alive():
                     helper.join()
@@ -97,11 +97,11 @@ def predict_many(
 
 
 class _OldGarbage:
-    """Waits: Python looks for garbage among what has lived for long only after the last of the batches under way.
+    """Postpones Python's collection of old garbage until the last of the running batches has ended.
 
-    Each such look takes as long as there are objects in the process, and comes the more often the more answers a batch
-    has made, none of which are garbage: with thousands of them it is a fifth of the time. Young objects are looked
-    through as ever.
+    Each such collection visits all objects of the process, and the answers of a batch, none of which are garbage,
+    trigger ever more of them: with thousands of answers they take a fifth of the time. Young objects are collected as
+    usual.
     """
 
     def __init__(self) -> None:

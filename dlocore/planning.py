@@ -16,7 +16,7 @@ from dlocore.scene.scene import Scene
 from dlocore.shape.shape import rest_curve
 from dlocore.solvers import paper
 
-# Medians measured on one 2-core cloud machine of 2026; they tell the order of the time it takes
+# Medians measured on one 2-core cloud machine in 2026; they give the order of magnitude of the time
 # (benchmarks/expected_times.py).
 _MARCH = {2: 9e-7, 3: 2.2e-6, 4: 3.1e-6}  # [s] per step and control point, by coordinates
 _ITERATION = 2.5e-4  # [s] of the least squares
@@ -24,9 +24,9 @@ _UNKNOWNS = 1.6e-9  # [s] per iteration, time span and cubed number of free coor
 _SETUP = 5e-4  # [s]
 _REFERENCE = {2: 2e-5, 3: 4e-5}  # [s] of the reference per step and element, by dimensions
 _RODS = ((20, 150), (40, 250), (80, 450))  # elements and steps of the rods that most scenes need
-_LEVEL = 1  # of refinement that most scenes end at, ...
-_CLIMB = 4.0  # ... and times the time up to there that the median one takes
-# times the time, as steps take more iterations, are divided where something is struck, and have to be more
+_LEVEL = 1  # refinement level at which most scenes end, ...
+_CLIMB = 4.0  # ... and the median time of a scene, as a multiple of the marches up to there
+# factors on the time: steps take more iterations, are divided at impacts, and have to be more
 _RUBS, _TOUCHES, _MEETS_ITSELF = 1.5, 5.0, 40.0
 _EVENTS = 1.5  # power of one more than the events of a motion
 _ITERATIONS = 8
@@ -37,14 +37,14 @@ class Plan:
     """What `predict` would do with a scene.
 
     Attributes:
-        dimensions: 2 where the motion is planar, else 3.
-        reason: why.
+        dimensions: 2 if the motion is planar, otherwise 3.
+        reason: why it is planar or not.
         effects: which effects it would simulate, and why; magnitudes are known only after solving.
         method: "march", "spacetime", "paper" or "reference".
-        n_u, n_t, steps: the grid: as given, or the one at which most scenes meet their target; of the reference the
-            nodes and the steps of its finest rod.
-        expected_time: the order of the time that it would take [s], as far as it is known before the motion: what is
-            struck, and what grows from it, decides.
+        n_u, n_t, steps: the grid: as given, or the one on which most scenes meet their target. For method "reference"
+            the nodes, times and steps of its finest rod.
+        expected_time: order of magnitude of the solve's time [s]. It depends on impacts and instabilities, which are
+            known only once the motion is.
     """
 
     dimensions: int
@@ -59,7 +59,7 @@ class Plan:
 
 @interruptible
 def plan(scene: Scene) -> Plan:
-    """Tell what a scene calls for, without solving it.
+    """Return what `predict` would do with a scene, without solving it.
 
     Raises:
         SceneError: the scene can't be solved as it was given.
@@ -89,7 +89,7 @@ def plan(scene: Scene) -> Plan:
         paper.refuse(problem, n_u, n_t)
     dimensions = problem.plane.dimensions
     if method == "reference":
-        from dlocore.reference.solve import refuse  # its compiled code is for those who ask for it
+        from dlocore.reference.solve import refuse  # its compiled code is loaded only if it is used
 
         refuse(problem)
         n_u, n_t, steps = _RODS[-1][0] + 1, _RODS[-1][1] + 1, _RODS[-1][1]
@@ -113,7 +113,7 @@ def plan(scene: Scene) -> Plan:
 
 
 def _harder(problem: Problem) -> float:
-    """Return how many times as long the steps of a motion take as those of a smooth one that touches nothing."""
+    """Return the factor by which a motion's steps take longer than those of a smooth one that touches nothing."""
     rubs, touches = problem.friction is not None, problem.contact is not None
     factor = _TOUCHES if touches else _RUBS if rubs else 1.0
     return factor * (_MEETS_ITSELF if problem.self_contact is not None else 1.0) * (1 + len(problem.events)) ** _EVENTS

@@ -31,33 +31,36 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-PART, TINY = 0.2, 1e-4  # of how far the cable moves, and of its length: up to which an error is not worth a word
-NOTHING = 1e-6  # of the length of the cable: what moves by less stands still but for what a solve leaves
-UNSURE = 0.5  # of a force: from which on its error is worth one, where it is more than TINY of what weighs or bends it
+PART, TINY = 0.2, 1e-4  # of how far the cable moves, and of its length: smaller errors get no note
+NOTHING = 1e-6  # of the length of the cable: a smaller motion counts as none, it may come from the solver alone
+UNSURE = 0.5  # of a force: larger errors get a note, if they exceed TINY of the weight, or of EI/L^2 if that is more
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prediction:
-    """A predicted motion. It can be pickled, with all that is read from it and may be found only then.
+    """A predicted motion.
+
+    Some attributes (`grasps`, `contacts`, `effects`, `notes`, `message`, `start_energy`, `material`, `stretch`) are
+    computed when they are first read. Pickling computes and stores them too.
 
     Attributes:
-        scene: what was asked.
-        status: "converged", or why not; never a success word for a failure.
+        scene: the scene that was solved.
+        status: "converged", or why the solve did not converge; never a success word for a failure.
         said: the status in words, and what to do about it.
         surface: the bivariate spline q(u, t).
         grasps: reaction of each grasp, in the scene's order.
-        contacts: force of the table, and of each obstacle that was simulated, on the cable; of method reference none.
+        contacts: force of the table, and of each simulated obstacle, on the cable; empty for method "reference".
         effects: what was simulated and why.
-        notes: what is to be known beside the status, such as what effects that the scene switches off would have done.
-        message: what is said, and the notes.
-        start_energy: elastic energy stored in the start shape [J]. These six are functions of the rest, evaluated
-            when they are first read.
+        notes: what else to know, for example what the effects that the scene switches off would have done.
+        message: `said` and the notes.
+        start_energy: elastic energy stored in the start shape [J].
         iterations: how the solve went.
         accuracy: method, estimated error, time.
-        start_fit: root mean square distance of the start from the given points [m], which no error estimate counts; 0
-            where it was given exactly.
-        level: the march behind it, on whose grid another may go on (`predict(..., like=...)`); None of a reference.
-        judged: the prediction like it whose error estimate it took on; None where its own error was estimated.
+        start_fit: root mean square distance of the start from the given points [m], which no error estimate includes;
+            0 if the start was given exactly.
+        level: the march behind the answer, whose grid another solve can reuse (`predict(..., like=...)`); None for
+            method "reference".
+        judged: the similar prediction (`like`) whose error estimate was reused; None if the error was estimated anew.
     """
 
     scene: Scene
@@ -86,23 +89,26 @@ class Prediction:
     @cached_property
     @interruptible
     def notes(self) -> tuple[str, ...]:
-        """What is to be known beside the status: of the scene as given, strains, instabilities, effects left out."""
-        from dlocore.problem.notes import scene_notes  # it needs the compiler, which to make a scene does not
+        """What else to know: about the scene as given, strains, instabilities, effects that were left out."""
+        from dlocore.problem.notes import scene_notes  # imports the compiler, which making a scene does not need
 
         return (*scene_notes(self.scene), *self._objections, *self._of_a_small_motion(), *self._of_unsure_forces())
 
     def _of_a_small_motion(self) -> list[str]:
-        """Return what is told of an answer that is good for the length of the cable, but not for so small a motion."""
+        """Return a note if the error is small against the length of the cable, but not against its motion."""
         control, error = self.surface.control_points[..., :3], self.accuracy.error_estimate
         length, moved = self.surface.length, float(np.linalg.norm(control - control[0], axis=-1).max())
         if self.status != "converged" or error is None or not error > max(PART * moved, TINY * length):
             return []
         if not moved > NOTHING * length:
             return []
-        return [f"the cable moves by {in_mm(moved)}, of which the estimated error is much: give a smaller target_error"]
+        return [
+            f"the cable moves by only {in_mm(moved)}, and the estimated error is large compared with that: give a "
+            "smaller target_error"
+        ]
 
     def _of_unsure_forces(self) -> list[str]:
-        """Return which forces of grippers are hardly known, for half of the time, though the motion is."""
+        """Return notes on gripper forces whose median error over time is large, though the motion converged."""
         if self.status != "converged" or self.accuracy.error_estimate is None:
             return []
         cable, told = self.scene.cable, []
@@ -114,8 +120,8 @@ class Prediction:
             size, error = (float(np.median(values[sizes > 0.0])) for values in (sizes, grasp.reaction_error))
             if error > max(UNSURE * size, small):
                 told.append(
-                    f"the force of the gripper at u = {grasp.u:.4g} m is {in_newtons(size)}, give or take "
-                    f"{in_newtons(error)}, as the median over time: give a smaller target_error where it matters"
+                    f"the force of the gripper at u = {grasp.u:.4g} m is uncertain: {in_newtons(size)}, give or take "
+                    f"{in_newtons(error)} (medians over time). If you need it, give a smaller target_error"
                 )
         return told
 
@@ -156,17 +162,18 @@ class Prediction:
     @cached_property
     @interruptible
     def material(self) -> MaterialMotion | None:
-        """What the sections remember over time, and how they are turned.
+        """What the sections remember over time, and how they are turned; None if they have nothing to remember.
 
-        None where they are elastic, and straight whatever the start. But for method "reference" there is the director
-        of those that twist, too, and all else is zero where they remember nothing.
+        They have nothing to remember if they are elastic and their stress-free shape is straight whatever the start. A
+        motion with twist is an exception, unless it is by method "reference": `material` then holds the director, and
+        all else in it is zero.
         """
         return self.report_material()
 
     @cached_property
     @interruptible
     def stretch(self) -> StretchMotion:
-        """How far the cable is stretched over time, to the accuracy of a tension."""
+        """Axial strain of the cable over time, accurate enough to read a tension from it."""
         return self.report_stretch()
 
     def energies(self, times: ArrayLike) -> dict[str, Floats]:
@@ -191,16 +198,16 @@ class Prediction:
             _objections="find_objections",
         )
         if self.level is not None:
-            state["level"] = self.level.alone  # what those beside it were for is known now
+            state["level"] = self.level.alone  # the levels beside it served the forces' errors, which are known now
         return state
 
     def shape_at(self, t: float | None = None) -> ControlPoints:
         """Return the cable at time `t` [s], its last by default, as the start of another motion.
 
-        Shape, velocity, stretch, twist, spin and memory go on, so that primitives chain: grasp, move, release, grasp
-        elsewhere. Where the sections remember nothing, but twist, the motion is the same without `material`, which is
-        then but their director. A strain of more than 50 %, which no cable follows, is given as 50 %: such a cable may
-        be too long to go on.
+        Shape, velocity, stretch, twist, spin and memory carry over, so that primitives chain: grasp, move, release,
+        grasp elsewhere. If the cable twists but remembers nothing, the next motion is the same without `material`,
+        which then holds only the director. Strains beyond 50 %, which no real cable bears, are clipped to 50 %; such a
+        cable may be too long to continue.
 
         Raises:
             SceneError: `t` is outside the predicted time.
@@ -217,7 +224,7 @@ def continued(
 ) -> ControlPoints:
     """Return the cable of a predicted motion at time `t` [s], its last by default, as the start of another motion.
 
-    Without `stretch`, where it was not stored, the cable goes on with its own length.
+    Without `stretch`, for example if it was not stored, the cable continues with its own length.
 
     Raises:
         SceneError: `t` is outside the predicted time.

@@ -1,7 +1,7 @@
 """Recordings: markers tracked along a cable over time, which of them are held, and what is known of the cable.
 
 Files (docs/identification.md): one `.npz` with the arrays `times` and `markers` and a JSON text `about`, or a `.csv` of
-the markers with a `.json` of the same name beside it.
+the markers with a `.json` of the same name in the same folder.
 """
 
 import csv
@@ -23,23 +23,23 @@ from dlocore.words import counted
 
 Floats = NDArray[np.float64]
 
-PAIR = 0.06  # of the length: two held neighbours at an end, nearer than this to each other, are one clamp
+PAIR = 0.06  # of the length: two held neighbours at most this far apart are one clamp
 LEAST_SEEN = 0.2  # of the frames in which each marker must be seen
 LEAST_FRAMES = 10  # of a motion
-_ELSEWHERE = 20.0  # times as far as a marker goes from frame to frame, on average: so far it does not go in one
-_NOISY = 0.02  # relative, by which noise makes the distances of markers add up to more than the cable's length
-_OTHER_UNIT = 20.0  # times the length, that no order of the markers makes
+_ELSEWHERE = 20.0  # times its mean step from frame to frame: a marker does not go farther in one
+_NOISY = 0.02  # relative, by which noise may make the distances of markers add up to more than the cable's length
+_OTHER_UNIT = 20.0  # times the length: distances that add up to more must be in another unit, not in another order
 _FACTS = ("u", "held", "length", "diameter", "linear_density", "point_masses", "gravity", "static", "name")
 
 
 @dataclass(frozen=True)
 class Hold:
-    """What the held markers say of one gripper.
+    """One gripper, as the held markers show it.
 
     Attributes:
         marker: the marker whose position is held.
         towards: its held neighbour, which gives the direction only; None: the direction is free.
-        forward: the neighbour lies towards larger u.
+        forward: whether the neighbour lies towards larger u.
     """
 
     marker: int
@@ -55,13 +55,13 @@ class Recording(Checked):
         times: (k,) [s], rising, evenly or not.
         markers: (k, m, 2 or 3) [m], NaN or masked where a marker was lost; 2D markers lie at z = 0.
         u: material coordinates of the markers (m,) [m], rising; None: from the distances of neighbours.
-        held: the markers that grippers hold; negative ones count from the end.
-        length: of the cable [m]; None: it ends at the outermost markers.
-        diameter, linear_density: what is known of the cable, [m] and [kg/m].
-        point_masses: what else hangs on it, as a connector at its end.
+        held: numbers of the markers that grippers hold; negative ones count from the end.
+        length: of the cable [m]; None: it ends at the last marker.
+        diameter, linear_density: of the cable if known, [m] and [kg/m].
+        point_masses: attached parts, such as a connector at an end.
         gravity: (3,) [m/s^2].
-        static: every frame is a shape at rest of its own, and `times` only number them.
-        name: for reports.
+        static: whether every frame is a separate shape at rest; `times` then only number the frames.
+        name: used in reports and errors.
 
     Raises:
         SceneError: the arrays do not fit together, or too little was seen.
@@ -122,7 +122,7 @@ class Recording(Checked):
 
     @property
     def place(self) -> str:
-        """The path of its fields in errors."""
+        """Prefix of its fields in errors."""
         return f"recordings[{self.name!r}]"
 
     @property
@@ -139,10 +139,10 @@ class Recording(Checked):
 
     @property
     def holds(self) -> tuple[Hold, ...]:
-        """The grippers: a pair of close held neighbours is a clamp, of which the inner one is held in place.
+        """The grippers. Two held neighbours close to each other are one clamp: the inner one is held in position.
 
-        Both as two held positions would fight: their measured distance varies by millimetres, the cable's does not.
-        Between them the cable is as straight as the gripper.
+        They are not two held positions, since these would conflict: the measured distance varies by millimetres, that
+        along the cable does not. Between the two the cable is as straight as the gripper.
         """
         u, rest, found = cast(Floats, self.u), list(self.held), []
         middle = 0.5 * cast(float, self.length)
@@ -173,15 +173,15 @@ class Recording(Checked):
 
 
 def apart_in_words(times: Floats) -> str:
-    """Return how far frames are apart at most, and what that may come from, in words."""
+    """Return in words the longest time between frames, and its possible causes."""
     return f"Frames are up to {np.diff(times).max():.3g} s apart: times in another unit than s, or a pause"
 
 
 def _no_longer(u: Floats, length: float) -> Floats:
-    """Return coordinates from distances (m,) [m], which noise makes longer, on a cable of a length [m].
+    """Return coordinates (m,) [m], found from distances that noise lengthens, scaled to fit on a cable of a length [m].
 
     Raises:
-        SceneError: they are longer by more than noise makes them.
+        SceneError: they exceed the length by more than noise explains.
     """
     times = float(u[-1]) / length
     if times > 1.0 + _NOISY:
@@ -218,10 +218,10 @@ def _markers(value: ArrayLike, frames: int, static: bool) -> Floats:
 
 
 def _zeros_of_lost(markers: Floats) -> NDArray[np.bool_]:
-    """Tell which samples (frames, m) of a motion are (0, 0, 0) because their marker was lost, as some trackers write.
+    """Return which samples (frames, m) of a motion are (0, 0, 0) because their marker was lost; some trackers do that.
 
-    Such a marker is somewhere else in the frames before and after, farther than it goes from frame to frame; one that
-    is at the origin comes from near it.
+    A lost marker is much farther from the origin in the frames before and after than it moves from frame to frame. A
+    marker that really is at the origin was near it in the frame before or after.
     """
     at = np.linalg.norm(markers, axis=2)
     steps = np.where((at[1:] > 0.0) & (at[:-1] > 0.0), np.linalg.norm(np.diff(markers, axis=0), axis=2), np.nan)
@@ -251,14 +251,14 @@ def _held(held: tuple[int, ...], count: int) -> tuple[int, ...]:
 
 
 def load_recording(path: str | Path, *, largest: float = math.inf) -> Recording:
-    """Read a recording from `<name>.npz`, or from `<name>.csv` with `<name>.json` beside it.
+    """Read a recording from `<name>.npz`, or from `<name>.csv` with `<name>.json` in the same folder.
 
     Args:
         path: the file.
-        largest: bytes that an array of a `.npz` may have once it is unpacked.
+        largest: largest size of an unpacked array of a `.npz` [bytes].
 
     Raises:
-        SceneError: the file is not one, or what it holds does not fit together.
+        SceneError: the file is not a recording, or its contents do not fit together.
         OSError: it can't be read.
     """
     path = Path(path)
@@ -273,7 +273,7 @@ def save_recording(recording: Recording, path: str | Path) -> None:
     """Write a recording as one `.npz` that `load_recording` reads.
 
     Raises:
-        SceneError: `path` has another ending.
+        SceneError: `path` does not end in `.npz`.
         OSError: it can't be written.
     """
     if Path(path).suffix != ".npz":
@@ -287,14 +287,14 @@ def save_recording(recording: Recording, path: str | Path) -> None:
 
 
 def about(recording: Recording) -> dict[str, Any]:
-    """Return what a recording says beside its arrays, as JSON."""
+    """Return the facts of a recording besides its arrays, as data for JSON."""
     facts = {name: getattr(recording, name) for name in _FACTS}
     facts["point_masses"] = [asdict(one) for one in recording.point_masses]
     return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in facts.items() if v is not None}
 
 
 def recording_of(times: ArrayLike, markers: ArrayLike, facts: Mapping[str, Any]) -> Recording:
-    """Return the recording of arrays and facts as files and requests give them.
+    """Return the recording made of arrays and facts in the form of files and requests.
 
     Raises:
         SceneError: a fact is unknown or wrong.
@@ -325,7 +325,7 @@ def read_facts(path: Path) -> dict[str, Any]:
     """Return the JSON object in a file.
 
     Raises:
-        SceneError: it holds none, or says something twice.
+        SceneError: it does not hold a JSON object, or a name occurs twice.
         OSError: it can't be read.
     """
     try:
@@ -379,7 +379,7 @@ def _from_csv(path: Path) -> Recording:
 
 
 def _rows(path: Path) -> list[tuple[int, list[str]]]:
-    """Return the rows of a `.csv` that are not empty, with the lines of the file on which they end."""
+    """Return the rows of a `.csv` that are not empty, each with the number of the line on which it ends."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             reader = csv.reader(file)

@@ -1,13 +1,15 @@
 """Derivatives of a predicted motion by parameters of its scene (docs/identification.md).
 
 Every step of a march solves R(q, v, a, past; parameter) = 0. The derivative of the motion obeys the linearised step,
-whose matrix is the step's own Newton matrix. It is found without a new march: two motions beside the known one, with
-the parameter a little larger and smaller, are followed to rounding with the factors of the known motion's steps, and
-their difference is taken. This differentiates the converged discrete system directly: what depends on the parameter
-(knots under a grasp that moves, the start, weights, the past of the strain) is covered alike, and the noise of a
-solver's tolerance is not in it. The error that is left is that of a central difference of a smooth function over a
-relative step of 1e-4: about 1e-7 of the derivative. A number that may be 0 is changed by 1e-6 of its natural scale at
-least, such as the length of the cable: a share of one that is 1e-12 by chance would be lost in rounding.
+whose matrix is the step's own Newton matrix. No new march is needed: two neighbouring motions, with the parameter a
+little larger and a little smaller, are solved to rounding with the factors of the known motion's steps, and their
+difference is taken. This differentiates the converged discrete system directly. It covers everything that depends on
+the parameter (knots under a grasp that moves, the start, weights, the past of the strain), and contains no noise of a
+solver's tolerance. The remaining error is that of a central difference of a smooth function over a relative step of
+1e-4: about 1e-7 of the derivative.
+
+A parameter that may be 0 is changed by at least 1e-6 of its natural scale, for example the length of the cable. A
+relative change of a value that happens to be 1e-12 would be lost in rounding.
 """
 
 import math
@@ -44,24 +46,24 @@ from dlocore.statics.statics import start_grid
 
 Floats = NDArray[np.float64]
 
-STEP = 1e-4  # relative, of the parameter: the difference's own error is its square
-COARSE_STEP = 1e-2  # where whole marches are compared, whose kinks would drown a smaller one
-SETTLED_STEP = 1e-3  # where they are as the start settles: nearly to rounding, but a taut one far from linearly
-LEAST = 0.01  # of the natural scale of a number that may be 0: a smaller one is changed as if it were that
+STEP = 1e-4  # relative, of the parameter: the error of the difference is its square
+COARSE_STEP = 1e-2  # if whole marches are compared: their kinks would drown a smaller step
+SETTLED_STEP = 1e-3  # if that is because the start settles: nearly to rounding, but a taut one is far from linear
+LEAST = 0.01  # of the natural scale of a parameter that may be 0: a smaller value is changed as if it were that
 SLIGHT = 0.1  # the natural scale of a strain
-_FITTED = ("shape.points[", "cable.rest_shape[")  # numbers that a curve is fitted through
-_FITTED_STEP = 3e-3  # of the length, of theirs: the choice of smoothness moves the curve by a millionth, at any change
-_OFF_END = 1e-3  # of the length, at least: how far from an end places are that are compared in place of one there
-_OF_WAY = 0.25  # of the way to the next place that holds, loads or weighs down the cable: the largest change of a place
-_FOLLOWED = 1e-12  # of the length, on the last update of a followed step
-_STRAYED = 1e-8  # of the length: a step left with more than this was not followed
+_FITTED = ("shape.points[", "cable.rest_shape[")  # coordinates that a curve is fitted through
+_FITTED_STEP = 3e-3  # of the length, for those: at any change the choice of smoothness moves the curve by a millionth
+_OFF_END = 1e-3  # of the length, at least: distance from an end of the places compared instead of one at the end
+_OF_WAY = 0.25  # of the way to the next grasp, load or point mass: largest change of a place
+_FOLLOWED = 1e-12  # of the length: tolerance on the last update of a step of a neighbouring motion
+_STRAYED = 1e-8  # of the length: a step whose last update is larger counts as not solved
 
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
     """A smooth stretch of a known motion: its steps, from `first` to `last`, and their factors.
 
-    Its first step is one by backward Euler where it begins with a jump.
+    If it begins with a jump, its first step is by backward Euler.
     """
 
     begin: float
@@ -74,12 +76,12 @@ class Stretch:
 
 @dataclass(frozen=True, eq=False)
 class KnownMotion:
-    """A marched motion whose steps are factorised, so that motions beside it can be followed.
+    """A marched motion whose steps are factorised, so that neighbouring motions can be solved with the factors.
 
     Attributes:
         motion: the march.
-        stretches: between each two events.
-        softened: steps whose tangent is not positive; they are followed with its positive part.
+        stretches: one between each two successive events.
+        softened: number of steps whose tangent is not positive definite; its positive part is used for them.
     """
 
     motion: March
@@ -88,14 +90,14 @@ class KnownMotion:
 
 
 def objection(problem: Problem, motion: March) -> str:
-    """Return why the steps of a motion can't be differentiated one by one, "" where they can."""
+    """Return why the steps of a motion can't be differentiated one by one, "" if they can."""
     for name in ("contact", "self_contact", "friction"):
         if getattr(problem, name) is not None:
-            return f"{name.replace('_', '-')} has kinks, and steps at which it strikes are done in another way"
+            return f"{name.replace('_', '-')} has kinks, and steps with an impact are solved in another way"
     if motion.stopped:
         return "the motion stopped before its end"
     if motion.split:
-        return "some steps found equilibrium only in smaller ones"
+        return "some steps had to be split to converge"
     if len(motion.times) <= motion.steps:
         return "not all of its states were kept"
     return ""
@@ -105,7 +107,7 @@ def factored(problem: Problem, motion: March) -> KnownMotion:
     """Return the motion with its steps factorised.
 
     Raises:
-        ValueError: `objection` has one.
+        ValueError: `objection` returns a reason against it, or the tangent of a step is singular.
     """
     if objection(problem, motion):
         raise ValueError(objection(problem, motion))
@@ -137,18 +139,18 @@ def beside(known: KnownMotion, problem: Problem, grid: Grid) -> tuple[Floats, Fl
 
     Args:
         known: the known motion.
-        problem: with the same effects and events as the known one's, those at slightly other times at most.
-        grid: with as many control points.
+        problem: the changed problem, with the same effects and events; the events may be at slightly different times.
+        grid: its grid, with as many control points.
 
     Returns:
-        states (steps + 1, n_u, nc) [m], their times (steps + 1,) [s] and the velocity after t = 0.
+        States (steps + 1, n_u, nc) [m], their times (steps + 1,) [s] and the velocity after t = 0.
 
     Raises:
-        ValueError: the motion strays too far to be followed.
+        ValueError: the problem has other effects or events, or its motion differs too much from the known one.
     """
     states = np.empty_like(known.motion.states)
     if problem.nc != states.shape[2]:
-        raise ValueError("the motion beside it has other effects, or leaves its plane")
+        raise ValueError("the motion with the changed parameter has other effects, or leaves the plane")
     states[0] = grid.start
     times = known.motion.times.copy()
     active, parameters = problem.law_table()
@@ -158,7 +160,7 @@ def beside(known: KnownMotion, problem: Problem, grid: Grid) -> tuple[Floats, Fl
     velocity = v
     marks = marks_of(problem)
     if len(marks) != len(known.stretches) + 1:
-        raise ValueError("the parameter brings an event into the motion, or takes one out")
+        raise ValueError("the change of the parameter adds an event to the motion, or removes one")
     for stretch, (begin, end) in zip(known.stretches, pairwise(marks), strict=True):
         first, last = stretch.first, stretch.last
         times[first : last + 1] = np.linspace(begin, end, last - first + 1)
@@ -172,7 +174,7 @@ def beside(known: KnownMotion, problem: Problem, grid: Grid) -> tuple[Floats, Fl
             grid.tables, active, parameters, history, applied, entry.held.elimination, entry.offsets,
         )  # fmt: skip
         if not left <= _STRAYED * length:
-            raise ValueError("the motion beside it is too far from it to be followed, as one in another plane is")
+            raise ValueError("the motion with the changed parameter differs too much, for example leaves the plane")
         velocity = entry.velocity(states[0], states[1], h, times[1]) if first == 0 else velocity
     return states, times, velocity
 
@@ -190,7 +192,7 @@ def _enter(
     """Close the grasps of the stretch from step `first` to `last` of `times` (steps + 1,) [s].
 
     Returns:
-        how it begins, and with which acceleration [m/s^2] and forces [N], each (n_u, nc), its steps do.
+        The entry into the stretch, and the acceleration [m/s^2] and forces [N], each (n_u, nc), at its first step.
     """
     own = times[first : last + 1]
     load = applied_forces(problem, grid, own[:1])[0]
@@ -209,12 +211,12 @@ class Sensitivities:
 
     Attributes:
         names: the parameters.
-        exact: by parameter: differentiated step by step; else by differences of whole marches.
-        reason: by parameter: why it is not exact, "" where it is.
-        steps: half the change of each parameter on which the derivative rests.
-        above, below: the motions with each parameter a little larger and smaller; one of them is the motion itself
-            where the parameter ends there, as a drag of zero does, and the derivative is that to the other side; by a
-            place at an end both may be to one side of the motion.
+        exact: for each parameter, whether it was differentiated step by step; otherwise whole marches were compared.
+        reason: for each parameter, why it is not exact; "" if it is.
+        steps: for each parameter, half the difference of its values in `above` and `below`.
+        above, below: for each parameter, the motions with it a little larger and a little smaller. If the parameter is
+            at a limit, such as a drag of zero, one of them is the predicted motion itself, and the derivative is
+            one-sided. For a place near an end both places may lie further inward.
     """
 
     names: tuple[str, ...]
@@ -230,11 +232,11 @@ class Sensitivities:
     def __call__(self, u: ArrayLike, t: ArrayLike) -> Floats:
         """Return dr/dparameter on the grid of t (m,) [s] and u (k,) [m]; (parameters, m, k, 3) [m per its unit].
 
-        By the length of the cable, or the horizon, it is read where the motions of both lengths are: at the very end it
-        is that a step before it.
+        Derivatives by the length of the cable, or by the horizon, are read where both motions exist: the value at the
+        very end is that one change of the parameter before the end.
 
         Raises:
-            SceneError: a place is off the cable, or a time outside the predicted time.
+            SceneError: a coordinate is off the cable, or a time outside the predicted time.
         """
         surfaces = (*self.above, *self.below)
         u = in_range("u", u, max((s.length for s in surfaces), default=np.inf), "m")
@@ -248,25 +250,27 @@ class Sensitivities:
 def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     """Return the derivatives of a predicted motion by parameters of its scene.
 
-    The prediction's march, on its grid and with the effects that it found, is differentiated step by step: exact up to
-    about 1e-7 of the largest derivative, for a time spline whose knots move with events alone. Where steps can't be
-    differentiated (contact, friction, strands that touch, steps that had to be split) whole marches are compared
-    instead, and `exact` and `reason` say so.
-    A parameter that can't be less, or more, as a drag of zero or the place of a grasp at an end, is changed to the
-    other side only: the derivative then errs by about the relative change of it over that of the parameter, a millionth
-    of its natural scale.
-    What is held, loaded or heavy at an end of the cable has other knots than what is a little away from it. There the
-    motions with it at a thousandth of the length from the end, and at twice that, are compared; nearer to the end where
-    something else holds, loads or weighs down the cable beside it.
+    The prediction's march is differentiated step by step, on its grid and with the effects that it found. The result is
+    exact up to about 1e-7 of the largest derivative, for a time spline whose knots move with events alone. If steps
+    can't be differentiated (contact, friction, strands that touch, steps that had to be split), whole marches are
+    compared instead, and `exact` and `reason` say so.
+
+    A parameter at a limit, such as a drag of zero or the place of a grasp at an end, is changed to one side only. The
+    relative error of the derivative is then about as large as the relative change of the derivative itself over that
+    change of the parameter, a millionth of its natural scale.
+
+    The knots for a grasp, load or point mass at an end of the cable differ from those for one a little away from the
+    end. For one at an end, two motions are compared: with it at a thousandth of the length from the end, and at twice
+    that. Both are nearer to the end if another grasp, load or point mass is close.
 
     Args:
         prediction: of the scene.
         wrt: numbers of the scene by their path, e.g. "cable.bending_stiffness", "environment.drag", "grasps[0].u",
-            "grasps[0].path.displacement[1]", "shape.control_points[4][2]". A derivative is by the number alone:
-            stiffnesses that were derived from others stay.
+            "grasps[0].path.displacement[1]", "shape.control_points[4][2]". Only that number is changed: stiffnesses
+            that were derived from others keep their values.
 
     Raises:
-        SceneError: a path leads to no number, or to one that can be neither less nor more.
+        SceneError: a path does not lead to a number, or the number can be changed to neither side.
     """
     instance("prediction", prediction, Prediction, "a Prediction")
     wrt = instances("wrt", wrt, str, 'paths such as "cable.bending_stiffness"')
@@ -277,7 +281,7 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     hardness, knots_t = _hardness(prediction), prediction.surface.knots_t
 
     def begun(problem: Problem) -> Grid:
-        """Return the prediction's grid with the start of a problem on it."""
+        """Return the start of a problem on a grid like the prediction's."""
         grid = start_grid(problem, accuracy.n_u, monitor)
         return watched(grid) if motion.grid.watched else grid
 
@@ -288,12 +292,12 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     elif not objected:
         coarse = SETTLED_STEP
         objected = (
-            "the start is an equilibrium that is found by iteration, so that whole marches are compared, with the "
-            f"number {100.0 * coarse:g} % larger and smaller"
+            "the start is an equilibrium found by iteration; whole marches are compared, with the parameter "
+            f"{100.0 * coarse:g} % larger and smaller"
         )
 
     def around(name: str, value: float, changes: tuple[float, float]) -> list[tuple[float, Problem, Grid]]:
-        """Return the scene with a number changed, and by how much; as it is where no scene has that."""
+        """Return the problems and grids with a parameter changed, and its changes: unchanged if a change is refused."""
         found, refused = list[tuple[float, Problem, Grid]](), list[SceneError]()
         for change in changes:
             try:
@@ -314,9 +318,9 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
         changes = _changes(scene, name, STEP * size)
         reason = objected
         if fitted:
-            reason = "a fit through points chooses its smoothness anew"
+            reason = "the fit through the points chooses its smoothness anew for each change"
         elif changes[0] != -changes[1]:
-            reason = "a place at an end has other knots than one beside it"
+            reason = "a place at an end has other knots than one near the end"
         sides = [] if reason else around(name, value, changes)
         try:
             if known is not None and not reason:
@@ -341,7 +345,7 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
 
 
 def _solved(prediction: Prediction, monitor: Monitor) -> tuple[Problem, March]:
-    """Return the problem of a prediction as it was solved, and its march; of a reference, which has none, one anew."""
+    """Return the problem of a prediction as it was solved, and its march, which is a new one for a reference."""
     level = prediction.level
     if level is not None:
         return level.problem, level.motion
@@ -354,7 +358,7 @@ def _solved(prediction: Prediction, monitor: Monitor) -> tuple[Problem, March]:
 
 
 def _hardness(prediction: Prediction) -> float:
-    """Return how many times stiffer than posed contact had to be."""
+    """Return the factor by which contact had to be stiffer in the solve than posed."""
     if prediction.level is None:
         return 1.0
     posed, solved = (x.self_contact or x.contact for x in (prediction.level.posed, prediction.level.problem))
@@ -362,9 +366,9 @@ def _hardness(prediction: Prediction) -> float:
 
 
 def _moved(knots_t: Floats, problem: Problem, other: Problem) -> Floats:
-    """Return the time knots [s] of a motion of `problem` for that of another.
+    """Return the time knots [s] for the motion of another problem, made from those of `problem`.
 
-    They move with the events; with the end alone where the other has an event more or less.
+    They move with the events, or only with the end if the other has more or fewer events.
     """
     before, after = marks_of(problem), marks_of(other)
     if len(before) != len(after):
@@ -382,7 +386,7 @@ def _surface(
 
 
 def _difference(high: SplineSurface, low: SplineSurface, u: Floats, t: Floats) -> Floats:
-    """Return by what positions differ (m, k, 3) [m] at u (k,) [m] and t (m,) [s] on both surfaces."""
+    """Return the differences of the positions (m, k, 3) [m] of two surfaces at u (k,) [m] and t (m,) [s]."""
     u, t = np.minimum(u, min(high.length, low.length)), np.minimum(t, min(high.horizon, low.horizon))
     return high.positions(u, t) - low.positions(u, t)
 
@@ -397,7 +401,7 @@ def _steps_of(path: str) -> list[str | int]:
 
 
 def _part(scene: Scene, path: str) -> Any:
-    """Return what is at a path of the scene."""
+    """Return the part of the scene at a path."""
     value: Any = scene
     for step in _steps_of(path):
         try:
@@ -416,11 +420,12 @@ def _number(scene: Scene, path: str) -> float:
 
 
 def _changes(scene: Scene, path: str, width: float) -> tuple[float, float]:
-    """Return the changes of the number at a path of which the motions are compared: by `width` up and down.
+    """Return the two changes of the number at a path for which motions are compared: `width` up and down.
 
-    But of a place so near to an end that the tip beyond it would have a span of its own in one of them alone, or bend
-    with a held direction as it has one in none, which doubles the derivative: to where it has one in both. No place
-    passes what else holds, loads or weighs down the cable, or comes near to it: the motion has a kink there.
+    A place near an end is an exception, in two cases: the tip beyond it would have a span of its own in only one of the
+    two motions; or it has one in neither, and a held direction bends it, which doubles the derivative. The place is
+    then moved to where the tip has its own span in both. No place passes, or comes near to, another grasp, load or
+    point mass, because the motion has a kink there.
     """
     if path.endswith(".u"):
         part, length = _part(scene, path.removesuffix(".u")), scene.cable.length
@@ -437,9 +442,9 @@ def _changes(scene: Scene, path: str, width: float) -> tuple[float, float]:
 
 
 def _scale(scene: Scene, path: str) -> float:
-    """Return what the number at a path of the scene is small against, in its unit.
+    """Return the natural scale of the number at a path of the scene, in its unit.
 
-    It is 0 for a number that can't be 0, as a stiffness: that is small against nothing but itself.
+    It is 0 for a number that can't be 0, such as a stiffness: only its own value counts then.
     """
     *before, last = _steps_of(path)
     field = next(step for step in (last, *reversed(before)) if isinstance(step, str))
@@ -462,7 +467,7 @@ def _scale(scene: Scene, path: str) -> float:
             return mass / length / time
         case "drag_quadratic":
             return mass / length**2
-        case "axial_damping":  # of which its slowest wave hardly rings
+        case "axial_damping":  # about critical for its slowest wave
             return math.sqrt(mass * length * cast(float, cable.axial_stiffness))
         case "bending_damping" | "torsional_damping":
             return float(getattr(cable, field.replace("damping", "stiffness"))) * time
@@ -478,14 +483,14 @@ def _scale(scene: Scene, path: str) -> float:
 
 
 def _field(part: Any, name: str) -> Any:
-    """Return what was given for a part of the scene by name; what follows from it can't be changed by itself."""
+    """Return a field of a part of the scene by name; derived properties can't be changed and are refused."""
     if not is_dataclass(part) or name not in {f.name for f in fields(part)}:
         raise AttributeError(name)
     return getattr(part, name)
 
 
 def _with(part: Any, path: str, value: float) -> Any:
-    """Return a part of a scene with another number at a path."""
+    """Return a part of a scene with the number at a path replaced."""
 
     def changed(part: Any, steps: list[str | int]) -> Any:
         if not steps:

@@ -10,10 +10,10 @@ from dlocore.pickling import Answered
 
 Floats = NDArray[np.float64]
 DEGREE = 3
-_TINY = 1e-300  # the least |r'|^3 that is divided by
-_GAUSS = 1.0 / 3.0**0.5  # of half an interval: where its two points are
+_TINY = 1e-300  # smallest divisor |r'|^3
+_GAUSS = 1.0 / 3.0**0.5  # of half an interval: the two Gauss points
 _MOST_SAMPLES = 1_000_000  # evenly spaced, in either direction
-_ROUNDING = 1e-9  # of the length, or of the time: how far beyond its ends a surface is read
+_ROUNDING = 1e-9  # of the length, or of the time: how far beyond its ends a surface may be read
 
 
 def uniform_knots(n: int, end: float) -> Floats:
@@ -25,7 +25,7 @@ def uniform_knots(n: int, end: float) -> Floats:
 
 
 def greville(knots: Floats) -> Floats:
-    """Return the means of three successive knots (n,), where control points of a straight line at even speed lie."""
+    """Return the Greville abscissae (n,), the means of three successive inner knots."""
     return (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0
 
 
@@ -42,9 +42,10 @@ def spline_at(knots: Floats, control_points: Floats, x: ArrayLike, derivative: i
 
 
 def nearest_line(x: Floats, u: Floats, values: Floats) -> Floats:
-    """Return the values (n,) at x (n,), linear between, that are nearest to values (k,) at u (k,), linear between.
+    """Return values (n,) at x (n,): the piecewise linear function nearest to that with `values` (k,) at u (k,).
 
-    Both x and u rise from the same place to the same one. The two have the same integral, also where one jumps.
+    Nearest is meant in the least-squares sense. Both x and u rise, from the same first to the same last coordinate. The
+    two functions have the same integral, also if the given one jumps.
     """
     from scipy.linalg import solveh_banded  # slow to import
 
@@ -64,10 +65,10 @@ def nearest_line(x: Floats, u: Floats, values: Floats) -> Floats:
 
 
 def in_range(name: str, x: ArrayLike, end: float, unit: str) -> Floats:
-    """Return `x`, a number or a row of them, as an array (k,), all within 0 to `end`, but for rounding.
+    """Return `x`, a number or a row of numbers, as an array (k,).
 
     Raises:
-        SceneError: it is not.
+        SceneError: it is neither, or a number is outside 0 to `end` by more than rounding.
     """
     allowed, margin = f"finite numbers at least 0 at most {end:g} [{unit}]", _ROUNDING * end
     try:
@@ -76,20 +77,22 @@ def in_range(name: str, x: ArrayLike, end: float, unit: str) -> Floats:
         raise SceneError(name, repr(x), allowed) from None
     if x.ndim > 1:
         raise SceneError(name, f"shape {x.shape}", f"one row of {allowed}")
-    for k in (x.argmin(), x.argmax()) if x.size else ():  # of what is not a number, where there is any
+    for k in (x.argmin(), x.argmax()) if x.size else ():  # both return the index of a NaN, if there is one
         if not -margin <= x.item(k) <= end + margin:
             raise SceneError(name, x.item(k), allowed)
     return x
 
 
 def _order(name: str, order: int) -> int:
-    """Return the order of a derivative, or raise SceneError unless a cubic has it."""
-    return whole(name, order, at_least=0, at_most=DEGREE)  # of those that a cubic has
+    """Return the order of a derivative, or raise SceneError unless it is 0 to 3."""
+    return whole(name, order, at_least=0, at_most=DEGREE)
 
 
 @dataclass(frozen=True, eq=False)
 class SplineSurface(Answered):
-    """A predicted space-time surface.
+    """A predicted space-time surface: positions and twist over material coordinate and time.
+
+    Every method that reads it raises SceneError if a coordinate is off the cable or a time outside the predicted time.
 
     Attributes:
         control_points: q_ij, (n_t, n_u, 4) [m, m, m, rad].
@@ -128,8 +131,7 @@ class SplineSurface(Answered):
             (k_t, k_u, 4) [m, m, m, rad], per m^du s^dt.
 
         Raises:
-            SceneError: a place is off the cable, a time outside the predicted time, or an order none of 0 to 3; as of
-                all that reads the surface.
+            SceneError: a coordinate is off the cable, a time outside the predicted time, or an order not 0 to 3.
         """
         over = design_matrix(self.knots_u, in_range("u", u, self.length, "m"), _order("du", du))
         t = in_range("t", t, self.horizon, "s")
@@ -142,7 +144,7 @@ class SplineSurface(Answered):
         return spline_at(self.knots_t, self.control_points, in_range("t", t, self.horizon, "s"), _order("dt", dt))
 
     def positions(self, u: ArrayLike, t: ArrayLike) -> Floats:
-        """Return r on the grid of `t` and `u`; (k_t, k_u, 3) [m]."""
+        """Return the positions r on the grid of `t` and `u`; (k_t, k_u, 3) [m]."""
         return self(u, t)[..., :3]
 
     def sample(self, samples_u: int = 101, samples_t: int = 33) -> tuple[Floats, Floats, Floats]:
@@ -152,10 +154,10 @@ class SplineSurface(Answered):
         return u, t, self(u, t)
 
     def curvature(self, u: ArrayLike, t: ArrayLike) -> Floats:
-        """Return the curvature |r' x r''| / |r'|^3 on the grid; (k_t, k_u) [1/m]. Where r' is zero it is 0.
+        """Return the curvature |r' x r''| / |r'|^3 on the grid; (k_t, k_u) [1/m]. It is 0 where r' is zero.
 
-        It is least sure at clamps and free ends: where a clamp bends a limp cable sharply the moment of its gripper
-        tells it better (docs/api.md).
+        It is least accurate at clamps and free ends. If a clamp bends a limp cable sharply, the moment of its gripper
+        gives the curvature more accurately (docs/api.md).
         """
         first, second = self(u, t, du=1)[..., :3], self(u, t, du=2)[..., :3]
         cross = np.linalg.norm(np.cross(first, second), axis=-1)
@@ -168,10 +170,10 @@ class SplineSurface(Answered):
     def frenet_twist(self, u: ArrayLike, t: ArrayLike, regularisation: float) -> Floats:
         """Return the paper's twist strain, theta' minus the Frenet torsion (paper eq. 8), regularised; (k_t, k_u).
 
-        For comparison only: the torsion (r_u x r_uu) . r_uuu / |r_u x r_uu|^2 is undefined where the cable is straight
-        or inflected. The denominator is raised by the square of `regularisation` [1/m], a curvature below which the
-        torsion fades out, and with it the twist that belongs there. theta is read as the paper's, against the Frenet
-        frame.
+        For comparison only. The torsion (r_u x r_uu) . r_uuu / |r_u x r_uu|^2 is undefined where the cable is straight
+        or inflected. Therefore the square of `regularisation` [1/m] is added to the denominator. Below that curvature
+        the torsion fades out, and with it the twist that belongs there. theta is interpreted as in the paper, against
+        the Frenet frame.
         """
         first, second, third = (self(u, t, du=order)[..., :3] for order in (1, 2, 3))
         binormal = np.cross(first, second)
@@ -181,9 +183,9 @@ class SplineSurface(Answered):
     def axial_strain(self, u: ArrayLike, t: ArrayLike) -> Floats:
         """Return the axial strain |r'| - 1 of the spline on the grid; (k_t, k_u).
 
-        It is read at the middle of each span and linear between, elsewhere the derivative of the spline oscillates
-        about it. In the two spans beside an end, a grasp or a load it may be off by a fifth: the strain that balances
-        the forces on the cable, from which to read a tension, is `Prediction.stretch`.
+        It is evaluated at the middle of each span and interpolated between, because elsewhere the derivative of the
+        spline oscillates about it. In the two spans beside an end, a grasp or a load it may be off by a fifth. For a
+        tension use `Prediction.stretch`, the strain that balances the forces on the cable.
         """
         u, breaks = in_range("u", u, self.length, "m"), np.unique(self.knots_u)
         middles = 0.5 * (breaks[:-1] + breaks[1:])

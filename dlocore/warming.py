@@ -1,4 +1,4 @@
-"""Compile every kernel, by predictions that between them call for all of them; from the cache where it has them."""
+"""Compile every kernel, or load it from the cache, by making predictions that together use all of them."""
 
 import os
 import subprocess
@@ -31,12 +31,12 @@ U = np.linspace(0.0, 1.0, 12)[:, None]
 ARC = Points(points=U * [1.0, 0.0, 0.0] + 0.05 * np.sin(3.0 * U) * [0.0, 1.0, 0.0])
 MOVE = Move(displacement=(0.0, 0.01, 0.0), rotation=(0.0, 0.0, 0.1), duration=1.0)
 GRASP = Grasp(u=0.3, hold="clamp", path=MOVE)
-# yields at a bend that is not reached, and has a memory, so that all that looks for that is compiled, too
+# it yields at a curvature that it never reaches, and has a memory: so the code for yielding is compiled, too
 CABLE = Cable.preset("paper", bending_damping=1e-4, yield_strain=0.1, memory_rate=1.0)
 
 
 def is_compiled() -> bool:
-    """Return whether the kernels have been compiled before: to load them takes seconds, to compile them minutes."""
+    """Return whether the kernels have been compiled before: loading them takes seconds, compiling them minutes."""
     return is_kept(march_steps)
 
 
@@ -45,8 +45,9 @@ def warm_up(processes: int | None = None, cancelled: Callable[[], bool] | None =
     """Compile, or load from the cache, every kernel, so that the first prediction is as fast as the next.
 
     Args:
-        processes: how many compile at once where nothing is compiled yet; by default one a core.
-        cancelled: asked ten times a second while they do, and between what is loaded; where it returns True it stops.
+        processes: how many processes compile at once if nothing is compiled yet; by default one per core.
+        cancelled: called ten times a second while they compile, and between the parts that are loaded; the warm-up
+            stops if it returns True.
 
     Raises:
         ValueError: fewer than one process.
@@ -59,7 +60,7 @@ def warm_up(processes: int | None = None, cancelled: Callable[[], bool] | None =
         if cancelled is not None and cancelled():
             raise Cancelled("the warm-up was cancelled")
 
-    by_python = Path(sys.executable or "").name.startswith("python")  # not a program that has one inside
+    by_python = Path(sys.executable or "").name.startswith("python")  # not a program that embeds Python
     if by_python and not is_compiled():
         _compile_in_processes(processes or os.cpu_count() or 1, check)
     for part in PARTS.values():
@@ -69,9 +70,9 @@ def warm_up(processes: int | None = None, cancelled: Callable[[], bool] | None =
 
 @interruptible
 def warm_up_for(scene: Scene) -> None:
-    """Load what a prediction of one scene takes, of all that is compiled; where nothing is, compile all of it.
+    """Load the kernels that a prediction of one scene needs; if nothing is compiled yet, compile all.
 
-    A motion that leaves its plane, or turns out to need another effect, loads what that takes as it comes to it.
+    If the motion leaves its plane, or turns out to need another effect, the kernels for that are loaded then.
 
     Raises:
         SceneError: the scene can't be solved as it was given.
@@ -86,10 +87,11 @@ def warm_up_for(scene: Scene) -> None:
 
 
 def _compile_in_processes(at_once: int, check: Callable[[], None]) -> None:
-    """Compile every share in a process of its own; what one fails to do is left to the caller.
+    """Compile every share in a process of its own; what a process fails to compile is left to the caller.
 
-    Where one is killed no other is started. All end where `check` raises, and as this process ends, however it does:
-    each reads from a pipe that this one holds. An interrupt from a terminal is for this one alone.
+    After a process is killed no other is started. All are killed if `check` raises. They also end when this process
+    ends, however it does, because each reads from a pipe that this one holds. An interrupt from a terminal reaches this
+    process only.
     """
     waiting, running = list(SHARES), list[subprocess.Popen[bytes]]()
     nowhere = subprocess.DEVNULL
@@ -116,19 +118,19 @@ def _compile_in_processes(at_once: int, check: Callable[[], None]) -> None:
 
 
 def _end_with_parent() -> None:
-    """End this process when the one that started it has ended, which closes the pipe that is read here."""
+    """End this process once its parent has ended, which closes the pipe that is read here."""
     os.read(0, 1)
     os._exit(1)
 
 
 def _smooth(table: Table | None) -> None:
-    """A whole smooth motion."""
+    """Predict a whole smooth motion."""
     around = Environment(drag=0.1, table=table)
     predict(Scene(cable=Cable.preset("paper"), shape=ARC, grasps=(GRASP,), environment=around))
 
 
 def _differentiated(table: Table | None, twist: Switch) -> None:
-    """The derivatives of a smooth motion of two, three or four coordinates, which `identify` takes, too."""
+    """Differentiate a smooth motion of two, three or four coordinates; `identify` needs that, too."""
     scene = Scene(
         cable=Cable.preset("paper"),
         shape=ARC,
@@ -141,7 +143,7 @@ def _differentiated(table: Table | None, twist: Switch) -> None:
 
 
 def _rough(table: Table | None, twist: Switch) -> None:
-    """Motions of two, three or four coordinates that begin with a speed, rub, lie beside something, and may yield."""
+    """Predict motions of two, three or four coordinates that start with a jump of speed, rub, touch and may yield."""
     beside = (Sphere(center=(0.5, 0.3, 0.0), radius=0.2, friction=0.1),)
     environment = Environment(drag=0.1, drag_quadratic=0.1, table=table, obstacles=beside)
     given = Quality(n_u=9, n_t=9, keep_grid=True)
@@ -161,14 +163,14 @@ def _rough(table: Table | None, twist: Switch) -> None:
 
 
 def _read_all(answer: Prediction) -> None:
-    """Read all that is found only as it is read, and ask for its energies, so that what that takes is compiled, too."""
+    """Read the energies and every attribute that is computed on first read, so that their kernels are compiled, too."""
     _ = answer.message, answer.grasps, answer.contacts, answer.effects, answer.material, answer.start_energy
     _ = [(iteration.surface, iteration.energy) for iteration in answer.iterations]
     answer.energies([0.0])
 
 
 def _reference() -> None:
-    """The reference, and strands that meet."""
+    """Solve by the reference, and find strands that meet."""
     turned = np.linspace(0.0, 7.0, 9)
     loop = np.column_stack([np.cos(turned), np.sin(turned), 0.1 * U[:9, 0]])
     nearest_strands(uniform_knots(9, 1.0), loop[None], 3, 0.01, 0.03)
@@ -179,15 +181,15 @@ def _reference() -> None:
 
 
 def _others() -> None:
-    """An equilibrium in a plane, without contact, and the printed scheme."""
+    """Find an equilibrium in a plane without contact, and solve by the printed scheme."""
     hangs = Scene(cable=CABLE, shape=Straight(direction=(0.0, 0.0, -1.0)), grasps=(Grasp(u=0.0),), horizon=1.0)
     equilibrium(hangs, n_u=9)
     as_printed = Quality(n_u=6, n_t=6, method="paper", delta=0.01, keep_grid=True)
     predict(Scene(cable=CABLE, shape=ARC, grasps=(GRASP,), environment=Environment(table=Table()), quality=as_printed))
 
 
-# whole smooth motions first: the code of a function that is loaded first serves all who call it, and they run faster
-# with what was compiled for them
+# whole smooth motions first: the copy of a function that is loaded first serves all its callers, and these motions run
+# faster with the copy that was compiled for them
 PARTS = {
     "smooth in a plane": lambda: _smooth(Table()),
     "smooth in space": lambda: _smooth(None),
@@ -200,14 +202,14 @@ PARTS = {
     "reference": _reference,
     "others": _others,
 }
-# what motions of two, three and four coordinates take
+# parts that motions of two, three and four coordinates need
 TAKEN = {
     2: ("smooth in a plane", "in a plane"),
     3: ("smooth in space", "in space"),
     4: ("smooth in space", "with twist"),
 }
-# what one process compiles, the longest first; of the last what it has in common with the one before comes late, when
-# that has compiled it
+# what each process compiles, the longest first. What the last one shares with the one before it comes last, so that it
+# is compiled by then
 SHARES = (
     ("with twist", "derivatives with twist"),
     ("smooth in space", "in space", "derivatives in space"),

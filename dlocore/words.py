@@ -1,23 +1,23 @@
-"""Numbers as messages write them."""
+"""Numbers in the form that messages use."""
 
 
 def in_mm(length: float, digits: int = 2) -> str:
-    """Return a length [m] as millimetres to so many digits, or to whole ones: 580 mm, not 5.8e+02 mm."""
+    """Return a length [m] in millimetres, with `digits` significant digits, or whole if large: 580 mm, not 5.8e+02."""
     return f"{_short(1e3 * length, digits)} mm"
 
 
 def in_ms(time: float, digits: int = 3) -> str:
-    """Return a time [s] as milliseconds to so many digits, or to whole ones: 2000 ms, not 2e+03 ms."""
+    """Return a time [s] in milliseconds, with `digits` significant digits, or whole if large: 2000 ms, not 2e+03."""
     return f"{_short(1e3 * time, digits)} ms"
 
 
 def in_newtons(force: float, digits: int = 2) -> str:
-    """Return a force [N] to so many digits, or to whole newtons: 264 N, not 2.6e+02 N."""
+    """Return a force [N] with `digits` significant digits, or whole if large: 264 N, not 2.6e+02 N."""
     return f"{_short(force, digits)} N"
 
 
 def counted(count: int, what: str) -> str:
-    """Return how many there are of what is called so in the singular: 1 iteration, 2 iterations."""
+    """Return a count with its noun, given in the singular: 1 iteration, 2 iterations."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 

@@ -1,4 +1,4 @@
-"""The parts of an answer, and of what a solve reports while it runs."""
+"""The parts of an answer, and the records that a solve reports while it runs."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ Status = Literal["converged", "max_iterations", "stalled", "time_limit"]
 
 
 def with_notes(said: str, notes: Sequence[str]) -> str:
-    """Return what was said of an answer and the notes on it, each in words, as one message."""
+    """Return the status of an answer in words, and the notes on it, as one message."""
     return " ".join([said, *[f"Note: {note}." for note in notes]])
 
 
@@ -31,7 +31,7 @@ class EffectReport:
         name: as in the scene's `effects`.
         active: whether it was simulated.
         reason: why, in words.
-        magnitude: its size on the predicted motion, in `unit`; None where that means nothing.
+        magnitude: its size on the predicted motion, in `unit`; None if it has none.
         unit: of the magnitude, e.g. "N".
     """
 
@@ -44,24 +44,25 @@ class EffectReport:
 
 @dataclass(frozen=True, eq=False)
 class Iteration:
-    """One iteration of a solve: of `spacetime` or `paper`, or one refinement level of `march`.
+    """One iteration of a solve: an iteration of `spacetime` or `paper`, or one refinement level of `march`.
 
     Attributes:
         number: from 0.
-        update: norm of the change of the control points, the paper's eq. (25) [m]; for a refinement level the largest
+        update: norm of the change of the control points, the paper's eq. (25) [m]. For a refinement level, the largest
             change of the surface [m], infinite at the first.
         residual: root of the weighted mean square of the equations' residual over the whole motion, as a displacement
-            [m] (docs/model.md eq. 16); for `paper` a force [N]; for a level of `march` the largest error left
-            by Newton's iterations [m].
+            [m] (docs/model.md eq. 16). For `paper`, a force [N]. For a level of `march`, the largest error that
+            Newton's iterations left [m].
         wall_time: since the solve began [s].
-        damping: share by which the diagonal of a `spacetime` step's normal equations was raised, where they had lost
-            their positive factors to rounding; else 0.
+        damping: relative amount by which the diagonal of the normal equations of a `spacetime` step was raised, if they
+            were no longer positive definite because of rounding; otherwise 0.
         step_length: fraction of the full step that was taken.
         n_u: control points along the cable at this iteration.
         n_t: control points in time.
-        find_surface: finds the iterate itself, which `surface` keeps.
-        find_energy: finds the elastic energy at the end of the motion [J], which `energy` keeps.
-        note: what it was: `spacetime`, `paper`, `march` with what was found on it, or `rod of` so many elements.
+        find_surface: computes the iterate itself; read `surface`, which stores it.
+        find_energy: computes the elastic energy at the end of the motion [J]; read `energy`, which stores it.
+        note: the kind of iteration: `spacetime`, `paper`, `march` with remarks on its result, or `rod of` so many
+            elements.
     """
 
     number: int
@@ -97,18 +98,18 @@ OnIteration = Callable[[Iteration], None]
 
 @dataclass(frozen=True, eq=False)
 class GraspReaction(Answered):
-    """Force and moment that a gripper gives to the cable, in world axes, the moment about the grasped point.
+    """Force and moment that a gripper exerts on the cable, in world axes; the moment is about the grasped point.
 
     Attributes:
         u: material coordinate of the grasp [m].
-        times: (k,) [s], those of the prediction's reactions; twice where these may jump, as a grasp closes or opens, as
-            `dlocore.Load` takes them.
-        reaction: (k, 3) [N]; zero while the gripper is open. The impulse that the cable gets where the velocity of a
-            gripper jumps, or it closes on a moving cable, is no part of it.
+        times: (k,) [s], the same for all grasps of a prediction. A time at which forces may jump, because a grasp
+            closes or opens, occurs twice, as in `dlocore.Load`.
+        reaction: (k, 3) [N]; zero while the gripper is open. Impulses are not included: the cable gets one if the
+            velocity of a gripper jumps, or if a gripper closes on a moving cable.
         moment: (k, 3) [N m]; zero for a grasp that holds only the position.
-        reaction_error: estimated error of the force at those times (k,) [N], of the discretisation, from its distance
-            to the force on another grid (docs/accuracy.md, forces); None where none was computed.
-        moment_error: the same of the moment (k,) [N m].
+        reaction_error: estimated discretisation error of the force (k,) [N], from its distance to the force on another
+            grid (docs/accuracy.md, forces); None if it was not estimated.
+        moment_error: the same for the moment (k,) [N m].
     """
 
     u: float
@@ -121,18 +122,18 @@ class GraspReaction(Answered):
 
 @dataclass(frozen=True, eq=False)
 class ContactForce(Answered):
-    """How hard the table or an obstacle presses on the cable, and how its friction holds it.
+    """Normal force and friction force of the table or an obstacle on the cable.
 
     Attributes:
         name: "table", or "obstacles[i]" with the number of the obstacle in the scene.
         times: (k,) [s].
-        force: that it gives to the cable across its surface (k, 3) [N], without friction.
-        friction: force that it gives to the cable along its surface (k, 3) [N].
-        pressed: sum of the sizes of what it gives along the cable (k,) [N]: more than the size of `force` where it
-            presses from several sides, as a peg on a cable that is laid around it.
-        force_error: estimated error of the force (k,) [N], as `GraspReaction.reaction_error`; None where none was
-            computed.
-        friction_error: that of the friction (k,) [N].
+        force: total normal force on the cable (k, 3) [N], without friction.
+        friction: total friction force on the cable (k, 3) [N].
+        pressed: sum of the magnitudes of the normal forces along the cable (k,) [N]. It exceeds the magnitude of
+            `force` if the cable is pressed from several sides, for example by a peg that it is laid around.
+        force_error: estimated error of the force (k,) [N], as `GraspReaction.reaction_error`; None if it was not
+            estimated.
+        friction_error: the same for the friction (k,) [N].
     """
 
     name: str
@@ -168,7 +169,7 @@ class MaterialMotion(Answered):
         """Return what the sections remember at time `t` [s], linear between the stored times.
 
         Raises:
-            SceneError: a time outside the predicted time.
+            SceneError: `t` is outside the predicted time.
         """
         k, s = _bracket(self.times, t)
         director = (1 - s) * self.director[k] + s * self.director[k + 1]
@@ -183,14 +184,14 @@ class MaterialMotion(Answered):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StretchMotion(Answered):
-    """How far the cable is stretched, over time: what its spline does not tell to the accuracy of a tension.
+    """Axial strain of the cable over time, accurate enough for a tension; the strain of its spline is not.
 
     Attributes:
         times: (m,) [s].
-        u: (k,) [m], with both ends, and both sides of where something holds, loads or weighs down the cable.
+        u: (k,) [m]: includes both ends, and both sides of each grasp, load and point mass.
         strain: axial strain (m, k) that balances the forces on the cable (docs/model.md, selective reduced
-            integration). In an elastic cable without axial damping EA times it is the tension [N]; where a force acts
-            in a point, the mean of both sides.
+            integration). In an elastic cable without axial damping, EA times it is the tension [N]. At a point where a
+            force acts it is the mean of both sides.
     """
 
     times: Floats
@@ -201,26 +202,26 @@ class StretchMotion(Answered):
         """Return the axial strain (k,) at time `t` [s], linear between the stored times.
 
         Raises:
-            SceneError: a time outside the predicted time.
+            SceneError: `t` is outside the predicted time.
         """
         k, s = _bracket(self.times, t)
         return np.asarray((1 - s) * self.strain[k] + s * self.strain[k + 1])
 
     def along(self, u: ArrayLike, t: ArrayLike) -> Floats:
-        """Return the axial strain (k_t, k_u) at the places `u` (k_u,) [m] and times `t` (k_t,) [s], linear between.
+        """Return the axial strain (k_t, k_u) at coordinates `u` (k_u,) [m] and times `t` (k_t,) [s], interpolated.
 
         Raises:
-            SceneError: a place is off the cable, or a time outside the predicted time.
+            SceneError: a coordinate is off the cable, or a time outside the predicted time.
         """
         u, t = in_range("u", u, float(self.u[-1]), "m"), in_range("t", t, float(self.times[-1]), "s")
         return np.array([np.interp(u, self.u, self.at(s)) for s in t]).reshape(len(t), len(u))
 
 
 def _bracket(times: Floats, t: float) -> tuple[int, float]:
-    """Return which of the times (m,) [s] is the last before `t`, and the share of the way from it to the next.
+    """Return the index of the last of the times (m,) [s] before `t`, and the share of the way from it to the next.
 
     Raises:
-        SceneError: `t` is outside them, or no single time.
+        SceneError: `t` is outside them, or not a single time.
     """
     given = in_range("t", t, float(times[-1]), "s")
     if given.size != 1:
@@ -232,26 +233,28 @@ def _bracket(times: Floats, t: float) -> tuple[int, float]:
 
 @dataclass(frozen=True, kw_only=True)
 class Accuracy:
-    """What the answer is worth and what it cost.
+    """How accurate the answer is, and what it cost.
 
     Attributes:
         method: the method that gave the answer.
-        error_estimate: estimated error of the position at the worst point of the surface [m]; None where nothing was
-            computed that tells.
-        error_parts: what it adds up from [m]: "grid", of the discretisation, or "space" and "time" where they are known
-            apart; "iteration", what the last iteration left; "neglected", effects that "auto" left out; "start",
-            where the scene does not determine its motion, how far a start that is hardly another ends elsewhere;
-            "contact", how far contact twice as stiff takes a motion that strikes something. Empty where there is no
-            estimate.
-        neglected: the part of it that effects left out by "auto" may have, about [m].
+        error_estimate: estimated error of the position at the worst point of the surface [m]; None if it was not
+            estimated.
+        error_parts: the parts that add up to it [m]; empty if there is no estimate. They are
+            "grid": discretisation, or "space" and "time" if these are known separately;
+            "iteration": what the last iteration left;
+            "neglected": effects that "auto" left out;
+            "start": if the scene does not determine its motion, how far an almost equal start takes it elsewhere;
+            "contact": for a motion that strikes something, how far contact twice as stiff would change it.
+        neglected: approximate error due to effects that "auto" left out [m], a part of the estimate.
         wall_time: time of the whole solve [s].
         n_u, n_t: size of the net of control points.
         delta: threshold on the update [m].
         steps: time steps of the march.
-        dimensions: 2 where the motion is planar, else 3.
+        dimensions: 2 if the motion is planar, otherwise 3.
         dimensions_reason: why, in words.
-        phases: time by phase [s]: "setup", "march", "fit", "spacetime", "paper", "estimate"; "march" has the fit of a
-            smooth motion without twist, which is one compiled call with it. Of method "reference": "simulation", "fit".
+        phases: time by phase [s]: "setup", "march", "fit", "spacetime", "paper", "estimate". For a smooth motion
+            without twist "march" includes the fit, since one compiled call does both. Method "reference" has
+            "simulation" and "fit".
     """
 
     method: str

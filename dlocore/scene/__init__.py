@@ -1,1 +1,1 @@
-"""What is asked: a cable, how it lies, what grasps and loads it, what surrounds it, how good the answer has to be."""
+"""The input: a cable, its start shape, its grasps and loads, its surroundings, and the quality of the answer."""

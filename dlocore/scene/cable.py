@@ -16,13 +16,13 @@ MAX_POINT_MASSES = 32
 
 @dataclass(frozen=True, kw_only=True)
 class PointMass:
-    """A connector, plug or clip: a `mass` [kg] at the material coordinate `u` [m], in the middle of the cable.
+    """A connector, plug or clip: a `mass` [kg] on the centreline at the material coordinate `u` [m].
 
-    It has weight and inertia, rubs on a table that the cable lies on and is pressed against what the cable touches. It
-    has no size of its own, no stiffness, no drag and no inertia of rotation (docs/model.md eq. 9a).
+    It has weight and inertia, and adds to the contact and friction forces of the cable at that point. It has no size,
+    no stiffness, no drag and no rotational inertia (docs/model.md eq. 9a).
 
     Raises:
-        SceneError: a value is not a finite number, or negative.
+        SceneError: a value is not a finite number, or negative, or too large.
     """
 
     u: float
@@ -37,16 +37,18 @@ class PointMass:
 class Cable(Checked):
     """A cable of round section, nearly inextensible, with independent section stiffnesses.
 
-    Give each stiffness itself, or `youngs_modulus` and `shear_modulus` and the solid round section gives it
-    (EA = E pi D^2/4, EI = E pi D^4/64, GJ = G pi D^4/32; docs/model.md eq. 2): of a solid rod only, for strands slide
-    on each other (docs/cable.md tells how to measure EI). Real wires do not follow the isotropic
-    rule between EI and GJ, so they are independent. Where nothing is given, EA = 16 EI/D^2 (the solid section of the
-    same EI) and GJ = EI (measured wires lie at 0.8 to 1.6). The axial damping that is not given lets waves of stretch
-    die out as fast as they can: 2 L/pi sqrt(mu EA), critical for the slowest one (docs/model.md eq. 7a).
+    Give each stiffness itself, or give `youngs_modulus` and `shear_modulus`. The moduli give the stiffnesses of a solid
+    round section: EA = E pi D^2/4, EI = E pi D^4/64, GJ = G pi D^4/32 (docs/model.md eq. 2). Use them for solid rods
+    only, because the strands of a cable slide on each other; docs/cable.md explains how to measure EI.
 
-    What was not given is kept as a number: `dataclasses.replace(cable, bending_stiffness=...)` leaves EA, GJ and the
-    axial damping as they were. With `axial_stiffness=None`, `torsional_stiffness=None` and `axial_damping=None` they
-    follow anew.
+    EI and GJ are independent, because real wires do not follow the isotropic rule between them. The defaults are
+    EA = 16 EI/D^2 (the solid section of the same EI) and GJ = EI (measured wires have 0.8 to 1.6 times EI). The default
+    axial damping, 2 L/pi sqrt(mu EA), is critical for the slowest wave of stretch, so that such waves die out as fast
+    as they can (docs/model.md eq. 7a).
+
+    Defaults are stored as numbers: `dataclasses.replace(cable, bending_stiffness=...)` leaves EA, GJ and the axial
+    damping as they were. To derive them anew, also pass `axial_stiffness=None`, `torsional_stiffness=None` and
+    `axial_damping=None`.
 
     Args:
         length: L [m], 0.01 to 1000.
@@ -59,19 +61,21 @@ class Cable(Checked):
         shear_modulus: G [Pa].
         bending_damping: internal damping on the rate of curvature [N m^2 s].
         torsional_damping: internal damping on the rate of twist [N m^2 s].
-        axial_damping: eta_e, internal damping on the rate of the axial strain [N s]; 0: waves of stretch ring on.
+        axial_damping: eta_e, internal damping on the rate of the axial strain [N s]; with 0, waves of stretch persist.
         yield_strain: the paper's eps_M in bending, a strain of the outermost fibre: the cable yields at the curvature
             2 eps_M/D (docs/model.md). None: elastic in bending.
         yield_twist: eps_M in twist, a shear of the outermost fibre: it yields at the twist rate 2 eps_M/D.
         yield_stretch: eps_M of the axial strain.
-        memory_rate: the paper's k_eps [1/s], how fast what yields is remembered; needed with any yield strain.
-        hardening: what of the remembered strain resists as a back stress, 0 (the paper's law) to 1.
-        rest_shape: the stress-free shape: "straight", "initial" (that of the start shape) or points (n, 2 or 3) [m],
-            4 to 100,000.
-        point_masses: what else hangs on it, as a connector at its end.
+        memory_rate: the paper's k_eps [1/s], the rate at which strain beyond yield becomes permanent; required with any
+            yield strain.
+        hardening: share of the remembered strain that acts as a back stress, 0 (the paper's law) to 1.
+        rest_shape: the stress-free shape: "straight", "initial" (the start shape), or points (n, 2 or 3) [m], 4 to
+            100,000 of them.
+        point_masses: attached parts, such as a connector at an end.
 
     Raises:
-        SceneError: a value is missing, not finite or not positive; the points of a shape are too few or all the same.
+        SceneError: a value is missing, not finite or out of range; the points of `rest_shape` are too few or all the
+            same.
     """
 
     length: float
@@ -150,17 +154,17 @@ class Cable(Checked):
 
     @property
     def yields(self) -> bool:
-        """Whether it may keep bends, twist or stretch: a yield strain is given."""
+        """Whether a yield strain is given, so that the cable may keep bends, twist or stretch."""
         return any(x is not None for x in (self.yield_strain, self.yield_twist, self.yield_stretch))
 
     @property
     def mass(self) -> float:
-        """What the cable and its point masses have together [kg]."""
+        """Total mass of the cable and its point masses [kg]."""
         return self.linear_density * self.length + sum(one.mass for one in self.point_masses)
 
     @property
     def solid_axial_stiffness(self) -> float:
-        """EA of a solid section that has the cable's EI, 16 EI/D^2 [N]: what is assumed where none is given."""
+        """EA of a solid section with the cable's EI, 16 EI/D^2 [N]: the default if no EA is given."""
         return 16 * cast(float, self.bending_stiffness) / self.diameter**2
 
     @staticmethod

@@ -12,7 +12,7 @@ from dlocore.pickling import Checked
 
 Floats = NDArray[np.float64]
 
-_ROUNDING = 1e-9  # of a direction, and of a height as a part of the size it is compared with
+_ROUNDING = 1e-9  # relative, of directions, and of heights against the size that they are compared with
 
 
 def _row(kind: int, center: Floats, frame: Floats, half: tuple[float, float, float], friction: float) -> Floats:
@@ -34,10 +34,11 @@ def _vertical(axis: Floats) -> bool:
 
 
 def _covers(center: float, half: float, height: float, reach: float) -> bool:
-    """Tell whether center -+ half holds height to height + reach.
+    """Return whether walls from center - half to center + half cover the heights from `height` to `height` + `reach`.
 
-    Walls that begin at the middle of a cable on a table, a radius above its surface, push it sideways only: it can't
-    get below them, as what stands at z = 0 where that is the middle's height.
+    `height` is that of the centreline of a cable on the table, one radius above the table's surface. Walls that begin
+    there, as those of an obstacle that stands at z = 0 if `table.height` is 0, push the cable sideways only: it can't
+    get below them.
     """
     rounding = _ROUNDING * reach
     return bool(center - half <= height + rounding and height + reach <= center + half + rounding)
@@ -76,9 +77,9 @@ class Sphere(Checked):
         object.__setattr__(self, "friction", _friction(self.friction))
 
     def upright_at(self, height: float, reach: float) -> bool:
-        """Tell whether a cable that lies on a table, its middle at `height` [m], touches the ball only sideways.
+        """Return whether a cable on a table, its centreline at `height` [m], touches the ball only sideways.
 
-        A ball has no vertical walls: it is so by symmetry, and only if the centre lies exactly at `height`.
+        A ball has no vertical walls, so this holds only by symmetry, if its centre lies exactly at `height`.
         """
         return _level(cast(Floats, self.center)[2], height, self.radius)
 
@@ -107,9 +108,9 @@ class Capsule(Checked):
         object.__setattr__(self, "friction", _friction(self.friction))
 
     def upright_at(self, height: float, reach: float) -> bool:
-        """Tell whether a cable that lies on a table, its middle at `height` [m], touches the capsule only sideways.
+        """Return whether a cable on a table, its centreline at `height` [m], touches the capsule only sideways.
 
-        So it is if the axis is vertical and the part between the round ends covers height to height + reach,
+        This holds if the axis is vertical and the part between the round ends covers `height` to `height` + `reach`,
         or, by symmetry, if the axis is horizontal and lies exactly at `height`.
         """
         start, end = cast(Floats, self.start), cast(Floats, self.end)
@@ -145,10 +146,10 @@ class Cylinder(Checked):
         object.__setattr__(self, "friction", _friction(self.friction))
 
     def upright_at(self, height: float, reach: float) -> bool:
-        """Tell whether a cable that lies on a table, its middle at `height` [m], touches the cylinder only sideways.
+        """Return whether a cable on a table, its centreline at `height` [m], touches the cylinder only sideways.
 
-        So it is if the axis is vertical and the mantle covers height to height + reach, or, by symmetry, if the axis is
-        horizontal and lies exactly at `height`.
+        This holds if the axis is vertical and the curved wall covers `height` to `height` + `reach`, or, by symmetry,
+        if the axis is horizontal and lies exactly at `height`.
         """
         center, axis = cast(Floats, self.center), cast(Floats, self.axis)
         if _vertical(axis):
@@ -184,9 +185,9 @@ class Box(Checked):
         object.__setattr__(self, "friction", _friction(self.friction))
 
     def upright_at(self, height: float, reach: float) -> bool:
-        """Tell whether four walls are vertical and cover height to height + reach [m].
+        """Return whether a cable on a table, its centreline at `height` [m], touches the box only sideways.
 
-        Then a cable that lies on a table, its middle at `height`, touches the box only sideways.
+        This holds if four walls are vertical and cover `height` to `height` + `reach` [m].
         """
         z, sizes = cast(Floats, self.center)[2], cast(Floats, self.size)
         return any(
@@ -198,7 +199,7 @@ class Box(Checked):
         """Return the axes of the box as rows (3, 3)."""
         if self.orientation is None:
             return np.eye(3)
-        from scipy.spatial.transform import Rotation  # slow to import, and seldom needed
+        from scipy.spatial.transform import Rotation  # slow to import, and rarely needed
 
         w, x, y, z = cast(Floats, self.orientation)
         return Rotation.from_quat([x, y, z, w]).as_matrix().T

@@ -1,7 +1,7 @@
 """Grasp paths: where a gripper goes, and how it turns, over time.
 
-A path's clock starts when its grasp does (`Grasp.grasp_time`, t = 0 by default). Before its first instant and after
-its last a path stands still.
+A path's clock starts when its grasp does (`Grasp.grasp_time`, t = 0 by default). Before its first time and after its
+last the gripper stands still.
 """
 
 import math
@@ -31,13 +31,13 @@ _PROFILES: dict[str, tuple[float, ...]] = {
 }
 MAX_WAYPOINTS = 100_000
 MAX_STOPS = 1000  # waypoints at which a gripper stops: each is an event
-DRAWN = 0.2  # [s]: in which a gripper that closes beside the cable draws it on to its waypoints
-STAYS = (1.0, *_PROFILES["linear"], 0.0, 0.0, 0.0)  # a straight move, or a turn about one axis, that is none
+DRAWN = 0.2  # [s], in which a gripper that closes beside its first waypoint draws the cable to its path
+STAYS = (1.0, *_PROFILES["linear"], 0.0, 0.0, 0.0)  # a straight move, or a turn about one axis, of zero size
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Still:
-    """Stay where the cable was grasped."""
+    """A gripper that stays where it grasped the cable."""
 
     @property
     def duration(self) -> float:
@@ -63,7 +63,7 @@ class Still:
         return None
 
     def spin(self, t: Floats, tangents: Floats) -> Floats:
-        """Turn about the `tangents` (k, 3) between each two of the times `t` (k,) [s]; (k - 1,) [rad]."""
+        """Turn about the `tangents` (k, 3) between successive times `t` (k,) [s]; (k - 1,) [rad]."""
         return np.zeros(len(t) - 1)
 
 
@@ -71,8 +71,8 @@ class Still:
 class Move(Checked):
     """Move by `displacement` (3,) [m] and turn by the rotation vector `rotation` (3,) [rad] in `duration` [s].
 
-    `profile` is "minimum_jerk" (zero velocity and acceleration at both ends), "cubic" (zero velocity) or "linear"
-    (constant velocity: it starts and stops with a jump).
+    `profile` is "minimum_jerk" (zero velocity and acceleration at both ends), "cubic" (zero velocity at both ends) or
+    "linear" (constant velocity, which jumps at both ends).
     """
 
     displacement: ArrayLike
@@ -100,7 +100,7 @@ class Move(Checked):
         return (self.duration, *_PROFILES[self.profile], *cast(Floats, self.rotation).tolist())
 
     def _share(self, t: Floats) -> Floats:
-        """Return the share of the way that is done at times `t` (k,) [s]."""
+        """Return the share of the way that is covered at times `t` (k,) [s]."""
         return _share(self.profile, t / self.duration)
 
     def at(self, t: Floats, start: Floats) -> Floats:
@@ -120,9 +120,9 @@ class Move(Checked):
         return np.eye(3) + np.sin(angle) * across + 2.0 * np.sin(0.5 * angle) ** 2 * (across @ across)  # Rodrigues
 
     def spin(self, t: Floats, tangents: Floats) -> Floats:
-        """Turn about the `tangents` (k, 3) between each two of the times `t` (k,) [s]; (k - 1,) [rad].
+        """Turn about the `tangents` (k, 3) between successive times `t` (k,) [s]; (k - 1,) [rad].
 
-        The angle of the tangent to the rotation vector stays, so this is exact.
+        The angle between the tangent and the rotation vector is constant, so this is exact.
         """
         if self.rotation is None:
             return np.zeros(len(t) - 1)
@@ -132,16 +132,21 @@ class Move(Checked):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Waypoints(Checked):
-    """Pass through `positions` (n, 3) [m] at `times` (n,) [s] along a C2 cubic spline, or stop at each.
+    """Pass through `positions` (n, 3) [m] at `times` (n,) [s] along a C2 cubic spline, or stop at each of them.
 
-    It starts at rest; with `start` "moving" at the velocity that the first waypoints tell, as a recorded path does.
-    With a `profile` other than "spline" it goes straight from each waypoint to the next as a `Move` with that profile
-    does, and turns about one axis: a robot's program of moves, and pauses where two waypoints are the same. A "linear"
-    one goes on at once, with another velocity.
-    `orientations` (n, 4), unit quaternions (w, x, y, z), turn the grasp by their rotation since the first, R(t) R(0)^-1
-    in world axes, the shorter way from each to the next; along a spline they do so as smoothly as positions go, and
-    start at rest, too. The first position must be that of the cable at the grasped point as the grasp closes, within
-    10 mm; the start shape is brought to it, and a cable in motion drawn to it within 0.2 s.
+    `profile` "spline" is for smooth paths. They start at rest, or with `start` "moving" at the velocity that the first
+    waypoints imply, as recorded paths do.
+
+    With another profile the path is a robot program: it goes straight from each waypoint to the next, as a `Move` with
+    that profile does, and turns about one axis on the way. Two waypoints in the same place are a pause. With "linear"
+    the gripper does not stop at a waypoint, but its velocity jumps there.
+
+    `orientations` (n, 4) are unit quaternions (w, x, y, z). They turn the grasp by their rotation since the first,
+    R(t) R(0)^-1 in world axes, the shorter way from each to the next. Along a spline the rotation is as smooth as the
+    positions, and starts at rest or moving as they do.
+
+    The first position must be within 10 mm of the grasped point of the cable when the grasp closes. The start shape is
+    moved to it; a cable in motion is drawn to it within 0.2 s.
     """
 
     times: ArrayLike
@@ -171,7 +176,7 @@ class Waypoints(Checked):
             raise SceneError("positions", f"{len(positions)} positions", f"as many as times ({len(times)})")
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "positions", positions)
-        from scipy.interpolate import make_interp_spline  # slow to import, as the rotations below
+        from scipy.interpolate import make_interp_spline  # slow to import, as are the rotations below
 
         spline = self._smoothly(positions) if smooth else make_interp_spline(times, positions, 1)
         object.__setattr__(self, "_spline", spline)
@@ -191,7 +196,7 @@ class Waypoints(Checked):
             object.__setattr__(self, "_turns", self._smoothly(_nearest(turns)) if smooth else Slerp(times, turns))
 
     def _smoothly(self, values: Floats) -> "CubicSpline":
-        """Return the C2 cubic spline through values (n, k) at the times, that starts at rest if the path does."""
+        """Return the C2 cubic spline through values (n, k) at the times; it starts at rest if the path does."""
         from scipy.interpolate import CubicSpline
 
         zero = np.zeros(values.shape[1])
@@ -205,7 +210,7 @@ class Waypoints(Checked):
 
     @property
     def line(self) -> None:
-        """None: no one straight move."""
+        """None: the path is not a single straight move."""
 
     @property
     def stops(self) -> Floats:
@@ -214,11 +219,11 @@ class Waypoints(Checked):
 
     @property
     def turn(self) -> tuple[float, ...] | None:
-        """None where the grasp turns: about no one axis."""
+        """None if the grasp turns, since that is not about a single axis; otherwise a turn of zero size."""
         return STAYS if self.orientations is None else None
 
     def _evenly(self, t: Floats) -> Floats:
-        """Return when it would be where it is at times t (k,) [s], were it as fast as the spline or chords are."""
+        """Return the parameters [s] at which to evaluate the spline, or the chords, for the times t (k,) [s]."""
         times = cast(Floats, self.times)
         t = np.clip(t, times[0], times[-1])
         if self.profile == "spline":
@@ -236,16 +241,16 @@ class Waypoints(Checked):
         return None if self.orientations is None else self._turned(t).as_matrix()
 
     def _turned(self, t: Floats) -> "Rotation":
-        """Return the rotations (k,) since the first waypoint at times `t` (k,) [s], of a path that turns."""
+        """Return the rotations (k,) since the first waypoint at times `t` (k,) [s]; only for a path that turns."""
         from scipy.spatial.transform import Rotation
 
         turns = self._turns(self._evenly(t))  # type: ignore[attr-defined]
         return Rotation.from_quat(turns) if self.profile == "spline" else turns
 
     def spin(self, t: Floats, tangents: Floats) -> Floats:
-        """Turn about the `tangents` (k, 3) between each two of the times `t` (k,) [s]; (k - 1,) [rad].
+        """Turn about the `tangents` (k, 3) between successive times `t` (k,) [s]; (k - 1,) [rad].
 
-        Between two waypoints the gripper turns the shorter way; a full turn needs three of them or more.
+        Between two waypoints the gripper turns the shorter way, so a full turn needs three waypoints or more.
         """
         if self.orientations is None:
             return np.zeros(len(t) - 1)
@@ -262,17 +267,17 @@ Path = Still | Move | Waypoints
 
 
 def _nearest(turns: "Rotation") -> Floats:
-    """Return a quaternion (x, y, z, w) of each of some rotations: of its two that which is nearer to the one before."""
+    """Return one of the two quaternions (x, y, z, w) of each rotation: the one nearer to the quaternion before it."""
     quaternions = turns.as_quat()
     signs = np.where((quaternions[1:] * quaternions[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
     return np.asarray(quaternions * np.cumprod(np.append(1.0, signs))[:, None])
 
 
 def held_at(path: Path, t: Floats, start: Floats) -> Floats:
-    """Positions (k, 3) [m] at times `t` (k,) [s] of what a gripper holds that was at `start` (3,) [m] as it closed.
+    """Positions (k, 3) [m] at times `t` (k,) [s] of a grasped point that was at `start` (3,) [m] as the gripper closed.
 
-    Those of its path; one with waypoints draws it from where it is on to them, by minimum jerk within DRAWN, or within
-    the time of all waypoints where that is shorter.
+    They are those of the path. Waypoints draw the point from `start` to the path by minimum jerk within DRAWN, or
+    within the duration of the path if that is shorter.
     """
     at = path.at(t, start)
     if not isinstance(path, Waypoints):
@@ -282,7 +287,7 @@ def held_at(path: Path, t: Floats, start: Floats) -> Floats:
 
 
 def _share(profile: str, x: Floats) -> Floats:
-    """Return the share of the way that is done by a profile at x (k,), 0 at its begin and 1 at its end."""
+    """Return the share of the way that a profile has covered at x (k,), where x is 0 at its begin and 1 at its end."""
     x = np.clip(x, 0.0, 1.0)
     a, b, c, d, e = _PROFILES[profile]
     return np.asarray(x * (a + x * (b + x * (c + x * (d + x * e)))))

@@ -1,4 +1,4 @@
-"""Points in order along a whole cable, as a start or a stress-free shape is given by."""
+"""Points in order along a whole cable, which give a start or a stress-free shape."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +12,7 @@ def points_along(field: str, value: ArrayLike) -> NDArray[np.float64]:
     """Return points (n, 3) [m] of the points (n, 2 or 3) `value`, 2D points at z = 0.
 
     Raises:
-        SceneError: they are no such points, too few, too many, or all the same.
+        SceneError: they are not such points, too few, too many, or all the same.
     """
     points = points_array(field, value)
     if not MIN_POINTS <= len(points) <= MAX_POINTS:

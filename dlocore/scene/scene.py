@@ -1,6 +1,6 @@
-"""The scene: a cable, its start, what grasps and loads it, its surroundings, and the asked quality.
+"""The scene: a cable, its start, its grasps and loads, its surroundings, and the requested quality.
 
-Frozen data in SI units, world frame right-handed with z up. Everything is validated once, here.
+Frozen data in SI units; the world frame is right-handed with z up. Everything is validated once, here.
 """
 
 import math
@@ -50,15 +50,15 @@ EFFECTS = (
 )
 NEEDED = ("stretch",)  # effects that can't be switched off
 MAX_GRASPS = 32
-MAX_N_U, MAX_N_T = 129, 513  # of a given grid: memory and time
+MAX_N_U, MAX_N_T = 129, 513  # of a given grid, to limit memory and time
 DELTA = 1e-5  # [m]: threshold of a least squares
 MAX_OBSTACLES = 100
 MAX_CONTROL_POINTS = 2000  # of a start
 AUTO_TARGET = 2e-3  # of the length: the error that quality "auto" aims at
 MAX_STRAIN = 0.5  # axial, that a start may have
-MAX_PRESCRIBED_STRAIN = 0.005  # of the chord between two grasps: beyond it no cable of this kind can follow
-FARTHEST, FAR = 100.0, 50.0  # of the length, and [m]: a gripper that goes farther than both has another unit
-AT_ONCE = 1e-5  # of the horizon, or of a swing
+MAX_PRESCRIBED_STRAIN = 0.005  # of the chord between two grasps: no cable of this kind can follow more
+FARTHEST, FAR = 100.0, 50.0  # of the length, and [m]: a gripper path longer than both must be in another unit
+AT_ONCE = 1e-5  # of the horizon, or of a swing: times closer than this are simultaneous
 MIN_GRASP_DISTANCE = 1e-4  # of the length, between two grasps that hold at the same time
 
 
@@ -67,11 +67,12 @@ class Straight(Checked):
     """A straight cable from `start` (3,) [m] along `direction` (3,), which need not have unit length.
 
     Args (of every start shape):
-        settle: relax to static equilibrium before t = 0, under the grasps' first poses, and the force of a load before
-            it jumps there; on something rough to where friction holds it.
+        settle: relax to static equilibrium before t = 0, under the grasps' first poses. A load that jumps at t = 0
+            acts with its force before the jump. On a rough surface the cable relaxes to where friction holds it.
         velocity: initial velocity [m/s]: None (rest), (3,) for all points, or (n, 3) at points evenly spaced along
-            the cable (for `Points`: at the points themselves; for `ControlPoints`: control points of the velocity,
-            (n, 4) with the rate of theta [rad/s]; without it the sections do not spin about their tangent).
+            the cable. For `Points`, (n, 3) at the points themselves. For `ControlPoints`, the control points of the
+            velocity, (n, 3), or (n, 4) with the rate of theta [rad/s]; without it the sections do not spin about
+            their tangent.
     """
 
     start: ArrayLike = (0.0, 0.0, 0.0)
@@ -93,7 +94,8 @@ class Straight(Checked):
 class Points(Checked):
     """Points `points` (n, 2 or 3) [m] in order along the whole cable, as a vision system delivers them.
 
-    Uneven spacing, noise and repeated points are welcome; 2D points lie at z = 0. 4 to 100,000 points.
+    4 to 100,000 points. Uneven spacing, noise and repeated points are accepted; 2D points lie at z = 0. `settle` and
+    `velocity` are those of `Straight`.
     """
 
     points: ArrayLike
@@ -109,15 +111,15 @@ class Points(Checked):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Material(Checked):
-    """What the sections of a cable remember: how they are turned, and the strain that has become theirs.
+    """What the sections of a cable remember: how they are turned, and their permanent strain.
 
     Args:
         director: unit vector (3,) across the cable at u = 0, fixed in its section where theta is zero.
         u: material coordinates (k,) [m], rising.
-        memory: stress-free strain there (k, 3): two curvatures in the sections' frame and the twist rate
+        memory: stress-free strain at `u` (k, 3): two curvatures in the sections' frame and the twist rate
             [1/m, 1/m, rad/m] (the paper's eps_0, eq. 9).
-        stretch: stress-free axial strain there (k,); None: zero.
-        natural: what `memory` was before anything yielded (k, 3): hardening pulls back to it; None: zero.
+        stretch: stress-free axial strain at `u` (k,); None: zero.
+        natural: `memory` before anything yielded (k, 3), towards which hardening pulls back; None: zero.
     """
 
     director: ArrayLike
@@ -146,10 +148,13 @@ class Material(Checked):
 class ControlPoints(Checked):
     """A cubic spline by its control points (n, 3 or 4) [m, m, m, rad], on `knots` (n + 4,) [m] or uniform ones.
 
-    The knots are clamped (four equal at each end) and run from 0 to the cable's length. The fourth column is theta,
-    the angle of the sections against a frame without twist (docs/model.md eq. 19). `material` is what the sections
-    remember of an earlier motion, `strain` (n,) the axial strain with which it goes on, at the means of each three
-    successive inner knots and linear between them; None: without any, whatever the control points' own length.
+    The knots are clamped (four equal at each end) and run from 0 to the cable's length. The fourth column is theta, the
+    angle of the sections against a frame without twist (docs/model.md eq. 19). `settle` and `velocity` are those of
+    `Straight`.
+
+    `material` is what the sections remember of an earlier motion. `strain` (n,) is the axial strain at the start: at
+    the Greville abscissae, the means of each three successive inner knots, and linear between them. With None the
+    strain is zero, whatever the length of the spline.
     """
 
     control_points: ArrayLike
@@ -205,10 +210,10 @@ class Grasp:
 
     Args:
         u: material coordinate [m], 0 to the cable's length.
-        hold: "point" holds the position, "tangent" position and direction, "clamp" the twist of the section too.
+        hold: "point" holds the position, "tangent" also the direction, "clamp" also the roll of the section.
         path: `Still`, `Move` or `Waypoints`; its clock starts at `grasp_time`.
-        grasp_time: when the gripper closes [s]; None: it holds from the start. One that would close at the horizon or
-            later never holds the cable, which `Prediction.notes` tells.
+        grasp_time: when the gripper closes [s]; None: it holds from the start. A gripper that would close at the
+            horizon or later never holds the cable, and `Prediction.notes` says so.
         release_time: when it opens [s]; None: never.
     """
 
@@ -243,8 +248,8 @@ class Grasp:
 class Load(Checked):
     """A known force at material coordinate `u` [m]: `force` (3,) [N], or (k, 3) at `times` (k,) [s].
 
-    Between the times it is linear, before them the first and after them the last. Of two equal times the first has the
-    force before a jump, the second that after it.
+    The force is linear between the times; before them the first acts, after them the last. Two equal times are a jump:
+    the first has the force before it, the second the force after it.
     """
 
     u: float
@@ -261,7 +266,7 @@ class Load(Checked):
         object.__setattr__(self, "force", array("force", self.force, shape=(len(times), 3), unit="N"))
 
     def at(self, t: Floats, end: float = np.inf) -> Floats:
-        """Forces at times `t` (k,) [s]; (k, 3) [N]. At a jump it is that after it, but before it from `end` [s] on."""
+        """Forces at times `t` (k,) [s]; (k, 3) [N]. At a jump: the force after it, or before it for t >= `end` [s]."""
         force = cast(Floats, self.force)
         if self.times is None:
             return np.broadcast_to(force, (len(t), 3))
@@ -273,7 +278,7 @@ class Load(Checked):
 
 
 def load_times(field: str, given: ArrayLike) -> Floats:
-    """Return the times (k,) [s] of a load, or raise SceneError unless they rise, or two are equal where it jumps."""
+    """Return the times (k,) [s] of a load, or raise SceneError unless they rise; two may be equal, for a jump."""
     times = array(field, given, shape=(None,), unit="s")
     if not (len(times) >= 1 and (np.diff(times) >= 0.0).all() and (times[2:] > times[:-2]).all()):
         raise SceneError(field, times, "rising times [s], two equal ones where the force jumps")
@@ -282,7 +287,7 @@ def load_times(field: str, given: ArrayLike) -> Floats:
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """A horizontal table; `height` [m] is that of the centreline of a cable lying on it, `friction` Coulomb's mu."""
+    """A horizontal table: `height` [m] of the centreline of a cable that lies on it, and Coulomb's mu as `friction`."""
 
     height: float = 0.0
     friction: float = 0.0
@@ -294,7 +299,15 @@ class Table:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Environment(Checked):
-    """Gravity (3,) [m/s^2], drag per unit length: linear [N s/m^2] and quadratic [N s^2/m^3], a table, obstacles."""
+    """Gravity, drag, table and obstacles.
+
+    Args:
+        gravity: (3,) [m/s^2], at most 1000.
+        drag: linear drag per unit length [N s/m^2].
+        drag_quadratic: quadratic drag per unit length [N s^2/m^3].
+        table: a `Table`; None: there is none.
+        obstacles: `Sphere`, `Capsule`, `Cylinder` or `Box`, up to 100.
+    """
 
     gravity: ArrayLike = (0.0, 0.0, -9.81)
     drag: float = 0.0
@@ -319,28 +332,33 @@ class Environment(Checked):
 
 @dataclass(frozen=True, kw_only=True)
 class Quality:
-    """What accuracy or grid is asked for, and by which method.
+    """The requested accuracy or grid, and the method.
 
-    Give `n_u` and `n_t` (a fixed grid), or `target_error` [m] at the worst point of the surface, or `time_budget` [s],
-    or nothing (0.2 % of the length is aimed at, an estimated error of 1 % is success). With a time budget grids are
-    refined as long as it lasts, but the first is marched to its end; an estimated error of 1 % is success, too.
+    Give one of these, or nothing:
+
+    - `n_u` and `n_t`: a given grid;
+    - `target_error` [m] at the worst point of the surface;
+    - `time_budget` [s]: grids are refined as long as it lasts, but the first is always marched to its end.
+
+    With nothing given, 0.2 % of the cable's length is the aim. With nothing or with a time budget, an estimated error
+    of up to 1 % counts as converged.
 
     Args:
         n_u: control points along the cable, 5 to 129.
-        n_t: control points in time, 5 to 513. Where a solve on such a grid errs by more than 1 % of the length, as it
-            estimates, or does not come to its end, finer grids are solved, and where these reach that 1 % they are the
-            answer, which says so. That takes what a `target_error` of 1 % takes, where no grid settles the motion a
-            minute or more: a deadline bounds it, `keep_grid` leaves it out.
+        n_t: control points in time, 5 to 513. If the estimated error on a given grid exceeds 1 % of the length, or the
+            solve does not finish, finer grids are solved. If these reach 1 % they are the answer, and `message` says
+            so. That takes as long as a `target_error` of 1 %; if no grid resolves the motion, a minute or more. A
+            deadline limits it, and `keep_grid` leaves it out.
         delta: threshold of a least squares on the norm of its control-point update, paper eq. (25) [m], 1e-10 to 1e-2;
-            without it 1e-5.
-        method: "march", "spacetime", "paper", "reference" (docs/reference.md), or "auto": `march`, which is nearer to
-            the motion on the same grid and takes less time; but `spacetime` where a grid is given with a `delta`, which
-            a march has no use for, and the motion is smooth. Where "spacetime" does not converge, `march` is the last
-            resort, and the answer says so.
-        estimate: with a given grid, estimate the error by a second march on another grid; False saves its time, and
-            with it what that calls for: however much a solve that converges errs, it is the answer.
-        keep_grid: answer with what a given grid, and a least squares that was asked for, come to by themselves,
-            however much that errs, and whether it converges or not, as who measures them wants.
+            None: 1e-5.
+        method: "march", "spacetime", "paper", "reference" (docs/reference.md) or "auto". "auto" is `march`, which on
+            the same grid is nearer to the motion and takes less time. It is `spacetime` if a grid is given with a
+            `delta`, which a march does not use, and the motion is smooth. If `spacetime` does not converge, `march` is
+            the last resort, and `message` says so.
+        estimate: with a given grid, estimate the error by a second march on another grid. False saves that time; a
+            solve that converges is then the answer, however large its error.
+        keep_grid: keep the answer of the given grid and of a requested least squares, however large its error, and
+            whether it converges or not. For those who measure grids and methods.
     """
 
     n_u: int | None = None
@@ -388,7 +406,7 @@ class Quality:
 
     @property
     def threshold(self) -> float:
-        """The threshold of a least squares on its update [m]: `delta`, or where none is given that of the paper."""
+        """The threshold of a least squares on its update [m]: `delta`, or DELTA if none is given."""
         return DELTA if self.delta is None else self.delta
 
 
@@ -399,12 +417,12 @@ class Scene(Checked):
     Args:
         cable: the cable.
         shape: where it is at t = 0.
-        grasps: what holds and moves it (the contract's `primitives`).
+        grasps: the grippers that hold and move it (`primitives` in requests and errors).
         loads: known forces.
-        environment: gravity, drag, table.
+        environment: gravity, drag, table, obstacles.
         horizon: predicted time [s]; None: until the last path ends, the last grasp opens and the last load is given.
-        effects: "on", "off" or "auto" by effect name; "auto" for those not named.
-        quality: asked accuracy or grid.
+        effects: "on", "off" or "auto" by effect name; effects not named are "auto".
+        quality: the requested accuracy or grid.
 
     Raises:
         SceneError: a part contradicts another, e.g. a grasp off the cable, or grasps too far apart.
@@ -425,7 +443,7 @@ class Scene(Checked):
         instance("environment", self.environment, Environment, "an Environment")
         instance("effects", self.effects, Mapping, 'a dict of "on", "off" or "auto" by effect name')
         instance("quality", self.quality, Quality, "a Quality")
-        object.__setattr__(self, "effects", Unwritten(self.effects))  # the caller's may change
+        object.__setattr__(self, "effects", Unwritten(self.effects))  # a copy: the caller may change the original
         object.__setattr__(self, "grasps", instances("grasps", self.grasps, Grasp, "Grasp"))
         object.__setattr__(self, "loads", instances("loads", self.loads, Load, "Load"))
         length = self.cable.length
@@ -446,7 +464,7 @@ class Scene(Checked):
                 raise SceneError("shape.knots[-1]", last, f"the cable's length, {length:g} [m]")
 
     def _check_sizes(self) -> None:
-        """Refuse what is so large against the cable that it is in another unit."""
+        """Refuse lengths so large compared with the cable that they must be in another unit."""
         length, target = self.cable.length, self.quality.target_error
         if target is not None and not target <= length:
             raise SceneError("quality.target_error", target, f"at most the cable's length, {length:g} [m]", MILLIMETRES)
@@ -459,23 +477,23 @@ class Scene(Checked):
 
     @property
     def swing(self) -> float:
-        """About how long a cable of that length needs to swing once [s]."""
+        """Approximate period of a swing of the cable [s]."""
         return 2.0 * math.sqrt(self.cable.length)
 
     @property
     def moment(self) -> float:
-        """What is no farther apart in time is at once [s]: the same time comes of two sums but for rounding."""
+        """Longest time between two times that count as one [s]: equal times computed as sums differ by rounding."""
         return AT_ONCE * min(cast(float, self.horizon), self.swing)
 
     @property
     def weight(self) -> float:
-        """What the cable weighs, with its point masses [N]."""
+        """Weight of the cable and its point masses [N]."""
         gravity = float(np.linalg.norm(cast(Floats, self.environment.gravity)))
         return self.cable.mass * gravity
 
     @property
     def places(self) -> tuple[float, ...]:
-        """Material coordinates at which something holds, loads or weighs down the cable in one place [m]."""
+        """Material coordinates of the grasps, loads and point masses [m]."""
         parts: tuple[Grasp | Load | PointMass, ...] = (*self.grasps, *self.loads, *self.cable.point_masses)
         return tuple(part.u for part in parts)
 
@@ -512,7 +530,7 @@ class Scene(Checked):
 
 
 def _farthest(path: Path) -> tuple[str, float]:
-    """Return how far from where it begins a path goes [m], and the name of what tells it."""
+    """Return the name of the field that sets how far a path goes, and its largest distance from its begin [m]."""
     if isinstance(path, Move):
         return "displacement", float(np.linalg.norm(cast(Floats, path.displacement)))
     if isinstance(path, Waypoints):

@@ -156,7 +156,7 @@ def test_why_a_derivative_is_not_exact_is_said_of_each_parameter() -> None:
     ball = Sphere(center=(0.6, 0.1, 0.0), radius=0.05)
     held = scene(grasps=(Grasp(u=0.0, hold="tangent", path=Move(displacement=(0.0, 0.1, 0.0), duration=1.5)),))
     touched = replace(held, environment=Environment(gravity=(0, 0, 0), drag=0.1, obstacles=(ball,)))
-    at_end = "a place at an end has other knots than one beside it"
+    at_end = "a place at an end has other knots than one near the end"
     names = ["grasps[0].u", "environment.drag"]
     assert sensitivities(predict(held), names).reason == (at_end, "")
     first, second = sensitivities(predict(touched), names).reason
