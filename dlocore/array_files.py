@@ -61,7 +61,7 @@ class ArrayFile:
 
     def __init__(self, file: BinaryIO, name: str, largest: float = math.inf) -> None:
         if not zipfile.is_zipfile(file):
-            raise SceneError(name, "no archive, or one whose end is missing", _ALLOWED)
+            raise SceneError(name, "a file that is not an archive, or is truncated", _ALLOWED)
         with _unpacking(name, _ALLOWED):
             self._archive = zipfile.ZipFile(file)
         self._name, self._largest = name, largest

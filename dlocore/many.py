@@ -47,7 +47,7 @@ def predict_many(
     wanted = usable_cores() if threads is None else whole("threads", threads, at_least=1, at_most=1024)
     check_options(like, deadline, keep_grid)
     if not isinstance(scenes, Iterable):
-        raise SceneError("scenes", scenes, "scenes one after the other, as a list of them")
+        raise SceneError("scenes", scenes, "a list or another iterable of scenes")
     given = list(scenes)
     answers: list[Prediction | SceneError | None] = [None] * len(given)
     failures: list[BaseException] = []

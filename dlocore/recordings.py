@@ -353,8 +353,8 @@ def _from_csv(path: Path) -> Recording:
     rows = _rows(path)
     beside = path.with_suffix(".json")
     if not beside.exists():
-        allowed = "a .json of the same name with what is known of it"
-        raise SceneError(path.name, f"no {beside.name} beside it", allowed)
+        allowed = "a .json of the same name with the facts of the recording"
+        raise SceneError(path.name, f"no {beside.name} in the same folder", allowed)
     facts = read_facts(beside)
     dimensions = facts.pop("dimensions", 3)
     if type(dimensions) is not int or dimensions not in (2, 3):

@@ -54,7 +54,7 @@ def warm_up(processes: int | None = None, cancelled: Callable[[], bool] | None =
         Cancelled: `cancelled` returned True.
     """
     if processes is not None and processes < 1:
-        raise ValueError(f"processes: {processes} is not allowed; at least 1")
+        raise ValueError(f"processes: got {processes}. Allowed: at least 1.")
 
     def check() -> None:
         if cancelled is not None and cancelled():

@@ -1,1 +1,1 @@
-"""Parts of an answer: how the solve went, reactions, frames and effects, in the world and in words."""
+"""The parts of an answer: iterations, reactions, contact forces, frames, stretch and effects, in world coordinates."""

@@ -1,4 +1,4 @@
-"""How near a motion comes to obstacles: the least gap over the whole surface, between its samples too."""
+"""How near a motion comes to obstacles: the least gap over the whole surface, also between samples."""
 
 from functools import reduce
 
@@ -11,18 +11,18 @@ from dlocore.spline import DEGREE, SplineSurface
 
 Floats = NDArray[np.float64]
 
-_PARTS = 4  # into which a cell is cut, along or in time, whichever leaves more in doubt
-_MOST = 256  # cells that are cut at once: where a cable lies on an obstacle for long, many are as near
-_ROUNDS = 30  # of cuts: rounding ends before
-_STEP = 1e-6  # of half a cell, over which slopes are found
+_PARTS = 4  # into which a cell is cut, along the cable or in time, in the direction of larger doubt
+_MOST = 256  # cells cut at once: if a cable lies on an obstacle for long, many are equally near
+_ROUNDS = 30  # most rounds of cuts: rounding is reached before
+_STEP = 1e-6  # of half a cell: step for slopes
 
 
 def least_distance(surface: SplineSurface, rows: Floats, tolerance: float) -> float:
     """Return the least signed distance [m] of a surface's centreline from obstacles, to `tolerance` [m].
 
-    Obstacles are convex, so that the distance is nowhere below its tangent at the middle of a cell of the surface, from
-    which the cell's points deviate by no more than the control points of the second derivatives allow. Cells that can't
-    be nearer than the nearest point so far are left, the others cut.
+    Obstacles are convex, so their distance is nowhere below its tangent plane at the middle of a cell of the surface.
+    The control points of the second derivatives bound how far the cell's points deviate from linear. Cells that can't
+    be nearer than the nearest point so far are dropped; the others are cut.
 
     Args:
         surface: the motion.
@@ -54,13 +54,13 @@ def least_distance(surface: SplineSurface, rows: Floats, tolerance: float) -> fl
 
 
 def _spans(knots: Floats) -> tuple[Floats, Floats]:
-    """Return middles and half widths (k,) of the spans between knots (k + 7,), those of no width among them."""
+    """Return middles and half widths (k,) of the spans between knots (k + 7,), including spans of zero width."""
     begin, end = knots[DEGREE : -DEGREE - 1], knots[DEGREE + 1 : -DEGREE]
     return 0.5 * (begin + end), 0.5 * (end - begin)
 
 
 def _largest(surface: SplineSurface, du: int, dt: int) -> Floats:
-    """Return a bound of a derivative of r in each span (spans in time, spans along) [m/(m^du s^dt)]."""
+    """Return a bound on a derivative of r in each span (spans in time, spans along the cable) [m/(m^du s^dt)]."""
     control = surface.control_points[..., :3]
     for axis, knots, order in ((1, surface.knots_u, du), (0, surface.knots_t, dt)):
         for k in range(1, order + 1):
@@ -69,21 +69,23 @@ def _largest(surface: SplineSurface, du: int, dt: int) -> Floats:
             factor = np.divide(DEGREE + 1.0 - k, width, out=np.zeros(n), where=width > 0.0)
             control = np.diff(control, axis=axis) * np.expand_dims(factor, (1 - axis, 2))
     bound = np.sqrt(np.einsum("kid,kid->ki", control, control))
-    for order in (dt, du):  # the control points of a span, first in time, then along
+    for order in (dt, du):  # the control points of a span, first in time, then along the cable
         count = len(bound) - DEGREE + order
         bound = reduce(np.maximum, (bound[k : k + count] for k in range(DEGREE + 1 - order))).T
     return bound
 
 
 def _looked_at(surface: SplineSurface, rows: Floats, cells: Floats, bends: Floats) -> tuple[Floats, Floats]:
-    """Return the distances (k, m) [m] of the middles of cells from obstacles, and how much less they may be elsewhere
-    in the cells, along and in time (2, k, m) [m].
+    """Return the distances of the middles of cells from obstacles, and by how much they may be less in the cells.
 
     Args:
         surface: the motion.
         rows: of the obstacles (m, ROW).
         cells: their middles u [m], t [s] and half widths (k, 4).
         bends: bounds of |r_uu|, |r_ut| and |r_tt| in them (k, 3).
+
+    Returns:
+        The distances (k, m) [m], and the possible decrease along the cable and in time (2, k, m) [m].
     """
     u, t, half_u, half_t = cells.T
     places, times = [u, u + _STEP * half_u, u], [t, t, t + _STEP * half_t]
@@ -99,14 +101,14 @@ def _cut(cells: Floats, along: NDArray[np.int64]) -> Floats:
     """Return the cells (k, 4) cut into _PARTS each, in u where `along` (k,) is 0 and in t where it is 1."""
     out = np.repeat(cells, _PARTS, axis=0)
     k, axis = np.arange(len(out)), np.repeat(along, _PARTS)
-    place = (2.0 * np.arange(_PARTS) + 1.0) / _PARTS - 1.0  # of the middles of the parts, over half the width
+    place = (2.0 * np.arange(_PARTS) + 1.0) / _PARTS - 1.0  # middles of the parts, relative to half the width
     out[k, axis] += np.tile(place, len(cells)) * out[k, axis + 2]
     out[k, axis + 2] /= _PARTS
     return out
 
 
 def _points(surface: SplineSurface, u: Floats, t: Floats) -> Floats:
-    """Return the points r (k, 3) [m] at the places u (k,) [m] and times t (k,) [s]."""
+    """Return the points r (k, 3) [m] at the pairs of u (k,) [m] and t (k,) [s]."""
     first_u, over_u = basis_rows(np.array(surface.knots_u), u, 0)
     first_t, over_t = basis_rows(np.array(surface.knots_t), t, 0)
     near = np.arange(DEGREE + 1)

@@ -1,4 +1,4 @@
-"""How far what is read from a motion may be off, as the same motion marched on other grids tells."""
+"""Error estimates of forces over time, from the same motion marched on other grids."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-_LEFT = 1.5  # times the distance to a force on another grid: benchmarks.force_errors
-_NEARBY = 12  # an error holds for this part of the motion: forces of two grids that swing cross each other
+_LEFT = 1.5  # the estimate, over the distance to a force on another grid: benchmarks.force_errors
+_NEARBY = 12  # an error holds for one such part of the motion, since oscillating forces of two grids cross each other
 
 
 class Series(NamedTuple):
@@ -17,7 +17,7 @@ class Series(NamedTuple):
 
     Attributes:
         times: (k,) [s].
-        parts: where in them those between each two events are; an event ends one and begins the next.
+        parts: the indices between each two events; an event ends one part and begins the next.
         values: (k, 3).
     """
 
@@ -27,20 +27,20 @@ class Series(NamedTuple):
 
 
 def parts_of(lengths: Sequence[int]) -> list[slice]:
-    """Return where parts of these lengths, one after the other, are."""
+    """Return the slices of successive parts of these lengths."""
     ends = np.cumsum([0, *lengths])
     return [slice(int(end) - length, int(end)) for end, length in zip(ends[1:], lengths, strict=True)]
 
 
 def at_times(t: Floats, times: Floats, values: Floats) -> Floats:
-    """Return vectors (m, 3) at times (m,), linear between, at the times `t` (k,); (k, 3)."""
+    """Return the vectors (k, 3) at times `t` (k,), linear between `values` (m, 3) at `times` (m,)."""
     return np.column_stack([np.interp(t, times, values[:, d]) for d in range(3)])
 
 
 def apart(own: Series, other: Series) -> Floats | None:
-    """Return the distance (k,) of vectors over time to others, in each part to those of the same time.
+    """Return the distances (k,) of vectors over time to others, compared part by part at the same times.
 
-    None where one of the parts has no other beside it: a least squares has fewer, as it goes through events.
+    None if a part has no counterpart: a least squares has fewer parts, because it passes through some events.
     """
     met = []
     for here in own.parts:
@@ -54,7 +54,7 @@ def apart(own: Series, other: Series) -> Floats | None:
 
 
 def errors(own: Series, others: Sequence[Series]) -> Floats | None:
-    """Return the estimated errors (k,) of vectors over time, None where no other series is beside all of them.
+    """Return the estimated errors (k,) of vectors over time, None if no other series has counterparts to all parts.
 
     It is _LEFT times the largest distance to another series within a _NEARBYth of the motion (docs/model.md, grids and
     error estimate).
@@ -65,6 +65,6 @@ def errors(own: Series, others: Sequence[Series]) -> Floats | None:
 
 def _largest_nearby(values: Floats) -> Floats:
     """Return for each of the values (k,), at about even times, the largest within half a _NEARBYth of all times."""
-    from scipy.ndimage import maximum_filter1d  # takes longer to load than most motions to solve
+    from scipy.ndimage import maximum_filter1d  # takes longer to load than most motions take to solve
 
     return np.asarray(maximum_filter1d(values, size=2 * round(0.5 * len(values) / _NEARBY) + 1))

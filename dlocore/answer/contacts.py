@@ -1,4 +1,4 @@
-"""How hard table and obstacles press on the cable, and how their friction holds it, over time."""
+"""Normal and friction forces of table and obstacles on the cable over time, with error estimates."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -22,27 +22,27 @@ from dlocore.scene.scene import Scene
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-CONTACT_TIMES = 129  # at most, about, at which contact is looked at
-_NEAR = 0.05  # of the length: obstacles that lie closer are the same one, moved
-_AT_ONCE = 1_000_000  # nodes that are looked at together, over all times
-_STRIDE = 16  # of so many nodes one is looked at first
-_LONGER = 1.1  # times as long as it is the cable may be strained
+CONTACT_TIMES = 129  # about the most times at which contact is evaluated
+_NEAR = 0.05  # of the length: obstacles of two scenes that lie closer are the same one, moved
+_AT_ONCE = 1_000_000  # nodes evaluated together, over all times
+_STRIDE = 16  # one in so many nodes is evaluated first
+_LONGER = 1.1  # largest stretched length of the cable, over its length
 _SWINGS = 2.0  # in which a cable that was not pressed against what it lies on comes to rest there
-_SIDE = 0.01  # of the depth at which contact is as stiff as it gets: way by which a normal is found
+_SIDE = 0.01  # of the depth at which contact reaches its full stiffness: step for finding normals
 
 
 def contact_forces(problem: Problem, grid: Grid, windows: Windows, marched: bool = True) -> tuple[ContactForce, ...]:
     """Return the forces of the table and of every obstacle that was simulated on the cable.
 
     They are the sums of N n ds and of f ds over the nodes of contact, with N of docs/model.md eq. 21, f of eq. 22, and
-    the speed of a node over the step that ends with a state. A cable that is solved in the plane of the table is
-    carried by it, whatever moves. Where the states are those of a least squares, not `marched`, all nodes act, and
-    friction goes with their speed.
+    the velocity of a node over the step that ends with a state. The table always carries a cable that is solved in the
+    plane of the table. For the states of a least squares (`marched` False) all nodes act, and friction depends on their
+    speed.
 
     Args:
         problem: as it was marched, see `Level.marched`.
-        grid: of its nodes.
-        windows: between events.
+        grid: grid with the contact nodes.
+        windows: stretches between events.
         marched: whether the states are those of a march.
     """
     kept = _kept([len(window.times) for window in windows])
@@ -59,7 +59,7 @@ def contact_forces(problem: Problem, grid: Grid, windows: Windows, marched: bool
         return tuple(found)
     nodes = grid.tables.contact
     met = [] if nodes.table_nodes == 0 else [("table", slice(0, nodes.table_nodes), TABLE)]
-    numbered = enumerate(problem.scene.environment.obstacles)  # of which those that are simulated are some, in order
+    numbered = enumerate(problem.scene.environment.obstacles)  # those simulated are some of these, in the same order
     for i, obstacle in enumerate(problem.obstacles):
         number = next(number for number, other in numbered if other is obstacle)
         met.append((f"obstacles[{number}]", slice(nodes.table_nodes, len(nodes.u)), COUNT + i))
@@ -76,12 +76,12 @@ def contact_forces(problem: Problem, grid: Grid, windows: Windows, marched: bool
 def with_contact_errors(
     found: tuple[ContactForce, ...], problem: Problem, windows: Windows, beside: Sequence[tuple[Problem, Grid, Windows]]
 ) -> tuple[ContactForce, ...]:
-    """Return contact forces with their errors, from those of the same motion marched on other grids.
+    """Return contact forces with error estimates, from those of the same motion marched on other grids.
 
     Args:
-        found: of the `windows`.
+        found: the contact forces in the `windows`.
         problem: as it was marched.
-        windows: between events.
+        windows: stretches between events.
         beside: problem, grid and windows of each other march.
     """
     others = [(force, w) for problem, grid, w in beside for force in contact_forces(problem, grid, w)]
@@ -99,11 +99,11 @@ def with_contact_errors(
 
 
 def _until_it_rests(problem: Problem, times: Floats, values: Floats, known: Floats) -> Floats:
-    """Return the errors (k,) of forces (k, 3) at `times` [s] from those `known` of grids, until the cable rests on it.
+    """Return the errors (k,) of forces (k, 3) at `times` [s]: those `known` from grids, raised until the cable rests.
 
-    A cable that lies on an obstacle as the motion begins has not been pressed against it yet, on any grid. It swings on
-    it, as on a spring, until the force is what it should have been from the beginning. Until then a force is off by
-    its distance to those that come, and to the last of them with what that one is off.
+    A cable that lies on an obstacle when the motion begins is not yet pressed against it, on any grid. It swings on the
+    contact as on a spring, until the force is what it should have been from the beginning. Until then the error of a
+    force is its largest distance to the later ones, where the error of the last one is added to the distance to it.
     """
     if problem.contact is None:
         return known
@@ -117,9 +117,10 @@ def _until_it_rests(problem: Problem, times: Floats, values: Floats, known: Floa
 def contacts_taken_on(
     found: tuple[ContactForce, ...], scene: Scene, judged: tuple[ContactForce, ...], like: Scene
 ) -> tuple[ContactForce, ...]:
-    """Return contact forces of a scene with the errors of those of one like it, as far as it has them.
+    """Return contact forces of a scene with the error estimates of a similar scene, `like`, as far as it has them.
 
-    An obstacle has those of one of its kind that is as large and lies within _NEAR of the length, whatever its number.
+    An obstacle gets those of an obstacle of the same kind whose place and size differ by less than _NEAR of the
+    length, whatever its number.
     """
     near, here, there = _NEAR * scene.cable.length, _rows(scene), _rows(like)
     errs = {force.name: force for force in judged}
@@ -147,12 +148,12 @@ def contacts_taken_on(
 
 
 def _rows(scene: Scene) -> dict[str, Floats]:
-    """Return the rows of the obstacles of a scene by the names of their contact forces."""
+    """Return the rows of the obstacles of a scene, by the names of their contact forces."""
     return {f"obstacles[{i}]": obstacle.row() for i, obstacle in enumerate(scene.environment.obstacles)}
 
 
 def _kept(lengths: Sequence[int]) -> list[Indices]:
-    """Return which of the times of windows of these lengths are looked at: their ends, and evenly many between."""
+    """Return the indices of the times to evaluate in windows of these lengths: their ends, and evenly many between."""
     share = min(1.0, CONTACT_TIMES / sum(lengths))
     return [np.unique(np.linspace(0, n - 1, max(2, round(share * n))).round().astype(int)) for n in lengths]
 
@@ -163,12 +164,12 @@ def _weight_on_table(scene: Scene) -> float:
 
 
 class _Behind(NamedTuple):
-    """What lies behind some states when the steps that end with them begin.
+    """History of some states, at the beginning of the steps that end with them.
 
     Attributes:
-        weights: (k, contact nodes) [m] of these in the step: one of a cell may stand for all of it.
-        stick: (k, contact nodes, 3) anchors of the friction [m]; (k, 0, 3) without.
-        slide: (k, lying points, 2) those of a cable that lies on the table [m]; (k, 0, 2) without.
+        weights: (k, contact nodes) [m], of the nodes in that step: one node of a cell may stand for all of it.
+        stick: (k, contact nodes, 3) anchors of friction [m]; (k, 0, 3) without friction.
+        slide: (k, lying points, 2) anchors of a cable that lies on the table [m]; (k, 0, 2) without.
     """
 
     weights: Floats
@@ -176,12 +177,12 @@ class _Behind(NamedTuple):
     slide: Floats
 
     def of(self, some: Indices) -> "_Behind":
-        """Return what lies behind some of the states."""
+        """Return the history of some of the states."""
         return _Behind(*(values[some] for values in self))
 
 
 def _nothing_behind(grid: Grid, kept: Sequence[Indices]) -> list[_Behind]:
-    """Return what lies behind states in each window where no march led to them: all nodes act."""
+    """Return the history of states in each window if no march led to them: all nodes act."""
     w = grid.tables.contact.w
     return [
         _Behind(np.broadcast_to(w, (len(at), len(w))), np.empty((len(at), 0, 3)), np.empty((len(at), 0, 2)))
@@ -190,10 +191,10 @@ def _nothing_behind(grid: Grid, kept: Sequence[Indices]) -> list[_Behind]:
 
 
 def _behind(problem: Problem, grid: Grid, windows: Windows, kept: Sequence[Indices]) -> list[_Behind]:
-    """Return what lies behind the states `kept` of each window of a march.
+    """Return the history of the states `kept` of each window of a march.
 
-    Which nodes act is known from where the cable was at the beginning of a step, but the anchors of friction from all
-    that it has done in the window.
+    Which nodes act depends only on where the cable was when a step began. The anchors of friction depend on its whole
+    motion in the window.
     """
     if problem.friction is None and grid.tables.contact.cell == 1:
         return _nothing_behind(grid, kept)
@@ -211,25 +212,25 @@ def _behind(problem: Problem, grid: Grid, windows: Windows, kept: Sequence[Indic
 
 
 def _basis(n_u: int, first: Indices, b0: Floats) -> Floats:
-    """Return the basis functions (k, n_u) where four of them, b0 (k, 4), from `first` (k,) on are not zero."""
+    """Return the basis functions (k, n_u), of which four, b0 (k, 4) from `first` (k,) on, are not zero."""
     basis = np.zeros((len(first), n_u))
     np.put_along_axis(basis, first[:, None] + np.arange(4), b0, axis=1)
     return basis
 
 
 def _sums(k: Indices, vectors: Floats, count: int) -> Floats:
-    """Return the sums (count, 3) of vectors (n, 3) by what they belong to, k (n,)."""
+    """Return the sums (count, 3) of vectors (n, 3), grouped by the indices k (n,)."""
     return np.column_stack([np.bincount(k, component, count) for component in vectors.T])
 
 
 def _speeds(window: WindowForces, at: Indices) -> Floats:
-    """Return the speed of control points (k, n_u, nc) [m/s] over the steps that end with some states of a window."""
-    step = np.maximum(at, 1)  # the first step is that of both its ends
+    """Return the velocities of control points (k, n_u, nc) [m/s] over the steps that end with the states `at`."""
+    step = np.maximum(at, 1)  # the first state has that of the first step, too
     return np.asarray((window.states[step] - window.states[step - 1]) / np.diff(window.times)[step - 1, None, None])
 
 
 def _lying(problem: Problem, grid: Grid, window: WindowForces, at: Indices, behind: _Behind, marched: bool) -> Floats:
-    """Return the friction (k, 3) [N] of the table on a cable that lies on it and moves in its plane, in the world."""
+    """Return the friction (k, 3) [N] of the table on a cable that moves in its plane, in world coordinates."""
     points, parameters = grid.tables.lying, problem.laws[1]
     if problem.friction is None or problem.friction.lying == 0.0:
         return np.zeros((len(at), 3))
@@ -255,17 +256,19 @@ def _pressed(
     behind: _Behind,
     marched: bool,
 ) -> tuple[Floats, Floats, Floats]:
-    """Return force and friction (k, 3) [N] of one thing on some nodes, in the world, and the sum of sizes (k,) [N].
+    """Return normal force and friction (k, 3) [N] of the table or one obstacle, and the sum of magnitudes (k,) [N].
+
+    The forces are in world coordinates; the magnitudes are those of the normal forces.
 
     Args:
-        problem: that was solved.
-        grid: of its nodes.
+        problem: the problem as it was marched.
+        grid: grid with the contact nodes.
         window: states between two events.
-        at: (k,) of them.
-        part: the nodes that may meet it.
-        row: of the parameters of the laws that are its.
-        behind: the states.
-        marched: whether friction goes with the displacement from anchors, or with the speed.
+        at: indices of some of them (k,).
+        part: the nodes that may touch the object.
+        row: row of the object in the parameters of the laws.
+        behind: history of the states.
+        marched: whether friction depends on the displacement from anchors; otherwise on the speed.
     """
     nodes, (active, parameters), d = grid.tables.contact, problem.laws, min(3, problem.nc)
     radius, stiffness, width, damping = parameters[CONTACT, :4]

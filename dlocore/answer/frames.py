@@ -1,6 +1,6 @@
-"""Frames of the sections over a whole motion: the angle theta of the answer, directors, and what is remembered.
+"""Frames of the sections over a whole motion: the angle theta of the answer, directors, and memory.
 
-A solve measures theta against frames that are carried along in time at each point of the cable; the answer gives it
+A solve measures theta against frames that are carried along in time at each point of the cable. The answer measures it
 against a frame without twist along the cable, so that theta' is the twist rate (docs/model.md eq. 19).
 """
 
@@ -24,9 +24,9 @@ from dlocore.spline import DEGREE, SplineSurface
 
 Floats = NDArray[np.float64]
 
-MATERIAL_TIMES = 33  # at most, at which the memory of a motion is kept
-_INSIDE = 1e-3  # of a span of the time knots: how far from its ends a time is inside
-_SMOOTH = 0.03  # times the bends of an angle over a span count as its slopes do: little where these decide
+MATERIAL_TIMES = 33  # most times at which the memory of a motion is stored
+_INSIDE = 1e-3  # of a span of the time knots: distance from its ends at which a time counts as inside
+_SMOOTH = 0.03  # weight of an angle's curvature against its slopes: small where the slopes determine it
 
 
 def free_of_frames(problem: Problem, grid: Grid, states: Floats, frames: Floats) -> Floats:
@@ -34,7 +34,7 @@ def free_of_frames(problem: Problem, grid: Grid, states: Floats, frames: Floats)
 
     Args:
         states: control points in the solve's coordinates (k, n_u, nc).
-        frames: the frames that their theta refers to (k, points, PAST), see `kernels/twisted.py`.
+        frames: the frames to which their theta refers (k, points, PAST), see `kernels/twisted.py`.
     """
     if problem.twist is None:
         return states
@@ -44,7 +44,7 @@ def free_of_frames(problem: Problem, grid: Grid, states: Floats, frames: Floats)
 
 
 def rates_of(problem: Problem, grid: Grid, states: Floats, frames: Floats) -> Floats:
-    """Return the twist rates (k, points) [rad/m] of the states (k, n_u, 4) at the curvature points, see above."""
+    """Return the twist rates (k, points) [rad/m] of the states (k, n_u, 4) at the curvature points; see above."""
     tau = np.empty((len(states), len(grid.tables.curvature.w)))
     _, parameters = problem.laws
     twist_rates(np.ascontiguousarray(states), grid.tables.curvature, parameters, np.ascontiguousarray(frames), tau)
@@ -52,13 +52,13 @@ def rates_of(problem: Problem, grid: Grid, states: Floats, frames: Floats) -> Fl
 
 
 def angles_of(problem: Problem, grid: Grid, rates: Floats, first: Floats) -> Floats:
-    """Return the fourth coordinates (k, n_u) [m] of which the first are given (k,) and the slopes are those of twist
-    rates (k, points) [rad/m] against frames without twist.
+    """Return the fourth coordinates (k, n_u) [m] whose slopes are the twist rates (k, points) [rad/m].
 
-    Their means over the knot spans leave oscillations about a double knot inside the cable free, which a grid has that
-    is too coarse for a triple one, so that of all angles with these slopes it is the smoothest.
+    The angles are against frames without twist; `first` (k,) are their values at u = 0. The means of the slopes over
+    the knot spans leave oscillations about a double knot inside the cable undetermined; a grid has one if it is too
+    coarse for a triple knot. Therefore the smoothest of all angles with these slopes is returned.
     """
-    assert problem.twist is not None, "who asks for angles has some"
+    assert problem.twist is not None, "without twist there are no angles"
     slopes = problem.twist.radius * rates
     return np.asarray(angles_with(grid.tables, slopes, np.ascontiguousarray(first), _SMOOTH))
 
@@ -66,13 +66,13 @@ def angles_of(problem: Problem, grid: Grid, rates: Floats, first: Floats) -> Flo
 def free_control(problem: Problem, grid: Grid, knots_t: Floats, control: Floats, times: Floats, log: Floats) -> Floats:
     """Return control points (n_t, n_u, 4) of a motion with theta against a frame without twist along the cable.
 
-    Spans of the knots without any of the times inside, as there are where the cable strikes something, would leave it
-    free: between the times, what the angles against the two frames differ by is linear.
+    Knot spans without any of the times inside, which exist where the cable strikes something, would leave theta
+    undetermined. There the difference of the angles against the two frames is interpolated linearly between the times.
 
     Args:
         control: (n_t, n_u, nc), with theta against frames carried in time.
         times: (k,) [s].
-        log: those frames at the times (k, points, PAST).
+        log: the carried frames at the times (k, points, PAST).
     """
     assert problem.twist is not None
     flat = np.ascontiguousarray(control).reshape(len(control), -1)
@@ -93,7 +93,7 @@ def free_control(problem: Problem, grid: Grid, knots_t: Floats, control: Floats,
 
 
 def _starved(knots_t: Floats, times: Floats) -> Floats:
-    """Return the middles [s] of those spans of the time knots that have none of the times (k,) [s] well inside."""
+    """Return the middles [s] of the spans of the time knots without any of the times (k,) [s] well inside."""
     begin, end = knots_t[DEGREE : -DEGREE - 1], knots_t[DEGREE + 1 : -DEGREE]
     margin = _INSIDE * (end - begin)
     none = np.searchsorted(times, begin + margin, side="right") == np.searchsorted(times, end - margin)
@@ -101,7 +101,7 @@ def _starved(knots_t: Floats, times: Floats) -> Floats:
 
 
 def carried(director: Floats, tangents: Floats) -> Floats:
-    """Return the unit vectors (k, 3) into which `director` turns as the unit tangents (k, 3) do, without spin."""
+    """Return the unit vectors (k, 3) to which `director` is carried along the unit tangents (k, 3), without spin."""
     out = np.empty_like(tangents)
     d, before = director, tangents[0]
     for k, t in enumerate(tangents):
@@ -150,28 +150,29 @@ def material_of(
 
 
 def _first_director(problem: Problem, grid: Grid, tangent: Floats) -> Floats:
-    """Return the director (3,) at u = 0, of the section where its theta is zero, as a motion begins along `tangent`.
+    """Return the director (3,) at u = 0, fixed in the section where theta is zero, when a motion begins.
 
-    The frames of a start that has settled were carried along with the cable, each by itself: it is found from that of
-    the first curvature point, and by how much they are twisted on the way to it.
+    `tangent` (3,) is the tangent there. The frames of a start that has settled were carried along with the cable, each
+    by itself. The director is then found from the frame at the first curvature point and the twist on the way to it.
     """
     if not problem.scene.shape.settle or problem.twist is None:
         return _in_one_turn(problem, tangent)
     past, (u, after) = grid.history.past, grid.tables.curvature.u[:2]
     director = transported(past[0, TANGENT : TANGENT + 3], tangent, past[0, DIRECTOR : DIRECTOR + 3])
-    rate = past[0, FRAME] - 0.5 * u * (past[1, FRAME] - past[0, FRAME]) / (after - u)  # half-way
+    rate = past[0, FRAME] - 0.5 * u * (past[1, FRAME] - past[0, FRAME]) / (after - u)  # half-way to that point
     return turned_about(tangent, director, -float(rate * u))
 
 
 def _in_one_turn(problem: Problem, tangent: Floats) -> Floats:
-    """Return the director (3,) of the given start, turned as its tangent is to another (3,) in one turn."""
+    """Return the director (3,) of the given start, turned by the smallest rotation of its tangent to another (3,)."""
     return transported(unit(problem.start(0.0, 1)[0]), tangent, start_director(problem))
 
 
 def directors(problem: Problem, surface: SplineSurface, times: Floats, material: MaterialMotion | None) -> Floats:
-    """Return the directors (k, 3) of the section at u = 0, where its theta is zero, at `times` (k,) [s].
+    """Return the directors (k, 3) of the section at u = 0, where theta is zero, at `times` (k,) [s].
 
-    Where the `material` of the motion is not known it begins with that of the given start, which settles in one turn.
+    If the `material` of the motion is not known, they begin with that of the given start, turned to the tangent at
+    t = 0 by the smallest rotation.
     """
     spans = np.unique(surface.knots_t)
     fine = np.unique(np.concatenate([np.linspace(a, b, 9) for a, b in pairwise(spans)] + [times]))

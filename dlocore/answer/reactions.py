@@ -1,4 +1,4 @@
-"""What grippers give to the cable, and how far that may be off, as marches on other grids tell."""
+"""Forces and moments of the grippers on the cable, and their errors estimated from marches on other grids."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,15 +18,15 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class WindowForces:
-    """What holds the cable over a stretch of time.
+    """The forces that hold the cable over a stretch of time between two events.
 
     Attributes:
         held: the held degrees of freedom.
         times: (k,) [s].
         forces: residual of the equations at the held degrees of freedom (k, held) [N].
         states: control points (k, n_u, nc) [m] at those times.
-        anchors: of friction as it begins, see `History`: (contact nodes, 3) and (lying points, 2) [m]; None where the
-            motion has none.
+        anchors: anchors of friction when the stretch begins, see `History`: (contact nodes, 3) and (lying points, 2)
+            [m]; None if the motion has none.
     """
 
     held: Held
@@ -70,11 +70,11 @@ def reactions(problem: Problem, grid: Grid, windows: Windows) -> tuple[GraspReac
 def with_reaction_errors(
     found: tuple[GraspReaction, ...], windows: Windows, beside: Sequence[tuple[Problem, Grid, Windows]]
 ) -> tuple[GraspReaction, ...]:
-    """Return reactions with their errors, from those of the same motion marched on other grids.
+    """Return reactions with error estimates, from those of the same motion marched on other grids.
 
     Args:
-        found: of the `windows`.
-        windows: between events.
+        found: the reactions in the `windows`.
+        windows: stretches between events.
         beside: problem, grid and windows of each other march.
     """
     others = [(reactions(*other), _parts(other[2])) for other in beside]
@@ -90,7 +90,7 @@ def with_reaction_errors(
 
 
 def taken_on(found: tuple[GraspReaction, ...], judged: tuple[GraspReaction, ...]) -> tuple[GraspReaction, ...]:
-    """Return reactions with the errors of those of a motion like it, as far as it has them."""
+    """Return reactions with the error estimates of a similar motion (`judged`), as far as that has them."""
     return tuple(
         reaction
         if like.reaction_error is None or like.moment_error is None
@@ -104,7 +104,7 @@ def taken_on(found: tuple[GraspReaction, ...], judged: tuple[GraspReaction, ...]
 
 
 def _parts(windows: Windows) -> list[slice]:
-    """Return where in the times of all windows those of each are."""
+    """Return the slice of each window in the times of all windows."""
     return parts_of([len(w.times) for w in windows])
 
 

@@ -1,4 +1,4 @@
-"""What a solve tells about itself: world coordinates, effects and energies."""
+"""Reports of a solve: the surface in world coordinates, effects and energies."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -17,21 +17,21 @@ from dlocore.spline import SplineSurface
 
 Floats = NDArray[np.float64]
 
-_NEAR = 0.01  # of the diameter: to which the gap to obstacles is found
+_NEAR = 0.01  # of the diameter: tolerance of the gap to obstacles
 
 
 def surface_of(problem: Problem, knots_u: Floats, knots_t: Floats, control: Floats) -> SplineSurface:
-    """Return the surface in the world frame of control points (n_t, n_u, nc) in the solve's coordinates."""
+    """Return the surface in the world frame from control points (n_t, n_u, nc) in the solve's coordinates."""
     return SplineSurface(problem.world(control), knots_u, knots_t)
 
 
 def elastic_energy(problem: Problem, grid: Grid, q: Floats, history: History) -> float:
-    """Return the elastic energy stored in control points q (n_u, nc) [J] with `history` behind them."""
+    """Return the elastic energy stored in control points q (n_u, nc) with a `history` [J]."""
     return float(stored_energy(problem.axes, q, grid.tables, *problem.laws, history))
 
 
 def planned_effects(problem: Problem) -> tuple[EffectReport, ...]:
-    """Return for each effect whether the scene calls for it, and why; magnitudes are known only after solving."""
+    """Return for each effect whether it would be simulated, and why; magnitudes are known only after solving."""
     return tuple(EffectReport(name, choice.active, choice.reason) for name, choice in problem.choices.items())
 
 

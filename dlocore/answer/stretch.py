@@ -1,4 +1,4 @@
-"""How far the cable is stretched over a whole motion, to the accuracy of a tension."""
+"""The axial strain over a whole motion, accurate enough for a tension."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -15,16 +15,16 @@ from dlocore.problem.tension import balanced, told_ends
 
 Floats = NDArray[np.float64]
 
-STRETCH_TIMES = 257  # at most, at which the stretch of a motion is kept
+STRETCH_TIMES = 257  # most times at which the stretch of a motion is stored
 
 
 def stretch_of(
     problem: Problem, grid: Grid, times: Floats, states: Floats, grasps: Sequence[GraspReaction]
 ) -> StretchMotion:
-    """Return how far a cable is stretched in the states (k, n_u, nc) at the times (k,) [s] of a motion.
+    """Return the axial strain of a cable from the states (k, n_u, nc) at the times (k,) [s] of a motion.
 
-    Where a force acts in a point, at which the tension jumps, it is told on both sides too. `grasps` tell what grippers
-    give to the cable.
+    Where a force acts at a point the tension jumps, and the strain is given on both sides as well. `grasps` are the
+    reactions of the grippers.
     """
     scene = problem.scene
     kept = np.unique(np.linspace(0, len(times) - 1, STRETCH_TIMES).round().astype(int))
@@ -43,14 +43,14 @@ def stretch_of(
 def _pulled(
     problem: Problem, grid: Grid, times: Floats, states: Floats, grasps: Sequence[GraspReaction], end: float
 ) -> Floats:
-    """Return the elastic axial strain (k,) that what grips and loads an `end` [m] pulls it with at the times (k,) [s].
+    """Return the elastic axial strain (k,) at an `end` [m] due to its gripper and loads, at the times (k,) [s].
 
-    The force along the cable is EA e + eta_e e_t (docs/model.md eq. 7a): the strain follows it a little later.
+    The force along the cable is EA e + eta_e e_t (docs/model.md eq. 7a), so that the strain follows it with a delay.
     """
     force = np.zeros((len(times), 3))
     for grasp in grasps:
         if grasp.u == end:
-            until = np.searchsorted(grasp.times, times)  # where an event is, before it
+            until = np.searchsorted(grasp.times, times)  # at an event, the force before it
             force += grasp.reaction[until.clip(max=len(grasp.times) - 1)]
     for load in problem.scene.loads:
         if load.u == end:
@@ -63,7 +63,7 @@ def _pulled(
         return strain
     late = problem.stretch_damping.axial_damping / problem.stretch.axial_stiffness
     steps = np.diff(times) / late
-    left, share = np.exp(-steps), -np.expm1(-steps) / steps  # of what it was, and of what the pull changes by
+    left, share = np.exp(-steps), -np.expm1(-steps) / steps  # factors of the old difference and of the pull's change
     out = strain.copy()
     for k, (was, new) in enumerate(pairwise(strain)):
         out[k + 1] = new + left[k] * (out[k] - was) - share[k] * (new - was)

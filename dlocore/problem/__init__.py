@@ -1,1 +1,1 @@
-"""From a scene to equations on a grid: plane, effects, knots, and what is held."""
+"""From a scene to equations on a grid: plane, effects, knots, and the constraints of grasps."""

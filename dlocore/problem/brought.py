@@ -1,4 +1,4 @@
-"""A start that is brought to where the grippers that hold it begin."""
+"""A start that is moved to where the grippers that hold it begin."""
 
 from dataclasses import replace
 from typing import cast
@@ -14,18 +14,19 @@ from dlocore.spline import greville
 
 Floats = NDArray[np.float64]
 
-GRASP_TOLERANCE = 0.010  # [m]: of the first waypoint from the cable
-_SPANS = 32  # at least, of a start of which a part is moved
+GRASP_TOLERANCE = 0.010  # [m]: largest distance of the first waypoint from the cable
+_SPANS = 32  # least number of a start of which a part is moved
 _ROUNDING = 1e-12  # of the length
-_TIMES = 20  # that it is brought nearer, at most
+_TIMES = 20  # most iterations of the move
 
 
 def brought(scene: Scene, start: StartCurve) -> StartCurve:
     """Return a start that passes through the first waypoints of the grasps that hold it from the beginning.
 
-    It is moved as a whole where one grasp holds it. Between two it is moved by d(u) = d_1 + (d_2 - d_1) s^2 (3 - 2 s)
-    with s = (u - u_1)/(u_2 - u_1), which turns it at neither; where a grasp has no waypoints d is 0 there. A few
-    millimetres that only its nearest control points went would bend it with thousands of newtons.
+    If one grasp holds it, it is moved as a whole. Between two grasps it is moved by
+    d(u) = d_1 + (d_2 - d_1) s^2 (3 - 2 s) with s = (u - u_1)/(u_2 - u_1), which turns it at neither of them. At a
+    grasp without waypoints d is 0. Moving only the nearest control points by a few millimetres would bend the cable
+    with thousands of newtons.
 
     Raises:
         SceneError: a first waypoint is farther than GRASP_TOLERANCE from the cable.
@@ -55,7 +56,7 @@ def brought(scene: Scene, start: StartCurve) -> StartCurve:
 
 
 def _between(places: Floats, u: Floats, ways: Floats) -> Floats:
-    """Return how far points at `places` (n,) are moved (n, 3), where those at u (k,), rising, are moved by `ways`."""
+    """Return the displacements (n, 3) at `places` (n,), interpolated from `ways` (k, 3) at u (k,), rising."""
     at = np.interp(places, u, np.arange(len(u)))
     left = np.minimum(at.astype(int), max(len(u) - 2, 0))
     right = np.minimum(left + 1, len(u) - 1)
@@ -64,7 +65,7 @@ def _between(places: Floats, u: Floats, ways: Floats) -> Floats:
 
 
 def finer(knots: Floats) -> Floats:
-    """Return knots with more of them, (n,) [m], so that a part of the cable can be moved."""
+    """Return the knots with more of them added, (n,) [m], so that a part of the cable can be moved."""
     length = knots[-1]
     even = np.linspace(0.0, length, _SPANS + 1)[1:-1]
     apart = np.abs(even[:, None] - knots[None]).min(axis=1)

@@ -1,8 +1,8 @@
-"""Sides for those that have none: straight cables that are pushed along themselves, motions that may leave their plane.
+"""Imperfections that make cables buckle: straight ones under compression, and motions that may leave their plane.
 
-Straight, a cable is in equilibrium however hard it is pushed, but no real cable stays so. Where a disturbance would
-grow by much, it gets the imperfection that columns are designed with, a bow without stress of a thousandth of its
-length.
+A perfectly straight cable is in equilibrium however hard it is compressed, but no real cable stays straight. If a
+disturbance would grow much, the cable gets the imperfection that columns are designed with: a stress-free bow of a
+thousandth of its length.
 """
 
 import math
@@ -29,25 +29,28 @@ from dlocore.words import in_mm
 Floats = NDArray[np.float64]
 
 BOW = 1e-3  # height, of the length of the part that buckles
-UNSTABLE = "in its plane the motion is unstable, as a disturbance out of it grows"
-_AS_LIKELY = "and its mirror image is as likely; with another bow it goes sooner or later, which no estimate counts"
-GROWTH = math.log(10.0)  # of a disturbance, from which on it matters that there is one
-# What of a force that is spread along a part, free at one end, counts as if it pushed there: of a column under its own
+UNSTABLE = "in its plane the motion is unstable, as disturbances out of the plane grow"
+_AS_LIKELY = (
+    "and its mirror image is as likely; with another bow the motion turns aside earlier or later, which the error "
+    "estimate does not include"
+)
+GROWTH = math.log(10.0)  # of a disturbance, from which on a bow is needed
+# Share of a force spread along a part with a free end that counts as a push at that end. For a column under its own
 # weight, mu g L^3/EI = 7.84 against P L^2/EI = pi^2/4 (Greenhill, 1881)
 _SPREAD = 0.315
-_SPANS = 24  # of the knots of a bowed start, in each part
-_AGES = 1e6  # times the horizon: all the time that a disturbance needs
-_LEANS = 1025  # places along a start, at which its frames are looked at
-_TIMES = 65  # at which each stretch of the motion is looked at
-_SHORTEST, _WAVES = 64.0, 25  # of the wave numbers that are looked at, over the least one
-_RESTS = 1e-3  # of its largest speed: what slides more slowly rests
+_SPANS = 24  # knot spans of a bowed start, in each part
+_AGES = 1e6  # times the horizon: as much time as any disturbance needs
+_LEANS = 1025  # places along a start at which its frames are evaluated
+_TIMES = 65  # times at which each stretch of the motion is evaluated
+_SHORTEST, _WAVES = 64.0, 25  # largest wave number over the least one, and how many are evaluated
+_RESTS = 1e-3  # of its largest speed: a part that slides more slowly counts as resting
 
 
 @dataclass(frozen=True)
 class _Part:
-    """A part of the cable, from `begin` to `end` [m], with a grasp at either end or None where it is free.
+    """A part of the cable from `begin` to `end` [m], and for each end its grasp, or None if it is free.
 
-    It is the same one, which grows and bows once, whoever holds its ends later on.
+    Parts are equal if their ends are, whichever grasps hold them: growth adds up over time, and each is bowed once.
     """
 
     begin: float
@@ -56,19 +59,21 @@ class _Part:
 
 
 def with_side(scene: Scene, start: StartCurve, at_rest: bool) -> StartCurve:
-    """Return the start, bowed to the left, or by turns, where it is straight and the motion pushes it along itself.
+    """Return the start, with a bow if it is straight and the motion compresses it along its axis.
 
-    The left is that of its direction, horizontally; that of a vertical one is the x axis. A start that settles is
-    straight, too, where it comes to rest on a line, and where it is nearly so: what it deviates from a line then, by a
-    bow at most, it does without stress. The bow is on the side on which such a start was given.
+    The bow is to the left of the start's direction, horizontally; for a vertical start it is along the x axis. Several
+    parts are bowed to alternating sides.
+
+    A start that settles also counts as straight if it comes to rest on a line, or nearly so: a deviation from a line of
+    up to a bow's height then counts as free of stress. The bow is on the side to which such a start deviates.
 
     Args:
         scene: the scene.
         start: start curve.
-        at_rest: a disturbance has all the time that it needs to grow, as where only the equilibrium is asked for.
+        at_rest: whether a disturbance has all the time that it needs to grow, because only an equilibrium is wanted.
     """
     given = start
-    # settled, a cable is straight that deviates from a line by less than a bow: its direction is no surer than that
+    # a settled start that deviates from a line by less than a bow is straight: its direction is no more certain
     settles = scene.shape.settle and not is_straight(given)
     flat = BOW if settles else FLATNESS
     start = (_straightened(scene, given, flat) if settles else None) or given
@@ -81,7 +86,7 @@ def with_side(scene: Scene, start: StartCurve, at_rest: bool) -> StartCurve:
     bowed = list(dict.fromkeys(piece for part in pushed for piece in _pieces(scene, part)))
     knots = _knots(bowed, scene.cable.length)
     u = greville(knots)
-    # by turns, as beyond a grasp that lets the cable turn it bends on the other way
+    # on alternating sides: beyond a grasp that lets the cable turn it bends the other way
     aside = np.sum([(-1) ** k * _bow(part, u) for k, part in enumerate(bowed)], axis=0)
     left = leftwards(along)
     if float(np.mean((given.control_points - given.control_points[0]) @ left)) < -FLATNESS * scene.cable.length:
@@ -91,7 +96,7 @@ def with_side(scene: Scene, start: StartCurve, at_rest: bool) -> StartCurve:
 
 
 def _straightened(scene: Scene, start: StartCurve, flat: float) -> StartCurve | None:
-    """Return the straight line on which a start that settles comes to rest, or None where it does not; see `_line`."""
+    """Return the straight line on which a start that settles comes to rest, or None if it does not; see `_line`."""
     straight = straightened(scene, start, _gravity(scene, start))
     along = None if straight is None else _line(scene, straight, flat)
     if straight is None or along is None:
@@ -111,20 +116,20 @@ def out_of_plane(scene: Scene, start: StartCurve, normal: Floats) -> StartCurve:
     parts = list(_parts(sorted(scene.grasps, key=lambda g: g.u), length))
     knots = _joined(start.knots, _knots(parts, length))
     u = greville(knots)
-    # one that buckles has a side already: what is left to tell is whether it leaves the plane that this gave it
+    # a start that buckles has a bow already: the small second one only shows whether it leaves the plane of the first
     aside = np.sum([_bow(part, u) for part in parts], axis=0) * (BOW if start.bow else 1.0)
     control = fit_to_knots(start, knots) + np.outer(aside, normal)
     bowed = replace(start, knots=knots, control_points=control, aside=float(aside.max()))
     if start.material is None and isinstance(scene.cable.rest_shape, str):
-        return bowed  # it has no bends but its own
+        return bowed  # its stress-free shape has no bends of its own
     level = _off_level(start, bowed) if start.material is None else 0.0
     return replace(bowed, lean=level - _lean(scene, bowed, normal))
 
 
 def _off_level(start: StartCurve, bowed: StartCurve) -> float:
-    """Return by how much a bow turns a section that was level at u = 0 out of level [rad].
+    """Return the angle by which a bow turns a section that was level at u = 0 out of level [rad].
 
-    A tangent near the vertical needs little for it: what is level across it is another direction on its other side.
+    If the tangent is near the vertical a small bow is enough, since the level direction across it changes quickly.
     """
     before, after = (curve(0.0, 1)[0] / np.linalg.norm(curve(0.0, 1)[0]) for curve in (start, bowed))
     carried, level = transported(before, after, leftwards(before)), leftwards(after)
@@ -132,11 +137,12 @@ def _off_level(start: StartCurve, bowed: StartCurve) -> float:
 
 
 def _lean(scene: Scene, curve: StartCurve, normal: Floats) -> float:
-    """Return by how much frames without twist, level at u = 0, lean out of a plane where grasps hold a curve [rad].
+    """Return the angle [rad] by which frames without twist, level at u = 0, lean out of a plane at the grasps.
 
     With tangent t and unit normal N of the plane they lean by f about t, f' = -(t . N) N . (t x t')/(1 - (t . N)^2).
-    Sections in such frames, of which only those at u = 0 are level, would tell the ends of the cable from each other.
-    It is the mean over the clamps, which keep sections as they are, else over all grasps, else of the ends.
+    If sections were placed in such frames, level at u = 0 only, the result would depend on which end has u = 0.
+    The angle is the mean over the clamps, which keep sections as they are; without clamps over all grasps; without
+    grasps over the two ends.
     """
     u = np.linspace(0.0, scene.cable.length, _LEANS)
     first, second = curve(u, 1), curve(u, 2)
@@ -150,7 +156,7 @@ def _lean(scene: Scene, curve: StartCurve, normal: Floats) -> float:
 
 
 def _joined(a: Floats, b: Floats) -> Floats:
-    """Return clamped knots that contain those of two others, each as often as the one that has it more often."""
+    """Return clamped knots that contain those of two others, each with the larger of its two multiplicities."""
     places = np.unique(np.round(np.concatenate([a, b]) / a[-1], 9)) * a[-1]
     near = 1e-9 * a[-1]
     counts = [max(int((np.abs(knots - x) <= near).sum()) for knots in (a, b)) for x in places]
@@ -158,7 +164,7 @@ def _joined(a: Floats, b: Floats) -> Floats:
 
 
 def _knots(parts: list[_Part], length: float) -> Floats:
-    """Return clamped knots, triple where a part begins or ends inside: what a grasp holds there stays on the line."""
+    """Return clamped knots, triple at inner ends of parts, so that the points that grasps hold stay on the line."""
     marks = sorted({0.0, length, *(x for part in parts for x in (part.begin, part.end))})
     knots = [np.zeros(4)]
     for a, b in pairwise(marks):
@@ -167,21 +173,21 @@ def _knots(parts: list[_Part], length: float) -> Floats:
 
 
 def side_notes(start: StartCurve) -> list[str]:
-    """Return what is to be known of a start that was bowed, in words."""
+    """Return notes on a start that was given a bow."""
     notes = []
     if start.bow:
         side = "left" if start.bow > 0.0 else "right"
         bow = f"it starts with a bow of {in_mm(abs(start.bow))} to its {side}, {_AS_LIKELY}"
-        why = "the straight cable is pushed or twisted along itself and has no side to buckle to"
+        why = "the straight cable is compressed or twisted along its axis and has no side to buckle to"
         notes.append(f"{why}: {bow}")
     if start.aside:
         bow = f"it starts with a bow of {in_mm(start.aside)} out of it, {_AS_LIKELY}"
-        notes.append(f"{'the plane of its bow may not hold it' if start.bow else UNSTABLE}: {bow}")
+        notes.append(f"{'the cable may leave the plane of its bow' if start.bow else UNSTABLE}: {bow}")
     return notes
 
 
 def _bow(part: _Part, u: Floats) -> Floats:
-    """Return how far the bow of a part lies aside at u (k,) [m]: level where a grasp may hold its direction."""
+    """Return the offset of the bow of a part at u (k,) [m]; its slope is zero where a grasp may hold the direction."""
     length = part.end - part.begin
     x = np.clip((u - part.begin) / length, 0.0, 1.0)
     if None not in part.grasps or part.grasps == (None, None):
@@ -192,7 +198,10 @@ def _bow(part: _Part, u: Floats) -> Floats:
 
 
 def _line(scene: Scene, start: StartCurve, flat: float) -> Floats | None:
-    """Return the direction (3,) of a start from which nothing leads away by more than a part `flat`, or None."""
+    """Return the direction (3,) of a straight start, or None.
+
+    It is None if the start, a path, a force or the stress-free shape leads off the line by more than a part `flat`.
+    """
     chord = start.control_points[-1] - start.control_points[0]
     size = math.sqrt(chord @ chord)
     if not size > 0.5 * scene.cable.length:
@@ -215,7 +224,7 @@ def _line(scene: Scene, start: StartCurve, flat: float) -> Floats | None:
 
 
 def _aside(path: Path, u: float, start: StartCurve, along: Floats, length: float, flat: float) -> bool:
-    """Tell whether a path of a grasp at u [m] leads or turns the cable off its line by more than a part `flat`."""
+    """Return whether the path of a grasp at u [m] moves or turns the cable off its line by more than a part `flat`."""
     if isinstance(path, Still):
         return False
     if isinstance(path, Move):
@@ -232,7 +241,7 @@ def _aside(path: Path, u: float, start: StartCurve, along: Floats, length: float
 
 
 def _gravity(scene: Scene, start: StartCurve) -> Floats:
-    """Return the gravity (3,) [m/s^2] that a table under the cable leaves."""
+    """Return the part of gravity (3,) [m/s^2] that a table under the cable does not carry."""
     table = scene.environment.table
     g = cast(Floats, scene.environment.gravity)
     if scene.effects.get("gravity", "auto") == "off":
@@ -243,12 +252,12 @@ def _gravity(scene: Scene, start: StartCurve) -> Floats:
 
 
 def _growths(scene: Scene, start: StartCurve, along: Floats, at_rest: bool) -> dict[_Part, float]:
-    """Return for the parts of a straight cable the natural logarithm by which a disturbance of them grows, about.
+    """Return, for the parts of a straight cable, the approximate natural logarithm of the growth of a disturbance.
 
-    A wave of wave number k grows at the rate s with mu s^2 + c s = M k^3 + P k^2 - EI k^4 under a push P and a torque
-    M, where c is what resists it aside, friction mu_f N of what slides at a speed v by mu_f N/v: that of the fastest is
-    summed over the time in which the part is unstable,
-    P + M^2/(4 EI) > pi^2 EI/l^2 (Greenhill, 1883).
+    Under a push P and a torque M a wave of wave number k grows at the rate s with
+    mu s^2 + c s = M k^3 + P k^2 - EI k^4, where c is the resistance to sideways motion. Friction mu_f N of a part that
+    slides at a speed v contributes mu_f N/v to c. The rate of the fastest wave is integrated over the time in which the
+    part is unstable, P + M^2/(4 EI) > pi^2 EI/l^2 (Greenhill, 1883).
     """
     cable, horizon = scene.cable, cast(float, scene.horizon)
     patience = _AGES if at_rest else 1.0
@@ -266,7 +275,7 @@ def _growths(scene: Scene, start: StartCurve, along: Floats, at_rest: bool) -> d
             k = (3.0 * torque + np.sqrt(9.0 * torque**2 + 32.0 * EI * push)) / (8.0 * EI)
             k = np.maximum(k, _least_wave_number(part))
             drive = np.where(_buckles(scene, part, push, torque), torque * k**3 + push * k**2 - EI * k**4, 0.0)
-            # a push that is spread along a part is larger beside what holds it, where shorter waves have the most of it
+            # a push that is spread along a part is larger near the grasp that holds it; shorter waves feel more of it
             waves = _least_wave_number(part) * np.geomspace(1.0, _SHORTEST, _WAVES)[:, None]
             pushes = beside * (1.0 - (1.0 - _SPREAD) * waves[0] / waves)
             shorter = np.where(push > 0.0, (pushes * waves**2 - EI * waves**4).max(axis=0), 0.0)
@@ -278,13 +287,13 @@ def _growths(scene: Scene, start: StartCurve, along: Floats, at_rest: bool) -> d
 
 
 def _buckles(scene: Scene, part: _Part, push: Floats, torque: Floats) -> NDArray[np.bool_]:
-    """Tell whether a push (k,) [N] and a torque (k,) [N m] bend a straight part."""
+    """Return whether a push (k,) [N] and a torque (k,) [N m] make a straight part buckle."""
     EI = cast(float, scene.cable.bending_stiffness)
     return push + torque**2 / (4.0 * EI) > EI * _least_wave_number(part) ** 2
 
 
 def _least_wave_number(part: _Part) -> float:
-    """Return the wave number of the longest bend of a part [1/m]."""
+    """Return the wave number of the longest buckling mode of a part [1/m]."""
     length = part.end - part.begin
     return math.pi / (length if None not in part.grasps else 2.0 * length)
 
@@ -294,7 +303,7 @@ def _parts(held: list[Grasp], length: float) -> Iterator[_Part]:
 
 
 def _pieces(scene: Scene, part: _Part) -> Iterator[_Part]:
-    """Return the pieces of a part between the grasps of t = 0, which close where the start was given, not on a bow."""
+    """Return the pieces of a part between the grasps of t = 0, which hold the start as given, not on a bow."""
     length = scene.cable.length
     inside = [g for g in scene.grasps if g.start == 0.0 and part.begin < g.u < part.end]
     held = [(g.u, g) for g in sorted(inside, key=lambda g: g.u)]
@@ -308,7 +317,7 @@ def _between(ends: Sequence[tuple[float, Grasp | None]], length: float) -> Itera
 
 
 def _friction(scene: Scene, start: StartCurve) -> float:
-    """Return by how much friction slows a start that slides on the table [m/s^2]."""
+    """Return the deceleration by friction of a start that slides on the table [m/s^2]."""
     table, switch = scene.environment.table, scene.effects.get
     if table is None or "off" in (switch("table"), switch("friction")) or not lies_on(table, scene, start):
         return 0.0
@@ -316,13 +325,13 @@ def _friction(scene: Scene, start: StartCurve) -> float:
 
 
 class _Loaded(NamedTuple):
-    """What a part of a straight cable bears, over time.
+    """The loads on a part of a straight cable, over time.
 
     Attributes:
-        push: the largest along it (k,) [N], 0 where it is pulled; of one that is spread what counts.
-        beside: of one that is spread along a part with a free end, that beside what holds its other end (k,) [N].
+        push: largest compression along it (k,) [N], 0 under tension; of a spread push the share that counts.
+        beside: for a push spread along a part with a free end, its value at the held end (k,) [N]; otherwise 0.
         torque: (k,) [N m].
-        aside: what resists a motion aside (k,) [N s/m^2].
+        aside: resistance to sideways motion (k,) [N s/m^2].
     """
 
     push: Floats
@@ -332,10 +341,11 @@ class _Loaded(NamedTuple):
 
 
 def _loaded(scene: Scene, start: StartCurve, along: Floats, part: _Part, t: Floats, rubs: float = 0.0) -> _Loaded:
-    """Return what a part bears at times t (k,) [s].
+    """Return the loads on a part at times t (k,) [s].
 
-    A cable that keeps its length moves as what holds it does; between two grasps that come closer, or a grasp and what
-    a free end meets, it is compressed. What slides is slowed by `rubs` [m/s^2].
+    A cable that keeps its length moves with the grasp that holds it. It is compressed between two grasps that approach
+    each other, or between a grasp and an object that its free end meets. Friction slows a sliding part by `rubs`
+    [m/s^2].
     """
     cable, around = scene.cable, scene.environment
     aside = np.full(len(t), around.drag)
@@ -373,12 +383,12 @@ def _loaded(scene: Scene, start: StartCurve, along: Floats, part: _Part, t: Floa
         both = first.hold == second.hold == "clamp" and scene.effects.get("twist", "auto") != "off"
         torque = cast(float, cable.torsional_stiffness) * turned / length if both else np.zeros(len(t))
         return _Loaded(np.maximum(push, 0.0), np.zeros(len(t)), torque, aside)
-    # what lies beyond a place is pushed from there: from the free end on, tension by tension
+    # each place pushes the part beyond it, up to the free end: find the largest push, load by load from that end
     from_end = second is None
     most = cast(float, cable.axial_stiffness) * _depth(scene, start, along, part, way) / length
     for u in [u for u, _ in loads] + [part.begin if from_end else part.end]:
         rest = (part.end - u) if from_end else (u - part.begin)
-        for there in (True, False):  # just before and just after a load
+        for there in (True, False):  # on the two sides of a load
             beyond = [f for v, f in loads if (v > u if from_end else v < u) or (there and v == u)]
             push = _SPREAD * needed * rest - np.sum(beyond, axis=0)
             most = np.maximum(most, push if from_end else -push)
@@ -387,7 +397,7 @@ def _loaded(scene: Scene, start: StartCurve, along: Floats, part: _Part, t: Floa
 
 
 def _way(grasp: Grasp, start: StartCurve, along: Floats, t: Floats) -> Floats:
-    """Return how far a grasp has gone along a direction at times t (k,) [s]; (k,) [m]."""
+    """Return how far a grasp has moved along a direction at times t (k,) [s]; (k,) [m]."""
     return (grasp.path.at(t - grasp.start, start(grasp.u)[0]) - start(grasp.u)[0]) @ along
 
 
@@ -397,13 +407,13 @@ def _way_along(start: StartCurve, part: _Part) -> float:
 
 
 def _free_way(start: StartCurve, along: Floats, acceleration: Floats, t: Floats) -> Floats:
-    """Return how far a cable that nothing holds has gone along its direction at times t (k,) [s]; (k,) [m]."""
+    """Return how far a cable that nothing holds has moved along its direction at times t (k,) [s]; (k,) [m]."""
     velocity = 0.0 if start.velocity is None else float(start.velocity.control_points.mean(axis=0) @ along)
     return velocity * t + 0.5 * acceleration * t**2
 
 
 def _depth(scene: Scene, start: StartCurve, along: Floats, part: _Part, way: Floats) -> Floats:
-    """Return how deep the free ends of a part would be in the table or an obstacle after a way (k,) [m]; (k,) [m]."""
+    """Return how deep the free ends of a part would be in the table or an obstacle after moving `way` (k,) [m]."""
     environment, radius = scene.environment, 0.5 * scene.cable.diameter
     on = {name for name in ("table", "obstacles") if scene.effects.get(name, "auto") != "off"}
     deepest = np.zeros(len(way))
@@ -420,7 +430,7 @@ def _depth(scene: Scene, start: StartCurve, along: Floats, part: _Part, way: Flo
 
 
 def _twist(start: StartCurve, part: _Part) -> float:
-    """Return the angle by which the sections at the end of a part are turned against those at its begin [rad]."""
+    """Return the angle by which the section at the end of a part is turned against that at its start [rad]."""
     return 0.0 if start.theta is None else float(np.diff(start.theta([part.begin, part.end])[:, 0])[0])
 
 

@@ -1,4 +1,4 @@
-"""What no cable can follow, found before anything is solved: grasps too far apart, a start inside table or obstacle."""
+"""Checks before the solve for what no cable can follow: grasps too far apart, a start inside table or obstacle."""
 
 import math
 from collections.abc import Callable
@@ -20,19 +20,19 @@ from dlocore.shape.shape import StartCurve
 Floats = NDArray[np.float64]
 
 CROSSING = 0.05  # of the diameter: strands of a start that are nearer pass through each other
-TOO_DEEP = 0.25  # of the diameter, in the table, an obstacle or itself: no cable is pressed in so far
-_MIDDLE = 0.5  # of the diameter: what was seen of a cable may lie so deep in an obstacle, which moves it out again
-_PLACES = 101  # of a curve, at first, at which it is looked at for what it goes into
-_FINE = 0.1  # of the radius: no finer
-_LONGER = 1.1  # times the straight way between two places of a curve is its way, at most
+TOO_DEEP = 0.25  # of the diameter: no cable is pressed so deep into the table, an obstacle or itself
+_MIDDLE = 0.5  # of the diameter: a start may be seen this deep in an obstacle, and is then moved out
+_PLACES = 101  # of a curve at which its depth in an obstacle is evaluated at first
+_FINE = 0.1  # of the radius: shortest distance of two such places
+_LONGER = 1.1  # largest length of a curve between two places, over their straight distance
 _SWINGS = (
-    ", where a smooth path swings out between its waypoints: a profile that stops at each, as minimum_jerk, goes "
-    "straight from one to the next, and more waypoints there, or more even times, keep it in"
+    ", where a smooth path swings out between its waypoints: a profile that stops at each, such as minimum_jerk, goes "
+    "straight from one to the next; more waypoints there, or more even times, keep a smooth path closer to them"
 )
 
 
 def check_reach(scene: Scene, start: StartCurve) -> None:
-    """Refuse two grasps that are at some time farther apart than the cable between them."""
+    """Refuse two grasps that are farther apart at some time than the cable between them is long."""
     if len(scene.grasps) < 2:
         return
     moments = [np.linspace(0.0, cast(float, scene.horizon), 257)]
@@ -48,7 +48,7 @@ def check_reach(scene: Scene, start: StartCurve) -> None:
             together = (t >= max(a.start, b.start)) & (t <= min(a.release_time or np.inf, b.release_time or np.inf))
             late = max(a.start, b.start) > 0 and not all(isinstance(g.path, Waypoints) for g in (a, b) if g.start > 0)
             if late or not together.any():
-                continue  # a later grasp begins where the cable is then, which only the solve can tell
+                continue  # a later grasp begins where the cable is then, which is known only after the solve
             most = between * (1.0 + MAX_PRESCRIBED_STRAIN) + 1e-6
             at = t[together]
             apart = np.linalg.norm(b.path.at(at - b.start, begin[j]) - a.path.at(at - a.start, begin[i]), axis=1)
@@ -65,7 +65,7 @@ def check_reach(scene: Scene, start: StartCurve) -> None:
 
 
 def _farthest(a: Path, from_a: Floats, b: Path, from_b: Floats) -> float:
-    """Return a distance [m] that two paths from given points never exceed: that of ends, where both are straight."""
+    """Return a bound on the distance [m] of two paths from given points: that of their ends, if both are straight."""
     if isinstance(a, Waypoints) or isinstance(b, Waypoints):
         return np.inf
     ends = [
@@ -86,7 +86,7 @@ def check_above(scene: Scene, start: StartCurve) -> None:
         reason = f"The start is {table.height - lowest:.3g} m below a cable that lies on the table"
         raise SceneError("environment.table.height", table.height, f"at most {lowest:.6g} [m] with this start", reason)
     for i, grasp in enumerate(scene.grasps):
-        late = grasp.start > 0.0 and not isinstance(grasp.path, Waypoints)  # from where the cable is by then
+        late = grasp.start > 0.0 and not isinstance(grasp.path, Waypoints)  # begins where the cable is by then
         if late or isinstance(grasp.path, Still):
             continue
         if isinstance(grasp.path, Move) and cast(Floats, grasp.path.displacement)[2] >= 0:
@@ -104,12 +104,12 @@ def check_above(scene: Scene, start: StartCurve) -> None:
 
 
 def _borne(scene: Scene) -> float:
-    """Return how deep a path may lead into the table or an obstacle [m]: as far as was seen, and as cables give way."""
+    """Return how deep a path may lead into the table or an obstacle [m], for errors of vision and soft contact."""
     return min(table_tolerance(scene), TOO_DEEP * scene.cable.diameter)
 
 
 def check_apart(scene: Scene, start: StartCurve) -> None:
-    """Refuse a start in which a strand lies inside another: contact could not tell to which side it belongs.
+    """Refuse a start in which a strand lies inside another: contact could not know to which side it belongs.
 
     The ends of a ring may lie in one place.
     """
@@ -136,7 +136,7 @@ def check_outside(scene: Scene, start: StartCurve, met: tuple[int, ...]) -> None
         raise SceneError(f"environment.obstacles[{met[i]}]", f"{inside:.3g} m inside", allowed, reason)
     for k, grasp in enumerate(scene.grasps):
         if grasp.start > 0.0:
-            continue  # from where the cable is by then
+            continue  # begins where the cable is by then
         begin, borne = start(grasp.u)[0], _borne(scene)
         deepest = partial(_deepest, rows, 0.5 * diameter, s=_moments(grasp.path), borne=borne)
         inside, i, t = deepest(partial(grasp.path.at, start=begin))
@@ -149,10 +149,19 @@ def check_outside(scene: Scene, start: StartCurve, met: tuple[int, ...]) -> None
 def _deepest(
     rows: Floats, radius: float, curve: Callable[[Floats], Floats], s: Floats, borne: float
 ) -> tuple[float, int, float]:
-    """Return how deep a cable of a radius is inside the obstacles of `rows` on a curve r(s) [m], in which, and where s.
+    """Return the largest depth [m] of a cable of a radius inside obstacles on a curve r(s), the obstacle, and its s.
 
-    It is looked at s (k,), and where two of these leave room between them for what is inside by more than `borne`,
-    however thin, half-way, again and again: no point is farther from an obstacle than its neighbour and the way there.
+    The curve is evaluated at s (k,). Where two neighbours leave room between them for a depth of more than `borne`,
+    it is evaluated half-way between them, again and again, so that even thin obstacles are found. The bound is that
+    the distance from an obstacle changes by no more than the way along the curve. It stops at the first depth above
+    `borne`.
+
+    Args:
+        rows: of the obstacles (m, ROW).
+        radius: of the cable [m].
+        curve: r(s).
+        s: (k,), rising.
+        borne: allowed depth [m].
     """
 
     def looked(at: Floats) -> tuple[Floats, Floats]:
@@ -179,13 +188,13 @@ def _deepest(
 
 
 def _moments(path: Path) -> Floats:
-    """Return times (k,) [s] of a path that miss no turn of it."""
+    """Return times (k,) [s] along a path, including all of its waypoints."""
     times = np.linspace(0.0, path.duration, _PLACES)
     return np.union1d(times, cast(Floats, path.times)) if isinstance(path, Waypoints) else times
 
 
 def _straight(path: Path, t: Floats, start: Floats) -> Floats:
-    """Return positions (k, 3) [m] of a path at times t (k,) [s], straight between waypoints where it is a spline."""
+    """Return positions (k, 3) [m] of a path at times t (k,) [s], with a spline replaced by straight lines."""
     if not isinstance(path, Waypoints) or path.profile != "spline":
         return path.at(t, start)
     return np.column_stack([np.interp(t, cast(Floats, path.times), x) for x in cast(Floats, path.positions).T])

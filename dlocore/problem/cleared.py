@@ -1,4 +1,4 @@
-"""A start that is moved out of what it was seen in."""
+"""A start that is moved out of the table or obstacles in which it was given."""
 
 from dataclasses import replace
 from typing import cast
@@ -17,20 +17,20 @@ from dlocore.spline import greville
 
 Floats = NDArray[np.float64]
 
-REACH = 0.1  # of the length: from what is moved out, what is so far along the cable stays where it is
-_PLACES = 401  # at which a start is looked at, as long as that is often enough for a tenth of REACH
-_HELD = 0.25  # of REACH: so near to a first waypoint, which stays, what is inside is left to contact
-_NEAR = 1e-3  # of the diameter: over which the way out is found
-_TIMES = 8  # that it is moved, at most
+REACH = 0.1  # of the length: the cable stays where it is beyond this distance from what is moved out
+_PLACES = 401  # at which a start is evaluated: enough for a tenth of REACH
+_HELD = 0.25  # of REACH: so near to a first waypoint, which stays, depth is left to contact
+_NEAR = 1e-3  # of the diameter: distance over which the direction outwards is found
+_TIMES = 8  # most iterations of the move
 
 
 def cleared(scene: Scene, start: StartCurve, met: tuple[int, ...], with_table: bool) -> StartCurve:
     """Return a start whose centreline is a radius off the obstacles that it meets, and no lower than the table.
 
-    What was seen of a cable that touches them may be some millimetres inside (`checks.check_outside`). What is deepest
-    is moved out by its depth, and with it the cable to either side, less and less up to REACH: pushed out by contact
-    alone, span by span, it would be bent by thousands of newtons. A start that goes on from a motion lies as that left
-    it, pressed in a little, and stays.
+    A camera may see a cable that touches an obstacle some millimetres inside it (`checks.check_outside`). The deepest
+    point is moved out by its depth, and with it the cable to either side, less and less up to REACH. Pushed out by
+    contact alone, span by span, the cable would be bent by thousands of newtons. A start that continues a motion is
+    pressed in a little, as that motion left it, and is not moved.
     """
     environment, diameter, length = scene.environment, scene.cable.diameter, scene.cable.length
     floor = environment.table.height if with_table and environment.table is not None else -np.inf
@@ -60,13 +60,13 @@ def cleared(scene: Scene, start: StartCurve, met: tuple[int, ...], with_table: b
 
 
 def _fading(away: Floats, reach: float) -> Floats:
-    """Return 1 where what is `away` [m] is 0, and less and less, smoothly, to 0 at `reach` [m] and beyond."""
+    """Return a factor that falls smoothly from 1 at a distance `away` of 0 to 0 at `reach` [m] and beyond."""
     s = np.minimum(np.abs(away) / reach, 1.0)
     return cast(Floats, 1.0 - s**2 * (3.0 - 2.0 * s))
 
 
 def _ways_out(rows: list[Floats], floor: float, points: Floats, radius: float) -> Floats:
-    """Return the ways (n, 3) [m] out of what points (n, 3) [m] of a cable are deepest in, 0 where they are outside.
+    """Return for points (n, 3) [m] of a cable the ways (n, 3) [m] out of what each is deepest in, 0 if it is outside.
 
     `rows` are those of obstacles, (1, ROW) each, and `floor` is the table's height [m].
     """

@@ -1,4 +1,4 @@
-"""A grid for a problem: knots, basis tables, held degrees of freedom and the start on them."""
+"""A grid for a problem: knots, basis tables, the start and its history, and applied forces."""
 
 from dataclasses import replace
 from functools import partial
@@ -30,32 +30,32 @@ from dlocore.spline import DEGREE, spline_at
 
 Floats = NDArray[np.float64]
 
-# A start that turns by SHARP [rad] within BEND of the length to either side of a point, which is many times as much as
-# it turns elsewhere, has knots graded towards the bend: the corner would be another one on every grid.
+# Knots are graded towards a sharp bend of the start, because the corner would be a different one on every grid. A bend
+# is sharp if the start turns by SHARP [rad] within BEND of the length to either side, many times as much as elsewhere.
 SHARP = 0.8
 BEND = 0.02
 _ELSEWHERE = 4.0  # times the median curvature
-_WIDE = 2.2  # times BEND: where a bend, rather than what is looked over, is as wide as that
+_WIDE = 2.2  # times BEND: a wider one is a wide bend, not a corner widened by the window
 _PLACES = 501  # along the start at which bends are looked for
-_REACH = round(BEND * (_PLACES - 1))  # of them, to either side
+_REACH = round(BEND * (_PLACES - 1))  # places of the window to either side
 _MOST_CORNERS = 4
-_ROUNDING = 1e-9  # of what is remembered: less has not yielded
+_ROUNDING = 1e-9  # of the memory: a smaller change is not yielding
 _THREE = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
-_LYING = 2.0  # times the depth at which contact bears the weight: one that lies is deeper beside what is lifted of it
-_APART = 0.25 * BEND  # of the length: what is nearer to a sharp bend shares its knot
+_LYING = 2.0  # times the depth at which contact bears the weight: a lying cable is deeper beside a part that is lifted
+_APART = 0.25 * BEND  # of the length: features nearer to a sharp bend share its knot
 
 
 def smallest_n_u(problem: Problem) -> int:
-    """Return the least number of control points that has a knot at every grasp, load and point mass."""
+    """Return the least number of control points with which there is a knot at every grasp, load and point mass."""
     return problem.features.least
 
 
 def too_few(problem: Problem, n_u: int) -> SceneError:
-    """Return the error of fewer control points than `smallest_n_u`."""
+    """Return the error for fewer control points than `smallest_n_u`."""
     features = problem.features
     knots = features.multiplicity[(features.u > 0.0) & (features.u < problem.scene.cable.length)].sum()
     reason = (
-        f"Places that are held, loaded or heavy need {knots} knots inside the cable (two where a direction is held)"
+        f"Grasps, loads and point masses need {knots} knots inside the cable (two for a grasp that holds a direction)"
     )
     return SceneError("quality.n_u", n_u, f"at least {smallest_n_u(problem)} in this scene", reason)
 
@@ -69,7 +69,7 @@ def make_grid(problem: Problem, n_u: int) -> Grid:
     scene, length = problem.scene, problem.scene.cable.length
     bends, apart = corners(problem.start, length), _APART * length
     grading = OPENING if problem.twist is None or problem.rests_straight else LASTING
-    # what is left out where there is no room for it: kinks of the angle, then sharp bends
+    # if there is no room for all: without sharp bends, else without kinks of the angle, else without both
     for kinks in (True, False) if problem.twist is not None else (False,):
         for sharp in (bends, []) if bends else ([],):
             features = find_features(scene, sharp, grading, apart, kinks) if sharp or kinks else problem.features
@@ -103,7 +103,7 @@ def _tables_of(problem: Problem, knots: Floats) -> Tables:
 
 
 def room_for(nc: int, points: int) -> int:
-    """Return how many numbers an assembly with so many coordinates and curvature points writes over."""
+    """Return the size of the work array of an assembly with so many coordinates and curvature points."""
     if nc == 2:
         return 0
     of = space if nc == 3 else twisted_rows
@@ -129,7 +129,7 @@ def _no_history(problem: Problem, tables: Tables) -> History:
 
 
 def _history_of(problem: Problem, grid: Grid) -> History:
-    """Return what the start of a grid has behind it: its stress-free strain, and frames without twist along it."""
+    """Return the history of the start of a grid: its stress-free strain, and frames without twist along it."""
     history = _no_history(problem, grid.tables)
     if problem.twist is not None:
         start_frames(grid.knots, grid.start, grid.tables.curvature, start_director(problem), history.past)
@@ -155,7 +155,7 @@ def _start_strain(problem: Problem, grid: Grid) -> Floats:
 def start_director(problem: Problem) -> Floats:
     """Return the director (3,) of the section at u = 0, where its theta is zero, at t = 0.
 
-    It is the remembered one, or the horizontal one to the left of the tangent; turned, where a bow makes it `lean`.
+    It is the remembered one, or the horizontal one to the left of the tangent, turned by the `lean` of a bow.
     """
     tangent = problem.start(0.0, 1)[0]
     tangent = tangent / np.linalg.norm(tangent)
@@ -168,13 +168,14 @@ def start_director(problem: Problem) -> Floats:
 def corners(curve: SplineCurve, length: float) -> list[float]:
     """Return the material coordinates [m] of the sharp bends of a start curve, sharpest first.
 
-    How sharp a place is tells the angle between the tangents BEND of the length to either side, to which noise that
-    turns to and fro adds nothing. A bend is where that is above half of its largest value about there: as wide as the
-    bend, or as what is looked over. It has its middle, and a wider one two places, a third of it to either side.
+    The sharpness of a place is the angle between the tangents BEND of the length to either side; noise that turns to
+    and fro adds nothing to it. A bend extends as far as that angle is above half of its local maximum: as wide as the
+    bend itself, or as the window. A narrow bend is represented by its middle, a wide one by two places, a third of its
+    width to either side.
     """
     spans = np.diff(curve.knots)
     if 2.0 * spans[spans > 0.0].min() > BEND * length:
-        return []  # all its spans are too long for it
+        return []  # all spans of the curve are too long for a sharp bend
     u = np.linspace(0.0, length, _PLACES)
     first, second = curve(u, 1), curve(u, 2)
     speed = np.linalg.norm(first, axis=1)
@@ -233,7 +234,7 @@ def _memory(problem: Problem, grid: Grid, history: History) -> Floats:
 
 
 def _untouched(problem: Problem, grid: Grid) -> Floats:
-    """Return the start (n_u, nc) on a grid but for what it was pushed out of the table or an obstacle by."""
+    """Return the start (n_u, nc) on a grid as it was before it was pushed out of the table or obstacles."""
     if problem.contact is None:
         return grid.start
     given = problem.coordinates(fit_to_knots(problem.start, grid.knots))
@@ -242,16 +243,17 @@ def _untouched(problem: Problem, grid: Grid) -> Floats:
 
 
 def _as_stressed(problem: Problem, grid: Grid, remembered: Floats) -> Floats:
-    """Return what the sections remember (points, 2 m) such that the start has the bending stress of the given one.
+    """Return what the sections remember (points, 2 m), changed so that the start has the stress of the given one.
 
-    On few control points the start can't bend as sharply as the given one, and where that is free of stress, as at a
-    corner, it would spring. What its bends miss there is left out of the stress-free ones, too. What has yielded is its
-    sections' own, and stays; so does what is remembered on the same knots.
+    On few control points the start can't bend as sharply as the given one. If that is stress-free, as at a corner, the
+    cable would spring. So the curvature that is missing in the start is also subtracted from the stress-free one.
+    Memory on the same knots is not changed; that of a cable that has yielded belongs to its sections and is not passed
+    here.
     """
     curve = problem.start
     if not remembered.any() or np.array_equal(curve.knots, grid.knots):
         return remembered
-    knots = np.array(curve.knots)  # of the one kind that the kernels are compiled for
+    knots = np.array(curve.knots)  # writable, as the kernels are compiled for
     theta = None if curve.theta is None else fit_to_knots(curve.theta, knots)[:, 0]
     tables = _tables_of(problem, knots)
     there = _section_bends(problem, knots, tables, problem.coordinates(curve.control_points, theta))
@@ -284,7 +286,7 @@ def _bends(knots: Floats, q: Floats, tables: Tables, director: Floats) -> tuple[
 
 
 def write_material(problem: Problem, grid: Grid, q: Floats, history: History, material: Material) -> None:
-    """Write what the sections remember at the state q (n_u, nc) of a motion of this problem into a history."""
+    """Write into a history what the sections remember at the state q (n_u, nc) of a motion of this problem."""
     if problem.nc != 3:
         tangent = problem.plane.world_vectors(grid.at(q, 0.0, 1)[: problem.plane.dimensions])
         history.memory[:] = _remembered(problem, grid, material, tangent, grid.knots)
@@ -298,9 +300,9 @@ def _write_stretch(grid: Grid, history: History, material: Material) -> None:
 
 
 def _remembered(problem: Problem, grid: Grid, material: Material, tangent: Floats, knots: Floats) -> Floats:
-    """Return the stress-free strain at the curvature points, and its natural value, (points, 2 m), of a material.
+    """Return the stress-free strain of a material at the curvature points, and its natural value, (points, 2 m).
 
-    `tangent` (3,) is that at u = 0, where the material's director lies; `knots` are those of what it remembers.
+    `tangent` (3,) is that at u = 0, where the material's director lies; `knots` are those of the memory.
     """
     u, places = grid.tables.curvature.u, cast(Floats, material.u)
     values = np.concatenate(_memories(material), axis=1)
@@ -312,7 +314,7 @@ def _remembered(problem: Problem, grid: Grid, material: Material, tangent: Float
 
 
 def _memories(material: Material) -> tuple[Floats, Floats]:
-    """Return what a material remembers, and what that was before anything yielded, (k, 3) each."""
+    """Return the memory of a material, and its value before anything yielded, (k, 3) each."""
     memory = cast(Floats, material.memory)
     return memory, np.zeros_like(memory) if material.natural is None else cast(Floats, material.natural)
 
@@ -323,10 +325,11 @@ def _has_yielded(material: Material) -> bool:
 
 
 def _between(u: Floats, places: Floats, values: Floats, knots: Floats) -> Floats:
-    """Return values (k, m) at u (k,) of those at `places` (p, m), the curvature points of a spline with these knots.
+    """Return values (k, m) at u (k,), interpolated from those at `places` (p, m).
 
-    In each span the curvature of a cubic is nearly linear, and has a kink at the knot: it is the parabola through the
-    three points of a span, and where the places are others, what is linear between them.
+    If the places are the curvature points of a spline with these knots, three in each span, the result is the parabola
+    through the three points of a span: the curvature of a cubic is nearly linear in each span, with kinks at the knots.
+    For other places it is linear between them.
     """
     cuts = np.unique(knots)
     span = np.clip(np.searchsorted(cuts, places) - 1, 0, len(cuts) - 2)
@@ -350,11 +353,11 @@ def _planar_memory(problem: Problem, sections: Floats, director: Floats, tangent
 
 
 def consistent_start(problem: Problem, grid: Grid, *, touches: bool = True) -> Floats:
-    """Return start control points (n_u, nc) that pass exactly through the held points of the curve, strained as it is.
+    """Return start control points (n_u, nc) that pass exactly through the held points, with the strain of the curve.
 
-    What the knots leave inside the table or an obstacle is pushed out, unless it `touches` neither; of one that goes
-    on from another motion, strained as it was, only what is deeper than a cable lies there (_LYING): it is pressed
-    against them already. The angle of the sections plays no part.
+    With `touches`, parts of the spline inside the table or an obstacle are pushed out. A start that continues another
+    motion, with a strain, is already pressed against them; of that, only parts deeper than a cable lies (_LYING) are
+    pushed out. The angle of the sections plays no role.
     """
     line = problem.line
     history = _no_history(line, grid.tables)
@@ -367,7 +370,7 @@ def consistent_start(problem: Problem, grid: Grid, *, touches: bool = True) -> F
     if line.contact is not None and problem.start.strain is not None:
         deep = _LYING * line.contact.depth_under(float(np.linalg.norm(line.weight())))
         parameters[laws.TABLE, 0] -= deep
-        parameters[laws.CONTACT, 0] -= deep  # the radius with which it touches obstacles
+        parameters[laws.CONTACT, 0] -= deep  # the cable's radius in contact with obstacles
     kept = [laws.STRETCH, *([laws.CONTACT, laws.TABLE] if touches else [])]
     active[[row for row in range(laws.COUNT) if row not in kept]] = 0
     history.axial[:, 0] = _start_strain(problem, grid)
@@ -381,9 +384,9 @@ def consistent_start(problem: Problem, grid: Grid, *, touches: bool = True) -> F
 
 
 def applied_forces(problem: Problem, grid: Grid, t: Floats, end: float = np.inf) -> Floats:
-    """Return the applied forces (1 or k, n_u, nc) [N]: weight, and loads at times t (k,) where there are any.
+    """Return the applied forces (1 or k, n_u, nc) [N]: weight, and loads at times t (k,) if there are any.
 
-    Of a load that jumps they are those after it, but before it from `end` [s] on.
+    At a jump of a load they are those after it, or those before it for times from `end` [s] on.
     """
     steady = cast(Floats, grid.tables.weight)[:, None] * problem.weight()
     if not problem.scene.loads:
@@ -397,16 +400,16 @@ def applied_forces(problem: Problem, grid: Grid, t: Floats, end: float = np.inf)
 
 
 def applied_at_rest(problem: Problem, grid: Grid, t: float) -> Floats:
-    """Return the applied forces (n_u, nc) [N] under which a cable rests at `t` [s]: of a load that jumps, before it."""
+    """Return the applied forces (n_u, nc) [N] under which a cable rests at `t` [s]: before a jump of a load there."""
     return applied_forces(problem, grid, np.array([t]), t)[0]
 
 
 def applied_in_steps(problem: Problem, grid: Grid, times: Floats, begin: float, end: float) -> Floats:
     """Return the applied forces (1 or k, n_u, nc) [N] with which a march steps to evenly spaced times (k,) [s].
 
-    Loads are weighed over the steps before and after each time, so that none is stepped over, however short it is: of
-    its impulse nothing is lost (docs/model.md eq. 13b). A stretch is entered with the forces at its `begin` [s]; what
-    their mean would have more comes with the next step. What comes after its `end` [s] is not known to it.
+    Loads are averaged with weights over the steps before and after each time, so that none is stepped over, however
+    short, and no impulse is lost (docs/model.md eq. 13b). A stretch is entered with the forces at its `begin` [s]; the
+    difference to their mean is added to the next step. Loads after its `end` [s] have no influence.
     """
     applied = applied_forces(problem, grid, times, end)
     h = times[1] - times[0]

@@ -1,4 +1,4 @@
-"""When a motion is not smooth, how long it is, and what holds the cable meanwhile."""
+"""The events at which a motion is not smooth, its length in swings, and the grasps that hold in between."""
 
 from dataclasses import dataclass
 from typing import cast
@@ -13,12 +13,12 @@ Floats = NDArray[np.float64]
 
 
 JUMP = 3  # multiplicity of the knot where the velocity jumps
-_LONGEST = 64.0  # times that a cable swings, for as many of which grids and comparisons grow
+_LONGEST = 64.0  # swings, up to which grids and comparisons grow with the length of a motion
 
 
 @dataclass(frozen=True, eq=False)
 class Event:
-    """A time at which the motion is not smooth, and how much of it jumps.
+    """A time at which the motion is not smooth, and how much jumps there.
 
     Attributes:
         time: [s].
@@ -30,12 +30,12 @@ class Event:
 
 
 def swings(scene: Scene) -> float:
-    """Return how many times as long a motion is as a cable of that length needs to swing, about; 1 to _LONGEST."""
+    """Return the approximate length of a motion in periods of a swing of the cable, 1 to _LONGEST."""
     return min(max(cast(float, scene.horizon) / scene.swing, 1.0), _LONGEST)
 
 
 def moments(scene: Scene, in_a_swing: int) -> int:
-    """Return at how many evenly spaced times motions are compared: so many, and as many again for each swing more."""
+    """Return the number of evenly spaced times for comparing motions: `in_a_swing`, and as many per further swing."""
     return round((in_a_swing - 1) * swings(scene)) + 1
 
 
@@ -72,12 +72,12 @@ def find_events(scene: Scene) -> tuple[Event, ...]:
 
 
 def _smoothness(path: Path) -> int:
-    """Return the multiplicity of the knot where a path ends, or one of its moves."""
+    """Return the multiplicity of the time knot at the end of a path, or of one of its moves."""
     profile = "" if isinstance(path, Still) else path.profile
     return {"minimum_jerk": 1, "cubic": 2}.get(profile, JUMP)
 
 
 def closed_grasps(scene: Scene, begin: float, end: float) -> list[Grasp]:
-    """Return the grasps that hold all through the times `begin` to `end` [s]."""
+    """Return the grasps that hold all the time from `begin` to `end` [s], between which there is no event."""
     middle = 0.5 * (begin + end)
     return [g for g in scene.grasps if g.start <= middle and (g.release_time is None or g.release_time > middle)]

@@ -1,4 +1,4 @@
-"""Where along the cable knots are needed: at grasps, loads, point masses and sharp bends, and closer beside them."""
+"""Where along the cable knots are needed: at grasps, loads, point masses and sharp bends, and denser near them."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -10,16 +10,16 @@ from dlocore.scene.scene import AUTO_TARGET, Scene
 
 Floats = NDArray[np.float64]
 
-# Grading of the knots towards a feature: exponent and width. An interior point force makes r''' jump and bends sharply
-# beside it; at an end or at a held direction a weaker grading serves better (docs/model.md).
+# Grading of the knots towards a feature: exponent and width. At an interior point force r''' jumps, and the cable bends
+# sharply beside it; at an end or a held direction a weaker grading is better (docs/model.md).
 _INTERIOR = (0.6, 0.02)
 _END = (0.3, 0.04)
-OPENING = (1.0, 0.01)  # a start that turns sharply: the corner would be another one on every grid
-LASTING = (1.3, 0.005)  # ... and may be free of stress, so that it stays and swings: it needs several spans for that
+OPENING = (1.0, 0.01)  # a start that turns sharply: the corner would be a different one on every grid
+LASTING = (1.3, 0.005)  # ... if the corner may be stress-free, so that it stays and swings, which needs several spans
 SAME = 1e-9  # of the length: features this close are one
-_TIP = 2e-3  # of the length: the longest end beyond a point that is held or loaded that needs no span of its own, ...
-_ALONE = 0.1  # ... where nothing else holds or loads the cable so near to that end
-_OF_TARGET = 0.1  # of the error that is aimed at: the longest such end beyond a held direction
+_TIP = 2e-3  # of the length: longest tip beyond a grasp, load or point mass that needs no span of its own, ...
+_ALONE = 0.1  # ... if no other one is within this part of the length from that end
+_OF_TARGET = 0.1  # of the target error: longest such tip beyond a held direction
 
 
 class Features(NamedTuple):
@@ -29,7 +29,7 @@ class Features(NamedTuple):
         u: (m,) [m], sorted.
         multiplicity: of the knot at each (m,).
         power, width: grading exponent, and width in parts of the length (m,).
-        least: number of control points that has them all; with kinks, two spans between any two, as they cost one.
+        least: number of control points needed for all of them; with kinks, also for two spans between each two.
     """
 
     u: Floats
@@ -51,8 +51,8 @@ def find_features(
     Args:
         bends: (k,) [m].
         grading: towards them, exponent and width.
-        apart: one knot serves a bend and what is no farther from it [m].
-        kinks: the angle of the sections may have kinks where directions are held, for which these knots are triple.
+        apart: a bend shares the knot of a feature that is no farther from it [m].
+        kinks: whether the knots at held directions are triple, so that the angle of the sections may have kinks there.
     """
     length = scene.cable.length
     found: dict[float, tuple[int, float, float]] = {}
@@ -84,12 +84,12 @@ def find_features(
 
 
 def longest_tip(scene: Scene, u: float, directed: bool) -> float:
-    """Return how long an end beyond what is held, loaded or heavy at `u` [m] may be that needs no span of its own [m].
+    """Return the longest tip of the cable [m] beyond a grasp, load or point mass at `u` [m] without a span of its own.
 
-    A tip, no longer than half a diameter, has no moment and does not bend: nothing is lost where it has no span of its
-    own. That would be so short that it folds, or strains, before it bends, and that what the time spline misses of the
-    motion is many times as long. Where a direction is held the tip has to bend with the cable, whose end that makes
-    stiffer: the motion is off by about half of what the tip is long, a twentieth of the error that is aimed at.
+    A tip of up to half a diameter carries no moment and does not bend, so nothing is lost without a span for it. Such a
+    short span would fold, or strain, before it bends, and the error of the time spline would be many times its length.
+    If a direction is held, the tip has to bend with the cable, which makes the cable's end stiffer. The error of the
+    motion is then about half the length of the tip, and at most a twentieth of the target error.
     """
     length = scene.cable.length
     if [v for v in scene.places if abs(v - _end_near(scene, u)) <= _ALONE * length] != [u]:
@@ -104,13 +104,13 @@ def _end_near(scene: Scene, u: float) -> float:
 
 
 def _without_tip(scene: Scene, u: float, directed: bool) -> float:
-    """Return where a knot for what is at `u` [m] belongs: at an end that only a tip lies beyond."""
+    """Return where to put the knot for a feature at `u` [m]: at the end of the cable if only a tip lies beyond it."""
     end = _end_near(scene, u)
     return end if abs(u - end) <= longest_tip(scene, u, directed) else u
 
 
 def free_ends(scene: Scene) -> tuple[bool, bool]:
-    """Return whether the direction of the cable is free, at least for a time, at its two ends."""
+    """Return for both ends of the cable whether its direction there is free, at least for a time."""
     length = scene.cable.length
 
     def free(end: float) -> bool:

@@ -1,4 +1,4 @@
-"""A space discretisation: knots, basis tables, the start on them and what lies behind it."""
+"""A space discretisation: knots, basis tables, and the start with its history."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -23,10 +23,10 @@ class Grid:
         knots: (n_u + 4,) [m].
         start: control points at t = 0 (n_u, nc) [m].
         velocity: their given velocities, before grasps close (n_u, nc) [m/s].
-        find_tables: finds `tables` of the knots, and
-        find_history: `history` of the grid, as they are first read.
-        watched: the tables have more points than the knots ask for, see `solvers/watched.py`.
-        tipped: the start had settled where it would fall, see `statics/tipping.py`.
+        find_tables: computes `tables` from the knots when they are first read.
+        find_history: computes `history` from the grid when it is first read.
+        watched: whether the tables have more points than the knots need, see `solvers/watched.py`.
+        tipped: whether the start had settled in an unstable equilibrium and was tipped, see `statics/tipping.py`.
     """
 
     knots: Floats
@@ -44,7 +44,7 @@ class Grid:
 
     @cached_property
     def history(self) -> History:
-        """What the start has behind it: stress-free strain, frames. Kernels write to it: pass `past()`."""
+        """History of the start: stress-free strain, frames. Kernels write to what they get: pass them `past()`."""
         return self.find_history(self)
 
     def changed(
@@ -55,7 +55,7 @@ class Grid:
         history: History | None = None,
         tipped: bool = False,
     ) -> "Grid":
-        """Return the grid with another start, other tables, or something else behind it; the rest as it is."""
+        """Return the grid with another start, other tables or another history, and the rest unchanged."""
         return Grid(
             self.knots,
             self.start if start is None else start,
@@ -70,7 +70,7 @@ class Grid:
         return state_with(self, tables="find_tables", history="find_history")
 
     def past(self) -> History:
-        """Return a copy of the history, to be carried on; until a step is taken contact acts at all nodes."""
+        """Return a copy of the history for a march to carry on; contact acts at all nodes until the first step."""
         past = History(*(x.copy() for x in self.history))
         past.pressing[:] = self.tables.contact.w
         return past

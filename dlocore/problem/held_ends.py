@@ -1,4 +1,4 @@
-"""Ends of a cable whose direction is held, with unit length (docs/model.md eq. 11), though the cable is stretched."""
+"""Ends whose direction is held with unit length (docs/model.md eq. 11), although the cable is stretched there."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,18 +9,19 @@ from dlocore.scene.scene import Scene
 
 Floats = NDArray[np.float64]
 
-_SHORT = 0.21  # of the span beside such an end, times the strain there, is what it lacks (tests/solver/test_held_ends)
-_NEAR = 3.0  # spans beside it over which the strain is taken: that of single points is a fifth off
-_MATTERS = 1e-5  # of the length: less is not looked for
+_SHORT = 0.21  # missing length beside such an end, over span times strain there (tests/solver/test_held_ends)
+_NEAR = 3.0  # spans beside it over which the strain is averaged: that of single points is a fifth off
+_MATTERS = 1e-5  # of the length: less is ignored
 
 
 def held_back(scene: Scene, grid: Grid, states: Floats, strained: float) -> float:
-    """Return how far unit length at its ends keeps a stretched cable from where it would be, at most [m].
+    """Return the largest displacement of a stretched cable due to the unit length at its ends [m].
 
-    It is of first order in the spans, where all else is of higher order, so that two grids tell half of it only.
+    This error is of first order in the spans, whereas all others are of higher order, so that two grids show only half
+    of it.
 
     Args:
-        scene: whose grasps hold.
+        scene: the scene with the grasps.
         grid: its space discretisation.
         states: positions of the control points over the motion (k, n_u, 2 or 3) [m].
         strained: the largest axial strain of the motion.

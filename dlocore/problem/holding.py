@@ -1,4 +1,4 @@
-"""What grasps hold: their rows solved for pivot control points (docs/model.md eq. 11, 12), and the turn of clamps."""
+"""Constraints of grasps: rows solved for pivot control points (docs/model.md eq. 11, 12), and the turn of clamps."""
 
 from dataclasses import dataclass
 from typing import cast
@@ -26,10 +26,10 @@ class Held:
         elimination: for the compiled kernels.
         offsets: (k, held) [m] prescribed part of the held degrees of freedom at the k times.
         rows: constraint rows for every coordinate of the centreline: (grasp, derivative) in the order of `inverse`, and
-            `SMOOTH` for each triple knot, where the slope does not jump.
+            `SMOOTH` for each triple knot, where the slope must not jump.
         inverse: (rows, rows) inverse of the constraint rows' pivot block.
         turned: the grasps that hold the angle of their section, in the order of `turned_inverse`.
-        turned_inverse: the same for the rows that hold theta.
+        turned_inverse: the inverse for the rows that hold theta.
     """
 
     grasps: tuple[Grasp, ...]
@@ -41,7 +41,7 @@ class Held:
     turned_inverse: Floats
 
     def multipliers(self, reactions: Floats, dimensions: int) -> Floats:
-        """Return the multipliers (k, rows, dimensions) of the constraint rows for forces (k, held) at the held ones."""
+        """Return the multipliers (k, rows, dimensions) of the constraint rows for forces (k, held) at the pivots."""
         count = len(self.rows) * dimensions
         return self.inverse.T @ reactions[:, :count].reshape(len(reactions), -1, dimensions)
 
@@ -50,12 +50,15 @@ class Held:
         return reactions[:, len(self.rows) * dimensions :] @ self.turned_inverse
 
 
-SMOOTH = (-1, 1)  # the row of no grasp
-Starts = dict[Grasp, Floats]  # point and unit tangent (2, 3) in the world where the path of a grasp begins
+SMOOTH = (-1, 1)  # a row that belongs to no grasp
+Starts = dict[Grasp, Floats]  # point and unit tangent (2, 3) in the world, where the path of a grasp begins
 
 
 def close_grasps(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, q: Floats | None) -> None:
-    """Note where the paths of newly closed `grasps` begin: on the start curve at t = 0, else on q (n_u, nc)."""
+    """Enter in `starts` where the paths of newly closed `grasps` begin: on the start curve at t = 0, else on q.
+
+    `q` are the control points (n_u, nc) as the grasps close; None at t = 0.
+    """
     plane = problem.plane
     for g in grasps:
         if g in starts:
@@ -68,12 +71,12 @@ def close_grasps(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Star
 
 
 def hold(problem: Problem, grid: Grid, grasps: list[Grasp], t: Floats, starts: Starts, q: Floats) -> Held:
-    """Eliminate what `grasps` hold at the times t (k,) [s].
+    """Eliminate the degrees of freedom that `grasps` hold at the times t (k,) [s].
 
-    The rows b(u_g) q = p(t), and b'(u_g) q = d(t) where the direction is held (unit stretch there), are solved for one
-    pivot control point each (docs/model.md eq. 12). Where a clamp holds the angle of its section, b(u_g) theta =
-    theta(t) is held likewise: the angle it has in q (n_u, nc), the state at t[0], and how much the gripper has turned
-    about the cable since, against the frames that are carried from each of the times to the next.
+    The rows b(u_g) q = p(t), and b'(u_g) q = d(t) if the direction is held (with unit length), are solved for one pivot
+    control point each (docs/model.md eq. 12). If a clamp holds the angle of its section, b(u_g) theta = theta(t) is
+    treated likewise. theta(t) is the angle in q (n_u, nc), the state at t[0], plus the turn of the gripper about the
+    cable since then, measured against the frames that are carried from each of the times to the next.
     """
     rows, table, sampled = constraint_rows(grasps, t, starts)
     turned = tuple(i for i, g in enumerate(grasps) if g.hold == "clamp") if problem.twist is not None else ()
@@ -95,8 +98,10 @@ def hold(problem: Problem, grid: Grid, grasps: list[Grasp], t: Floats, starts: S
 def constraint_rows(
     grasps: list[Grasp], t: Floats, starts: Starts
 ) -> tuple[tuple[tuple[int, int], ...], Floats, Floats]:
-    """Return what `grasps` hold of the centreline: (grasp, derivative) of each row, and `rows` and `sampled` of
-    `kernels.holding.hold_rows`.
+    """Return the constraint rows of `grasps` on the centreline.
+
+    Returns:
+        (grasp, derivative) of each row, and the arguments `rows` and `sampled` of `kernels.holding.hold_rows`.
     """
     rows: list[tuple[int, int]] = []
     table: list[tuple[float, ...]] = []
@@ -120,10 +125,10 @@ def constraint_rows(
 
 
 def spin_of(grasp: Grasp, t: Floats, direction: Floats) -> Floats:
-    """Return how much a gripper that turns has turned about the cable since t[0], at the times t (k,) [s]; (k,) [rad].
+    """Return the angle by which a gripper has turned about the cable since t[0], at the times t (k,) [s]; (k,) [rad].
 
-    It is measured against a frame that the smallest rotations carry from each of the tangents to the next, of which
-    `direction` (3,) is that where the path begins, and counts full turns.
+    It is measured against a frame that the smallest rotations carry from each tangent to the next, and counts full
+    turns. `direction` (3,) is the tangent where the path begins.
     """
     turns = cast(Floats, grasp.path.rotation_at(t - grasp.start))
     across = turns[0].T @ unit_across(turns[0] @ direction)  # a director, fixed in the gripper

@@ -1,4 +1,4 @@
-"""What is to be known of a scene as it was given, whatever its motion."""
+"""Notes on a scene as it was given, whatever its motion."""
 
 import math
 from typing import cast
@@ -15,25 +15,25 @@ from dlocore.words import in_mm
 Floats = NDArray[np.float64]
 
 LIGHTEST, HEAVIEST = 0.1, 2.5e4  # [kg/m^3] of a cable: a tenth of air, more than any metal
-SAME_LENGTH = 5e-3  # of the cable's: lengths of points that differ by less are as good as the same
-SAME_ENDS = 1e-3  # of the length: and so are ends, as those of noisy points, which the cable's length decides about
-SAME_START = 1e-3  # of the length: a start that is moved by less was seen there
-ABOUT_ITSELF = 0.9  # of the turn of a gripper: what is about the cable that it holds, so that little else is left
-MANY_TURNS = 3.0  # of a gripper in one move: by more it is asked whether degrees were meant, where they are ...
+SAME_LENGTH = 5e-3  # of the cable's length: a smaller difference of the points' length gets no note, ...
+SAME_ENDS = 1e-3  # ... nor does one that moves the ends by less than this part of the length
+SAME_START = 1e-3  # of the length: a start that is moved by less gets no note
+ABOUT_ITSELF = 0.9  # of the turn of a gripper: a note if more of it is about the cable that it holds
+MANY_TURNS = 3.0  # of a gripper in one move: with more, a note asks whether degrees were meant, if the numbers are ...
 _DEGREES = 5.0  # ... multiples of this
-NO_TURN = 1e-4  # by which the last of four is less than 1 in a quaternion that would be no turn, were it w
+NO_TURN = 1e-4  # a quaternion whose last number is nearer to 1 than this is no turn if that number is w
 _SAME_TIME = 1e-9  # relative
-OVERSHOOTS = 0.5  # of the extent of waypoints: how far a path may swing out of the box around them without a word ...
-OUT = 1e-2  # ... and of the length
-CLOSE = 0.1  # of the median time between waypoints: what is less is no time in which a smooth path can follow noise ...
-THROWN = 1e-3  # ... and may throw it off, by so much of the length or more, and ...
-_MORE = 10.0  # ... by so many times as what is this close is off a path without it, which is less than that: no move
-_BETWEEN = 8  # places of a path between each two waypoints at which that is looked at
-_PLACES = 65  # of a start at which it is looked at
+OVERSHOOTS = 0.5  # of the extent of waypoints: farthest that a path may swing out of their box without a note, ...
+OUT = 1e-2  # ... or this part of the length, if that is more
+CLOSE = 0.1  # of the median time between waypoints: in less time noise may throw a smooth path off. A note if ...
+THROWN = 1e-3  # ... it does so by more than this part of the length, ...
+_MORE = 10.0  # ... and by more than this times the distance of the close waypoints from a path without them
+_BETWEEN = 8  # places between each two waypoints at which a path is evaluated
+_PLACES = 65  # of a start at which it is evaluated
 
 
 def scene_notes(scene: Scene) -> list[str]:
-    """Return what is to be known of a scene as it was given, in words."""
+    """Return notes on a scene as it was given."""
     return [
         *cable_notes(scene),
         *_of_times(scene),
@@ -45,12 +45,12 @@ def scene_notes(scene: Scene) -> list[str]:
 
 
 def cable_notes(scene: Scene) -> list[str]:
-    """Return what is to be known of a scene's cable and how it lies, in words."""
+    """Return notes on a scene's cable and start shape."""
     return [*_of_units(scene), *_of_points(scene)]
 
 
 def start_notes(scene: Scene, start: StartCurve) -> list[str]:
-    """Return what is told of a start that is not where it was given, in words; of a bow `side_notes` tell."""
+    """Return a note on a start that is not where it was given; for bows see `side_notes`."""
     if start.bow or start.aside:
         return []
     length = scene.cable.length
@@ -58,14 +58,14 @@ def start_notes(scene: Scene, start: StartCurve) -> list[str]:
     moved = float(np.linalg.norm(start(u) - start_curve(scene.shape, length)(u), axis=1).max())
     if moved <= SAME_START * length:
         return []
-    why = "to the first waypoints of its grippers, on to the table, or out of what it was in"
+    why = "to meet the first waypoints of its grippers, to lie on the table, or to be outside obstacles"
     return [f"the start is moved by up to {in_mm(moved)} from where it was given, {why}"]
 
 
 def edge_notes(scene: Scene, obstacles: tuple[Obstacle, ...]) -> list[str]:
-    """Return what is told of `obstacles` of a scene under whose walls a cable on its table can slip, in words.
+    """Return notes on those `obstacles` of a scene under whose walls a cable on the table can slip.
 
-    That is where they begin above the middle of the cable and below its top.
+    These are the ones whose walls begin above the centreline of the cable and below its top.
     """
     table, diameter = scene.environment.table, scene.cable.diameter
     if table is None or scene.effects.get("table", "auto") == "off":
@@ -75,7 +75,7 @@ def edge_notes(scene: Scene, obstacles: tuple[Obstacle, ...]) -> list[str]:
         if not isinstance(obstacle, Box | Cylinder):
             continue
         row = obstacle.row()
-        base = float(row[3] - np.abs(row[4:13].reshape(3, 3)[:, 2]) @ row[13:16])  # where walls are upright
+        base = float(row[3] - np.abs(row[4:13].reshape(3, 3)[:, 2]) @ row[13:16])  # if its walls are upright
         above = base - table.height
         stands = obstacle.upright_at(table.height, 0.5 * diameter) or not obstacle.upright_at(base, diameter)
         if 0.0 < above < 0.5 * diameter and not stands:
@@ -89,19 +89,19 @@ def edge_notes(scene: Scene, obstacles: tuple[Obstacle, ...]) -> list[str]:
 
 
 def _of_units(scene: Scene) -> list[str]:
-    """Return what is told of a cable lighter than air, as with lengths in millimetres, or heavier than any metal."""
+    """Return a note on a cable lighter than air, as if its lengths were in millimetres, or heavier than any metal."""
     cable = scene.cable
     density = cable.linear_density / (0.25 * math.pi * cable.diameter**2)
     if LIGHTEST <= density <= HEAVIEST:
         return []
     thick = f"{cable.diameter:g} m thick and weighs {cable.linear_density:g} kg/m"
     if density < LIGHTEST:
-        return [f"the cable is {thick}, which is less than air does: its length and diameter may be in millimetres"]
-    return [f"the cable is {thick}, more than any metal does: linear_density is its mass per length in kg/m"]
+        return [f"the cable is {thick}, so it is lighter than air: its length and diameter may be in millimetres"]
+    return [f"the cable is {thick}, so it is heavier than any metal: linear_density is its mass per length in kg/m"]
 
 
 def _of_points(scene: Scene) -> list[str]:
-    """Return what is told of points that were made as long as the cable, or that the start does not go through."""
+    """Return a note on points that were scaled to the cable's length, or that the start misses."""
     if not isinstance(scene.shape, Points):
         return []
     length = scene.cable.length
@@ -109,21 +109,21 @@ def _of_points(scene: Scene) -> list[str]:
     differ = abs(start.length_given - length) > SAME_LENGTH * length
     if differ and start.ends_moved > SAME_ENDS * length:
         return [
-            f"the points of the shape are {start.length_given:.4g} m long and the cable {length:.4g} m: they are "
-            f"scaled to it about their middle, which moves an end by up to {in_mm(start.ends_moved)}, and a gripper "
-            "that holds it"
+            f"the points of the shape are {start.length_given:.4g} m long and the cable {length:.4g} m: their curve is "
+            f"scaled to the cable about its middle, which moves an end by up to {in_mm(start.ends_moved)}, and with it "
+            "a gripper that holds it there"
         ]
     if start.fit_missed > (scene.quality.target_error or AUTO_TARGET * length):
         return [
-            f"the start is a smooth curve that misses the points of the shape by {in_mm(start.fit_missed)}, beside "
-            "their noise, which the estimated error does not count: give points as long as the cable, more of them at "
-            "sharp bends, or the control points of a spline"
+            f"the start is a smooth curve that misses the points of the shape by {in_mm(start.fit_missed)}, in "
+            "addition to their noise. The estimated error does not include this: give points that are as long as the "
+            "cable, more of them at sharp bends, or the control points of a spline"
         ]
     return []
 
 
 def _of_times(scene: Scene) -> list[str]:
-    """Return what is told of grippers that would close when the motion is over."""
+    """Return notes on grippers that would close when the motion is over."""
     horizon = cast(float, scene.horizon)
     return [
         f"primitives[{i}] never holds the cable: it closes at {grasp.start:g} s and the horizon is {horizon:g} s"
@@ -133,7 +133,7 @@ def _of_times(scene: Scene) -> list[str]:
 
 
 def _of_turns(scene: Scene) -> list[str]:
-    """Return what is told of grippers that turn about the cable where they hold its direction alone."""
+    """Return notes on grippers that turn about the cable but hold only its direction."""
     notes = []
     for i, grasp in enumerate(scene.grasps):
         path = grasp.path
@@ -144,14 +144,14 @@ def _of_turns(scene: Scene) -> list[str]:
         about = abs(float(turn @ along)) / float(np.linalg.norm(along))
         if about > ABOUT_ITSELF * float(np.linalg.norm(turn)):
             notes.append(
-                f"primitives[{i}] turns about the cable, which hold 'tangent' lets turn in the gripper: "
+                f"primitives[{i}] turns about the cable, but hold 'tangent' lets the cable turn in the gripper: "
                 "hold 'clamp' twists it"
             )
     return notes
 
 
 def _of_conventions(scene: Scene) -> list[str]:
-    """Return what is asked of paths that seem to be in degrees, in (x, y, z, w), or by the clock of the scene."""
+    """Return notes on paths that seem to be in degrees, in (x, y, z, w), or by the clock of the scene."""
     return [
         f"primitives[{i}]{asked}"
         for i, grasp in enumerate(scene.grasps)
@@ -179,8 +179,8 @@ def _scalar_last(grasp: Grasp) -> str:
     least = math.sqrt(0.5)  # of cos(angle/2): a quarter turn from none
     if not (turns[0, 3] > 1.0 - NO_TURN and turns[:, 3].min() > least and np.ptp(turns, axis=0).any()):
         return ""
-    begins = ".path.orientations begin at a half turn about z, (0, 0, 0, 1) as (w, x, y, z)"
-    return f"{begins}: if they are (x, y, z, w), where that is no turn, put w first"
+    begins = ".path.orientations begin at a half turn about z, (0, 0, 0, 1) read as (w, x, y, z)"
+    return f"{begins}: if they are meant as (x, y, z, w), in which that is no turn, put w first"
 
 
 def _by_another_clock(grasp: Grasp) -> str:
@@ -189,12 +189,12 @@ def _by_another_clock(grasp: Grasp) -> str:
     first = float(cast(Floats, grasp.path.times)[0])
     if not math.isclose(first, grasp.start, rel_tol=_SAME_TIME):
         return ""
-    begins = f".path.times begin at {first:.4g} s, as grasp_time: they are since then, and it waits until"
-    return f"{begins} {grasp.start + first:.4g} s. Let them begin at 0 to go at once"
+    begins = f".path.times begin at {first:.4g} s, as grasp_time: they count from then, so the gripper waits until"
+    return f"{begins} {grasp.start + first:.4g} s. Let them begin at 0 to move at once"
 
 
 def _of_overshoots(scene: Scene) -> list[str]:
-    """Return what is told of paths that swing far out of their waypoints, as smooth ones through uneven times do."""
+    """Return notes on paths that swing far out of their waypoints, as smooth ones through uneven times do."""
     notes = []
     for i, grasp in enumerate(scene.grasps):
         if not isinstance(grasp.path, Waypoints):
@@ -207,14 +207,14 @@ def _of_overshoots(scene: Scene) -> list[str]:
         if out[k] > max(OVERSHOOTS * float(np.linalg.norm(high - low)), OUT * scene.cable.length):
             notes.append(
                 f"the path of primitives[{i}] swings out of its waypoints by up to {in_mm(out[k])}, at "
-                f"{grasp.start + t[k]:.3g} s, as it goes smoothly through uneven times: more even ones "
-                "keep it in, or a profile that stops at each"
+                f"{grasp.start + t[k]:.3g} s, because a smooth path through uneven times overshoots: use more even "
+                "times, or a profile that stops at each waypoint"
             )
     return notes
 
 
 def _of_close_times(scene: Scene) -> list[str]:
-    """Return what is told of waypoints whose times are so close that noise between them throws a smooth path off."""
+    """Return notes on waypoints whose times are so close that noise between them throws a smooth path off."""
     notes = []
     for i, grasp in enumerate(scene.grasps):
         path = grasp.path
@@ -237,12 +237,12 @@ def _of_close_times(scene: Scene) -> list[str]:
             notes.append(
                 f"primitives[{i}].path.times[{j}] is {gap:.2g} s after the one before it, others are {usual:.2g} s "
                 f"apart: noise between the two throws the smooth path off by up to {in_mm(thrown[k])}, at "
-                f"{grasp.start + t[k]:.4g} s. Leave it out"
+                f"{grasp.start + t[k]:.4g} s. Leave this waypoint out"
             )
     return notes
 
 
 def _along(times: Floats) -> Floats:
-    """Return times [s] at and between those of waypoints (n,) at which a path is looked at."""
+    """Return the times [s], at and between those of waypoints (n,), at which a path is evaluated."""
     between = np.linspace(0.0, 1.0, _BETWEEN, endpoint=False)
     return np.asarray((times[:-1, None] + np.diff(times)[:, None] * between).ravel())

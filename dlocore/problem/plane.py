@@ -14,8 +14,8 @@ from dlocore.shape.shape import StartCurve
 Floats = NDArray[np.float64]
 
 FLATNESS = 1e-9  # of the length: a start and a motion this close to a plane are planar
-NEARLY = 1e-5  # relative: one this close to a plane is drawn out of it by less than a real cable is bent
-_ALONG = np.array([1.0, 0.0, 0.0])  # of no vector at all
+NEARLY = 1e-5  # relative: forces this close to a plane draw a cable out of it by less than real cables are bent
+_ALONG = np.array([1.0, 0.0, 0.0])  # direction to use if all vectors are zero
 _SEEN = 0.005, 0.02  # [m] and of the length: points seen this close to the table lie on it
 
 
@@ -51,7 +51,7 @@ class Plane:
         return self.origin + x @ self.axes
 
     def distance(self, r: Floats) -> float:
-        """Return the largest component of the way from the points r (..., 3) to the plane [m]."""
+        """Return the largest component of the distances of the points r (..., 3) from the plane [m]."""
         return float(np.abs(r - self.world(self.points(r))).max())
 
     def world_vectors(self, x: Floats) -> Floats:
@@ -60,7 +60,7 @@ class Plane:
 
 
 def natural_points(scene: Scene) -> Floats | None:
-    """Return the points (n, 3) [m] of a given natural shape, whose plane is that of the cable's bends, or None."""
+    """Return the points (n, 3) [m] of a stress-free shape that is given by points, or None."""
     rest = scene.cable.rest_shape
     if isinstance(rest, str):
         return None
@@ -69,7 +69,7 @@ def natural_points(scene: Scene) -> Floats | None:
 
 
 def is_straight(start: StartCurve) -> bool:
-    """Tell whether the start is straight."""
+    """Return whether the start is straight."""
     chord = start.control_points - start.control_points[0]
     return float(np.linalg.svd(chord, compute_uv=False)[1]) <= FLATNESS * float(np.abs(chord).max())
 
@@ -81,18 +81,18 @@ def off_line(vectors: Floats, along: Floats) -> float:
 
 
 def table_tolerance(scene: Scene) -> float:
-    """Return how far off the table, or in something, what was seen of a cable that touches it may lie [m]."""
+    """Return how far off the table, or inside an obstacle, a cable that touches it may be seen [m]."""
     absolute, relative = _SEEN
     return min(absolute, relative * scene.cable.length)
 
 
 def lies_on(table: Table, scene: Scene, start: StartCurve) -> bool:
-    """Tell whether a start lies on a table, as well as it was seen."""
+    """Return whether a start lies on a table, within `table_tolerance`."""
     return max(abs(z - table.height) for z in start.heights) <= table_tolerance(scene)
 
 
 def off_the_table(scene: Scene, start: StartCurve, met: tuple[int, ...]) -> str:
-    """Return why the cable leaves the table or does more than slide on it, or "" where it lies there all the time."""
+    """Return why the cable leaves the table or does more than slide on it, or "" if it lies there all the time."""
     table, environment = scene.environment.table, scene.environment
     assert table is not None
     if scene.effects.get("table", "auto") == "on":
@@ -150,7 +150,7 @@ def find_plane(scene: Scene, start: StartCurve, on_table: bool, met: bool) -> Pl
     if scene.environment.table is not None and not on_table and scene.effects.get("table", "auto") != "off":
         return Plane(np.eye(3), origin, "the cable does not stay on the table")
     if scene.effects.get("twist", "auto") == "on":
-        return Plane(np.eye(3), origin, "twist is asked for")
+        return Plane(np.eye(3), origin, "twist is switched on in the scene")
     if start.twisted and scene.effects.get("twist", "auto") != "off":
         return Plane(np.eye(3), origin, "the start is twisted")
     if on_table:
@@ -159,10 +159,10 @@ def find_plane(scene: Scene, start: StartCurve, on_table: bool, met: bool) -> Pl
 
 
 def rest_plane(scene: Scene, start: StartCurve) -> Plane:
-    """Return the plane of start, paths and forces, or of all but the paths where the start settles in it first.
+    """Return the plane of start, paths and forces; if the start settles in a plane first, of all but the paths.
 
-    They may lie in it but for rounding elsewhere (NEARLY), as of coordinates that were measured or turned. That takes a
-    cable out of it by less than any real one is bent, and is no side to go to.
+    They may deviate from it by rounding elsewhere (NEARLY), as coordinates that were measured or rotated do. That draws
+    the cable out of the plane by less than any real cable is bent, and does not decide to which side it goes.
     """
     for still in (False, True) if scene.shape.settle else (False,):
         nearly = flat_plane(scene, start, still=still, flat=NEARLY)
@@ -173,13 +173,14 @@ def rest_plane(scene: Scene, start: StartCurve) -> Plane:
 
 
 def flat_plane(scene: Scene, start: StartCurve, *, still: bool = False, flat: float = FLATNESS) -> Plane:
-    """Return the plane of start, paths and forces, whatever the cable may touch; all of space where they have none.
+    """Return the plane of start, paths and forces, whatever the cable may touch; all of space if they have none.
 
-    Of grasps that stand `still` only where they begin counts. So `flat` they have to lie, relative to what is
-    largest; and where that is more than FLATNESS, to what moves a free cable by its length within the horizon.
+    With `still`, only the first points of the paths count. `flat` is the allowed deviation relative to the largest
+    vector of each kind. If it is more than FLATNESS, velocities and forces are also compared with those that move a
+    free cable by its length within the horizon.
     """
     origin, length, mass = np.array(start.control_points[0]), scene.cable.length, scene.cable.mass
-    speed = length / cast(float, scene.horizon) if flat > FLATNESS else 0.0  # [m/s] within the horizon by its length
+    speed = length / cast(float, scene.horizon) if flat > FLATNESS else 0.0  # [m/s], its length within the horizon
     fall = speed**2 / length
     spread = [(start.control_points - origin) / length]
     if start.velocity is not None:
@@ -222,9 +223,9 @@ def flat_plane(scene: Scene, start: StartCurve, *, still: bool = False, flat: fl
 
 
 def _normal_of(vectors: Floats, flat: float) -> Floats:
-    """Return a unit vector (3,) across the largest of some vectors (k, 3) and the one that lies farthest off its line.
+    """Return a unit vector (3,) normal to the largest of the vectors (k, 3) and to the one farthest off its line.
 
-    Where they lie in one plane it is normal to that; where they lie in a line, but for a part `flat`, across it.
+    If they lie in one plane it is the normal of that. If they lie in a line, but for a part `flat`, it is across it.
     """
     squares = np.einsum("ij,ij->i", vectors, vectors)
     k = int(squares.argmax())
@@ -240,16 +241,16 @@ def _normal_of(vectors: Floats, flat: float) -> Floats:
 
 
 def turns_of(path: Path, times: int) -> Floats | None:
-    """Return the rotations (times, 3, 3) of a path at evenly spaced times, or None where it never turns."""
+    """Return the rotations (times, 3, 3) of a path at evenly spaced times, or None if it never turns."""
     if path.turn is not None and not any(path.turn[6:]):
         return None
     return path.rotation_at(np.linspace(0.0, path.duration, times))
 
 
 def _remembered_bends(start: StartCurve, flat: float) -> Floats:
-    """Return vectors (k, 3) along which the sections' memory bends the cable; an off-plane one where it is twisted.
+    """Return vectors (k, 3) along which the sections' memory bends the cable; all three axes if it is twisted.
 
-    What is smaller than a part `flat` of the largest is none.
+    Bends and twist smaller than a part `flat` of the largest value are ignored.
     """
     material = start.material
     assert material is not None
@@ -259,7 +260,7 @@ def _remembered_bends(start: StartCurve, flat: float) -> Floats:
         return np.zeros((1, 3))
     if np.abs(memory[:, 2]).max() > flat * scale:
         return np.eye(3)
-    # a flat curve carries its frame flat: all its bends lie in its plane where those at u = 0 do
+    # a flat curve carries its frame flat: all its bends lie in its plane if those at u = 0 do
     tangent = start(0.0, 1)[0] / np.linalg.norm(start(0.0, 1)[0])
     first = cast(Floats, material.director)
     second = np.cross(tangent, first)
@@ -269,7 +270,7 @@ def _remembered_bends(start: StartCurve, flat: float) -> Floats:
 
 
 def turned_about(tangent: Floats, director: Floats, angle: float) -> Floats:
-    """Return a director (3,), turned by an angle [rad] about the unit tangent (3,) that it is across."""
+    """Return a director (3,), turned by an angle [rad] about the unit tangent (3,) to which it is normal."""
     return math.cos(angle) * director + math.sin(angle) * np.cross(tangent, director)
 
 
@@ -290,6 +291,6 @@ def unit_across(normal: Floats) -> Floats:
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
-    """Return a x b of two vectors (3,); that of NumPy, which is for many, takes ten times as long."""
+    """Return a x b of two vectors (3,). NumPy's own, made for arrays of many, takes ten times as long."""
     (x, y, z), (u, v, w) = a.tolist(), b.tolist()
     return np.array([y * w - z * v, z * u - x * w, x * v - y * u])

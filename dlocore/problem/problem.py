@@ -1,4 +1,4 @@
-"""From a scene to the equations of its motion, before any grid: dimensions, effects, features, prescribed motion."""
+"""From a scene to the equations of its motion, before any grid: dimensions, effects, features."""
 
 import math
 from collections.abc import Mapping
@@ -40,13 +40,13 @@ from dlocore.spline import DEGREE
 
 Floats = NDArray[np.float64]
 
-LEAST_MASS = 1e-9  # of the true one, where inertia is off: it keeps rigid motion determined
+LEAST_MASS = 1e-9  # of the true mass, if inertia is off: it keeps rigid motion determined
 MOST_NODES = 4000  # of contact
-_SAG = 0.005  # of the diameter: by how much a cable comes nearer to something round between two of them
-_SEGMENTS = 800  # of the cable that its contact with itself looks at, where they are shorter than it is thick
-_STIFFENING = 10.0  # times that contact is made stiffer at once, at most
-_EDGES = 16.0  # of them on a diameter, where obstacles have edges
-_ON_TABLE, _OF_SPAN = 64.0, 4.0  # of them on the cable at least, and on a span of its spline, for a table
+_SAG = 0.005  # of the diameter: largest sag of a cable on something round between two contact nodes
+_SEGMENTS = 800  # of the cable for its contact with itself, if they are shorter than a diameter
+_STIFFENING = 10.0  # largest factor by which contact is stiffened at once
+_EDGES = 16.0  # contact nodes per diameter, if obstacles have edges
+_ON_TABLE, _OF_SPAN = 64.0, 4.0  # least contact nodes of a table, on the cable and on a span of its spline
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +57,12 @@ class Problem:
         scene: the scene.
         start: start curve [m].
         plane: coordinates of the centreline in the solve.
-        on_table: the cable lies on the table, which carries its weight.
-        lies_over: it lies on a table, where one strand may lie over another, though it may leave that as its sections
-            turn over.
+        on_table: whether the cable lies on the table all the time, which carries its weight.
+        lies_over: whether it lies on a table, where one strand may lie over another. It may still leave the table when
+            its sections turn over.
         choices: for each effect whether it is simulated, and why.
-        called_for: the effects that a result has called for, and why; "side": off the plane of the motion, by
-            a bow or off the table.
+        called_for: the effects that a result has called for, and why. "side" lets the cable leave the plane of the
+            motion, by a bow, or the table.
         inertia, drag, gravity, ...: the active effects, None where inactive.
     """
 
@@ -111,13 +111,13 @@ class Problem:
 
     @property
     def rests_as_it_begins(self) -> bool:
-        """Whether the scene takes the start as the stress-free shape, which another start would not be."""
+        """Whether the scene defines the start as the stress-free shape, so that another start changes that too."""
         rest = self.scene.cable.rest_shape
         return isinstance(rest, str) and rest == "initial"
 
     @cached_property
     def features(self) -> Features:
-        """Where along the cable knots are needed, but for sharp bends of the start."""
+        """Where along the cable knots are needed, without sharp bends of the start."""
         return find_features(self.scene)
 
     @cached_property
@@ -127,12 +127,12 @@ class Problem:
 
     @property
     def touches(self) -> bool:
-        """Whether the cable touches something, rubs on it or meets itself: forces with kinks."""
+        """Whether contact, friction or self-contact is simulated: forces with kinks."""
         return self.contact is not None or self.friction is not None or self.self_contact is not None
 
     @cached_property
     def kinks(self) -> int:
-        """Number of places inside where the angle of the sections may have a kink, as grasps hold directions there."""
+        """Number of inner places where grasps hold directions, so that the angle of the sections may have a kink."""
         if self.twist is None:
             return 0
         u, multiplicity = self.features.u, self.features.multiplicity
@@ -140,13 +140,13 @@ class Problem:
 
     @cached_property
     def rest_plane(self) -> Plane:
-        """The plane of start, paths and forces, or of all but the paths where the start settles in it first."""
+        """The plane of start, paths and forces; if the start settles in a plane first, of all but the paths."""
         return rest_plane(self.scene, self.start)
 
     @property
     def line(self) -> Self:
-        """The same without the angle of the sections: that of the centreline alone."""
-        return self if self.twist is None else self._untwisted  # itself it would keep alive until a search for garbage
+        """The problem of the centreline alone, without the angle of the sections."""
+        return self if self.twist is None else self._untwisted  # caching `self` would be a cycle for the collector
 
     @cached_property
     def _untwisted(self) -> Self:
@@ -159,7 +159,7 @@ class Problem:
 
     @cached_property
     def axes(self) -> tuple[int, ...]:
-        """(0, 1), (0, 1, 2) or (0, 1, 2, 3), from which the compiled kernels know the number of coordinates."""
+        """(0, 1), (0, 1, 2) or (0, 1, 2, 3): its type tells the compiled kernels the number of coordinates."""
         return tuple(range(self.nc))
 
     def coordinates(self, r: Floats, theta: Floats | None = None) -> Floats:
@@ -171,7 +171,7 @@ class Problem:
         return self._with_twist(self.plane.vectors(v), theta_rate)
 
     def _with_twist(self, x: Floats, theta: Floats | None) -> Floats:
-        """Return x (..., 2 or 3) with the fourth coordinate of an angle, or its rate, where there is twist."""
+        """Return x (..., 2 or 3), with the angle or its rate as fourth coordinate if there is twist."""
         if self.twist is None:
             return np.ascontiguousarray(x)
         turned = np.zeros(x.shape[:-1]) if theta is None else theta
@@ -184,12 +184,12 @@ class Problem:
         return np.asarray(flat.reshape((*q.shape[:-1], 4)))
 
     def mass_density(self) -> float:
-        """Return the coefficient of the mass matrix [kg/m]; where inertia is off a trace that fixes rigid motion."""
+        """Return the coefficient of the mass matrix [kg/m]; if inertia is off, a tiny one that fixes rigid motion."""
         return LEAST_MASS * self.scene.cable.linear_density if self.inertia is None else self.inertia.density()
 
     @cached_property
     def masses(self) -> Floats:
-        """Material coordinate of each point mass, and the length of cable that is as heavy, (k, 2) [m] (eq. 9a)."""
+        """Material coordinate of each point mass, and the length of cable of equal mass, (k, 2) [m] (eq. 9a)."""
         cable = self.scene.cable
         return np.array([(one.u, one.mass / cable.linear_density) for one in cable.point_masses]).reshape(-1, 2)
 
@@ -204,7 +204,7 @@ class Problem:
 
     @cached_property
     def keeps_history(self) -> bool:
-        """Whether a law reads what earlier steps left behind."""
+        """Whether a law reads the history of earlier steps."""
         return bool(self.laws[0][list(laws.READ_HISTORY)].any())
 
     @cached_property
@@ -214,7 +214,7 @@ class Problem:
 
     @cached_property
     def laws(self) -> tuple[NDArray[np.int64], Floats]:
-        """What `law_table` returns, for those who only read it."""
+        """The arrays of `law_table`, not copied: read them only."""
         active = np.zeros(laws.COUNT, np.int64)
         parameters = np.zeros((laws.COUNT + len(self.obstacles), laws.PARAMETERS))
         if self.obstacles:
@@ -242,16 +242,17 @@ class Problem:
                 values = effect.parameters()
                 parameters[row, : len(values)] = values
         if self.table is not None and self.contact is not None:
-            # so that a cable at the table's height is at rest there
+            # so that a cable at the table's height rests there
             parameters[laws.TABLE, 0] += self.contact.depth_under(max(0.0, -float(self.weight()[2])))
         return active, parameters
 
     def table_spacing(self, n_u: int) -> float:
-        """Return how close the nodes of contact with the table lie for `n_u` control points [m].
+        """Return the spacing of the nodes of contact with the table for `n_u` control points [m].
 
-        There is nothing to fall between, but where a cable strikes the table and unrolls on it each node comes down by
-        itself, which takes the more energy the farther they are apart. With twist beside obstacles they are as close as
-        those for obstacles: how evenly a bent cable is borne decides on when its sections turn over (scene 102:21).
+        A flat table can't pass between nodes. But when a cable strikes the table and unrolls on it, each node comes
+        down by itself, which dissipates more energy the farther they are apart. With twist and obstacles they are as
+        close as those for obstacles, because how evenly a bent cable is supported decides when its sections turn over
+        (scene 102:21).
         """
         if self.contact is None or self.table is None:
             return np.inf
@@ -259,11 +260,11 @@ class Problem:
         return apart if self.twist is None else min(apart, self.contact_spacing())
 
     def contact_spacing(self) -> float:
-        """Return how close the nodes of contact with obstacles lie [m]; infinite where there is none.
+        """Return the spacing of the nodes of contact with obstacles [m]; infinite if there are none.
 
-        Between nodes a cable that lies about something round comes nearer to it by _SAG of its diameter at most: on a
-        peg of 2 cm nodes may be 2.1 mm apart, farther they would hold a cable that slides. Over an edge it slides from
-        node to node unless they are much closer.
+        Between nodes a cable that lies around something round sags towards it by at most _SAG of its diameter. On a peg
+        of 2 cm nodes may be 2.1 mm apart; farther apart they would hold a cable that slides. Over an edge the cable
+        slides from node to node unless they are much closer.
         """
         if self.contact is None or not self.obstacles:
             return np.inf
@@ -272,7 +273,7 @@ class Problem:
         return max(closest, cable.length / MOST_NODES)
 
     def contact_cell(self) -> int:
-        """Return how many of those nodes one may stand for, away from edges."""
+        """Return how many of those nodes a single one may stand for, away from edges."""
         return max(1, int(self._round_spacing / self.contact_spacing())) if self._meets_edges else 1
 
     @property
@@ -283,16 +284,16 @@ class Problem:
 
     @property
     def _round_spacing(self) -> float:
-        """How close nodes lie on what is round or flat [m]."""
+        """Spacing of contact nodes on round or flat surfaces [m]."""
         diameter = self.scene.cable.diameter
         radii = [0.5 * diameter + o.radius for o in self.obstacles if not isinstance(o, Box)]
         return min(diameter, float(np.sqrt(8.0 * _SAG * diameter * min(radii, default=np.inf))))
 
     def strand_spacing(self) -> float:
-        """Return how close the nodes lie between which the cable's strands are straight to each other [m]; or infinite.
+        """Return the spacing of the self-contact nodes [m], between which strands count as straight; or infinite.
 
-        It is the same on every grid, as strands that strike each other a little elsewhere may soon be far apart. It is
-        half a diameter; of a thin cable, for which a share of its diameter is little, a whole one.
+        It is the same on every grid, because strands that strike each other at slightly different places may soon be
+        far apart. It is half a diameter, or up to a whole one for a thin cable, to limit the number of nodes.
         """
         if self.self_contact is None:
             return np.inf
@@ -300,7 +301,7 @@ class Problem:
         return max(min(diameter, max(0.5 * diameter, length / _SEGMENTS)), length / MOST_NODES)
 
     def stiffness_aside(self, pull: float = 0.0) -> float:
-        """Return about how stiff bending, weight and a pull [N] make the cable against what takes it aside [N/m^2]."""
+        """Return the approximate sideways stiffness of the cable by bending, weight and a pull [N]; [N/m^2]."""
         length = self.scene.cable.length
         bending = self.bend.bending_stiffness if self.bend else 0.0
         return bending / length**4 + (float(np.linalg.norm(self.weight())) + pull / length) / length
@@ -316,10 +317,10 @@ def pose(scene: Scene, called_for: Mapping[str, str] | None = None, *, at_rest: 
     Args:
         scene: the scene.
         called_for: effects that a result of this scene has called for, and the reason for each.
-        at_rest: only an equilibrium is asked for, see `with_side` and `reached`.
+        at_rest: whether only an equilibrium is wanted, see `with_side` and `reached`.
 
     Raises:
-        SceneError: the scene asks what no cable can follow, or switches off what the rest of it needs.
+        SceneError: no cable can follow the scene, or it switches off an effect that the rest of it needs.
     """
     instance("scene", scene, Scene, "a Scene")
     cable, environment = scene.cable, scene.environment
@@ -355,8 +356,8 @@ def pose(scene: Scene, called_for: Mapping[str, str] | None = None, *, at_rest: 
         for name, wanted in (("cable.rest_shape", bent), ("effects.plasticity", choices["plasticity"].active)):
             if wanted:
                 given = cable.rest_shape if bent else scene.effects.get("plasticity", "auto")
-                reason = "In space bends remembered by the sections turn with them"
-                raise SceneError(name, given, 'what it is with effects.twist "on" or "auto"', reason)
+                reason = "In space, bends that the sections remember turn with them, which needs twist"
+                raise SceneError(name, given, 'the same with effects.twist "on" or "auto"', reason)
 
     def active(name: str, present: bool = True) -> bool:
         return present and choices[name].active
@@ -429,14 +430,14 @@ def stiffer(problem: Problem, ratio: float) -> Problem:
 
 
 def stiffer_for(problem: Problem, deepest: float, speed: float = 0.0) -> Problem:
-    """Return the problem with contact about so much stiffer that what was `deepest` [m] will be as deep as is allowed.
+    """Return the problem with contact stiffer, so that a depth of `deepest` [m] becomes about the allowed one.
 
-    At once it is made _STIFFENING times as stiff at most, or as stiff as stops there what strikes with a `speed` [m/s]:
-    critically damped, it comes as deep as speed sqrt(mu/k)/e.
+    At once contact is made at most _STIFFENING times as stiff, or as stiff as needed to stop an impact with a `speed`
+    [m/s] at the allowed depth: critically damped, the depth of an impact is speed sqrt(mu/k)/e.
     """
     cable = problem.scene.cable
     allowed = DEEPEST * cable.diameter
-    # where strands strike each other, the depth goes only with the root of the stiffness
+    # for strands that strike each other, the depth goes only with the root of the stiffness
     ratio = min((1.5 * deepest / allowed) ** (1 if problem.self_contact is None else 2), _STIFFENING)
     contact = problem.self_contact or problem.contact
     assert contact is not None
@@ -445,11 +446,11 @@ def stiffer_for(problem: Problem, deepest: float, speed: float = 0.0) -> Problem
 
 
 def stiff_as_taut(problem: Problem) -> Problem | None:
-    """Return the problem with contact that holds a cable pulled taut around something, None where it has that, or none.
+    """Return the problem with contact stiff enough for a taut cable around something; None if it is so already.
 
-    By how much it is pulled is given: what it sinks in, it is stretched less. Contact of k = EA/(L D) takes about half
-    of that in an edge, less in anything round; a softer one takes it all, however much of it there is. So it is with a
-    loop that is pulled tight around itself.
+    Also None without contact. The displacement of the grippers is prescribed, so the deeper the cable sinks in, the
+    less it is stretched. Contact of k = EA/(L D) takes up about half of that at an edge, and less on anything round; a
+    much softer one takes up all of it. The same holds for a loop that is pulled tight around itself.
     """
     cable, contact = problem.scene.cable, problem.self_contact or problem.contact
     if contact is None:
@@ -459,7 +460,7 @@ def stiff_as_taut(problem: Problem) -> Problem | None:
 
 
 def firmer(problem: Problem, step: float) -> Problem:
-    """Return the problem with friction that gives way by as much as is in keeping with steps of `step` [s]."""
+    """Return the problem with the elastic slip of its friction adapted to steps of `step` [s]."""
     if problem.friction is None:
         return problem
     cable = problem.scene.cable
@@ -467,9 +468,9 @@ def firmer(problem: Problem, step: float) -> Problem:
 
 
 def _contact_stiffness(scene: Scene) -> float:
-    """Return a stiffness [N/m^2] under which weight and bending sink the cable in by half a per cent of its diameter.
+    """Return a contact stiffness [N/m^2] such that weight and bending press the cable in by 0.5 % of its diameter.
 
-    Bending: that of a tenth of the length, EI/(0.1 L)^3.
+    The bending force is that of a tenth of the length, EI/(0.1 L)^3.
     """
     cable = scene.cable
     weight = cable.linear_density * float(np.linalg.norm(cast(Floats, scene.environment.gravity)))
@@ -478,7 +479,7 @@ def _contact_stiffness(scene: Scene) -> float:
 
 
 def _is_bent(scene: Scene, start: StartCurve) -> bool:
-    """Tell whether the stress-free shape is bent or twisted, so that it matters how the sections are turned."""
+    """Return whether the stress-free shape is bent or twisted, so that it matters how the sections are turned."""
     rest, material = scene.cable.rest_shape, start.material
     if material is not None and bool(cast(Floats, material.memory).any()):
         return True

@@ -1,4 +1,4 @@
-"""Which effects a scene calls for, and the reason for each: from the scene, and from what a result has shown."""
+"""Which effects to simulate, and the reason for each: from the scene, and from what a result has shown."""
 
 import math
 from collections.abc import Mapping
@@ -20,14 +20,14 @@ from dlocore.words import in_mm
 
 Floats = NDArray[np.float64]
 
-SLOW = 30.0  # times the first natural period: so slow a motion goes through equilibria
-ROLL = 0.01  # [rad]: what a clamp turns its section by about the cable, from which on it is told how all are turned
-_ROLL_TIMES = 33  # at which it is looked for
+SLOW = 30.0  # times the first natural period: a motion this slow is quasi-static
+ROLL = 0.01  # [rad]: a clamp that turns its section by more about the cable calls for twist
+_ROLL_TIMES = 33  # times at which that turn is evaluated
 NEAR = 0.1  # of the length: an obstacle nearer than this to the cable and its way may be touched
 
 
 class Choice(NamedTuple):
-    """Whether an effect is simulated, and why in words."""
+    """Whether an effect is simulated, and why, in words."""
 
     active: bool
     reason: str
@@ -66,12 +66,12 @@ def choose(
     Args:
         scene: the scene.
         start: start curve.
-        dimensions: 2 where the motion is planar, else 3.
-        on_table: the cable lies on the table and moves in its plane.
-        lies_over: it lies there, though it may leave the plane.
-        leaves: why it does not, in words.
+        dimensions: 2 if the motion is planar, otherwise 3.
+        on_table: whether the cable lies on the table and moves in its plane.
+        lies_over: whether it lies there, though it may leave the plane.
+        leaves: why it does not stay in the plane of the table, in words.
         met: the obstacles that are simulated.
-        bent: its stress-free shape is bent or twisted.
+        bent: whether its stress-free shape is bent or twisted.
         called_for: effects that a result has called for, and the reason for each.
     """
     cable, environment = scene.cable, scene.environment
@@ -115,7 +115,7 @@ def choose(
 
 
 def _inertia(scene: Scene, start: StartCurve, on_table: bool) -> Choice:
-    """Choose inertia unless the motion is so slow that the cable goes through equilibria."""
+    """Choose inertia unless the motion is so slow that it is quasi-static."""
     cable, environment = scene.cable, scene.environment
     moves = [g.path for g in scene.grasps if isinstance(g.path, Move)]
     smooth = len(moves) > 0 and "linear" not in [m.profile for m in moves]
@@ -136,7 +136,7 @@ def _inertia(scene: Scene, start: StartCurve, on_table: bool) -> Choice:
 
 
 def _self_contact(scene: Scene, start: StartCurve, lies_over: bool) -> Choice:
-    """Choose contact of the cable with itself where two strands of the start are near each other."""
+    """Choose contact of the cable with itself if two strands of the start are near each other."""
     if lies_over:
         return _LIES_OVER
     diameter, control = scene.cable.diameter, np.ascontiguousarray(start.control_points)
@@ -149,12 +149,14 @@ def _self_contact(scene: Scene, start: StartCurve, lies_over: bool) -> Choice:
 
 
 def reached(scene: Scene, start: StartCurve, called_for: Mapping[str, str], at_rest: bool = False) -> tuple[int, ...]:
-    """Return the obstacles that the cable may touch: those near its start, or carried off with its grasps.
+    """Return the numbers of the obstacles that the cable may touch.
 
-    Every point of the cable follows its grasps about as far as they go; what a result shows to come near is called
-    for by it. A start that settles has come from where it was given: it may have touched all that the cable reaches
-    from the grasps that hold it, and one that is brought to rest (`at_rest`) all that it reaches from the paths of
-    those that hold it at some time.
+    These are the ones near the start, or near the start moved along with the grasps: every point of the cable follows
+    its grasps about as far as they go. If a result shows that the cable comes near others, that result calls for them.
+
+    A start that settles moves from where it was given. It may have touched every obstacle that the cable can reach from
+    the grasps that hold it. For an equilibrium (`at_rest`) these are all that it can reach from the paths of the
+    grasps that hold it at some time.
     """
     obstacles = scene.environment.obstacles
     switch = scene.effects.get("obstacles", "auto")
@@ -173,19 +175,19 @@ def reached(scene: Scene, start: StartCurve, called_for: Mapping[str, str], at_r
     if at_rest:
         near |= _in_reach(scene, start, rows, u)
     elif scene.shape.settle and holding:
-        away = np.array([distances(rows, start(g.u)).min(axis=0) for g in holding]) - radius  # of each from each grasp
+        away = np.array([distances(rows, start(g.u)).min(axis=0) for g in holding]) - radius  # (grasps, obstacles)
         near |= _all_reach(u, holding, away)
     return tuple(int(i) for i in np.flatnonzero(near))
 
 
 def _in_reach(scene: Scene, start: StartCurve, rows: Floats, u: Floats) -> NDArray[np.bool_]:
-    """Return which obstacles places u (k,) [m] reach, at some time, from the paths of all that holds the cable then.
+    """Return which obstacles places u (k,) [m] can reach, at some time, from the paths of all grasps that hold then.
 
-    Where a gripper closes later is known where it has waypoints, or is the first; else it is as far from what holds the
-    cable by then as the cable between them, at most.
+    The place where a gripper closes later is known if it has waypoints or is the first. Otherwise its distance from
+    each grasp that holds by then is at most the length of cable between the two.
     """
     grasps = sorted(scene.grasps, key=lambda g: g.start)
-    away: dict[Grasp, Floats] = {}  # of each obstacle from the path of a grasp, at least
+    away: dict[Grasp, Floats] = {}  # least distance of each obstacle from the path of a grasp
     for g in grasps:
         way = np.ascontiguousarray(_way(g, start))
         if g.start == grasps[0].start or isinstance(g.path, Waypoints):
@@ -204,13 +206,13 @@ def _in_reach(scene: Scene, start: StartCurve, rows: Floats, u: Floats) -> NDArr
 
 
 def _all_reach(u: Floats, holding: list[Grasp], away: Floats) -> NDArray[np.bool_]:
-    """Return which obstacles, `away` (grasps, obstacles) [m], any of the places u (k,) [m] reaches from all grasps."""
+    """Return which obstacles some place u (k,) [m] can reach from all grasps; `away` (grasps, obstacles) [m]."""
     along = np.abs(u[:, None] - np.array([g.u for g in holding]))
     return np.asarray((along[:, :, None] >= away).all(axis=1).any(axis=0))
 
 
 def _way(grasp: Grasp, start: StartCurve) -> Floats:
-    """Return points (k, 3) [m] on the path of a grasp, where it holds a start from the beginning."""
+    """Return points (k, 3) [m] on the path of a grasp, as if it held the start from the beginning."""
     return grasp.path.at(np.linspace(0.0, grasp.path.duration, 17), start(grasp.u)[0])
 
 
@@ -229,13 +231,13 @@ def _twist(scene: Scene, start: StartCurve, dimensions: int, bent: bool, plastic
     if plastic:
         return Choice(True, "bends that the sections remember turn with them")
     if damped:
-        return Choice(True, "internal damping acts on bends as the sections see them, which twist lets turn")
+        return Choice(True, "internal damping acts on bends in the frame of the sections, which twist turns")
     turned = turned_by_grasps(scene, start)
-    return Choice(bool(turned), turned or "nothing holds an orientation at two places, or turns it about the cable")
+    return Choice(bool(turned), turned or "no two grasps hold an orientation, and none turns it about the cable")
 
 
 def turned_by_grasps(scene: Scene, start: StartCurve) -> str:
-    """Return how grasps turn sections about the cable, or hold them against each other, in words; "" if they do not."""
+    """Return in words how grasps turn sections about the cable or hold them against each other, "" if they do not."""
     clamps = [g for g in scene.grasps if g.hold == "clamp"]
     if _held_together(clamps):
         return "two grasps hold the orientation of the sections"
@@ -243,7 +245,7 @@ def turned_by_grasps(scene: Scene, start: StartCurve) -> str:
 
 
 def _rolls(grasp: Grasp, start: StartCurve) -> bool:
-    """Tell whether a clamp turns its section about the cable: what closes later, and turns at all, may do so."""
+    """Return whether a clamp turns its section about the cable; one that closes later may do so if it turns at all."""
     path = grasp.path
     t = np.linspace(0.0, path.duration, _ROLL_TIMES)
     turned = path.rotation_at(t)
@@ -257,7 +259,7 @@ def _rolls(grasp: Grasp, start: StartCurve) -> bool:
 
 
 def _held_together(grasps: list[Grasp]) -> bool:
-    """Tell whether two of the grasps hold at the same time."""
+    """Return whether two of the grasps hold at the same time."""
     for i, a in enumerate(grasps):
         for b in grasps[:i]:
             if max(a.start, b.start) < min(a.release_time or np.inf, b.release_time or np.inf):

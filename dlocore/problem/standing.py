@@ -1,4 +1,4 @@
-"""What stands on the table: obstacles whose upright walls begin no higher than the middle of a cable lying there."""
+"""Obstacles that stand on the table: their upright walls begin no higher than the centreline of a cable lying there."""
 
 from collections.abc import Sequence
 
@@ -10,14 +10,14 @@ from dlocore.scene.scene import Scene
 
 Floats = NDArray[np.float64]
 
-_VERTICAL = 1e-9  # of 1, by which the axis of a wall may be off
+_VERTICAL = 1e-9  # by which the cosine of a wall's axis to the vertical may be below 1
 
 
 def obstacle_rows(scene: Scene, obstacles: Sequence[Obstacle]) -> Floats:
     """Return the rows (m, ROW) of obstacles of a scene, see `effects/distance.py`.
 
-    Upright walls that begin at the surface of the table, or up to the middle of a cable on it, go on below that by its
-    length: no cable gets under them, and what is in them is pushed out sideways.
+    Upright walls that begin at the surface of the table, or up to one radius above it, are extended downwards by the
+    length of the cable. So no cable gets under them, and a cable inside them is pushed out sideways.
     """
     rows = np.array([obstacle.row() for obstacle in obstacles])
     table, diameter = scene.environment.table, scene.cable.diameter

@@ -1,4 +1,4 @@
-"""Starts that come to rest on a straight line, as nothing keeps them bent."""
+"""Starts that come to rest on a straight line, because nothing keeps them bent."""
 
 import math
 from dataclasses import replace
@@ -15,21 +15,21 @@ from dlocore.spline import greville
 
 Floats = NDArray[np.float64]
 
-_EXACT = 1e-6  # of the length, or the sine of an angle: what is held this close to a line lies on it
-_LOOKS = 65  # along the cable
+_EXACT = 1e-6  # of the length, or the sine of an angle: a grasp this close to a line lies on it
+_LOOKS = 65  # places along the cable at which it is evaluated
 
 
 def straightened(scene: Scene, start: StartCurve, gravity: Floats) -> StartCurve | None:
-    """Return the straight line on which a start that settles could rest, or None where there is none.
+    """Return the straight line on which a start that settles could rest, or None if there is none.
 
-    It leads through what the grasps hold, along the directions that they hold, or hangs from the one at its end.
-    Between grasps it is strained evenly, beyond them not at all. Whether it is in equilibrium there, and a stable one,
-    is not asked.
+    It passes through the grasped points, along the held directions, or hangs from a single grasp at one end. Between
+    grasps it is strained evenly, beyond them not at all. Whether that is an equilibrium, and a stable one, is not
+    checked.
 
     Args:
         scene: the scene.
         start: start curve.
-        gravity: what a table under the cable leaves of it (3,) [m/s^2].
+        gravity: the part of gravity that a table under the cable does not carry (3,) [m/s^2].
     """
     held = sorted((g for g in scene.grasps if g.start == 0.0), key=lambda g: g.u)
     rest = scene.cable.rest_shape
@@ -43,7 +43,7 @@ def straightened(scene: Scene, start: StartCurve, gravity: Floats) -> StartCurve
         return None
     if any(t @ along < (1.0 - 0.5 * _EXACT**2) * math.sqrt(t @ t) for t in tangents):
         return None
-    # straight, the sections at the ends of a curve in space would be turned against each other otherwise
+    # straightening a curve in space between two clamps would turn the sections at its ends against each other
     if sum(g.hold == "clamp" for g in held) > 1 and _off_plane(start) > _EXACT * length:
         return None
     knots = np.concatenate([np.zeros(4), np.repeat(u[(u > 0.0) & (u < length)], 3), np.full(4, length)])
@@ -52,13 +52,13 @@ def straightened(scene: Scene, start: StartCurve, gravity: Floats) -> StartCurve
 
 
 def _direction(at: Floats, u: Floats, length: float, tangents: list[Floats], gravity: Floats) -> Floats | None:
-    """Return the direction (3,) of the line through what is held, None where nothing determines it.
+    """Return the direction (3,) of the line through the grasped points, None if nothing determines it.
 
     Args:
-        at: what is held (k, 3) [m].
-        u: where (k,) [m].
+        at: the grasped points (k, 3) [m].
+        u: their material coordinates (k,) [m].
         length: of the cable [m].
-        tangents: those that are held (3,).
+        tangents: the held directions, (3,) each.
         gravity: (3,) [m/s^2].
     """
     if len(at) > 1:
@@ -74,22 +74,22 @@ def _direction(at: Floats, u: Floats, length: float, tangents: list[Floats], gra
 
 
 def _places(x: Floats, u: Floats, at: Floats, along: Floats) -> Floats:
-    """Return where the places x (n,) of a line lie (n, 3) [m] that is held `at` (k, 3) [m] at u (k,) [m]."""
+    """Return the points (n, 3) [m] at coordinates x (n,) of a line that is held `at` (k, 3) [m] at u (k,) [m]."""
     beyond = np.minimum(x - u[0], 0.0) + np.maximum(x - u[-1], 0.0)
     return np.column_stack([np.interp(x, u, at[:, d]) for d in range(3)]) + np.outer(beyond, along)
 
 
 def _off_plane(start: StartCurve) -> float:
-    """Return about how far a curve leads out of the plane that is nearest to it [m]."""
+    """Return approximately how far a curve leads out of the plane nearest to it [m]."""
     control = start.control_points
     return float(np.linalg.svd(control - control.mean(axis=0), compute_uv=False)[2])
 
 
 def _is_free(scene: Scene, start: StartCurve, straight: StartCurve, at: Floats, held: Floats) -> bool:
-    """Tell whether nothing is in the way from a start to a straight line, and nothing that it lies on rubs.
+    """Return whether nothing is in the way from a start to a straight line, and no friction holds the cable.
 
-    On its way no place of the cable goes farther than the one that goes farthest, or lower than it can hang from what
-    is held `at` (k, 3) [m], at the material coordinates `held` (k,) [m].
+    On the way no place of the cable is taken to move farther than the one with the longest way between the two, nor
+    lower than it can hang from the points `at` (k, 3) [m] held at the coordinates `held` (k,) [m].
     """
     environment, switch = scene.environment, scene.effects.get
     u = np.linspace(0.0, scene.cable.length, _LOOKS)

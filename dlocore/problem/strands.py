@@ -9,15 +9,15 @@ from dlocore.kernels.strands import lengths_apart, nearest_of
 
 Floats = NDArray[np.float64]
 
-_MOST_PARTS = 1000  # of a cable whose strands are looked for
+_MOST_PARTS = 1000  # into which the cable is divided to find near strands
 
 
 def nearest_strands(knots: Floats, states: Floats, dimensions: int, diameter: float, within: float) -> float:
-    """Return the smallest distance of two strands [m] in the states of a motion, infinite where it is above `within`.
+    """Return the smallest distance of two strands [m] in the states of a motion, infinite if it is above `within`.
 
-    Strands a length s apart are at least s cos(T/2) apart in space where the cable turns by T < pi between them
-    (Schur), and the control polygon turns at least as much: most states need no closer look, and others only at strands
-    that lie far apart along the cable.
+    Strands that are a length s apart along the cable are at least s cos(T/2) apart in space if the cable turns by
+    T < pi between them (Schur), and the control polygon turns at least as much. So most states need no closer look, and
+    in the others only strands that are far apart along the cable do.
 
     Args:
         knots: (n + 4,) [m].
@@ -26,7 +26,7 @@ def nearest_strands(knots: Floats, states: Floats, dimensions: int, diameter: fl
         diameter: of the cable [m].
         within: largest distance of interest [m], less than `APART` diameters.
     """
-    knots = np.array(knots)  # those of a given start are read-only, for which the kernels are not compiled
+    knots = np.array(knots)  # those of a given start are read-only, and kernels are compiled for writable arrays
     apart = lengths_apart(states, knots, dimensions, 2.0 * float(np.arccos(within / (APART * diameter))))
     which = np.flatnonzero(apart < knots[-1])
     if len(which) == 0:

@@ -2,12 +2,12 @@
 
 It is the quadratic spline e on the knots of the grid with
 
-    int e phi_j du = sum_p w_p e_p phi_j(u_p)   for all quadratic basis functions phi_j,
+    int e phi_j du = sum_p w_p e_p phi_j(u_p)   for all quadratic basis functions phi_j.
 
-of which the b_i' are combinations, so that the forces on all control points are those of the e_p (docs/model.md,
-selective reduced integration). Where a force acts in a point a step is added, where a direction is held, with unit
-length, a force on phi_j(u_g). At an end whose direction is held e is what its gripper tells; else both are as large as
-leaves e least curved.
+The b_i' are combinations of these phi_j, so that the forces on all control points are those of the e_p (docs/model.md,
+selective reduced integration). Two terms are added: a step where a force acts at a point, and a force on phi_j(u_g)
+where a direction is held with unit length. Their sizes are those that make e least curved, except that at an end whose
+direction is held e is determined by the force of its gripper.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,19 +22,19 @@ from dlocore.spline import DEGREE
 
 Floats = NDArray[np.float64]
 
-_SAME = 1e-9  # of the largest singular value: what two sides of a place differ by where they are one
+_SAME = 1e-9  # of the largest singular value: smaller ones are the rounding between two equal sides of a place
 
 
 def told_ends(scene: Scene) -> list[float]:
-    """Return the ends [m] whose direction is held and whose gripper tells the strain there: no mass is between them."""
+    """Return the ends [m] at which a held direction's gripper force gives the strain: those without a point mass."""
     heavy = {mass.u for mass in scene.cable.point_masses}
     return [u for u in (0.0, scene.cable.length) if u not in heavy and u in _held(scene)]
 
 
 def balanced(scene: Scene, grid: Grid, u: Floats, ends: Sequence[float] = ()) -> Floats:
-    """Return the matrix (k, p + ends) that makes the axial strain at u (k,) [m] of what is known of it.
+    """Return the matrix (k, p + ends) that gives the axial strain at u (k,) [m] from the known strains.
 
-    That is the strain at the axial points (p,) of a grid and that at some of its `told_ends` (ends,) [m].
+    These are the strains at the axial points (p,) of a grid and at some of its `told_ends` (ends,) [m].
     """
     tables, knots, length = grid.tables, grid.knots[1:-1], float(grid.knots[-1])
     points, weights = gauss_points(np.array(grid.knots), *GAUSS_3)
@@ -58,18 +58,18 @@ def balanced(scene: Scene, grid: Grid, u: Floats, ends: Sequence[float] = ()) ->
     own, others = found[:, :count], found[:, count:]
 
     def read(at: Floats) -> tuple[Floats, Floats]:
-        """Return what the points and the other forces make of the strain at some places."""
+        """Return the matrices from the strains at the points, and from the added terms, to the strain at `at`."""
         there = _basis(knots, at)
         return there @ own, there @ others + np.hstack([np.zeros((len(at), len(sides))), steps(at)])
 
     of_points, of_forces = read(np.array(ends))
     to_ends = np.linalg.pinv(of_forces)
-    forces = np.hstack([-to_ends @ of_points, to_ends])  # that make of the strain at the ends what is told
-    free = np.linalg.qr(of_forces.T, "complete")[0][:, len(ends) :]  # what they may be besides
+    forces = np.hstack([-to_ends @ of_points, to_ends])  # which give the known strain at the ends
+    free = np.linalg.qr(of_forces.T, "complete")[0][:, len(ends) :]  # changes that leave it unchanged
     begins, ends_of = np.unique(knots)[:-1], np.unique(knots)[1:]
     curved = (ends_of - begins)[:, None] ** 2 * _basis(knots, 0.5 * (begins + ends_of), 2)
     left = curved @ (np.hstack([own, np.zeros((len(own), len(ends)))]) + others @ forces)
-    # the two sides of a held place may be the same but for rounding, of which no force is to be made
+    # the two sides of a held place may be the same up to rounding, which must not be turned into a force
     forces -= free @ np.linalg.pinv(curved @ others @ free, rcond=_SAME) @ left
     of_points, of_forces = read(u)
     strain = of_forces @ forces
@@ -78,10 +78,10 @@ def balanced(scene: Scene, grid: Grid, u: Floats, ends: Sequence[float] = ()) ->
 
 
 def at_points(scene: Scene, grid: Grid, strain: Callable[[Floats], Floats]) -> Floats:
-    """Return the strain at the axial points (p,) of a grid that bears what a `strain` along the cable does.
+    """Return the strain at the axial points (p,) of a grid that exerts the same forces as a `strain` along the cable.
 
-    `strain` takes places (k,) [m] and returns (k,). What is returned has the forces on all control points that it has,
-    and is otherwise as near to it as it can be.
+    `strain` takes coordinates (k,) [m] and returns (k,). The result has the same forces on all control points, and is
+    otherwise as near to `strain` as possible.
     """
     tables, knots = grid.tables, grid.knots[1:-1]
     points, weights = gauss_points(np.array(grid.knots), *GAUSS_3)
@@ -94,17 +94,14 @@ def at_points(scene: Scene, grid: Grid, strain: Callable[[Floats], Floats]) -> F
 
 
 def _held_sides(scene: Scene) -> list[float]:
-    """Return both sides of each place whose direction is held [m], which are not the same where the knot is triple.
-
-    An end has one.
-    """
+    """Return both sides of each place whose direction is held [m], an end's only one; they differ at a triple knot."""
     length = scene.cable.length
     sides = [[u] if u in (0.0, length) else [np.nextafter(u, 0.0), np.nextafter(u, length)] for u in _held(scene)]
     return [float(u) for of_one in sides for u in of_one]
 
 
 def _held(scene: Scene) -> list[float]:
-    """Return where a direction is held [m], rising, each place once."""
+    """Return the places where a direction is held [m], rising, each once."""
     return sorted({g.u for g in scene.grasps if g.hold != "point"})
 
 

@@ -1,4 +1,4 @@
-"""The time of a problem in parts: the knots that its events ask for, and the steps between them."""
+"""The time grid of a problem: knots at its events, and the steps between them."""
 
 from itertools import pairwise
 from typing import cast
@@ -12,15 +12,16 @@ from dlocore.scene.paths import Waypoints
 
 Floats = NDArray[np.float64]
 
-_LEAST = 8  # steps of a stretch
-_SHORTER = 64.0  # times, at most, where that makes more of them
+_LEAST = 8  # least steps of a stretch
+_SHORTER = 64.0  # times, at most, that the steps of a short stretch are shorter to make more of them
 
 
 def time_knots(problem: Problem, n_t: int) -> Floats | None:
-    """Return the time knots (n_t + 4,) [s] with a knot at every event, or None where n_t is too small for them.
+    """Return the time knots (n_t + 4,) [s] with a knot at every event, or None if n_t is too small for them.
 
-    Where the answer is a march waypoints have knots too if these are at most half of what is left, and nowhere closer
-    than even ones: a path through waypoints is then a spline on these knots. The least squares prefer even ones.
+    If the answer is a march, waypoints get knots too, provided that these are at most half of the remaining ones and
+    nowhere closer than even knots. A path through waypoints is then a spline on these knots. The least squares work
+    better with even knots.
     """
     found = {event.time: event.multiplicity for event in problem.events}
     quality = problem.scene.quality
@@ -34,7 +35,7 @@ def time_knots(problem: Problem, n_t: int) -> Floats | None:
 
 
 def _waypoints(problem: Problem, n_t: int) -> list[float]:
-    """Return the times [s] of the waypoints inside the horizon, or none where they are too many or too close."""
+    """Return the times [s] of the waypoints inside the horizon, or none if they are too many or too close."""
     horizon, led = problem.horizon, []
     for g in problem.scene.grasps:
         if isinstance(g.path, Waypoints):
@@ -52,20 +53,20 @@ def _waypoints(problem: Problem, n_t: int) -> list[float]:
 
 
 def smallest_n_t(problem: Problem) -> int:
-    """Return the least number of control points in time that has a knot at every event."""
+    """Return the least number of control points in time with which there is a knot at every event."""
     return max(5, 4 + sum(e.multiplicity for e in problem.events))
 
 
 def marks_of(problem: Problem) -> list[float]:
-    """Return the times [s] between which the motion is smooth: its beginning, its events and its end."""
+    """Return the times [s] between which the motion is smooth: the beginning, the events and the end."""
     return [0.0, *[e.time for e in problem.events], problem.horizon]
 
 
 def step_counts(marks: list[float], steps: int) -> list[int]:
-    """Return the time steps of each stretch between the marks, about `steps` in all, more where marks lie close.
+    """Return the time steps of each stretch between the marks: about `steps` in all, and more if marks lie close.
 
-    In a short stretch steps are up to `_SHORTER` times shorter than others, or it has `_LEAST`: still shorter ones
-    would leave of accelerations, and of forces with them, nothing but noise.
+    In a short stretch the steps are up to `_SHORTER` times shorter than elsewhere, or there are `_LEAST` of them. Even
+    shorter ones would drown accelerations, and forces with them, in noise.
     """
     if len(marks) == 2:
         return [steps]
@@ -74,7 +75,7 @@ def step_counts(marks: list[float], steps: int) -> list[int]:
 
 
 def step_times(marks: list[float], counts: list[int]) -> Floats:
-    """Return the times (steps + 1,) [s] of a march with so many steps between each two marks."""
+    """Return the times (steps + 1,) [s] of a march with `counts` steps between each two successive marks."""
     times = np.zeros(sum(counts) + 1)
     first = 0
     for (a, b), count in zip(pairwise(marks), counts, strict=True):

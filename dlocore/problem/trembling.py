@@ -1,4 +1,4 @@
-"""Paths through waypoints that tremble, as recorded ones do, faster than steps can see."""
+"""Paths through waypoints that tremble faster than the steps of a march resolve, as recorded ones may."""
 
 from typing import cast
 
@@ -12,11 +12,11 @@ Floats = NDArray[np.float64]
 
 
 def trembles(problem: Problem, step: float) -> float:
-    """Return how far a cable is taken by what steps of `step` [s] do not see of the paths of its grasps [m], at most.
+    """Return a bound on how far the cable is moved by what steps of `step` [s] miss of its grasps' paths [m].
 
-    That is how fast a path moves beside the way that it comes in a step, root mean square, for as long as a cable of
-    that length needs to swing: a stiff one goes on with the speed of its gripper, however small the way of that was. 0
-    where inertia is left out, as the cable only follows the way then.
+    It is the root mean square of a path's velocity less its mean over a step, times the period of a swing: a stiff
+    cable keeps the speed of its gripper, however short the gripper's own way was. It is 0 if inertia is left out,
+    because then only the way matters.
     """
     scene, most = problem.scene, 0.0
     if problem.inertia is None:
@@ -24,7 +24,7 @@ def trembles(problem: Problem, step: float) -> float:
     lasts = min(problem.horizon, scene.swing)
     for grasp in scene.grasps:
         path = grasp.path
-        if not isinstance(path, Waypoints) or path.profile != "spline":  # a program is no record
+        if not isinstance(path, Waypoints) or path.profile != "spline":  # a robot program is not a recorded path
             continue
         end = min(grasp.release_time or problem.horizon, problem.horizon) - grasp.start
         times = cast(Floats, path.times)[1:-1]

@@ -59,7 +59,7 @@ class Still:
         return np.broadcast_to(start, (len(t), 3))
 
     def rotation_at(self, t: Floats) -> Floats | None:
-        """Rotations since the grasp began at times `t`; (k, 3, 3), or None where it never turns."""
+        """Rotations since the grasp began at times `t`; (k, 3, 3), or None if it never turns."""
         return None
 
     def spin(self, t: Floats, tangents: Floats) -> Floats:
@@ -109,7 +109,7 @@ class Move(Checked):
         return start + s[:, None] * cast(Floats, self.displacement)
 
     def rotation_at(self, t: Floats) -> Floats | None:
-        """Rotations since the grasp began at times `t`; (k, 3, 3), or None where it never turns."""
+        """Rotations since the grasp began at times `t`; (k, 3, 3), or None if it never turns."""
         if self.rotation is None:
             return None
         rotation = cast(Floats, self.rotation)
@@ -237,7 +237,7 @@ class Waypoints(Checked):
         return self._spline(self._evenly(t))  # type: ignore[attr-defined]
 
     def rotation_at(self, t: Floats) -> Floats | None:
-        """Rotations since the grasp began at times `t`; (k, 3, 3), or None where it never turns."""
+        """Rotations since the grasp began at times `t`; (k, 3, 3), or None if it never turns."""
         return None if self.orientations is None else self._turned(t).as_matrix()
 
     def _turned(self, t: Floats) -> "Rotation":
@@ -287,7 +287,7 @@ def held_at(path: Path, t: Floats, start: Floats) -> Floats:
 
 
 def _share(profile: str, x: Floats) -> Floats:
-    """Return the share of the way that a profile has covered at x (k,), where x is 0 at its begin and 1 at its end."""
+    """Return the share of the way that a profile has covered at x (k,), where x is 0 at its start and 1 at its end."""
     x = np.clip(x, 0.0, 1.0)
     a, b, c, d, e = _PROFILES[profile]
     return np.asarray(x * (a + x * (b + x * (c + x * (d + x * e)))))

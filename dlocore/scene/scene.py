@@ -473,7 +473,7 @@ class Scene(Checked):
             name, far = _farthest(grasp.path)
             if not far <= most:
                 field = f"primitives[{i}].path.{name}"
-                raise SceneError(field, f"a way of {far:g} m", f"at most {most:g} [m] for this cable", MILLIMETRES)
+                raise SceneError(field, f"a distance of {far:g} m", f"at most {most:g} [m] for this cable", MILLIMETRES)
 
     @property
     def swing(self) -> float:
@@ -530,7 +530,7 @@ class Scene(Checked):
 
 
 def _farthest(path: Path) -> tuple[str, float]:
-    """Return the name of the field that sets how far a path goes, and its largest distance from its begin [m]."""
+    """Return the name of the field that sets how far a path goes, and its largest distance from its start [m]."""
     if isinstance(path, Move):
         return "displacement", float(np.linalg.norm(cast(Floats, path.displacement)))
     if isinstance(path, Waypoints):

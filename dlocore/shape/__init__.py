@@ -1,1 +1,1 @@
-"""Curves: how a cable lies at the start, fitted to points, ordered or as a mere cloud."""
+"""Start shapes: curves, and their fit to points, in order or as an unordered cloud."""

@@ -1,4 +1,4 @@
-"""Fit a cable's curve to what a vision system sees: points in order or not, 2D or 3D, noisy, with outliers."""
+"""Fit a cable's curve to the points of a vision system: in order or not, 2D or 3D, noisy, with outliers."""
 
 from dataclasses import dataclass, replace
 
@@ -18,8 +18,8 @@ from dlocore.spline import DEGREE
 Floats = NDArray[np.float64]
 
 LEAST = 4  # points
-MOST = 20_000  # points of a cloud: its order takes 0.3 s
-GROUPS = 250  # of a cloud: about as many points as a cable has places to bend
+MOST = 20_000  # points of an unordered cloud: ordering them takes 0.3 s
+GROUPS = 250  # to which a cloud is averaged: about as many points as a cable has places to bend
 REFITS = 3  # each without the outliers of the one before
 
 
@@ -29,9 +29,9 @@ class CloudFit:
 
     Attributes:
         curve: cubic spline in arclength with its fit errors [m].
-        measured_length: length of the curve before it was made as long as the cable [m].
+        measured_length: length of the curve before it was scaled to the cable [m].
         order: indices of the points along the cable (m,).
-        outliers: indices of the points that are not of it, rising.
+        outliers: indices of the points that do not belong to it, rising.
     """
 
     curve: StartCurve
@@ -53,12 +53,13 @@ def fit_cloud(
     Args:
         points: (n, 2 or 3) [m].
         ordered: whether they are in order along the cable.
-        length: of the cable [m]; absent: as it is measured.
-        start: near the cable's end at u = 0 [m], for unordered points.
-        remove_outliers: whether to leave out points that are not of the cable.
+        length: of the cable [m]; None: the measured one.
+        start: a point near the cable's end at u = 0 (3,) [m], for unordered points.
+        remove_outliers: whether to leave out points that do not belong to the cable.
 
     Raises:
-        SceneError: the points are too few, of no single curve, or of one that differs in length from the cable.
+        SceneError: the points are too few or too many, do not show a single curve, or show one whose length differs
+            from the cable's.
     """
     p = points_array("points", points)
     allowed, reason = "points along one smooth curve", "No curve can be fitted to them"
@@ -82,7 +83,7 @@ def _fitted(p: Floats, ordered: bool, length: float | None, start: Floats | None
         no_curve = _no_curve(len(kept), count)
         try:
             measured = _measured(seen)
-        except SceneError:  # about a length and points that are not the caller's, as that of the fit below
+        except SceneError:  # it names a length and points that are not the caller's, as does that of the fit below
             raise no_curve from None
         try:
             curve = start_curve(Points(points=seen), measured if length is None else length)
@@ -101,14 +102,14 @@ def _fitted(p: Floats, ordered: bool, length: float | None, start: Floats | None
 
 
 def _no_curve(kept: int, count: int) -> SceneError:
-    """Return the error of `count` points of which those that are `kept` have no fit."""
+    """Return the error for `count` points of which the `kept` ones can't be fitted."""
     given = f"{count} points" if kept == count else f"{count} points, of which {count - kept} would be left out"
     allowed = "points along one smooth curve, in their order if need be, or more of them, without outliers"
     return SceneError("points", given, allowed, "They show no single curve")
 
 
 def _averaged(p: Floats) -> Floats:
-    """Average points ordered by their place along the cable over groups, where noise hides their order in a group."""
+    """Average points, ordered along the cable, over groups; noise hides their order within a group."""
     if len(p) <= GROUPS:
         return p
     first = np.linspace(0, len(p), GROUPS + 1).astype(np.intp)
@@ -120,8 +121,8 @@ def _averaged(p: Floats) -> Floats:
 def _measured(p: Floats) -> float:
     """Return the length of the curve that ordered points show [m].
 
-    The chords between noisy points are too long; a smooth curve over them tells about how much, and a fit in its
-    arclength the rest.
+    The chords between noisy points are too long. A smooth curve over them gives a first estimate of the length, and a
+    fit in its arclength the final one.
     """
     middle = p - p.mean(axis=0)
     s = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(p, axis=0) ** 2).sum(axis=1)))])

@@ -15,24 +15,24 @@ from dlocore.spline import DEGREE
 
 Floats = NDArray[np.float64]
 
-MAX_LENGTH_MISMATCH = 0.10  # of the cable's length: beyond it the shape is another cable's, or a part of this one's
+MAX_LENGTH_MISMATCH = 0.10  # of the cable's length: with more, the shape is of another cable, or only part of this one
 SAME = 1e-6  # of the length: points closer than this are one point given twice
-MAX_GROUPS = 2000  # points are averaged down to about this many: then a group is a small part of a knot span
+MAX_GROUPS = 2000  # points are averaged down to about this many: a group is then a small part of a knot span
 MAX_SPANS = 160  # knot spans: three for each radius of a cable that turns eight full loops
-SPARSE = 40  # points: so few are far apart against their noise, so their order and spacing are not in doubt
-REFITS = 4  # of the parameter: measured, a fifth moves the curve by 1 % of the noise, and by 7 % in one of 100 cases
-NOISE = 0.002  # [m], or of a length above 1 m: what few points deviate from a smooth curve beyond it is shape
-END_NOISE = 3.0  # an end point lies within three deviations of the noise, so the cable's end does
-MARGIN = 0.05  # of the length: how far feet of noisy points may lie beyond the ends
+SPARSE = 40  # points: up to so many are far apart compared with their noise, so order and spacing are not in doubt
+REFITS = 4  # of the parameter: a fifth was measured to move the curve by 1 % of the noise, by 7 % in 1 case of 100
+NOISE = 0.002  # [m], or of a length above 1 m: larger deviations of few points from a smooth curve are shape
+END_NOISE = 3.0  # an end point, and so the cable's end, lies within three standard deviations of the noise
+MARGIN = 0.05  # of the length: how far the feet of noisy points may lie beyond the ends
 SPEED_ERROR = 3e-4  # at quarter points; between them it is at most twice that, below the 1e-3 strain of a taut cable
-SLOWEST = 1e-3  # of the chord's speed: where the parameter of a fit moves on and the curve doesn't, it is a cusp
-STEPS, MIN_STEPS = 16, 512  # of the arclength of a fit, a knot span and in all: its inverse is smooth to SPEED_ERROR
-STEP_BACK = 0.04  # of the size of the curve: steps that are shorter turn back by noise
-TURNED_BACK = -0.5  # the cosine of two steps in a row
-MISSED = 0.01  # of the length, by which a fit with fewer spans may miss the points in the mean
-MIN_SPANS = 8  # of a fit, at which even few points can show three bends
-MIN_UNIT_SPANS, MAX_UNIT_SPANS = 64, 4096  # beyond which a curve is too sharp for a cable, and is fitted with fewer
-KEPT = 64  # fits, each at most some 100 kB
+SLOWEST = 1e-3  # of the chord's speed: a curve that is slower in its parameter has a cusp
+STEPS, MIN_STEPS = 16, 512  # of the arclength, per knot span and least in all: its inverse is smooth to SPEED_ERROR
+STEP_BACK = 0.04  # of the size of the curve: shorter steps may turn back because of noise
+TURNED_BACK = -0.5  # cosine of two successive steps
+MISSED = 0.01  # of the length: a fit with fewer spans may miss the points by this much more on average
+MIN_SPANS = 8  # of a fit: enough for few points to show three bends
+MIN_UNIT_SPANS, MAX_UNIT_SPANS = 64, 4096  # a curve that needs more is too sharp for a cable, and is fitted with fewer
+KEPT = 64  # cached fits, each at most some 100 kB
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class PointFit:
 
     Attributes:
         curve: cubic spline in arclength on clamped knots, from 0 to its length [m].
-        length_given: length between the first and the last point, before the cable's length decided about the ends [m].
+        length_given: length between the first and the last point, before the ends were adjusted to the cable [m].
         at: arclength of each given point (n,) [m].
     """
 
@@ -53,31 +53,32 @@ class PointFit:
 def fit_points(points: Floats, length: float) -> PointFit:
     """Fit a curve to ordered points along a whole cable.
 
-    1. Take the length of the chords between the points as their first parameter. Among dense points noise makes it
-       many times too long, but evenly so; averaging points before was measured to change nothing.
-    2. Minimise sum |r(s_i) - p_i|^2 + lambda int k |r'''|^2 ds (`smooth`), s_i the arclength of point i.
+    1. Take the length of the chords between the points as their first parameter. For dense points noise makes it many
+       times too long, but evenly so. Averaging points before that was measured to change nothing.
+    2. Minimise sum |r(s_i) - p_i|^2 + lambda int k |r'''|^2 ds (`smooth`), where s_i is the arclength of point i.
     3. Project the points on the curve, measure its true arclength there, and fit again, more softly where it bends.
-    4. As far as noise leaves in doubt where the first and the last point lie on the curve, the cable's length decides.
+    4. Noise leaves some doubt about where the first and the last point lie on the curve. Within that doubt the cable's
+       length decides.
 
     Args:
-        points: in order (n, 3) [m], about their middle.
+        points: in order (n, 3) [m], relative to their middle.
         length: of the cable [m].
 
     Raises:
         SceneError: the curve differs in length from the cable by more than MAX_LENGTH_MISMATCH, fewer than three
-            points are distinct, or the curve is so sharp that only one which misses the points could be followed.
+            points are distinct, or the curve is so sharp that a curve which a cable can follow misses the points.
     """
     return _fit(np.asarray(points, dtype=np.float64).tobytes(), length)
 
 
 def forget_fits() -> None:
-    """Forget the fits that are kept, so that a prediction takes as long as the first from its points."""
+    """Clear the cached fits, so that a prediction takes as long as the first one from its points."""
     _fit.cache_clear()
 
 
 @lru_cache(maxsize=KEPT)
 def _fit(coordinates: bytes, length: float) -> PointFit:
-    """Fit as `fit_points` does; the last fits are kept, as planners predict many motions from one shape."""
+    """Fit as `fit_points` does. The last fits are cached, because planners predict many motions from one shape."""
     points = np.frombuffer(coordinates).reshape(-1, 3)
     distinct, which = _distinct(points, SAME * length)
     if len(distinct) < 3:
@@ -96,7 +97,7 @@ def _fit(coordinates: bytes, length: float) -> PointFit:
         missed = float(np.sqrt(((p - spline(x)) ** 2).sum(axis=1).mean()))
         most_missed = min(most_missed, missed + MISSED * length)
         if not _is_about(given, length) and _is_about(chords[-1], length):
-            continue  # the spline loops at a corner between points that tell of none
+            continue  # the spline makes a loop at a corner that the points do not show
         if not _is_about(given, length):
             break
         doubt = 2 * END_NOISE * missed
@@ -115,8 +116,10 @@ def _fit(coordinates: bytes, length: float) -> PointFit:
 def _smoothed(
     s: Floats, p: Floats, weight: Floats, spans: int, noise: float, most_noise: float
 ) -> tuple[BSpline, Floats, Floats, tuple[Floats, Floats]]:
-    """Return a spline through the points, their parameters on it and arclengths (n,) [m] from a guess of these, and
-    what `_arclength` says of it.
+    """Return a smooth spline through the points, starting from a guess `s` of their arclengths.
+
+    Returns:
+        The spline, the parameters of the points on it (n,), their arclengths (n,) [m], and its `_arclength`.
     """
     stiffness = np.ones(spans)
     for _ in range(REFITS):
@@ -134,9 +137,10 @@ def _smoothed(
 
 
 def _turns_back(points: Floats) -> int | None:
-    """Return the first of the points (n, 3) at which the way along them turns back by more than noise, or None.
+    """Return the index of the first point (n, 3) at which their path doubles back by more than noise, or None.
 
-    It does between two steps that are long against the curve, by more than a corner that a cable can follow.
+    It doubles back where two successive steps, both long compared with the size of the curve, turn by more than a
+    cable can follow.
     """
     kept = np.flatnonzero(np.concatenate([[True], np.any(np.diff(points, axis=0) != 0.0, axis=1)]))
     steps = np.diff(points[kept], axis=0)
@@ -148,7 +152,7 @@ def _turns_back(points: Floats) -> int | None:
 
 
 def _doubled_back(at: int | None) -> SceneError:
-    """Return the error of points whose way turns back at the point `at`, or that are too sharp elsewhere."""
+    """Return the error for points that double back at the point `at`, or, with None, bend too sharply somewhere."""
     allowed = (
         "points in order along a curve that a cable can follow, without outliers; dlocore.shape.cloud.fit_cloud, or "
         "POST /v1/shapes:fit, fits points without order (ordered false) or with outliers"
@@ -158,7 +162,7 @@ def _doubled_back(at: int | None) -> SceneError:
 
 
 def check_length(name: str, allowed: str, given: float, length: float, field: str = "cable.length") -> None:
-    """Raise SceneError on `name` unless a curve of length `given` [m] fits a cable of `length` [m], that of `field`."""
+    """Raise SceneError on `name` unless a curve `given` [m] long fits a cable of `length` [m], the value of `field`."""
     if not _is_about(given, length):
         reason = f"The cable is {length:.4g} m long; the two may differ by {MAX_LENGTH_MISMATCH:.0%}"
         if given > FARTHEST * length:
@@ -171,16 +175,16 @@ def _is_about(given: float, length: float) -> bool:
 
 
 def _distinct(p: Floats, distance: float) -> tuple[Floats, NDArray[np.intp]]:
-    """Return the points without repetitions of their predecessors (m, 3), and for each point which of them it is.
+    """Return the points without repetitions of their predecessors (m, 3), and for each point its index in these.
 
-    A repeated point is no second measurement: counted as one it would pass for a point without noise.
+    A repeated point is not a second measurement: counted as one it would look like a point without noise.
     """
     new = np.concatenate([[True], (np.diff(p, axis=0) ** 2).sum(axis=1) > distance**2])
     return p[new], np.cumsum(new) - 1
 
 
 def _share(p: Floats) -> Floats:
-    """Return the progress along the points (n,), from 0 to 1: half by their number, half by chord length."""
+    """Return the progress along the points (n,), from 0 to 1: the mean of that by number and that by chord length."""
     chord = _cumulated(p)
     return 0.5 * (np.arange(len(p)) / (len(p) - 1) + chord / chord[-1])
 
@@ -190,11 +194,11 @@ def _cumulated(p: Floats) -> Floats:
 
 
 def _averaged(p: Floats, share: Floats) -> tuple[Floats, Floats, Floats]:
-    """Average consecutive points over equal parts of their progress; points, progress and number in each group."""
+    """Return averages of consecutive points over equal parts of their progress: points, progress and number in each."""
     if len(p) <= MAX_GROUPS:
         return p, share, np.ones(len(p))
-    # An irrational number of parts about the middle: no regular spacing puts points on the boundaries, where rounding
-    # would decide, and reversed points fall into the same groups.
+    # An irrational number of parts, symmetric about the middle: no regular spacing puts points on the boundaries, where
+    # rounding would decide, and reversed points fall into the same groups.
     part = np.rint((share - 0.5) * (MAX_GROUPS - 0.38196601125))
     start = np.flatnonzero(np.diff(part, prepend=np.nan) != 0)
     number = np.diff(start, append=len(p)).astype(float)
@@ -202,7 +206,7 @@ def _averaged(p: Floats, share: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _noise(p: Floats) -> float:
-    """Return a robust estimate of the noise of a coordinate [m]: points against the chord of their neighbours."""
+    """Return a robust estimate of the noise of a coordinate [m], from points against the chord of their neighbours."""
     before, after = np.diff(p, axis=0)[:-1], np.diff(p, axis=0)[1:]
     a, b = np.sqrt((before**2).sum(axis=1)), np.sqrt((after**2).sum(axis=1))
     left = a / np.maximum(a + b, 1e-300)
@@ -212,7 +216,7 @@ def _noise(p: Floats) -> float:
 
 
 def _foot(spline: BSpline, x: Floats, p: Floats) -> Floats:
-    """Move parameters towards the feet of the points on the curve: one Newton step along the tangent."""
+    """Return parameters moved towards the feet of the points on the curve, by one Newton step along the tangent."""
     tangent = spline(x, 1)
     return x + ((p - spline(x)) * tangent).sum(axis=1) / np.maximum((tangent**2).sum(axis=1), SLOWEST**2)
 
@@ -220,8 +224,8 @@ def _foot(spline: BSpline, x: Floats, p: Floats) -> Floats:
 def _ends(s: Floats, noise: float) -> tuple[float, float]:
     """Return the arclength of the first and the last point, free of their noise [m].
 
-    One foot is as uncertain as its point, so where points are dense, a line through the first ones tells where the
-    first one is; no more of them than lie within four deviations of it, since their spacing is uncertain too.
+    A foot is as uncertain as its point. If points are dense, a line through the first few gives the place of the first
+    one. Only those within four standard deviations of it are used, because their spacing is uncertain too.
     """
 
     def end(v: Floats) -> float:
@@ -233,7 +237,7 @@ def _ends(s: Floats, noise: float) -> tuple[float, float]:
 
 
 def _arclength(spline: BSpline) -> tuple[Floats, Floats]:
-    """Return a grid of parameters with margins and the arclength there [m], 0 at parameter 0; Simpson's rule."""
+    """Return a grid of parameters with margins and the arclength there [m], 0 at parameter 0, by Simpson's rule."""
     span, steps = spline.t[-DEGREE - 1], max(STEPS * (len(spline.c) - DEGREE), MIN_STEPS)
     fine = np.linspace(-MARGIN * span, (1 + MARGIN) * span, 2 * steps + 1)
     speed = np.sqrt((spline(fine, 1) ** 2).sum(axis=1))
@@ -245,7 +249,8 @@ def _arclength(spline: BSpline) -> tuple[Floats, Floats]:
 def _unit_speed(spline: BSpline, measured: tuple[Floats, Floats], start: float, end: float) -> BSpline | None:
     """Return the piece of a curve, `measured` by `_arclength`, between two arclengths [m] as a spline in arclength.
 
-    Its spans are halved until | |r'| - 1 | <= SPEED_ERROR; None where the curve is too sharp for MAX_UNIT_SPANS.
+    Its spans are halved until | |r'| - 1 | <= SPEED_ERROR. None if the curve has a cusp or is too sharp for
+    MAX_UNIT_SPANS.
     """
     grid, along = measured
     speed = np.sqrt((spline(grid, 1) ** 2).sum(axis=1))

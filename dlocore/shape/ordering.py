@@ -1,11 +1,11 @@
-"""Order the points of a cable that a vision system gives as a mere cloud, and drop those that aren't of it.
+"""Order the points of a cable that a vision system gives as an unordered cloud, and drop those that don't belong to it.
 
 The cloud is thinned to a backbone: the means of balls of one radius, joined by a minimum spanning tree whose longest
 path is the cable. The radius grows from the spacing of the points until the tree is hardly more than that path, i.e.
-until the balls are wider than the noise. Every point is then ordered by where along the backbone it lies.
+until the balls are wider than the noise. Every point is then ordered by its place along the backbone.
 
 Limits: the cable must not cross itself, nor come closer to itself than about three times the noise or spacing of its
-points; a gap in view may be as wide as that too. What can't be ordered is refused, not guessed.
+points. A gap in view may be as wide as that, too. Points that can't be ordered are refused, not guessed.
 """
 
 from dataclasses import dataclass
@@ -22,14 +22,14 @@ from dlocore.errors import SceneError
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-MAX_BALLS = 600  # of the backbone: more show nothing more, and the tree takes their number squared
-GROWTH = 1.4  # of the radius from one try to the next
-WIDEST = 0.06  # of the size of the cloud: in wider balls any shape is a short path
-A_PATH = 0.97  # share of the points on or beside the longest path from which on the tree counts as a path
-LEAST_PATH = 0.85  # below it at every radius the points are of no single curve
+MAX_BALLS = 600  # of the backbone: more show no more detail, and the cost of the tree grows with their square
+GROWTH = 1.4  # factor on the radius from one try to the next
+WIDEST = 0.06  # of the size of the cloud: with wider balls any shape is a short path
+A_PATH = 0.97  # the tree counts as a path if this share of the points is on or beside its longest path
+LEAST_PATH = 0.85  # if the share is smaller at every radius, the points do not show a single curve
 BESIDE = 2.5  # radii from the path within which a ball is beside it, not on a branch
-WIDE_GAP = 8.0  # times the typical step: an edge of the tree that long leads to another thing
-LONELY = 7.0  # times the typical distance to the neighbours: such a point is no part of a curve
+WIDE_GAP = 8.0  # times the typical step: a longer edge of the tree leads to another object
+LONELY = 7.0  # times the typical distance to the neighbours: a point farther off is not part of a curve
 DEVIATIONS = 5.0  # standard deviations of the noise beyond which a point is an outlier
 SPIKE = 2.0  # detour over a point, relative to the way without it, that no cable takes in one step
 
@@ -40,7 +40,7 @@ class Order:
 
     Attributes:
         order: indices of the points along the cable (m,).
-        outliers: indices of the points that are not of it, rising.
+        outliers: indices of the points that do not belong to it, rising.
     """
 
     order: Indices
@@ -52,7 +52,7 @@ def order_points(points: Floats, start: Floats | None = None) -> Order:
 
     Args:
         points: in any order, noisy, with outliers.
-        start: near the cable's end at u = 0 [m]; absent: the end with the smaller x (then y, then z).
+        start: a point near the cable's end at u = 0 [m]; None: the end with the smaller x (then y, then z).
 
     Raises:
         SceneError: they don't lie along one open curve.
@@ -71,7 +71,7 @@ def order_points(points: Floats, start: Floats | None = None) -> Order:
 def without_spikes(points: Floats) -> Order:
     """Drop the outliers among ordered points (n, 3) [m]: points far off the line between their neighbours.
 
-    One point at a time, the farthest first, since a bad one makes its neighbours look bad too.
+    They are dropped one at a time, the farthest first, since a bad one makes its neighbours look bad, too.
     """
     kept = np.arange(len(points))
     while len(kept) > 4:
@@ -84,7 +84,7 @@ def without_spikes(points: Floats) -> Order:
 
 
 def _off_line(p: Floats) -> tuple[Floats, Floats]:
-    """Return how far each point is from the way without it [m], and how much longer the way over it is."""
+    """Return the distance of each point from the chord of its neighbours [m], and the way over it over that chord."""
     steps = _steps(p)
     chord = np.sqrt(((p[2:] - p[:-2]) ** 2).sum(axis=1))
     along = np.clip(steps[:-1] / np.maximum(steps[:-1] + steps[1:], 1e-300), 0.0, 1.0)
@@ -100,12 +100,12 @@ def _steps(p: Floats) -> Floats:
 
 
 def _cutoff(distance: Floats, floor: float) -> float:
-    """Return the distance beyond which a point is an outlier [m]: for the half-normal, the median is 0.67 sigma."""
+    """Return the distance beyond which a point is an outlier [m]; the median of the half-normal is 0.67 sigma."""
     return max(DEVIATIONS * float(np.median(distance)) / 0.6745, floor)
 
 
 def _in_company(points: Floats) -> Indices:
-    """Return the points that aren't far from all others (m,)."""
+    """Return the indices of the points that are not far from all others (m,)."""
     if len(points) < 6:
         return np.arange(len(points))
     distance = np.asarray(cKDTree(points).query(points, k=3)[0])[:, 1:].mean(axis=1)
@@ -116,7 +116,7 @@ def _backbone(points: Floats) -> Floats:
     """Return a polyline (m, 3) [m] along the middle of the points.
 
     Raises:
-        SceneError: their tree is no path at any radius.
+        SceneError: their tree is not a path at any radius, or they are all in one place.
     """
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     if not size > 0:
@@ -145,7 +145,7 @@ def _no_curve(why: str) -> SceneError:
 
 
 def _balls(points: Floats, radius: float) -> tuple[Floats, Floats]:
-    """Cover the points by balls; the means of the points in each (m, 3), and their number (m,)."""
+    """Cover the points by balls, and return the means of the points in each (m, 3) and their numbers (m,)."""
     tree = cKDTree(points)
     free = np.ones(len(points), dtype=bool)
     centres: list[Floats] = []
@@ -176,7 +176,7 @@ def _longest_path(centres: Floats, count: Floats, radius: float) -> tuple[Indice
 
 
 def _component_of_most(tree: csr_matrix, count: Floats) -> int:
-    """Return a node of the part of the forest that most points are in."""
+    """Return a node of the part of the forest that contains most points."""
     unseen, best, most = set(range(len(count))), 0, -1.0
     while unseen:
         node = next(iter(unseen))
@@ -202,7 +202,7 @@ def _path_to_farthest(tree: csr_matrix, node: int) -> Indices:
 
 
 def _project(points: Floats, path: Floats) -> tuple[Floats, Floats]:
-    """Return where along a polyline each point lies and how far from it [m]; its ends go on straight."""
+    """Return the place of each point along a polyline and its distance from it [m]; the ends are extended straight."""
     start, step = path[:-1], np.diff(path, axis=0)
     length = np.maximum(_steps(path), 1e-300)
     along = np.concatenate([[0.0], np.cumsum(length)])[:-1]

@@ -19,11 +19,11 @@ from dlocore.spline import DEGREE, greville, uniform_knots
 
 Floats = NDArray[np.float64]
 
-SPEED_RANGE = (0.5, 1.5)  # of |r'|: a coarse spline of a hairpin stays within, evenly spaced control points don't
+SPEED_RANGE = (0.5, 1.5)  # of |r'|: a coarse spline of a hairpin stays inside, evenly spaced control points don't
 SAME_ANGLE = 1e-9  # [rad]
 SAME_SPIN = 1e-6  # [rad/s]
-_SPUN = 8  # places in each span at which the spin of the sections is found
-_PLACES = 129  # at which a curve is looked at for how it turns
+_SPUN = 8  # places in each span at which the spin of the sections is computed
+_PLACES = 129  # places at which the turning of a curve is computed
 _ONE_SPAN = uniform_knots(4, 1.0)
 _THIRDS = np.linspace(0.0, 1.0, 4)[:, None]
 
@@ -51,21 +51,20 @@ class StartCurve(SplineCurve):
 
     Attributes:
         velocity: v(u) [m/s], or None at rest.
-        fit_rms: root mean square distance of the given points from the curve [m]; 0 where it is given exactly.
+        fit_rms: root mean square distance of the given points from the curve [m]; 0 if it was given exactly.
         fit_max: the largest of these distances [m].
-        fit_missed: root mean square of what neighbouring points share of theirs, which is no noise [m].
-        length_given: length of the curve, its strain taken off, before it was made as long as the cable [m].
-        ends_moved: by how much that moved the end that it moved farther [m]; 0 where the curve is given exactly.
-        theta: angle of the sections, a spline with control points (n, 1) [rad], or None where it is the same
-            everywhere.
-        theta_rate: its rate, a spline with control points (n, 1) [rad/s], or None where no section spins.
-        strain: places u (k,) [m], rising, and the axial strain there (k,), or None where there is none.
-        material: what the sections remember, or None where the scene's `rest_shape` tells.
-        bow: height of the bow without stress that a straight start was given to buckle by [m], see
+        fit_missed: root mean square of the part of them that neighbouring points share, which is not noise [m].
+        length_given: length of the curve without its strain, before it was scaled to the cable [m].
+        ends_moved: how far the scaling moved the end that it moved farther [m]; 0 if the curve was given exactly.
+        theta: angle of the sections, a spline with control points (n, 1) [rad], or None if it is the same everywhere.
+        theta_rate: its rate, a spline with control points (n, 1) [rad/s], or None if no section spins.
+        strain: coordinates u (k,) [m], rising, and the axial strain there (k,), or None if there is none.
+        material: what the sections remember, or None if the scene's `rest_shape` defines that.
+        bow: height of the stress-free bow that a straight start was given so that it buckles [m], see
             `problem/buckling.py`.
-        aside: that of the bow that a planar start was given out of its plane [m].
-        lean: angle about the tangent by which its sections are turned at u = 0 so that where grasps hold them they lie
-            as they did in the plane, in the mean [rad].
+        aside: height of the bow that a planar start was given out of its plane [m].
+        lean: angle about the tangent by which the section at u = 0 is turned, so that at the grasps the sections lie as
+            they did in the plane, on average [rad].
     """
 
     velocity: SplineCurve | None = None
@@ -90,7 +89,7 @@ class StartCurve(SplineCurve):
 
     @property
     def twisted(self) -> bool:
-        """Whether its sections are turned against each other or what they remember, or turn so."""
+        """Whether its sections are turned, or turn, against each other or against what they remember."""
         rate = self.theta_rate
         return self.theta is not None or (rate is not None and _turned(rate.control_points, SAME_SPIN, self.material))
 
@@ -103,8 +102,8 @@ class StartCurve(SplineCurve):
     def spin_at(self, u: Floats) -> Floats:
         """Return how fast the sections spin about their tangent (k,) [rad/s] at u (k,) [m], rising.
 
-        It is theta_t + f, where f is the spin of the frame without twist along the cable that theta is measured
-        against: f(0) = 0, f' = t . (t_t x r_uu) at unit speed (docs/model.md eq. 9).
+        It is theta_t + f. Here f is the spin of the frame without twist along the cable against which theta is
+        measured: f(0) = 0, f' = t . (t_t x r_uu) at unit speed (docs/model.md eq. 9).
         """
         if self.theta_rate is None:
             return np.zeros(len(u))
@@ -118,7 +117,7 @@ class StartCurve(SplineCurve):
 
     @cached_property
     def turning(self) -> float:
-        """Angle by which the tangent turns along the curve, to whichever side [rad]."""
+        """Total angle by which the tangent turns along the curve, whatever the direction [rad]."""
         tangents = self(np.linspace(0.0, self.knots[-1], _PLACES), 1)
         tangents /= np.linalg.norm(tangents, axis=1)[:, None]
         chords = np.linalg.norm(np.diff(tangents, axis=0), axis=1)
@@ -126,15 +125,16 @@ class StartCurve(SplineCurve):
 
 
 def _plain(x: Floats) -> Floats:
-    """Return x, or a copy of it, as an array of the one kind that the kernels are compiled for."""
+    """Return x, or a copy of it, as a C-contiguous writable array, as the kernels are compiled for."""
     return x if x.flags.c_contiguous and x.flags.writeable else np.array(x, order="C")
 
 
 def start_curve(shape: Shape, length: float) -> StartCurve:
-    """Return the curve that a cable of `length` [m] lies along at t = 0.
+    """Return the curve along which a cable of `length` [m] lies at t = 0.
 
     Raises:
-        SceneError: the points are of a curve more than 10 % longer or shorter than the cable.
+        SceneError: the points or control points are of a curve more than 10 % longer or shorter than the cable, or of
+            no curve that a cable can follow.
     """
     if isinstance(shape, Straight):
         return _straight(shape, length)
@@ -144,14 +144,14 @@ def start_curve(shape: Shape, length: float) -> StartCurve:
 
 
 def rest_curve(points: Floats, length: float) -> SplineCurve:
-    """Return the stress-free curve through points (n, 3) [m] of a cable of a length [m].
+    """Return the stress-free curve of a cable of a length [m] through points (n, 3) [m].
 
     Raises:
         SceneError: the points do not lie along a curve of about that length.
     """
     try:
         return start_curve(Points(points=points), length)
-    except SceneError as error:  # of the start's points, whose field is another
+    except SceneError as error:  # it names the points of the start: name the rest shape
         raise SceneError("cable.rest_shape", error.given, error.allowed, error.reason) from None
 
 
@@ -163,7 +163,7 @@ def _straight(shape: Straight, length: float) -> StartCurve:
 
 
 def _given(shape: ControlPoints, length: float) -> StartCurve:
-    from dlocore.shape.fit import check_length  # slow to import, as those below, and a straight cable needs none
+    from dlocore.shape.fit import check_length  # slow to import, as are those below; a straight cable needs none
 
     rows = cast(Floats, shape.control_points)
     control, angles = rows[:, :3].copy(), rows[:, 3:].copy()
@@ -199,22 +199,23 @@ def _given(shape: ControlPoints, length: float) -> StartCurve:
 
 
 def _turned(angles: Floats, same: float, material: Material | None) -> bool:
-    """Tell whether sections with these angles (n, 1), or rates, are turned against each other or what they remember."""
+    """Return whether sections with these angles (n, 1), or rates, are turned against each other or their memory."""
     return bool(np.ptp(angles) > same or (material is not None and np.abs(angles).max() > same))
 
 
 def _speed(curve: StartCurve) -> tuple[Floats, Floats]:
-    """Return |r'| without strain at the Gauss points of each knot span (k,), and their quadrature weights (k,) [m]."""
+    """Return |r'| without the strain at the Gauss points of the knot spans (k,), and their weights (k,) [m]."""
     u, width = gauss_points(_plain(curve.knots), *GAUSS_4)
     return np.sqrt((curve(u, 1) ** 2).sum(axis=1)) / (1.0 + curve.strain_at(u)), width
 
 
 def _fitted(shape: Points, length: float) -> StartCurve:
-    """Fit the points; what the noise at the ends leaves of the mismatch in length is scaled away about the middle.
+    """Fit the points, and scale the curve about its middle to the cable's length.
 
-    Scaling keeps the curve's shape and its unit speed. Where the points themselves are to scale and miss the ends
-    instead, it costs 10 to 16 mm rms for 5 % of a 1 m cable, as much as continuing the curve beyond its ends would
-    where the points are off scale; but the points are said to cover the whole cable.
+    The scaling removes the mismatch in length that noise at the ends does not explain. It keeps the curve's shape and
+    its unit speed. If the points are to scale but miss the ends of the cable, scaling costs 10 to 16 mm rms for 5 % of
+    a 1 m cable. Extending the curve beyond its ends would cost as much if the points are off scale; but the points are
+    defined to cover the whole cable.
     """
     from dlocore.shape.fit import fit_points
 
@@ -243,7 +244,7 @@ def _fitted(shape: Points, length: float) -> StartCurve:
 
 
 def _offsets(curve: SplineCurve, at: Floats, points: Floats) -> Floats:
-    """Return how far points are from a unit-speed curve (n, 3) [m], from parameters near their feet."""
+    """Return the offsets (n, 3) [m] of points from a unit-speed curve, given parameters near their feet."""
     foot = at + ((points - curve(at)) * curve(at, 1)).sum(axis=1)
     return points - curve(np.clip(foot, 0.0, curve.knots[-1]))
 
@@ -251,7 +252,10 @@ def _offsets(curve: SplineCurve, at: Floats, points: Floats) -> Floats:
 def _velocity(
     given: ArrayLike | None, length: float, at: Callable[[int], Floats], *, exact: bool
 ) -> SplineCurve | None:
-    """Return the velocity field of one velocity (3,) or of one at each of the points at `at(rows)` [m]."""
+    """Return the velocity field of one velocity (3,) for all, or of `rows` velocities at `at(rows)` [m].
+
+    `exact` interpolates them; otherwise they are smoothed.
+    """
     if given is None:
         return None
     velocity = cast(Floats, given)
@@ -274,9 +278,9 @@ def _velocity(
 def fit_to_knots(curve: SplineCurve, knots: Floats) -> Floats:
     """Return the control points (len(knots) - 4, 3) [m] of `curve` on clamped cubic `knots` [m], by least squares.
 
-    Exact for a straight cable, for the curve's own knots and for knots that contain them. Elsewhere the projection
-    keeps the shape and not the unit speed: on 9 control points and uniform knots a 1 m cable along one sine wave is
-    strained by 4 % in the middle of a span, on 13 by 0.9 %, on 25 by 0.07 %.
+    Exact for a straight cable, for the curve's own knots and for knots that contain them. Otherwise the projection
+    keeps the shape but not the unit speed: a 1 m cable along one sine wave is strained by 4 % in the middle of a span
+    on 9 control points with uniform knots, by 0.9 % on 13, and by 0.07 % on 25.
     """
     return np.asarray(on_knots(_plain(curve.knots), _plain(curve.control_points), _plain(knots), *GAUSS_4))
 
@@ -287,7 +291,7 @@ def velocity_to_knots(curve: StartCurve, knots: Floats) -> Floats | None:
 
 
 def spin_to_knots(curve: StartCurve, knots: Floats) -> Floats | None:
-    """Return the control points (n_u,) [rad/s] of the sections' spin on `knots` [m], or None where they have none."""
+    """Return the control points (n_u,) [rad/s] of the sections' spin on `knots` [m], or None if they have none."""
     if curve.theta_rate is None:
         return None
     from scipy.interpolate import make_lsq_spline

@@ -1,4 +1,4 @@
-"""A penalised cubic spline whose smoothness is chosen from the data, by banded linear algebra alone."""
+"""A penalised cubic spline whose smoothness is chosen from the data, using only banded linear algebra."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +12,8 @@ Floats = NDArray[np.float64]
 
 WEAKEST = 1e-6  # lambda, relative to the data: interpolation
 STRONGEST = 1e-2  # relative to the data and the sixth power of the spans: a parabola to 1 %, and well above rounding
-MOST_SPANS = 300  # with more the likelihood of the smoothest curves drowns in rounding
-SOFTEST = 0.03  # of the mean |r'''|^2, below which straight parts differ in nothing but their noise
+MOST_SPANS = 300  # with more, the likelihood of the smoothest curves drowns in rounding
+SOFTEST = 0.03  # of the mean |r'''|^2: below it straight parts differ only by their noise
 
 
 def smooth(
@@ -31,18 +31,18 @@ def smooth(
 
         (N - 3) (log v + D / (3 (N - 3) v)) + log det(A + lambda P) - (n - 3) log lambda,
 
-    D = sum w |y|^2 - b . c, (A + lambda P) c = b, with the variance v = D / (3 (N - 3)) where that is below
-    `most_noise`^2. Without this bound a hairpin seen by 30 points counts as noise of 10 mm on a smoother curve.
-    Cross-validation was tried: from 8 to 60 points it often takes noise for shape, with lengths up to 10 % too long.
+    D = sum w |y|^2 - b . c, (A + lambda P) c = b, with the variance v = D / (3 (N - 3)), or `most_noise`^2 if that is
+    less. Without this bound a hairpin seen by 30 points would count as noise of 10 mm on a smoother curve.
+    Cross-validation was tried: for 8 to 60 points it often takes noise for shape, with lengths up to 10 % too long.
 
     Args:
         x: parameters (N,), in any order, near [0, length] [m].
         y: data (N, 3).
         weight: number of points that each row stands for (N,).
         length: end of the last span [m].
-        spans: number of knot spans, of which `MOST_SPANS` are taken at most.
+        spans: number of knot spans; at most `MOST_SPANS` are used.
         most_noise: bound on the standard deviation of a coordinate of the data.
-        stiffness: k, relative, of each of no more than `MOST_SPANS` spans (spans,); None: 1.
+        stiffness: k, relative, of each span (spans,), at most `MOST_SPANS`; None: 1.
     """
     spans = min(spans, MOST_SPANS)
     n = spans + DEGREE
@@ -79,7 +79,7 @@ def normal_equations(k: NDArray[np.intp], basis: Floats, weight: Floats, y: Floa
 
 
 def _penalty(stiffness: Floats) -> Floats:
-    """Return the lower band (4, n) of the weighted squared third differences: int k |r'''|^2 but for a factor."""
+    """Return the lower band (4, n) of the weighted squared third differences: int k |r'''|^2 up to a factor."""
     n = len(stiffness) + DEGREE
     band = np.zeros((4, n))
     difference = (-1.0, 3.0, -3.0, 1.0)
@@ -90,7 +90,7 @@ def _penalty(stiffness: Floats) -> Floats:
 
 
 def _least(strengths: Floats, score: Floats) -> float:
-    """Return the lambda of least score, by a parabola in log lambda through the three best neighbours."""
+    """Return the lambda of least score, from a parabola in log lambda through the best one and its neighbours."""
     best = int(np.argmin(score))
     i = int(np.clip(best, 1, len(score) - 2))
     left, middle, right = score[i - 1 : i + 2]
@@ -101,7 +101,7 @@ def _least(strengths: Floats, score: Floats) -> float:
 
 
 def _solve(band: Floats, right: Floats) -> Floats:
-    """Return the solution of a banded system; zeros unless it is positive definite."""
+    """Return the solution of a banded system, or zeros if it is not positive definite."""
     factor, failed = dpbtrf(band, lower=1)
     if failed:
         return np.zeros_like(right)
@@ -110,7 +110,7 @@ def _solve(band: Floats, right: Floats) -> Floats:
 
 
 def _residual(band: Floats, right: Floats, x: Floats) -> Floats:
-    """Return right - A x of a symmetric band A, with more digits where the machine has them: third differences do."""
+    """Return right - A x of a symmetric band A, in long double, since third differences lose digits."""
     long, wide = x.astype(np.longdouble), band.astype(np.longdouble)
     left = right - wide[0][:, None] * long
     for k in range(1, len(band)):
@@ -122,9 +122,9 @@ def _residual(band: Floats, right: Floats, x: Floats) -> Floats:
 def stiffness_of(spline: BSpline) -> Floats:
     """Return the relative stiffness of each span (m,) that lets the next fit bend where this one does.
 
-    It is the mean of |r'''|^2 over its local value. A hairpin between straight legs is no noise on a straight cable:
-    where 60 points with 3 mm of noise show one of radius 20 mm, this brings the error from 12 to 7 mm; on evenly
-    bent curves it changes nothing.
+    It is the mean of |r'''|^2 over its local value. So a hairpin between straight legs is not taken for noise on a
+    straight cable: for a hairpin of radius 20 mm, shown by 60 points with 3 mm of noise, the error falls from 12 to
+    7 mm. On evenly bent curves it changes nothing.
     """
     bend = (np.diff(spline.c, DEGREE, axis=0) ** 2).sum(axis=1)
     bend = np.convolve(np.pad(bend, 1, mode="edge"), [0.25, 0.5, 0.25], "valid")

@@ -1,11 +1,11 @@
-"""Parallel transport of vectors: what a frame without spin does while the tangent turns."""
+"""Parallel transport of vectors: the motion of a frame without spin while the tangent turns."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-_OPPOSITE = -0.999999  # cosine below which tangents are reversed: no one rotation is the smallest
+_OPPOSITE = -0.999999  # cosine below which tangents count as reversed: the smallest rotation is not unique
 
 
 def transported(before: Floats, after: Floats, x: Floats) -> Floats:

@@ -220,7 +220,7 @@ def test_what_is_wrong_with_the_facts_of_a_table_is_named(tmp_path: Path, facts:
 def test_a_table_without_its_facts_tells_which_file_is_missing(tmp_path: Path) -> None:
     path = written(tmp_path, rows())
     path.with_suffix(".json").unlink()
-    with pytest.raises(SceneError, match=r"^table\.csv: got no table\.json beside it"):
+    with pytest.raises(SceneError, match=r"^table\.csv: got no table\.json in the same folder"):
         load_recording(path)
 
 

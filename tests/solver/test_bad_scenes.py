@@ -212,7 +212,9 @@ def test_bad_scene_is_refused_by_the_name_of_its_field(field, make):
 
 def test_what_is_as_large_as_in_millimetres_is_told_of_as_such():
     far = Move(displacement=(0.0, 500.0, 0.0), duration=1.6)
-    with pytest.raises(SceneError, match=r"a way of 500 m\. .* looks like millimetres\. Allowed: at most 100 \[m\]"):
+    with pytest.raises(
+        SceneError, match=r"a distance of 500 m\. .* looks like millimetres\. Allowed: at most 100 \[m\]"
+    ):
         scene(grasps=(Grasp(u=0.3, path=far),))
     with pytest.raises(SceneError, match="looks like millimetres"):
         scene(quality=Quality(target_error=2.0))

@@ -13,7 +13,7 @@ from tests.solver.scenes import Floats, cable
 
 MOVED = (
     "the start is moved by up to {:g} mm from where it was given, "
-    "to the first waypoints of its grippers, on to the table, or out of what it was in"
+    "to meet the first waypoints of its grippers, to lie on the table, or to be outside obstacles"
 )
 UP = np.array([0.0, 0.05, 0.0])
 ROUGH = Environment(drag=0.1, table=Table(friction=0.3))
