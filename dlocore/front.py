@@ -74,9 +74,9 @@ def predict(
         cancelled: called between iterations; the solve stops if it returns True.
         cost: what solves cost on this machine (`dlocore.calibration.stored_cost`). A solve with a time budget then
             begins with a grid that fits the budget; without `cost` it begins with the coarsest.
-        keep_grid: True sets `keep_grid` of the scene's `quality` for this solve. Otherwise, if the estimated error on
-            a given grid exceeds 1 % of the length, or a solve on it does not converge, finer grids or a march are
-            tried. If they do better they are the answer, and `message` says so.
+        keep_grid: True keeps the answer of a given grid even if the scene's `quality` does not ask for that. If neither
+            does, finer grids or a march are tried when the estimated error on a given grid exceeds 1 % of the length,
+            or a solve on it does not converge. If they do better they are the answer, and `message` says so.
 
     Returns:
         The prediction. Not converging is a status, not an exception.

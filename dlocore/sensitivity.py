@@ -150,7 +150,7 @@ def beside(known: KnownMotion, problem: Problem, grid: Grid) -> tuple[Floats, Fl
     """
     states = np.empty_like(known.motion.states)
     if problem.nc != states.shape[2]:
-        raise ValueError("the motion with the changed parameter has other effects, or leaves the plane")
+        raise ValueError("the motion with the changed parameter has other effects, or leaves its plane")
     states[0] = grid.start
     times = known.motion.times.copy()
     active, parameters = problem.law_table()
@@ -174,7 +174,7 @@ def beside(known: KnownMotion, problem: Problem, grid: Grid) -> tuple[Floats, Fl
             grid.tables, active, parameters, history, applied, entry.held.elimination, entry.offsets,
         )  # fmt: skip
         if not left <= _STRAYED * length:
-            raise ValueError("the motion with the changed parameter differs too much, for example leaves the plane")
+            raise ValueError("the motion with the changed parameter differs too much, for example is in another plane")
         velocity = entry.velocity(states[0], states[1], h, times[1]) if first == 0 else velocity
     return states, times, velocity
 

@@ -225,7 +225,7 @@ def test_what_is_as_large_as_in_millimetres_is_told_of_as_such():
 def test_of_too_few_control_points_it_is_told_how_many_knots_are_needed():
     grasps = (Grasp(u=0.0, path=UP), Grasp(u=0.3, path=UP), Grasp(u=0.6, hold="tangent", path=UP))
     with pytest.raises(
-        SceneError, match=r"need 3 knots inside .*\(two where a direction is held\)\. Allowed: at least 7"
+        SceneError, match=r"need 3 knots inside .*\(two for a grasp that holds a direction\)\. Allowed: at least 7"
     ):
         predict(scene(grasps=grasps, quality=Quality(n_u=5, n_t=13)))
 

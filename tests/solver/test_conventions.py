@@ -70,7 +70,7 @@ def test_a_late_path_whose_times_begin_at_its_grasp_time_is_asked_about() -> Non
     path = Waypoints(times=[1.0, 2.0], positions=PLACE[:2])
     (note,) = notes(path, grasp_time=1.0)
     assert note.startswith("primitives[1].path.times begin at 1 s, as grasp_time")
-    assert "it waits until 2 s" in note
+    assert "the gripper waits until 2 s" in note
 
 
 def test_one_that_begins_at_once_or_waits_for_another_time_is_not() -> None:

@@ -200,5 +200,5 @@ def test_predictions_make_no_garbage_that_only_a_search_finds():
 
 @pytest.mark.parametrize("scenes", [None, scene(0.2)], ids=["None", "one scene"])
 def test_what_is_no_list_of_scenes_is_refused_by_name(scenes):
-    with pytest.raises(SceneError, match=r"scenes: got .*Allowed: scenes one after the other"):
+    with pytest.raises(SceneError, match=r"scenes: got .*Allowed: a list or another iterable of scenes"):
         predict_many(scenes)

@@ -423,6 +423,6 @@ def test_what_steps_err_by_is_measured_again_where_more_points_have_moved_the_su
     )
     found = predict(scene)
     assert found.status == "converged"
-    assert "with another bow it goes sooner or later" in found.message
+    assert "with another bow the motion turns aside earlier or later" in found.message
     assert found.accuracy.error_estimate < 2e-3
     assert found.surface([0.5], [1.2])[0, 0, 1] == pytest.approx(0.0163, abs=2.0 * found.accuracy.error_estimate)
