@@ -1,4 +1,4 @@
-"""The JSON contract: what goes in, what comes out, and the way to and from the solver's data."""
+"""The JSON contract: requests, answers, and their conversion to and from the solver's data."""
 
 from app.schemas.convert import Motion, to_scene
 from app.schemas.describe import from_scene

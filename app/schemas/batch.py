@@ -18,14 +18,15 @@ class _Batch(Model):
     like: RunId | None = Field(default=None, description=LIKE, examples=[None])
     order: Literal["index", "finished"] = Field(
         default="index",
-        description="Lines in the order of the scenes, each as soon as all before it are done; or as they finish.",
+        description="Order of the lines: `index`, that of the scenes, each line as soon as all before it are done; or "
+        "`finished`, as the scenes finish.",
         examples=["index"],
     )
     fields: list[OptionalField] = Field(
         default=list(OPTIONAL_FIELDS),
         max_length=len(OPTIONAL_FIELDS),
-        description="What each result has besides `id`, `state`, `created`, `status`, `message`, `accuracy` and "
-        "`links`; what is left out is not worked out. A stored run has everything.",
+        description="Parts of each result, in addition to `id`, `state`, `created`, `status`, `message`, `accuracy` "
+        "and `links`; the other parts are not computed. A stored run has all of them.",
         examples=[["surface", "grasps"]],
     )
 
@@ -36,13 +37,13 @@ class ScenesBatch(_Batch):
     scenes: list[Any] = Field(
         min_length=1,
         max_length=_MOST,
-        description="Requests as for `POST /v1/predictions`. A wrong one gives a line with a problem.",
+        description="Requests as for `POST /v1/predictions`. An invalid one gives a line with a problem.",
         examples=[[PAPER]],
     )
 
 
 class PrimitivesBatch(_Batch):
-    """One scene with many ways to move the cable."""
+    """One scene with many lists of primitives, that is, many ways to move the cable."""
 
     scene: dict[str, Any] = Field(
         description="A request as for `POST /v1/predictions`; its `primitives` are replaced.",
@@ -51,7 +52,7 @@ class PrimitivesBatch(_Batch):
     primitives: list[Any] = Field(
         min_length=1,
         max_length=_MOST,
-        description="Lists of primitives, one for each prediction. A wrong one gives a line with a problem.",
+        description="Lists of primitives, one for each prediction. An invalid one gives a line with a problem.",
         examples=[[PAPER["primitives"]]],
     )
 
@@ -77,7 +78,7 @@ class BatchRequest(RootModel):
         return value
 
     def scenes(self) -> list[Any]:
-        """Return the requests, as data."""
+        """Return the requests as data."""
         if isinstance(self.root, ScenesBatch):
             return self.root.scenes
         return [{**self.root.scene, "primitives": primitives} for primitives in self.root.primitives]
@@ -88,7 +89,7 @@ def _some_optional(schema: dict[str, Any]) -> None:
 
 
 class BatchResult(PredictionResponse):
-    """A predicted motion, with those `fields` that the batch asks for."""
+    """A predicted motion with the `fields` that the batch requests."""
 
     model_config = ConfigDict(json_schema_extra=_some_optional)
 
@@ -96,12 +97,12 @@ class BatchResult(PredictionResponse):
 class BatchLine(BaseModel):
     """One line of the answer: `result` or `problem`."""
 
-    index: int = Field(description="Which scene, from 0.", examples=[0])
+    index: int = Field(description="Index of the scene, from 0.", examples=[0])
     status: str = Field(
-        description="That of the prediction, e.g. `converged`; `failed` where there is none.", examples=["converged"]
+        description="Status of the prediction, e.g. `converged`; `failed` if there is none.", examples=["converged"]
     )
     result: BatchResult | None = Field(default=None, description="The prediction.")
-    problem: ProblemDocument | None = Field(default=None, description="Why there is none.")
+    problem: ProblemDocument | None = Field(default=None, description="Why there is no prediction.")
 
 
 def _swept(y: float) -> list[dict[str, Any]]:

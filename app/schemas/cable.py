@@ -26,7 +26,7 @@ def _yield(what: str, example: float) -> Any:
 
 
 class PointMassModel(Model):
-    """A connector, plug or clip in one place of the cable: weight and inertia without size, drag or rotation."""
+    """A connector, plug or clip at one point of the cable: weight and inertia without size, drag or rotation."""
 
     u: Coordinate
     mass: Number = Field(ge=0.0, le=1e4, description="Mass [kg].", examples=[0.02])
@@ -35,14 +35,15 @@ class PointMassModel(Model):
 class CableModel(Model):
     """A cable of round section. `length`, `diameter` and `linear_density` are required unless `preset` gives them.
 
-    Give the stiffnesses themselves, or the moduli and the solid round section gives them: EA = E pi D^2/4,
-    EI = E pi D^4/64, GJ = G pi D^4/32. That is right for solid rods only. Strands slide on each other: by the
-    modulus of copper 6 mm have an EI of 7 N m^2, measured wires of that size have 1e-4 to 1e-3.
+    Give either the stiffnesses or the moduli. Moduli are converted as for a solid round section: EA = E pi D^2/4,
+    EI = E pi D^4/64, GJ = G pi D^4/32. This is right for solid rods only, because the strands of a cable slide on each
+    other: with the modulus of copper, a diameter of 6 mm gives an EI of 7 N m^2; measured wires of that size have 1e-4
+    to 1e-3.
     """
 
     preset: str | None = Field(
         default=None,
-        description="Name of a preset (`GET /v1/cables`); fields given beside it override its values.",
+        description="Name of a preset (`GET /v1/cables`); other fields given here override its values.",
         examples=list(PRESETS)[:2],
     )
     length: Number | None = Field(
@@ -50,11 +51,11 @@ class CableModel(Model):
     )
     diameter: Number | None = _positive("Diameter D, at most half the length", "m", 0.005, 500.0)
     linear_density: Number | None = _positive("Mass per length", "kg/m", 0.05, 1e4)
-    bending_stiffness: Number | None = _positive("EI", "N m^2", 1e-3)
-    axial_stiffness: Number | None = _positive("EA", "N", 640.0)
-    torsional_stiffness: Number | None = _positive("GJ", "N m^2", 1e-3)
-    youngs_modulus: Number | None = _positive("E, gives EA and EI where they are absent", "Pa", 2e7)
-    shear_modulus: Number | None = _positive("G, gives GJ where it is absent", "Pa", 7e6)
+    bending_stiffness: Number | None = _positive("Bending stiffness EI", "N m^2", 1e-3)
+    axial_stiffness: Number | None = _positive("Axial stiffness EA", "N", 640.0)
+    torsional_stiffness: Number | None = _positive("Torsional stiffness GJ", "N m^2", 1e-3)
+    youngs_modulus: Number | None = _positive("Young's modulus E; gives EA and EI if they are absent", "Pa", 2e7)
+    shear_modulus: Number | None = _positive("Shear modulus G; gives GJ if it is absent", "Pa", 7e6)
     bending_damping: Number = Field(
         default=0.0, ge=0.0, description="Internal damping on the rate of curvature [N m^2 s].", examples=[1e-4]
     )
@@ -66,22 +67,22 @@ class CableModel(Model):
         ge=0.0,
         description=(
             "Internal damping on the rate of the axial strain [N s]; absent: 2 L/pi sqrt(mu EA), which damps the "
-            "slowest wave of stretch critically; 0: waves of stretch ring on."
+            "slowest stretch wave critically; 0: stretch waves keep ringing."
         ),
         examples=[3.6],
     )
     yield_strain: Number | None = _yield(
-        "Bending strain of the outermost fibre at which the cable yields, eps_M: the curvature 2 eps_M/D", 0.01
+        "Bending strain eps_M of the outermost fibre at which the cable yields, at a curvature of 2 eps_M/D", 0.01
     )
     yield_twist: Number | None = _yield(
-        "Shear of the outermost fibre at which the cable yields in twist: the twist rate 2 eps_M/D", 0.02
+        "Shear eps_M of the outermost fibre at which the cable yields in twist, at a twist rate of 2 eps_M/D", 0.02
     )
     yield_stretch: Number | None = _yield("Axial strain at which the cable yields", 0.005)
     memory_rate: Number | None = Field(
         default=None,
         gt=0.0,
         le=1e9,
-        description="Rate at which a strain beyond yield is remembered, k_eps [1/s]; given with a yield strain only.",
+        description="Rate k_eps at which a strain beyond yield is remembered [1/s]; only with a yield limit.",
         examples=[50.0],
     )
     hardening: Number = Field(
@@ -94,14 +95,14 @@ class CableModel(Model):
     rest_shape: RestShape = Field(
         default="straight",
         description=(
-            "The stress-free shape: `straight`, `initial` (that of the start shape) or points in order along the cable,"
-            " 2D or 3D [m]."
+            "The stress-free shape: `straight`, `initial` (the start shape) or points in order along the cable, 2D or "
+            "3D [m]."
         ),
         examples=["straight"],
     )
     point_masses: list[PointMassModel] = Field(
         default=[],
         max_length=MAX_POINT_MASSES,
-        description="What else hangs on the cable, as a connector at its end.",
+        description="Parts attached to the cable, such as a connector at its end.",
         examples=[[{"u": 1.0, "mass": 0.02}]],
     )

@@ -1,4 +1,4 @@
-"""Everything that is wrong with a scene, where converting it would stop at the first fault."""
+"""Find everything that is wrong with a scene; its conversion alone would stop at the first fault."""
 
 import re
 from collections.abc import Callable, Iterable
@@ -13,15 +13,16 @@ from dlocore.errors import within
 from dlocore.shape.shape import start_curve
 
 _NUMBERED = re.compile(r"(primitives|loads|obstacles)\[(\d+)\]")
-_STILL = 1.0  # s: a horizon for grasps that stay where they are
+_STILL = 1.0  # s: the horizon where that of the request is left out; grasps that stay still have none of their own
 
 
 def scene_errors(request: PredictionRequest, stored: convert.StoredMotion) -> list[SceneError]:
     """Return what is wrong with a request, at most `MAX_REPORTED` faults.
 
-    First come the faults of each part by itself. Where cable, shape, quality and the numbers of the environment have
-    none, the parts that are right are put together; the grasp, load, obstacle or table that contradicts the rest is
-    told of and left out, until none does. Any other fault of the whole is told of where it is the only one.
+    The faults that each part has by itself come first. If the cable, the shape, the quality and the numbers of the
+    environment have none, the valid parts are put together. A grasp, load, obstacle or table that contradicts the rest
+    is then reported and left out, until nothing contradicts. Any other fault of the whole is reported only if it is the
+    only fault.
 
     Args:
         request: the valid request.
@@ -43,7 +44,7 @@ def scene_errors(request: PredictionRequest, stored: convert.StoredMotion) -> li
         except SceneError as error:
             told = rest.in_first_numbers(error)
             whole = rest.leave_out(told.field)
-            if not found or (whole and told.field != "horizon"):  # that of the rest is not what was asked for
+            if not found or (whole and told.field != "horizon"):  # the horizon of the rest is not that of the request
                 found[told.field] = told
     return list(found.values())[:MAX_REPORTED]
 
@@ -56,7 +57,7 @@ def _parts(request: PredictionRequest, stored: convert.StoredMotion) -> Iterable
     def shape() -> object:
         try:
             known = convert.cable_of(request.cable)
-        except SceneError:  # told by `cable`
+        except SceneError:  # reported by `cable`
             return None
         return start_curve(convert.shape_of(request, known, stored), known.length)
 
@@ -73,7 +74,7 @@ def _parts(request: PredictionRequest, stored: convert.StoredMotion) -> Iterable
 
 
 class _Rest:
-    """A request from which grasps, loads, obstacles, table and horizon can be left out one by one."""
+    """A request whose grasps, loads, obstacles, table and horizon can be left out one by one."""
 
     def __init__(self, request: PredictionRequest) -> None:
         around = request.environment
@@ -87,7 +88,7 @@ class _Rest:
         }
 
     def leave_out(self, field: str) -> bool:
-        """Leave out the part that has a field, and return whether there is such a part."""
+        """Leave out the part that contains a field, and return whether there is such a part."""
         path = next((path for path in self._parts if field.startswith(path)), "")
         return self._parts.pop(path, self) is not self
 
@@ -104,7 +105,7 @@ class _Rest:
         )
 
     def in_first_numbers(self, error: SceneError) -> SceneError:
-        """Return what is wrong with `request()` with the parts numbered as they were at first."""
+        """Return a fault of `request()` with the parts numbered as in the original request."""
 
         def number(found: re.Match[str]) -> str:
             left = [path.removeprefix("environment.") for path in self._parts if found[1] in path]

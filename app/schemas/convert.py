@@ -1,4 +1,4 @@
-"""From a valid request to the solver's scene."""
+"""Convert a valid request to the solver's scene."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -49,7 +49,7 @@ from dlocore.scene.scene import Shape, load_times
 class Motion(NamedTuple):
     """A predicted motion: its surface, what the sections of the cable remember (None: nothing), and its stretch.
 
-    The stretch is None of one that was stored before it was noted.
+    The stretch is None for a run that was stored before stretch was recorded.
     """
 
     surface: SplineSurface
@@ -57,7 +57,7 @@ class Motion(NamedTuple):
     stretch: StretchMotion | None
 
 
-# Finds the motion of a stored prediction by its id; None where there is no such prediction.
+# Finds the motion of a stored prediction by its id; None if there is no such prediction.
 StoredMotion = Callable[[str], Motion | None]
 
 
@@ -123,7 +123,7 @@ def shape_of(request: PredictionRequest, cable: Cable, stored: StoredMotion) -> 
 
 
 def check_columns(name: str, rows: list[list[float]]) -> None:
-    """Raise SceneError on the first row of the field `name` that differs in length from the first one."""
+    """Raise SceneError for the first row of the field `name` whose length differs from that of row 0."""
     columns = len(rows[0])
     for i, row in enumerate(rows):
         if len(row) != columns:
@@ -131,7 +131,7 @@ def check_columns(name: str, rows: list[list[float]]) -> None:
 
 
 def _velocity(value: Any, kind: str) -> Any:
-    """Return the velocity as one vector or rows, given for a shape whose velocities are of `kind`."""
+    """Return the velocity as one vector or as rows; `kind` is the kind of velocities that the shape takes."""
     if not isinstance(value, PointVelocities | ControlVelocities):
         return value
     if value.kind != kind:
@@ -221,7 +221,7 @@ def obstacle_of(i: int, model: ObstacleModel) -> Obstacle:
 
 
 def quality_of(model: str | QualityModel) -> Quality:
-    """Return the asked quality of the solver, or raise SceneError."""
+    """Return the requested quality of the solver, or raise SceneError."""
     if isinstance(model, str):
         return Quality()
     with within("quality"):

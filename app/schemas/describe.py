@@ -1,4 +1,4 @@
-"""From the solver's scene to the request that describes it."""
+"""Convert the solver's scene to the request that describes it."""
 
 from dataclasses import fields, is_dataclass
 from typing import Any
@@ -21,20 +21,20 @@ _KINDS: dict[type, str] = {
 
 
 def from_scene(scene: Scene) -> dict[str, Any]:
-    """Return the request that describes a scene, ready for JSON: `to_scene` makes the same scene of it.
+    """Return the request that describes a scene, ready for JSON; `to_scene` turns it back into the same scene.
 
-    It is what `POST /v1/predictions` and `dlo predict` take, and what the 3D scene opens from a file.
+    `POST /v1/predictions` and `dlo predict` take it, and the 3D scene opens it from a file.
 
     Raises:
-        SceneError: a request can't say what a field says: `shape.material` (the service knows it of the stored
-            prediction that a shape of kind "prediction" names), `quality.estimate` without an estimate, or more
-            `loads` than it may have.
+        SceneError: the scene has what a request can't express: a `shape.material` (the service takes it from the stored
+            prediction that a shape of kind "prediction" names), a `quality.estimate` of False, or more `loads` than a
+            request may have.
     """
     if isinstance(scene.shape, ControlPoints) and scene.shape.material is not None:
-        allowed = 'None; a shape of kind "prediction" goes on from a stored one with its material'
+        allowed = 'None; a shape of kind "prediction" continues a stored prediction with its material'
         raise SceneError("shape.material", "a material", allowed)
     if not scene.quality.estimate:
-        raise SceneError("quality.estimate", False, "True: an answer of the service has an estimate")
+        raise SceneError("quality.estimate", False, "True: every answer of the service has an error estimate")
     if len(scene.loads) > MAX_LOADS:
         raise SceneError("loads", f"{len(scene.loads)} loads", f"at most {MAX_LOADS}")
     return {
@@ -50,13 +50,13 @@ def from_scene(scene: Scene) -> dict[str, Any]:
 
 
 def from_cable(cable: Cable) -> dict[str, Any]:
-    """Return a cable as a request has it, ready for JSON."""
+    """Return a cable in the form that requests use, ready for JSON."""
     described: dict[str, Any] = _plain(cable)
     return described
 
 
 def _plain(value: Any) -> Any:
-    """Return a part of a scene as numbers, words, lists and objects; what is None is left out of an object."""
+    """Return a part of a scene as numbers, words, lists and objects, without the fields that are None."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if isinstance(value, tuple | list):
@@ -69,7 +69,7 @@ def _plain(value: Any) -> Any:
 
 
 def _shape(shape: Straight | Points | ControlPoints) -> dict[str, Any]:
-    """Return a shape; velocities that have an angle's rate are given as control points of it."""
+    """Return a shape; velocities that include the rate of an angle are written as control points."""
     described: dict[str, Any] = _plain(shape)
     if np.ndim(described.get("velocity", 0.0)) == 2 and len(described["velocity"][0]) == 4:
         described["velocity"] = {"kind": "control_points", "control_points": described["velocity"]}

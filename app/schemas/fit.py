@@ -13,29 +13,30 @@ Seen = Annotated[list[Coordinate], Field(min_length=2, max_length=3)]
 
 
 class FitRequest(Model):
-    """Points of a cable, as a vision system sees them: noisy, unevenly spaced, with outliers, 2D or 3D."""
+    """Points of a cable as a vision system sees them: noisy, unevenly spaced, with outliers, 2D or 3D."""
 
     points: list[Seen] = Field(
         min_length=4,
         max_length=100_000,
-        description="Points [m], all 2D (z = 0) or all 3D; at most 20,000 where they are in no order.",
+        description="Points [m], all 2D (z = 0) or all 3D; at most 20,000 if they are not in order.",
         examples=[[[0.02, 0.01], [0.24, 0.05], [0.47, -0.03], [0.74, 0.13]]],
     )
-    ordered: Flag = Field(default=True, description="Whether they are in order along the cable.", examples=[True])
+    ordered: Flag = Field(default=True, description="Whether the points are in order along the cable.", examples=[True])
     length: Number | None = Field(
         default=None,
         ge=MIN_LENGTH,
         le=MAX_LENGTH,
-        description="Length of the cable [m], which the curve gets; absent: as it is measured.",
+        description="Length of the cable [m], and so of the curve; absent: the length that the points show.",
         examples=[0.8],
     )
     start: Annotated[list[Coordinate], Field(min_length=3, max_length=3)] | None = Field(
         default=None,
-        description="Near the cable's end at u = 0 [m], for points in no order; absent: the end with the smaller x.",
+        description="A point near the cable's end at u = 0 [m], for points that are not in order; absent: the end with "
+        "the smaller x.",
         examples=[[0.02, 0.01, 0.0]],
     )
     outliers: Literal["remove", "keep"] = Field(
-        default="remove", description="What to do with points that are not of the cable.", examples=["remove"]
+        default="remove", description="What to do with points that do not belong to the cable.", examples=["remove"]
     )
 
 
@@ -43,7 +44,7 @@ class FitErrorModel(BaseModel):
     """Distances of the points from the curve."""
 
     rms: float = Field(description="Root mean square [m].", examples=[0.0012])
-    max: float = Field(description="Largest [m].", examples=[0.0031])
+    max: float = Field(description="Largest distance [m].", examples=[0.0031])
 
 
 class FitResponse(BaseModel):
@@ -55,8 +56,8 @@ class FitResponse(BaseModel):
     length: float = Field(description="Length of the spline [m].", examples=[0.8])
     measured_length: float = Field(description="Length that the points show [m].", examples=[0.795])
     fit_error: FitErrorModel = Field(description="Distances of the points from the curve.")
-    order: list[int] = Field(description="Indices of the points along the cable.", examples=[[0, 1, 2, 3]])
-    outliers: list[int] = Field(description="Indices of the points that were left out.", examples=[[]])
+    order: list[int] = Field(description="Indices of the points in order along the cable.", examples=[[0, 1, 2, 3]])
+    outliers: list[int] = Field(description="Indices of the points that were left out as outliers.", examples=[[]])
     shape: dict[str, Any] = Field(
         description="The curve as the `shape` of a request.",
         examples=[{"kind": "control_points", "control_points": [[0.0, 0.0, 0.0]], "knots": [0.0, 0.8]}],
@@ -86,7 +87,7 @@ _CLOUD = [
 FIT_EXAMPLES: dict[str, Example] = {
     "ordered": {"summary": "Points in order along a cable of known length", "value": {"points": _SEEN, "length": 0.73}},
     "cloud": {
-        "summary": "Points in no order, one of them not of the cable",
+        "summary": "Points that are not in order, one of which does not belong to the cable",
         "value": {"points": _CLOUD, "ordered": False},
     },
 }

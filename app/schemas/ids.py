@@ -1,4 +1,4 @@
-"""Ids of runs, studies and calibrations, which tell when these were asked for."""
+"""Ids of runs, studies and calibrations; an id contains the time of its request."""
 
 import secrets
 import time
@@ -13,6 +13,6 @@ def new_id() -> str:
 
 
 def created_of(id: str) -> str:
-    """Return when an id was given, ISO 8601 in UTC; now where it is none, as of what is not kept."""
+    """Return when an id was made, ISO 8601 in UTC; the present time if it is no id, as for what is not kept."""
     created = datetime.fromtimestamp(int(id[:12], 16) / 1e3, UTC) if ID.fullmatch(id) else datetime.now(UTC)
     return created.isoformat(timespec="milliseconds").replace("+00:00", "Z")

@@ -13,7 +13,7 @@ Instant = Annotated[Number, Field(ge=0.0, le=1e4)]
 
 
 class StillPath(Model):
-    """Stay where the cable was grasped."""
+    """Stay where the cable is grasped."""
 
     kind: Literal["still"]
 
@@ -25,7 +25,7 @@ class MovePath(Model):
     displacement: Vector = Field(description="Displacement [m].", examples=[[0, 0.5, 0]])
     rotation: Vector | None = Field(
         default=None,
-        description="Final rotation vector [rad], in world axes; holds other than `point` only.",
+        description="Final rotation vector [rad], in world axes; not with the hold `point`.",
         examples=[[0, 0, 0.8]],
     )
     duration: Number = Field(gt=1e-4, le=1e4, description="Duration [s].", examples=[1.6])
@@ -33,11 +33,14 @@ class MovePath(Model):
 
 
 class WaypointsPath(Model):
-    """Pass through positions at given times, along a C2 spline, or stop at each."""
+    """Pass through positions at given times along a C2 spline, or stop at each of them."""
 
     kind: Literal["waypoints"]
     times: Long[Instant] = Field(
-        min_length=2, max_length=MAX_WAYPOINTS, description="Rising times since the grasp [s].", examples=[[0, 0.5, 1]]
+        min_length=2,
+        max_length=MAX_WAYPOINTS,
+        description="Increasing times since the grasp [s].",
+        examples=[[0, 0.5, 1]],
     )
     positions: Long[Vector] = Field(
         min_length=2,
@@ -46,19 +49,22 @@ class WaypointsPath(Model):
     )
     orientations: Long[Quaternion] | None = Field(
         default=None,
-        description="One unit quaternion (w, x, y, z) for each time, in world axes, of which only the turn since the "
-        "first counts, R(t) R(0)^-1; it turns the shorter way to the next, of profile `spline` as smoothly as may be.",
+        description="One unit quaternion (w, x, y, z) for each time, in world axes. Only the rotation since the first "
+        "one counts, R(t) R(0)^-1. The gripper turns the shorter way to the next one, with the profile `spline` as "
+        "smoothly as possible.",
         examples=[[[1, 0, 0, 0]] * 3],
     )
     start: Start = Field(
         default="rest",
-        description="`rest`: it starts at rest; `moving`: as fast as the first positions tell, as of a recorded path.",
+        description="`rest`: the gripper starts at rest; `moving`: with the speed that the first positions show, as "
+        "for a recorded path.",
         examples=["rest"],
     )
     profile: Through = Field(
         default="spline",
-        description="`spline`: smoothly through all positions. Else straight from one to the next, as a `move` of that "
-        f"profile: a program of moves, with pauses where two positions are the same; at most {MAX_STOPS:,} of them.",
+        description="`spline`: smoothly through all positions. With any other profile: straight from each position to "
+        "the next, as a `move` with that profile. This is a program of moves, in which two equal positions are a "
+        f"pause; it has at most {MAX_STOPS:,} positions.",
         examples=["spline"],
     )
 
@@ -72,23 +78,25 @@ class PrimitiveModel(Model):
     u: Coordinate
     hold: Hold = Field(
         default="point",
-        description="`point` holds the position, `tangent` the direction too, `clamp` the twist as well.",
+        description="`point` holds the position, `tangent` also the direction, `clamp` also the twist.",
         examples=["point"],
     )
-    path: PathModel = Field(description="Where the gripper goes; its clock starts at `grasp_time`.")
+    path: PathModel = Field(description="Where the gripper goes; the time of the path starts at `grasp_time`.")
     grasp_time: Instant | None = Field(
         default=None, description="When the gripper closes [s]; absent: it holds from the start.", examples=[0.0]
     )
-    release_time: Instant | None = Field(default=None, description="When it opens [s]; absent: never.", examples=[2.0])
+    release_time: Instant | None = Field(
+        default=None, description="When the gripper opens [s]; absent: never.", examples=[2.0]
+    )
 
 
 class ForceOverTime(Model):
-    """A force given at times, linear between them and constant outside."""
+    """A force given at times: linear between them, and constant before the first and after the last."""
 
     times: Long[Number] = Field(
         min_length=1,
-        description="Rising times [s], two equal ones where the force jumps; the first force acts before them, too, "
-        "and the last one after.",
+        description="Increasing times [s]; two equal ones are a jump. The first force also acts before the first time, "
+        "and the last force after the last time.",
         examples=[[0, 1]],
     )
     values: Long[Vector] = Field(
@@ -97,7 +105,7 @@ class ForceOverTime(Model):
 
 
 class LoadModel(Model):
-    """A known force, where the motion is not known."""
+    """A known force on a point of the cable whose motion is not known."""
 
     u: Coordinate
     force: Annotated[Annotated[Vector, LIST] | Annotated[ForceOverTime, OBJECT], BY_FORM] = Field(

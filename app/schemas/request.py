@@ -1,4 +1,4 @@
-"""The request of ``POST /v1/predictions``, and examples of it."""
+"""The request of ``POST /v1/predictions``, with examples."""
 
 from typing import Any
 
@@ -21,12 +21,14 @@ class PredictionRequest(Model):
     name: str = Field(
         default="",
         max_length=200,
-        description="What to call the run in lists; `GET /v1/predictions?name=` finds it.",
+        description="Name of the run in lists; `GET /v1/predictions?name=` finds it.",
         examples=["Lay the cable along the wall"],
     )
     cable: CableModel = Field(description="The cable.")
     shape: ShapeModel = Field(description="Where the cable is at t = 0.")
-    primitives: list[PrimitiveModel] = Field(default=[], max_length=MAX_GRASPS, description="One for each grasp.")
+    primitives: list[PrimitiveModel] = Field(
+        default=[], max_length=MAX_GRASPS, description="The grippers, one for each grasp."
+    )
     loads: list[LoadModel] = Field(default=[], max_length=MAX_LOADS, description="Known forces.")
     environment: EnvironmentModel = Field(default=EnvironmentModel(), description="Gravity, drag, table, obstacles.")
     horizon: Number | None = Field(
@@ -38,7 +40,7 @@ class PredictionRequest(Model):
         examples=[2.5],
     )
     effects: Effects = Field(default="auto", description="Which effects to simulate.", examples=["auto"])
-    quality: Quality = Field(default="auto", description="Asked accuracy, grid or time.", examples=["auto"])
+    quality: Quality = Field(default="auto", description="Requested accuracy, grid or time.", examples=["auto"])
     output: OutputModel = Field(default=OutputModel(), description="Sampling of the answer.")
 
 

@@ -1,4 +1,4 @@
-"""The response of the predictions, as data to serialise and as a schema to read."""
+"""The response to a prediction, as data to serialise and as a schema."""
 
 from collections.abc import Callable, Collection
 from dataclasses import fields as dataclass_fields
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 OptionalField = Literal[
     "surface", "control_points", "knots_u", "knots_t", "degree", "grasps", "contacts", "effects", "iterations", "start"
 ]
-OPTIONAL_FIELDS: tuple[OptionalField, ...] = get_args(OptionalField)  # of an answer, which a batch may do without
+OPTIONAL_FIELDS: tuple[OptionalField, ...] = get_args(OptionalField)  # parts of an answer that a batch can leave out
 _ID = "019b1f5a2c07f3e9d1c5b6a7e8f0"
 _RUN = f"/v1/predictions/{_ID}"
 
@@ -32,12 +32,12 @@ class SurfaceModel(BaseModel):
         description="Positions [t][u][3] [m].", examples=[[[[0.0, 0.0, 0.0], [0.01, 0.0, 0.0]]]]
     )
     twist: list[list[float]] = Field(
-        description="Angles of the sections against a frame without twist [t][u] [rad].", examples=[[[0.0, 0.0]]]
+        description="Angles of the sections relative to a frame without twist [t][u] [rad].", examples=[[[0.0, 0.0]]]
     )
 
 
 class GraspModel(BaseModel):
-    """What a gripper must give to the cable, in world axes; the moment is about the grasped point."""
+    """Force and moment that a gripper must exert on the cable, in world axes; the moment is about the grasped point."""
 
     u: float = Field(description="Material coordinate [m].", examples=[0.25])
     reaction: list[list[float]] = Field(
@@ -48,17 +48,19 @@ class GraspModel(BaseModel):
     )
     reaction_error: list[float] | None = Field(
         default=None,
-        description="Estimated error of the force at these times, of the discretisation [t] [N]; none where none was "
-        "computed, as by the methods paper and reference.",
+        description="Estimated discretisation error of the force at these times [t] [N]; null if none was computed, as "
+        "with the methods `paper` and `reference`.",
         examples=[[0.002]],
     )
     moment_error: list[float] | None = Field(
-        default=None, description="The same of the moment [t] [N m].", examples=[[0.0]]
+        default=None,
+        description="Estimated discretisation error of the moment at these times [t] [N m]; null as for the force.",
+        examples=[[0.0]],
     )
     peak_force: float | None = Field(
         default=None,
-        description="Largest force over the whole motion, also between the times of the surface [N]; this and the "
-        "other peaks are absent of a run that was stored before they were noted.",
+        description="Largest force over the whole motion, also between the times of the surface [N]. This and the "
+        "other peaks are absent for a run that was stored before they were recorded.",
         examples=[0.31],
     )
     peak_force_time: float | None = Field(default=None, description="When the force is largest [s].", examples=[0.42])
@@ -69,34 +71,35 @@ class GraspModel(BaseModel):
 
 
 class ContactModel(BaseModel):
-    """How hard the table or an obstacle presses on the cable, and how its friction holds it."""
+    """Contact force and friction of the table or an obstacle on the cable."""
 
     name: str = Field(
         description="`table`, or `obstacles[i]` with the number of the obstacle in the request.",
         examples=["obstacles[0]"],
     )
     force: list[list[float]] = Field(
-        description="Force on the cable across its surface, without friction, at the times of the surface [t][3] [N].",
+        description="Normal force on the cable, without friction, at the times of the predicted surface [t][3] [N].",
         examples=[[[0.0, 0.0, 0.32]]],
     )
     friction: list[list[float]] | None = Field(
         default=None,
-        description="Friction on the cable at these times [t][3] [N]; none of a run stored before it was noted.",
+        description="Friction on the cable at these times [t][3] [N]; null for a run that was stored before friction "
+        "was recorded.",
         examples=[[[-0.06, 0.0, 0.0]]],
     )
     pressed: list[float] = Field(
-        description="Sum of the sizes of the forces along the cable [t] [N]: more than the size of `force` where it "
-        "presses from several sides.",
+        description="Sum of the magnitudes of the normal forces along the cable [t] [N]: more than the magnitude of "
+        "`force` if the contact presses from several sides.",
         examples=[[0.33]],
     )
     force_error: list[float] | None = Field(
         default=None,
-        description="Estimated error of the force at these times [t] [N]; none where none was computed.",
+        description="Estimated error of the force at these times [t] [N]; null if none was computed.",
         examples=[[0.006]],
     )
     friction_error: list[float] | None = Field(
         default=None,
-        description="Estimated error of the friction at these times [t] [N]; none where none was computed.",
+        description="Estimated error of the friction at these times [t] [N]; null if none was computed.",
         examples=[[0.002]],
     )
 
@@ -104,68 +107,69 @@ class ContactModel(BaseModel):
 class EffectModel(BaseModel):
     """Whether an effect was simulated, and why."""
 
-    name: str = Field(description="As in the request.", examples=["gravity"])
+    name: str = Field(description="Name as in the request.", examples=["gravity"])
     active: bool = Field(description="Whether it was simulated.", examples=[True])
     reason: str = Field(description="Why, in words.", examples=["the cable has weight and hangs free"])
     magnitude: float | None = Field(
-        description="Its size on the predicted motion; null where that means nothing.", examples=[0.49]
+        description="Its size in the predicted motion; null if that has no meaning.", examples=[0.49]
     )
     unit: str = Field(description="Unit of the magnitude.", examples=["N"])
 
 
 class IterationModel(BaseModel):
-    """One iteration of the solve, or one refinement level of a march. Null where a value is not finite."""
+    """One iteration of the solve, or one refinement level of a march. A value that is not finite is null."""
 
-    number: int = Field(description="From 0.", examples=[0])
+    number: int = Field(description="Number of the iteration, from 0.", examples=[0])
     update: float | None = Field(
         description="Norm of the change of the control points, the paper's eq. (25) [m].", examples=[8.9e-4]
     )
     residual: float | None = Field(
-        description="Root mean square residual over the motion [m]; method `paper`: [N].", examples=[2.7e-7]
+        description="Root mean square residual over the motion [m]; with the method `paper` [N].", examples=[2.7e-7]
     )
     energy: float | None = Field(description="Elastic energy at the end of the motion [J].", examples=[2.9e-5])
-    wall_time: float = Field(description="Since the solve began [s].", examples=[0.002])
+    wall_time: float = Field(description="Time since the solve began [s].", examples=[0.002])
     damping: float | None = Field(
-        description="Share by which the diagonal of the normal equations of a `spacetime` step was raised, where they "
-        "had lost their positive factors to rounding; else 0.",
+        description="Share by which the diagonal of the normal equations of a `spacetime` step was raised because "
+        "rounding had made their factors not positive; otherwise 0.",
         examples=[0.0],
     )
-    step_length: float | None = Field(description="Fraction of the full step taken.", examples=[1.0])
+    step_length: float | None = Field(description="Fraction of the full step that was taken.", examples=[1.0])
     n_u: int = Field(description="Control points along the cable.", examples=[13])
     n_t: int = Field(description="Control points in time.", examples=[19])
     note: str = Field(description="What happened, in words.", examples=["march"])
 
 
 class AccuracyModel(BaseModel):
-    """What the answer is worth and what it cost."""
+    """Accuracy and cost of the answer."""
 
     method: str = Field(description="Method that gave the answer.", examples=["spacetime"])
     error_estimate: float | None = Field(
-        description="Error of position at the worst point [m]; null where unknown.", examples=[8.9e-4]
+        description="Estimated position error at the worst point [m]; null if unknown.", examples=[8.9e-4]
     )
     error_parts: dict[str, float] = Field(
-        description='What it adds up from [m]: "grid" (or "space" and "time", where they are known apart), '
-        '"iteration" and "neglected", "start" where the scene does not determine its motion, and "contact" where how '
-        "stiff contact is decides on it; empty where it is unknown.",
+        description='The parts that the estimate is the sum of [m]: "grid" (or "space" and "time", if they are known '
+        'separately), "iteration" and "neglected"; also "start" if the scene does not determine its motion, and '
+        '"contact" if the stiffness of contact decides on the motion. Empty if the estimate is unknown.',
         examples=[{"grid": 8.8e-4, "iteration": 1e-8, "neglected": 0.0}],
     )
     neglected: float = Field(
-        description="The part of it that effects left out by `auto` may have, about [m].", examples=[0.0]
+        description="The part of the estimate for effects that `auto` left out, approximately [m].", examples=[0.0]
     )
     wall_time: float = Field(description="Time of the solve [s].", examples=[0.004])
     n_u: int = Field(description="Control points along the cable.", examples=[13])
     n_t: int = Field(description="Control points in time.", examples=[19])
     delta: float = Field(description="Threshold on the update [m].", examples=[1e-5])
     steps: int = Field(description="Time steps of the march.", examples=[64])
-    dimensions: int = Field(description="2 where the motion is planar, else 3.", examples=[2])
+    dimensions: int = Field(description="2 if the motion is planar, otherwise 3.", examples=[2])
     dimensions_reason: str = Field(
-        description="Why, in words.", examples=["the cable lies on the table and moves in its plane"]
+        description="Why the motion has so many dimensions, in words.",
+        examples=["the cable lies on the table and moves in its plane"],
     )
     phases: dict[str, float] = Field(description="Time by phase [s].", examples=[{"setup": 0.001, "march": 0.003}])
 
 
 class StartModel(BaseModel):
-    """The start shape as the solver took it."""
+    """The start shape as the solver used it."""
 
     elastic_energy: float = Field(description="Elastic energy stored in the start shape [J].", examples=[0.0])
     fit_error: float = Field(description="Root mean square distance from the given points [m].", examples=[0.0])
@@ -179,17 +183,17 @@ class LinksModel(BaseModel):
         description="The iterations and the motion, for rerun (.rrd).", examples=[_RUN + "/recording.rrd"]
     )
     surface: str = Field(description="The surface for NumPy (.npz).", examples=[_RUN + "/surface.npz"])
-    scene: str = Field(description="The request, to be sent again.", examples=[_RUN + "/scene.json"])
+    scene: str = Field(description="The request, which can be sent again.", examples=[_RUN + "/scene.json"])
     viewer: str = Field(description="The recording in the browser.", examples=[_RUN + "/viewer"])
-    events: str = Field(description="The course of the solve as server-sent events.", examples=[_RUN + "/events"])
+    events: str = Field(description="The progress of the solve as server-sent events.", examples=[_RUN + "/events"])
 
 
 class PredictionResponse(BaseModel):
     """A predicted motion."""
 
     id: str = Field(description="Id of the run.", examples=[_ID])
-    state: Literal["done"] = Field(description="There is an answer.")
-    created: str = Field(description="When it was asked for, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000Z"])
+    state: Literal["done"] = Field(description="The prediction has an answer.")
+    created: str = Field(description="When it was requested, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000Z"])
     status: Status = Field(description="`converged`, or why not.", examples=["converged"])
     message: str = Field(
         description="The status in words, and what to do about it.",
@@ -205,18 +209,20 @@ class PredictionResponse(BaseModel):
     )
     knots_t: list[float] = Field(description="Knots in time [s].", examples=[[0.0, 0.0, 0.0, 0.0, 1.6, 1.6, 1.6, 1.6]])
     degree: int = Field(description="Degree of the spline.", examples=[3])
-    grasps: list[GraspModel] = Field(description="What each gripper must give, in the order of `primitives`.")
+    grasps: list[GraspModel] = Field(
+        description="Force and moment that each gripper must exert, in the order of `primitives`."
+    )
     contacts: list[ContactModel] = Field(
         default=[],
-        description="How hard the table, and each obstacle that was simulated, presses and rubs; empty of a run "
-        "that was stored before it was noted, and of method reference.",
+        description="Contact force and friction of the table and of each obstacle that was simulated; empty for a run "
+        "that was stored before they were recorded, and with the method `reference`.",
     )
     effects: list[EffectModel] = Field(description="What was simulated, and why.")
     iterations: list[IterationModel] = Field(description="How the solve went.")
-    accuracy: AccuracyModel = Field(description="What the answer is worth and what it cost.")
-    start: StartModel = Field(description="The start shape as the solver took it.")
+    accuracy: AccuracyModel = Field(description="Accuracy and cost of the answer.")
+    start: StartModel = Field(description="The start shape as the solver used it.")
     links: LinksModel | None = Field(
-        description="Addresses of its parts; null where the run is not stored or can't be."
+        description="Addresses of its parts; null if the run is not stored or can't be stored."
     )
 
 
@@ -228,32 +234,32 @@ class JobLinksModel(BaseModel):
 
 
 class JobItem(BaseModel):
-    """A prediction that has no answer in a list."""
+    """A prediction without an answer, as an item of a list."""
 
     id: str = Field(description="Id of the run.", examples=["019b1f5a2c07f3e9d1c5b6a7e8f0"])
-    created: str = Field(description="When it was asked for, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000Z"])
-    state: Literal["queued", "running", "failed", "cancelled"] = Field(
-        description="How far it is.", examples=["running"]
-    )
-    links: JobLinksModel = Field(description="Addresses of its parts.")
+    created: str = Field(description="When it was requested, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000Z"])
+    state: Literal["queued", "running", "failed", "cancelled"] = Field(description="Its state.", examples=["running"])
+    links: JobLinksModel = Field(description="Its addresses.")
 
 
 class JobResponse(JobItem):
-    """A prediction that has no answer: not yet, or not any more."""
+    """A prediction without an answer: queued, running, failed or cancelled."""
 
     iterations: list[IterationModel] = Field(description="The iterations so far.")
-    problem: "ProblemDocument | None" = Field(description="Why it failed.")
+    problem: "ProblemDocument | None" = Field(description="Why it failed or was cancelled.")
 
 
 class RunSummary(BaseModel):
-    """A stored run in a list."""
+    """A stored run, as an item of a list."""
 
-    id: str = Field(description="Its id.", examples=[_ID])
-    name: str = Field(description="What the request calls it.", examples=["Lay the cable along the wall"])
-    created: str = Field(description="When it was asked for, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000Z"])
+    id: str = Field(description="Id of the run.", examples=[_ID])
+    name: str = Field(description="Name that the request gives it.", examples=["Lay the cable along the wall"])
+    created: str = Field(description="When it was requested, ISO 8601 in UTC.", examples=["2026-01-31T12:00:00.000Z"])
     status: Status = Field(description="`converged`, or why not.", examples=["converged"])
     method: str = Field(description="Method that gave the answer.", examples=["march"])
-    error_estimate: float | None = Field(description="Error of position at the worst point [m].", examples=[8.9e-4])
+    error_estimate: float | None = Field(
+        description="Estimated position error at the worst point [m]; null if unknown.", examples=[8.9e-4]
+    )
     wall_time: float = Field(description="Time of the solve [s].", examples=[0.004])
     links: LinksModel = Field(description="Addresses of its parts.")
 
@@ -262,19 +268,21 @@ class PredictionList(BaseModel):
     """Stored runs, newest first."""
 
     predictions: list[RunSummary] = Field(description="The runs on this page.")
-    total: int = Field(description="How many stored runs match, on all pages.", examples=[42])
-    limit: int = Field(description="At most so many are listed.", examples=[20])
-    offset: int = Field(description="So many newer ones were passed over.", examples=[0])
+    total: int = Field(description="Number of stored runs that match, on all pages.", examples=[42])
+    limit: int = Field(description="Largest number of runs on a page.", examples=[20])
+    offset: int = Field(description="Number of newer runs that were skipped.", examples=[0])
     next: str | None = Field(
         description="Address of the next page, or null.", examples=["/v1/predictions?limit=20&cursor=" + _ID]
     )
-    under_way: list[JobItem] = Field(description="All predictions that run or wait, newest first.")
+    under_way: list[JobItem] = Field(description="All predictions that are running or waiting, newest first.")
 
 
 class BadFieldModel(BaseModel):
     """One wrong field."""
 
-    field: str = Field(description="Path of the field; `body` for the whole.", examples=["primitives[0].u"])
+    field: str = Field(
+        description="Path of the field; `body` for the request as a whole.", examples=["primitives[0].u"]
+    )
     given: str = Field(description="What was given, shortened.", examples=["2.0"])
     allowed: str = Field(description="What would be accepted.", examples=["0 to the cable's length, 1 [m]"])
     message: str = Field(description="What is wrong, in words.", examples=["Got 2.0. Allowed: 0 to 1 [m]."])
@@ -283,8 +291,8 @@ class BadFieldModel(BaseModel):
 class ProblemDocument(BaseModel):
     """What went wrong (RFC 9457)."""
 
-    type: str = Field(description="A name of the kind of problem.", examples=["urn:dlo:problem:bad-request"])
-    title: str = Field(description="The phrase of the status.", examples=["Unprocessable Content"])
+    type: str = Field(description="Name of the kind of problem.", examples=["urn:dlo:problem:bad-request"])
+    title: str = Field(description="The phrase of the HTTP status.", examples=["Unprocessable Content"])
     status: int = Field(description="The HTTP status.", examples=[422])
     detail: str = Field(
         description="What went wrong and what to do, in words.",
@@ -334,7 +342,7 @@ def from_prediction(
         id: id of the stored run.
         samples_u: samples along the cable.
         samples_t: samples in time.
-        fields: which of `OPTIONAL_FIELDS` it has; the others are not worked out.
+        fields: the members of `OPTIONAL_FIELDS` that it has; the others are not computed.
     """
     u, t, q = prediction.surface.sample(samples_u, samples_t)
     accuracy = vars(prediction.accuracy)
@@ -368,7 +376,7 @@ def from_prediction(
 
 
 def iteration_document(iteration: Iteration) -> dict[str, Any]:
-    """Return an iteration without its surface, with None where a value is not finite."""
+    """Return an iteration without its surface; values that are not finite are None."""
     named = [f.name for f in dataclass_fields(iteration) if f.name not in ("find_surface", "find_energy")]
     document = {name: getattr(iteration, name) for name in (*named, "energy")}
     for name in ("update", "residual", "energy", "damping", "step_length"):
@@ -381,7 +389,7 @@ def _finite(value: float | None) -> float | None:
 
 
 def _grasp_document(grasp: GraspReaction, t: Floats) -> dict[str, Any]:
-    """Return what a gripper must give: at the times `t` (k,) [s], and at most."""
+    """Return the force and moment of a gripper at the times `t` (k,) [s], and their peaks."""
     document: dict[str, Any] = {
         "u": grasp.u,
         "reaction": at_times(t, grasp.times, grasp.reaction),
@@ -397,7 +405,7 @@ def _grasp_document(grasp: GraspReaction, t: Floats) -> dict[str, Any]:
 
 
 def _contact_document(contact: ContactForce, t: Floats) -> dict[str, Any]:
-    """Return what the table or an obstacle gives to the cable at the times `t` (k,) [s]."""
+    """Return the force and friction of the table or an obstacle on the cable at the times `t` (k,) [s]."""
 
     def error(values: Floats | None) -> Floats | None:
         return None if values is None else np.interp(t, contact.times, values)

@@ -11,7 +11,11 @@ from dlocore.scene.scene import MAX_CONTROL_POINTS, MAX_STRAIN
 ControlPoint = Annotated[list[Number], Field(min_length=3, max_length=4)]
 Settle = Annotated[
     Flag,
-    Field(description="Relax to static equilibrium under the primitives' first poses before t = 0.", examples=[False]),
+    Field(
+        description="Whether the cable relaxes to static equilibrium before t = 0, with the grippers in their first "
+        "poses.",
+        examples=[False],
+    ),
 ]
 
 
@@ -29,7 +33,7 @@ class ControlVelocities(Model):
     control_points: Long[ControlPoint] = Field(
         min_length=4,
         description=(
-            "[m/s, m/s, m/s] or [m/s, m/s, m/s, rad/s]; the fourth is the rate of theta. With three the "
+            "[m/s, m/s, m/s] or [m/s, m/s, m/s, rad/s]; the fourth is the rate of the angle theta. With three, the "
             "sections do not spin about their tangent."
         ),
         examples=[[[0, 0.1, 0]] * 4],
@@ -52,8 +56,8 @@ Velocity = Annotated[
     Discriminator(_velocity_form),
     Field(
         description=(
-            "Initial velocity [m/s]: one vector for the whole cable, one for each point (each control point) of the "
-            "shape, or an object of the shape's form. Absent: at rest."
+            "Initial velocity [m/s]: one vector for the whole cable, one for each point (or control point) of the "
+            "shape, or an object whose kind suits the shape. Absent: at rest."
         ),
         examples=[[0.0, 0.1, 0.0]],
     ),
@@ -87,14 +91,14 @@ class PointsShape(Model):
 
 
 class ControlPointsShape(Model):
-    """A clamped cubic spline by its control points."""
+    """A clamped cubic spline, given by its control points."""
 
     kind: Literal["control_points"]
     control_points: list[ControlPoint] = Field(
         min_length=4,
         max_length=MAX_CONTROL_POINTS,
         description=(
-            "Control points [m, m, m] or [m, m, m, rad]; the fourth is the angle of the sections against a frame "
+            "Control points [m, m, m] or [m, m, m, rad]; the fourth is the angle of the sections relative to a frame "
             "without twist."
         ),
         examples=[[[0, 0, 0], [0.3, 0, 0], [0.7, 0, 0], [1, 0, 0]]],
@@ -110,14 +114,14 @@ class ControlPointsShape(Model):
         default=None,
         description=(
             "Axial strain, one number for each control point, at the mean of three successive inner knots; absent: the "
-            "cable has its own length, whatever that of the spline."
+            "cable has its own length, whatever the length of the spline."
         ),
         examples=[[0.001, 0.001, 0.0, 0.0]],
     )
 
 
 class PredictionShape(Model):
-    """Continue from a stored prediction: with its shape, velocity, stretch and twist, and what the cable remembers."""
+    """Continue a stored prediction with its shape, velocity, stretch and twist, and what the cable remembers."""
 
     kind: Literal["prediction"]
     id: str = Field(description="Id of a stored prediction.", examples=["0193b1f5a2c07f3e9d1c5b6a7e8f"])

@@ -1,4 +1,4 @@
-"""The environment, the effects and the asked quality of a request."""
+"""The environment, the effects and the requested quality of a request."""
 
 from typing import Annotated, Literal
 
@@ -76,7 +76,7 @@ ObstacleModel = Annotated[Cylinder | Box | Sphere | Capsule, Field(discriminator
 
 
 class EnvironmentModel(Model):
-    """What surrounds the cable. World frame right-handed, z up."""
+    """What surrounds the cable. The world frame is right-handed with z up."""
 
     gravity: Vector = Field(default=[0.0, 0.0, -9.81], description="Gravity [m/s^2].", examples=[[0, 0, -9.81]])
     drag: Number = Field(
@@ -89,21 +89,21 @@ class EnvironmentModel(Model):
     obstacles: list[ObstacleModel] = Field(
         default=[],
         max_length=MAX_OBSTACLES,
-        description="Solid obstacles by their true surfaces; the cable touches them with its radius.",
+        description="Solid obstacles, given by their true surfaces; the cable touches them with its radius.",
     )
 
 
 class EffectsModel(Model):
-    """Which effects to simulate; `auto` asks the scene."""
+    """Which effects to simulate; with `auto` the scene decides."""
 
     inertia: Switch = Field(default="auto", description="Inertia of the cable.", examples=["auto"])
     drag: Switch = Field(default="auto", description="Drag of the surrounding air or liquid.", examples=["auto"])
     damping: Switch = Field(default="auto", description="Internal damping of bending and twist.", examples=["auto"])
     gravity: Switch = Field(default="auto", description="Weight.", examples=["auto"])
-    stretch: Switch = Field(default="auto", description="Axial stretch, which holds the length.", examples=["auto"])
+    stretch: Switch = Field(default="auto", description="Axial stretch, which keeps the length.", examples=["auto"])
     bend: Switch = Field(default="auto", description="Bending stiffness.", examples=["auto"])
     twist: Switch = Field(default="auto", description="Twist and its stiffness.", examples=["auto"])
-    plasticity: Switch = Field(default="auto", description="Yield and the memory of it.", examples=["auto"])
+    plasticity: Switch = Field(default="auto", description="Yield, and the memory of it.", examples=["auto"])
     table: Switch = Field(default="auto", description="Contact with the table.", examples=["auto"])
     friction: Switch = Field(default="auto", description="Friction on the table and on obstacles.", examples=["auto"])
     obstacles: Switch = Field(default="auto", description="Contact with obstacles.", examples=["auto"])
@@ -111,47 +111,52 @@ class EffectsModel(Model):
 
 
 class QualityModel(Model):
-    """A grid (`n_u` with `n_t`), or a target error, or a time budget; and how to solve."""
+    """A grid (`n_u` with `n_t`), a target error or a time budget; and how to solve."""
 
     n_u: CountOrNone = Field(
         default=None,
         ge=5,
         le=MAX_N_U,
-        description="Control points along the cable. Where a solve on the grid errs by more than 1 % of the length, as "
-        "it estimates, or does not come to its end, finer grids that reach 1 % are the answer. The message says so. "
-        "Where no grids settle the motion that takes until the time limit of the service; keep_grid leaves it out.",
+        description="Control points along the cable. If the estimated error on this grid is more than 1 % of the "
+        "length, or the solve does not come to its end, the answer is on finer grids that reach 1 %, and its message "
+        "says so. If no grids settle the motion, this lasts until the time limit of the service; `keep_grid` prevents "
+        "it.",
         examples=[9],
     )
     n_t: CountOrNone = Field(default=None, ge=5, le=MAX_N_T, description="Control points in time.", examples=[13])
     keep_grid: Flag = Field(
         default=False,
-        description="Whether to answer with what a given grid, and a least squares that was asked for, come to by "
-        "themselves, however much that errs, and whether it converges or not.",
+        description="Whether to keep the result of a given grid, and of a requested least squares, whatever its error "
+        "is and whether or not it converges.",
         examples=[False],
     )
     delta: Number | None = Field(
         default=None,
         ge=1e-10,
         le=1e-2,
-        description="Threshold of a least squares on its control-point update [m]; absent: 1e-5.",
+        description="Threshold on the control-point update of a least squares [m]; absent: 1e-5.",
         examples=[1e-5],
     )
     target_error: Number | None = Field(
-        default=None, ge=1e-6, le=10.0, description="Error at the worst point of the surface [m].", examples=[0.002]
+        default=None,
+        ge=1e-6,
+        le=10.0,
+        description="Target for the error at the worst point of the surface [m].",
+        examples=[0.002],
     )
     time_budget: Number | None = Field(
         default=None,
         ge=1e-4,
         le=3600.0,
-        description="Time the solve may take [s]; a first grid that takes longer is still marched to its end. "
-        "`converged` then says that the estimated error is within 1 % of the length.",
+        description="Time that the solve may take [s]; a first grid that takes longer is still marched to its end. "
+        "With a time budget, `converged` means that the estimated error is within 1 % of the length.",
         examples=[0.02],
     )
     method: Method = Field(
         default="auto",
-        description="How to solve; the answer names the method used. `auto` is `march`, but `spacetime` where a grid "
-        "is given with a `delta` and nothing touches, slips or yields. A `spacetime` that does not converge leaves the "
-        "answer to `march`, and its message says so.",
+        description="How to solve; the answer names the method used. `auto` is `march`, or `spacetime` if a grid is "
+        "given with a `delta` and nothing touches, slips or yields. If `spacetime` does not converge, `march` gives "
+        "the answer, and the message says so.",
         examples=["auto"],
     )
 
