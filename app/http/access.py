@@ -1,10 +1,10 @@
-"""Who is let in, at every address but ``/health`` and ``/ready``: the optional bearer token, and pages of other sites.
+"""Access control for every address but ``/health`` and ``/ready``: the optional bearer token, and pages of other sites.
 
-A program sends ``Authorization: Bearer TOKEN``. A browser can't, so a page opened once with ``?token=TOKEN`` gets a
-cookie that stands for the token, and is sent on to the same address without it.
+A program sends ``Authorization: Bearer TOKEN``. A browser can't, so a page that is opened once with ``?token=TOKEN``
+gets a cookie that stands for the token, and is redirected to the same address without the token.
 
-A browser that reaches the service may have any page open. Pages of other sites can't read answers, but without a token
-could have the service do things, and a page whose name leads to 127.0.0.1 for a moment could read, too.
+A browser that can reach the service may have any page open. Pages of other sites can't read the answers, but without a
+token they could make the service do things. A page whose host name resolves to 127.0.0.1 for a moment could also read.
 """
 
 import hashlib
@@ -24,17 +24,17 @@ from app.settings import Settings
 
 OPEN = frozenset({"/health", "/ready"})
 COOKIE = "dlo-session"
-IN_QUERY = "token"  # name in the query of a page that is opened with it
-_POLICY_VIOLATION = 1008  # the close code of a websocket that is refused
-_SAFE = frozenset({"GET", "HEAD", "OPTIONS"})  # change nothing
+IN_QUERY = "token"  # name of the token in the query of a page
+_POLICY_VIOLATION = 1008  # close code of a refused websocket
+_SAFE = frozenset({"GET", "HEAD", "OPTIONS"})  # methods that change nothing
 _MORE = "DLO_ALLOWED_ORIGINS allows others."
 
 
 class Access:
-    """Let in only those who know the token, over HTTP and over websockets.
+    """Let in only clients that know the token, over HTTP and over websockets.
 
     Args:
-        app: what they are let in to.
+        app: the application behind it.
         token: the token.
     """
 
@@ -77,11 +77,11 @@ class Access:
 
 
 class AllowedSites(CORSMiddleware):
-    """Give browsers leave to let pages of some other origins call the API, and tell those of others in a problem.
+    """Let pages of some other origins call the API (CORS), and answer those of any other with a problem.
 
     Args:
-        app: what they may call.
-        origins: theirs.
+        app: the application behind it.
+        origins: the allowed origins.
     """
 
     def __init__(self, app: ASGIApp, origins: Sequence[str]) -> None:
@@ -94,7 +94,7 @@ class AllowedSites(CORSMiddleware):
         )
 
     def preflight_response(self, request_headers: Headers) -> Response:
-        """Return the leave, or the problem of a request that may not be made."""
+        """Return the permission, or the problem of a request that is not allowed."""
         answer = super().preflight_response(request_headers)
         if answer.status_code == 200:
             return answer
@@ -107,13 +107,14 @@ class AllowedSites(CORSMiddleware):
 
 
 class OtherSites:
-    """Refuse what pages of other sites ask for; programs, which send no origin, are let in.
+    """Refuse requests from pages of other sites; programs, which send no origin, are let in.
 
-    A websocket must come from the service's own pages or from an allowed origin. Without a token so must whatever
-    changes something; and who connects to a service on a loopback address must call it by a name that is known.
+    A websocket must come from the service's own pages or from an allowed origin. If the service has no token, this also
+    holds for every request that changes something, and a client that connects to a service on a loopback address must
+    use a known host name.
 
     Args:
-        app: what they are let in to.
+        app: the application behind it.
         settings: the settings.
     """
 
@@ -146,20 +147,20 @@ class OtherSites:
 
     def _is_known(self, host: str) -> bool:
         name = _host_in(host)
-        return not host or is_loopback(name) or name in self._names  # no browser leaves it out
+        return not host or is_loopback(name) or name in self._names  # no browser leaves the host out
 
     def _is_allowed(self, origin: str, host: str) -> bool:
         return origin in self._origins or (host != "" and origin.partition("://")[2] == host)
 
 
 def _came_in_on_loopback(scope: Scope) -> bool:
-    """Say whether the client has connected to a loopback address of this machine."""
+    """Return whether the client has connected to a loopback address of this machine."""
     address, _ = scope.get("server") or ("", None)
     return is_loopback(address)
 
 
 def is_loopback(host: str) -> bool:
-    """Say whether `host`, an address or a name, is one that only this machine reaches."""
+    """Return whether `host`, an address or a name, is one that only this machine can reach."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -167,7 +168,7 @@ def is_loopback(host: str) -> bool:
 
 
 def _host_in(netloc: str) -> str:
-    """Return the name or address in `netloc`, in lower case and without its port; "" where there is none."""
+    """Return the name or address in `netloc`, in lower case and without its port; "" if there is none."""
     try:
         return urlsplit(f"//{netloc}").hostname or ""
     except ValueError:

@@ -1,4 +1,4 @@
-"""What is wrong with which field of a request: pydantic's findings in the words of the contract."""
+"""What is wrong with which field of a request: pydantic's errors in the words of the contract."""
 
 import ast
 import json
@@ -24,7 +24,7 @@ class BadField:
 
     Attributes:
         field: its path, e.g. ``primitives[0].u``; ``body`` for the request as a whole.
-        given: what was given, shortened for reading.
+        given: what was given, shortened to be readable.
         allowed: what would be accepted, in words.
         message: what is wrong, in words.
     """
@@ -43,18 +43,18 @@ class BadField:
 
     @staticmethod
     def in_query(field: str, value: str | list[str], allowed: str, what: str) -> "BadField":
-        """Return a query parameter of which a sentence says what is wrong with it."""
+        """Return a wrong query parameter; the sentence `what` says what is wrong."""
         given = _shown(value, "")
         return BadField(field, given, allowed, f"{what} Got {given}. Allowed: {allowed}.")
 
 
 def bad_fields(errors: Sequence[Any], body: Any, model: type[BaseModel] = PredictionRequest) -> list[BadField]:
-    """Return pydantic's `errors` about the request `body`, at most 50 of them.
+    """Return pydantic's `errors` about the request `body`, at most `MAX_REPORTED` of them.
 
     Args:
-        errors: what pydantic found.
+        errors: the errors that pydantic found.
         body: the request.
-        model: what it should have been.
+        model: the model that it should have matched.
     """
     schema = _schema_of(model)
     return [_bad_field(error, body, schema) for error in errors[:MAX_REPORTED]]
@@ -74,7 +74,7 @@ def _bad_field(error: Any, body: Any, schema: "_Schema") -> BadField:
     if kind == "json_invalid":
         at = loc[1] if len(loc) > 1 else 0
         given = str(body or "")[max(0, at - 30) : at + 30]
-        allowed = f"JSON (RFC 8259) in UTF-8, with each name once in an object, and at most {MAX_NAMES}"
+        allowed = f"JSON (RFC 8259) in UTF-8, with each name once in an object, and at most {MAX_NAMES} names"
         return BadField(_WHOLE, given, allowed, f"The body can't be read: {context['error']}. Allowed: {allowed}.")
     if kind == "two_forms":
         given, allowed = context["given"], context["allowed"]
@@ -84,7 +84,7 @@ def _bad_field(error: Any, body: Any, schema: "_Schema") -> BadField:
     if kind == "union_tag_not_found":
         steps = [*steps, "kind"]
     given = "nothing" if kind in ("missing", "union_tag_not_found") else _shown(error["input"], kind)
-    by_kind = not context.get("tag", "").startswith("~")  # else by form, which has no field of its own
+    by_kind = not context.get("tag", "").startswith("~")  # otherwise by form, which has no field of its own
     if kind == "union_tag_invalid" and by_kind:
         steps, given = [*steps, "kind"], _shown(error["input"].get("kind"), kind)
     allowed = _allowed(kind, context, tagged, schema if where == _WHOLE else _NONE)
@@ -94,7 +94,7 @@ def _bad_field(error: Any, body: Any, schema: "_Schema") -> BadField:
 def _steps(loc: list[Any], body: Any) -> tuple[list[Any], list[Any]]:
     """Return the path of an error with the names of union branches, and without them.
 
-    A branch by form begins with "~"; a branch by `kind` is that of the object it was found in.
+    The name of a branch by form begins with "~". The name of a branch by `kind` is the `kind` of the object there.
     """
     steps: list[Any] = []
     value, fresh = body, True
@@ -124,10 +124,10 @@ def _shown(value: Any, kind: str) -> str:
 
 
 def _from_python(text: str) -> str:
-    """Return as JSON has it what the solver shows as Python has it: None, a bool, a tuple, the shape of an array."""
+    """Return in JSON's notation what the solver shows in Python's: None, a bool, a tuple, the shape of an array."""
     try:
         value = ast.literal_eval(text)
-    except (ValueError, SyntaxError, MemoryError, RecursionError):  # no value, but words, or one that is shortened
+    except (ValueError, SyntaxError, MemoryError, RecursionError):  # words, or a shortened value
         shape = _SHAPE.fullmatch(text)
         return text if shape is None else " x ".join(re.findall("[0-9]+", shape[1])) + " numbers"
     try:
@@ -137,12 +137,12 @@ def _from_python(text: str) -> str:
 
 
 def _written(text: str) -> str:
-    """Return a text with escapes for halves of surrogate pairs, which JSON can spell but UTF-8 can't hold."""
+    """Return a text with lone surrogates escaped: JSON can express them, but UTF-8 can't."""
     return text.encode(errors="backslashreplace").decode()
 
 
 def _as_json(value: Any) -> str:
-    """Return a value as JSON has it; a text bare, but for one that reads like another value, or like none."""
+    """Return a value as JSON; a text has no quotes unless it is blank or reads like another value."""
     text = json.dumps(value, default=repr, ensure_ascii=False)
     if not isinstance(value, str) or not value.strip():
         return text
@@ -199,7 +199,7 @@ def _allowed(kind: str, context: dict[str, Any], loc: list[Any], whole: "_Schema
         return " or ".join([values, *whole.other_forms(loc)])
     if kind == "string_pattern_mismatch":
         return RUN_ID
-    if kind == "string_unicode":  # of a text, or of a name in an object
+    if kind == "string_unicode":  # in a text, or in a name in an object
         return "texts and names in Unicode, which has surrogates in pairs only"
     if kind in ("too_short", "too_long"):
         return _bounds(context, "min_length", "max_length", "{} items")
@@ -244,7 +244,7 @@ class _Schema:
         self._document = document
 
     def at(self, loc: list[Any]) -> dict[str, Any]:
-        """Return the schema of the field at `loc`, with union branches as pydantic names them; {} where unknown."""
+        """Return the schema of the field at `loc`, with union branches as pydantic names them; {} if unknown."""
         node = self._document
         for item in loc:
             if isinstance(item, str) and item.startswith("~"):
@@ -257,19 +257,19 @@ class _Schema:
         return {**resolved, "description": description} if description else resolved
 
     def names(self, loc: list[Any]) -> list[str]:
-        """Return the field names of the object at `loc`, or of the one object among the forms that it may have."""
+        """Return the field names of the object at `loc`, or of the object among the forms that it may have."""
         node = self.at(loc)
         options = [node, *map(self._resolved, _options(node))]
         return next((list(option["properties"]) for option in options if "properties" in option), [])
 
     def other_forms(self, loc: list[Any]) -> list[str]:
-        """Return in words what the field at `loc` may be besides a text."""
+        """Return in words what the field at `loc` may be other than a text."""
         options = [self._resolved(option) for option in _options(self.at(loc))]
         words = {"array": "a list", "object": "an object with some of " + ", ".join(self.names(loc))}
         return [words[option["type"]] for option in options if option.get("type") in words]
 
     def form(self, node: dict[str, Any]) -> str:
-        """Return in words what a value of the schema `node` is; "" where that is not told."""
+        """Return in words what a value of the schema `node` is; "" if the schema does not say."""
         node = self._resolved(node)
         kinds = node.get("discriminator", {}).get("mapping")
         if kinds:
@@ -310,7 +310,7 @@ class _Schema:
         return {}
 
 
-_NONE = _Schema({})  # of what is no field of the body
+_NONE = _Schema({})  # for what is not a field of the body
 
 
 @cache

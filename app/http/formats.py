@@ -1,4 +1,4 @@
-"""What a client accepts (RFC 9110, 12.5.1), and a prediction in the forms there are: JSON, .npz, MessagePack."""
+"""Content negotiation (RFC 9110, 12.5.1), and the forms of a prediction: JSON, .npz, MessagePack."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -19,7 +19,7 @@ MSGPACK = "application/vnd.msgpack"
 EVENTS = "text/event-stream"
 LINES = "application/jsonl"
 
-# other names under which a form is asked for
+# other names under which clients request a form
 _SYNONYMS = {
     MSGPACK: (MSGPACK, "application/msgpack", "application/x-msgpack"),
     LINES: (LINES, "application/x-ndjson", "application/x-jsonlines", "application/jsonlines"),
@@ -28,10 +28,10 @@ FORMS = (JSON, NPZ, MSGPACK)
 
 
 def negotiated(accept: str | None, offers: Sequence[str]) -> str:
-    """Return the one of `offers` that an ``Accept`` header ranks highest, the first of equals.
+    """Return which of `offers` an ``Accept`` header ranks highest; of equals, the first.
 
     Args:
-        accept: the header; absent or empty, anything is accepted.
+        accept: the header; if it is absent or empty, anything is accepted.
         offers: media types, the preferred one first.
 
     Raises:
@@ -47,13 +47,13 @@ def negotiated(accept: str | None, offers: Sequence[str]) -> str:
 
 
 def prefers(accept: str | None, form: str, other: str) -> bool:
-    """Return whether an ``Accept`` header ranks one media type above another; absent or empty, it ranks none."""
+    """Return whether an ``Accept`` header ranks `form` above `other`; one that is absent or empty ranks neither."""
     ranges = _ranges(accept or "*/*")
     return _quality(form, ranges) > _quality(other, ranges)
 
 
 def _ranges(accept: str) -> dict[str, float]:
-    """Return the quality of each media range; parameters other than ``q`` don't tell our forms apart."""
+    """Return the quality of each media range; parameters other than ``q`` make no difference to our forms."""
     ranges: dict[str, float] = {}
     for part in accept.lower().split(","):
         media, *parameters = (word.strip() for word in part.split(";"))
@@ -73,7 +73,7 @@ def _quality(media: str, ranges: dict[str, float]) -> float:
 
 
 def as_msgpack(document: bytes) -> bytes:
-    """Return a JSON document as MessagePack, the same names and nesting; every number of a surface a float64."""
+    """Return a JSON document as MessagePack with the same names and nesting; all numbers of a surface are float64."""
     packed: bytes = msgpack.packb(orjson.loads(document))
     return packed
 
@@ -84,7 +84,7 @@ def as_npz(document: bytes, material: MaterialMotion | None) -> bytes:
 
 
 def json_response(document: Any, status: int = 200) -> Response:
-    """Return a document as the JSON of an answer."""
+    """Return a document as a JSON response."""
     return Response(orjson.dumps(document), status, media_type=JSON)
 
 
@@ -94,10 +94,10 @@ async def prediction_response(
     """Return a prediction as a response of the media type `form`, one of `FORMS`.
 
     Args:
-        document: its JSON document.
+        document: the prediction as a JSON document.
         form: the media type.
-        material: finds what the sections of the cable remember; called in a thread where the form holds it.
-        status: of the response.
+        material: finds what the sections of the cable remember; called in a thread if the form contains it.
+        status: status of the response.
     """
 
     def encoded() -> bytes:

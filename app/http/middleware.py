@@ -1,4 +1,4 @@
-"""What every request and response passes through: the log, a limit on bodies, headers that keep a page to itself."""
+"""Middleware for every request and response: the access log, a limit on bodies, HEAD, and security headers."""
 
 import logging
 import time
@@ -27,18 +27,18 @@ _log = logging.getLogger("dlo.access")
 
 
 class AccessLog:
-    """Write one line for each request: method, path without its query, status, time, and the run if there is one."""
+    """Log one line for each request: method, path without its query, status, time, and the run if there is one."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass the request on, and note how it ended."""
+        """Pass the request on, and log how it ended."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
         began = time.perf_counter()
-        status = 0  # of a request that was given up
+        status = 0  # stays 0 if the request is abandoned
 
         async def noted(message: Message) -> None:
             nonlocal status
@@ -56,7 +56,7 @@ class AccessLog:
 
 
 class BodyLimit:
-    """Answer 413 to a body of more than `limit` bytes, whether it says so or just goes on."""
+    """Answer 413 to a body of more than `limit` bytes, whether it declares its length or not."""
 
     def __init__(self, app: ASGIApp, limit: int) -> None:
         self.app = app
@@ -86,7 +86,7 @@ class BodyLimit:
 
 
 class Heads:
-    """Answer HEAD as GET without its body, as those who watch a service ask; not within the API, which has no HEAD."""
+    """Answer HEAD as GET without the body, as monitoring requests it; not within the API, which has no HEAD."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
@@ -104,7 +104,7 @@ class Heads:
 
 
 class PageHeaders:
-    """Add the content security policy: pages load nothing from elsewhere, and nobody else frames them."""
+    """Add the content security policy: pages load nothing from other hosts, and other sites can't frame them."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app

@@ -1,4 +1,4 @@
-"""The OpenAPI document: FastAPI's, with the schemas of the answers that are serialised without a model."""
+"""The OpenAPI document: that of FastAPI, and the schemas of the answers that are serialised without a model."""
 
 from typing import Any
 
@@ -14,7 +14,7 @@ _REFERENCE = "#/components/schemas/{model}"
 
 
 def install(app: FastAPI) -> None:
-    """Let ``app.openapi`` describe problems and predictions as they are sent."""
+    """Make ``app.openapi`` describe problems and predictions as they are sent."""
     described = app.openapi
 
     def openapi() -> dict[str, Any]:
@@ -27,7 +27,9 @@ def install(app: FastAPI) -> None:
                 for operation in path.values():
                     _describe_bad_request(address, operation["responses"])
                     if "401" in operation["responses"]:
-                        operation["responses"]["403"] = problem_document("A page of another site asks for it.")
+                        operation["responses"]["403"] = problem_document(
+                            "The request comes from a page of another site."
+                        )
             _add_enums(document)
             _add_token(document, is_needed=app.state.settings.token is not None)
             for name in ("HTTPValidationError", "ValidationError"):
@@ -45,7 +47,7 @@ def _schemas(model: type[BaseModel]) -> dict[str, Any]:
 
 
 def _add_enums(node: Any) -> None:
-    """Give each constant as the one value of an enum, too, which more generators of clients read."""
+    """Also write each constant as the only value of an enum, which more client generators understand."""
     if isinstance(node, dict) and isinstance(node.get("const"), str):
         node["enum"] = [node["const"]]
     for part in node.values() if isinstance(node, dict) else node if isinstance(node, list) else ():
@@ -53,8 +55,8 @@ def _add_enums(node: Any) -> None:
 
 
 def _add_token(document: dict[str, Any], *, is_needed: bool) -> None:
-    """Describe the bearer token, wherever an address can answer 401; optional in a service that needs none."""
-    description = "The token of the service (`DLO_TOKEN`), where it has one."
+    """Describe the bearer token of every address that can answer 401; it is optional if the service needs none."""
+    description = "The token of the service (`DLO_TOKEN`), if it has one."
     schemes = document["components"].setdefault("securitySchemes", {})
     schemes["token"] = {"type": "http", "scheme": "bearer", "description": description}
     for path in document["paths"].values():
@@ -64,9 +66,9 @@ def _add_token(document: dict[str, Any], *, is_needed: bool) -> None:
 
 
 def _describe_bad_request(address: str, responses: dict[str, Any]) -> None:
-    """Describe a bad request, which every address of the API can have by its query, where its route does not.
+    """Describe the answer to a bad request where the route does not: any address of the API can get a bad query.
 
-    FastAPI's own description, which it adds wherever something is validated, is replaced.
+    This replaces the description that FastAPI adds wherever something is validated.
     """
     content = responses.get("422", {}).get("content", {})
     if "application/json" in content or ("422" not in responses and address.startswith(API)):

@@ -1,4 +1,4 @@
-"""The ``Prefer`` header (RFC 7240): what a client would like, as far as there is a choice."""
+"""The ``Prefer`` header (RFC 7240): what a client prefers, where the service leaves a choice."""
 
 import re
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ class Preferences:
 
     Attributes:
         respond_async: answer before the solve is done.
-        wait: but wait so long for it first [s].
+        wait: how long to wait for the solve first [s].
         applied: the preferences that were understood, for ``Preference-Applied``.
     """
 
@@ -23,7 +23,7 @@ class Preferences:
 
 
 def preferences(header: str | None) -> Preferences:
-    """Return what a ``Prefer`` header says; what it says beyond ``respond-async`` and ``wait`` is passed over."""
+    """Return what a ``Prefer`` header says; all but ``respond-async`` and ``wait`` is ignored."""
     found: dict[str, str] = {}
     for part in (header or "").lower().split(","):
         match = _PREFERENCE.match(part)

@@ -17,7 +17,7 @@ from app.schemas.request import PredictionRequest
 from dlocore import SceneError
 
 MEDIA_TYPE = "application/problem+json"
-API = "/v1/"  # what the addresses of the API begin with
+API = "/v1/"  # prefix of the addresses of the API
 _log = logging.getLogger("dlo")
 
 _DEFECT = "The service failed; this is a defect. Its log says where."
@@ -28,7 +28,7 @@ _DETAILS = {
 
 
 class ProblemError(Exception):
-    """A failure to be answered as a problem document.
+    """A failure that is answered with a problem document.
 
     Args:
         status: HTTP status.
@@ -50,18 +50,18 @@ class ProblemError(Exception):
 
 
 def no_such_run(id: str, field: str = "") -> ProblemError:
-    """Return the problem of an id that is none, or was one; `field`: where it was given, if not in the address."""
+    """Return the problem of an id without a run (any more); `field`: where it was given, if not in the address."""
     place = f"{field}: " if field else ""
     return ProblemError(404, "no-such-run", f"{place}There is no run {id[:64]!r}; it may have been removed.")
 
 
 def phrase_of(status: int) -> str:
-    """Return the phrase of a status, as RFC 9110 has it; Python before 3.13 has older ones."""
+    """Return the phrase of a status as in RFC 9110; Python before 3.13 has older ones."""
     return {413: "Content Too Large", 422: "Unprocessable Content"}.get(status, HTTPStatus(status).phrase)
 
 
 def document_of(problem: ProblemError) -> dict[str, Any]:
-    """Return the problem as its document."""
+    """Return the document of a problem."""
     return {
         "type": f"urn:dlo:problem:{problem.kind}",
         "title": phrase_of(problem.status),
@@ -77,7 +77,7 @@ def problem_response(problem: ProblemError) -> Response:
 
 
 def problem_of(error: Exception) -> ProblemError:
-    """Return what to tell of an error of a solve; what is no one's input is a defect, and only named so."""
+    """Return the problem to report for an error of a solve; an error not caused by input is reported as a defect."""
     if isinstance(error, ProblemError):
         return error
     if isinstance(error, SceneError):
@@ -86,7 +86,7 @@ def problem_of(error: Exception) -> ProblemError:
 
 
 def not_written(what: str, error: OSError) -> ProblemError:
-    """Return the problem that `what` can't be written, as on a full disk."""
+    """Return the problem that `what` can't be written, for example on a full disk."""
     return ProblemError(507, "not-written", f"{what} can't be written: {error.strerror or error}.")
 
 
@@ -116,7 +116,7 @@ async def _on_http_error(request: Request, error: Exception) -> Response:
 
 
 def _allowed(request: Request) -> str:
-    """Return the methods of this address: those that a route takes there, GET for files, and HEAD as `Heads` has it."""
+    """Return the methods of this address: those of its routes, GET for files, and HEAD where `Heads` answers it."""
     routes = [route for route in request.app.routes if not isinstance(route, Mount)]
 
     def taken(method: str) -> bool:

@@ -1,4 +1,4 @@
-"""Names in the query of an address: one that is misspelt, or given twice for one value, is refused, not passed over."""
+"""Check the names in the query of an address: a misspelt name, or one given twice for one value, is refused."""
 
 from typing import Any, get_args, get_origin
 
@@ -10,9 +10,9 @@ from app.http.problems import bad_scene
 
 
 async def check_query(request: Request) -> None:
-    """Raise a 422 problem where the query has names that the route doesn't know, or several values for one.
+    """Raise a 422 problem if the query has names that the route doesn't know, or several values for one parameter.
 
-    A token may be in any query.
+    Any query may contain a token.
     """
     given = request.query_params
     parameters = request.scope["route"].dependant.query_params
@@ -26,7 +26,7 @@ async def check_query(request: Request) -> None:
     for parameter in parameters:
         values = given.getlist(parameter.alias)
         if len(values) > 1 and not _is_list(parameter.field_info.annotation):
-            wrong.append(BadField.in_query(parameter.alias, values, "one value", "It is there more than once."))
+            wrong.append(BadField.in_query(parameter.alias, values, "one value", "It is given more than once."))
     if wrong:
         raise bad_scene(wrong)
 

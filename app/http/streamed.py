@@ -1,4 +1,4 @@
-"""A response that is written piece by piece until it ends or the client has gone."""
+"""A response that is written piece by piece until it ends or the client disconnects."""
 
 from collections.abc import Awaitable, Callable, Mapping
 
@@ -12,11 +12,11 @@ Emit = Callable[[bytes], Awaitable[None]]
 class Streamed(Response):
     """Send what `produce` emits; cancel it as soon as the client closes the connection.
 
-    Unlike an iterator, `produce` may hold tasks and places in a queue: it always ends before the response does.
+    Unlike an iterator, `produce` may own tasks and places in a queue, because it always ends before the response does.
 
     Args:
         produce: called with the function that sends a piece.
-        media_type: of the whole.
+        media_type: media type of the response.
         headers: response headers.
     """
 

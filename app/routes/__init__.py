@@ -1,1 +1,1 @@
-"""The HTTP routes: thin, each a few lines around the service."""
+"""The HTTP routes: each is a few lines around the service."""

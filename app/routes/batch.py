@@ -14,7 +14,7 @@ from app.service.batch import check_size, predict_all
 from app.service.service import TheService
 
 router = APIRouter(tags=["predictions"], route_class=JsonRoute)
-_LINE = {"schema": {"$ref": "#/components/schemas/BatchLine"}}  # of each: OpenAPI 3.1 has no word for that
+_LINE = {"schema": {"$ref": "#/components/schemas/BatchLine"}}  # of each line, which OpenAPI 3.1 can't express
 
 
 @router.post(
@@ -22,7 +22,7 @@ _LINE = {"schema": {"$ref": "#/components/schemas/BatchLine"}}  # of each: OpenA
     response_class=Response,
     summary="Predict many scenes",
     responses={
-        200: {"description": "JSON lines: the schema, `BatchLine`, is that of each line.", "content": {LINES: _LINE}},
+        200: {"description": "JSON lines. The schema `BatchLine` describes each line.", "content": {LINES: _LINE}},
         **described.failures(401, 404, 406, 413, 415, 422, 429, 503),
     },
 )
@@ -31,8 +31,8 @@ async def batch(
 ) -> Response:
     """Predict many scenes, or one scene with many primitives, on all cores.
 
-    The answer is JSON lines, streamed. A wrong scene gives a line with its problem and spoils no other one. Closing
-    the connection cancels the rest. The runs are not stored unless `store` says so.
+    The answer is a stream of JSON lines. An invalid scene gives a line with its problem and does not affect the others.
+    Closing the connection cancels the rest. The runs are only stored with `store`.
     """
     negotiated(request.headers.get("accept"), (LINES,))
     scenes = wanted.scenes()

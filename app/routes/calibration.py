@@ -1,7 +1,7 @@
 """``/v1/calibration``: what accuracy costs in time on the machine of the service.
 
-It is measured when someone asks for it, not at the first start: it takes tens of seconds of a core, of which the first
-requests would feel a part, and what it measures while others compile is worth little.
+It is measured on request, not at the first start: it takes tens of seconds of a core, which would slow the first
+requests down, and times that are measured while other code is being compiled are worth little.
 """
 
 import logging
@@ -31,7 +31,7 @@ KIND = "calibration"
 
 
 def document_of(found: Calibration, dimensions: int) -> dict[str, Any]:
-    """Return a calibration's points of one kind of motion, and which of them are worth their time."""
+    """Return the points of a calibration for motions of some dimensions, and which of them are on the Pareto front."""
     points = found.of_dimensions(dimensions)
     return {
         "machine": found.machine,
@@ -55,10 +55,10 @@ async def read(
     request: Request,
     service: TheService,
     dimensions: Annotated[
-        Literal["2", "3"], Query(description="Motions in the plane, 2, or in space, 3.", examples=["2"])
+        Literal["2", "3"], Query(description="Dimensions of the motions: 2, in the plane, or 3.", examples=["2"])
     ] = "2",
 ) -> Response:
-    """Return error and time of both methods over grids, and the Pareto front; 404 until it has been measured."""
+    """Return the error and time of both methods over grids, and the Pareto front; 404 until they are measured."""
     negotiated(request.headers.get("accept"), (JSON,))
     found = await anyio.to_thread.run_sync(calibration.load, service.settings.calibration_file)
     if found is None:
@@ -69,10 +69,10 @@ async def read(
 
 @router.post("", status_code=202, response_class=Response, summary="Calibrate", responses=described.MEASURE)
 async def measure(request: Request, service: TheService) -> Response:
-    """Measure this machine in the background, about 10 to 20 seconds; predictions go first.
+    """Measure this machine in the background for about 10 to 20 seconds; predictions go first.
 
-    Where a calibration is under way already, that one is answered. With `Accept: text/event-stream` the answer is its
-    progress; closing the connection does not stop it, `DELETE` does.
+    If a calibration is already under way, the answer is that one. With `Accept: text/event-stream` the answer is its
+    progress; closing the connection does not stop the calibration, `DELETE` does.
     """
     form = negotiated(request.headers.get("accept"), (JSON, EVENTS))
     running = service.measurements.under_way(KIND)
@@ -96,7 +96,7 @@ async def measure(request: Request, service: TheService) -> Response:
 
 @router.delete("", response_class=Response, summary="Stop calibrating", responses=described.STOP)
 async def stop(service: TheService) -> Response:
-    """Stop the calibration that is under way; what was measured before stays."""
+    """Stop the calibration that is under way; an earlier result is kept."""
     running = service.measurements.under_way(KIND)
     if not running:
         raise ProblemError(404, "not-calibrating", "No calibration is under way.")
@@ -111,9 +111,9 @@ async def follow(
     service: TheService,
     last_event_id: events.LastEventId = None,
 ) -> Response:
-    """Give the course of the last calibration as server-sent events: `state`, `progress`, and `done` or `error`.
+    """Return the progress of the last calibration as server-sent events: `state`, `progress`, and `done` or `error`.
 
-    204: nothing is left to tell.
+    204: no events are left.
     """
     negotiated(request.headers.get("accept"), (EVENTS,))
     job = service.measurements.last(KIND)

@@ -1,4 +1,4 @@
-"""``/v1/examples``: ready scenes to send, to open in the 3D scene, or to start one's own from."""
+"""``/v1/examples``: ready scenes to send, to open in the 3D scene, or to use as a starting point."""
 
 import anyio.to_thread
 from fastapi import APIRouter
@@ -18,16 +18,16 @@ class ExampleLinks(BaseModel):
     """Addresses, relative to the service."""
 
     self: str = Field(description="The scene as JSON.", examples=["/v1/examples/paper-25"])
-    scene: str = Field(description="The 3D scene with it.", examples=["/scene/?example=paper-25"])
+    scene: str = Field(description="The 3D scene that shows it.", examples=["/scene/?example=paper-25"])
     picture: str = Field(description="A small picture of its prediction.", examples=["/gallery/paper-25.svg"])
 
 
 class ExampleSummary(BaseModel):
-    """A ready scene in the list."""
+    """A ready scene, as an item of the list."""
 
     name: str = Field(description="Its name in addresses.", examples=["paper-25"])
     title: str = Field(description="What it is, in a few words.", examples=["Grasped at a quarter"])
-    description: str = Field(description="What is to be seen.", examples=["A straight cable is pulled sideways."])
+    description: str = Field(description="What it shows.", examples=["A straight cable is pulled sideways."])
     links: ExampleLinks = Field(description="Addresses, relative to the service.")
 
 
@@ -48,7 +48,7 @@ def _summary(example: Example) -> ExampleSummary:
 
 @router.get("", summary="List the ready scenes", responses=described.failures(401))
 async def listed() -> ExampleList:
-    """Return the ready scenes; each is a request of `POST /v1/predictions`."""
+    """Return the ready scenes; each is a request for `POST /v1/predictions`."""
     found = await anyio.to_thread.run_sync(examples)
     return ExampleList(examples=[_summary(example) for example in found.values()])
 
@@ -60,7 +60,7 @@ async def listed() -> ExampleList:
     responses={**described.failures(401), 404: problem_document("There is no such example.")},
 )
 async def example(name: str) -> Response:
-    """Return the scene, to be sent to `POST /v1/predictions` as it is."""
+    """Return the scene; it can be sent to `POST /v1/predictions` as it is."""
     found = await anyio.to_thread.run_sync(examples)
     if name not in found:
         names = ", ".join(found)

@@ -21,7 +21,7 @@ router = APIRouter(prefix="/v1/predictions/{id}", tags=["predictions"])
     responses=described.a_file("Arrays of the surface, the spline, the reactions, and what the cable remembers.", NPZ),
 )
 async def surface(id: str, service: TheService) -> Response:
-    """Return `u`, `t`, `positions`, `twist`, the spline, the reactions of the grasps, and what the cable remembers."""
+    """Return the surface: `u`, `t`, `positions`, `twist`, the spline, the reactions, and what the cable remembers."""
     document = await part(service, service.document, id)
 
     def npz() -> bytes:
@@ -37,7 +37,7 @@ async def surface(id: str, service: TheService) -> Response:
     responses={**described.a_file("How the solve went and the motion.", _ANY), **described.failures(507)},
 )
 async def recording(id: str, service: TheService) -> Response:
-    """Return the recording; it is written when first asked for."""
+    """Return the recording; it is written at the first request."""
     try:
         content = await part(service, service.runs.recording, id)
     except OSError as error:
@@ -49,10 +49,10 @@ async def recording(id: str, service: TheService) -> Response:
     "/scene.json",
     response_class=Response,
     summary="The request as it was sent",
-    responses=described.a_file("Send it again to repeat the run.", JSON),
+    responses=described.a_file("The request, which can be sent again to repeat the run.", JSON),
 )
 async def scene_json(id: str, service: TheService) -> Response:
-    """Return the request."""
+    """Return the request as it was sent."""
     return Response(await part(service, service.runs.request, id), media_type=JSON)
 
 
@@ -64,9 +64,9 @@ async def scene_json(id: str, service: TheService) -> Response:
     responses=described.failures(401, 404, 409),
 )
 async def viewer(id: str, request: Request, service: TheService) -> Response:
-    """Redirect to the recording in rerun's web viewer, which this service serves too."""
+    """Redirect to the recording in rerun's web viewer, which this service also serves."""
     await part(service, service.runs.document, id)
-    origin = str(request.base_url).rstrip("/")  # the viewer takes whole addresses only
+    origin = str(request.base_url).rstrip("/")  # the viewer takes only absolute addresses
     urls = f"url={origin}/rerun/layout.rbl&url={origin}/v1/predictions/{id}/recording.rrd"
     return RedirectResponse(f"/rerun/?{urls}&renderer=webgl", 307)
 

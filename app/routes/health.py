@@ -1,4 +1,4 @@
-"""``/health``, ``/ready`` and ``/metrics``, for whoever watches over the service."""
+"""``/health``, ``/ready`` and ``/metrics``, for monitoring."""
 
 from typing import Literal
 
@@ -17,7 +17,7 @@ class Health(BaseModel):
     """The process answers."""
 
     status: Literal["ok"] = "ok"
-    calibrated: bool = Field(description="Whether `GET /v1/calibration` has something to tell.", examples=[False])
+    calibrated: bool = Field(description="Whether `GET /v1/calibration` has a result.", examples=[False])
 
 
 class Ready(BaseModel):
@@ -28,7 +28,7 @@ class Ready(BaseModel):
 
 @router.get("/health", summary="Is the process alive?")
 async def health(request: Request) -> Health:
-    """Answer as long as the process does."""
+    """Answer as long as the process is alive."""
     return Health(calibrated=request.app.state.settings.calibration_file.exists())
 
 
@@ -44,7 +44,7 @@ async def ready(service: TheService) -> Ready:
     response_class=Response,
     summary="Counters for Prometheus",
     responses={
-        200: {"description": "Prometheus' text form.", "content": {"text/plain": {"schema": {"type": "string"}}}},
+        200: {"description": "Prometheus text format.", "content": {"text/plain": {"schema": {"type": "string"}}}},
         **described.failures(401),
     },
 )

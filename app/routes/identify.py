@@ -35,15 +35,15 @@ router = APIRouter(tags=["cables"], route_class=JsonRoute)
     summary="Identify a cable from recordings",
     responses={
         **described.failures(401, 406, 413, 415, 422, 429, 503, 504),
-        200: {"description": "The cable; or the course as server-sent events.", "content": {EVENTS: {}}},
+        200: {"description": "The cable; or the progress as server-sent events.", "content": {EVENTS: {}}},
     },
 )
 async def identify(request: Request, asked: Annotated[IdentifyRequest, Body()], service: TheService) -> Response:
-    """Find the parameters with which predictions meet recordings best, with 95 % intervals.
+    """Find the parameters with which predictions fit the recordings best, with 95 % intervals.
 
-    With `Accept: text/event-stream` the answer is a course of events: `iteration` with the values so far, and `done`
-    with the answer or `error` with the problem. Takes seconds to minutes; one runs at a time, and ends with 504 at the
-    time limit of the service (`DLO_TIME_LIMIT`).
+    With `Accept: text/event-stream` the answer is a stream of events: `iteration` with the values so far, and finally
+    `done` with the answer or `error` with the problem. An identification takes seconds to minutes. One runs at a time.
+    At the time limit of the service (`DLO_TIME_LIMIT`) it ends with 504.
     """
     form = negotiated(request.headers.get("accept"), (JSON, EVENTS))
     recordings = await anyio.to_thread.run_sync(_recordings, asked)
@@ -58,7 +58,7 @@ async def identify(request: Request, asked: Annotated[IdentifyRequest, Body()], 
 
 
 class _Search:
-    """One identification: its answer, or its course."""
+    """One identification: its answer, or its events."""
 
     def __init__(
         self, asked: IdentifyRequest, recordings: list[Recording], cable: Cable | None, searches: Searches
@@ -102,7 +102,7 @@ def _answer(found: Identification) -> bytes:
 
 
 def _by_number(error: SceneError, recordings: list[Recording]) -> SceneError:
-    """Return the error with the path of a recording's field as the request has it: by number, not by name."""
+    """Return the error with the path that the field has in the request: by number of the recording, not by name."""
     places = {recording.place: f"recordings[{i}]" for i, recording in enumerate(recordings)}
     place = next((place for place in places if error.field.startswith(place)), None)
     field = error.field if place is None else places[place] + error.field.removeprefix(place)

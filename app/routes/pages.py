@@ -1,4 +1,4 @@
-"""The landing page and its files, at every address that nothing else answers; and the way to addresses with a slash."""
+"""The landing page and its files, at every address without another route; and redirects to addresses with a slash."""
 
 import os
 
@@ -30,9 +30,9 @@ POLICY = "; ".join(
 
 
 class _Files(StaticFiles):
-    """The files with a content security policy of their own, stricter than what the API's documentation needs.
+    """The files, with a content security policy that is stricter than what the API's documentation needs.
 
-    Where there is no file a browser gets ``404.html``, and who prefers no page a problem document.
+    If there is no such file, a browser gets ``404.html``, and a client that does not prefer HTML a problem document.
     """
 
     async def get_response(self, path: str, scope: Scope) -> Response:
@@ -49,7 +49,9 @@ class _Files(StaticFiles):
     ) -> Response:
         response = super().file_response(full_path, stat_result, scope, status_code)
         response.headers["Content-Security-Policy"] = POLICY
-        response.headers["Cache-Control"] = "no-cache"  # asked anew by its tag: parts of two versions don't mix
+        response.headers["Cache-Control"] = (
+            "no-cache"  # revalidated by its tag, so that files of two versions don't mix
+        )
         return response
 
 
@@ -63,13 +65,13 @@ class _Pages(Mount):
 
 
 async def _with_slash(request: Request) -> Response:
-    """Redirect to the address that the relative links of the scene's page need."""
+    """Redirect to the address with a slash, which the relative links of the scene's page need."""
     query = request.url.query
     return RedirectResponse(f"{request.url.path}/" + (f"?{query}" if query else ""), 307)
 
 
 def add_pages(app: FastAPI) -> None:
-    """Serve the pages at /; to be called after every other route is there."""
+    """Serve the pages at /; call this after all other routes are added."""
     for path in ("/scene", "/scene/{name}"):
         app.get(path, include_in_schema=False)(_with_slash)
     app.router.routes.append(_Pages("/", _Files(directory=static_dir(), html=True, check_dir=False), name="pages"))

@@ -31,7 +31,7 @@ _ISO = re.compile(r"\d{4}-\d\d-\d\d[Tt ]\d\d:\d\d(:\d\d([.,]\d+)?)?([Zz]|[+-]\d\
 
 
 def _iso(value: str) -> str:
-    """Return `value` as it is; pydantic alone would take a bare number for seconds since 1970."""
+    """Return `value` if it is ISO 8601; pydantic alone would also take a bare number as seconds since 1970."""
     if not _ISO.fullmatch(value):
         raise PydanticCustomError("datetime_parsing", "not ISO 8601")
     return value
@@ -58,10 +58,10 @@ async def predict(
         Header(description=described.PREFER, examples=["respond-async", "respond-async, wait=5"]),
     ] = None,
 ) -> Response:
-    """Solve the scene and answer with the predicted space-time surface.
+    """Solve the scene and return the predicted space-time surface.
 
-    The answer says whether it converged (`status`, `message`), how accurate it is, and what was simulated and why.
-    Closing the connection cancels the solve, unless `Prefer: respond-async` was sent.
+    The answer says whether the solve converged (`status`, `message`), how accurate the surface is, and what was
+    simulated and why. Closing the connection cancels the solve, unless `Prefer: respond-async` was sent.
     """
     form = negotiated(request.headers.get("accept"), (*FORMS, EVENTS))
     wishes = preferences(prefer)
@@ -76,7 +76,7 @@ async def predict(
         async with calling_when_gone(request, job.cancel):
             await job.finished.wait()
         if not job.beyond_limit:
-            service.jobs.forget(job.id)  # it is answered here and now
+            service.jobs.forget(job.id)  # it is answered here
         response = await _answer(job, service, form)
     if response.status_code == 201 or form == EVENTS or wishes.respond_async:
         response.headers["Location"] = f"/v1/predictions/{job.id}"
@@ -86,7 +86,7 @@ async def predict(
 
 
 async def _answer(job: Job, service: Service, form: str) -> Response:
-    """Return what came of a job: 201 for a stored run, 200 for one that is not."""
+    """Return the answer of a job: 201 for a stored run, 200 for one that is not stored."""
     if job.problem is not None:
         raise job.problem
     address = f"/v1/predictions/{job.id}"
@@ -113,27 +113,28 @@ def _state(job: Job, status: int = 200) -> Response:
 async def listed(
     request: Request,
     service: TheService,
-    limit: Annotated[int, Query(ge=1, le=1000, description="At most so many.", examples=[20])] = 20,
-    offset: Annotated[int, Query(ge=0, le=10**9, description="Pass over so many newer ones.", examples=[0])] = 0,
+    limit: Annotated[int, Query(ge=1, le=1000, description="Largest number of runs on a page.", examples=[20])] = 20,
+    offset: Annotated[int, Query(ge=0, le=10**9, description="Number of newer runs to skip.", examples=[0])] = 0,
     cursor: Annotated[
         RunId | None,
         Query(description="Only runs older than the one with this id, as in `next`."),
     ] = None,
-    status: Annotated[list[Status] | None, Query(description="Only runs with one of these.")] = None,
+    status: Annotated[list[Status] | None, Query(description="Only runs with one of these statuses.")] = None,
     method: Annotated[
-        Literal["march", "spacetime", "paper", "reference"] | None, Query(description="Only runs solved by it.")
+        Literal["march", "spacetime", "paper", "reference"] | None,
+        Query(description="Only runs solved by this method."),
     ] = None,
-    name: Annotated[str, Query(max_length=200, description="Only runs with this in their name, in any case.")] = "",
+    name: Annotated[str, Query(max_length=200, description="Only runs whose name contains this, ignoring case.")] = "",
     since: Annotated[
-        Instant | None, Query(description="Only runs asked for at that time or later, ISO 8601 with offset.")
+        Instant | None, Query(description="Only runs requested at this time or later, ISO 8601 with offset.")
     ] = None,
     before: Annotated[
-        Instant | None, Query(description="Only runs asked for before that time, ISO 8601 with offset.")
+        Instant | None, Query(description="Only runs requested before this time, ISO 8601 with offset.")
     ] = None,
 ) -> Response:
-    """List the stored runs, and apart from them what runs or waits, which is not filtered.
+    """List the stored runs and, as `under_way`, the predictions that are running or waiting, which are not filtered.
 
-    Follow `next` for the next page: runs that come or go meanwhile don't shift it.
+    Follow `next` for the next page: runs that are added or removed in the meantime don't shift it.
     """
     negotiated(request.headers.get("accept"), (JSON,))
 
@@ -166,9 +167,9 @@ async def listed(
     return json_response(document)
 
 
-@router.get("/{id}", response_class=Response, summary="Read a prediction, or how far it is", responses=described.READ)
+@router.get("/{id}", response_class=Response, summary="Read a prediction, or its progress", responses=described.READ)
 async def read(id: str, request: Request, service: TheService) -> Response:
-    """Return the prediction as it was answered; while there is none (yet), its state and its iterations so far."""
+    """Return the prediction as it was answered; if there is none (yet), its state and the iterations so far."""
     form = negotiated(request.headers.get("accept"), FORMS)
     document, job = await _found(service, service.document, id)
     if document is not None:
@@ -188,7 +189,7 @@ async def read(id: str, request: Request, service: TheService) -> Response:
     responses=described.DELETE,
 )
 async def remove(id: str, service: TheService) -> Response:
-    """Cancel the prediction where it is queued or running (200, or 202 while it still stops); else remove it (204)."""
+    """Cancel the prediction if it is queued or running (200, or 202 while it is still stopping), or remove it (204)."""
     job = service.jobs.get(id)
     if job is not None and not job.finished.is_set():
         await job.stop()
@@ -208,10 +209,11 @@ async def follow(
     service: TheService,
     last_event_id: events.LastEventId = None,
 ) -> Response:
-    """Give the course of the solve as server-sent events.
+    """Return the progress of the solve as server-sent events.
 
-    `state` has the id and the state, `iteration` one item of `iterations`; the last one is `done` with the prediction
-    or `error` with a problem document. Who comes late gets the past iterations first. 204: nothing is left to tell.
+    `state` has the id and the state, `iteration` one item of `iterations`. The last event is `done` with the prediction
+    or `error` with a problem document. A client that connects late gets the past iterations first. 204: no events are
+    left.
     """
     negotiated(request.headers.get("accept"), (EVENTS,))
     seen = events.seen_before(last_event_id)
@@ -225,8 +227,8 @@ async def follow(
 
 
 def not_done(job: Job) -> ProblemError:
-    """Return the problem of asking for parts of a prediction that has no answer."""
-    detail = f"The prediction is {job.state}; this part of it is there when it is done and stored."
+    """Return the problem of a request for a part of a prediction that has no answer."""
+    detail = f"The prediction is {job.state}; this part of it is available once it is done and stored."
     return ProblemError(409, "not-done", detail, headers={} if job.finished.is_set() else {"Retry-After": "1"})
 
 
@@ -234,7 +236,7 @@ async def part(service: Service, read: Callable[[str], bytes | None], id: str) -
     """Return what `read` finds of the stored run `id`.
 
     Raises:
-        ProblemError: 404 where there is no such run, 409 where it has no answer or is not stored.
+        ProblemError: 404 if there is no such run, 409 if it has no answer or is not stored.
     """
     content, job = await _found(service, read, id)
     if content is None:
@@ -243,7 +245,7 @@ async def part(service: Service, read: Callable[[str], bytes | None], id: str) -
 
 
 async def _found(service: Service, read: Callable[[str], bytes | None], id: str) -> tuple[bytes | None, Job | None]:
-    """Return what `read` finds of the run `id`, and its job, also where the job ends while one looks."""
+    """Return what `read` finds of the run `id`, and its job, even if the job ends during the search."""
     job = service.jobs.get(id)
     content = await anyio.to_thread.run_sync(read, id)
     if content is None and job is not None and job.state == "done":

@@ -14,7 +14,7 @@ router = APIRouter(prefix="/rerun", include_in_schema=False)
 
 @router.get("")
 async def slash() -> Response:
-    """Redirect to the address that the page's relative links need."""
+    """Redirect to the address with a slash, which the page's relative links need."""
     return RedirectResponse("/rerun/", 307)
 
 

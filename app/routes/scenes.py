@@ -1,4 +1,4 @@
-"""``/v1/scenes:explain``: what a prediction of a scene would be, without making it."""
+"""``/v1/scenes:explain``: what a prediction of a scene would do, without solving it."""
 
 from typing import Annotated, Any
 
@@ -30,7 +30,7 @@ router = APIRouter(tags=["scenes"], route_class=JsonRoute)
 async def explain(
     request: Request, scene: Annotated[PredictionRequest, Body(openapi_examples=EXAMPLES)], service: TheService
 ) -> Response:
-    """Say which effects the scene calls for and why, and what grid and time a solve would take.
+    """Return which effects the scene calls for and why, and which grid and time a solve would take.
 
     422 names every part of the scene that is wrong, not only the first.
     """

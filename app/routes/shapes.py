@@ -1,4 +1,4 @@
-"""``/v1/shapes:fit``: the curve of a cable that a vision system sees."""
+"""``/v1/shapes:fit``: fit a curve to the points of a cable that a vision system sees."""
 
 from typing import Annotated
 
@@ -26,10 +26,10 @@ router = APIRouter(tags=["shapes"], route_class=JsonRoute)
     responses=described.failures(401, 406, 413, 415, 422),
 )
 async def fit(request: Request, seen: Annotated[FitRequest, Body(openapi_examples=FIT_EXAMPLES)]) -> Response:
-    """Fit a cubic spline in arclength to points, ordered or not, and say how far they are from it.
+    """Fit a cubic spline in arclength to points, ordered or not, and return how far they are from it.
 
-    `shape` of the answer can be the `shape` of a prediction. Points that branch, cross or lie in several parts are
-    refused: they show no single cable.
+    `shape` of the answer can be used as the `shape` of a prediction. Points that branch, cross or lie in several parts
+    are refused, because they show no single cable.
     """
     negotiated(request.headers.get("accept"), (JSON,))
     return Response(await anyio.to_thread.run_sync(_fitted, seen), media_type=JSON)

@@ -31,7 +31,7 @@ from dlocore.study.running import run_study
 router = APIRouter(prefix="/v1/studies", tags=["studies"], route_class=JsonRoute)
 _log = logging.getLogger("dlo")
 KIND = "studies"
-MOST_WAITING = 4  # studies that run or wait: each may take minutes
+MOST_WAITING = 4  # studies that may run or wait at once: each may take minutes
 
 
 def store_of(service: Service) -> StudyStore:
@@ -45,14 +45,14 @@ async def study(
 ) -> Response:
     """Measure time and true error of every scene on every grid, in the background; predictions go first.
 
-    Studies run one after the other and are stored. With `Accept: text/event-stream` the answer is the progress; closing
-    the connection does not stop the study, `DELETE` does.
+    Studies run one after the other and are stored. With `Accept: text/event-stream` the answer is the progress of the
+    study; closing the connection does not stop it, `DELETE` does.
     """
     form = negotiated(request.headers.get("accept"), (JSON, EVENTS))
     service.check_ready()
     plan = await anyio.to_thread.run_sync(_plan, wanted, service)
     if len(service.measurements.under_way(KIND)) >= MOST_WAITING:
-        detail = f"{MOST_WAITING} studies run or wait, as many as allowed."
+        detail = f"{MOST_WAITING} studies are running or waiting, as many as allowed."
         raise ProblemError(429, "queue-full", detail, headers={"Retry-After": "60"})
     id, store = new_id(), store_of(service)
 
@@ -61,7 +61,7 @@ async def study(
         document = orjson.dumps({"id": id, "state": "done", "created": job.created, **to_document(measured)})
         try:
             store.save(id, document)
-        except OSError as error:  # it can be read until the service stops
+        except OSError as error:  # it can still be read until the service stops
             _log.error("the study %s is not stored: %s", id, error)
         return document
 
@@ -97,7 +97,7 @@ def _plan(wanted: StudyRequest, service: Service) -> Plan:
 
 @router.get("", response_model=StudyList, summary="List the studies", responses=described.failures(401, 406))
 async def listed(request: Request, service: TheService) -> Response:
-    """List the studies, newest first: those that are stored, run or wait, and the last that failed or were stopped."""
+    """List the studies, newest first: stored, running and waiting ones, and the last that failed or were stopped."""
     negotiated(request.headers.get("accept"), (JSON,))
     found = {job.id: {**job.item(), "size": None} for job in service.measurements.of(KIND)}
     for id, size in (await anyio.to_thread.run_sync(store_of(service).sizes)).items():
@@ -107,7 +107,7 @@ async def listed(request: Request, service: TheService) -> Response:
 
 @router.get("/{id}", response_model=StudyResponse, summary="Read a study", responses=described.READ_STUDY)
 async def read(id: str, request: Request, service: TheService) -> Response:
-    """Return the study; 202 with its state while it runs or waits, and where it has failed."""
+    """Return the study; 202 with its state if it is running or waiting, has failed or was stopped."""
     negotiated(request.headers.get("accept"), (JSON,))
     document = await anyio.to_thread.run_sync(store_of(service).document, id)
     if document is not None:
@@ -115,7 +115,7 @@ async def read(id: str, request: Request, service: TheService) -> Response:
     job = service.measurements.get(id)
     if job is None or job.kind != KIND:
         raise _no_study(id)
-    if job.state == "done":  # it ended while one looked
+    if job.state == "done":  # it ended after the search for its document
         return Response(job.document, media_type=JSON)
     return json_response(job.summary(), 202)
 
@@ -128,7 +128,7 @@ async def read(id: str, request: Request, service: TheService) -> Response:
     responses=described.REMOVE_STUDY,
 )
 async def remove(id: str, service: TheService) -> Response:
-    """Stop the study where it runs or waits (200, or 202 while it still stops); else remove it (204)."""
+    """Stop the study if it is running or waiting (200, or 202 while it is still stopping), or remove it (204)."""
     job = service.measurements.get(id)
     mine = job is not None and job.kind == KIND
     if mine and job is not None and not job.finished.is_set():
@@ -148,9 +148,9 @@ async def follow(
     service: TheService,
     last_event_id: events.LastEventId = None,
 ) -> Response:
-    """Give the course of a study as server-sent events: `state`, `progress`, and `done` or `error`.
+    """Return the progress of a study as server-sent events: `state`, `progress`, and `done` or `error`.
 
-    204: nothing is left to tell.
+    204: no events are left.
     """
     negotiated(request.headers.get("accept"), (EVENTS,))
     seen = events.seen_before(last_event_id)

@@ -263,7 +263,7 @@ def posted(client: TestClient, address: str, body: str) -> Any:
 def test_a_name_that_is_given_twice_is_refused(client: TestClient, address: str, body: str, name: str) -> None:
     (error,) = the_problem(posted(client, address, body), 422)["errors"]
     assert error["field"] == "body"
-    assert f'"{name}" is there twice in one object' in error["message"]
+    assert f'"{name}" appears twice in one object' in error["message"]
     assert error["given"].count(name) >= 1
 
 
@@ -359,7 +359,7 @@ def test_an_object_of_too_many_names_is_refused_before_each_is_a_fault(client: T
     (error,) = the_problem(posted(client, "/v1/predictions:batch", body), 422)["errors"]
     assert error["field"] == "body"
     assert "an object has too many names" in error["message"]
-    assert error["allowed"].endswith(f"and at most {MAX_NAMES}")
+    assert error["allowed"].endswith(f"and at most {MAX_NAMES} names")
     assert f'"{MAX_NAMES}"' in error["given"]
     scene = {**PAPER, **{str(i): 1 for i in range(MAX_NAMES - len(PAPER))}}
     assert len(the_problem(client.post("/v1/predictions", json=scene), 422)["errors"]) == MAX_REPORTED
@@ -414,7 +414,7 @@ def test_a_compressed_body_is_told_that_none_is_accepted(client: TestClient, enc
     body = json.dumps(PAPER).encode()
     headers = {"content-type": "application/json", "content-encoding": encoding}
     response = client.post("/v1/predictions", content=gzip.compress(body) if is_packed else body, headers=headers)
-    assert "none is accepted" in the_problem(response, 415)["detail"]
+    assert "no encoding is accepted" in the_problem(response, 415)["detail"]
     assert response.headers["accept-encoding"] == "identity"
 
 
