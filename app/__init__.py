@@ -1,7 +1,7 @@
 """The service around the predictor: HTTP, stored runs, recordings, the 3D scene and the command line.
 
-A solve uses one core and the workers run side by side, so the linear algebra libraries must not start threads of
-their own; they read these variables once, when NumPy is first imported.
+A solve uses one core, and several workers run at the same time, so the linear algebra libraries must not start threads
+of their own. They read these variables once, when NumPy is first imported.
 """
 
 import os

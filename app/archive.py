@@ -1,4 +1,4 @@
-"""A run as stored: request, response document, and the nets of control points; and the surface as .npz."""
+"""The form in which a run is stored: request, response document and control points; and its surface as .npz."""
 
 import io
 from dataclasses import dataclass, replace
@@ -28,17 +28,17 @@ PEAKS = ("peak_force", "peak_force_time", "peak_moment", "peak_moment_time")  # 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A prediction with what was asked, as far as it is stored.
+    """A prediction with its request, as far as they are stored.
 
     Attributes:
         request: the request.
         document: the response.
         surface: the predicted surface.
         material: what the sections of the cable remember over the motion, if anything.
-        stretch: how far it is stretched over the motion; None of a run stored before it was noted.
+        stretch: how far it is stretched over the motion; None for a run stored before stretch was recorded.
         iterations: the iterates.
-        start: the start shape where it was given by control points, also as the end of another run.
-        machine: what it was solved on.
+        start: the start shape if it was given by control points, or was the end of another run.
+        machine: the machine that solved it.
     """
 
     request: dict[str, Any]
@@ -60,10 +60,10 @@ class Run:
 
     @cached_property
     def scene(self) -> Scene:
-        """The scene that was solved; it needs no other run, even where it continued from one.
+        """The scene that was solved; it needs no other run, even if it continued one.
 
         Raises:
-            ValueError: it continued from one, and was stored without the shape that it took from there.
+            ValueError: it continued another run, and was stored without the shape that it took from that run.
         """
         if self.request["shape"]["kind"] != "prediction":
             return to_scene(PredictionRequest.model_validate(self.request), lambda id: None)
@@ -74,7 +74,7 @@ class Run:
 
 
 def pack(prediction: Prediction) -> bytes:
-    """Return the nets of a prediction, of its answer, its iterations and its start, as .npz."""
+    """Return the arrays of a prediction as .npz: the nets of control points of its answer and iterations, its start."""
     arrays: dict[str, Any] = {"machine": np.array(machine_line())}
     shape = prediction.scene.shape
     if isinstance(shape, ControlPoints):
@@ -93,13 +93,13 @@ def pack(prediction: Prediction) -> bytes:
 
 
 def _named(prefix: str, part: object) -> dict[str, Any]:
-    """Return what is given of a part, which may be None, as arrays whose names begin with `prefix`."""
+    """Return the fields of a part as arrays, with `prefix` before their names; the part and any field may be None."""
     given = {} if part is None else vars(part)
     return {f"{prefix}{name}": np.asarray(value) for name, value in given.items() if value is not None}
 
 
 def _part(prefix: str, arrays: Any) -> dict[str, Any]:
-    """Return the arrays of an .npz whose names begin with `prefix`, without it."""
+    """Return the arrays of an .npz whose names begin with `prefix`, by their names without it."""
     return {name.removeprefix(prefix): arrays[name] for name in arrays.files if name.startswith(prefix)}
 
 
@@ -117,19 +117,19 @@ def _motion(arrays: Any) -> Motion:
 
 
 def unpack_motion(nets: bytes) -> Motion:
-    """Return the motion of the run whose nets these are."""
+    """Return the motion of a run from its stored nets."""
     with np.load(io.BytesIO(nets), allow_pickle=False) as arrays:
         return _motion(arrays)
 
 
 def unpack(request: dict[str, Any], document: dict[str, Any], nets: bytes) -> Run:
-    """Return the run that was stored as these parts."""
+    """Return the run that these parts were stored for."""
     with np.load(io.BytesIO(nets), allow_pickle=False) as arrays:
         motion = _motion(arrays)
         iterates = [_surface(arrays, k + 1) for k in range(len(document["iterations"]))]
         scalars = {name: arrays[name] for name in SCALARS}
         start, remembered = _part("start_", arrays), _part("remembered_", arrays)
-        machine = str(arrays["machine"]) if "machine" in arrays.files else "unknown"  # stored before it was noted
+        machine = str(arrays["machine"]) if "machine" in arrays.files else "unknown"  # stored before it was recorded
     iterations = tuple(
         Iteration(
             number=shown["number"],
@@ -152,12 +152,15 @@ def unpack(request: dict[str, Any], document: dict[str, Any], nets: bytes) -> Ru
 def surface_npz(document: dict[str, Any], material: MaterialMotion | None) -> bytes:
     """Return the surface, the spline and the reactions of a response document, and the material, as .npz.
 
-    Arrays: `u` (k_u,), `t` (k_t,), `positions` (k_t, k_u, 3), `twist` (k_t, k_u), `control_points` (n_t, n_u, 4),
-    `knots_u`, `knots_t`, `degree`, `grasp_u` (g,), `reaction` and `moment` (g, k_t, 3), `reaction_error` and
-    `moment_error` (g, k_t), `peak_force`, `peak_force_time`, `peak_moment` and `peak_moment_time` (g,), which are NaN
-    of a document without them; `contact` (c,), the names of what presses on the cable, `contact_force` and
-    `contact_friction` (c, k_t, 3), `contact_pressed`, `contact_force_error` and `contact_friction_error` (c, k_t), NaN
-    where unknown; where the cable remembers, `material_` and each field of `MaterialMotion`; SI units.
+    Arrays, in SI units:
+
+    - `u` (k_u,), `t` (k_t,), `positions` (k_t, k_u, 3), `twist` (k_t, k_u);
+    - `control_points` (n_t, n_u, 4), `knots_u`, `knots_t`, `degree`;
+    - `grasp_u` (g,), `reaction` and `moment` (g, k_t, 3), `reaction_error` and `moment_error` (g, k_t), and the peaks
+      `peak_force`, `peak_force_time`, `peak_moment` and `peak_moment_time` (g,), NaN if the document lacks them;
+    - `contact` (c,), the names of what presses on the cable, `contact_force` and `contact_friction` (c, k_t, 3),
+      `contact_pressed`, `contact_force_error` and `contact_friction_error` (c, k_t), NaN where unknown;
+    - with a material, each field of `MaterialMotion` with `material_` before its name.
     """
     surface, grasps, contacts = document["surface"], document["grasps"], document.get("contacts", [])
     times = len(surface["t"])
@@ -184,7 +187,7 @@ def surface_npz(document: dict[str, Any], material: MaterialMotion | None) -> by
 
 
 def _errors(givers: list[dict[str, Any]], name: str, times: int) -> NDArray[np.float64]:
-    """Return the errors of the forces or moments of grasps or contacts (n, times), NaN where there are none."""
+    """Return the errors of the forces or moments of grasps or contacts (n, times), NaN if there are none."""
     found = np.full((len(givers), times), np.nan)
     for row, giver in zip(found, givers, strict=True):
         if giver.get(name) is not None:
@@ -193,7 +196,7 @@ def _errors(givers: list[dict[str, Any]], name: str, times: int) -> NDArray[np.f
 
 
 def _friction(contact: dict[str, Any], times: int) -> Any:
-    """Return the friction of a contact (times, 3), NaN of a document that was stored before it was noted."""
+    """Return the friction of a contact (times, 3), NaN for a document stored before friction was recorded."""
     known = contact.get("friction")
     return np.full((times, 3), np.nan) if known is None else known
 

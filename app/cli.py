@@ -20,7 +20,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def _ended_by_an_interrupt() -> Iterator[None]:
-    """Let an interrupt end the process there and then: Python forgets one that comes while it looks after an import."""
+    """Let an interrupt end the process at once: Python can lose an interrupt that arrives during an import."""
     handler = signal.getsignal(signal.SIGINT)
     if handler is not signal.default_int_handler or threading.current_thread() is not threading.main_thread():
         yield

@@ -1,4 +1,4 @@
-"""The log: one JSON object a line, with the id of the run that it is about."""
+"""The log: one JSON object for each line, with the id of the run that the line is about."""
 
 import json
 import logging
@@ -6,12 +6,12 @@ import time
 from contextvars import ContextVar
 from typing import Any, Literal
 
-RUN: ContextVar[str] = ContextVar("run", default="")  # id of the run that the current task or thread works at
+RUN: ContextVar[str] = ContextVar("run", default="")  # id of the run that the current task or thread works on
 _KNOWN = frozenset(vars(logging.makeLogRecord({}))) | {"message", "asctime", "color_message", "taskName"}
 
 
 class JsonFormatter(logging.Formatter):
-    """One JSON object a line: time, level, logger, message, run, and what was given as ``extra``."""
+    """Format a record as one line of JSON: time, level, logger, message, run, and the fields of ``extra``."""
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the record as JSON."""
@@ -30,7 +30,7 @@ class JsonFormatter(logging.Formatter):
 
 
 def configuration(form: Literal["json", "text"]) -> dict[str, Any]:
-    """Return the configuration of `logging.config.dictConfig` for the service, to standard error."""
+    """Return the configuration for `logging.config.dictConfig`, with which the service logs to standard error."""
     formatters: dict[str, Any] = {
         "json": {"()": JsonFormatter},
         "text": {"format": "%(asctime)s %(levelname)s %(name)s: %(message)s"},

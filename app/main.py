@@ -32,15 +32,15 @@ from dlocore.machine import program_version
 
 _ABOUT = """Predict how a cable moves when grippers move it: post a scene, get the whole motion as one bivariate spline.
 
-SI units: metres, seconds, radians, newtons, kilograms; world frame right-handed, z up. Failures are
-`application/problem+json` (RFC 9457) and name the field that is wrong."""
+All quantities are in SI units: metres, seconds, radians, newtons, kilograms. The world frame is right-handed, z up.
+Errors are `application/problem+json` (RFC 9457); those of a request name the fields that are wrong."""
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
-    """Return the application, wired up.
+    """Return the application with its middleware and routes.
 
     Args:
-        settings: the settings; those of the environment where absent.
+        settings: the settings; absent: those of the environment.
     """
     settings = settings or Settings()
 
@@ -61,7 +61,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         app.add_middleware(Access, token=settings.token.get_secret_value())
     app.add_middleware(OtherSites, settings=settings)
     app.add_middleware(PageHeaders)
-    if settings.allowed_origins:  # outside of the token: a browser asks for leave without it
+    if settings.allowed_origins:  # outside the token check: a browser's preflight request has no token
         app.add_middleware(AllowedSites, origins=settings.allowed_origins)
     app.add_middleware(AccessLog)
     for routes in (batch, predictions, files, scenes, examples, shapes, cables, calibration, studies, identify):

@@ -1,4 +1,4 @@
-"""Where an obstacle stands and how it is turned, for pictures of it."""
+"""Position and orientation of an obstacle, for drawing it."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +10,9 @@ Floats = NDArray[np.float64]
 
 
 def pose(obstacle: Obstacle) -> tuple[Floats, Floats]:
-    """Return the centre (3,) [m] of an obstacle and the quaternion wxyz (4,) that turns its own axes to the world's.
+    """Return the centre (3,) [m] of an obstacle and the quaternion wxyz (4,) that rotates its own axes into the world.
 
-    Capsules and cylinders lie along their own z.
+    The axis of capsules and cylinders is their own z.
     """
     row = obstacle.row()
     axes = row[4:13].reshape(3, 3)

@@ -1,4 +1,4 @@
-"""How far a measurement is, on a terminal."""
+"""A progress bar for measurements, on a terminal."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -7,10 +7,10 @@ from contextlib import contextmanager
 
 @contextmanager
 def progress_bar(name: str) -> Iterator[Callable[[int, int, str], None]]:
-    """Show a bar on standard error, where that is a terminal, as long as the `with` lasts.
+    """Show a bar on standard error during the `with` block, if standard error is a terminal.
 
     Yields:
-        What to call with how many parts are done, how many there are, and what comes, in words.
+        A function to call with the number of parts done, the number of all parts, and the next part in words.
     """
     from tqdm import tqdm
 

@@ -28,7 +28,7 @@ from dlocore.files import whole
 from dlocore.scene.scene import Method
 from dlocore.words import in_mm, in_ms
 
-_TO_ANSWER = 3  # s beyond the grace in which what was cancelled is answered
+_TO_ANSWER = 3  # s beyond the grace, to answer the requests that were cancelled
 
 
 def serve(host: str | None, port: int | None) -> int:
@@ -37,13 +37,13 @@ def serve(host: str | None, port: int | None) -> int:
 
     given = {name: value for name, value in (("host", host), ("port", port)) if value is not None}
     settings = _settings(**given)
-    _settings()  # what the environment says must be right even where an option overrides it
+    _settings()  # the environment must be valid even where an option overrides it
     from app import logs
     from app.main import create_app
 
     _check_data_dir(settings.data_dir)
     listening = _listening(settings.host, settings.port)
-    # one process: the 3D scene and the queue of solves live in it; viser compresses nothing, so neither do we
+    # one process, because the 3D scene and the queue of solves live in it; viser compresses nothing, so neither do we
     config = uvicorn.Config(
         create_app(settings),
         log_config=logs.configuration(settings.log_format),
@@ -55,7 +55,7 @@ def serve(host: str | None, port: int | None) -> int:
     address = f"http://{where}:{listening.getsockname()[1]}"
     print(f"page      {address}/\n3D scene  {address}/scene/\nAPI docs  {address}/docs", flush=True)
     if settings.token is None and not is_loopback(settings.host):
-        print("warning   anyone who reaches this address can use it; DLO_TOKEN asks for a token", file=sys.stderr)
+        print("warning   anyone who can reach this address can use it; DLO_TOKEN requires a token", file=sys.stderr)
     print(f"runs      {settings.data_dir / 'runs'}", flush=True)
     uvicorn.Server(config).run(sockets=[listening])
     return 0
@@ -65,20 +65,20 @@ def _check_data_dir(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise CommandError(f"DLO_DATA_DIR: can't make {folder}: {error.strerror}", FAILED) from None
+        raise CommandError(f"DLO_DATA_DIR: can't create {folder}: {error.strerror}", FAILED) from None
     if not os.access(folder, os.W_OK):
         raise CommandError(f"DLO_DATA_DIR: can't write to {folder}", FAILED)
 
 
 def _listening(host: str, port: int) -> socket.socket:
-    """Return a socket that listens there."""
+    """Return a socket that listens on a port of a host."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         return socket.create_server((host, port), family=family)
     except OSError as error:
-        reason = str(error.strerror).partition(" (")[0]  # which names the address once more
+        reason = str(error.strerror).partition(" (")[0]  # the rest repeats the address
         raise CommandError(
-            f"can't listen on port {port} of {host}: {reason}. --port 0 takes one that is free.",
+            f"can't listen on port {port} of {host}: {reason}. --port 0 takes a free port.",
             FAILED,
         ) from None
 
@@ -92,7 +92,7 @@ def predict(
     method: Method | None = None,
     deadline: float | None = None,
 ) -> int:
-    """Predict one scene, write what is asked for, and say how it went on stderr; within a deadline [s] of the solve.
+    """Predict one scene, write the requested outputs, and print a summary to stderr; `deadline` limits the solve [s].
 
     Raises:
         CommandError: the scene, an output or the deadline is not possible.
@@ -131,7 +131,7 @@ def _check_predict(scene: str, *, npz: str | None, json: str | None, rrd: str | 
 
 
 def _check_suffix(option: str, path: str, suffix: str, advice: str = "") -> None:
-    """Refuse a file, but not a device, whose name tells of another format."""
+    """Refuse a file whose name suggests another format; a device may have any name."""
     if Path(path).suffix.lower() != suffix and not is_device(path):
         raise CommandError(f"{option}: got {path}. Allowed: a name that ends in {suffix}{advice}.")
 
@@ -200,7 +200,7 @@ def _settings(**given: Any) -> Settings:
         shown = "a secret" if name == "token" else repr(first["input"])
         origin = f"--{name}" if name in given else f"DLO_{name.upper()}"
         raise CommandError(f"{origin}: got {shown}. {first['msg']}: {_described(name)}") from None
-    except SettingsError as error:  # no JSON where there has to be
+    except SettingsError as error:  # a value that must be JSON is not
         name = re.findall(r'"(\w+)"', str(error))[0]
         shown = repr(os.environ.get(f"DLO_{name.upper()}"))
         raise CommandError(f"DLO_{name.upper()}: got {shown}. Allowed: {_described(name)}") from None
@@ -212,7 +212,7 @@ def _described(setting: str) -> str:
 
 def _request(raw: bytes) -> PredictionRequest:
     try:
-        # takes NaN too, which the schema then refuses by name
+        # also takes NaN, which the schema then refuses by field
         body = stdlib_json.loads(raw, object_pairs_hook=_with_each_name_once)
     except (ValueError, RecursionError) as error:
         raise CommandError(f"the scene is not JSON: {error}") from None
@@ -223,10 +223,10 @@ def _request(raw: bytes) -> PredictionRequest:
 
 
 def _by(request: PredictionRequest, method: Method) -> PredictionRequest:
-    """Return the request solved by another method; the reference has no grid and no time budget of its own."""
+    """Return the request with another method; `reference` takes neither a grid nor a time budget."""
     given = {} if isinstance(request.quality, str) else request.quality.model_dump(exclude_unset=True)
     if method in ("spacetime", "paper") and given.get("n_u") is None:
-        wanted = 'a scene whose quality names the grid, as {"n_u": 9, "n_t": 13, "delta": 1e-5}'
+        wanted = 'a scene whose quality gives the grid, such as {"n_u": 9, "n_t": 13, "delta": 1e-5}'
         raise CommandError(f"--method: got {method}. Allowed: march or reference, or {wanted}.")
     if method == "reference":
         given = {name: value for name, value in given.items() if name == "target_error"}
@@ -244,7 +244,7 @@ def read_scene(file: str) -> Scene:
     """Return the scene of a JSON file, "-" for standard input.
 
     Raises:
-        CommandError: it can't be read, or is no scene that can be solved; what is wrong is said with the file's name.
+        CommandError: it can't be read, or is not a scene that can be solved; the message names the file and the fault.
     """
     raw = read_input(file)
     try:
@@ -276,7 +276,7 @@ def _solve(request: PredictionRequest, deadline: float | None) -> Prediction:
 
         try:
             scene = to_scene(request, _stored)
-            warm_up_for(scene)  # so that the reported time is that of the solve
+            warm_up_for(scene)  # so that the reported time is that of the solve alone
             cost = stored_cost(_settings().calibration_file) if scene.quality.time_budget is not None else None
             return solve(scene, on_iteration=show, deadline=deadline, cost=cost)
         except SceneError as error:

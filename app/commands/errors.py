@@ -1,4 +1,4 @@
-"""How a command fails."""
+"""How commands fail: the error, and the exit codes."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,7 @@ FAILED, BAD_INPUT, NOT_CONVERGED = 1, 2, 3  # exit codes
 
 
 class CommandError(Exception):
-    """A command that can't go on; the message is for the person who ran it."""
+    """A command can't continue; the message is for the person who ran it."""
 
     def __init__(self, message: str, exit_code: int = BAD_INPUT) -> None:
         super().__init__(message)
@@ -16,5 +16,5 @@ class CommandError(Exception):
 
 
 def in_lines(fields: Sequence[BadField]) -> str:
-    """Return what is wrong with input, a line a field."""
+    """Return what is wrong with the input, one line for each field."""
     return "\n     ".join(f"{field.field}: {field.message}" for field in fields)

@@ -1,4 +1,4 @@
-"""What commands read and write: files, and standard input and output by the name "-"."""
+"""Reading and writing of commands: files, and standard input and output by the name "-"."""
 
 import os
 import sys
@@ -33,12 +33,12 @@ def read_input(path: str) -> bytes:
 def check_outputs(
     outputs: Mapping[str, str | None], inputs: Sequence[str] = (), folders: Mapping[str, str | None] | None = None
 ) -> None:
-    """Refuse outputs that can't be written, or overwrite each other or an input, before any work is done for them.
+    """Refuse outputs that can't be written, or that overwrite each other or an input, before any work is done for them.
 
     Args:
-        outputs: files by the option that asks for them, None where it does not.
+        outputs: files by the option that requests them; None if the option is absent.
         inputs: files that are read.
-        folders: likewise, folders that are made where they are missing.
+        folders: folders by their option, which are created if they are missing.
 
     Raises:
         CommandError: an output can't be written, or is the input or another output.
@@ -63,7 +63,7 @@ def check_outputs(
 
 
 def is_device(path: str) -> bool:
-    """Return whether something is there that is no file, and takes all that is written to it."""
+    """Return whether the path exists but is no regular file, so that it takes all that is written to it."""
     return Path(path).exists() and not Path(path).is_file()
 
 
@@ -83,7 +83,7 @@ def _check_folder(path: str) -> None:
 
 
 def make_folder(path: str) -> None:
-    """Make a folder of outputs where it is missing, before any work is done for them."""
+    """Create a folder for outputs if it is missing, before any work is done for them."""
     try:
         Path(path).mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -97,9 +97,9 @@ def _named(path: str) -> Path:
 
 
 def _check_made(path: str, folder: Path, written: Path) -> None:
-    """Refuse an output inside what is no folder, or for which what is there already can't be written to."""
+    """Refuse an output if `folder` is no folder, or if `written`, which exists, is not writable."""
     if not folder.is_dir():
-        raise _unwritable(path, f"{folder} is no folder")
+        raise _unwritable(path, f"{folder} is not a folder")
     if not os.access(written, os.W_OK):
         raise _unwritable(path, "Permission denied")
 
@@ -113,7 +113,7 @@ def write_output(path: str, content: bytes) -> None:
 
     Raises:
         CommandError: it can't be written.
-        BrokenPipeError: who read standard output has left.
+        BrokenPipeError: the reader of standard output has closed it.
     """
     try:
         if path == STANDARD:
@@ -128,5 +128,5 @@ def write_output(path: str, content: bytes) -> None:
 
 
 def for_people(*outputs: str | None) -> TextIO:
-    """Return where to print a table: beside what goes to standard output, if anything does, it would be no data."""
+    """Return where to print a table: standard output, or standard error if data goes to standard output."""
     return sys.stderr if STANDARD in outputs else sys.stdout

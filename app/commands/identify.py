@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 def identify(
     recordings: list[str], *, names: list[str] | None, cable: str | None, output: str, report: str | None, n_u: int
 ) -> int:
-    """Identify a cable from recordings, write it as JSON, and a report where one is asked for.
+    """Identify a cable from recordings, write it as JSON, and write a report if one is requested.
 
     Args:
-        recordings: files.
-        names: of the parameters; None: the usual ones.
-        cable: file of what is known of it; None: what the recordings tell.
+        recordings: files of the recordings.
+        names: names of the parameters; None: the default ones.
+        cable: file of what is known of the cable; None: only what the recordings say.
         output: file for the cable, "-" for standard output.
         report: file for the report, None for none.
         n_u: control points along the cable.
@@ -64,10 +64,10 @@ def identify(
 
 
 def _read_cable(file: str) -> Cable:
-    """Return the cable of a JSON file, alone or as the `cable` of something.
+    """Return the cable of a JSON file, which is the whole document or its `cable`.
 
     Raises:
-        CommandError: it can't be read, or is no cable; what is wrong is said with the file's name.
+        CommandError: it can't be read, or is not a cable; the message names the file and the fault.
     """
     try:
         body = orjson.loads(read_input(file))
@@ -99,7 +99,7 @@ def validate(datasets: list[str], *, fit: int | None, models: list[str], json: s
 
     Args:
         datasets: files, or folders of files.
-        fit: windows of each cable to fit on; None: as many as usual.
+        fit: windows of each cable to fit on; None: the default number.
         models: which of "scalars" and "bends".
         json: file for all numbers, "-" for standard output, None for none.
         plots: folder for the plots, None for none.
@@ -117,7 +117,9 @@ def validate(datasets: list[str], *, fit: int | None, models: list[str], json: s
     check_outputs({"--json": json}, read, {"--plots": plots})
     allowed = get_args(Model)
     if not set(models) <= set(allowed) or len(set(models)) < len(models):
-        raise CommandError(f"--models: got {','.join(models)!r}. Allowed: {' or '.join(allowed)}, or both, by a comma.")
+        raise CommandError(
+            f"--models: got {','.join(models)!r}. Allowed: {' or '.join(allowed)}, or both, separated by a comma."
+        )
     table = partial(print, file=for_people(json), flush=True)
     try:
         cables, wires = load_datasets([Path(d) for d in datasets], FIT if fit is None else fit)

@@ -21,7 +21,7 @@ _GRID = re.compile(r"(\d+)[x×](\d+)")
 
 
 def study(options: argparse.Namespace) -> int:
-    """Run a study, write and draw it, compare it with an earlier one, and say what came out."""
+    """Run a study, write and draw it, compare it with an earlier one, and print the results."""
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # threads of a linear algebra library would blur the times
     from dlocore.study import record
     from dlocore.study.compare import compare, words
@@ -71,7 +71,7 @@ def study(options: argparse.Namespace) -> int:
 
 
 def _words(error: SceneError, options: argparse.Namespace) -> str:
-    """Return what is wrong with the plan, by the name of the option that asks for it."""
+    """Return what is wrong with the plan, under the name of the option that caused it."""
     name, _, part = error.field.partition(".")
     if getattr(options, name, None) is None or name == "scenes":
         return str(error)
@@ -97,7 +97,7 @@ def _check_matplotlib() -> None:
 
 
 def _asked(options: argparse.Namespace) -> dict[str, Any]:
-    """Return what the options ask of a study; what they leave out is the study's own default."""
+    """Return the arguments of a plan that the options set; for the others the plan has its own defaults."""
     asked: dict[str, Any] = {"repeats": options.repeats, "estimate": options.estimate, "judge": options.judge}
     if options.scenes:
         asked["scenes"] = _scenes(options.scenes)
@@ -138,7 +138,7 @@ def _grids(grids: list[str] | None, n_u: list[int] | None, n_t: list[int] | None
 
 
 def _switches(given: str) -> Mapping[str, Switch]:
-    """Return the switches of a set of effects as it is written on the command line."""
+    """Return the switches of a set of effects, given as on the command line."""
     if given == "auto":
         return {}
     if given == "all":

@@ -115,7 +115,9 @@ def test_an_allowed_origin_is_taken_as_browsers_send_it(given: str, meant: str) 
     ["lab.example", "https://lab.example/app", "https://", "https://*.lab.example", "https://me@lab.example", ""],
 )
 def test_an_allowed_origin_that_no_browser_sends_is_refused(given: str) -> None:
-    with pytest.raises(ValidationError, match="is no origin, as https://host or http://host:port without a path"):
+    with pytest.raises(
+        ValidationError, match="is not an origin such as https://host or http://host:port, without a path"
+    ):
         Settings(allowed_origins=("https://lab.example", given))
 
 

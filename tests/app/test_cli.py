@@ -412,7 +412,11 @@ def test_a_recording_of_the_command_line_is_that_of_the_solve(tmp_path: Path) ->
     [
         ("DLO_PORT", "here", "DLO_PORT: got 'here'. "),
         ("DLO_ALLOWED_ORIGINS", "foo", "DLO_ALLOWED_ORIGINS: got 'foo'. Allowed: Other origins"),
-        ("DLO_ALLOWED_ORIGINS", '["lab"]', "DLO_ALLOWED_ORIGINS: got ['lab']. 'lab' is no origin, as https://host"),
+        (
+            "DLO_ALLOWED_ORIGINS",
+            '["lab"]',
+            "DLO_ALLOWED_ORIGINS: got ['lab']. 'lab' is not an origin such as https://host",
+        ),
         ("DLO_TOKEN", "short", "DLO_TOKEN: got a secret. It has 5 characters, and needs at least 8: Bearer token"),
     ],
 )
@@ -441,7 +445,7 @@ def test_what_serve_can_not_have_is_named_before_it_says_where_it_is(
     assert main(["serve", "--port", "0"]) == 1
     output = capsys.readouterr()
     assert output.out == ""
-    assert f"DLO_DATA_DIR: can't make {tmp_path}/file/data: Not a directory" in output.err
+    assert f"DLO_DATA_DIR: can't create {tmp_path}/file/data: Not a directory" in output.err
 
 
 def test_help_reads_well(capsys: pytest.CaptureFixture[str]) -> None:
