@@ -1,4 +1,4 @@
-"""Many predictions in one request: all workers at once, a line for each, one bad scene spoiling no other."""
+"""Many predictions in one request, on all workers: each has a line, and an invalid scene does not affect the others."""
 
 import logging
 from collections.abc import Collection
@@ -20,7 +20,7 @@ from app.service.service import Service
 from dlocore import Scene
 
 _log = logging.getLogger("dlo")
-AHEAD = 4  # lines that may be ready before the one that is due, for each worker
+AHEAD = 4  # finished lines per worker that may wait for an earlier one
 
 
 async def predict_all(
@@ -33,16 +33,16 @@ async def predict_all(
     order: Literal["index", "finished"],
     fields: Collection[str],
 ) -> None:
-    """Predict `scenes` and emit a line of JSON for each; when cancelled, cancel those under way.
+    """Predict `scenes` and emit a line of JSON for each; if cancelled, cancel those under way.
 
     Args:
-        service: whose workers are used; the batch has been admitted as one request.
-        scenes: requests as data, right or wrong.
-        emit: takes a line; it is waited for, so that a slow client slows the batch down.
+        service: the service whose workers are used; the batch has been admitted as one request.
+        scenes: requests as data, valid or not.
+        emit: takes a line; it is awaited, so that a slow client slows the batch down.
         store: whether to keep the runs.
-        like: id of a run that all go on from, if any.
-        order: in that of the scenes, or as they finish.
-        fields: which of `OPTIONAL_FIELDS` each answer has.
+        like: id of a similar run whose grid and error estimate all of them reuse, if any.
+        order: "index", in the order of the scenes, or "finished", as they finish.
+        fields: the members of `OPTIONAL_FIELDS` that each answer has.
     """
     waiting: dict[int, bytes] = {}
     turn = anyio.Condition()
@@ -106,7 +106,9 @@ def _scene(service: Service, data: Any) -> tuple[PredictionRequest, Scene]:
 
 
 def check_size(count: int, most: int, field: str) -> None:
-    """Raise a 413 problem where a batch has more than `most` scenes."""
+    """Raise a 413 problem if a batch has more than `most` scenes."""
     if count > most:
-        detail = f"{field}: {count} scenes are more than the {most} that one batch may have. Send them in parts."
+        detail = (
+            f"{field}: {count} scenes are more than the {most} that one batch may have. Send them in several batches."
+        )
         raise ProblemError(413, "batch-too-large", detail)

@@ -1,4 +1,4 @@
-"""Predictions under way: their state, their progress for whoever follows it, and their end."""
+"""Predictions under way: their state, their progress for clients that follow it, and their end."""
 
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
@@ -13,10 +13,10 @@ from app.schemas.response import job_links
 from dlocore import MaterialMotion
 
 State = Literal["queued", "running", "done", "failed", "cancelled"]
-MAX_FINISHED = 256  # jobs remembered after their end, where no stored run stands for them
+MAX_FINISHED = 256  # jobs without a stored run that are remembered after their end
 MAX_BYTES = 256_000_000  # of their answers
-HEARTBEAT = 15.0  # s without news after which a follower hears that the connection is alive
-CANCEL_TIME = 1.0  # s to wait for a cancelled job to stop, which takes a solve about 0.1 s to notice
+HEARTBEAT = 15.0  # s without events after which a follower is sent a sign that the connection is alive
+CANCEL_TIME = 1.0  # s to wait for a cancelled job to stop; a solve notices within about 0.1 s
 
 
 @dataclass(eq=False)
@@ -24,19 +24,19 @@ class Job:
     """One prediction from the request to its end. Use it from the event loop; only `cancelled` crosses threads.
 
     Attributes:
-        store: whether the run is to be stored; at the end, whether it is.
-        id: that of the run.
-        state: how far it is.
+        store: whether the run is to be stored; at the end, whether it is stored.
+        id: id of the run.
+        state: its state.
         iterations: the documents of the iterations so far.
         document: the answer as JSON.
         material: what the sections of the cable remember.
-        problem: why there is none.
+        problem: why there is no answer.
         beyond_limit: whether the answer is the best iterate within the time limit of the service.
         cancelled: set by `cancel`.
         finished: set at the end.
     """
 
-    EVENT: ClassVar[str] = "iteration"  # the name of an item of `iterations` among the events
+    EVENT: ClassVar[str] = "iteration"  # name of the events for items of `iterations`
 
     store: bool
     id: str = field(default_factory=new_id)
@@ -53,44 +53,44 @@ class Job:
 
     @property
     def created(self) -> str:
-        """When it was asked for, ISO 8601 in UTC."""
+        """When it was requested, ISO 8601 in UTC."""
         return created_of(self.id)
 
     @property
     def mark(self) -> str:
-        """What stands before the numbers of its events: nothing, as its address is its own."""
+        """Prefix of the numbers of its events: none, since no other job has its address."""
         return ""
 
     @property
     def size(self) -> int:
-        """Bytes of its answer, as far as it is kept here."""
+        """Bytes of its answer, as far as the job holds it."""
         arrays = () if self.material is None else vars(self.material).values()
         return len(self.document or b"") + sum(array.nbytes for array in arrays)
 
     def cancel(self) -> None:
-        """Stop it: at once while it waits, at the solver's next check while it runs."""
+        """Stop it: at once if it is queued, at the solver's next check if it is running."""
         self.cancelled.set()
         if self.state == "queued":
             self.scope.cancel()
 
     async def stop(self) -> None:
-        """Cancel it, and give it a moment to end: `finished` tells whether it has."""
+        """Cancel it, and give it a moment to end; `finished` says whether it has ended."""
         self.cancel()
         with anyio.move_on_after(CANCEL_TIME):
             await self.finished.wait()
 
     def begin(self) -> None:
-        """Note that a worker has taken it up."""
+        """Record that a worker has started it."""
         self.state = "running"
         self._tell()
 
     def add(self, iteration: dict[str, Any]) -> None:
-        """Note an iteration."""
+        """Record an iteration."""
         self.iterations.append(iteration)
         self._tell()
 
     def end(self, state: State, problem: ProblemError | None = None) -> None:
-        """Note the end."""
+        """Record the end."""
         self.state = state
         self.problem = problem
         self.finished.set()
@@ -101,13 +101,13 @@ class Job:
         changed.set()
 
     async def progress(self, seen: int = 0) -> AsyncIterator[State | dict[str, Any] | None]:
-        """Give each state and each iteration after the first `seen`, the past ones first, until the end.
+        """Yield each state, and each iteration after the first `seen`, past ones first, until the end.
 
-        None stands for a time without news.
+        None means that nothing has happened for a while.
         """
         shown: State | None = None
         while True:
-            changed = self._changed  # before what is looked at, so that nothing comes unseen between
+            changed = self._changed  # taken before the checks below, so that no change in between is missed
             if shown is None or (self.state == "running" and shown == "queued"):
                 shown = self.state
                 yield shown
@@ -131,18 +131,18 @@ class Job:
         }
 
     def item(self) -> dict[str, Any]:
-        """Return what a list tells of it."""
+        """Return its entry in a list."""
         return {"id": self.id, "created": self.created, "state": self.state, "links": job_links(self.id)}
 
 
 class Jobs:
-    """The jobs that no stored run stands for: under way, failed, cancelled, or not to be stored."""
+    """The jobs without a stored run: under way, failed, cancelled, or not to be stored."""
 
     def __init__(self) -> None:
         self._jobs: dict[str, Job] = {}
 
     def add(self, job: Job) -> None:
-        """Remember a job; forget the oldest finished ones beyond the caps."""
+        """Remember a job; forget the oldest finished ones beyond the limits."""
         self._jobs[job.id] = job
         finished = [kept for kept in self._jobs.values() if kept.finished.is_set()]
         total = sum(kept.size for kept in finished)
@@ -156,7 +156,7 @@ class Jobs:
         return self._jobs.get(id)
 
     def under_way(self) -> list[Job]:
-        """Return those that run or wait, newest first."""
+        """Return those that are running or waiting, newest first."""
         return [job for job in reversed(self._jobs.values()) if not job.finished.is_set()]
 
     def forget(self, id: str) -> bool:

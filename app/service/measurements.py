@@ -1,4 +1,4 @@
-"""Measurements under way: calibrations and studies. They take long, run one at a time, and give way to predictions."""
+"""Measurements under way: calibrations and studies. They take long, run one at a time, and yield to predictions."""
 
 import asyncio
 import contextlib
@@ -22,9 +22,9 @@ _log = logging.getLogger("dlo")
 
 Tell = Callable[[int, int, str], None]
 Work = Callable[[Tell, Callable[[], bool]], bytes]  # (progress, cancelled) -> the answer
-_NICE = 10  # how much a measurement's thread stands back
-_WAY = 5.0  # s that one part of a measurement waits for predictions, at most: it is to end at last
-_LOOK = 0.02  # s between two looks whether predictions run
+_NICE = 10  # niceness of a measurement's thread
+_WAY = 5.0  # longest time that one part of a measurement waits for predictions [s], so that it does end
+_LOOK = 0.02  # s between two checks whether predictions run
 
 
 @dataclass(eq=False, kw_only=True)
@@ -32,7 +32,7 @@ class Measurement(Job):
     """A calibration or a study from the request to its end; `iterations` are the documents of its progress.
 
     Attributes:
-        kind: what it is, the collection in its address.
+        kind: its kind, the name of its collection in the address.
     """
 
     EVENT: ClassVar[str] = "progress"
@@ -46,7 +46,7 @@ class Measurement(Job):
 
     @property
     def mark(self) -> str:
-        """What stands before the numbers of its events: its id, where others have the same address after it."""
+        """Prefix of the numbers of its events: its id, if later measurements have the same address."""
         return f"{self.id}-" if self.kind == "calibration" else ""
 
     def summary(self) -> dict[str, Any]:
@@ -58,12 +58,12 @@ class Measurement(Job):
         }
 
     def item(self) -> dict[str, Any]:
-        """Return what a list tells of it."""
+        """Return its entry in a list."""
         return item_of(self.address, self.id, self.state)
 
 
 def item_of(address: str, id: str, state: State) -> dict[str, Any]:
-    """Return what a list tells of a measurement at an address."""
+    """Return the entry of a list for a measurement at an address."""
     links = {"self": address, "events": f"{address}/events"}
     return {"id": id, "created": created_of(id), "state": state, "links": links}
 
@@ -76,7 +76,7 @@ class Measurements:
         self._one_at_a_time = anyio.Lock()
 
     def add(self, kind: str, id: str) -> Measurement:
-        """Return a new measurement; forget the oldest finished ones beyond the cap."""
+        """Return a new measurement; forget the oldest finished ones beyond the limit."""
         finished = [kept for kept in self._kept.values() if kept.finished.is_set()]
         for oldest in finished[: max(0, len(finished) - MAX_FINISHED)]:
             del self._kept[oldest.id]
@@ -97,11 +97,11 @@ class Measurements:
         return next(reversed(self.of(kind)), None)
 
     def of(self, kind: str) -> list[Measurement]:
-        """Return those of a kind that run or wait, and the last that ended."""
+        """Return those of a kind that are running or waiting, and the last that ended."""
         return [kept for kept in self._kept.values() if kept.kind == kind]
 
     def under_way(self, kind: str) -> list[Measurement]:
-        """Return those of a kind that run or wait."""
+        """Return those of a kind that are running or waiting."""
         return [kept for kept in self.of(kind) if not kept.finished.is_set()]
 
     def give_up(self) -> None:
@@ -111,12 +111,12 @@ class Measurements:
             measurement.scope.cancel()
 
     async def run(self, measurement: Measurement, work: Work, busy: Callable[[], bool]) -> None:
-        """Measure when it is its turn, and note the progress and the end.
+        """Run a measurement when it is its turn, and record its progress and its end.
 
         Args:
-            measurement: what is noted on.
+            measurement: the measurement, in which they are recorded.
             work: measures; called in a thread of its own.
-            busy: whether predictions run or wait; asked from that thread.
+            busy: returns whether predictions are running or waiting; called from that thread.
         """
         loop = asyncio.get_running_loop()
         cancelled = measurement.cancelled
@@ -150,7 +150,7 @@ def _cancelled() -> ProblemError:
 
 
 async def _in_thread(call: Callable[[], bytes]) -> bytes:
-    """Return what `call` returns in a thread of its own, which stands back behind all others where the system can."""
+    """Return what `call` returns in a thread of its own, which has a low priority where the system supports that."""
     loop = asyncio.get_running_loop()
     outcome: asyncio.Future[bytes] = loop.create_future()
 
@@ -163,14 +163,14 @@ async def _in_thread(call: Callable[[], bytes]) -> bytes:
             outcome.set_result(answer or b"")
 
     def run() -> None:
-        if sys.platform == "linux":  # elsewhere it would be the whole process that stands back
+        if sys.platform == "linux":  # elsewhere this would lower the priority of the whole process
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICE)
         answer, failure = None, None
         try:
             answer = call()
         except BaseException as error:
             failure = error
-        with contextlib.suppress(RuntimeError):  # the service has stopped meanwhile
+        with contextlib.suppress(RuntimeError):  # the service has stopped in the meantime
             loop.call_soon_threadsafe(settle, answer, failure)
 
     threading.Thread(target=run, name="measurement", daemon=True).start()

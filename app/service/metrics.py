@@ -1,4 +1,4 @@
-"""What the service counts, for Prometheus."""
+"""Counters of the service, for Prometheus."""
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector, generate_latest
 
@@ -14,14 +14,14 @@ class Metrics:
     """Counters and gauges of one service.
 
     Args:
-        worker: whose queue is shown.
-        runs: whose size is shown.
+        worker: the worker whose queue is shown.
+        runs: the store whose size is shown.
     """
 
     def __init__(self, worker: Worker, runs: RunStore) -> None:
         self._registry = CollectorRegistry()
         ProcessCollector(registry=self._registry)
-        self._solves = Counter("dlo_solves", "Solves by their end.", ["status", "method"], registry=self._registry)
+        self._solves = Counter("dlo_solves", "Solves by outcome.", ["status", "method"], registry=self._registry)
         self._iterations = Counter(
             "dlo_iterations", "Iterations, or refinement levels of a march.", ["method"], registry=self._registry
         )
@@ -29,8 +29,8 @@ class Metrics:
             "dlo_solve_seconds", "Time of a solve.", ["method"], buckets=_TIMES, registry=self._registry
         )
         for name, text, value in (
-            ("dlo_queue_depth", "Solves that wait for a worker.", lambda: worker.waiting),
-            ("dlo_running", "Solves that run.", lambda: worker.running),
+            ("dlo_queue_depth", "Solves that are waiting for a worker.", lambda: worker.waiting),
+            ("dlo_running", "Solves that are running.", lambda: worker.running),
             ("dlo_workers", "Solves that may run at once.", lambda: worker.workers),
             ("dlo_stored_runs", "Stored runs.", lambda: runs.size[0]),
             ("dlo_stored_bytes", "Bytes of the stored runs.", lambda: runs.size[1]),
@@ -45,9 +45,9 @@ class Metrics:
         self._seconds.labels(accuracy.method).observe(accuracy.wall_time)
 
     def ended(self, status: str, method: str) -> None:
-        """Count a solve without an answer: "refused", "cancelled" or "failed"; the method is the one asked for."""
+        """Count a solve without an answer by its status, such as "cancelled", and by the requested method."""
         self._solves.labels(status, method).inc()
 
     def text(self) -> bytes:
-        """Return them in Prometheus' text form."""
+        """Return the metrics in the Prometheus text format."""
         return generate_latest(self._registry)

@@ -1,4 +1,4 @@
-"""Identifications of cables: one runs at a time, few wait, and none takes longer than a solve may."""
+"""Identifications of cables: one runs at a time, a few may wait, and each has the time limit of a solve."""
 
 import math
 import time
@@ -23,7 +23,7 @@ class Searches:
     """The searches of the API and of all tabs of the 3D scene. Use it from one event loop.
 
     Args:
-        worker: whose time limit they keep, and with which they are stopped.
+        worker: gives their time limit, and stops them when it is stopped.
     """
 
     def __init__(self, worker: Worker) -> None:
@@ -31,7 +31,7 @@ class Searches:
         self._one_at_a_time = anyio.CapacityLimiter(1)
 
     def check_room(self) -> None:
-        """Raise a 429 problem where as many searches wait as may."""
+        """Raise a 429 problem if no further search may wait."""
         if self._one_at_a_time.statistics().tasks_waiting >= WAITING:
             raise ProblemError(
                 429, "queue-full", "Too many identifications are waiting.", headers={"Retry-After": "30"}
@@ -43,13 +43,13 @@ class Searches:
         """Identify a cable in a thread when it is its turn.
 
         Args:
-            recordings: from which.
-            cancelled: asked from the thread whether to stop.
-            options: others of `dlocore.identify.identify`.
+            recordings: the recordings of the cable.
+            cancelled: returns whether to stop; called from the thread.
+            options: further arguments of `dlocore.identify.identify`.
 
         Raises:
-            SceneError: the recordings do not tell what is asked.
-            ProblemError: 429 where too many wait, 503 when cancelled, 504 at the time limit.
+            SceneError: the recordings or the options can't be used.
+            ProblemError: 429 if too many wait, 503 if cancelled, 504 at the time limit.
         """
         self.check_room()
         stopped, ends = Event(), math.inf

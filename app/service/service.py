@@ -1,4 +1,4 @@
-"""What the routes work with: the settings, the stored runs, the solves under way, and whether the solver is ready."""
+"""The service behind the routes: settings, stored runs, solves under way, and whether the solver is ready."""
 
 import asyncio
 import contextlib
@@ -41,13 +41,13 @@ class Service:
         settings: the settings.
         runs: the stored runs.
         worker: the worker threads.
-        metrics: what is counted.
-        jobs: predictions that no stored run stands for.
-        recent: the last predictions, from which others may go on.
+        metrics: the counters.
+        jobs: predictions without a stored run.
+        recent: the latest predictions, for others that are `like` them.
         measurements: calibrations and studies under way.
         searches: identifications of cables.
         ready: whether the solver is compiled and loaded.
-        compiled: whether the solver had been compiled before the start, so that it is loaded within seconds.
+        compiled: whether the solver was already compiled at the start and only has to be loaded, which takes seconds.
     """
 
     settings: Settings
@@ -74,7 +74,7 @@ class Service:
 
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
-        """Compile the solver and work at jobs while the context lasts, or until `stop`; then finish or cancel them."""
+        """Compile the solver and run jobs during the context, or until `stop`; then finish or cancel them."""
         async with anyio.create_task_group() as self._tasks:
             self._tasks.start_soon(self._warm_up)
             try:
@@ -97,7 +97,7 @@ class Service:
             _log.info("ready", extra={"workers": self.worker.workers})
 
     def stop(self) -> None:
-        """Begin to close: refuse what is new, let what is under way finish within the grace, and then cancel it."""
+        """Begin to close: refuse new requests, and cancel those under way that do not finish within the grace time."""
         if not self.worker.closed:
             assert self._tasks is not None
             self.worker.close()
@@ -109,7 +109,7 @@ class Service:
                 with anyio.move_on_after(self.settings.shutdown_grace):
                     await self.worker.idle()
                 if self.worker.busy:
-                    _log.warning("cancelling what is still under way", extra={"requests": self.worker.admitted})
+                    _log.warning("cancelling all that is still under way", extra={"requests": self.worker.admitted})
                 self.jobs.cancel_all()
                 self.measurements.give_up()
                 self.worker.cancel_all()
@@ -119,28 +119,28 @@ class Service:
             self._closed.set()
 
     def check_ready(self) -> None:
-        """Raise a 503 problem when the service stops, and while the solver is being compiled or loaded."""
+        """Raise a 503 problem if the service is stopping, or the solver is still being compiled or loaded."""
         if self.worker.closed:
             raise ProblemError(503, "shutting-down", "The service is shutting down.", headers={"Retry-After": "5"})
         if not self.ready and self.compiled:
             detail = "The solver is being loaded. Try again in a few seconds."
             raise ProblemError(503, "not-ready", detail, headers={"Retry-After": "2"})
         if not self.ready:
-            detail = "The solver is being compiled, which takes some minutes, once."
+            detail = "The solver is being compiled. This takes some minutes, but only once."
             raise ProblemError(503, "not-ready", detail, headers={"Retry-After": "30"})
 
     async def submit(self, request: PredictionRequest, raw: bytes, *, store: bool, like: str | None = None) -> Job:
-        """Take up a prediction and return it as it is waiting.
+        """Queue a prediction and return its job.
 
         Args:
             request: the valid request.
-            raw: the same as it was sent.
+            raw: the request as it was sent.
             store: whether to keep the run.
-            like: id of a run to go on from, if any.
+            like: id of a similar run whose grid and error estimate it reuses, if any.
 
         Raises:
             SceneError: the scene is impossible.
-            ProblemError: 404 where there is no run `like`, 429 or 503.
+            ProblemError: 404 if there is no run `like`, 429 if the queue is full, 503 if not ready or stopping.
         """
         self.check_ready()
         await self.check_known(like)
@@ -154,7 +154,7 @@ class Service:
         return job
 
     async def check_known(self, like: str | None) -> None:
-        """Raise a 404 problem where `like` is given, but not the id of a run."""
+        """Raise a 404 problem if `like` is given but is not the id of a run."""
         if like is None or self.recent.get(like) is not None:
             return
         if await anyio.to_thread.run_sync(self.runs.document, like) is None:
@@ -172,7 +172,7 @@ class Service:
                 job.material = await anyio.to_thread.run_sync(lambda: prediction.material)
                 job.document = document
                 if job.store:
-                    self.jobs.forget(job.id)  # the stored run stands for it
+                    self.jobs.forget(job.id)  # the stored run takes its place
                 job.end("done")
         except Exception as error:
             problem = problem_of(error)
@@ -186,15 +186,15 @@ class Service:
             job.end("cancelled", ProblemError(503, "cancelled", "The solve was cancelled."))
 
     def measure(self, kind: str, id: str, work: Work) -> Measurement:
-        """Take up a measurement, which gives way to predictions, and return it as it is waiting.
+        """Queue a measurement, which yields to predictions, and return it.
 
         Args:
-            kind: what it is, the collection in its address.
+            kind: its kind, the name of its collection in the address.
             id: its id.
             work: measures in a thread and returns the answer as JSON.
 
         Raises:
-            ProblemError: 503, the service is not ready or stops.
+            ProblemError: 503, the service is not ready or is stopping.
         """
         self.check_ready()
         assert self._tasks is not None
@@ -219,7 +219,7 @@ class Service:
         on_start: Callable[[], None] = nothing,
         on_iteration: Callable[[Iteration], None] = nothing,
     ) -> Prediction:
-        """Predict `scene` in a worker thread as `Worker.solve` does, from the run `like` if any; count and log it."""
+        """Predict `scene` by `Worker.solve`, like the run `like` if it is given; count and log the solve."""
         method = scene.quality.method
         before = self.recent.get(like) if like else None
         try:
@@ -236,7 +236,7 @@ class Service:
             self.metrics.ended("failed", method)
             raise
         if like and before is None:
-            why = "Solved from the beginning: The prediction before is not in memory any more."
+            why = "Solved from the beginning: The previous prediction is no longer in memory."
             prediction = replace(prediction, said=f"{prediction.said} {why}")
         self.metrics.solved(prediction)
         accuracy = prediction.accuracy
@@ -255,17 +255,17 @@ class Service:
         store: bool,
         fields: Collection[str] = OPTIONAL_FIELDS,
     ) -> tuple[bytes, bool]:
-        """Return the answer as JSON and whether it is stored, and remember it; for any thread.
+        """Remember a prediction; return its answer as JSON and whether it is stored. Safe to call from any thread.
 
-        What can't be stored is answered all the same: its message says why it is not stored.
+        A prediction that can't be stored is still answered; its message says why it is not stored.
 
         Args:
-            prediction: what was solved.
+            prediction: what the solver returned.
             request: the valid request.
-            raw: the same as it was sent.
-            id: of the run.
+            raw: the request as it was sent.
+            id: id of the run.
             store: whether to store it.
-            fields: which of `OPTIONAL_FIELDS` the answer has; what is stored has all.
+            fields: the members of `OPTIONAL_FIELDS` that the answer has; a stored run has all of them.
         """
         u, t = request.output.samples_u, request.output.samples_t
         told, stored = prediction, b""
@@ -281,11 +281,11 @@ class Service:
         else:
             document = {**from_prediction(told, id, u, t, fields), "links": None}
             answer = orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
-        self.recent.add(id, prediction)  # with what the answer has found of it, which takes memory, too
+        self.recent.add(id, prediction)  # last, since parts computed for the answer count as its memory, too
         return answer, store
 
     def document(self, id: str) -> bytes | None:
-        """Return the answer of the run `id`, stored or not, as JSON, or None where there is none; for any thread."""
+        """Return the answer of the run `id`, stored or not, as JSON, or None if there is none; for any thread."""
         job = self.jobs.get(id)
         return job.document if job is not None and job.document is not None else self.runs.document(id)
 
@@ -299,7 +299,7 @@ class Service:
 
 
 def _with_fields(stored: bytes, fields: Collection[str]) -> bytes:
-    """Return a stored answer without those of `OPTIONAL_FIELDS` that are not asked for."""
+    """Return a stored answer without those of `OPTIONAL_FIELDS` that are not in `fields`."""
     left_out = set(OPTIONAL_FIELDS).difference(fields)
     if not left_out:
         return stored

@@ -1,4 +1,4 @@
-"""The signal that stops the server, heard as it arrives: the server ends the lifespan only after the last request."""
+"""Catch the signal that stops the server at once: the server ends the lifespan only after the last request."""
 
 import asyncio
 import signal
@@ -10,9 +10,9 @@ from types import FrameType
 
 @contextmanager
 def when_stopped(call: Callable[[], None]) -> Iterator[None]:
-    """Call back in the event loop when a signal stops the server, while the context lasts; the server hears it, too.
+    """During the context, call back in the event loop when a signal stops the server; the server also receives it.
 
-    Outside the main thread, to which signals go, there is none to hear.
+    Outside the main thread nothing is called, because signals go to the main thread.
     """
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -1,4 +1,4 @@
-"""The solves that run and wait: bounded worker threads, one solve each."""
+"""The solves that run or wait: a bounded number of worker threads, one solve each."""
 
 import math
 import time
@@ -17,29 +17,29 @@ from dlocore import Cancelled, Iteration, Prediction, Scene, predict
 from dlocore.accuracy.cost import Cost
 from dlocore.calibration import stored_cost
 
-GRACE = 5.0  # s that a solve may take beyond its deadline, which it looks at between steps
+GRACE = 5.0  # s that a solve may take beyond its deadline, which it checks between steps
 _MEMORY = 0.8  # weight of the past in the running mean of solve times
 
 
 def nothing(*_: object) -> None:
-    """Do nothing, where nobody wants to be told."""
+    """Do nothing: the callback if none is needed."""
 
 
 @dataclass
 class Worker:
-    """Bounded worker threads for solves. Use it from one event loop.
+    """A bounded number of worker threads for solves. Use it from one event loop.
 
-    A client's request is admitted first, or refused; what is admitted waits in order for a free worker.
+    A client's request is first admitted or refused. Admitted requests wait in order for a free worker.
 
     Args:
         workers: solves that run at once.
         queue_size: requests that may wait.
         time_limit: longest solve [s].
-        calibration_file: where what solves cost on this machine is stored; None: nowhere.
+        calibration_file: file with the cost of solves on this machine; None: there is none.
 
     Attributes:
-        running: solves that run.
-        admitted: requests that run or wait.
+        running: number of solves that are running.
+        admitted: number of requests that are running or waiting.
         closed: whether new requests are refused.
     """
 
@@ -65,20 +65,20 @@ class Worker:
 
     @property
     def waiting(self) -> int:
-        """How many solves wait for a worker."""
+        """Number of solves that wait for a worker."""
         return self._limiter.statistics().tasks_waiting
 
     def admit(self) -> None:
-        """Take a place among the requests that run or wait; to be followed by `release`.
+        """Take a place among the requests that run or wait; give it back with `release`.
 
         Raises:
-            ProblemError: 429 where the queue is full, 503 when shutting down.
+            ProblemError: 429 if the queue is full, 503 if the service is shutting down.
         """
         if self.closed:
             raise ProblemError(503, "shutting-down", "The service is shutting down.", headers={"Retry-After": "5"})
         if self.admitted >= self.workers + self.queue_size:
             wait = max(1, math.ceil(self._mean_time * self.admitted / self.workers))
-            detail = f"{self.admitted} solves are under way or waiting, as many as allowed. Try again in {wait} s."
+            detail = f"{self.admitted} solves are running or waiting, as many as allowed. Try again in {wait} s."
             raise ProblemError(429, "queue-full", detail, headers={"Retry-After": str(wait)})
         self.admitted += 1
 
@@ -100,13 +100,13 @@ class Worker:
         Args:
             scene: the scene.
             cancelled: set it to stop the solve.
-            like: a prediction to go on from.
+            like: a similar prediction whose grid and error estimate are reused.
             on_start: called when a worker is free.
             on_iteration: called in the worker thread after every iteration.
 
         Raises:
             SceneError: the scene can't be solved as it was given.
-            ProblemError: 503 when cancelled, 504 where the solve went on past the time limit without an answer.
+            ProblemError: 503 if cancelled, 504 if the solve passed the time limit without an answer.
         """
         with self.stoppable(cancelled):
             async with self._limiter:
@@ -128,7 +128,7 @@ class Worker:
 
     @contextmanager
     def stoppable(self, cancelled: Event) -> Iterator[None]:
-        """Have `cancel_all` set the event while the context lasts. At its end it is set: a thread left behind stops.
+        """Let `cancel_all` set the event during the context. Set it at the end, so that an abandoned thread stops.
 
         Raises:
             ProblemError: 503, everything has been cancelled.
@@ -153,7 +153,7 @@ class Worker:
             with anyio.fail_after(self.time_limit + GRACE):
                 return await anyio.to_thread.run_sync(solve, abandon_on_cancel=True, limiter=anyio.CapacityLimiter(1))
         except TimeoutError:
-            detail = f"The solve took longer than the limit of {self.time_limit:g} s and gave nothing to offer."
+            detail = f"The solve took longer than the limit of {self.time_limit:g} s and gave no result."
             raise ProblemError(504, "time-limit", detail) from None
         except Cancelled:
             raise ProblemError(503, "cancelled", "The solve was cancelled.") from None
@@ -165,7 +165,7 @@ class Worker:
         self.closed = True
 
     def cancel_all(self) -> None:
-        """Stop everything that runs or waits, and what comes."""
+        """Stop everything that runs or waits, and everything that follows."""
         self._stopped = True
         for event in self._under_way:
             event.set()

@@ -1,1 +1,1 @@
-"""What is kept: runs and studies on disk, the last predictions in memory."""
+"""Storage: runs and studies on disk, the latest predictions in memory."""

@@ -1,4 +1,4 @@
-"""The last predictions, kept in memory so that others much like them can go on from their grids."""
+"""The latest predictions, kept in memory so that similar ones can reuse their grids and error estimates."""
 
 import gc
 import sys
@@ -10,21 +10,21 @@ import numpy as np
 
 from dlocore import Prediction
 
-MOST_BYTES = 256_000_000  # of memory, within a tenth
-_OF_ALL = (type, ModuleType, BuiltinFunctionType)  # what all predictions have in common
+MOST_BYTES = 256_000_000  # of memory, accurate to a tenth
+_OF_ALL = (type, ModuleType, BuiltinFunctionType)  # shared by all predictions, and so not counted
 
 
 class Recent:
-    """The last predictions by id, as many as `most` bytes hold; safe to call from any thread."""
+    """The latest predictions by id, as many as fit in `most` bytes; safe to call from any thread."""
 
     def __init__(self, most: int = MOST_BYTES) -> None:
         self._most = most
-        self._kept: OrderedDict[str, tuple[Prediction, int]] = OrderedDict()  # each with its bytes
+        self._kept: OrderedDict[str, tuple[Prediction, int]] = OrderedDict()  # each with its size in bytes
         self._bytes = 0
         self._lock = Lock()
 
     def add(self, id: str, prediction: Prediction) -> None:
-        """Keep a prediction, of which all that is wanted has been read; forget those not asked for the longest."""
+        """Keep a prediction whose lazy parts have been read; forget the least recently used ones beyond the limit."""
         size = size_of(prediction)
         with self._lock:
             self._remove(id)
@@ -34,7 +34,7 @@ class Recent:
                 self._remove(next(iter(self._kept)))
 
     def get(self, id: str) -> Prediction | None:
-        """Return the prediction `id`, or None where it is not kept."""
+        """Return the prediction `id`, or None if it is not kept."""
         with self._lock:
             if id not in self._kept:
                 return None
@@ -52,9 +52,9 @@ class Recent:
 
 
 def size_of(prediction: Prediction) -> int:
-    """Return how many bytes a prediction holds: its arrays, its other objects, and those it goes on from.
+    """Return how many bytes a prediction holds: its arrays, its other objects, and predictions that it refers to.
 
-    Found by following what each part refers to, but for code: it grows with whatever a prediction comes to hold.
+    The size is found by following all references except those to code, so it includes whatever a prediction holds.
     """
     seen: set[int] = set()
     total = 0

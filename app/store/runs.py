@@ -1,4 +1,4 @@
-"""Stored runs: one directory each, written whole or not at all, capped in number and bytes."""
+"""Stored runs: one directory each, written whole or not at all, limited in number and bytes."""
 
 import contextlib
 import logging
@@ -32,15 +32,15 @@ REQUEST, DOCUMENT, NETS, SUMMARY, RECORDING = "scene.json", "prediction.json", "
 class _Entry:
     summary: dict[str, Any]
     size: int  # bytes of its files
-    recording: int = 0  # those of them that are its recording
+    recording: int = 0  # bytes of its recording, part of `size`
 
 
 class RunStore:
     """The stored runs of a data directory; safe to call from any thread.
 
-    A run is written to a temporary directory, synced and renamed, so that a crash leaves a whole run or none. The
-    oldest runs go first when there are more than `max_runs` of them, or more than `max_run_bytes` bytes; but before
-    any run goes for its bytes, the recordings go, which can be written again.
+    A run is written to a temporary directory, synced and renamed, so that a crash leaves a whole run or none. If there
+    are more than `max_runs` runs, the oldest are removed. If they have more than `max_run_bytes` bytes, recordings are
+    removed first, because they can be written again, and then the oldest runs.
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -71,15 +71,15 @@ class RunStore:
         id: str | None = None,
         name: str = "",
     ) -> tuple[str, bytes]:
-        """Store a prediction and return its id and its document, which are known even where the run is soon removed.
+        """Store a prediction and return its id and its document, which are valid even if the run is removed at once.
 
         Args:
             scene_json: the request, as data or as the bytes that were sent.
             prediction: what the solver returned.
             samples_u: samples along the cable in the stored document.
             samples_t: samples in time.
-            id: that of the run, of `new_id`; absent: a new one.
-            name: what the run is called in lists.
+            id: id of the run, from `new_id`; absent: a new one.
+            name: name of the run in lists.
 
         Raises:
             OSError: it can't be written.
@@ -127,7 +127,7 @@ class RunStore:
             raise
 
     def _evict(self) -> list[Path]:
-        """Forget the oldest runs beyond the caps and return their directories, out of the way of new readers."""
+        """Forget the oldest runs beyond the limits; return their directories, renamed so that no reader finds them."""
         ids = sorted(self._entries)
         beyond = ids[: max(0, len(ids) - self._max_runs)]
         removed = [self._forget(id) for id in beyond]
@@ -143,18 +143,18 @@ class RunStore:
         return removed
 
     def _drop_recording(self, id: str) -> int:
-        """Remove the recording of a run, and return its bytes."""
+        """Remove the recording of a run and return its size in bytes."""
         entry = self._entries[id]
         dropped, entry.recording = entry.recording, 0
         entry.size -= dropped
-        with contextlib.suppress(OSError):  # then it goes with its run
+        with contextlib.suppress(OSError):  # then it is removed with its run
             (self._root / id / RECORDING).unlink(missing_ok=True)
         return dropped
 
     def _forget(self, id: str) -> Path:
         del self._entries[id]
         doomed = self._root / f".old-{id}"
-        with contextlib.suppress(FileNotFoundError, NotADirectoryError):  # removed by another hand
+        with contextlib.suppress(FileNotFoundError, NotADirectoryError):  # removed by someone else
             (self._root / id).rename(doomed)
         return doomed
 
@@ -181,10 +181,10 @@ class RunStore:
         """Return the summaries of runs, newest first, and how many match in all.
 
         Args:
-            limit: at most so many.
-            offset: pass over so many newer ones.
-            cursor: only runs older than the one with this id, which need not exist any more.
-            where: only runs for whose summary this holds.
+            limit: largest number of summaries.
+            offset: number of newer runs to skip.
+            cursor: only runs older than the one with this id, which need no longer exist.
+            where: only runs for whose summary this is true.
         """
         with self._lock:
             entries = [(id, self._entries[id].summary) for id in sorted(self._entries, reverse=True)]
@@ -194,16 +194,16 @@ class RunStore:
 
     @property
     def size(self) -> tuple[int, int]:
-        """How many runs are stored, and their bytes."""
+        """Number of stored runs, and their bytes."""
         with self._lock:
             return len(self._entries), sum(entry.size for entry in self._entries.values())
 
     def request(self, id: str) -> bytes | None:
-        """Return the request as it was sent, or None where there is no such run."""
+        """Return the request as it was sent, or None if there is no such run."""
         return self._read(id, REQUEST)
 
     def document(self, id: str) -> bytes | None:
-        """Return the response as JSON, or None where there is no such run."""
+        """Return the response as JSON, or None if there is no such run."""
         return self._read(id, DOCUMENT)
 
     def _read(self, id: str, name: str) -> bytes | None:
@@ -215,7 +215,7 @@ class RunStore:
             return None
 
     def load(self, id: str) -> Run | None:
-        """Return a run with its surface and iterates, or None where there is no such run."""
+        """Return a run with its surface and iterates, or None if there is no such run."""
         parts = [self._read(id, name) for name in (REQUEST, DOCUMENT, NETS)]
         if any(part is None for part in parts):
             return None
@@ -223,12 +223,12 @@ class RunStore:
         return unpack(orjson.loads(request), orjson.loads(document), nets)
 
     def motion(self, id: str) -> Motion | None:
-        """Return the motion of a run, or None where there is no such run."""
+        """Return the motion of a run, or None if there is no such run."""
         nets = self._read(id, NETS)
         return None if nets is None else unpack_motion(nets)
 
     def recording(self, id: str) -> bytes | None:
-        """Return the recording (.rrd) of a run, written when first asked for; None where there is no such run.
+        """Return the recording (.rrd) of a run, which is written at the first request; None if there is no such run.
 
         Raises:
             OSError: it can't be written.
@@ -236,7 +236,7 @@ class RunStore:
         content = self._read(id, RECORDING)
         if content is not None or id not in self:
             return content
-        with self._recording:  # one at a time: the readers of one run need it once
+        with self._recording:  # one at a time, so that several readers of a run write it only once
             content = self._read(id, RECORDING) or self._record(id)
         return content
 
@@ -266,7 +266,7 @@ class RunStore:
 
 
 def _summary(directory: Path) -> dict[str, Any] | None:
-    """Return the summary of a run, or None where there is none that can be read."""
+    """Return the summary of a run, or None if there is none or it can't be read."""
     try:
         found: dict[str, Any] = orjson.loads((directory / SUMMARY).read_bytes())
     except FileNotFoundError:

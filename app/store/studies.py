@@ -1,4 +1,4 @@
-"""Stored studies: one JSON file each, written whole or not at all, capped in number."""
+"""Stored studies: one JSON file each, written whole or not at all, limited in number."""
 
 import threading
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 from app.schemas.base import ID
 from dlocore.files import write_whole
 
-MAX_STUDIES = 100  # the oldest go first
+MAX_STUDIES = 100  # beyond it the oldest are removed
 
 
 class StudyStore:
@@ -25,7 +25,7 @@ class StudyStore:
                 file.unlink(missing_ok=True)
 
     def document(self, id: str) -> bytes | None:
-        """Return the document of a study, or None where there is none."""
+        """Return the document of a study, or None if there is none."""
         if not ID.fullmatch(id):
             return None
         try:

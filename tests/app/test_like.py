@@ -51,7 +51,7 @@ def test_what_is_forgotten_is_solved_from_the_beginning_and_says_so(client: Test
     service.recent.forget(first["id"])
     found = client.post(f"/v1/predictions?like={first['id']}", json=moved(0.01)).json()
     assert found["status"] == "converged"
-    assert f"{AFRESH}: The prediction before is not in memory any more." in found["message"]
+    assert f"{AFRESH}: The previous prediction is no longer in memory." in found["message"]
 
 
 def test_an_id_that_is_none_is_refused(client: TestClient) -> None:

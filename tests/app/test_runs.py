@@ -233,7 +233,7 @@ def test_a_second_process_on_a_data_directory_is_told_of_the_first(
     assert caplog.messages == []
     second = store(tmp_path)
     assert caplog.messages == [
-        f"another process uses {tmp_path}: each answers 404 for what the other one is given from now on"
+        f"another process uses {tmp_path}: each answers 404 for runs that the other stores from now on"
     ]
     del first, second
     caplog.clear()
