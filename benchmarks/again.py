@@ -1,9 +1,9 @@
-"""What it saves to go on from a prediction like it: `python -m benchmarks.again [--random N] [--scenes NAME ...]`.
+"""What `like` saves in predicting a similar scene: `python -m benchmarks.again [--random N] [--scenes NAME ...]`.
 
-Every scene of the catalogue, and random ones, in which a gripper moves are predicted; then again with its target moved
-by 1 % of the length, from the beginning (`predict(scene)`) and from what is known (`predict(scene, like=known)`). Times
-are medians of three; the error is the largest distance to a march refined until it stands still, and judged where that
-march is at least five times as accurate. One thread.
+Every scene of the catalogue in which a gripper moves, and random ones, are predicted. They are then predicted again
+with the target of the gripper moved by 1 % of the length: from the beginning (`predict(scene)`), and reusing what is
+known (`predict(scene, like=known)`). Times are medians of three. The error is the largest distance to a march that is
+refined until it no longer changes; it is judged only if that march is at least five times as accurate. One thread.
 """
 
 import os

@@ -1,9 +1,9 @@
-"""What the damping of stretch does to motions: `python -m benchmarks.axial_damping [NAME ...]`.
+"""The effect of axial damping on motions: `python -m benchmarks.axial_damping [NAME ...]`.
 
-Every scene of the catalogue, the paper's cases and random scenes that did not converge without it are solved three
-times to a thousandth of the length: with the damping that a cable has where none is given (docs/model.md eq. 7a),
-without, and a hundred times as stiff along itself, which is as near as it gets to a cable that does not stretch at all.
-A row tells how far they are apart, in parts of the length, and what each says of its own error.
+Every scene of the catalogue, the paper's cases, and random scenes that did not converge without axial damping are
+solved three times to a thousandth of the length: with the default damping (docs/model.md eq. 7a), without damping, and
+with a hundred times the axial stiffness, which is as close as possible to a cable that does not stretch at all. Each
+row gives how far these motions are apart, as shares of the length, and the error estimate of each.
 """
 
 import os

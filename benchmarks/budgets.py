@@ -1,9 +1,9 @@
-"""What time budgets give: `python -m benchmarks.budgets [--seed S] [--begin N] [--end N] [--budgets MS ...]
+"""What time budgets achieve: `python -m benchmarks.budgets [--seed S] [--begin N] [--end N] [--budgets MS ...]
 [--calibrated]`.
 
-Random hard scenes are predicted within time budgets, and compared with a prediction to 0.1 % of the length. Time is
-that of the processor, so that other programs on the machine do not count. The first grid is the coarsest, or with
-`--calibrated` what `dlo calibrate` has told of this machine chooses it.
+Random hard scenes are predicted within time budgets and compared with a prediction to 0.1 % of the length. Times are
+processor times, so that other programs on the machine do not count. The first grid is the coarsest one; with
+`--calibrated` it is chosen from the results of `dlo calibrate` on this machine.
 """
 
 import os

@@ -1,8 +1,9 @@
-"""Whether motions go on as they would have: `python -m benchmarks.chained [--seed S] [--begin N] [--end N]`.
+"""Whether a continued motion equals an unbroken one: `python -m benchmarks.chained [--seed S] [--begin N] [--end N]`.
 
-Random hard scenes are predicted as a whole and in two parts, of which the second begins with `shape_at` of the end of
-the first. Where all paths have ended by then the grippers stand still in it, else they follow the rest of their paths.
-The two are compared over the time of the second part, in parts of the length, with the sum of the three estimates.
+Random hard scenes are predicted as a whole and in two parts; the second part starts from `shape_at` at the end of the
+first. In the second part the grippers stand still if all paths have ended by then; otherwise they follow the rest of
+their paths. Over the time of the second part, the distance between the two motions is compared with the sum of the
+three error estimates, both as shares of the length.
 """
 
 import os

@@ -1,11 +1,14 @@
 """What the choices of the discretisation are worth: `python -m benchmarks.choices`.
 
-The final worst error of a march on the paper's case, against the converged motion, as the solver is and with one choice
-undone: the quadrature of the energies of stretch and bending, the knots, the numerical damping of the time steps. Then
-the energy of a free, undamped motion, which should stay, over the numerical damping. Last a bent wire that a clamp
-carries and turns by its middle: its largest error anywhere, with and without kinks of its sections' angle there;
-straight wires with one bend, which swings slowly: how far they are from rigid bodies; and a bent rod that springs
-straight in resisting air: its largest error anywhere, with and without what its first acceleration has of fast waves.
+- The final worst error of a march on the paper's case, relative to the converged motion: with the solver as it is, and
+  with one choice undone (the quadrature of the stretch and bending energies, the knots, the numerical damping of the
+  time steps).
+- The energy of a free, undamped motion, which should be constant, over the numerical damping.
+- A bent wire that a clamp carries and turns at its middle: its largest error anywhere, with and without kinks in the
+  angle of the sections there.
+- Straight wires with one bend that swing slowly: how far they are from rigid bodies.
+- A bent rod that springs straight in resisting air: its largest error anywhere, with and without the fast waves in its
+  first acceleration.
 """
 
 import os

@@ -1,10 +1,10 @@
-"""From the hand to the picture: how long a dragged target takes to come back as a prediction.
+"""Latency of the 3D scene: the time from a drag of a target to the prediction that shows it.
 
     python -m benchmarks.drag [--seconds 15] [--json FILE]
 
-Starts the service, opens its 3D scene as a browser does (by its websocket), drags the target of the paper's case along
-a circle at the 20 inputs a second that the client's page sends, and notes for every input when the first picture comes
-that shows it, or a newer one. Then plays the motion and counts the poses a second.
+Starts the service and opens its 3D scene by the websocket, as a browser does. Drags the target of the paper's case
+along a circle with 20 inputs per second, as the client's page sends them, and records for every input when the first
+picture arrives that shows this input or a newer one. Then plays the motion and counts the poses per second.
 """
 
 import argparse

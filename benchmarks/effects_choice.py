@@ -1,8 +1,8 @@
 """What the automatic choice of effects costs and saves: `python -m benchmarks.effects_choice [--scenes NAME ...]`.
 
-Every scene of the catalogue is solved with the effects that are chosen automatically, and with every effect on; the
-quality target, 0.2 % of the length, is the same. Then each effect is left out of a scene that calls for it. Both tables
-are Markdown. Times are medians of whole calls of `predict` after a first one that is not counted. One thread.
+Every scene of the catalogue is solved with the automatically chosen effects and with all effects on, to the same target
+error of 0.2 % of the length. Then each effect is left out of a scene that calls for it. Both tables are Markdown. Times
+are medians of whole calls of `predict` after a first one that is not counted. One thread.
 """
 
 import os

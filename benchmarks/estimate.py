@@ -1,14 +1,14 @@
-"""How honest the error estimate is: `python -m benchmarks.estimate [--truths FOLDER] [--scenes NAME ...]`.
+"""How reliable the error estimate is: `python -m benchmarks.estimate [--truths FOLDER] [--scenes NAME ...]`.
 
 Every scene of the catalogue, and random ones, are solved for several target errors and on given grids. The estimate of
-each answer is compared with its true error: the largest distance, over cable and time, to a march refined until it
-stands still. A motion that is unstable in its plane starts with a bow out of it where the grid is free, and is another
-one than on a given grid: it is compared with an answer to a tenth of the smallest target. Where what an answer is
-compared with is not at least five times as accurate, it is not judged.
+each answer is compared with its true error: the largest distance, over cable and time, to a march that is refined until
+it no longer changes. A motion that is unstable in its plane starts with a bow out of the plane on a free grid, and so
+differs from the motion on a given grid; it is compared with an answer to a tenth of the smallest target. An answer is
+judged only if the motion that it is compared with is at least five times as accurate.
 
-For every setting: how many answers were judged, quantiles of estimate/true, the share of ratios in 0.5 to 5, and the
-share of true errors above twice the estimate. Then every answer beyond these bounds. One thread. `--truths` keeps the
-refined marches, which take most of the time: remove the folder when the model changes.
+For every setting the benchmark prints the number of judged answers, quantiles of estimate/true, the share of ratios in
+0.5 to 5, and the share of true errors above twice the estimate; then every answer beyond these bounds. One thread.
+`--truths` keeps the refined marches, which take most of the time: remove the folder when the model changes.
 """
 
 import os

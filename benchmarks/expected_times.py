@@ -1,7 +1,7 @@
 """How far the time that `plan` expects is from the time of the solve: `python -m benchmarks.expected_times`.
 
-Scenes of the catalogue, asked for as they are mostly asked for: quality "auto", targets of 1 % and 0.1 % of the length,
-and a grid; and random hard scenes. Each is solved once to have all loaded, and once more if that was quick, within
+Scenes of the catalogue with the most common qualities ("auto", target errors of 1 % and 0.1 % of the length, and a
+given grid), and random hard scenes. Each is solved once so that all code is loaded, and again if that was quick, within
 `--deadline`.
 """
 

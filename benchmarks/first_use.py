@@ -1,8 +1,8 @@
-"""What a fresh process waits for: `python -m benchmarks.first_use [--repeats N]`.
+"""How long a new process waits for its first prediction: `python -m benchmarks.first_use [--repeats N]`.
 
-The time that `import dlocore` takes, and then the first prediction, which loads the compiled code: of the paper's
-case on 9 x 13 control points, and of a cable between two grippers in space. Each is the median over processes that do
-nothing else. The code is compiled before.
+The times of `import dlocore` and then of the first prediction, which loads the compiled code: for the paper's case on
+9 x 13 control points, and for a cable between two grippers in space. Each time is the median over processes that do
+nothing else. The code is compiled beforehand.
 """
 
 import argparse

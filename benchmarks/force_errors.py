@@ -1,13 +1,13 @@
-"""How honest the estimated errors of forces are: `python -m benchmarks.force_errors [--scenes NAME ...]`.
+"""How reliable the estimated errors of forces are: `python -m benchmarks.force_errors [--scenes NAME ...]`.
 
 Every scene of the catalogue with grippers, and random ones, are solved for several target errors and on given grids.
-The force of each gripper is compared with that of a march to a fifty-thousandth of the length, between each two events;
-its estimated error with how far the two are apart. Where the fine one may be off by as much, as it estimates itself,
-the force is not judged: one that rings at a jump of the velocity rings faster on every finer grid.
+Between every two events, the force of each gripper is compared with that of a march to a fifty-thousandth of the
+length, and its estimated error with the difference of the two. The force is not judged if the fine march may be off by
+as much according to its own estimate: a force that rings at a jump of the velocity rings faster on every finer grid.
 
-For every setting: the forces that were judged; the mean part of the time at which the true error is within the
-estimated one; quantiles of estimate/true, both as root mean squares over the motion; the share of ratios in 0.5 to 5,
-and below 0.5. Then every force beyond these bounds. One thread.
+For every setting the benchmark prints the number of judged forces; the mean share of the time at which the true error
+is within the estimated one; quantiles of estimate/true, both as root mean squares over the motion; and the shares of
+ratios in 0.5 to 5, and below 0.5. Then every force beyond these bounds. One thread.
 """
 
 import os

@@ -2,8 +2,8 @@
 
     python -m benchmarks.health
 
-A service of its own is started on the loopback address with one worker for each core, two clients post the finest grid
-over and over, and a third one asks for the health every few milliseconds.
+Starts a separate service on the loopback address with one worker for each core. Two clients post the finest grid over
+and over, and a third one requests ``/health`` every few milliseconds.
 """
 
 import argparse

@@ -1,9 +1,9 @@
 """Identify simulated cables that are tracked badly, over seeded trials: `python -m benchmarks.identification`.
 
-Each trial draws a cable and its drag over a factor of three, hangs it between two grippers that swing together and a
-little against each other, and tracks it at 200 Hz: nine markers on the cable and two on each gripper, 5 cm apart, all
-with 1 mm of noise, 5 % outliers of 5 cm and 10 % lost. Nothing else tells where the grippers are. The truth is marched
-with steps half as long as those that recordings are replayed with, on a net of as many control points, or of more
+Each trial draws a cable and its drag within a factor of three, and hangs the cable between two grippers that swing
+together and slightly against each other. It is tracked at 200 Hz by nine markers on the cable and two on each gripper,
+5 cm apart. All have 1 mm of noise; 5 % are outliers of 5 cm, and 10 % are lost. Nothing else shows where the grippers
+are. The truth is marched with half the time step of the replays, on a net of as many control points, or of more
 (`--truth`).
 """
 

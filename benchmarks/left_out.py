@@ -1,9 +1,9 @@
 """What the automatic choice of effects leaves out: `python -m benchmarks.left_out --seed 40 --count 200`.
 
 Random scenes, drawn as by `benchmarks.random_scenes` but with quality "auto" and all effects "auto", are solved as they
-are, and again with each effect that was left out switched on, one at a time. Those that this moves by more than twice
-what both estimate, and by more than 0.1 % of the length, are printed: there the choice was wrong and did not say so.
-Answers that tell of strands which cross are passed over. `--index 17` runs that one.
+are, and again with each effect that was left out switched on, one at a time. A scene is printed if this moves it by
+more than twice the two error estimates and by more than 0.1 % of the length: there the choice was wrong and did not say
+so. Answers that report crossing strands are skipped. `--index 17` runs only scene 17.
 """
 
 import os

@@ -1,9 +1,10 @@
 """Load on the service: `python -m benchmarks.load [--seconds 30] [--clients 32] [--predictions 2000] [--json FILE]`.
 
-Starts the service on a free port of this machine, on a data directory of its own. First `--predictions` predictions of
-the paper's case one after another on a few connections, with memory and threads of the service before and after them;
-then `--clients` clients for `--seconds`, each as fast as it is answered: every answer must be a 201, or a 429 where
-more ask than the queue holds. Ends with an error where an answer is neither or where memory or threads grew.
+Starts the service on a free port of this machine, with a data directory of its own. First it requests `--predictions`
+predictions of the paper's case one after another on a few connections, and measures the memory and threads of the
+service before and after them. Then `--clients` clients send requests for `--seconds`, each as soon as its last one is
+answered: every answer must be a 201, or a 429 if there are more requests than the queue holds. Ends with an error if an
+answer is neither, or if memory or threads grew.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""What a measurement was taken on: processor, cores, versions, commit."""
+"""The machine of a measurement: processor, cores, versions, commit."""
 
 import subprocess
 from pathlib import Path

@@ -1,9 +1,9 @@
-"""Predictions a second of `predict_many`: `python -m benchmarks.many [--scenes N] [--repeats N]`.
+"""Predictions per second of `predict_many`: `python -m benchmarks.many [--scenes N] [--repeats N]`.
 
-Scenes of the paper's case, a straight cable on a frictionless table with random grasp, way and bending stiffness, on
-9 x 13 control points by the march, with and without an error estimate; and of a cable that hangs between two grippers.
-Each number is the median over the repeats, in which the numbers of threads take turns. Every answer is compared with
-that of one thread, bit for bit.
+Two kinds of scenes: the paper's case, a straight cable on a frictionless table with random grasp, displacement and
+bending stiffness, marched on 9 x 13 control points with and without an error estimate; and a cable that hangs between
+two grippers. Each number is the median over the repeats, in which the numbers of threads take turns. Every answer is
+compared bit for bit with that of one thread.
 """
 
 import os

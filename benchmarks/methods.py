@@ -1,8 +1,9 @@
-"""The least squares beside the march on the same grids: `python -m benchmarks.methods [--seed N] [--scenes N]`.
+"""The least squares compared with the march on the same grids: `python -m benchmarks.methods [--seed N] [--scenes N]`.
 
-Of random hard scenes those on a given grid, whose motion is smooth: how often the least squares converges, and where
-it does, its largest error and its time over those of the march. The truth is a march to 0.1 % of the length. Scenes for
-which that does not converge are left out of the errors, those whose march shows no motion on that grid of everything.
+Takes those random hard scenes that have a given grid and a smooth motion. Prints how often the least squares converges
+and, where it does, its largest error and its time relative to those of the march. The truth is a march to 0.1 % of the
+length. Scenes for which the truth does not converge are left out of the errors. Scenes whose march shows no motion on
+that grid, or whose least squares runs out of time, are left out entirely.
 """
 
 import os

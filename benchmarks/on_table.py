@@ -1,9 +1,10 @@
 """Random motions among obstacles on a table: `python -m benchmarks.on_table --seed 1 --count 60`.
 
-A cable of 0.4 to 2 m lies on a table, straight, bowed or wavy; grippers lift it, carry it in an arc or bring two of its
+A cable of 0.4 to 2 m lies on a table, straight, bowed or wavy. Grippers lift it, carry it in an arc or bring two of its
 points together, beside and over posts, boxes, bars and balls (`benchmarks/table_scenes.py`). Each possible scene is
-predicted with quality "auto" and a deadline. Printed are those that do not converge, how many do, and what that took.
-With `--reference` what converges is compared with the step-by-step reference. `--index 17` runs that one.
+predicted with quality "auto" and a deadline. The scenes that do not converge are printed, then how many converge and
+the time this took. With `--reference`, the converged ones are compared with the step-by-step reference. `--index 17`
+runs only scene 17.
 """
 
 import os

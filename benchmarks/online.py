@@ -1,6 +1,6 @@
 """Identify a simulated cable while its frames arrive at 30 Hz: `python -m benchmarks.online`.
 
-Prints the processor time of an update, and how the estimate comes near the truth from a cable three times too stiff.
+Prints the processor time of an update, and how the estimate approaches the truth from a cable three times too stiff.
 """
 
 import os

@@ -1,11 +1,11 @@
-"""Planar motions that are drawn out of their plane: `python -m benchmarks.out_of_plane --seed 32 --count 500`.
+"""Planar motions that leave their plane when disturbed: `python -m benchmarks.out_of_plane --seed 32 --count 500`.
 
-The reference takes from the scene the plane in which it moves, as the march does, and can't tell whether a cable
-stays in it. Here random scenes off a table that are solved in a plane, drawn as by `benchmarks.random_scenes` but with
-quality "auto" and without contact of the cable with itself, are solved in space, too, with an acceleration across the
-plane that moves a free cable by less than 10^-4 of its length. Those that this moves by more than twice what both
-estimate are printed. Starts that settle are left out, as any weight turns them, and those that get a bow, as it takes
-the place of that. `--index 17` runs that one.
+Like the march, the reference takes the plane of the motion from the scene, so it can't show whether a cable stays in
+that plane. Here random scenes without a table that are solved in a plane, drawn as by `benchmarks.random_scenes` but
+with quality "auto" and without self-contact, are also solved in space, with an acceleration across the plane that moves
+a free cable by less than 10^-4 of its length. A scene is printed if this moves it by more than twice the two error
+estimates. Starts that settle are left out, because any weight turns them, and so are starts that get a bow, which takes
+the place of the acceleration. `--index 17` runs only scene 17.
 """
 
 import os

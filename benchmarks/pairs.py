@@ -1,4 +1,4 @@
-"""Two predictions of one random scene: how far they are apart, and whether what they estimate tells of that."""
+"""Two predictions of one random scene: how far they are apart, and whether their error estimates account for that."""
 
 import argparse
 from collections.abc import Sequence

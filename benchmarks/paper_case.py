@@ -3,8 +3,8 @@
 A straight cable on a frictionless table (L = 1 m, D = 5 mm, 0.05 kg/m, EA = 16 EI/D^2, drag 0.05 N s/m^2) is grasped at
 0, 0.25, 0.5 or 0.8 m and moved sideways by 0.5 m in 1.6 s. Times are medians of whole calls of `predict`, each on a new
 scene: the kernels are compiled, but nothing is kept from one call to the next. One thread. Errors are distances to the
-project's own march, refined until it moves by less than 0.1 mm. The explicit rod is a peer: compiled too, but it makes
-its tables of the grasp's path in Python, within the time.
+project's own march, refined until it changes by less than 0.1 mm. The explicit rod is measured for comparison: it is
+compiled too, but its time includes building the tables of the grasp's path in Python.
 """
 
 import os

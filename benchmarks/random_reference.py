@@ -1,8 +1,8 @@
 """Random hard scenes against the step-by-step reference: `python -m benchmarks.random_reference --seed 1 --count 400`.
 
-Scenes as `benchmarks.random_scenes` draws them, with quality "auto" and without contact of the cable with itself, which
-the reference does not know. Counted are those that both solve within their deadlines; each whose largest distance
-anywhere is more than twice what both estimate is printed. `--index 17` runs that one.
+Scenes as `benchmarks.random_scenes` draws them, with quality "auto" and without self-contact, which the reference does
+not have. The scenes that both solve within their deadlines are counted. A scene is printed if the largest distance
+between the two anywhere is more than twice the two error estimates. `--index 17` runs only scene 17.
 """
 
 import os

@@ -1,11 +1,12 @@
-"""Run random hard scenes and count what goes wrong: exceptions, NaN, hangs, broken laws, answers that lie.
+"""Run random hard scenes and count what goes wrong: exceptions, NaN, hangs, violated laws, false answers.
 
     python -m benchmarks.random_scenes --seed 1 --count 50000 --jobs 2 --deadline 1 --again 400 --resume scenes.jsonl
 
-Every scene is drawn from (seed, index) alone; `--index 17` runs that one and prints it as Python. With `--again` all
-scenes are run with the short `--deadline` and judged by the laws. Of those that do not converge in it so many, drawn by
-the seed, are run once more with `--again-deadline`, and asked whether they determine their motion. Without it all are
-asked that do not converge. With `--last-deadline` those that fail in this second stage are run a third time, with that.
+Every scene is drawn from (seed, index) alone; `--index 17` runs only scene 17 and prints it as Python. With `--again N`
+all scenes are run with the short `--deadline` and judged by the laws. Of those that do not converge within it, N that
+the seed draws are run again with `--again-deadline` and checked for whether they determine their motion. Without
+`--again`, all that do not converge are checked. With `--last-deadline`, those that fail in this second stage are run a
+third time with that deadline.
 """
 
 import argparse

@@ -1,10 +1,10 @@
-"""Whether scenes that say the same have the same answer: `python -m benchmarks.reworded [--seed S] [--end N]`.
+"""Whether equivalent scenes have the same answer: `python -m benchmarks.reworded [--seed S] [--end N]`.
 
-Random hard scenes are predicted as they are, and with something added that changes nothing: an obstacle far away, or
-beside the cable, a load of no force, a release after the end, a gripper that takes over from another on its way, grasps
-in another order, a gravity that is turned by 1e-7, next to no drag, effects switched on that were left out, the start
-as the control points of the answer; and as they are seen from a frame that drifts, or falls. The answers are compared,
-in parts of the length, with the sum of both estimates.
+Random hard scenes are predicted as they are, and with a change that should make no difference: an obstacle far away or
+beside the cable, a load of zero force, a release after the end, a gripper that takes over from another one during its
+path, grasps in another order, gravity turned by 1e-7, almost no drag, effects switched on that were left out, the start
+given as the control points of the answer. They are also predicted as seen from a frame that drifts or falls. The
+distance between the answers is compared with the sum of both error estimates, as shares of the length.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""Random scenes such as a robot meets them, from seeds."""
+"""Random scenes that are typical of robots, drawn from seeds."""
 
 import numpy as np
 

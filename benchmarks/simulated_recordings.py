@@ -1,4 +1,4 @@
-"""Recordings of a simulated cable between two grippers, tracked badly: noise, outliers, lost markers."""
+"""Recordings of a simulated cable between two grippers, with bad tracking: noise, outliers, lost markers."""
 
 from dataclasses import dataclass, replace
 from typing import cast

@@ -1,4 +1,4 @@
-"""Random scenes of a cable that grippers lift, lay, carry or bring together among obstacles on a table."""
+"""Random scenes of a cable that grippers lift, lay down, carry or bring together among obstacles on a table."""
 
 from typing import Any
 

@@ -1,10 +1,12 @@
 """What a target error costs: `python -m benchmarks.targets [--repeats N] [--cases]`.
 
-In the plane, to a millimetre: a straight cable of a metre on a frictionless table is moved sideways by half a metre in
-1.6 s: three bending stiffnesses, four grasps, two drags, held by a point or by its direction too. In space with twist,
-to two: a cable that hangs between two clamps, of which one moves by 0.3 m in 1 s, and may turn: three bending
-stiffnesses, from its equilibrium or from points near it. Times are medians of whole calls of `predict`, on one core;
-the error is the largest distance to a march refined until it stands still.
+- In the plane, to one millimetre: a straight cable of one metre on a frictionless table is moved sideways by half a
+  metre in 1.6 s, with three bending stiffnesses, four grasps and two drags, held at a point or also by its direction.
+- In space with twist, to two millimetres: a cable hangs between two clamps, one of which moves by 0.3 m in 1 s and may
+  turn, with three bending stiffnesses, from its equilibrium or from points near it.
+
+Times are medians of whole calls of `predict` on one core. The error is the largest distance to a march that is refined
+until it no longer changes.
 """
 
 import os

@@ -1,13 +1,14 @@
 """The twist at which hanging wires flip, against measurements: `python -m benchmarks.wires DIRECTORY`.
 
 DIRECTORY holds `<wire>_hang.npz` and `<wire>_hang.json` of three wires from github.com/qj25/adapteddlo_muj, which are
-not part of this project. Each wire hangs as a U between two holders 0.12 m apart from which it leaves horizontally and
-outwards, 5 repeats of 51 points in a vertical plane; `critical_twist_deg_measured` is the rotation of the holders
-against each other at which the U flips to a figure 8. The stiffnesses are those its authors identified from the same
-shapes and twists, so that this compares two models of the rod on one measurement more than it predicts anything.
+not part of this project. Each wire hangs as a U between two holders 0.12 m apart, from which it leaves horizontally and
+outwards; there are 5 repeats of 51 points in a vertical plane. `critical_twist_deg_measured` is the rotation of the
+holders relative to each other at which the U flips to a figure 8. The stiffnesses are those that the authors of the
+data identified from the same shapes and twists, so this is a comparison of two rod models on one measurement rather
+than a prediction.
 
-Three answers: the equilibrium under slowly growing rotation, a motion in time, and the boundary value problem of
-Kirchhoff's rod without any of the solver (docs/validation-wires.md).
+Three answers are computed: the equilibrium under slowly growing rotation, a motion in time, and the boundary value
+problem of Kirchhoff's rod, which uses none of the solver (docs/validation-wires.md).
 """
 
 import os

@@ -1,4 +1,4 @@
-"""A plastic cable is bent around a peg on a rough table, released, and grasped again elsewhere: it keeps its bend.
+"""A plastic cable is bent around a peg on a rough table, released and grasped elsewhere; it keeps its bend.
 
 Usage: python examples/bend_around_a_peg.py [PICTURE]
 """
@@ -24,7 +24,7 @@ peg = dlo.Cylinder(center=(0.4, 0.043, 0.0), radius=0.04, height=0.1, friction=0
 table = dlo.Environment(drag=0.02, table=dlo.Table(friction=0.3), obstacles=(peg,))
 turn = np.linspace(0.0, 1.0, 25)
 angle = 2.6 * turn**3 * (10 - 15 * turn + 6 * turn**2)  # [rad], from rest to rest
-reach = 0.4 - 0.055 * angle  # of the cable that is not wound up yet [m]
+reach = 0.4 - 0.055 * angle  # of the cable that is not yet wound around the peg [m]
 positions = np.column_stack([0.4 + reach * np.cos(angle), reach * np.sin(angle), 0 * angle])
 around = dlo.Waypoints(times=1.5 * turn, positions=positions)
 bent = dlo.predict(
@@ -40,7 +40,7 @@ print("bent:", bent.message)
 for effect in bent.effects:
     print(f"  {effect.name:13} {'on ' if effect.active else 'off'} {effect.reason}")
 
-# the second motion starts where the first one ended, with the bends that the cable keeps
+# the second motion starts where the first one ended, with the bends that the cable has kept
 moved = dlo.predict(
     dlo.Scene(
         cable=cable,

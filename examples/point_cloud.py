@@ -1,4 +1,4 @@
-"""A cable as a camera sees it: noisy, unevenly spaced points on a table are the start; one gripper moves it.
+"""A cable as a camera sees it: it starts from noisy, unevenly spaced points on a table, and one gripper moves it.
 
 Usage: python examples/point_cloud.py [PICTURE]
 """
@@ -13,7 +13,7 @@ import dlocore as dlo
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#E69F00", "#009E73", "#999999"  # Okabe-Ito
 LENGTH, NOISE, COUNT = 0.8, 0.002, 60  # [m], [m], points
 
-# the true shape, which the solver does not know: its direction winds to and fro along the cable
+# the true shape, which the solver does not know: its direction swings to and fro along the cable
 s = np.linspace(0.0, LENGTH, 2001)
 angle = 0.9 * np.sin(2 * np.pi * s / LENGTH) + 0.5 * np.cos(np.pi * s / LENGTH)
 true = np.column_stack([np.cos(angle), np.sin(angle)]).cumsum(axis=0) * (s[1] - s[0])

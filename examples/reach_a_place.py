@@ -1,7 +1,7 @@
-"""Where must the gripper go, so that the free end of a cable on a table comes to rest at a place?
+"""Where must the gripper go so that the free end of a cable on a table comes to rest at a given place?
 
-Newton's method over the gripper's target: every prediction after the first goes on from the one before it
-(`predict(..., like=...)`), which takes a part of the time.
+Newton's method finds the gripper's target. Every prediction after the first reuses the grid and the error estimate of
+the previous one (`predict(..., like=...)`), which takes only part of the time.
 
 Usage: python examples/reach_a_place.py [PICTURE]
 """
@@ -14,14 +14,14 @@ import numpy as np
 
 import dlocore as dlo
 
-GOAL = np.array([0.75, -0.01])  # [m] for the end at u = 1 m
-STEP = 0.005  # [m] of the differences
-FARTHEST = 0.1  # [m] from one target to the next
+GOAL = np.array([0.75, -0.01])  # [m], of the end at u = 1 m
+STEP = 0.005  # [m], of the finite differences
+FARTHEST = 0.1  # [m], most from one target to the next
 BLUE, ORANGE, GREY = "#0072B2", "#E69F00", "#999999"  # Okabe-Ito
 
 
 def scene(target: np.ndarray) -> dlo.Scene:
-    """Return the cable, gripped at 0.25 m and moved by `target` (2,) [m]."""
+    """Return the scene of the cable, grasped at 0.25 m and moved by `target` (2,) [m]."""
     path = dlo.Move(displacement=(*target, 0.0), duration=1.6)
     return dlo.Scene(
         cable=dlo.Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=1e-2),

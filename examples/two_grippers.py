@@ -1,4 +1,4 @@
-"""Two grippers carry a hanging cable: start at rest under gravity, known motion, the forces the grippers must give.
+"""Two grippers carry a hanging cable: it starts at rest under gravity; plotted are the motion and the grippers' forces.
 
 Usage: python examples/two_grippers.py [PICTURE]
 """
