@@ -12,11 +12,11 @@ help:
 	@echo 'make run     install into $(VENV) and serve the page, the 3D scene and the API on http://127.0.0.1:8000'
 	@echo 'make test    run all tests (PYTEST_ARGS="-m '"'not slow'"'" for the quick ones)'
 	@echo 'make check   ruff and mypy'
-	@echo 'make setup   install what the tests need; make compile compiles the solver, too'
+	@echo 'make setup   install what the tests need; make compile also compiles the solver'
 	@echo 'make format  format the code'
 	@echo 'make bench   measure the predictor on the reference cases'
-	@echo 'make lock    resolve the locked requirements anew'
-	@echo 'make clean   remove caches and builds; distclean removes $(VENV) too'
+	@echo 'make lock    resolve the locked requirements again'
+	@echo 'make clean   remove caches and builds; make distclean also removes $(VENV)'
 
 run: $(VENV)/.run-installed
 	$(BIN)/dlo serve
@@ -41,11 +41,11 @@ format: $(VENV)/.dev-installed
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-# one thread: threads of a linear algebra library only slow problems of this size down
+# one thread: for problems of this size, the threads of a linear algebra library only cost time
 bench: $(VENV)/.dev-installed
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.paper_case
 
-# of both files for every Python from 3.11 on and every system; without index addresses, which are the user's
+# both files serve every Python from 3.11 on and every system; they have no index addresses, which are up to the user
 lock: $(VENV)/.dev-installed
 	$(PIP) install --quiet $(UV)
 	$(BIN)/uv pip compile --universal --python-version 3.11 --custom-compile-command 'make lock' \
@@ -58,7 +58,7 @@ $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "dlo needs Python 3.11 or later: PYTHON=python3.12 make")'
 	$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
 
-# what a lock file names and the project itself: by uv in a third of the time, by pip where uv or its index is not to be had
+# install what a lock file names, and the project itself: with uv in a third of the time, or with pip if uv is not available
 define install
 	@echo 'Installing into $(VENV); this may take a minute or two the first time.'
 	{ $(PIP) install --quiet $(UV) && \
@@ -67,7 +67,7 @@ define install
 	@touch $@
 endef
 
-# set-up runs again only when the locks or pyproject.toml change
+# the installation runs again only if the locks or pyproject.toml change
 $(VENV)/.run-installed: requirements.lock pyproject.toml | $(BIN)/python
 	$(call install,requirements.lock)
 
