@@ -1,4 +1,4 @@
-"""Two grippers carry a hanging cable: it starts at rest under gravity; plotted are the motion and the grippers' forces.
+"""Two grippers carry a hanging cable that starts at rest: its motion, and the forces that the grippers must exert.
 
 Usage: python examples/two_grippers.py [PICTURE]
 """

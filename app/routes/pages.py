@@ -49,9 +49,7 @@ class _Files(StaticFiles):
     ) -> Response:
         response = super().file_response(full_path, stat_result, scope, status_code)
         response.headers["Content-Security-Policy"] = POLICY
-        response.headers["Cache-Control"] = (
-            "no-cache"  # revalidated by its tag, so that files of two versions don't mix
-        )
+        response.headers["Cache-Control"] = "no-cache"  # revalidated by tag: files of two versions don't mix
         return response
 
 
