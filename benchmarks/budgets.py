@@ -84,8 +84,10 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=108)
     parser.add_argument("--begin", type=int, default=0, help="first index (default 0)")
     parser.add_argument("--end", type=int, default=300, help="index after the last (default 300)")
-    parser.add_argument("--budgets", type=float, nargs="+", default=[5.0, 20.0, 100.0, 500.0], help="[ms]")
-    parser.add_argument("--calibrated", action="store_true", help="with what solves cost, as the service")
+    parser.add_argument("--budgets", type=float, nargs="+", default=[5.0, 20.0, 100.0, 500.0], help="time budgets [ms]")
+    parser.add_argument(
+        "--calibrated", action="store_true", help="use the measured cost of solves, as the service does"
+    )
     options = parser.parse_args()
     warm_up()
     cost = stored_cost() if options.calibrated else None

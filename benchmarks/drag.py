@@ -82,8 +82,8 @@ def played(client: SceneClient, seconds: float) -> float:
 def main() -> None:
     """Measure, and print what was found."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seconds", type=float, default=15.0, help="of dragging")
-    parser.add_argument("--json", type=Path, help="where to write the numbers")
+    parser.add_argument("--seconds", type=float, default=15.0, help="duration of dragging")
+    parser.add_argument("--json", type=Path, help="file to write the numbers to")
     options = parser.parse_args()
     with service() as address:
         found = measured(address, options.seconds)

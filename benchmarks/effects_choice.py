@@ -142,7 +142,7 @@ def print_effects(scenes: dict[str, Scene], repeats: int) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenes", nargs="+", metavar="NAME", help="only scenes whose name contains one of these")
-    parser.add_argument("--repeats", type=int, default=5, help="timed calls of each scene, at most (default 5)")
+    parser.add_argument("--repeats", type=int, default=5, help="most timed calls of each scene (default 5)")
     options = parser.parse_args()
     warm_up()
     scenes = catalogue()

@@ -54,9 +54,9 @@ def ratio(scene: Scene, deadline: float) -> float:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seed", type=int, default=131, help="of the random scenes (default 131)")
+    parser.add_argument("--seed", type=int, default=131, help="seed of the random scenes (default 131)")
     parser.add_argument("--random", type=int, default=150, help="random scenes drawn (default 150)")
-    parser.add_argument("--deadline", type=float, default=6.0, help="[s], for each solve (default 6)")
+    parser.add_argument("--deadline", type=float, default=6.0, help="time limit of each solve [s] (default 6)")
     options = parser.parse_args()
     warm_up()
     found: dict[str, list[float]] = {}

@@ -170,9 +170,13 @@ def show(before: State, after: State, count: int, steady: Counter[str], run: Loa
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=bounded(*SECONDS, float), default=30.0, help="of the load (default 30)")
-    parser.add_argument("--clients", type=bounded(*CLIENTS, int), default=32, help="at once (default 32)")
-    parser.add_argument("--predictions", type=bounded(*PREDICTIONS, int), default=2000, help="(default 2000)")
+    parser.add_argument(
+        "--seconds", type=bounded(*SECONDS, float), default=30.0, help="duration of the load (default 30)"
+    )
+    parser.add_argument("--clients", type=bounded(*CLIENTS, int), default=32, help="clients at once (default 32)")
+    parser.add_argument(
+        "--predictions", type=bounded(*PREDICTIONS, int), default=2000, help="predictions (default 2000)"
+    )
     parser.add_argument("--json", type=Path, help="file to write every result to")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as data, service(Path(data)) as (address, pid):

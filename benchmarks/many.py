@@ -83,8 +83,8 @@ def _solved(answer: object) -> bool:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenes", type=int, default=2000, help="of each kind (default 2000)")
-    parser.add_argument("--repeats", type=int, default=7, help="default 7")
+    parser.add_argument("--scenes", type=int, default=2000, help="scenes of each kind (default 2000)")
+    parser.add_argument("--repeats", type=int, default=7, help="timed calls (default 7)")
     options = parser.parse_args()
     warm_up()
     random = np.random.default_rng(1)

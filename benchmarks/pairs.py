@@ -77,7 +77,7 @@ def scenes_parser(text: str | None, count: int) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=count, help=f"scenes to draw (default {count})")
-    parser.add_argument("--index", type=int, help="only this one")
+    parser.add_argument("--index", type=int, help="run only this scene")
     return parser
 
 

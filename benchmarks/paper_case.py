@@ -230,8 +230,8 @@ def stored_table(results: list[Result]) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--repeats", type=int, default=50, help="timed calls of each case, at most (default 50)")
-    parser.add_argument("--reference", type=Path, help="folder with stored solutions to compare with, too")
+    parser.add_argument("--repeats", type=int, default=50, help="most timed calls of each case (default 50)")
+    parser.add_argument("--reference", type=Path, help="folder with stored solutions, for a further comparison")
     parser.add_argument("--json", type=Path, help="file to write every result to")
     options = parser.parse_args()
     warm_up()

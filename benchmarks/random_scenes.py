@@ -272,15 +272,19 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=300)
     parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--resume", type=Path, help="file of records to write, and to go on from")
+    parser.add_argument("--resume", type=Path, help="file of records to write and to continue")
     parser.add_argument("--check", type=int, default=300, help="scenes compared with a refined march")
-    parser.add_argument("--deadline", type=float, default=30.0, help="seconds that a prediction is allowed")
-    parser.add_argument("--again", type=int, default=0, help="of the scenes that do not converge, run again so many")
-    parser.add_argument("--again-deadline", type=float, default=60.0, help="seconds that a prediction is allowed then")
-    parser.add_argument("--last-deadline", type=float, help="seconds that those which fail then are allowed once more")
+    parser.add_argument("--deadline", type=float, default=30.0, help="time limit of a prediction [s]")
+    parser.add_argument(
+        "--again", type=int, default=0, help="number of scenes to run again of those that do not converge"
+    )
+    parser.add_argument(
+        "--again-deadline", type=float, default=60.0, help="time limit of a prediction in the second run [s]"
+    )
+    parser.add_argument("--last-deadline", type=float, help="time limit of a third run of those that fail again [s]")
     parser.add_argument(
         "--measure", choices=("failed", "all"), default="failed",
-        help="whose start is disturbed in a run of one stage, beside those compared (default: of those that fail)",
+        help="scenes whose start is disturbed in a run of one stage, in addition to those compared (default: failed)",
     )  # fmt: skip
     parser.add_argument("--index", type=int, help="run this scene alone and print it as Python")
     parser.add_argument("--summary", action="store_true", help="only print the summary of the file")

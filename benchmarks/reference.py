@@ -103,7 +103,9 @@ def main(names: list[str]) -> None:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenes", nargs="*", metavar="SCENE", help="absent: those named in this file")
+    parser.add_argument(
+        "scenes", nargs="*", metavar="SCENE", help="names of scenes; absent: those that this file names"
+    )
     scenes = parser.parse_args().scenes
     unknown = set(scenes) - set(examples() | catalogue())
     if unknown:
