@@ -1,1 +1,1 @@
-"""Grids for an asked error or time: refined until two agree, and what takes the place of one that fails."""
+"""Grids for a requested error or time: refined until two agree, and the fallbacks if a grid fails."""

@@ -1,4 +1,4 @@
-"""What refining may cost: which grid is worth its time, and where a time budget begins."""
+"""What refinement may cost: which grid is worth its time, and where to begin within a time budget."""
 
 from dataclasses import dataclass
 
@@ -10,30 +10,30 @@ from dlocore.problem.problem import Problem
 from dlocore.solvers.march import MOST_FRAMES
 from dlocore.solvers.monitor import Monitor
 
-_KEPT = 0.8  # of the budget: what the model may be sure of, as it knows nothing of the motion
+_KEPT = 0.8  # of the budget: the share that is planned for, because the cost model knows nothing of the motion
 MOST_WORK = 3.2e7  # control points times steps of one march in the plane
-_COSTS = {2: 1.0, 3: 2.0, 4: 2.9}  # times the time, by coordinates: in space, and with twist, 1.4 times that
-_FRAMES = 3  # a control point in time, at least, that are kept of a motion with twist: what its time spline needs
-PATIENT = 64.0  # times as much, of a march that will end before a deadline or within a time budget, ...
-MOST_STEPS = 1_000_000  # ... and has no more steps: what holds the cable is kept of all of them, see `Kept`
-_DEAR = 0.25  # of the time left: a march that takes more is not done only to tell what steps err by
-_MAY_BE = 2.0  # times as long as is left: a march that is expected to take that may be done by then
-_SLOWER = 1.3  # times as long as its work tells, a march may take
-CONTACT_COSTS = 2  # times as much work counts with contact, which takes more of the time of a step
-AUTO_SHARE = 1 / 32  # of it for who asked for no target, once the estimated error is what is enough
+_COSTS = {2: 1.0, 3: 2.0, 4: 2.9}  # relative time by coordinates: space, and twist, take 1.4 times that
+_FRAMES = 3  # control points in time kept of a motion with twist, at least: its time spline needs them
+PATIENT = 64.0  # times MOST_WORK, for a march that will end before a deadline or within a time budget, ...
+MOST_STEPS = 1_000_000  # ... with no more steps than this: `Kept` stores the reactions of all of them
+_DEAR = 0.25  # of the time left: a march that takes more is not done just to find the error of the steps
+_MAY_BE = 2.0  # times the time left: a march expected to take this long may still finish
+_SLOWER = 1.3  # times the time that its work suggests: what a march may take
+CONTACT_COSTS = 2  # times: work with contact counts as this much more, because a step takes longer
+AUTO_SHARE = 1 / 32  # of MOST_WORK, if no target was requested and the estimated error is already good enough
 _MOST_POINTS = 800  # along the cable, ...
-_PATIENT_POINTS = 4  # ... or so many times as many, of a march that will end before a deadline
+_PATIENT_POINTS = 4  # ... times this, for a march that will end before a deadline
 
 
 @dataclass
 class Means:
-    """What a climb may spend.
+    """What a refinement may spend.
 
     Attributes:
-        monitor: that of the solve, with its deadline.
-        cost: what solves cost on this machine, where it is known.
-        budget: time allowed [s], infinite where none was given.
-        pace: time that the last march took for each of its points and steps [s].
+        monitor: of the solve, with its deadline.
+        cost: cost of solves on this machine, if known.
+        budget: time allowed [s]; infinite if none was given.
+        pace: time of the last march per point and step [s].
     """
 
     monitor: Monitor
@@ -43,24 +43,24 @@ class Means:
 
     @property
     def left(self) -> float:
-        """Time that is left [s], infinite where there is neither a deadline nor a budget."""
+        """Time left [s]; infinite if there is neither a deadline nor a budget."""
         return min(self.monitor.remaining(), self.budget - self.monitor.elapsed())
 
     @property
     def used_up(self) -> bool:
-        """Whether a time budget is."""
+        """Whether a time budget is used up."""
         return self.monitor.elapsed() > self.budget
 
     def took(self, problem: Problem, size: Size, spent: float) -> None:
-        """Note how long the march of a size took [s]."""
+        """Record how long the march of a size took [s]."""
         self.pace = spent / _work(problem, size)
 
     def is_dear(self, problem: Problem, size: Size) -> bool:
-        """Tell whether time is limited, and a march of a size takes much of what is left of it."""
+        """Tell whether time is limited and a march of this size takes much of what is left."""
         return self.left < np.inf and self.pace * _work(problem, size) > _DEAR * self.left
 
     def affordable(self, problem: Problem, size: Size, content: bool) -> Size | None:
-        """Return a size, or None where a march of it takes too long, or longer than it is worth to who is `content`."""
+        """Return the size, or None if its march takes too long, or longer than a `content` caller would wait."""
         work, left = _work(problem, size), self.left
         in_time = left < np.inf and size.steps <= MOST_STEPS and _SLOWER * self.pace * work < left
         most = MOST_WORK * (AUTO_SHARE if content else PATIENT if in_time else 1.0)
@@ -69,31 +69,32 @@ class Means:
         return size if fits and size.n_u <= points and work <= most else None
 
     def next_fits(self, problem: Problem, size: Size, finer: Size, spent: float, checked: bool) -> bool:
-        """Tell whether the next grid is done within the budget, if one of `size` took a time `spent` [s].
+        """Tell whether the next grid can be done within the budget, if one of `size` took `spent` [s].
 
-        One that was not `checked` by another yet is no answer: the next one is tried if it may be done.
+        A grid that has not been `checked` by another is no answer yet, so the next one is tried even if it only may
+        finish.
         """
         left = self.budget - self.monitor.elapsed()
         return not growth(problem, self.cost, size, finer) * spent > (left if checked else _MAY_BE * left)
 
 
 def _work(problem: Problem, size: Size) -> float:
-    """Return the control points times steps of a march in the plane that takes as long as one of a size."""
+    """Return the equivalent work of a march of a size: control points times steps of a march in the plane."""
     touches = problem.contact is not None or problem.self_contact is not None
     return size.n_u * size.steps * _COSTS[problem.nc] * (CONTACT_COSTS if touches else 1.0)
 
 
 def march_time(problem: Problem, cost: Cost, size: Size) -> float:
-    """Return about how long a march on a grid takes [s]."""
+    """Return the approximate time of a march on a grid [s]."""
     active = [name for name, choice in problem.choices.items() if choice.active]
     return cost.time("march", *size, coordinates=problem.nc, effects=active, estimate=False)
 
 
 def first_level(problem: Problem, cost: Cost | None, budget: float) -> int:
-    """Return the first grid, a number in `LEVELS`, of the marches within a time budget [s].
+    """Return the first grid of the marches within a time budget [s], as an index into `LEVELS`.
 
-    It is the finest that leaves time for the next one, by which its error is told; the coarsest where nothing is known
-    of this machine.
+    It is the finest that leaves time for the next one, which gives its error; the coarsest if nothing is known about
+    this machine.
     """
     if cost is None or problem.nc not in cost.rates:
         return 0
@@ -103,7 +104,7 @@ def first_level(problem: Problem, cost: Cost | None, budget: float) -> int:
 
 
 def growth(problem: Problem, cost: Cost | None, size: Size, next_size: Size) -> float:
-    """Return how many times as long a march on the next grid will take as on this one; by its work, if that is all."""
+    """Return the ratio of march times of the next grid and this one; the ratio of work if no more is known."""
     if cost is None or problem.nc not in cost.rates:
         return _work(problem, next_size) / _work(problem, size)
     return march_time(problem, cost, next_size) / march_time(problem, cost, size)

@@ -1,4 +1,4 @@
-"""What error the changes from one grid to a finer one point to."""
+"""Error estimates from the changes between one grid and a finer one."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -9,20 +9,20 @@ from dlocore.levels.level import Level
 from dlocore.solvers.march import STRONGLY_DAMPED
 from dlocore.solvers.timefit import MISSED_COUNTS
 
-_LEFT = 0.45  # of what twice as many steps moved the surface by, is left; 1/3 in theory: benchmarks.estimate
-_LEFT_KINKED = 0.9  # the same of a `kinked` march; 1 were its steps of first order
-_LEFT_ALONG = 0.75  # the same of half as many control points again
-_MOST_LEFT = 1.5  # times the last change: what is believed of changes that hardly shrink
-_MOST_FALL = 20.0  # times less than the refinement before, at most, is believed of one: more is chance
-# ... where strong damping begins with it: its errors are about those of half as many steps without, which the grid
-# before has, so that these two may agree as they err alike. A third of what that was moved by is left in both.
+_LEFT = 0.45  # of the change by doubled steps: the error that remains; 1/3 in theory: benchmarks.estimate
+_LEFT_KINKED = 0.9  # the same for a `kinked` march; it would be 1 if its steps were of first order
+_LEFT_ALONG = 0.75  # the same for half as many control points again
+_MOST_LEFT = 1.5  # times the last change: the largest estimate that is made from changes that hardly shrink
+_MOST_FALL = 20.0  # a change may be at most this many times smaller than the one before: more is chance
+# ... if strong damping begins with it: its errors are about those of half as many steps without, as on the grid
+# before, so the two may agree because they err alike. A third of the previous change is left in both.
 _MOST_FALL_DAMPED = 3.0 * _LEFT_KINKED
-_MOST_FALL_YIELDING = 4.0  # ... where the cable yields: it is bent for good within a span, which coarse grids lack
-_MOST_FALL_RISEN = 3.0  # ... of one in both directions where that before it had risen: they are in no order yet
-MORE = 1.1  # times as many steps, or control points: fewer are as many
-_STALE = 2.0  # times what a refinement in one direction moved the surface by: once those in the other moved it by more,
-# what the first has left is measured again
-_RISES = 2.0  # times as far as the last refinement in both directions: the first one in one of them is in no order
+_MOST_FALL_YIELDING = 4.0  # ... if the cable yields: it is bent for good within a span, which coarse grids can't show
+_MOST_FALL_RISEN = 3.0  # ... for a refinement in both directions after one that had risen: they are in no order yet
+MORE = 1.1  # times as many steps, or control points: fewer count as the same
+_STALE = 2.0  # times the change by a refinement in one direction: once those in the other moved the surface more,
+# the error left in the first is measured again
+_RISES = 2.0  # times the last change in both directions: the first one in one direction is in no order yet
 DIRECTIONS = "space", "time"
 
 
@@ -30,10 +30,10 @@ class Change(NamedTuple):
     """How far a refinement moved the surface.
 
     Attributes:
-        moved: by this one, as if it had twice the steps at least [m].
-        before: by the one before it in the same direction [m], infinite where there is none.
-        left: share of it that is left in theory, or more.
-        fall: times less than the one before it that this one is believed to be, at most.
+        moved: by this refinement, scaled to at least twice the steps [m].
+        before: by the previous one in the same direction [m]; infinite if there is none.
+        left: the share of it that is left as error in theory, or more.
+        fall: how many times smaller than the previous change this one is believed to be, at most.
     """
 
     moved: float
@@ -43,11 +43,10 @@ class Change(NamedTuple):
 
     @property
     def error(self) -> float:
-        """The error [m] that it points to.
+        """The error [m] that the change indicates.
 
-        Where changes shrink by less than expected from one refinement to the next, the sum of those to come is larger
-        than the share that is left in theory: c/(1 - c), c = moved/before. Where they shrink by far more, two grids
-        may agree by chance.
+        If changes shrink less than expected from one refinement to the next, the sum of those to come is larger than
+        the theoretical share: c/(1 - c), c = moved/before. If they shrink far more, two grids may agree by chance.
         """
         known = 0.0 < self.before < np.inf
         contraction = self.moved / self.before if known else 0.0
@@ -62,8 +61,8 @@ def weighed(level: Level, before: Level, last: Change | None, first: bool = Fals
     Args:
         level: the finer one.
         before: the coarser one.
-        last: the change of the refinement before in the same direction.
-        first: nothing is known yet of whether changes shrink. Where steps may err by first order they may not on coarse
+        last: the change of the previous refinement in the same direction.
+        first: whether it is not yet known if changes shrink. Steps that may err by first order need not do so on coarse
             grids, and two of these agree by chance.
     """
     moved_before = np.inf if last is None else last.moved
@@ -76,7 +75,7 @@ def weighed(level: Level, before: Level, last: Change | None, first: bool = Fals
         falls.append(_MOST_FALL_RISEN)
     if more <= MORE:
         return Change(level.change, moved_before, _LEFT_ALONG, min(falls))
-    # the errors of the steps are of second order: what twice as many take away is three times what they leave
+    # the errors of the steps are of second order: doubling the steps removes three times what it leaves
     counts = max(1.0, 3.0 / (more**2 - 1.0))
     damped, was_damped = (x.motion.rho == STRONGLY_DAMPED for x in (level, before))
     if damped and not was_damped:
@@ -86,23 +85,23 @@ def weighed(level: Level, before: Level, last: Change | None, first: bool = Fals
 
 
 def refined(level: Level, before: Level) -> str:
-    """Return in which direction a level has more than the one before: "space", "time", or "both"."""
+    """Return in which direction a level is finer than the one before: "space", "time", or "both"."""
     if level.motion.grid.n_u <= MORE * before.motion.grid.n_u:
         return "time"
     return "both" if level.motion.steps > MORE * before.motion.steps else "space"
 
 
 def untold(level: Level) -> dict[str, float]:
-    """Return what no other grid tells of a level, or too little, by the direction in which a finer one mends it [m].
+    """Return the errors of a level that other grids hardly show, by the direction that reduces them [m].
 
-    In time that is what its time spline misses, and its steps of trembling paths; in space how far ends whose direction
-    is held keep a stretched cable from where it would be.
+    In time they are the misfit of its time spline and the steps of trembling paths. In space it is how far ends whose
+    direction is held keep a stretched cable from its true position.
     """
     return {"space": level.held_back, "time": max(MISSED_COUNTS * level.missed, level.unseen)}
 
 
 def with_untold(parts: Mapping[str, float], level: Level) -> dict[str, float]:
-    """Return parts of an error [m], the last one larger where their sum is less than what is `untold`."""
+    """Return parts of an error [m]; the last one is raised if their sum is less than what is `untold`."""
     parts = dict(parts)
     parts[list(parts)[-1]] += max(0.0, max(untold(level).values()) - sum(parts.values()))
     return parts
@@ -112,8 +111,8 @@ class Changes:
     """How far refinements moved the surface, by direction: "space", "time", or "both" at once.
 
     Attributes:
-        last: what the last refinement in each direction did.
-        since: by direction, how far others have moved the surface at most since then [m].
+        last: the change of the last refinement in each direction.
+        since: by direction, how far other refinements have moved the surface since then, at most [m].
     """
 
     def __init__(self, last: Mapping[str, Change] | None = None) -> None:
@@ -121,10 +120,10 @@ class Changes:
         self.since: dict[str, float] = {}
 
     def note(self, direction: str, level: Level, before: Level) -> None:
-        """Note that a refinement in a direction took one level to the next.
+        """Record that a refinement in a direction led from one level to the next.
 
-        The first one in a direction alone is not yet on the way to a limit if it moves the surface by far more than the
-        last one in both did.
+        The first one in a single direction is not yet converging if it moves the surface far more than the last one in
+        both did.
         """
         last, both = self.last.get(direction), self.last.get("both")
         if last is None and both is not None and _RISES * both.moved < level.change:
@@ -134,7 +133,7 @@ class Changes:
 
     @property
     def error(self) -> float:
-        """The error [m] they point to: of the whole grid, or of both directions once both are known; else infinite."""
+        """The error [m] they indicate: of the whole grid, or of both directions once both are known; else infinite."""
         if self._apart:
             return sum(self.last[direction].error for direction in DIRECTIONS)
         return self.last["both"].error if "both" in self.last else np.inf
@@ -144,7 +143,7 @@ class Changes:
         return max(self.error, *untold(level).values())
 
     def parts(self, level: Level) -> dict[str, float] | None:
-        """Return the parts of that error [m], space and time as far as they are known apart, or None."""
+        """Return the parts of that error [m], space and time separate as far as they are known; None if unknown."""
         if not np.isfinite(self.error):
             return None
         known = DIRECTIONS if self._apart else ("both",)
@@ -152,14 +151,15 @@ class Changes:
         return with_untold(parts, level)
 
     def worst(self) -> str:
-        """Return the direction to refine: time, then space, then that which erred more."""
+        """Return the direction to refine: time first, then space, then the one with the larger error."""
         unknown = [direction for direction in ("time", "space") if direction not in self.last]
         return unknown[0] if unknown else max(DIRECTIONS, key=lambda direction: self.last[direction].error)
 
     def stale(self, target: float) -> list[str]:
-        """Return the directions whose last refinement tells little of the grid at hand.
+        """Return the directions whose last refinement says little about the current grid.
 
-        The others have since moved the surface by several times as much, and by more than the target [m].
+        Refinements in the other directions have since moved the surface by several times as much, and by more than the
+        target [m].
         """
         known = [direction for direction in DIRECTIONS if direction in self.last]
         return [d for d in known if self.since.get(d, 0.0) > max(_STALE * self.last[d].moved, target)]

@@ -1,4 +1,4 @@
-"""The march on another grid that the error on a given one is estimated with."""
+"""The comparison march on another grid, from which the error on a given grid is estimated."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -11,23 +11,23 @@ from dlocore.problem.time_grid import smallest_n_t
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 
 FINER = 1.5  # times n_u, n_t and the steps
-COARSER, FEWER = 0.75, 0.5  # times n_u and n_t, and the steps
-_SAFETY = 1.5  # times the distance to a finer march: what a slowly converging motion may be off beyond it
+COARSER, FEWER = 0.75, 0.5  # times n_u and n_t, and times the steps
+_SAFETY = 1.5  # times the distance to a finer march: a slowly converging motion may be off by more than that distance
 _LEFT = 0.75  # times the distance to a coarser march: benchmarks.estimate
-_LEFT_KINKED = 1.0  # the same of a `kinked` march
-_ROOM = 0.8  # of n_u and n_t: a march on more is not coarser
+_LEFT_KINKED = 1.0  # the same for a `kinked` march
+_ROOM = 0.8  # of n_u and n_t: a march with more than this does not count as coarser
 TOO_LATE = "The time limit passed before its error was estimated."
 UNKNOWN = "Its error is not known"
 
 
 class Compared(NamedTuple):
-    """What a march on another grid tells of the error of one.
+    """The error of a march on one grid, from a march on another.
 
     Attributes:
-        estimate: the estimated error [m], None where there is none.
+        estimate: the estimated error [m]; None if there is none.
         doubt: why there is none, in words.
         turned: largest angle between the sections of the two [rad].
-        beside: that level, none where there is no estimate.
+        beside: the other level; empty if there is no estimate.
     """
 
     estimate: float | None
@@ -36,26 +36,26 @@ class Compared(NamedTuple):
     beside: tuple[Level, ...] = ()
 
     def on(self, level: Level) -> Level:
-        """Return a level with what it was compared with."""
+        """Return a level together with what it was compared with."""
         return replace(level, turned=self.turned, beside=self.beside) if self.beside else level
 
 
 def coarser(problem: Problem, size: Size) -> Size | None:
-    """Return the size of the march that the error of one on a given grid is estimated with, None where it is finer."""
+    """Return the size of the march from which the error on a given grid is estimated; None if it is not coarser."""
     other = _resized(problem, size, COARSER, FEWER)
     return other if other.n_u <= _ROOM * size.n_u and other.n_t <= _ROOM * size.n_t else None
 
 
 def finer(problem: Problem, size: Size) -> Size:
-    """Return the size of a grid half as fine again."""
+    """Return the size of a grid that is finer by a factor of 1.5."""
     return _resized(problem, size, FINER, FINER)
 
 
 def by_coarser(problem: Problem, level: Level, monitor: Monitor) -> Compared:
     """Return the estimated error of a march on a given grid.
 
-    It is a share of the distance to a march on a coarser grid, which takes less than half of its time. Where the grid
-    has no room for one, or it fails, a finer one takes its place.
+    It is a share of the distance to a march on a coarser grid, which takes less than half the time. If no coarser grid
+    is possible, or its march fails, a finer one is used.
     """
     size = coarser(problem, level.size)
     if size is not None:
@@ -71,7 +71,7 @@ def by_coarser(problem: Problem, level: Level, monitor: Monitor) -> Compared:
 def by_finer(problem: Problem, level: Level, monitor: Monitor) -> Compared:
     """Return the estimated error of a solution on a given grid.
 
-    It is the distance to a march on a grid half as fine again, with a margin.
+    It is the distance to a march on a grid finer by a factor of 1.5, with a margin.
     """
     other, said = _marched(problem, finer(problem, level.size), level, monitor)
     if other is None:
@@ -82,20 +82,20 @@ def by_finer(problem: Problem, level: Level, monitor: Monitor) -> Compared:
 
 
 def _compared(share: float, level: Level, other: Level, problem: Problem) -> Compared:
-    """Return the estimate that is a share of the distance to another march."""
+    """Return the estimate as a share of the distance to another march."""
     apart = share * distance(level, other, problem)
     return Compared(apart, turned=turned(level, other, problem), beside=(other,))
 
 
 def _resized(problem: Problem, size: Size, points: float, steps: float) -> Size:
-    """Return so many times the control points, but as many as the problem needs, and so many times the steps."""
+    """Return a size with scaled control points, but at least as many as the problem needs, and scaled steps."""
     n_u = max(smallest_n_u(problem), round(points * size.n_u))
     n_t = max(smallest_n_t(problem), round(points * size.n_t))
     return Size(n_u, n_t, round(steps * size.steps))
 
 
 def _marched(problem: Problem, size: Size, level: Level, monitor: Monitor) -> tuple[Level | None, str]:
-    """March on another grid than a level; None, and why, where that is of no use or the time is up."""
+    """March on another grid than a level; return None and the reason if that is of no use or the time is up."""
     if level.motion.stopped:
         return None, ""
     try:

@@ -1,4 +1,4 @@
-"""What a solve costs in time, as a function of its grid, fitted to measured solves."""
+"""The time of a solve as a function of its grid, fitted to measured solves."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,11 +11,10 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Rates:
-    """Times that add up to that of a solve, for one number of coordinates.
+    """The times that add up to the time of a solve, for one number of coordinates.
 
-    A march takes `setup` + steps (`step` + `step_point` n_u); each iteration of the least squares takes `iteration` +
-    n_t n_u (`block` + `block_1` n_u + `block_2` n_u^2) more: the factors of a band grow with n_u^3, its other work with
-    less.
+    A march takes `setup` + steps (`step` + `step_point` n_u). Each iteration of the least squares adds `iteration` +
+    n_t n_u (`block` + `block_1` n_u + `block_2` n_u^2): factorising a band grows with n_u^3, other work with less.
 
     Attributes:
         setup: knots, tables and the start [s].
@@ -47,12 +46,12 @@ class Rates:
 
 @dataclass(frozen=True, kw_only=True)
 class Cost:
-    """A model of the time that a solve takes on one machine.
+    """A model of the time of a solve on one machine.
 
     Attributes:
         rates: by number of coordinates: 2 in the plane, 3 in space, 4 in space with twist.
-        effects: by effect, how many times as long a march takes with it.
-        estimates: by method, how many times as long a solve takes with an error estimate.
+        effects: by effect, the factor by which it lengthens a march.
+        estimates: by method, the factor by which an error estimate lengthens a solve.
         deviation: by method, the typical factor between the model and a measured time, at least 1.
     """
 
@@ -72,7 +71,7 @@ class Cost:
         effects: Sequence[str] = (),
         estimate: bool = True,
     ) -> float:
-        """Return about how long a solve on one grid takes [s].
+        """Return the approximate time of a solve on one grid [s].
 
         Args:
             method: "march" or "spacetime".
@@ -81,7 +80,7 @@ class Cost:
             steps: time steps of the march.
             coordinates: of a control point, 2 to 4.
             effects: the active ones.
-            estimate: whether the error is estimated, too.
+            estimate: whether the error is estimated too.
         """
         rates = self.rates[coordinates]
         total = rates.march(n_u, steps)
@@ -105,10 +104,10 @@ class Sample:
 
 
 def fitted_rates(samples: Sequence[Sample]) -> dict[int, Rates]:
-    """Return the rates that fit measured solves best, by number of coordinates.
+    """Return the rates that best fit measured solves, by number of coordinates.
 
-    No part of a time is negative; the relative errors of all times count the same, so that short solves are met as well
-    as long ones.
+    No part of a time is negative. Relative errors of all times count the same, so short solves are fitted as well as
+    long ones.
     """
     found: dict[int, Rates] = {}
     for coordinates in sorted({s.coordinates for s in samples}):
@@ -137,8 +136,8 @@ def fitted_rates(samples: Sequence[Sample]) -> dict[int, Rates]:
 
 
 def _nonnegative(rows: ArrayLike, times: ArrayLike) -> list[float]:
-    """Return the non-negative factors (k,) of rows (m, k) that meet times (m,) with the least relative errors."""
-    from scipy.optimize import nnls  # slow to import, and a prediction needs none
+    """Return the non-negative factors (k,) of rows (m, k) that fit times (m,) with the least relative errors."""
+    from scipy.optimize import nnls  # slow to import, and not needed for a prediction
 
     matrix = np.asarray(rows, float) / np.asarray(times, float)[:, None]
     scale = np.abs(matrix).max(axis=0)
@@ -147,15 +146,15 @@ def _nonnegative(rows: ArrayLike, times: ArrayLike) -> list[float]:
 
 
 def exponent(sizes: ArrayLike, times: ArrayLike) -> tuple[float, float]:
-    """Return (p, c) of the power law c size^p [s] that fits measured times best, by logarithms."""
+    """Return (p, c) of the power law c size^p [s] that best fits measured times, in logarithms."""
     p, log_c = np.polyfit(np.log(np.asarray(sizes, float)), np.log(np.asarray(times, float)), 1)
     return float(p), float(np.exp(log_c))
 
 
 def pareto_front(times: ArrayLike, errors: ArrayLike) -> list[int]:
-    """Return the indices of the points of which no other is both faster and more accurate, fastest first.
+    """Return the indices of the points that no other point beats in both time and accuracy, fastest first.
 
-    Points without a finite error are on no front.
+    Points without a finite error are left out.
     """
     time, error = np.asarray(times, float), np.asarray(errors, float)
     front: list[int] = []

@@ -1,4 +1,4 @@
-"""What is unsure of a motion on whose grid others agree: it may hang on its start, or on how stiff contact is."""
+"""Doubts about a motion on whose grid others agree: it may depend on its exact start or on the contact stiffness."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,14 +18,14 @@ ALLOW = "Allow a larger target_error, more time or a shorter motion."
 
 @dataclass
 class Doubts:
-    """What is unsure of the last level that was looked at.
+    """What is uncertain about the last level that was examined.
 
     Attributes:
-        start: how far a start that is hardly another goes elsewhere [m], 0 where that does not matter.
-        contact: how far contact that is stiffer takes it elsewhere, alike [m].
-        lost: whether a start goes so far that its scene does not determine the motion.
-        looked: the level that was looked at.
-        unseen: whether no time was left to look at the newest one; then what the one before says counts.
+        start: how far a tiny change of the start moves the motion [m]; 0 if that does not matter.
+        contact: how far stiffer contact moves it [m]; 0 if that does not matter.
+        lost: whether a start changes the motion so much that the scene does not determine it.
+        looked: the level that was examined.
+        unseen: whether there was no time to examine the newest one; then the result of the one before counts.
     """
 
     start: float = 0.0
@@ -35,7 +35,7 @@ class Doubts:
     unseen: bool = False
 
     def look(self, level: Level, monitor: Monitor, hard: bool) -> None:
-        """Find what is unsure of a level; `hard` as in `goes_astray`.
+        """Find what is uncertain about a level; `hard` as in `goes_astray`.
 
         Raises:
             Cancelled: the caller asked to stop.
@@ -46,7 +46,7 @@ class Doubts:
         length = problem.scene.cable.length
         try:
             moved = goes_astray(problem, motion, monitor, hard)
-            if moved > 0.0 and turns_unsurely(level):  # coarse steps damp what turns sections over, and how it grows
+            if moved > 0.0 and turns_unsurely(level):  # coarse steps damp the turning over of sections, and its growth
                 slower = march(problem, motion.grid, 2 * motion.asked, monitor, rho=motion.rho, whole=True)
                 moved = max(moved, goes_astray(problem, slower, monitor, hard))
             moved = max(moved, settles_elsewhere(problem, motion.grid, monitor))
@@ -59,11 +59,11 @@ class Doubts:
         self.lost, self.looked, self.unseen = lost, level, False
 
     def undermines(self, estimate: float, enough: float) -> bool:
-        """Tell whether a motion whose estimated error [m] would be enough [m] may go elsewhere by too much."""
+        """Tell whether a motion whose estimated error [m] would be good enough [m] may still differ by too much."""
         return self._loses(self.start + self.contact, estimate, enough)
 
     def status(self, status: Status, advice: str, estimate: float, enough: float) -> tuple[Status, str]:
-        """Return the status and the advice of an answer, which is no success where this undermines it."""
+        """Return the status and advice of an answer, which is not converged if these doubts undermine it."""
         if self._loses(self.start, estimate, enough) or self.contact > enough:
             return "stalled", " Make the motion slower, damp it, or hold the cable in more places."
         return ("max_iterations", f" {ALLOW}") if self.undermines(estimate, enough) else (status, advice)
@@ -71,7 +71,7 @@ class Doubts:
     def told(
         self, message: str, parts: Mapping[str, float] | None, problem: Problem, estimate: float, enough: float
     ) -> tuple[str, dict[str, float] | None]:
-        """Return a message and the parts of the error [m], with what is unsure."""
+        """Return a message and the parts of the error [m], including what is uncertain."""
         parts, said = dict(parts or {}), []
         if self.start:
             parts["start"] = self.start

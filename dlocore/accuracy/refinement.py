@@ -1,4 +1,4 @@
-"""Marches refined until two of them agree: the whole grid first, then the direction that still errs."""
+"""Marches refined until two of them agree: first the whole grid, then the direction with the larger error."""
 
 from dataclasses import dataclass, field, replace
 
@@ -31,34 +31,37 @@ from dlocore.solvers.timefit import MISSED_COUNTS
 from dlocore.statics.statics import RESTLESS
 from dlocore.words import in_mm, in_ms
 
-AUTO_ENOUGH = 1e-2  # of the length: the estimated error with which it is content where the finest grids reach no closer
-ROUGH = 0.05  # of the length: two grids that differ more are in no order yet: the next is marched with strong damping
+AUTO_ENOUGH = 1e-2  # of the length: the estimated error that quality "auto" accepts if the finest grids get no closer
+ROUGH = 0.05  # of the length: grids that differ more are not in order yet: the next is marched with strong damping
 _FINER = {"space": 1.5, "time": 2.0}
-_FINE_IN_TIME = 0.3  # of the target: a time spline that misses its march by less keeps its knots as the steps halve
-_AT_BEST = 0.2  # of an error, is left by one refinement: what is still too much after all of them is not begun
-_EVENED = 3  # refinements in space, at most, of a grid that agrees with the one before on strain within a span
-_TEARS = 0.5  # axial strain that no finer grid is expected to take back, where ...
-_TORN = 3  # ... so many in a row have it
+_FINE_IN_TIME = 0.3  # of the target: a time spline that misses its march by less keeps its knots as steps halve
+_AT_BEST = 0.2  # of an error is left by one refinement, at best: if that is too much after all of them, none is begun
+_EVENED = 3  # refinements in space, at most, of a grid that agrees with the one before about strain within a span
+_TEARS = 0.5  # axial strain that no finer grid is expected to remove, once ...
+_TORN = 3  # ... this many in a row have it
 _FAILURES = 2  # refinements in time of a march that found no equilibrium
 
 
 def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | None = None) -> Outcome:
-    """March on finer and finer grids until two agree within the target, or the time budget is used.
+    """March on finer and finer grids until two agree within the target, or the time budget is used up.
 
-    The first few refine space and time together, which is what most motions need. What is left errs mostly in one of
-    them: a cable that is let go vibrates faster than it is curved, a loop that tightens is curved more than it is fast.
-    So from there on each grid is finer in one direction, that whose last refinement moved the surface most, and the
-    error is the sum of both. A cable that folds between its control points gets more of them, whatever grids agree on.
-    The error is at least what the time spline misses of its march: a cable that trembles faster than two grids can show
-    looks alike on both. A motion that its scene does not determine is none to agree on: where two grids say so in turn
-    that is the answer. A march that finds no equilibrium is tried with more steps before it is given up, and one whose
-    motion tears the cable on grid after grid ends there. Within a time budget the first grid is the one that what
-    solves cost on this machine allows. Who gives a time, as a budget or a deadline, is given more grids within it than
-    who doesn't, who would wait for minutes.
+    The first few refine space and time together, which is all that most motions need. The remaining error is mostly in
+    one of the two: a released cable vibrates faster than it is curved, a tightening loop is curved more than it is
+    fast. So from then on each grid is finer in one direction, that whose last refinement moved the surface most, and
+    the error is the sum of both.
 
-    A target that was asked for has to be met. Quality "auto" aims at AUTO_TARGET with a share of that work, and where
-    it reaches no closer with it, an estimate of AUTO_ENOUGH is success, for which it does all of the work that a target
-    is worth; the message says how far the grids agree.
+    - A cable that folds between its control points gets more of them, whatever grids agree on.
+    - The error is at least the misfit of the time spline to its march: a cable that trembles faster than two grids can
+      show looks alike on both.
+    - If two grids in turn say that the scene does not determine the motion, that is the answer.
+    - A march that finds no equilibrium is tried with more steps before it is given up. The refinement ends if the
+      motion tears the cable on grid after grid.
+    - With a time budget, the first grid is chosen by the cost of solves on this machine. With a budget or a deadline,
+      more grids are allowed within it than without, when a caller would wait for minutes.
+
+    A requested target has to be met. Quality "auto" aims at AUTO_TARGET with a share of the work that a target is
+    worth. If it gets no closer with that, an estimate of AUTO_ENOUGH counts as converged, and all of the work is
+    allowed to reach it. The message says how far the grids agree.
     """
     length = problem.scene.cable.length
     budget = quality.time_budget
@@ -73,24 +76,24 @@ def climb(problem: Problem, quality: Quality, monitor: Monitor, cost: Cost | Non
 
 @dataclass(kw_only=True)
 class _Climb:
-    """One climb, and how far it has come.
+    """One refinement and its progress.
 
     Attributes:
         problem: what is solved now; motions may call for more effects.
         means: what it may spend.
-        target: error that is aimed at [m].
-        enough: estimated error that is success where no finer grid is left [m].
-        number: of the grids that refine space and time together, this one included.
-        direction: in which the grid at hand is meant to be finer than the best one: "both", "space" or "time".
-        best: the finest march so far that is to be believed.
+        target: the error aimed at [m].
+        enough: the estimated error that is accepted if no finer grid is left [m].
+        number: how many grids have refined space and time together, including this one.
+        direction: in which the current grid is meant to be finer than the best one: "both", "space" or "time".
+        best: the finest march so far that is credible.
         changes: how far refinements moved the surface.
-        estimate: error of the best one [m].
+        estimate: error of the best march [m].
         rho: spectral radius of the next march.
-        failures: marches in a row that found less than the best one, or no equilibrium as that.
-        doubts: what is unsure of the last grid that agreed, as others would agree on it, too.
+        failures: marches in a row that were worse than the best one or found no equilibrium where it did.
+        doubts: what is uncertain about the last grid that agreed, since other grids would agree on it too.
         torn: marches in a row that strained the cable by more than `_TEARS`.
-        evened: how often more control points were taken as the cable was strained between the points that watch it.
-        wanting: effects that a finer grid called for, and that no time was left to march with, in words.
+        evened: how often control points were added because the cable was strained between the points that watch it.
+        wanting: effects that a finer grid called for but that there was no time to march with, in words.
     """
 
     problem: Problem
@@ -111,7 +114,7 @@ class _Climb:
 
     @property
     def monitor(self) -> Monitor:
-        """That of the solve."""
+        """The monitor of the solve."""
         return self.means.monitor
 
     @property
@@ -122,7 +125,7 @@ class _Climb:
     def outcome(self) -> Outcome:
         """March until an answer is found, and return it."""
         size: Size | None = stretched(self.problem, self.number)
-        shown: Level | None = None  # the best one on grids whose start rests, where on finer ones it does not
+        shown: Level | None = None  # the best march on grids whose start came to rest, if it does not on finer ones
         while size is not None:
             began, marches = self.monitor.elapsed(), len(self.monitor.iterations)
             try:
@@ -140,12 +143,12 @@ class _Climb:
                     if shown is None:
                         raise
                     return self._restless(shown, error)
-                # a start that finds no rest on few control points may do so on more; one that did on fewer still was at
-                # rest as they can't bend the way that it would go
+                # a start that finds no rest on few control points may do so on more; one that did on
+                # still fewer was at rest only because they can't bend the way it would go
                 self._forget()
                 size = stretched(self.problem, self.number)
                 continue
-            others = self.monitor.iterations[marches:]  # of the grid, which called for another effect
+            others = self.monitor.iterations[marches:]  # marches of this grid that called for another effect
             spent = self.monitor.elapsed() - (others[-1].wall_time if others else began)
             self.means.took(self.problem, size, spent)
             if self.best is not None:
@@ -189,7 +192,7 @@ class _Climb:
                 finer = self._next(level, size, unfolds)
                 if finer is None and status == "converged" and self.estimate <= self.enough:
                     self._look(level)
-                    # what contact leaves unsure has to be made up for by the grid
+                    # the grid has to make up for the uncertainty of contact
                     finer = self._next(level, size, unfolds) if self.doubts.contact and not self.doubts.start else None
             checked = bool(np.isfinite(level.change))
             if finer is not None and not self.means.next_fits(self.problem, size, finer, spent, checked):
@@ -198,14 +201,14 @@ class _Climb:
         return self._ended()
 
     def _march(self, size: Size) -> Level:
-        """March on the next grid; where its motion calls for another effect, forget the grids before."""
+        """March on the next grid; if its motion calls for another effect, forget the previous grids."""
         before = self.best
         if before is not None:
             self.monitor.end_within(self.means.budget)
             self.monitor.check()
         rho = self.rho
         if before is not None and size.steps == before.size.steps and before.motion.rho == STRONGLY_DAMPED:
-            rho = STRONGLY_DAMPED  # without, the same steps went astray
+            rho = STRONGLY_DAMPED  # without it, the same steps went astray
         level = march_level(
             self.problem, size, self.monitor, rho, free_knots=True, rough=True, before=before, whole=before is not None
         )
@@ -213,22 +216,22 @@ class _Climb:
             change = distance(before, level, self.problem)
             beside = (before.alone, *(() if self._refined(level, before) == "both" else before.beside[:1]))
             level = replace(level, change=change, turned=turned(before, level, self.problem), beside=beside)
-            if not self._is_rough(level):  # so strands do not meet because of the grid
+            if not self._is_rough(level):  # so strands do not meet just because of the grid
                 level = march_level(self.problem, size, self.monitor, rho, free_knots=True, known=level, whole=True)
         if level.posed is not self.problem:
-            self._forget()  # another motion
+            self._forget()  # a different motion
         self.problem = level.posed  # a rough grid may have needed contact that is too stiff for a fine one
         return level
 
     def _refined(self, level: Level, best: Level) -> str:
-        """Return in which direction a grid is finer than the best one, as it turned out.
+        """Return in which direction a grid turned out to be finer than the best one.
 
-        Where one had to have more control points than were meant, so as to be believed, the next may have no more.
+        If a grid needed more control points than planned to be credible, the next one may have no more than it.
         """
         return refined(level, best) if self.direction == "both" else self.direction
 
     def _forget(self) -> None:
-        """Forget the grids before."""
+        """Forget the previous grids."""
         self.best, self.changes, self.estimate = None, Changes(), np.inf
         self.evened, self.torn, self.doubts = 0, 0, Doubts()
 
@@ -236,7 +239,7 @@ class _Climb:
         return not level.change <= ROUGH * self.problem.scene.cable.length
 
     def _after_failure(self, level: Level, best: Level, size: Size) -> Size | None:
-        """Return the size to try where a finer grid failed, None where it did not, or was tried often enough."""
+        """Return the size to try if a finer grid failed; None if it did not, or if enough were tried."""
         if not _is_worse(level, best):
             return None
         self.failures += 1
@@ -245,8 +248,8 @@ class _Climb:
         return self._affordable(_finer(size, "space" if is_folded(best) else "time", True))
 
     def _weigh(self, level: Level, best: Level) -> None:
-        """Note how far a level moved the surface, what error that points to, and how to damp the next march."""
-        if best.motion.stopped:  # its surface stands still from there on: how far that is from another tells nothing
+        """Record how far a level moved the surface, the error that indicates, and how to damp the next march."""
+        if best.motion.stopped:  # its surface stands still from there on, so its distance to another says nothing
             self.changes, self.estimate = Changes(), np.inf
             return
         self.changes.note(self._refined(level, best), level, best)
@@ -256,9 +259,9 @@ class _Climb:
             self.rho = STRONGLY_DAMPED if rough else RHO  # later on two marches would differ by their damping
 
     def _once_more(self, size: Size) -> Size | None:
-        """Return the next size in a direction whose last refinement tells little of the grid at hand, or None.
+        """Return the next size in a direction whose last refinement says little about this grid; None if there is none.
 
-        On coarse steps, which damp what they can't resolve, more control points may move the surface by far less.
+        On coarse steps, which damp what they can't resolve, more control points may move the surface far less.
         """
         for direction in self.changes.stale(self.target):
             finer = self._affordable(_finer(size, direction, False))
@@ -268,9 +271,9 @@ class _Climb:
         return None
 
     def _look_back(self, level: Level, size: Size) -> None:
-        """Where nothing is known of what steps err by, and twice as many are dear, learn it from half as many.
+        """Find the error of the steps from half as many, if it is unknown and twice as many are expensive.
 
-        So it is where a motion calls for another effect on a fine grid: the grids before tell nothing of it.
+        This happens if a motion calls for another effect on a fine grid: the previous grids then say nothing about it.
         """
         known = "both" in self.changes.last or "time" in self.changes.last
         if known or self.number < len(LEVELS) - 1 or level.motion.stopped or is_folded(level):
@@ -293,7 +296,7 @@ class _Climb:
         self.estimate = self.changes.estimate(level)
 
     def _next(self, level: Level, size: Size, unfolds: Size | None) -> Size | None:
-        """Return the next size, None where no finer grid is worth its time; `unfolds` is for a motion that folds."""
+        """Return the next size, None if no finer grid is worth its time; `unfolds` is for a motion that folds."""
         self.number += 1
         while self.number < len(LEVELS):
             finer = stretched(self.problem, self.number)
@@ -303,11 +306,11 @@ class _Climb:
         if unfolds is not None:
             longer = self._affordable(_finer(size, "time", False))
             if longer is not None and self.changes.worst() == "time" and "space" in self.changes.last:
-                # where grids had to have more points than were meant, what steps err by is not known, or is more
+                # if grids needed more points than planned, the error of the steps is unknown or larger
                 self.direction = "time"
                 return longer
             self.direction = "space"
-            if "both" in self.changes.last:  # of space, grids that agree on a fold tell nothing
+            if "both" in self.changes.last:  # grids that agree on a fold say nothing about space
                 self.changes.last.setdefault("time", self.changes.last["both"])
             return unfolds
         trembles = MISSED_COUNTS * level.missed > _FINE_IN_TIME * self.target
@@ -320,13 +323,13 @@ class _Climb:
             # may still bring the sum of both below it
             self.direction = next(direction for direction in DIRECTIONS if direction != self.direction)
         if self.direction == "time" and self.problem.self_contact is None:
-            # on the same steps strongly damped marches err by far more; but strands that strike each other rebound less
+            # on the same steps strongly damped marches err far more; but strands that strike each other rebound less
             self.rho = RHO
         hope = _AT_BEST ** self._left(sizes[self.direction])
         return None if change is not None and hope * change.moved > self.enough else sizes[self.direction]
 
     def _affordable(self, size: Size) -> Size | None:
-        """Return a size, or None where a march of it takes too long."""
+        """Return a size, or None if its march takes too long."""
         success = self.best is None or not is_folded(self.best)
         content = self.enough > self.target and self.estimate + self.doubts.contact <= self.enough and success
         return self.means.affordable(self.problem, size, content)
@@ -340,7 +343,7 @@ class _Climb:
         return count
 
     def _look(self, level: Level) -> None:
-        """Find what is unsure of a level, in the time that is left."""
+        """Find what is uncertain about a level, in the time left."""
         monitor = self.monitor.within(self.means.left) if self._timed else self.monitor
         try:
             self.doubts.look(level, monitor, self.number >= len(LEVELS))
@@ -349,20 +352,20 @@ class _Climb:
 
     @property
     def _undermined(self) -> bool:
-        """Whether start or contact may take a motion so far elsewhere that no grid tells of it what was asked for."""
+        """Whether start or contact may change the motion so much that no grid can give the requested accuracy."""
         return self.doubts.undermines(self.estimate, self.enough)
 
     def _agreeing(self, level: Level) -> Outcome:
         return self._answer(level, "converged", self._agreed(level))
 
     def _answer(self, level: Level, status: Status, message: str, advice: str = "") -> Outcome:
-        """Return an answer, which is no success where its start or contact may take it astray."""
+        """Return an answer; it is not converged if its start or contact may lead it astray."""
         message, parts = self._told(level, message)
         status, advice = self.doubts.status(status, advice, self.estimate, self.enough)
         return Outcome(level, status, message + advice, parts)
 
     def _told(self, level: Level, message: str) -> tuple[str, dict[str, float] | None]:
-        """Return a message and the parts of the error [m], with how far start and contact may take a motion."""
+        """Return a message and the parts of the error [m], with how far start and contact may change the motion."""
         return self.doubts.told(message, self.changes.parts(level), self.problem, self.estimate, self.enough)
 
     def _agreed(self, level: Level) -> str:
@@ -370,7 +373,7 @@ class _Climb:
 
     @property
     def _in_all(self) -> float:
-        """The estimated error of the best one, with the effects that are left out [m]."""
+        """The estimated error of the best march, including neglected effects [m]."""
         return self.estimate + (0.0 if self.best is None else neglected(self.best))
 
     def _left_over(self) -> str:
@@ -380,9 +383,9 @@ class _Climb:
         return f"{known}, target {in_mm(self.target, 3)}"
 
     def _unfolded(self, level: Level, size: Size) -> Outcome | None:
-        """Return the answer of a march that watches over the length at more points, if a fold is all that is amiss.
+        """Return the answer of a march that watches the length at more points, if a fold is the only problem.
 
-        A tip far shorter than a span, beyond a grasp, may fold straight back on any grid: nothing else moves by that.
+        A tip far shorter than a span, beyond a grasp, may fold straight back on any grid; this moves nothing else.
         """
         if not (is_folded(level) and self.estimate <= ACCEPT * self.target and not self._timed):
             return None
@@ -405,10 +408,10 @@ class _Climb:
         return Outcome(other, "converged", self._agreed(other), parts)
 
     def _within_budget(self, level: Level) -> Outcome:
-        """Return the best that the budget allows; it is a success where its error is known, and is what is enough."""
+        """Return the best answer within the budget; it counts as converged if its error is known and small enough."""
         allowed = in_ms(self.means.budget)
         if not np.isfinite(level.change):
-            return Outcome(level, "time_limit", f"{allowed} allow one grid, unchecked.", None)
+            return Outcome(level, "time_limit", f"{allowed} allowed only one grid, so its error is not checked.", None)
         status, failure = march_status(self.problem, level)
         moved = f"The best grid in {allowed}; the last refinement moved the surface by {in_mm(level.change)}."
         self._look(level)
@@ -421,7 +424,7 @@ class _Climb:
         return Outcome(level, status, message, parts)
 
     def _unfinished(self, level: Level, best: Level) -> Outcome:
-        """Return the best one, where a finer grid was not finished."""
+        """Return the best march, when a finer grid was not finished."""
         if self.estimate <= self.enough:
             return self._ended()
         status, message = march_status(self.problem, level)
@@ -429,11 +432,11 @@ class _Climb:
         return Outcome(best, status, f"A finer grid was not finished: {message}", errors)
 
     def _restless(self, best: Level, error: SceneError) -> Outcome:
-        """Return the best one, where the start on finer grids finds no rest, so that its error is not known."""
+        """Return the best march, when the start finds no rest on finer grids, so that its error is unknown."""
         return Outcome(best, "stalled", f"On finer grids the start did not come to rest: {error}", None)
 
     def _ended(self) -> Outcome:
-        """Return the best one, where no finer grid is to be tried or the time is up."""
+        """Return the best march, when no finer grid is left to try or the time is up."""
         best = self.best
         assert best is not None
         if self.wanting:
@@ -455,13 +458,13 @@ class _Climb:
             if not self.doubts.start:
                 self._look(best)
             finest = f"{best.motion.grid.n_u} control points along the cable and {best.motion.steps} steps"
-            spent = f"From {finest} on no finer grid is expected to reach the target in what may be spent"
+            spent = f"No grid finer than {finest} is expected to reach the target within the work allowed"
             return self._answer(best, "max_iterations", f"{spent}; {left}.", f" {ALLOW}")
         return Outcome(best, status, message, self.changes.parts(best))
 
 
 def _is_worse(level: Level, best: Level) -> bool:
-    """Tell whether a finer grid failed, or strained the cable beyond belief, and the one before by far less."""
+    """Tell whether a finer grid failed or strained the cable beyond belief, and the one before far less."""
     torn = level.motion.largest_strain > credible_after(best)
     failed = bool(level.motion.stopped) and not best.motion.stopped
     stalled = march_status(level.problem, level)[0] != "converged" == march_status(best.problem, best)[0]
@@ -469,7 +472,7 @@ def _is_worse(level: Level, best: Level) -> bool:
 
 
 def _finer(size: Size, direction: str, trembles: bool) -> Size:
-    """Return the next size in a direction; more time knots go with more steps only where the motion `trembles`."""
+    """Return the next size in a direction; time knots are added with the steps only if the motion `trembles`."""
     ratio = _FINER[direction]
     if direction == "space":
         return size._replace(n_u=round(ratio * size.n_u))

@@ -1,1 +1,1 @@
-"""One march on one grid, with all the effects that its motion calls for, and what is to be said of it."""
+"""One march on one grid, with all the effects that its motion calls for, and the messages about it."""

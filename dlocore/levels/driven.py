@@ -1,7 +1,7 @@
-"""What no cable can follow and only its motion tells: grippers that close beside it, or drive it into something.
+"""Motions that no cable can follow and that only the solve reveals: grippers that close beside it or drive it in.
 
-Grasps that hold from the beginning are looked at before anything is solved (`problem/checks.py`). One that closes
-later has its path begin where the cable is by then, and whether two strands meet is not known beforehand.
+Grasps that hold from the beginning are checked before anything is solved (`problem/checks.py`). The path of a grasp
+that closes later begins where the cable is by then, and whether two strands meet is not known beforehand.
 """
 
 import math
@@ -27,7 +27,7 @@ from dlocore.words import in_mm
 
 Floats = NDArray[np.float64]
 
-_LOOKS = 129  # times at which a path is looked at, while it is held
+_LOOKS = 129  # times at which a path is checked while it is held
 
 
 class Driven(NamedTuple):
@@ -35,7 +35,7 @@ class Driven(NamedTuple):
 
     Attributes:
         grasp: its index.
-        into: what, as a part of a sentence.
+        into: what it drives it into, as part of a sentence.
         time: when it is deepest [s].
         depth: [m].
     """
@@ -47,10 +47,10 @@ class Driven(NamedTuple):
 
 
 def driven(problem: Problem, motion: March) -> Driven | None:
-    """Return where a gripper drives the point that it holds into something by more than TOO_DEEP, deepest, or None.
+    """Return where a gripper drives its grasped point into something by more than TOO_DEEP, the deepest case, or None.
 
-    That is an obstacle, the table, or another held point of the cable, which is within a diameter. Paths are looked at
-    to their end, from where the motion has the point as the gripper closes: the motion itself may have ended before.
+    That may be an obstacle, the table, or another held point of the cable within a diameter. Paths are checked to their
+    end, from where the point is in the motion when the gripper closes; the motion itself may have ended before.
     """
     scene = problem.scene
     late = any(g.start > 0.0 for g in scene.grasps) and problem.contact is not None
@@ -64,14 +64,14 @@ def driven(problem: Problem, motion: March) -> Driven | None:
 
 
 def closes_beside(problem: Problem, motion: March) -> str:
-    """Return in words that a gripper closes beside the cable, see `beside`, or ""."""
+    """Return a message if a gripper closes beside the cable, see `beside`; else ""."""
     return beside(problem.scene, partial(_begin, problem, motion))
 
 
 def beside(scene: Scene, place: Callable[[Grasp], Floats | None]) -> str:
-    """Return in words that a gripper with waypoints closes beside the cable, farther off than the start may be, or "".
+    """Return a message if a gripper with waypoints closes beside the cable, farther off than is allowed; else "".
 
-    `place` returns where the cable is as a grasp closes (3,) [m], None where that is not known.
+    `place` returns where the cable is when a grasp closes (3,) [m]; None if that is not known.
     """
     for k, grasp in enumerate(scene.grasps):
         if not (isinstance(grasp.path, Waypoints) and 0.0 < grasp.start < cast(float, scene.horizon)):
@@ -81,21 +81,21 @@ def beside(scene: Scene, place: Callable[[Grasp], Floats | None]) -> str:
             there = ", ".join(f"{x:.4g}" for x in begin)
             return (
                 f"primitives[{k}].path.positions[0] is {in_mm(away)} from the cable at u = {grasp.u:g} m, which is at "
-                f"({there}) m as the gripper closes there, at {grasp.start:.4g} s. Allowed: {in_mm(GRASP_TOLERANCE)}."
+                f"({there}) m when the gripper closes there, at {grasp.start:.4g} s. Allowed: {in_mm(GRASP_TOLERANCE)}."
             )
     return ""
 
 
 def words(problem: Problem, found: Driven) -> str:
-    """Return in words where a gripper drives what it holds."""
+    """Return a message about where a gripper drives what it holds."""
     share = found.depth / problem.scene.cable.diameter
     point = f"primitives[{found.grasp}] drives the point that it holds {share:.0%} of the cable's diameter"
-    where = f"{point} into {found.into} at {found.time:.3g} s, which no cable follows."
-    return f"{where} Its path begins where the cable is as it closes: end it elsewhere, or close it at another time."
+    where = f"{point} into {found.into} at {found.time:.3g} s, which no cable can follow."
+    return f"{where} Its path begins where the cable then is: end the path elsewhere, or close at another time."
 
 
 def _begin(problem: Problem, motion: March, grasp: Grasp) -> Floats | None:
-    """Return where the path of a grasp begins (3,) [m], None where the motion has not come so far."""
+    """Return where the path of a grasp begins (3,) [m]; None if the motion did not get that far."""
     if grasp.start == 0.0:
         return problem.start.place(grasp.u)[0]
     k = int(np.searchsorted(motion.times, grasp.start * (1 - 1e-12)))
@@ -107,7 +107,7 @@ def _begin(problem: Problem, motion: March, grasp: Grasp) -> Floats | None:
 
 
 def _held(scene: Scene, grasps: list[Grasp]) -> Floats:
-    """Return times at which all of some grasps hold [s], none where they never do."""
+    """Return times at which all of the given grasps hold [s]; empty if they never do."""
     begin = max(g.start for g in grasps)
     end = min(cast(float, scene.horizon), *(g.release_time or np.inf for g in grasps))
     if not begin < end:
@@ -117,7 +117,7 @@ def _held(scene: Scene, grasps: list[Grasp]) -> Floats:
 
 
 def _into_surroundings(problem: Problem, begins: list[Floats | None]) -> Iterator[Driven]:
-    """Return how deep each grasp that closes late goes into each obstacle, and into the table."""
+    """Yield how deep each grasp that closes late goes into each obstacle, and into the table."""
     scene, radius = problem.scene, 0.5 * problem.scene.cable.diameter
     names = [f"obstacles[{scene.environment.obstacles.index(o)}]" for o in problem.obstacles]
     rows = obstacle_rows(scene, problem.obstacles)
@@ -135,7 +135,7 @@ def _into_surroundings(problem: Problem, begins: list[Floats | None]) -> Iterato
 
 
 def _into_each_other(problem: Problem, begins: list[Floats | None]) -> Iterator[Driven]:
-    """Return how far each two held points that begin apart come within a diameter, where strands may not cross."""
+    """Yield how far each pair of held points that begin apart comes within a diameter, where strands may not cross."""
     scene, diameter = problem.scene, problem.scene.cable.diameter
     if problem.self_contact is None:
         return

@@ -1,4 +1,4 @@
-"""A march on a grid that was asked for: once more, in another way, where it fails on it as it is."""
+"""A march on a given grid: tried again in another way if it fails on the grid as it is."""
 
 from dataclasses import replace
 
@@ -13,16 +13,17 @@ from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.timefit import evened, fit, largest
 from dlocore.words import in_mm
 
-MISSED = 0.02  # of the length: a time spline that misses its march by more is no answer
-# what is tried where a march finds no equilibrium, folds or tears the cable: times as many steps, and whether more
-# points watch over the length
+MISSED = 0.02  # of the length: a time spline that misses its march by more is not a valid answer
+# what is tried if a march finds no equilibrium, folds or tears the cable: the factor on the steps, and whether more
+# points watch the length
 _OTHERWISE = ((4, False), (1, True), (4, True), (16, False))
 
 
 def march_given(problem: Problem, n_u: int, n_t: int, monitor: Monitor) -> Level:
-    """March on a given grid; where that fails, with more steps or on points between which the cable can't fold.
+    """March on a given grid; if that fails, use more steps, or points between which the cable can't fold.
 
-    The first march that is a success is the answer, and says what was done; where none is, it is the first of all.
+    The first march that succeeds is the answer, and its message says what was done. If none does, the answer is the
+    first of all.
     """
     size = Size(n_u, n_t, given_steps(n_t))
     first = level = march_level(problem, size, monitor)
@@ -41,19 +42,19 @@ def march_given(problem: Problem, n_u: int, n_t: int, monitor: Monitor) -> Level
         status = given_status(evenly_fitted(level))[0]
         if status == "converged" or (status == "max_iterations" and not is_folded(first)):
             return level
-        if status == "max_iterations":  # but for the time spline it is a success
+        if status == "max_iterations":  # a success except for the time spline
             shown = level
     return shown
 
 
 def _said(first: Level, steps: int, watch: bool) -> str:
     failed = march_status(first.problem, first)[1].split(". ")[0]
-    stiffer = " Here its length is watched at more points, which makes it stiffer on few control points."
-    return f" On the grid as it is, with {steps} steps: {failed}." + (stiffer if watch else "")
+    stiffer = " Here its length is watched at more points, which makes the cable stiffer on few control points."
+    return f" On the grid as given, with {steps} steps: {failed}." + (stiffer if watch else "")
 
 
 def evenly_fitted(level: Level) -> Level:
-    """Return a level of a given grid; where its time spline misses the march by more than MISSED, with knots moved."""
+    """Return a level of a given grid, with moved time knots if its time spline misses the march by more than MISSED."""
     motion, problem = level.motion, level.problem
     if motion.stopped or not level.missed > MISSED * problem.scene.cable.length:
         return level
@@ -64,9 +65,9 @@ def evenly_fitted(level: Level) -> Level:
 
 
 def given_status(level: Level) -> tuple[Status, str]:
-    """Return the status of a march on a given grid, and what it says, in words."""
+    """Return the status and the message of a march on a given grid."""
     status, message = march_status(level.problem, level)
     if status == "converged" and level.missed > MISSED * level.problem.scene.cable.length:
-        spline = f"The time spline of {len(level.control)} control points misses them by {in_mm(level.missed)}."
+        spline = f"The time spline of {len(level.control)} control points misses the march by {in_mm(level.missed)}."
         return "max_iterations", f"{message} {spline} Raise n_t."
     return status, message

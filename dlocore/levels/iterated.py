@@ -1,4 +1,4 @@
-"""A least squares that started from the march of a level: how it ended, and what is to be said of that."""
+"""A least squares that started from the march of a level: how it ended, and the message about it."""
 
 from dataclasses import dataclass, replace
 
@@ -20,15 +20,15 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Ended:
-    """What is shown of a least squares that came to its end.
+    """The result shown for a least squares that has ended.
 
     Attributes:
         level: of the march that it started from, with the control points that are shown.
-        method: that they are of.
+        method: the method that these come from.
         status: as of a prediction.
-        message: what is said of it, in words.
-        left: the last update of it, or of the march that is shown in its place [m].
-        find_forces: finds what holds the cable in the last iterate; None: the march tells.
+        message: what to say about it, in words.
+        left: its last update, or that of the march shown instead [m].
+        find_forces: finds what holds the cable in the last iterate; None: the march gives it.
     """
 
     level: Level
@@ -40,10 +40,10 @@ class Ended:
 
 
 def ended(level: Level, quality: Quality, method: str, solved: Solved, count: int, monitor: Monitor) -> Ended:
-    """Return what is shown of a solution by "spacetime" or "paper" after so many iterations, or in its place.
+    """Return the result to show for a solution by "spacetime" or "paper" after `count` iterations.
 
-    What does not converge in space and time, or grows beyond all bounds, is none: the march that it started from is
-    shown.
+    A "spacetime" solution that does not converge, or iterates beyond all bounds, are replaced by the march that it
+    started from.
     """
     problem, iterations = level.problem, counted(count, "iteration")
     if solved.converged:
@@ -53,10 +53,10 @@ def ended(level: Level, quality: Quality, method: str, solved: Solved, count: in
         status = "max_iterations"
         message = (
             f"The update fell to {solved.update:.2g} m in {iterations}, not below delta = {quality.threshold:g} m. "
-            "Raise n_u and n_t, allow a larger delta, or take method march."
+            "Raise n_u and n_t, allow a larger delta, or use method march."
         )
     if problem.self_contact is not None:
-        message += " The least squares does not know of contact of the cable with itself; method march does."
+        message += " The least squares leaves out contact of the cable with itself; method march includes it."
     control, find_forces, left = solved.control, solved.find_forces, solved.update
     if not solved.converged and method == "spacetime":
         level = evenly_fitted(level)
@@ -78,11 +78,11 @@ def ended(level: Level, quality: Quality, method: str, solved: Solved, count: in
 
 
 def out_of_time(level: Level, method: str, control: Floats, count: int) -> Outcome:
-    """Return what is shown where the time was up after so many iterations, the last of which led to `control`."""
+    """Return the result to show if the time ran out after `count` iterations, the last of which led to `control`."""
     if method == "paper":
         message = "The time limit passed; this is the last iterate. Allow more time or a coarser grid."
         return Outcome(replace(level, control=control), "time_limit", message, None)
-    message = (  # iterates that don't come near may be anything
+    message = (  # iterates that have not converged may be far off
         f"The time limit passed after {counted(count, 'iteration')} of the least squares. "
         "Allow more time or a coarser grid. The surface is that of the march it started from."
     )

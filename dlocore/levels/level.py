@@ -1,4 +1,4 @@
-"""One march on one grid, again where it failed or strained the cable, and its time spline."""
+"""One march on one grid, repeated if it failed or overstrained the cable, and its time spline."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -30,9 +30,9 @@ from dlocore.statics.statics import start_grid
 
 Floats = NDArray[np.float64]
 
-# (n_u, n_t, steps) of a motion of about two seconds of one metre, before it is refined in one direction only
-# Each has twice the steps and 1.45 times the control points of the one before: of an error of second order in time, and
-# of one of fourth order along the cable, that leaves much the same share of what it moved the surface by.
+# (n_u, n_t, steps) for a motion of about two seconds of one metre, before it is refined in one direction only. Each has
+# twice the steps and 1.45 times the control points of the one before: with an error of second order in time and of
+# fourth order along the cable, both leave about the same share of the change.
 LEVELS = (
     (9, 13, 40),
     (13, 19, 80),
@@ -40,19 +40,19 @@ LEVELS = (
     (28, 41, 320),
     (41, 60, 640),
 )
-CREDIBLE_STRAIN = 0.02  # axial: a march that stretches the cable more is tried again with strong damping
-TEARS = 1.5  # times the strain of another march: what strains a cable so much more does it for want of steps
-_STIFFER = 5  # times that contact is made stiffer on one grid
-_MISSED = 0.01  # of the diameter: what the time spline may miss of a motion with contact
-_LONG = 4.0  # times that a cable swings: in so long a motion what is fast may be a small part of it, which ...
-_FITTED = 0.1  # ... has more time knots where the spline misses it by more than this share of the target
+CREDIBLE_STRAIN = 0.02  # axial strain: a march that stretches the cable more is repeated with strong damping
+TEARS = 1.5  # times the strain of another march: a strain this much larger is due to too few steps
+_STIFFER = 5  # times that contact is made stiffer on one grid, at most
+_MISSED = 0.01  # of the diameter: how far the time spline may miss a motion with contact
+_LONG = 4.0  # times the period of a swing: in a motion this long the fast part may be short, so it ...
+_FITTED = 0.1  # ... gets more time knots where the spline misses it by more than this share of the target
 _ROUNDING = 1e-9
-_SAMPLES = 33  # along the cable, and in time while it swings once, at which surfaces are compared
-_AT_ONCE = 1e-2  # of the length: what moves by more from one of these times to the next is compared in between, at ...
-_SOONER = 0.5 ** np.arange(1.0, 7.0)  # ... these parts of it, where it sets out at once, and ...
-_EVENLY = np.arange(1.0, 8.0) / 8.0  # ... these, in motions so long that these times are far apart
-_YIELDING = 0.8  # of the depth, at most, is left by a stiffer contact where it is one of stiffness
-ACCEPT = 0.75  # of the target: an answer with a smaller estimated error is believed
+_SAMPLES = 33  # along the cable, and in time per swing, at which surfaces are compared
+_AT_ONCE = 1e-2  # of the length: what moves more between two of these times is compared in between too, at ...
+_SOONER = 0.5 ** np.arange(1.0, 7.0)  # ... these fractions if it sets out suddenly, and ...
+_EVENLY = np.arange(1.0, 8.0) / 8.0  # ... these in motions so long that the times are far apart
+_YIELDING = 0.8  # of the depth is left by a stiffer contact, at most, if stiffness was the problem
+ACCEPT = 0.75  # of the target: an answer with a smaller error estimate is accepted
 
 
 class Size(NamedTuple):
@@ -68,20 +68,20 @@ class Level:
     """A march on one grid and its spline.
 
     Attributes:
-        size: of the grid, as it was asked for.
-        posed: what was to be solved.
-        problem: what was solved: contact may have been made stiffer.
+        size: of the grid, as requested.
+        posed: the problem that was to be solved.
+        problem: the problem that was solved: contact may have been made stiffer.
         motion: the march.
         knots_t: (n_t + 4,) [s].
         control: (n_t, n_u, nc) [m].
-        missed: what the time spline misses of the march [m], see `largest`.
-        change: largest distance to the level before [m], infinite at the first.
+        missed: the misfit of the time spline to the march [m], see `largest`.
+        change: largest distance to the level before [m]; infinite at the first.
         turned: largest angle of the sections from those of the level before, or of the march that its error was
             estimated with [rad]; 0 without twist.
-        beside: those that its forces are compared with: the one that its error was estimated with, or the level before,
-            and the one before that where the two differ in one direction only.
+        beside: the levels that its forces are compared with: the one that its error was estimated with, or the level
+            before, and the one before that if the two differ in one direction only.
         note: what was found on it, in words.
-        mended: what was done differently from other marches on a given grid as it failed on that one, in words.
+        mended: what was done differently because the first march on the given grid failed, in words.
     """
 
     size: Size
@@ -99,23 +99,23 @@ class Level:
 
     @property
     def alone(self) -> "Level":
-        """The level without those beside it."""
+        """The level without those in `beside`."""
         return replace(self, beside=())
 
     @property
     def marched(self) -> Problem:
-        """The problem as it was marched: friction gives way by what is in keeping with the steps."""
+        """The problem as it was marched: the give of friction is adapted to the steps."""
         return firmer(self.problem, self.problem.horizon / self.motion.asked)
 
     @cached_property
     def unseen(self) -> float:
-        """How far the cable is taken by what the steps do not see [m], see `trembles` and `unresolved_way`."""
+        """How far unresolved motion within the steps may move the cable [m], see `trembles` and `unresolved_way`."""
         step = self.problem.horizon / self.motion.steps
         return max(trembles(self.problem, step), unresolved_way(self.problem, step))
 
     @cached_property
     def held_back(self) -> float:
-        """How far unit length at its ends keeps a stretched cable from where it would be [m], see `held_back`."""
+        """How far unit length at its ends keeps a stretched cable from its true position [m], see `held_back`."""
         motion, dimensions = self.motion, self.problem.plane.dimensions
         return held_back(self.problem.scene, motion.grid, motion.states[..., :dimensions], motion.largest_strain)
 
@@ -127,7 +127,7 @@ class Level:
 
     @cached_property
     def between(self) -> Floats:
-        """Other times (k,) [s] to compare it at: what the evenly spaced ones would not tell."""
+        """Further times (k,) [s] to compare it at, where the evenly spaced ones may miss something."""
         step = self.problem.horizon / (len(self.samples) - 1)
         found = [begin + step * _SOONER for begin in self.sudden]
         if step * (_SAMPLES - 1) > (1.0 + _ROUNDING) * self.problem.scene.swing:
@@ -136,7 +136,7 @@ class Level:
         return np.asarray(times[times < self.problem.horizon])
 
     def _lively(self, step: float) -> Floats:
-        """Return from which times (k,) [s] on the cable goes a long way within `step` [s]."""
+        """Return the times (k,) [s] from which on the cable moves far within `step` [s]."""
         states = self.motion.states[..., : self.problem.plane.dimensions]
         way = np.linalg.norm(np.diff(states, axis=0), axis=2).max(axis=1)
         number = np.minimum(self.motion.times[1:] / step - _ROUNDING, len(self.samples) - 2).astype(int)
@@ -144,7 +144,7 @@ class Level:
 
     @property
     def sudden(self) -> list[float]:
-        """When it sets out so fast that the next of the evenly spaced times may come too late to tell [s]."""
+        """Times at which it sets out so fast that the next evenly spaced time may come too late to show it [s]."""
         problem, motion, dimensions = self.problem, self.motion, self.problem.plane.dimensions
         far = _AT_ONCE * problem.scene.cable.length
         found = [0.0] if farthest(self.samples[:1], self.samples[1:2], dimensions) > far else []
@@ -158,7 +158,7 @@ class Level:
         return found
 
     def at(self, times: Floats, u: Floats | None = None) -> Floats:
-        """Return the surface at times (k,) [s] and at places `u` (m,) [m], else those of `samples`; (k, m, nc) [m]."""
+        """Return the surface at times (k,) [s] and places `u` (m,) [m], else those of `samples`; (k, m, nc) [m]."""
         knots = self.motion.grid.knots
         u = np.linspace(0.0, knots[-1], _SAMPLES) if u is None else u
         states = np.swapaxes(spline_at(self.knots_t, self.control, times), 0, 1)
@@ -175,7 +175,7 @@ def stretched(problem: Problem, level: int) -> Size:
 
 
 def given_steps(n_t: int) -> int:
-    """Return the number of time steps that goes with a given number of control points in time."""
+    """Return the number of time steps for a given number of control points in time."""
     return max(48, 5 * n_t)
 
 
@@ -199,25 +199,25 @@ def run_level(
 ) -> Level:
     """March on one grid and fit the time spline.
 
-    A march that found no equilibrium, or stretched the cable beyond belief, is done again with strong numerical
-    damping, or without where it had it, and kept where it comes farther or strains the cable by far less.
+    A march that found no equilibrium, or stretched the cable beyond belief, is repeated with strong numerical damping,
+    or without if it had that. The repeated one is kept if it gets farther or strains the cable far less.
 
     Args:
         rho: spectral radius of the march.
         booked: whether to book the time by phase.
-        free_knots: whether to add time knots where the cable strikes something; the grid is free to be refined, and it
-            is of interest whether a disturbance may grow.
-        hardness: times that contact is stiffer to begin with, as it had to be made on a grid before.
+        free_knots: whether to add time knots where the cable strikes something. The grid is then free to be refined,
+            and it matters whether a disturbance may grow.
+        hardness: the factor on the contact stiffness to begin with, as a previous grid needed it.
         credible: axial strain up to which a march is believed.
-        watch: watch over the stretch at more points, between which the cable can't fold.
-        grid: with the start on it, where it is known.
-        like: another of the same problem, from whose start that of this one is settled.
-        knots_t: time knots to begin with, where they are known.
-        whole: whether a march that the deadline ends is of no use.
+        watch: whether to watch the stretch at more points, between which the cable can't fold.
+        grid: with the start on it, if that is known.
+        like: another grid of the same problem, from whose start the start of this one is settled.
+        knots_t: time knots to begin with, if they are known.
+        whole: whether a march cut short by the deadline is of no use.
 
     Raises:
         Cancelled: the caller asked to stop.
-        TimeIsUp: the deadline passed, where it had to be `whole`.
+        TimeIsUp: the deadline passed, and the march had to be `whole`.
     """
     posed = problem
     if hardness > 1.0:
@@ -261,22 +261,22 @@ def run_level(
 def _stiffened(
     problem: Problem, motion: March, grid: Grid, steps: int, monitor: Monitor, rho: float, whole: bool
 ) -> tuple[Problem, March]:
-    """Return what was solved and its march, again with stiffer contact where the cable is pressed into it too deep.
+    """Return the solved problem and its march, repeated with stiffer contact if the cable is pressed in too deep.
 
-    A stiffer one counts where the motion goes farther with it, or as far and is pressed in less. Against what is pulled
-    in it is of no use.
+    A stiffer one is kept if the motion gets farther with it, or as far and is pressed in less. It is of no use against
+    what is pulled in by tension.
     """
     allowed, tried = DEEPEST * problem.scene.cable.diameter, problem
     for _ in range(_STIFFER):
         if motion.stopped == "time" or motion.deepest <= allowed:
             break
         if motion.stopped and problem.self_contact is None:
-            break  # a soft contact may be why strands got through each other, and the march ended
+            break  # soft contact may be why strands got through each other and the march ended
         harder = stiffer_for(tried, motion.deepest)
         again = march(harder, grid, steps, monitor, rho=rho, whole=whole)
         if (again.reached, -again.deepest) < (motion.reached, -_YIELDING * motion.deepest):
             taut = stiff_as_taut(harder) if again.reached == motion.reached else None
-            if taut is not None:  # of what is pulled in, a soft contact stops nothing
+            if taut is not None:  # soft contact stops nothing that is pulled in by tension
                 tried = taut
                 continue
             if problem.self_contact is None or tried is not problem or again.reached < motion.reached:
@@ -290,14 +290,14 @@ def _stiffened(
 def _splined(
     problem: Problem, motion: March, knots_t: Floats, known: tuple[Floats, Floats] | None, free_knots: bool
 ) -> tuple[Floats, Floats, Floats]:
-    """Return time knots (n_t + 4,) [s] and control points (n_t, n_u, nc) [m] of a march, and what they miss [m].
+    """Return time knots (n_t + 4,) [s] and control points (n_t, n_u, nc) [m] of a march, and their misfit [m].
 
     Args:
         problem: that was solved.
         motion: its march.
-        knots_t: those to begin with.
-        known: control points on these, and what each state (steps + 1,) is missed by [m], where that is known.
-        free_knots: whether knots are added where the cable strikes something, or is fast within a long time.
+        knots_t: the knots to begin with.
+        known: control points on these, and the misfit at each state (steps + 1,) [m], if they are known.
+        free_knots: whether to add knots where the cable strikes something, or is fast within a long time.
     """
     smooth = motion
     period = problem.scene.swing
@@ -316,7 +316,7 @@ def _splined(
 
 
 def _fastest(motion: March) -> float:
-    """Return the largest speed of a control point in a motion, as far as it came [m/s]."""
+    """Return the largest speed of a control point in a motion, up to where it ended [m/s]."""
     states = motion.states[: motion.reached + 1, :, : min(3, motion.states.shape[2])]
     moved = np.linalg.norm(np.diff(states, axis=0), axis=2).max(axis=1)
     return float((moved / np.diff(motion.times[: motion.reached + 1])).max(initial=0.0))
@@ -325,13 +325,14 @@ def _fastest(motion: March) -> float:
 def _march(
     problem: Problem, grid: Grid, steps: int, monitor: Monitor, rho: float, whole: bool, credible: float
 ) -> tuple[Problem, March, March | None]:
-    """March; return what was solved, its march, and one with strong damping where it is known.
+    """March; return the solved problem, its march, and one with strong damping if it is known.
 
-    What goes astray is given up there and then, if something else does not. Waves that gain energy strain the cable
-    beyond belief, and most of their steps find equilibrium only in smaller ones: what comes to its end so, with strong
-    damping to follow, takes forty times as long. What is struck so fast that it goes through what it strikes, or
-    through itself, jams or goes another way: contact is made stiffer, and where that is not enough, so stiff at once
-    that it stops what is as fast as anything was until then.
+    A march that goes astray is stopped at once if an alternative does not go astray:
+
+    - Waves that gain energy strain the cable beyond belief, and most of their steps find equilibrium only in smaller
+      ones. Finishing such a march before trying strong damping takes forty times as long.
+    - A cable that moves so fast that it goes through what it strikes, or through itself, jams or goes another way.
+      Contact is made stiffer, and if that is not enough, so stiff that it stops the largest speed reached until then.
     """
     damped: March | None = None
     shallow = TOO_DEEP * problem.scene.cable.diameter
@@ -356,7 +357,7 @@ def _march(
 def hardness(level: Level) -> float:
     """Return how many times stiffer than posed contact may have to be on the grid after a level: 1 or more.
 
-    What the level needed, but no more than leaves half the depth that is allowed.
+    It is the factor that the level needed, but no more than leaves half of the depth that is allowed.
     """
     posed, solved = (p.self_contact or p.contact for p in (level.posed, level.problem))
     if posed is None or solved is None:
@@ -371,10 +372,10 @@ def credible_after(level: Level) -> float:
 
 
 def distance(a: Level, b: Level, problem: Problem) -> float:
-    """Return the largest distance between the surfaces of two levels [m], also soon after they set out at once.
+    """Return the largest distance between the surfaces of two levels [m], including just after a sudden start.
 
-    On fine grids it is looked for beside the ends, and beside what holds, loads or weighs down the cable, too: in the
-    short spans there, in which a stretched cable is worst, there may be none of the even places.
+    On fine grids it is also sought beside the ends and beside whatever holds, loads or weighs down the cable: a
+    stretched cable is worst in the short spans there, which may contain none of the evenly spaced places.
     """
     dimensions = problem.plane.dimensions
     most = float(farthest(a.samples, b.samples, dimensions))
@@ -389,7 +390,7 @@ def distance(a: Level, b: Level, problem: Problem) -> float:
 
 
 def _beside(problem: Problem, grid: Grid) -> Floats:
-    """Return two knots of a grid to either side of each end, and of what holds, loads or weighs down the cable [m]."""
+    """Return two knots of a grid on each side of each end and of whatever holds, loads or weighs down the cable [m]."""
     breaks = np.unique(grid.knots)
     at = np.searchsorted(breaks, [0.0, *problem.scene.places, problem.scene.cable.length])
     return breaks[(at[:, None] + np.arange(-2, 3)).clip(0, len(breaks) - 1)].ravel()

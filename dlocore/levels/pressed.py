@@ -1,4 +1,4 @@
-"""Into what a motion presses the cable deepest, where along it and when: of one that jams."""
+"""What a jammed motion presses the cable into deepest, with the place along the cable and the time."""
 
 from collections.abc import Iterator
 
@@ -15,20 +15,20 @@ from dlocore.spline import design_matrix
 
 Floats = NDArray[np.float64]
 
-_AT_ONCE = 1_000_000  # nodes that are looked at together, over all times
-_MOST_PARTS = 1000  # of a cable between which two that meet are looked for
+_AT_ONCE = 1_000_000  # nodes that are examined together, over all times
+_MOST_PARTS = 1000  # parts of a cable, at most, between which a meeting pair is sought
 _ROUNDING = 1e-9  # of a distance
 
 
 def pressed_into(problem: Problem, motion: March) -> str:
-    """Return in words what the states of a motion are deepest in, where and when; of no more where none is in any."""
+    """Return in words what the motion is deepest in, with place and time; unspecific words if it is in nothing."""
     found = [*_into_surroundings(problem, motion), *_into_itself(problem, motion)]
     depth, words = max(found, default=(0.0, ""))
     return words if depth > 0.0 else "the table, an obstacle or itself"
 
 
 def _into_surroundings(problem: Problem, motion: March) -> Iterator[tuple[float, str]]:
-    """Yield how deep the cable is in each obstacle and in the table [m], at most, and its words."""
+    """Yield how deep the cable is in each obstacle and in the table, at most [m], and the words for it."""
     if problem.contact is None:
         return
     scene, u = problem.scene, np.unique(motion.grid.tables.contact.u)
@@ -46,7 +46,7 @@ def _into_surroundings(problem: Problem, motion: March) -> Iterator[tuple[float,
 
 
 def _into_itself(problem: Problem, motion: March) -> Iterator[tuple[float, str]]:
-    """Yield how far two strands are within a diameter [m], at most, and its words, where they may not cross."""
+    """Yield how far two strands are within a diameter, at most [m], and the words for it, if they may not cross."""
     if problem.self_contact is None:
         return
     diameter, dimensions, knots = problem.scene.cable.diameter, problem.plane.dimensions, motion.grid.knots

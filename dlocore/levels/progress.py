@@ -60,6 +60,6 @@ def surface_at(problem: Problem, level: Level, control: Floats) -> SplineSurface
     """Return the surface of control points (n_t, n_u, nc) on the knots of a level."""
     motion, grid = level.motion, level.motion.grid
     if problem.twist is not None:
-        log = motion.log[:, : len(grid.tables.curvature.w)]  # with memory: to copy the frames alone takes longer
+        log = motion.log[:, : len(grid.tables.curvature.w)]  # with memory: copying the frames alone takes longer
         control = free_control(problem, grid, level.knots_t, control, motion.times[motion.logged], log)
     return surface_of(problem, grid.knots, level.knots_t, control)

@@ -1,7 +1,7 @@
-"""What a solved motion says about the effects that were left out: which of them it calls for, and how much they matter.
+"""Effects that were left out of a solved motion: which of them it calls for, and how much they matter.
 
-An effect that is left out by `auto` and shows in the result is switched on, and the solve goes on with it. One that is
-switched off in the scene stays off, and the answer says what that does.
+If an effect that `auto` has left out shows in the result, it is switched on and the solve continues with it. An effect
+that the scene switches off stays off, and the answer says what it would have done.
 """
 
 from collections.abc import Callable
@@ -45,23 +45,23 @@ from dlocore.words import in_mm
 
 Floats = NDArray[np.float64]
 
-CLOSE = 0.01  # of the length: a cable that comes this near to an obstacle left out calls for it
-MATTERS = 0.001  # of the length: what a neglected effect may move the cable before it is worth a word
-_SHARE = 0.2  # of a target that was asked for: what the inertia that is left out may move it
-_TURNS = 0.1  # of that, and of the target: what the sections' spin may move it, which a motion that snaps enlarges
-FAR_MORE = 2.0  # times the strain of the march: what its spline adds is worth a word
-TURNED, OF_TURN = 0.2, 0.05  # [rad], and of the largest angle of its sections: what grids may differ by without a word
-_PLACES, _MOMENTS = 4, 33  # in a span, and in time while it swings once, at which a surface is searched for strain
+CLOSE = 0.01  # of the length: a cable that comes this near to an obstacle that was left out calls for it
+MATTERS = 0.001  # of the length: a neglected effect that moves the cable by more than this is reported
+_SHARE = 0.2  # of a requested target: how far neglected inertia may move it
+_TURNS = 0.1  # of that, and of the target: how far spinning sections may move it: a snapping motion amplifies that
+FAR_MORE = 2.0  # times the strain of the march: a spline that adds more is reported
+TURNED, OF_TURN = 0.2, 0.05  # [rad], and of the largest angle of its sections: a larger difference of grids is reported
+_PLACES, _MOMENTS = 4, 33  # in a span, and in time per swing, at which the strain of a surface is checked
 _BLOCK = 4096  # states whose gaps to obstacles are found at once
-_LOOKS = 5  # states of each stretch of a motion at which neglected forces are weighed
-_LONGER = 4  # times as long, each time that a motion is searched for turns
-_SKIPPED = 3  # of so many control points one is searched: their neighbours turn with them
+_LOOKS = 5  # states of each stretch of a motion at which neglected forces are evaluated
+_LONGER = 4  # factor on the time over which a motion is searched for turns, from one search to the next
+_SKIPPED = 3  # one of this many control points is searched: its neighbours turn with it
 
 
 def called_for(level: Level, fine: bool = True) -> dict[str, str]:
     """Return the effects that `auto` has left out and the motion calls for, with the reason for each.
 
-    Where the grid is not `fine` it is left open what only such a grid tells.
+    If the grid is not `fine`, the effects that only a fine grid can decide are left open.
     """
     problem, found = level.problem, {}
     switch, length = problem.scene.effects.get, problem.scene.cable.length
@@ -74,9 +74,9 @@ def called_for(level: Level, fine: bool = True) -> dict[str, str]:
         moved = _response(level, "inertia")
         if level.motion.stopped == "step":
             reached = level.motion.times[level.motion.reached]
-            found["inertia"] = f"without it the cable has no equilibrium to go on to at {reached:.3g} s"
+            found["inertia"] = f"without it the cable has no equilibrium to continue to at {reached:.3g} s"
         elif moved > min(MATTERS * length, _SHARE * asked):
-            most = min(moved, length)  # where the cable is about to give way it tells no distance
+            most = min(moved, length)  # if the cable is about to give way, this is no distance
             found["inertia"] = f"without it a first solve is {in_mm(most)} off"
     if switch("twist", "auto") == "auto":
         moved = _spun(level)
@@ -84,15 +84,15 @@ def called_for(level: Level, fine: bool = True) -> dict[str, str]:
             found["twist"] = (
                 f"sections that turn at sharp bends resist, which moves the cable by {in_mm(moved)} or more"
             )
-    if fine and not found:  # they are of the motion that has all the others
+    if fine and not found:  # these are decided on the motion that has all the others
         found.update(called_for_by_fine(level))
     return found
 
 
 def called_for_by_fine(level: Level) -> dict[str, str]:
-    """Return what rough grids may call for only because they are rough, and why.
+    """Return effects that a rough grid may call for just because it is rough, and why.
 
-    It is contact of the cable with itself, where `auto` has left it out, and on free grids a side to which a motion
+    These are contact of the cable with itself, if `auto` has left it out, and on free grids a side to which a motion
     leaves its plane.
     """
     return {**_side(level), **_strands(level)}
@@ -117,10 +117,10 @@ def _strands(level: Level) -> dict[str, str]:
 
 
 def objections(level: Level) -> list[str]:
-    """Return what is to be known of a motion beside its status, in words.
+    """Return the notes about a motion beyond its status, in words.
 
-    That is what the effects that the scene switches off would have done, where it matters, a strain along the cable
-    that few bear, and one that is pulled taut.
+    They report what the effects that the scene switches off would have done, if it matters, a strain along the cable
+    that few cables bear, a cable that is pulled taut, and the like.
     """
     problem, found = level.problem, []
     found += strain_notes(level.problem.scene.cable, level.motion.largest_strain, "the motion")
@@ -145,7 +145,7 @@ def objections(level: Level) -> list[str]:
     if elsewhere:
         lopsided = f"a cable lopsided by {in_mm(BOW * problem.scene.cable.length)}"
         found.append(
-            f"the motion is its own mirror image, and unstable so: {lopsided} goes {elsewhere:.2g} m elsewhere"
+            f"the motion is its own mirror image, which is unstable: {lopsided} departs from it by {elsewhere:.2g} m"
         )
     off = {name for name, value in problem.scene.effects.items() if value == "off"}
     for name, test in (("plasticity", _yields), ("obstacles", _touches), ("self_contact", _meets_itself)):
@@ -163,16 +163,16 @@ def objections(level: Level) -> list[str]:
     for name in _forces(problem) if off else ():
         if name in off:
             moved = _response(level, name)
-            if moved > allowed:  # beyond its length the linear response tells no distance
+            if moved > allowed:  # beyond the cable's length, the linear response is no distance
                 far = "its length or more" if moved > problem.scene.cable.length else f"about {in_mm(moved)}"
                 found.append(f"{name} is off, though it would move the cable by {far}")
     return found
 
 
 def _unsure(level: Level) -> list[str]:
-    """Return in words that a motion on a given grid hangs on its start, or on how stiff contact is.
+    """Return a note if a motion on a given grid depends on its exact start or on the contact stiffness.
 
-    On free grids status and error estimate tell.
+    On free grids, status and error estimate say so.
     """
     problem, motion = level.problem, level.motion
     length = problem.scene.cable.length
@@ -182,12 +182,12 @@ def _unsure(level: Level) -> list[str]:
     if moved > UNDETERMINED * length:
         return [f"on this grid {in_words(problem, moved)}"]
     gives = gives_way(problem, motion, Monitor())
-    told = f"on this grid {firmness_in_words(gives)}, which the estimated error leaves out"
+    told = f"on this grid {firmness_in_words(gives)}, which the estimated error does not include"
     return [told] if gives > DOUBTFUL * length else []
 
 
 def turns_unsurely(level: Level) -> bool:
-    """Tell whether two grids do not agree on the angles of the sections, which no distance between them shows."""
+    """Tell whether two grids disagree on the angles of the sections, which no distance between them shows."""
     if level.turned <= TURNED:
         return False
     twist = level.problem.twist
@@ -199,16 +199,16 @@ def _twisted(level: Level) -> list[str]:
     if not turns_unsurely(level):
         return []
     return [
-        "the angle of its sections, and the torque with it, is not as sure as its positions, as two grids differ by up "
-        f"to {level.turned:.2g} rad: a given grid with larger n_u and n_t shows waves of twist"
+        "the angles of the sections, and the torque, are less certain than the positions: two grids differ by up "
+        f"to {level.turned:.2g} rad; a given grid with larger n_u and n_t shows waves of twist"
     ]
 
 
 def _stretched(level: Level) -> list[str]:
-    """Return in words where the surface strains the cable by more than few bear, and more than its march seems to.
+    """Return a note if the surface strains the cable more than few cables bear, and far more than its march does.
 
-    What the time spline misses of the march may be little to the cable, and much to a short span of it; and a coarse
-    grid may strain a span between the points at which the march looks.
+    What the time spline misses of the march may be little for the cable, but much for a short span of it. A coarse grid
+    may also strain a span between the points at which the march checks it.
     """
     knots, horizon = level.motion.grid.knots, level.problem.horizon
     breaks = np.unique(knots)
@@ -220,17 +220,17 @@ def _stretched(level: Level) -> list[str]:
     if not strain[k, s] > max(STRAINED, FAR_MORE * level.motion.largest_strain):
         return []
     quality = level.problem.scene.quality
-    advice = "take more control points" if quality.n_u is not None else "ask for a smaller target_error"
+    advice = "use more control points" if quality.n_u is not None else "ask for a smaller target_error"
     if quality.time_budget is not None:
         advice = "allow a larger time_budget"
     return [
         f"the surface stretches the cable by up to {strain[k, s]:.0%} within a span, at {u[s]:.4g} m and {t[k]:.3g} s: "
-        f"of lengths and directions there an error of positions tells nothing; {advice}"
+        f"the error of the positions says nothing about lengths and directions there; {advice}"
     ]
 
 
 def neglected(level: Level) -> float:
-    """Return how far the effects that `auto` has left out would have moved the cable, at most, about [m]."""
+    """Return about how far the effects that `auto` has left out would have moved the cable, at most [m]."""
     problem, switch = level.problem, level.problem.scene.effects.get
     moved = _spun(level) if switch("twist", "auto") == "auto" else 0.0
     if problem.inertia is None and switch("inertia", "auto") == "auto":
@@ -239,7 +239,7 @@ def neglected(level: Level) -> float:
 
 
 def _spun(level: Level) -> float:
-    """Return how far the inertia of sections that turn would move a cable that is solved without twist, about [m]."""
+    """Return about how far the inertia of turning sections would move a cable that is solved without twist [m]."""
     problem, motion = level.problem, level.motion
     if not _turns_sections(problem) or not bends_sharply(problem, motion.grid, motion.states):
         return 0.0
@@ -280,7 +280,7 @@ def _touches(level: Level) -> dict[str, str]:
     if not left_out:
         return {}
     gap, nearer = np.inf, np.inf  # and how near it may have come between the states
-    for first in range(0, max(1, len(level.motion.states) - 1), _BLOCK):  # all at once may be more than memory holds
+    for first in range(0, max(1, len(level.motion.states) - 1), _BLOCK):  # all at once may need too much memory
         gaps, between = _gaps(level, left_out, slice(first, first + _BLOCK + 1))
         gap, nearer = min(gap, float(gaps.min())), min(nearer, float((gaps - between).min()))
     if nearer > CLOSE * problem.scene.cable.length:
@@ -290,7 +290,7 @@ def _touches(level: Level) -> dict[str, str]:
 
 
 def _gaps(level: Level, obstacles: list[Obstacle], part: slice) -> tuple[Floats, Floats]:
-    """Return the gaps (k points,) [m] to obstacles in some states, and how much less they may be half-way to others."""
+    """Return the gaps (k points,) [m] to obstacles in some states, and how much smaller they may be between states."""
     problem, motion = level.problem, level.motion
     u = np.linspace(0.0, problem.scene.cable.length, 65)
     points = np.einsum("ui,kid->kud", design_matrix(motion.grid.knots, u), motion.states[part])
@@ -381,12 +381,12 @@ def _forces(problem: Problem) -> dict[str, Force]:
 
 
 def _response(level: Level, name: str) -> float:
-    """Return the largest displacement [m] of a control point that an effect which was left out would cause, about.
+    """Return about the largest displacement [m] of a control point that a neglected effect would cause.
 
-    It is (K + 2/T^2 M + 1/T C)^-1 f for its forces f at a few states of the motion: their static displacement where the
-    cable is held stiffly, and that of a free body after the time T of the motion where it isn't. Inertia is looked for
-    where the motion turns fastest, over longer and longer times tau: (K + M/tau^2)^-1 M a then is the static
-    displacement in modes that are faster than tau, and by how far the motion turned in slower ones.
+    It is (K + 2/T^2 M + 1/T C)^-1 f for the effect's forces f at a few states of the motion: the static displacement
+    where the cable is held stiffly, and that of a free body after the time T of the motion where it isn't. Inertia is
+    evaluated where the motion turns fastest, over longer and longer times tau: (K + M/tau^2)^-1 M a is then the static
+    displacement in modes faster than tau, and how far the motion turned in slower ones.
     """
     force, most = _forces(level.problem)[name], 0.0
     for window in level.motion.forces:
@@ -396,7 +396,7 @@ def _response(level: Level, name: str) -> float:
 
 
 def _look(window: WindowForces, k: int, stride: int) -> _Look:
-    """Return a look at the state k of a stretch, with rates over so many of its (equal) steps to both sides."""
+    """Return a look at the state k of a stretch, with rates over `stride` of its (equal) steps to both sides."""
     before, q, after = window.states[k - stride], window.states[k], window.states[k + stride]
     tau = stride * float(window.times[-1] - window.times[0]) / (len(window.times) - 1)
     return _Look(float(window.times[k]), q, (after - before) / (2.0 * tau), (after - 2.0 * q + before) / tau**2, tau)
@@ -410,7 +410,7 @@ def _evenly(window: WindowForces) -> list[_Look]:
 
 
 def _turns(window: WindowForces) -> list[_Look]:
-    """Return looks at the states of a stretch of motion where it turns fastest, over longer and longer times."""
+    """Return looks at the states of a stretch where the motion turns fastest, over longer and longer times."""
     states, stride, found = window.states[:, ::_SKIPPED], 1, []
     while 2 * stride < len(states):
         step, end = max(1, stride // 2), len(states)
@@ -423,14 +423,14 @@ def _turns(window: WindowForces) -> list[_Look]:
 
 
 def _given_way(level: Level, window: WindowForces, look: _Look, force: Force) -> float:
-    """Return how far a force moves the cable at most, from where it is looked at [m]; 0 where it gives way anyway."""
+    """Return how far a force moves the cable at most, from the state of a look [m]; 0 if it gives way anyway."""
     problem, grid = level.problem, level.motion.grid
     nc, e = problem.nc, window.held.elimination
     active, parameters = problem.law_table()
     slow = problem.scene.cable.linear_density * (2.0 / problem.horizon**2 + look.tau**-2)
     K, f = np.empty((look.q.size, 4 * nc)), np.empty_like(look.q)
     right = np.ascontiguousarray(force(look, level)).ravel()
-    for geometric in (1.0, 0.0):  # of a cable that is about to give way only the positive part is of use
+    for geometric in (1.0, 0.0):  # for a cable that is about to give way only the positive part is of use
         scales = (1.0, 0.0, geometric)
         assemble(problem.axes, look.q, look.v, grid.tables, active, parameters, grid.history, NO_RATES, scales, f, K)
         add_scalar_band(nc, grid.tables.inertia, slow, K)

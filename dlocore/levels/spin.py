@@ -1,9 +1,9 @@
-"""What the inertia of the sections, which turn about the cable as it moves, does to a motion solved without twist.
+"""The inertia of the sections, which turn about the cable as it moves, in a motion that is solved without twist.
 
-A cable without twist turns its sections: where it bends and its tangent t turns, too, the spin w of its sections about
-it differs along it, w' = -sigma' with sigma' = t . (t_dot x kappa) (docs/model.md, eq. 9). The inertia mu rho^2 per
-length against that, rho = D/sqrt(8), takes a torque T, T' = mu rho^2 w_dot, which is zero at both ends, and what it
-does is the virtual work T (kappa x t) . delta t per length. It matters where the cable bends to a few diameters only.
+Even without twist, a moving cable turns its sections. Where it bends and its tangent t turns too, their spin w about
+the tangent varies along the cable: w' = -sigma' with sigma' = t . (t_dot x kappa) (docs/model.md, eq. 9). The inertia
+mu rho^2 per length, rho = D/sqrt(8), requires a torque T with T' = mu rho^2 w_dot that vanishes at both ends. Its
+virtual work per length is T (kappa x t) . delta t. It matters only where the cable bends to a few diameters.
 """
 
 import numpy as np
@@ -15,8 +15,8 @@ from dlocore.problem.problem import Problem
 
 Floats = NDArray[np.float64]
 
-SHARP = 16.0  # diameters: the radius of a bend, above which the sections' inertia is not looked at
-_STRIDE = 8  # of so many states one is looked at for sharp bends
+SHARP = 16.0  # diameters: the radius of bends above which the inertia of the sections is ignored
+_STRIDE = 8  # one of this many states is checked for sharp bends
 _CONTROLS = np.arange(4)
 
 
@@ -34,7 +34,7 @@ def spin_forces(problem: Problem, grid: Grid, q: Floats, v: Floats, a: Floats, c
         problem: of a motion in space, without twist.
         grid: its grid.
         q, v, a: control points, their velocities and accelerations (n_u, 3) [m, m/s, m/s^2].
-        clamped: where a gripper keeps a section from turning [m]; None: it is the mean of the spin that is kept.
+        clamped: where a gripper keeps a section from turning [m]; None: the mean of the spin is conserved.
     """
     cable, tables = problem.scene.cable, grid.tables
     inertia = cable.linear_density * cable.diameter**2 / 8.0

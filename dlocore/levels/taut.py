@@ -1,4 +1,4 @@
-"""Whether the grippers pull the cable taut, farther than the way that it has is long."""
+"""Detect that the grippers pull the cable taut: the path between them is longer than the cable."""
 
 from typing import cast
 
@@ -12,15 +12,15 @@ from dlocore.words import in_newtons
 
 Floats = NDArray[np.float64]
 
-TAUT = 10.0  # times what all other forces on the cable add up to: mean tension of one that is pulled taut
-_LOOKS = 65  # at states of a motion, at most
+TAUT = 10.0  # times the sum of all other forces on the cable: the mean tension from which on it is pulled taut
+_LOOKS = 65  # states of a motion that are checked, at most
 
 
 def taut_notes(level: Level) -> list[str]:
-    """Return what is told of a motion whose grippers pull the cable taut, as they are stiffer than anything.
+    """Return a note if the grippers, which are stiffer than anything, pull the cable taut.
 
-    Then its mean tension along the cable, at two looks in succession at least, is far above what weight, inertia, drag,
-    bending and loads on it add up to. Waves of stretch pass in between.
+    The mean tension along the cable is then far above the sum of weight, inertia, drag, bending and loads, in at least
+    two successive looks. Waves of stretch pass between looks.
     """
     problem, motion = level.problem, level.motion
     scene, cable = problem.scene, problem.scene.cable
@@ -39,13 +39,13 @@ def taut_notes(level: Level) -> list[str]:
     worst = int(tension.argmax())
     pull, rest = in_newtons(tension[worst]), in_newtons(others)
     return [
-        f"the grippers pull the cable taut: at {times[worst]:.3g} s with {pull} in the mean, where all other forces "
-        f"on it add up to {rest}: bring them no farther apart than the cable between them reaches"
+        f"the grippers pull the cable taut: at {times[worst]:.3g} s its mean tension is {pull}, while all other forces "
+        f"on it add up to {rest}; bring the grippers no farther apart than the length of cable between them"
     ]
 
 
 def _others(level: Level, states: Floats, times: Floats) -> float:
-    """Return what all forces on a cable but those of its grippers come to at most [N], about."""
+    """Return about the largest sum of all forces on a cable except those of its grippers [N]."""
     problem = level.problem
     scene, cable, around, grid = problem.scene, problem.scene.cable, problem.scene.environment, level.motion.grid
     velocity = np.diff(states[..., : problem.plane.dimensions], axis=0) / np.diff(times)[:, None, None]

@@ -1,4 +1,4 @@
-"""One march that has all the effects its motion calls for, and what is to be said of it."""
+"""One march with all the effects that its motion calls for, and its status and message."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -27,11 +27,11 @@ from dlocore.solvers.march import RHO
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.stability.sideways import may_leave_plane
 
-_LOOKS = (1, 2, 3)  # grids on which a motion is looked at for whether it leaves its plane
+_LOOKS = (1, 2, 3)  # grids on which it is checked whether a motion leaves its plane
 
 
 class Outcome(NamedTuple):
-    """A level of refinement, what to say of it, and the parts of its estimated error [m], or None."""
+    """A level of refinement, its status and message, and the parts of its estimated error [m], or None."""
 
     level: Level
     status: Status
@@ -51,16 +51,25 @@ def march_level(
     watch: bool = False,
     whole: bool = False,
 ) -> Level:
-    """March on one grid; where the motion calls for effects that were left out, again with them.
+    """March on one grid, repeated with the effects that were left out if the motion calls for them.
 
-    On a `rough` grid, which another follows, strands may meet, and a motion leave its plane, because of the grid:
-    whether they do is left open. A march of this grid that is `known` is done again only for that. Contact begins as
-    stiff as the level `before` had to make it, strains are believed that are not far above its own, and a start that is
-    to settle does so from its start. With `watch` the cable can't fold within a span, see `run_level`.
+    Args:
+        problem: what is to be solved.
+        size: of the grid.
+        monitor: of the solve.
+        rho: spectral radius.
+        free_knots: whether time knots may be added, see `run_level`.
+        rough: whether a finer grid follows. On a rough grid strands may meet, and a motion may leave its plane, just
+            because of the grid, so that is left open.
+        known: a march of this grid, which is repeated only if a fine grid calls for more.
+        before: the previous level: contact begins as stiff as it had to be there, strains are believed that are not far
+            above its own, and a start that is to settle does so from its start.
+        watch: whether to keep the cable from folding within a span, see `run_level`.
+        whole: whether a march cut short by the deadline is of no use.
 
     Raises:
         Cancelled: the caller asked to stop.
-        TimeIsUp: the deadline passed, where the march had to be `whole`; it names the effects that were called for.
+        TimeIsUp: the deadline passed, and the march had to be `whole`; it names the effects that were called for.
     """
     called, asked = dict(problem.called_for), problem.called_for
     while True:
@@ -88,7 +97,7 @@ def march_level(
 
 
 def sided(problem: Problem, monitor: Monitor) -> Problem:
-    """Return the problem, with a side to go to where a march says that its motion leaves its plane."""
+    """Return the problem, with a side to go to if a march shows that its motion leaves its plane."""
     scene = problem.scene
     bends = scene.cable.yields and scene.effects.get("plasticity", "auto") != "off"  # for good: they may turn over
     if not (may_leave_plane(problem) or bends):
@@ -101,19 +110,19 @@ def sided(problem: Problem, monitor: Monitor) -> Problem:
 
 
 def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
-    """Return the status of a march, and what it says, in words."""
+    """Return the status and the message of a march."""
     motion = level.motion
     if not motion.stopped and motion.largest_strain > TORN:
-        strain = f"The motion strains the cable along itself by {motion.largest_strain:.0%}, which no cable follows."
-        advice = "Bring the grasps no farther apart than the cable between them, or make the motion slower."
-        if len(problem.scene.grasps) < 2:  # what it carries and is slowed by pulls it
+        strain = f"The motion strains the cable along itself by {motion.largest_strain:.0%}, which no cable can follow."
+        advice = "Bring the grasps no farther apart than the length of cable between them, or make the motion slower."
+        if len(problem.scene.grasps) < 2:  # it is pulled by what it carries and what slows it down
             stiffness = cast(float, problem.scene.cable.axial_stiffness)
             advice = f"Its axial stiffness is {stiffness:.3g} N: give it more, or less mass, weight, drag or speed."
         return "stalled", f"{strain} {advice}"
     if is_folded(level):
         least, most = motion.slopes
         seen = f"|r'| is {least:.2g} to {most:.2g} within a span"
-        return "stalled", f"The cable is folded finer than its control points can show: {seen}. Take more of them."
+        return "stalled", f"The cable is folded finer than its control points can show: {seen}. Use more of them."
     if motion.stopped != "time":
         off = closes_beside(problem, motion)
         if off:
@@ -124,7 +133,7 @@ def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
     deep = motion.deepest / problem.scene.cable.diameter
     if not motion.stopped and deep > TOO_DEEP:
         pushed = f"The cable is pressed {deep:.0%} of its diameter into {pressed_into(problem, motion)}."
-        return "stalled", f"{pushed} Move it less far against that, or less fast."
+        return "stalled", f"{pushed} Press it in less, or move it more slowly."
     if not motion.stopped:
         split = f", {motion.split} of them in smaller steps" if motion.split else ""
         return "converged", f"Every time step found its equilibrium{split}.{level.mended}"
@@ -139,13 +148,13 @@ def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
 
 
 def is_uneven(level: Level) -> bool:
-    """Tell whether a whole motion strains the cable within a span, and far more than where that is watched."""
+    """Tell whether a whole motion strains the cable within a span, and far more than at the points that watch it."""
     least, most = level.motion.slopes
     strain = max(1.0 - least, most - 1.0)
     return not level.motion.stopped and strain > max(STRAINED, FAR_MORE * level.motion.largest_strain)
 
 
 def is_folded(level: Level) -> bool:
-    """Tell whether a whole motion folds the cable within a span: grids may agree on that, and it is none of a cable."""
+    """Tell whether a whole motion folds the cable within a span: grids may agree on it, but no real cable does it."""
     least, most = level.motion.slopes
     return not level.motion.stopped and not (least >= FOLDED and most <= 2.0 - FOLDED)

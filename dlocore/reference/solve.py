@@ -33,7 +33,7 @@ Floats = NDArray[np.float64]
 
 TARGET = 1e-3  # of the length, where no target error is asked for
 FITTED = 0.05  # of the target: by how much the spline may miss the rods, which are to agree to the rest
-UNSEEN = "The time was up before it was seen whether the scene determines its motion."
+UNSEEN = "The time ran out before it was known whether the scene determines its motion."
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,7 @@ def refuse(problem: Problem) -> None:
         reason = "The reference goes through the motion step by step"
         raise SceneError("effects.inertia", "off", '"on" or "auto" with method "reference"', reason)
     if problem.self_contact is not None:
-        reason = "The reference does not know of contact of the cable with itself"
+        reason = "The reference does not simulate contact of the cable with itself"
         raise SceneError(
             "effects.self_contact", effects.get("self_contact", "auto"), '"off", or another method', reason
         )
@@ -228,7 +228,7 @@ def _status(refined: Refined, fitted: Fit, target: float) -> tuple[Status, str]:
     count = len(motion.rod.u) - 1
     moved = f"the last refinement, to {count} elements, moved it by {in_mm(last.change)}"
     if len(refined.levels) == 1:
-        moved = f"one rod of {count} elements, unchecked"
+        moved = f"only one rod, of {count} elements, so its error is not checked"
     if motion.stopped:
         moved = f"it stands still after {motion.times[-1]:.4g} s of {refined.problem.horizon:.4g} s"
     if refined.ended == "agreed":

@@ -1,4 +1,4 @@
-"""Whether a scene determines its motion: a start that is known to a millionth of the length may end anywhere."""
+"""Whether a scene determines its motion, or a change of the start by a millionth of the length leads elsewhere."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -20,20 +20,20 @@ Floats = NDArray[np.float64]
 
 DISTURBED = 1e-6  # of the length: bend of a start
 TURNED = 1e-4  # rad: turn of its sections
-UNDETERMINED = 1e-2  # of the length: what moves by more when its start is bent so much is not determined
-DOUBTFUL = 1e-3  # of the length: what moves by more is told, and may go elsewhere when its start is bent the other way
-UNSEEN = "A disturbance may grow in this motion; the time was up before it was seen how far it takes it."
-_GROWTH = math.log(20.0)  # of a disturbance, as looks at some states tell, from which on it is looked for how much
-_HARDLY = 1e-4  # of the length: a start that is no farther from a line is hardly bent
-_AT_ONCE = 64  # states whose past is looked up at once, which takes memory
+UNDETERMINED = 1e-2  # of the length: a motion that such a bend changes by more is not determined
+DOUBTFUL = 1e-3  # of the length: a motion changed by more is reported, and also checked with the opposite bend
+UNSEEN = "A disturbance may grow in this motion; the time ran out before its effect could be determined."
+_GROWTH = math.log(20.0)  # growth of a disturbance, estimated from some states, from which on its effect is measured
+_HARDLY = 1e-4  # of the length: a start no farther from a straight line is hardly bent
+_AT_ONCE = 64  # states whose history is looked up at once, which takes memory
 _COMPARED = 1025  # states of two motions, at most
 
 
 def bent(problem: Problem, grid: Grid, seed: int) -> Floats:
-    """Return how a start (n_u, nc) [m] is bent: by some half waves of about DISTURBED of the length.
+    """Return the bend of a start (n_u, nc) [m]: some half waves of about DISTURBED of the length.
 
-    With twist its sections are turned, too, by about TURNED, between its ends: what turns over on a table hardly feels
-    that it is bent.
+    With twist its sections are also turned between its ends, by about TURNED: a cable that turns over on a table hardly
+    feels a bend.
     """
     u = np.linspace(0.0, np.pi, grid.n_u)[:, None]
     dimensions = problem.plane.dimensions
@@ -46,14 +46,17 @@ def bent(problem: Problem, grid: Grid, seed: int) -> Floats:
 
 
 def goes_astray(problem: Problem, motion: March, monitor: Monitor, hard: bool) -> float:
-    """Return how far a motion goes elsewhere when its start is bent by DISTURBED of the length [m].
+    """Return how far a motion changes if its start is bent by DISTURBED of the length [m].
 
-    Where a disturbance grows most later on, it is displaced by as much as that begins (`_onset`), too. It is marched
-    once more for that, and again with the opposite bend where that leaves it in doubt (`farther`): where a disturbance
-    may grow, or where tangents can't tell. They can't where the cable strikes something, where it touches
-    or rubs and is `hard`, needed grids beyond the first few, and where it starts so nearly straight that it buckles
-    between any two looks. Not where the start has a bow in a plane and another out of it (`problem/buckling.py`), which
-    is no larger, and of which the answer tells. Else, and where that march finds no equilibrium, it is 0.
+    The motion is marched once more with the bent start, if a disturbance may grow in it, or if tangents can't show
+    that. It is marched again with the opposite bend if the first result is in doubt (`farther`). If a disturbance grows
+    most later on, the cable is also displaced by as much when that growth begins (`_onset`).
+
+    Tangents can't show growth if the cable strikes something, if it touches or rubs and is `hard`, that is, it needed
+    grids beyond the first few, and if it starts so nearly straight that it buckles between any two looks.
+
+    The result is 0 in all other cases, and if the march finds no equilibrium. It is also 0 if the start has a bow in a
+    plane and another out of it (`problem/buckling.py`), which is no larger than the bend and is reported in the answer.
 
     Raises:
         Cancelled: the caller asked to stop.
@@ -76,7 +79,7 @@ def goes_astray(problem: Problem, motion: March, monitor: Monitor, hard: bool) -
             problem, grid.changed(start=start), motion.asked, monitor, rho=motion.rho, whole=True, knocks=knocks
         )
 
-    plain = marched(0.0) if onset > 0.0 else motion  # in the same steps, of which some begin at the onset
+    plain = marched(0.0) if onset > 0.0 else motion  # in the same steps, some of which begin at the onset
     if plain.stopped:
         return 0.0
     at = np.unique(np.linspace(0, len(plain.states) - 1, _COMPARED).round().astype(int))
@@ -92,43 +95,43 @@ def goes_astray(problem: Problem, motion: March, monitor: Monitor, hard: bool) -
 
 
 def farther(moved: Callable[[float], float], length: float) -> float:
-    """Return by how much a bend of a start, moved(1.0), or its opposite, moved(-1.0), moves a motion [m].
+    """Return how far a bend of a start, moved(1.0), or its opposite, moved(-1.0), changes a motion [m].
 
-    The opposite is asked where the first leaves it in doubt: what grows by more than DOUBTFUL may have gone to the same
-    of two sides, only sooner or later.
+    The opposite is tried if the first leaves a doubt: a motion that changes by more than DOUBTFUL may have gone to the
+    same of two sides, only sooner or later.
     """
     first = moved(1.0)
     return max(first, moved(-1.0)) if DOUBTFUL * length < first <= UNDETERMINED * length else first
 
 
 def in_words(problem: Problem, moved: float) -> str:
-    """Return in words that a scene does not determine its motion, which a bend moves by so much [m]."""
+    """Return a message that a scene does not determine its motion, which a bend changes by `moved` [m]."""
     return f"the scene does not determine its motion: {bend_in_words(problem, moved)}"
 
 
 def bend_in_words(problem: Problem, moved: float) -> str:
-    """Return in words that a cable which is hardly bent goes elsewhere by so much [m]."""
+    """Return a message that a tiny bend of the start changes the motion by `moved` [m]."""
     bend = f"{DISTURBED * problem.scene.cable.length * 1e6:.2g} um"
-    turned = "" if problem.twist is None else f" and turned by {TURNED * 1e3:.2g} mrad,"
-    return f"a cable bent by a millionth of the length, {bend},{turned} goes elsewhere by up to {in_mm(moved)}"
+    turned = "" if problem.twist is None else f" and turning its sections by {TURNED * 1e3:.2g} mrad"
+    return f"bending the start by a millionth of the length, {bend},{turned} changes the motion by up to {in_mm(moved)}"
 
 
 def bend_of(start: StartCurve) -> float:
-    """Return how far a start lies from the line between its ends, of its length; infinite where these meet."""
+    """Return how far a start lies from the line between its ends, relative to its length; infinite if the ends meet."""
     ways = start.control_points - start.control_points[0]
     chord = ways[-1]
     return off_line(ways, chord) / float(start.knots[-1]) if chord @ chord > 0.0 else np.inf
 
 
 def _hardly_bent(start: StartCurve) -> bool:
-    """Tell whether a start is nearly straight, and not quite: too little decides on the side to which it buckles."""
+    """Tell whether a start is nearly but not quite straight, so that very little decides where it buckles to."""
     if start.bow or len(start.control_points) <= DEGREE + 1:
         return False
     return FLATNESS < bend_of(start) < _HARDLY
 
 
 def may_grow(problem: Problem, motion: March) -> bool:
-    """Tell whether a disturbance may grow by much in a motion, as tangents of some states tell (eq. 18a)."""
+    """Tell whether a disturbance may grow by much in a motion, judged by the tangents of some states (eq. 18a)."""
     growth = motion.growth
     if growth is None:
         growth = sum(float(rates.mean() * (times[-1] - times[0])) for times, rates in _rates(problem, motion))
@@ -136,9 +139,9 @@ def may_grow(problem: Problem, motion: March) -> bool:
 
 
 def _onset(problem: Problem, motion: March) -> float:
-    """Return when the stretch of a motion begins in which a disturbance grows most [s]; 0 where it grows in none.
+    """Return when the part of a motion begins in which a disturbance grows most [s]; 0 if it grows in none.
 
-    A motion that is damped has forgotten by then what disturbed its start.
+    By then a damped motion has forgotten any disturbance of its start.
     """
     onset = most = grown = begin = 0.0
     for times, rates in _rates(problem, motion):
@@ -151,15 +154,15 @@ def _onset(problem: Problem, motion: March) -> float:
 
 
 def _rates(problem: Problem, motion: March) -> Iterator[tuple[Floats, Floats]]:
-    """Yield times (k + 1,) [s] in each stretch of a motion, and how fast a disturbance grows at most between them.
+    """Yield times (k + 1,) [s] in each stretch of a motion, and the largest growth rates of a disturbance between them.
 
-    The rates (k,) [1/s] are those of the states at the later ones.
+    The rates (k,) [1/s] are those of the states at the end of each interval.
     """
     for window in motion.forces:
         lasts = float(window.times[-1] - window.times[0])
         at = looked_at(len(window.times) - 1, max(2, round(LOOKS * lasts / problem.horizon)))
         step = lasts / (len(window.times) - 1)
-        frequency = 1.0 / step if problem.friction is not None else 0.0  # without friction speeds play no part
+        frequency = 1.0 / step if problem.friction is not None else 0.0  # without friction, speeds play no part
         rates = [
             fastest_growth(
                 problem.axes, window.states[some], frequency * (window.states[some] - window.states[some - 1]),

@@ -1,4 +1,4 @@
-"""How far a motion hangs on the stiffness of contact, which is numerical: what strikes sinks in for an instant."""
+"""How far a motion depends on the contact stiffness, which is numerical: a striking cable sinks in for an instant."""
 
 import numpy as np
 
@@ -11,11 +11,11 @@ FIRMER = 2.0  # times as stiff
 
 
 def gives_way(problem: Problem, motion: March, monitor: Monitor) -> float:
-    """Return how far a motion that strikes something goes elsewhere with contact FIRMER times as stiff [m].
+    """Return how far a motion that strikes something changes with contact FIRMER times as stiff [m].
 
-    What strikes is stopped within a time sqrt(mu/k) (docs/model.md eq. 21), however fine the grid is, so no grid tells
-    of it; a wave that follows may enlarge what that changes. 0 where no step was divided for a strike, and where that
-    march finds no equilibrium.
+    A strike lasts for a time sqrt(mu/k) (docs/model.md eq. 21), however fine the grid is, so no grid shows its effect,
+    and a wave that follows may enlarge it. The result is 0 if no step was divided for a strike, or if the march with
+    stiffer contact finds no equilibrium.
 
     Raises:
         Cancelled: the caller asked to stop.
@@ -32,5 +32,5 @@ def gives_way(problem: Problem, motion: March, monitor: Monitor) -> float:
 
 
 def firmness_in_words(moved: float) -> str:
-    """Return in words that contact which is stiffer takes a motion elsewhere by so much [m]."""
-    return f"contact that is twice as stiff takes the cable elsewhere by up to {in_mm(moved)}"
+    """Return a message that stiffer contact changes the motion by `moved` [m]."""
+    return f"contact twice as stiff changes the motion by up to {in_mm(moved)}"

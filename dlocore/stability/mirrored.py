@@ -1,4 +1,4 @@
-"""Whether a planar motion that is its own mirror image stays so: whether a lopsided cable goes elsewhere."""
+"""Whether a planar motion that is its own mirror image stays so, or a lopsided cable departs from it."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,17 +12,17 @@ from dlocore.spline import design_matrix, greville
 
 Floats = NDArray[np.float64]
 
-MATTERS = 10.0  # times the disturbance: what grows less is as good as symmetric
+MATTERS = 10.0  # times the disturbance: if it grows less, the motion is as good as symmetric
 _EXACT = 1e-7  # of the length: a motion this close to its mirror image is symmetric for the solver too
 _LOOKS = 7  # states of a motion
 _PLACES = 33  # along the cable
 
 
 def goes_elsewhere(problem: Problem, motion: March) -> float:
-    """Return how far a lopsided cable goes elsewhere in a symmetric planar motion [m]; 0 where that does not grow.
+    """Return how far a lopsided cable departs from a symmetric planar motion [m]; 0 if the difference does not grow.
 
-    Its stress-free shape is bent to one side in one half, and to the other in the other, by BOW of the length. It is
-    marched once more from the same start in the same steps.
+    The stress-free shape is bent by BOW of the length, to one side in one half and to the other side in the other. The
+    motion is marched once more from the same start in the same steps.
     """
     length = problem.scene.cable.length
     if problem.plane.dimensions != 2 or motion.stopped or not _is_mirrored(motion, length):
@@ -43,7 +43,7 @@ def goes_elsewhere(problem: Problem, motion: March) -> float:
 
 
 def _is_mirrored(motion: March, length: float) -> bool:
-    """Tell whether a cable is its own mirror image all the time, in the line across the middle between its ends."""
+    """Tell whether a cable is always its own mirror image, in the line across the middle between its ends."""
     places = design_matrix(motion.grid.knots, np.linspace(0.0, length, _PLACES))
     looks = np.linspace(0, len(motion.states) - 1, _LOOKS).astype(int)
     r = np.einsum("pi,kid->kpd", places, motion.states[looks])

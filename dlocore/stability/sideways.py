@@ -28,20 +28,20 @@ from dlocore.stability.determined import bend_of
 
 Floats = NDArray[np.float64]
 
-_FLAT = 1e-2  # of the length: so near to a plane a motion is planar, but for what rounding grows to
-_STRAIGHT = 1e-2  # of the length: a start no farther from a line buckles, where it is pushed, within some steps
-_LOOKS_AT_STRAIGHT = 64  # states of its motion that are looked at, at least
-_NEUTRAL = 1e-4  # of what bends a cable and weighs on it: the stiffness that a start at rest may have of none
-_ROUNDING = 1e-13  # of the largest stiffness: what rounding leaves of none
+_FLAT = 1e-2  # of the length: a motion this near to a plane counts as planar, up to what rounding grows to
+_STRAIGHT = 1e-2  # of the length: a start no farther from a line buckles within some steps if it is pushed
+_LOOKS_AT_STRAIGHT = 64  # states of its motion that are checked, at least
+_NEUTRAL = 1e-4  # of what bends a cable and weighs on it: a stiffness this small may be zero for a start at rest
+_ROUNDING = 1e-13  # of the largest stiffness: a smaller one is rounding
 _COLUMN, _BELOW = np.array([(j, o) for j in range(4) for o in range(4 - j)]).T  # of a lower triangle (4, 4)
-WITH_TWIST = "with effects.twist on or auto"  # a way to have a motion leave its plane
-_FIRM = 1e6  # times the largest stiffness, with which what is held stays in the plane
+WITH_TWIST = "with effects.twist on or auto"  # a way to let a motion leave its plane
+_FIRM = 1e6  # times the largest stiffness: the springs that keep held parts in the plane
 
 
 def leaves_plane(problem: Problem, motion: March) -> bool:
-    """Tell whether a disturbance out of the plane of a motion would grow tenfold in its time.
+    """Tell whether a disturbance out of the plane of a motion would grow tenfold during the motion.
 
-    So it would where the start has settled to an equilibrium that is none of a cable that may leave the plane.
+    This includes a start that has settled on an equilibrium that a cable free to leave the plane does not have.
     """
     grid = motion.grid
     if not (_bends_in_plane(problem) or _may_lie_flat(problem)):
@@ -55,7 +55,7 @@ def leaves_plane(problem: Problem, motion: March) -> bool:
     times, states = motion.times[looks], motion.states[looks]
     leasts = _leasts(problem, grid, states, times.tolist(), motion.behind(times), slack)
     rates = sum((math.sqrt(drag**2 - 4.0 * density * min(least, 0.0)) - drag) / (2.0 * density) for least in leasts)
-    # a straight cable that buckles may do so to any side: until it has, all grow alike
+    # a straight cable may buckle to any side: until it has, disturbances to all sides grow alike
     both = math.log(1.0 / BOW) if problem.start.bow else 0.0
     return rates / len(looks) * problem.horizon > GROWTH + both
 
@@ -63,9 +63,9 @@ def leaves_plane(problem: Problem, motion: March) -> bool:
 def _leasts(
     problem: Problem, grid: Grid, states: Floats, times: list[float], behind: History, slack: float
 ) -> Iterator[float]:
-    """Yield the least stiffness [N/m^2] against leaving their plane of states (k, n, nc) below -slack.
+    """Yield the least stiffness [N/m^2] against leaving the plane, of states (k, n, nc) where it is below -slack.
 
-    What lies `behind` them is a `History` with arrays (1 or k, ...).
+    Their history, `behind`, is a `History` with arrays (1 or k, ...).
     """
     if _bends_in_plane(problem):
         leasts = _leasts_of_lying if _is_weighed_down(problem) else _leasts_of_bent
@@ -90,49 +90,49 @@ def _leasts(
 
 
 def _allowed(slack: float, stiff: Floats, unit: Floats) -> float:
-    """Return the slack, or what rounding leaves of no stiffness, if that is more; of a matrix and a unit, or bands."""
+    """Return the slack, or the rounding of zero stiffness if that is larger, for a matrix and a unit, or bands."""
     return max(slack, _ROUNDING * float(np.abs(stiff).max()) / float(unit.max()))
 
 
 def _firm(stiff: Floats) -> float:
-    """Return the stiffness of springs that hold against one, a matrix or bands of it."""
+    """Return the stiffness of springs that are firm compared with a stiffness, given as a matrix or its bands."""
     return _FIRM * float(np.abs(stiff).max())
 
 
 def may_leave_plane(problem: Problem) -> bool:
-    """Tell whether `leaves_plane` can tell anything of a motion, but for what it may touch on its way."""
+    """Tell whether `leaves_plane` can judge a motion, apart from what the cable may touch on its way."""
     return _bends_in_plane(problem) or not (problem.on_table or problem.rest_plane.dimensions == 3)
 
 
 def lacks_twist(problem: Problem) -> bool:
-    """Tell whether a cable that is bent without stress could not leave its plane, as the scene switches twist off."""
+    """Tell whether a stress-free bent cable could not leave its plane because the scene switches twist off."""
     return problem.scene.effects.get("twist", "auto") == "off" and _bends_in_plane(problem)
 
 
 def solved_in_space(ways: list[str]) -> str:
-    """Return in words that a motion is kept in a plane that it would leave, and the ways to have it leave."""
+    """Return a message that a motion is kept in a plane that it would leave, with the ways to let it leave."""
     return f"{UNSTABLE}: {' and '.join(ways)} it is solved in space"
 
 
 def _bends_in_plane(problem: Problem) -> bool:
-    """Tell whether a cable that is bent without stress moves in a plane that it may leave, or turn over in."""
+    """Tell whether a stress-free bent cable moves in a plane that it may leave, or turn over in."""
     return _may_be_bent(problem) and problem.plane.dimensions == 2 and not problem.start.twisted
 
 
 def _may_lie_flat(problem: Problem) -> bool:
-    """Tell whether a cable that may leave its plane has one, also if it is solved in space."""
+    """Tell whether a cable that may leave its plane has one, even if it is solved in space."""
     leaves = is_looked_at(problem) or _turns_in_plane(problem)
     return leaves and (problem.plane.dimensions == 2 or problem.rest_plane.dimensions == 2)
 
 
 def _turns_in_plane(problem: Problem) -> bool:
-    """Tell whether a cable that is bent without stress is solved in space with twist, and may all the same lie flat."""
+    """Tell whether a stress-free bent cable is solved in space with twist and may nevertheless lie flat."""
     start = problem.start
     return _may_be_bent(problem) and problem.nc == 4 and not (start.aside or start.twisted)
 
 
 def _may_be_bent(problem: Problem) -> bool:
-    """Tell whether the cable may have bends without stress: by its shape, as it yields, or of an earlier motion."""
+    """Tell whether the cable may have stress-free bends: by its shape, by yielding, or from an earlier motion."""
     rest = problem.scene.cable.rest_shape
     bent = not isinstance(rest, str) or rest != "straight"
     return bent or problem.start.material is not None or problem.bending_memory is not None
@@ -141,10 +141,10 @@ def _may_be_bent(problem: Problem) -> bool:
 def _leasts_of_bent(
     problem: Problem, grid: Grid, states: Floats, times: list[float], bends: Floats, slack: float
 ) -> Iterator[float]:
-    """Do what `_leasts` does for a cable that is bent without stress: its sections turn as it leaves the plane.
+    """Do what `_leasts` does for a stress-free bent cable, whose sections turn as it leaves the plane.
 
-    The stiffness is that of the motion in space with twist, in the planar states, against displacements out of the
-    plane and turns of the sections.
+    The stiffness is that of the motion in space with twist, evaluated in the planar states, against displacements out
+    of the plane and turns of the sections.
     """
     elastic = {**problem.scene.effects, "twist": "on", "plasticity": "off"}
     posed = pose(replace(problem.scene, effects=elastic), problem.called_for)
@@ -154,7 +154,7 @@ def _leasts_of_bent(
     for t, flat, natural in zip(times, states, bends, strict=True):
         q = np.zeros((grid.n_u, posed.nc))
         q[:, :3] = posed.plane.points(problem.plane.world(flat))
-        # in a plane the sections turn as the tangent does
+        # in a plane, the sections turn with the tangent
         across = np.cross(normal, space.at(q, 0.0, 1)[:3])
         start_frames(grid.knots, q, space.tables.curvature, across / np.linalg.norm(across), history.past)
         history.memory[:, 0] = natural
@@ -164,9 +164,10 @@ def _leasts_of_bent(
 def _leasts_of_turning(
     problem: Problem, grid: Grid, states: Floats, times: list[float], behind: History, slack: float
 ) -> Iterator[float]:
-    """Do what `_leasts_of_bent` does for a cable that is solved in space with twist: its frames tell how it is turned.
+    """Do what `_leasts_of_bent` does for a cable solved in space with twist: its frames give the section angles.
 
-    What yields does not do so by a small disturbance. A cable that rubs on what it is pressed to does not slip off it.
+    A small disturbance does not make anything yield. A cable that rubs on what it is pressed against does not slip off
+    it.
     """
     active, parameters = problem.law_table()
     active[[laws.BENDING_MEMORY, laws.TWIST_MEMORY, laws.STRETCH_MEMORY, laws.SELF_CONTACT, laws.FRICTION]] = 0
@@ -210,10 +211,10 @@ def _is_weighed_down(problem: Problem) -> bool:
 def _leasts_of_lying(
     problem: Problem, grid: Grid, states: Floats, times: list[float], bends: Floats, slack: float
 ) -> Iterator[float]:
-    """Do what `_leasts` does for a cable that is bent without stress and lies on a table: its sections may turn over.
+    """Do what `_leasts` does for a stress-free bent cable that lies on a table, whose sections may turn over.
 
-    Of the energy of turns p of the sections, the integral over two of EI kappa kappa_0 p^2 + GJ p'^2: the bend kappa_0
-    without stress turns with them. As elsewhere they count as the way D/sqrt(8) p.
+    The energy of turns p of the sections is half the integral of EI kappa kappa_0 p^2 + GJ p'^2: the stress-free bend
+    kappa_0 turns with them. As elsewhere, p counts as the displacement D/sqrt(8) p.
     """
     cable, tables = problem.scene.cable, grid.tables
     first, basis = basis_rows(grid.knots, tables.curvature.u, 1)
@@ -234,7 +235,7 @@ def _leasts_of_lying(
 
 
 def _products(rows: Floats) -> Floats:
-    """Return the products (k, 10) of the four values of each row (k, 4) that a lower band has, in its order."""
+    """Return the products (k, 10) of the four values of each row (k, 4), in the order of a lower band."""
     return np.asarray(rows[:, _COLUMN] * rows[:, _COLUMN + _BELOW])
 
 
@@ -250,15 +251,15 @@ def of_one_time(history: History) -> History:
 
 
 def is_looked_at(problem: Problem) -> bool:
-    """Tell whether the stiffness across its plane is that of a cable that is straight without stress, and may leave."""
+    """Tell whether the stiffness across its plane is that of a straight stress-free cable that may leave the plane."""
     start = problem.start
     return not (problem.on_table or _may_be_bent(problem) or start.aside or start.twisted)
 
 
 def _in_plane(problem: Problem, states: Floats) -> Floats:
-    """Return the coordinates (m, n, 2) in their plane of states (k, n, nc), until they leave it: m = 0 to k.
+    """Return the coordinates (m, n, 2) of states (k, n, nc) in their plane, until they leave it: m = 0 to k.
 
-    It is 0 where there is no plane, or they can't leave it, as on a table.
+    m is 0 if there is no plane or they can't leave it, as on a table.
     """
     if not _may_lie_flat(problem):
         return states[:0]
@@ -273,13 +274,13 @@ def _in_plane(problem: Problem, states: Floats) -> Floats:
 def pose_as_shown(scene: Scene, called_for: Mapping[str, str], control_points: Floats) -> Problem:
     """Return the problem of a motion with control points (n_t, n_u, 4) [m, rad].
 
-    Its start is bowed out of its plane where they begin so, and it may leave a table where its sections turn.
+    Its start is bowed out of its plane if they begin so, and it may leave a table if its sections turn.
     """
     problem = pose(scene, called_for)
     if problem.on_table:
         shown = bool(control_points[..., 3].any())
     else:
-        plane = problem.rest_plane  # in space nothing is off it
+        plane = problem.rest_plane  # in space, nothing is off it
         off = 0.1 * BOW**2 * scene.cable.length + 2.0 * plane.distance(problem.start.control_points)
         shown = plane.dimensions == 2 and plane.distance(control_points[0, :, :3]) > off
     return pose(scene, {**called_for, "side": UNSTABLE}) if shown else problem
@@ -299,7 +300,7 @@ def _elastic(problem: Problem, grid: Grid, flat: Floats) -> Floats:
     moduli = cast(float, cable.bending_stiffness), cast(float, cable.axial_stiffness)
     if not problem.start.bow:
         return np.asarray(stiffness_across(np.ascontiguousarray(flat), tables, *moduli))
-    # sections that turn with the bend of kappa take its natural bend along: EI |kappa - natural| then is the moment
+    # sections that turn with the bend kappa take its stress-free bend along: the moment is then EI |kappa - natural|
     natural = np.linalg.norm(grid.history.memory[:, grid.history.memory.shape[1] // 2 :], axis=1)
     bands = []
     for q in flat:
@@ -313,8 +314,8 @@ def _elastic(problem: Problem, grid: Grid, flat: Floats) -> Floats:
 def slipping_across(problem: Problem, grid: Grid, states: Floats) -> Floats:
     """Return what obstacles add to the stiffness of states (k, n, nc): lower bands (k, n, 4), negative on round ones.
 
-    A cable that is pressed by N on what is round across the plane, with H the curvature of the distance there, slips
-    off it to the side: -N H. Where it rubs it is held.
+    A cable pressed with force N against a surface that is round across the plane, where the distance has curvature H,
+    slips off to the side: the stiffness is -N H. If it rubs, it is held.
     """
     bands = np.zeros((*states.shape[:2], 4))
     if problem.plane.dimensions == 2 or not problem.obstacles or problem.friction is not None:
@@ -347,10 +348,10 @@ def _held_band(grid: Grid, held: list[Grasp], stiffness: float, direction: bool 
 
 
 def _twisting(problem: Problem, grid: Grid, q: Floats, held: list[Grasp]) -> Floats:
-    """Return the stiffness (n, n) that clamps add, which do not let the sections between them turn.
+    """Return the stiffness (n, n) that clamps add because they keep the sections between them from turning.
 
-    A displacement w out of the plane twists a cable of curvature kappa by kappa w' per length; spread evenly over the
-    length l between two clamps that takes the energy GJ/(2 l) (integral of kappa w')^2.
+    A displacement w out of the plane twists a cable of curvature kappa by kappa w' per length. Spread evenly over the
+    length l between two clamps, this takes the energy GJ/(2 l) (integral of kappa w')^2.
     """
     tables, added = grid.tables, np.zeros((len(q), len(q)))
     clamps = sorted(g.u for g in held if g.hold == "clamp")

@@ -1,1 +1,1 @@
-"""Equilibria: where a cable that is held comes to rest."""
+"""Static equilibria: where a held cable comes to rest."""

@@ -1,4 +1,4 @@
-"""A start that has settled on one grid as what the next one begins with."""
+"""Transfer a start that has settled on one grid to the next grid."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,8 @@ from dlocore.shape.shape import SplineCurve, fit_to_knots
 
 Floats = NDArray[np.float64]
 
-_UNEVEN = 0.4  # of |r'| - 1 between the points that watch over the length: of a shape that finer grids do not have
-_ASTRAY = 0.3  # [rad]: a held section that turns out farther from where it was has been turned on the way
+_UNEVEN = 0.4  # of |r'| - 1 between the points that watch the length: the sign of a shape that finer grids do not have
+_ASTRAY = 0.3  # [rad]: a held section that ends up farther from its original angle was turned on the way
 
 
 def starts_folded(grid: Grid) -> bool:
@@ -25,11 +25,11 @@ def starts_folded(grid: Grid) -> bool:
 
 
 def begin_on(problem: Problem, grid: Grid, settled: Grid) -> tuple[Floats, History] | None:
-    """Return the start of a `settled` grid of a problem on another grid: control points (n_u, nc) [m] and a history.
+    """Return the start of a `settled` grid on another grid of the problem: control points (n_u, nc) [m] and a history.
 
-    The frames of its sections are carried there from the given start in one turn, and theta is such that the twist is
-    that of the settled start. None where the two grids are of different kinds, the settled start is folded within a
-    span, or the sections that clamps hold would not be turned as they are.
+    The frames of its sections are carried there from the given start in one turn, and theta is chosen so that the twist
+    is that of the settled start. The result is None if the two grids are of different kinds, if the settled start is
+    folded within a span, or if the sections held by clamps would end up turned.
     """
     dimensions = problem.plane.dimensions
     if settled.start.shape[1] != problem.nc or starts_folded(settled):

@@ -1,4 +1,4 @@
-"""Bring a cable to rest downhill of where it is: it slides in small steps, until friction, if any, holds it."""
+"""Bring a cable to rest downhill of its position: it slides in small steps until friction, if any, holds it."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +19,11 @@ from dlocore.statics.settling import RESTING, STIFFER, Rest
 
 Floats = NDArray[np.float64]
 
-_TOLERANCE = 1e-9  # of the length, on what Newton's method leaves of a step
-_FIRST, _LONG, _LAST = 1e-3, 1e2, 1e3  # steps [s]: the first, long enough to tell rest from creeping, the longest
+_TOLERANCE = 1e-9  # of the length: the residual error of Newton's method in a step
+_FIRST, _LONG, _LAST = 1e-3, 1e2, 1e3  # steps [s]: the first, one long enough to tell rest from creeping, the longest
 _STEPS = 2000  # at most
-_PATIENCE = 64  # steps at most until a length that has failed is tried again: twice as many each time it fails
-_FARTHEST = 0.05  # of the length, in a step: farther the cable might pass through what is in its way
+_PATIENCE = 64  # steps, at most, until a failed length is tried again; the wait doubles each time it fails
+_FARTHEST = 0.05  # of the length, per step: farther, the cable might pass through an obstacle
 _RATES = (
     laws.DAMPING, laws.TWIST_DAMPING, laws.STRETCH_DAMPING, laws.QUADRATIC_DRAG,
     laws.BENDING_MEMORY, laws.TWIST_MEMORY, laws.STRETCH_MEMORY,
@@ -31,12 +31,12 @@ _RATES = (
 
 
 def slide_to_rest(problem: Problem, grid: Grid, monitor: Monitor) -> tuple[Floats, Rest, History]:
-    """Return control points (n_u, nc) [m] at rest with the grasps at their first poses, how, and what lies behind them.
+    """Return control points (n_u, nc) [m] at rest with the grasps at their first poses, the rest, and the history.
 
-    Steps of backward Euler whose velocity is forgotten, each twice as long as the last, but where so long a one has
-    just failed: the cable goes where its energy falls, and friction, whose anchors it drags along, holds it where it
-    can. Nothing yields on the way. Where the cable sinks too deep into something, and might sink through it, it slides
-    again with stiffer contact.
+    The cable takes backward Euler steps, each of which forgets the velocity. Each is twice as long as the last, unless
+    a step of that length has just failed. The cable goes where its energy falls, and friction, whose anchors it drags
+    along, holds it where it can. Nothing yields on the way. If the cable sinks too deep into something, and might sink
+    through it, it slides again with stiffer contact.
 
     Raises:
         Cancelled: the caller asked to stop.
@@ -52,7 +52,7 @@ def slide_to_rest(problem: Problem, grid: Grid, monitor: Monitor) -> tuple[Float
 
 
 def _slid(problem: Problem, grid: Grid, monitor: Monitor) -> tuple[Floats, Rest, History, float]:
-    """Return what `slide_to_rest` does, with the contact at hand, and the largest depth on the way [m]."""
+    """Do what `slide_to_rest` does with the given contact stiffness; return also the largest depth on the way [m]."""
     cable = problem.scene.cable
     active, parameters = firmer(problem, 0.0).law_table()
     active[list(_RATES)] = 0
@@ -91,7 +91,7 @@ def _slid(problem: Problem, grid: Grid, monitor: Monitor) -> tuple[Floats, Rest,
         if moved <= RESTING * length and h >= _LONG:
             rest = "settled"
             break
-        if h > longest:  # what had failed does no longer
+        if h > longest:  # the length that had failed no longer does
             longest, patience = _LAST, 1
         wait = max(wait - 1, 0)
         h = min(2.0 * h, longest if wait > 0 else _LAST)

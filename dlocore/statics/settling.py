@@ -1,4 +1,4 @@
-"""Bring a held cable to rest: relaxations held back by springs, ever weaker ones."""
+"""Bring a held cable to rest by relaxations that are held back by springs, which become weaker and weaker."""
 
 from itertools import pairwise
 from typing import Literal, NamedTuple, cast
@@ -25,45 +25,45 @@ from dlocore.spline import greville
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-Rest = Literal["settled", "restless", "time"]  # at rest; no rest found; the time was up
+Rest = Literal["settled", "restless", "time"]  # at rest; no rest found; out of time
 
-TOLERANCE = 1e-10  # of the length, on the last Newton update
-RESTING = 1e-8  # of the length, as near to the equilibrium as a march solves its steps
-UNDRIVEN = 1e-6  # of what weighs on the cable and bends it: a force that drives nothing
-ROUNDS = 400  # of relaxations, each held back by where it started
+TOLERANCE = 1e-10  # of the length, for the last Newton update
+RESTING = 1e-8  # of the length: as near to the equilibrium as a march solves its steps
+UNDRIVEN = 1e-6  # of the force that weighs on the cable and bends it: a force this small drives nothing
+ROUNDS = 400  # of relaxations, each held back by springs to where it started
 PATH_STEPS = 24  # at least, that bring a grasp to its pose at a later time, or a load to its force
-PATH_ROUNDS = 4  # of relaxations at each of them but the last
-STIFFER = 6  # times that contact is made stiffer
-_ROUNDING = 1e-15  # of the axial stiffness: what it makes of a force
+PATH_ROUNDS = 4  # of relaxations at each of these steps except the last
+STIFFER = 6  # times that contact is made stiffer, at most
+_ROUNDING = 1e-15  # of the axial stiffness: the force that rounding makes of it
 _SPRINGS = 10.0  # times what weighs on the cable and bends it, per length: the springs of the first relaxation
-_CLOSE = 0.05  # of the first update of a relaxation, on the last: the next one follows it
-_WEAK = 2e-3  # of the first springs: those that hold back nothing, and whose relaxations end at TOLERANCE
-_NEARBY = 1e-5  # of them: the springs that a start found on another grid begins with; it needs none as strong as they
-_STRONGEST = 1e6  # times them: the springs that Newton's method alone is tried with
-_STRONGER = 4.0  # times, where it fails
-_COMES_TO_REST = 0.5  # of the relaxation before: a cable that moves less by so much is on its way to rest
+_CLOSE = 0.05  # of the first update of a relaxation: once an update is smaller, the next relaxation follows
+_WEAK = 2e-3  # of the first springs: these hold back nothing, and their relaxations end at TOLERANCE
+_NEARBY = 1e-5  # of the first springs: those for a start that was found on another grid, which needs none so strong
+_STRONGEST = 1e6  # times the first springs: the strongest with which Newton's method alone is tried
+_STRONGER = 4.0  # times, if it fails
+_COMES_TO_REST = 0.5  # of the previous relaxation: a cable that moves less than this is coming to rest
 _ITERATIONS = 60  # of a relaxation with a line search
-_ROUGH = 1e-5  # of the length: the tolerance of the first of those, which others follow
-_YIELDING = 0.8  # of the depth, at most, is left by a stiffer contact where it is one of stiffness
-_FAR = 0.1  # of the length: no farther a grasp moves in one of those steps
-_TURNED = 0.5  # [rad]: nor turns
-_PLACES = 384  # on its path, at least, at which that is looked for
-_CHANGED = 0.25  # of all that a load changes by: a push in between that is no stronger is left out
-_SHORTEST = 1e-9  # of the time: no shorter are the steps that bring the grasps to their poses
+_ROUGH = 1e-5  # of the length: the tolerance of the first of these, which others follow
+_YIELDING = 0.8  # of the depth is left by a stiffer contact, at most, if stiffness was the problem
+_FAR = 0.1  # of the length: the farthest that a grasp moves in one of these steps
+_TURNED = 0.5  # [rad]: the farthest that it turns
+_PLACES = 384  # on its path, at least, at which that is checked
+_CHANGED = 0.25  # of a load's total change: a push in between that is weaker is ignored
+_SHORTEST = 1e-9  # of the time: the shortest steps that bring the grasps to their poses
 
 
 class Settled(NamedTuple):
-    """Where a cable came to rest, or not.
+    """The state in which a cable came to rest, or failed to.
 
     Attributes:
         problem: what was solved: contact may have been made stiffer.
         q: control points (n_u, nc) [m].
-        rest: how they rest.
-        held: what is held of them.
-        history: what lies behind them.
+        rest: whether they rest.
+        held: which of them are held.
+        history: their history.
         at: the grasps are at their poses of this time [s].
         starts: where the paths of the grasps begin.
-        deepest: how deep the control points lay in the table or an obstacle as they were carried there, at most [m].
+        deepest: the largest depth of the control points in the table or an obstacle as they were carried there [m].
     """
 
     problem: Problem
@@ -82,14 +82,14 @@ def settle(
 ) -> Settled:  # fmt: skip
     """Bring the cable to rest from where it is, with the grasps at their poses of time `at` [s].
 
-    Relaxations held back by a spring towards where they started: the first strongly, later ones less, so that a cable
-    without a stable tangent (buckling, free rotation) walks downhill instead of jumping. Each is Newton's method alone,
-    with stronger springs where it fails; where it fails with any, and where something is touched, which makes kinks, it
-    is one with a line search.
+    The relaxations are held back by a spring towards where they started, strongly at first and then less and less, so
+    that a cable without a stable tangent (buckling, free rotation) walks downhill instead of jumping. Each uses
+    Newton's method alone, with stronger springs if that fails. If it fails with any springs, or if something is
+    touched, which makes kinks, the relaxation uses a line search.
 
     Args:
-        begin: control points and history that are near the equilibrium; the start of the grid without.
-        starts: where the paths of the grasps begin; without, on the start.
+        begin: control points and history near the equilibrium; by default the start of the grid.
+        starts: where the paths of the grasps begin; by default on the start.
 
     Raises:
         Cancelled: the caller asked to stop.
@@ -107,9 +107,9 @@ def settle(
 def settle_along(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> Settled:
     """Bring the cable from its start along the paths of its grasps, and to rest at their poses of time `at` [s].
 
-    On the way it is relaxed a little at some times, at more of them where it would be carried through an obstacle, and
-    comes to rest before a gripper closes on it. What nothing holds stays where it is, unless it may touch something.
-    Contact is made stiffer where the cable sinks in by more than DEEPEST.
+    On the way it is relaxed a little at some times, at more of them where it would be carried through an obstacle. It
+    comes to rest before a gripper closes on it. Parts that nothing holds stay where they are, unless they may touch
+    something. Contact is made stiffer if the cable sinks in by more than DEEPEST.
 
     Raises:
         Cancelled: the caller asked to stop.
@@ -142,7 +142,7 @@ def settle_along(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> S
 
 
 def depth(problem: Problem, grid: Grid, q: Floats) -> float:
-    """Return how deep control points q (n_u, nc) lie in the table or an obstacle, at most; 0 in none [m]."""
+    """Return the largest depth of control points q (n_u, nc) in the table or an obstacle; 0 if in none [m]."""
     if problem.contact is None:
         return 0.0
     nodes, unrubbed = grid.tables.contact, np.zeros((0, 3))
@@ -157,7 +157,7 @@ def holding(problem: Problem, grid: Grid, settled: Settled) -> WindowForces:
 
 
 def _with_tension(grid: Grid, history: History) -> History:
-    """Return a history with room for the tension that relaxations take."""
+    """Return a history with room for the tension that relaxations use."""
     if len(history.tension):
         return history
     return history._replace(tension=np.zeros((len(grid.tables.axial.w), COLUMNS)))
@@ -167,9 +167,9 @@ def _relaxed(
     problem: Problem, grid: Grid, q: Floats, history: History, held: Held, applied: Floats, rounds: int, share: float,
     monitor: Monitor,
 ) -> Rest:  # fmt: skip
-    """Relax the control points q (n_u, nc) and their history in place, in so many rounds, and tell how they rest.
+    """Relax the control points q (n_u, nc) and their history in place, in up to `rounds` rounds; return how they rest.
 
-    `share` is that of the first springs to begin with.
+    `share` is the share of the first springs to begin with.
     """
     active, parameters = problem.law_table()
     axes, tables, elimination, offset = problem.axes, grid.tables, held.elimination, held.offsets[-1]
@@ -191,7 +191,7 @@ def _relaxed(
                 0.0 if weak else _CLOSE, TOLERANCE * length, RESTING * length,
             )  # fmt: skip
             if not np.isfinite(update):
-                if near:  # and no weaker springs hold it: at rest, if it is not pushed
+                if near:  # and no weaker springs hold it: at rest, unless it is pushed
                     return "settled"
                 strength *= _STRONGER
                 if share < 1.0 and strength > springs:
@@ -233,7 +233,7 @@ def _relaxed_firmly(
     problem: Problem, grid: Grid, q: Floats, history: History, held: Held, applied: Floats, rounds: int,
     monitor: Monitor,
 ) -> tuple[Problem, Rest]:  # fmt: skip
-    """Do what `_relaxed` does, again with stiffer contact as long as the cable sinks in too deep and that helps.
+    """Do what `_relaxed` does, repeated with stiffer contact while the cable sinks in too deep and that helps.
 
     Returns:
         what was solved, and how the control points rest.
@@ -254,15 +254,15 @@ def _relaxed_firmly(
         taut = stiff_as_taut(tried)
         if again == "time" or taut is None:  # what is this deep was not pushed in
             return problem, again if again == "time" else rest
-        tried = taut  # of what is pulled in, a soft contact stops nothing
+        tried = taut  # soft contact stops nothing that is pulled in
     return problem, rest
 
 
 def _only_turns(problem: Problem, grid: Grid, history: History, before: Floats, q: Floats, applied: Floats) -> bool:
     """Tell whether a relaxation turned the cable as a whole, from `before` to q (n_u, nc), and no force drives that.
 
-    A cable that hangs from a point, or between two, may turn about itself: it is in equilibrium at any angle. Turned as
-    a whole it stores what it did before, if it is straight by nature: what a coarse grid makes of that is no force.
+    A cable that hangs from a point, or between two, may turn about itself: it is in equilibrium at any angle. If it is
+    straight when stress-free, its energy is the same at all angles; a difference on a coarse grid is no force.
     """
     length, dimensions = problem.scene.cable.length, problem.plane.dimensions
     if not _moved_rigidly(before[:, :dimensions], q[:, :dimensions], RESTING * length):
@@ -278,7 +278,7 @@ def _only_turns(problem: Problem, grid: Grid, history: History, before: Floats, 
 
 
 def _moved_rigidly(before: Floats, after: Floats, tolerance: float) -> bool:
-    """Tell whether points (n, 2 or 3) lie within a tolerance [m] of a rigid motion of where they were before."""
+    """Tell whether points (n, 2 or 3) are within a tolerance [m] of a rigid motion of their previous positions."""
     a, b = before - before[0], after - after[0]
     apart = np.sqrt((a * a).sum(axis=1)) - np.sqrt((b * b).sum(axis=1))
     if np.abs(apart).max() > 2.0 * before.shape[1] ** 0.5 * tolerance:  # a distance that no such motion leaves
@@ -291,7 +291,7 @@ def _moved_rigidly(before: Floats, after: Floats, tolerance: float) -> bool:
 def _times(scene: Scene, at: float) -> list[float]:
     """Return the times [s] at which a cable relaxes on its way to the poses of time `at`, the last first.
 
-    Where a gripper closes or opens there are two: with what held until then, and what does from then on.
+    Where a gripper closes or opens there are two: one with what held until then, and one with what holds from then on.
     """
     sudden = [t for g in scene.grasps for t in (g.start, g.release_time) if t is not None and 0.0 < t <= at]
     turns = [t for g in scene.grasps if isinstance(g.path, Waypoints) for t in (g.start + g.path.stops).tolist()]
@@ -302,9 +302,9 @@ def _times(scene: Scene, at: float) -> list[float]:
 
 
 def _steps(grasp: Grasp, at: float, length: float) -> list[float]:
-    """Return times [s] on the way of a grasp until `at`: PATH_STEPS even steps, and more where it goes far in one.
+    """Return times [s] on the way of a grasp until `at`: PATH_STEPS even steps, and more if it goes far in one.
 
-    In none it moves by more than _FAR of the length, or turns by more than _TURNED.
+    In no step does it move by more than _FAR of the length, or turn by more than _TURNED.
     """
     path, lasts = grasp.path, min(at, grasp.release_time or np.inf) - grasp.start
     lasts = min(lasts, path.duration)
@@ -334,9 +334,10 @@ def _steps(grasp: Grasp, at: float, length: float) -> list[float]:
 
 
 def _load_steps(load: Load, at: float) -> list[float]:
-    """Return even times [s] until `at` while a load changes, and when in between it is farthest from what it was.
+    """Return even times [s] until `at` while a load changes, and times of strong pushes in between.
 
-    The latter only where that is _CHANGED of all that it changes by, or more.
+    Such a time is when the load differs most from its value at the even time before, if that is at least _CHANGED of
+    the largest change.
     """
     times = cast(Floats, load.times)
     begin, end = max(0.0, times[0]), min(at, times[-1])
@@ -355,7 +356,7 @@ def _load_steps(load: Load, at: float) -> list[float]:
 
 
 def _carried(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, t: float, q: Floats) -> Floats:
-    """Return control points q (n_u, nc) shifted with the grasps, evenly in between, where they move to at `t` [s].
+    """Return control points q (n_u, nc) shifted with the grasps to their places at `t` [s], evenly in between.
 
     A grasp that moves alone by more than a span folds the cable there, and a fold finer than the quadrature stays.
     """
@@ -380,14 +381,14 @@ def _carried(problem: Problem, grid: Grid, grasps: list[Grasp], starts: Starts, 
 def _is_through(problem: Problem, grid: Grid, before: Floats, carried: Floats) -> bool:
     """Tell whether control points (n_u, nc) were carried past the middle of an obstacle, or nearly.
 
-    Twice as far they would be through it: from within its near half contact pushes the cable back to where it was.
+    Carried twice as far, they would be through it: from within its near half, contact pushes the cable back.
     """
     nodes = grid.tables.contact
     return bool(passes(problem.nc, before, 2.0 * carried - before, nodes, problem.laws[1], nodes.w))
 
 
 def _unbalanced(problem: Problem, grid: Grid, history: History, q: Floats, applied: Floats) -> Floats:
-    """Return the forces (n_u, nc) [N] on the control points q that nothing balances but what holds them."""
+    """Return the forces (n_u, nc) [N] on the control points q that only the grasps balance."""
     active, parameters = problem.laws
     f, nothing = np.empty_like(q), np.empty((1, 1))
     assemble(

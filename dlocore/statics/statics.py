@@ -1,4 +1,4 @@
-"""Static equilibrium alone: the paper's remark after eq. (20), the equations without M and N."""
+"""Static equilibrium alone: the equations without M and N, as in the paper's remark after eq. (20)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -38,16 +38,16 @@ from dlocore.words import in_mm
 
 Floats = NDArray[np.float64]
 
-RESTLESS = "shape.settle"  # the field of the error of a start that finds no rest
+RESTLESS = "shape.settle"  # the field that the error names if a start finds no rest
 LEVELS = (9, 13, 17, 25, 33, 49, 65, 97, 129, 193, 257, 385)
-_WOUND = np.pi  # [rad]: a start that turns by more along its length may have other equilibria beside the one downhill
-_COARSE = 12  # control points: on so few a start may settle to another of several equilibria than on more
-_ELSEWHERE = 0.02  # of the length: farther apart starts may lie in two equilibria
+_WOUND = np.pi  # [rad]: a start that turns more than this along its length may have equilibria beside the one downhill
+_COARSE = 12  # control points: on so few, a start may settle to a different one of several equilibria than on more
+_ELSEWHERE = 0.02  # of the length: starts farther apart than this may be different equilibria
 _FAR = 0.05  # of the length: a start that settles no farther away has hardly passed by another equilibrium
-_TELLING = 13  # control points, of a start that is settled twice to see whether it tells to which side it goes
-_IN_SPANS = np.array([0.0, 0.25, 0.5, 0.75])  # parts of each span of both grids at which they are compared
-_LEFT = 1.5  # times its distance to the force on the grid before is the error of a force, as in motions
-_FINER = (1.5, 2.0)  # times the control points, with which a start that finds no rest may
+_TELLING = 13  # control points of a start that is settled twice, to see whether the side it goes to is determined
+_IN_SPANS = np.array([0.0, 0.25, 0.5, 0.75])  # fractions of each span of both grids at which they are compared
+_LEFT = 1.5  # times the difference to the grid before: the error of a force, as for motions
+_FINER = (1.5, 2.0)  # times the control points: grids on which a start that finds no rest may find one
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,14 +59,13 @@ class Equilibrium:
         message: the status in words.
         control_points: (n_u, 4) [m, m, m, rad].
         knots_u: (n_u + 4,) [m].
-        reactions: force of each grasp, in the scene's order (grasps, 3) [N]; zero where it is open.
+        reactions: force of each grasp, in the scene's order (grasps, 3) [N]; zero if it is open.
         moments: moment of each grasp (grasps, 3) [N m].
-        reaction_errors: how far each of the reactions may be off, as the grid before tells (grasps,) [N]; None where
-            n_u was given.
-        moment_errors: the same of the moments (grasps,) [N m].
+        reaction_errors: estimated error of each reaction, from the grid before (grasps,) [N]; None if n_u was given.
+        moment_errors: the same for the moments (grasps,) [N m].
         energy: elastic energy [J].
-        error_estimate: largest distance to the grid before, and how far unit length at its ends keeps a stretched
-            cable from where it would be [m]; None where n_u was given.
+        error_estimate: largest distance to the grid before, plus how far unit length at its ends keeps a stretched
+            cable from its true position [m]; None if n_u was given.
     """
 
     status: Status
@@ -100,16 +99,17 @@ def equilibrium(
 ) -> Equilibrium:
     """Find the static equilibrium of a scene's cable with its grasps at their poses of time `at`.
 
-    The cable is brought there from its start shape along the grasps' paths, so that of several equilibria the one is
-    found that it would slowly reach; a gripper that closes later holds it where it has come to rest. Without a given
-    `n_u` grids are refined until two agree to a tenth of a per mille of the length, or to the scene's `target_error`.
+    The cable is brought there from its start shape along the paths of the grasps. So if there are several equilibria,
+    the result is the one that it would slowly reach. A gripper that closes later holds the cable where it has come to
+    rest. Without a given `n_u`, grids are refined until two agree to a tenth of a per mille of the length, or to the
+    scene's `target_error`.
 
     Args:
         scene: its horizon, inertia, drag, damping, friction and plasticity play no part.
-        at: time of the grasps' poses and of the loads [s]; of a load that jumps then, the force before it.
-        n_u: number of control points, as many as the scene needs at least, 385 at most; None: chosen.
+        at: time of the grasps' poses and of the loads [s]; for a load that jumps then, the force before the jump.
+        n_u: number of control points, at least as many as the scene needs and at most 385; None: chosen.
         deadline: time allowed [s].
-        cancelled: asked between relaxations; where it returns True the solve stops.
+        cancelled: called between relaxations; if it returns True the solve stops.
 
     Raises:
         SceneError: bad input, or nothing holds the cable against its weight.
@@ -140,7 +140,7 @@ def equilibrium(
     sides = [*side_notes(problem.start), *tip_notes(rest.grid.tipped, scene.cable.length)]
     notes += sides
     if problem.friction is not None:
-        notes.append("friction is left out, which holds a cable where it came to lie")
+        notes.append("friction is left out, though it can hold a cable where it came to lie")
     grid, q, history, problem = rest.grid, rest.settled.q, rest.settled.history, rest.settled.problem
     sunk = _sunk(grid, rest.settled)
     if DEEPEST < sunk <= TOO_DEEP:
@@ -170,7 +170,7 @@ def equilibrium(
 
 
 def _is_driven(problem: Problem, at: float) -> bool:
-    """Tell whether forces act on a cable at the time `at` [s] other than such as press it on to the table."""
+    """Tell whether forces other than those that press it onto the table act on a cable at the time `at` [s]."""
     weight = problem.plane.world_vectors(problem.weight()[None, : problem.plane.dimensions])
     forces = np.vstack([weight, *(load.at(np.array([at])) for load in problem.scene.loads)])
     if problem.on_table or problem.table is not None:
@@ -179,12 +179,12 @@ def _is_driven(problem: Problem, at: float) -> bool:
 
 
 class _Rest(NamedTuple):
-    """What `settle` found on the last of some grids, and on the one before it if there is one, and what to say of it.
+    """The result of `settle` on the last of some grids and on the one before it, if there is one, with its message.
 
     Attributes:
         found: the grids and what they settled to, the finest last.
-        status, message: of that.
-        change: how far it is from the one before [m].
+        status, message: of the result.
+        change: its distance to the result on the grid before [m].
     """
 
     found: tuple[tuple[Grid, Settled], ...]
@@ -222,10 +222,10 @@ def _refined(problem: Problem, sizes: list[int], at: float, target: float, monit
         status = "stalled"
         message = "The relaxation did not come to rest. The scene may have no equilibrium, or many side by side."
     elif _is_folded(grid, settled):
-        status, message = "stalled", "The cable is folded finer than its control points can show. Take more of them."
+        status, message = "stalled", "The cable is folded finer than its control points can show. Use more of them."
     elif _strain(grid, settled) > TORN:
         status = "stalled"
-        message = f"The cable is strained along itself by {_strain(grid, settled):.0%}, which no cable follows. "
+        message = f"The cable is strained along itself by {_strain(grid, settled):.0%}, which no cable can follow. "
         message += _loosened(problem.scene, at)
     elif _sunk(grid, settled) > TOO_DEEP:
         status = "stalled"
@@ -248,14 +248,14 @@ def _agreed(change: float) -> str:
 
 
 def _without_bow(rest: _Rest, at: float, target: float, monitor: Monitor) -> _Rest:
-    """Return what a cable comes to from its rest without the stress-free bow that showed it a side to buckle to.
+    """Return the rest of a cable after its stress-free bow, which gave it a side to buckle to, is removed.
 
-    It is the rest itself where grids find none without, or do not agree on it to the target [m].
+    It is the given rest if no rest is found without the bow, or if grids do not agree on it to the target [m].
     """
     found = []
     for grid, settled in rest.found:
         history = History(*(x.copy() for x in settled.history))
-        history.memory[:] = 0.0  # a cable that is given a bow is straight without stress
+        history.memory[:] = 0.0  # a cable that is given a bow is straight when stress-free
         straight = settle(settled.problem, grid, at, monitor, (settled.q.copy(), history), settled.starts)
         if straight.rest != "settled":
             return rest
@@ -267,22 +267,22 @@ def _without_bow(rest: _Rest, at: float, target: float, monitor: Monitor) -> _Re
 
 
 def _held(grid: Grid, settled: Settled) -> tuple[Floats, Floats]:
-    """Return the force [N] and the moment [N m] of each grasp on a cable that has settled, (grasps, 3) each."""
+    """Return the force [N] and the moment [N m] of each grasp on a settled cable, (grasps, 3) each."""
     held = reactions(settled.problem, grid, (holding(settled.problem, grid, settled),))
     force, moment = ([getattr(g, name)[-1] for g in held] for name in ("reaction", "moment"))
     return np.array(force).reshape(-1, 3), np.array(moment).reshape(-1, 3)
 
 
 def _is_folded(grid: Grid, settled: Settled) -> bool:
-    """Tell whether a cable came to rest folded within a span, which no energy sees."""
+    """Tell whether a cable came to rest folded within a span, which its energy does not see."""
     points = grid.tables.curvature
     return not slopes(settled.q[None], 1, points.first, points.b1)[0] >= FOLDED
 
 
 def _apart(coarse: Grid, before: Settled, grid: Grid, settled: Settled) -> float:
-    """Return how far a cable that has settled on a grid lies from where it did on a coarser one, at most [m].
+    """Return the largest distance between a cable that settled on a grid and on a coarser one [m].
 
-    What unit length at held ends takes counts besides: two grids tell a part of that only.
+    The effect of unit length at held ends is added, because two grids show only part of it.
     """
     cuts, dimensions = np.union1d(coarse.knots, grid.knots), settled.problem.plane.dimensions
     u = (cuts[:-1, None] + np.diff(cuts)[:, None] * _IN_SPANS).ravel()
@@ -293,25 +293,25 @@ def _apart(coarse: Grid, before: Settled, grid: Grid, settled: Settled) -> float
 
 
 def _strain(grid: Grid, settled: Settled) -> float:
-    """Return the largest axial strain of a cable that has settled."""
+    """Return the largest axial strain of a settled cable."""
     return grid.largest_strain(settled.q[None, :, : settled.problem.plane.dimensions])
 
 
 def _loosened(scene: Scene, at: float) -> str:
-    """Return in words what strains a cable less under the grasps of the time `at`."""
+    """Return advice on how to strain a cable less under the grasps of the time `at`."""
     if len(closed_grasps(scene, at, at)) > 1:
-        return "Bring the grasps no farther apart than the cable between them."
+        return "Bring the grasps no farther apart than the length of cable between them."
     stiffness = cast(float, scene.cable.axial_stiffness)
     return f"Its axial stiffness is {stiffness:.3g} N: give it more, or less mass, weight or load."
 
 
 def _sunk(grid: Grid, settled: Settled) -> float:
-    """Return how deep a cable that has settled lies in what it touches, in parts of its diameter."""
+    """Return how deep a settled cable lies in what it touches, as a fraction of its diameter."""
     return depth(settled.problem, grid, settled.q) / settled.problem.scene.cable.diameter
 
 
 def _rested(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> tuple[Grid, Settled]:
-    """Return a grid, and the rest that its start comes to and stays in, under the grasps and loads of the time `at`."""
+    """Return a grid, and the rest that its start comes to and stays in under the grasps and loads of the time `at`."""
     settled = settle_along(problem, grid, at, monitor)
     if settled.rest != "settled":
         return grid, settled
@@ -320,11 +320,11 @@ def _rested(problem: Problem, grid: Grid, at: float, monitor: Monitor) -> tuple[
 
 
 def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None = None) -> Grid:
-    """Return the grid of a motion's start: settled to equilibrium where the scene asks for it.
+    """Return the grid of a motion's start, settled to equilibrium if the scene requests it.
 
-    Where a grid `like` it, of the same problem, has settled, the start is settled from there: of several equilibria it
-    is the same one, and near. Where none has, and this one finds no rest from the given start, or folds within a span,
-    it is settled from that of a finer grid.
+    If a grid `like` it, of the same problem, has settled, the start settles from there, so that it reaches the same one
+    of several equilibria, and is near it. If none has, and this one finds no rest from the given start or folds within
+    a span, it settles from the start of a finer grid.
 
     Raises:
         SceneError: the start was to settle and found no equilibrium.
@@ -345,10 +345,11 @@ def start_grid(problem: Problem, n_u: int, monitor: Monitor, like: Grid | None =
 
 
 def settles_elsewhere(problem: Problem, settled: Grid, monitor: Monitor) -> float:
-    """Return how far apart a start settles that is bent by DISTURBED of the length to one side and to the other [m].
+    """Return the distance between the rests of a start that is bent by DISTURBED of the length to either side [m].
 
-    It is 0 where it did not go far to where it is `settled`, where friction holds it, and where it finds no rest. An S
-    between two pins may go to either side of the line between them. A coarse grid tells.
+    For example, an S between two pins may go to either side of the line between them. A coarse grid is enough to see
+    it. The result is 0 if the start did not move far to where it is `settled`, if friction holds it, and if it finds no
+    rest.
 
     Raises:
         Cancelled: the caller asked to stop.
@@ -366,7 +367,7 @@ def settles_elsewhere(problem: Problem, settled: Grid, monitor: Monitor) -> floa
 
 
 def _rests_apart(problem: Problem, rest: _Rest, at: float, monitor: Monitor) -> float:
-    """Return the same of an equilibrium under the grasps and loads of the time `at` [m]."""
+    """Return the same distance for an equilibrium under the grasps and loads of the time `at` [m]."""
 
     def rest_of(start: Grid) -> Floats | None:
         other = _rested(problem, start, at, monitor)[1]
@@ -376,9 +377,9 @@ def _rests_apart(problem: Problem, rest: _Rest, at: float, monitor: Monitor) -> 
 
 
 def _to_two_sides(problem: Problem, grid: Grid, q: Floats, rest_of: Callable[[Grid], Floats | None]) -> float:
-    """Return how far apart the rests of a start are that is bent to either side, if it went far to `q` on `grid` [m].
+    """Return the distance between the rests of a start bent to either side, if it moved far to `q` on `grid` [m].
 
-    `rest_of` returns the control points of a start's rest on a grid, None where it finds none.
+    `rest_of` returns the control points of a start's rest on a grid; None if it finds none.
     """
     u = np.linspace(0.0, problem.scene.cable.length, 33)
     dimensions = problem.plane.dimensions
@@ -396,19 +397,19 @@ def _to_two_sides(problem: Problem, grid: Grid, q: Floats, rest_of: Callable[[Gr
 
 
 def _settled(problem: Problem, grid: Grid, monitor: Monitor, like: Grid | None) -> Grid | None:
-    """Return a grid with its start settled where it stays, or None where it finds no rest; see `_at_rest`."""
+    """Return a grid whose start is settled and stays at rest; None if it finds no rest; see `_at_rest`."""
     found = _at_rest(problem, grid, monitor, like)
     return None if found is None else tipped(problem, found, monitor)
 
 
 def _at_rest(problem: Problem, grid: Grid, monitor: Monitor, like: Grid | None) -> Grid | None:
-    """Return a grid with its start settled, first from that of a grid like it, or None where it finds no rest.
+    """Return a grid with its start settled, if possible from that of a grid like it; None if it finds no rest.
 
-    What friction holds depends on the way, and of several equilibria that a wound start may have, or one with obstacles
-    below it, relaxations may jump to another: such starts slide downhill from the given one, on every grid. One that
-    folds within a span as it slides, which no energy sees, relaxes all the same where nothing is in its way. Where the
-    grid like it is coarse and its start went far, this one settles from the given start too, and that counts if it is
-    another equilibrium.
+    Where friction holds a cable depends on the way it took. If a start is wound or has obstacles below it, relaxations
+    may jump to a different one of several equilibria. Such starts slide downhill from the given start, on every grid. A
+    start that folds within a span as it slides, which the energy does not see, is relaxed all the same if nothing is in
+    its way. If the similar grid is coarse and its start moved far, this start is settled from the given one too, and
+    the result is used if it is a different equilibrium.
     """
     slid: Grid | None = None
     if problem.friction is not None or problem.obstacles or problem.start.turning > _WOUND:
@@ -431,7 +432,7 @@ def _at_rest(problem: Problem, grid: Grid, monitor: Monitor, like: Grid | None) 
 
 
 def _is_elsewhere(problem: Problem, one: Floats, other: Floats) -> bool:
-    """Tell whether control points (n_u, nc) of two starts on one grid may lie in two equilibria."""
+    """Tell whether control points (n_u, nc) of two starts on one grid may be in different equilibria."""
     apart = (one - other)[:, : problem.plane.dimensions]
     return float(np.abs(apart).max()) > _ELSEWHERE * problem.scene.cable.length
 
@@ -439,6 +440,6 @@ def _is_elsewhere(problem: Problem, one: Floats, other: Floats) -> bool:
 def _is_wanting(problem: Problem, start: Grid | None) -> bool:
     """Tell whether a start found no rest, or a fold within a span that a relaxation may unfold.
 
-    Over an obstacle it may not: it would take the cable through it.
+    Over an obstacle it may not, because it would take the cable through the obstacle.
     """
     return start is None or (problem.friction is None and not problem.obstacles and starts_folded(start))

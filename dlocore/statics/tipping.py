@@ -1,7 +1,7 @@
-"""Starts that settle on an equilibrium that any disturbance leaves: they are tipped off it, and settle on.
+"""Starts that settle on an unstable equilibrium: they are tipped off it and settle further.
 
-An arch that stands on two points that let it turn, as a start that is symmetric to the vertical slides up to: forces
-balance there, and no cable stays. The tangent K of such a state has a negative eigenvalue.
+An example is an arch that stands on two points that let it turn. A start that is symmetric to the vertical slides up to
+it: the forces balance there, but no cable stays. The tangent K of such a state has a negative eigenvalue.
 """
 
 import numpy as np
@@ -23,31 +23,29 @@ from dlocore.words import in_mm
 
 Floats = NDArray[np.float64]
 
-TIPPED = "at rest the cable stands on an equilibrium that any disturbance leaves"
-_SLACK = 1e-4  # of what weighs on the cable and bends it: a stiffness that rounding may make of none
-_STIFFER = 4.0  # times: the springs that are tried until they hold the cable
-_SPRINGS = 20  # of them
-_ITERATIONS = 30  # to the way in which it falls
-_SIDE = np.array([1.0, 0.7, 0.4])  # in which it falls, rather than the other way: the same on every grid
-_LOPSIDED = 0.37  # more of the end than of the beginning, which may go to two sides
+TIPPED = "at rest the cable stands on an unstable equilibrium"
+_SLACK = 1e-4  # of what weighs on the cable and bends it: a stiffness that may be rounding
+_STIFFER = 4.0  # times: factor between the springs that are tried until they hold the cable
+_SPRINGS = 20  # tried, at most
+_ITERATIONS = 30  # of the search for the way in which it falls
+_SIDE = np.array([1.0, 0.7, 0.4])  # the side to which it falls, of two opposite ones: the same on every grid
+_LOPSIDED = 0.37  # the end counts more than the beginning by this, since they may go to opposite sides
 _FALLS = 3  # from one such equilibrium to another, at most
 
 
 def tipped(problem: Problem, grid: Grid, monitor: Monitor, at: float = 0.0, starts: Starts | None = None) -> Grid:
-    """Return a grid that has settled, free of contact, tipped off where it would fall and settled on.
+    """Return a settled grid, free of contact, tipped off an equilibrium where it would fall and settled further.
 
-    One that lies in a plane, and of which `stability/sideways.py` tells whether it leaves that, is left to it. So is
-    one that friction holds.
-
-    The tip is one of `BOW` of the length, in the shape of the fastest fall. Where it finds no rest after it, or falls
-    again and again, the grid is returned as it is.
+    The tip is `BOW` of the length, in the shape of the fastest fall. If it finds no rest after it, or falls again and
+    again, the grid is returned as it is. A start is not tipped if friction holds it, or if it lies in a plane and
+    `stability/sideways.py` decides whether it leaves that.
 
     Args:
         problem: the equations.
         grid: the grid.
-        monitor: that of the solve.
+        monitor: of the solve.
         at: the grasps are at their poses of this time [s].
-        starts: where the paths of the grasps begin; without, all at t = 0.
+        starts: where the paths of the grasps begin; by default all at t = 0.
 
     Raises:
         Cancelled: the caller asked to stop.
@@ -68,29 +66,29 @@ def tipped(problem: Problem, grid: Grid, monitor: Monitor, at: float = 0.0, star
 
 
 def may_fall(problem: Problem) -> bool:
-    """Tell whether a start of a problem is tipped where it would fall."""
-    # one that is straight by nature and lies in a plane that it may leave is given a bow if `is_unstable` tells so
+    """Tell whether a start of a problem is to be tipped if it would fall."""
+    # a straight stress-free cable in a plane that it may leave is given a bow instead, if `is_unstable` says so
     bowed = problem.plane.dimensions == 3 and problem.rest_plane.dimensions == 2 and is_looked_at(problem)
     return not problem.touches and not bowed
 
 
 def to_a_side(u: Floats) -> Floats:
-    """Return displacements (n, 3) along a cable at u (n,), in parts of its length: a start falls to their side."""
+    """Return displacements (n, 3) along a cable at u (n,), relative to its length: a start falls to their side."""
     return (1.0 + _LOPSIDED * u)[:, None] * _SIDE
 
 
 def tip_notes(tipped: bool, length: float) -> list[str]:
-    """Return what is to be known of a start that was tipped, in words; `length` [m] is that of the cable."""
+    """Return the notes about a start that was tipped; `length` [m] is that of the cable."""
     tip = f"it is tipped by {in_mm(BOW * length)}, and another side may be as likely"
     return [f"{TIPPED}: {tip}"] if tipped else []
 
 
 def falls(problem: Problem, grid: Grid, at: float = 0.0, starts: Starts | None = None) -> Floats | None:
-    """Return the way (n_u, nc) in which a start at rest falls, or None where it stays; see `tipped`.
+    """Return the direction (n_u, nc) in which a start at rest falls, or None if it stays; see `tipped`.
 
-    Its largest displacement is one, or less where sections turn by more than that over the length. It is the
-    eigenvector of the least eigenvalue of its tangent, if that is negative: found by inverse iteration, held by springs
-    just strong enough for it to stay.
+    Its largest displacement is one, or less if sections turn by more than that over the length. It is the eigenvector
+    of the least eigenvalue of the tangent, if that is negative. It is found by inverse iteration, with springs just
+    strong enough to hold the cable.
     """
     cable, nc, q, dimensions = problem.scene.cable, problem.nc, grid.start, problem.plane.dimensions
     grasps = closed_grasps(problem.scene, at, at)
@@ -98,7 +96,7 @@ def falls(problem: Problem, grid: Grid, at: float = 0.0, starts: Starts | None =
     close_grasps(problem, grid, grasps, starts, q)
     elimination = hold(problem, grid, grasps, np.full(2, at), starts, q).elimination
     active, parameters = problem.law_table()
-    pull = float(np.abs(applied_at_rest(problem, grid, at)).max())  # of any control point [N]
+    pull = float(np.abs(applied_at_rest(problem, grid, at)).max())  # largest force on any control point [N]
 
     def pushed(springs: float, right: Floats) -> Floats | None:
         f, K = np.empty_like(q), np.empty((q.size, 4 * nc))
@@ -129,5 +127,5 @@ def falls(problem: Problem, grid: Grid, at: float = 0.0, starts: Starts | None =
         assert moved is not None, "these springs hold it"
         size = float(np.abs(moved[:, :dimensions]).max())
         way = moved / max(size, turn * float(np.abs(moved[:, dimensions:]).max(initial=0.0)))
-    farthest = np.sum(way**2, axis=1, keepdims=True)  # it falls where it goes farthest, however it waves elsewhere
+    farthest = np.sum(way**2, axis=1, keepdims=True)  # it falls to where it moves farthest, whatever it does elsewhere
     return way if float(np.sum(farthest * way * side)) >= 0.0 else -way

@@ -1,4 +1,4 @@
-"""Starts that settle to one of many directions: nothing holds them from turning as a whole, and on the way they do."""
+"""Starts that may settle in any of many directions, because nothing keeps them from turning as a whole on the way."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,16 +10,16 @@ from dlocore.spline import design_matrix
 
 Floats = NDArray[np.float64]
 
-_FLAT = 1e-6  # of the length: points so near to a line, or a plane, lie in it
-_MOVES = 1e-3  # of the length: a start that settles within this of the given one hardly turns
+_FLAT = 1e-6  # of the length: points this near to a line, or a plane, lie in it
+_MOVES = 1e-3  # of the length: a start that settles within this of the given one has hardly turned
 _LOOKS = 33
 
 
 def turns_freely(problem: Problem) -> str:
-    """Return in words what a start that settles may turn about, as nothing holds it from that, or "".
+    """Return in words what a start that settles may turn about because nothing prevents it, or "".
 
-    That is the vertical through a grasp that holds a position, or through several above each other; without weight the
-    line through such grasps, or a single one. A start in a plane through that line turns to neither side.
+    This is the vertical through a grasp that holds a position, or through several above each other; without weight it
+    is the line through such grasps, or a single grasp. A start in a plane through that line turns to neither side.
     """
     scene = problem.scene
     held = closed_grasps(scene, 0.0, 0.0)
@@ -48,7 +48,7 @@ def turns_freely(problem: Problem) -> str:
 
 
 def turn_notes(problem: Problem, grid: Grid) -> list[str]:
-    """Return in words that the direction in which the start of a grid has come to rest is one of many."""
+    """Return a note if the direction in which the start of a grid has come to rest is one of many."""
     about = turns_freely(problem)
     if not about:
         return []
@@ -57,4 +57,4 @@ def turn_notes(problem: Problem, grid: Grid) -> list[str]:
     moved = problem.plane.world(at_rest) - problem.start(u)
     if np.linalg.norm(moved, axis=1).max() <= _MOVES * problem.scene.cable.length:
         return []
-    return [f"nothing holds the start from turning about {about}: where to it turns as it settles depends on the way"]
+    return [f"nothing keeps the start from turning about {about}: how far it turns as it settles depends on the way"]

@@ -1,4 +1,4 @@
-"""Rests in which a cable would yield: nothing yields on the way to them."""
+"""Rests in which a cable would yield, because nothing yields on the way to them."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,13 +11,13 @@ from dlocore.problem.problem import Problem
 
 Floats = NDArray[np.float64]
 
-_MORE = 1.01  # times what it yields at: a cable that has yielded as far as it does is not told to
+_MORE = 1.01  # times the yield limit: a cable that has yielded as far as it will is not reported
 
 
 def yield_notes(problem: Problem, grid: Grid, q: Floats, history: History) -> list[str]:
-    """Return in words that control points q (n_u, nc) at rest are strained by more than what the cable yields at.
+    """Return a note if control points q (n_u, nc) at rest are strained by more than the yield limit of the cable.
 
-    `history` is what lies behind them. What is left of a strain that has yielded before counts (docs/model.md eq. 20).
+    `history` is their history. For a strain that has yielded before, what is left of it counts (docs/model.md eq. 20).
     """
     cable = problem.scene.cable
     memory, natural = np.split(history.memory, 2, axis=1)
@@ -39,7 +39,7 @@ def yield_notes(problem: Problem, grid: Grid, q: Floats, history: History) -> li
     ):
         if limit is not None and most > _MORE * limit:
             found.append(
-                f"nothing yields as the cable settles: at rest it is {how} by {most:.3g}{unit}, and it yields at "
+                f"yielding is left out as the cable settles: at rest it is {how} by {most:.3g}{unit}, but it yields at "
                 f"{limit:.3g}{unit}"
             )
     return found

@@ -164,9 +164,7 @@ def test_a_least_squares_that_does_not_converge_is_answered_by_a_march(
     message = capsys.readouterr().err
     assert message.startswith("converged: ")
     assert "method   march, 17 x 41" in message
-    assert (
-        "A march is the answer in place of the least squares that was asked for, which did not converge in" in message
-    )
+    assert "A march gives the answer instead of the requested least squares, which did not converge in" in message
     answer = json.loads(document.read_text())
     assert (answer["status"], answer["accuracy"]["method"]) == ("converged", "march")
     assert answer["accuracy"]["error_estimate"] > 0

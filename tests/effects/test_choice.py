@@ -277,4 +277,4 @@ def test_a_slow_motion_that_has_no_equilibrium_to_go_on_to_is_solved_with_inerti
     assert prediction.status == "converged", prediction.message
     active, reason = effect(prediction, "inertia")
     assert active
-    assert "no equilibrium to go on to" in reason
+    assert "no equilibrium to continue to" in reason

@@ -251,7 +251,7 @@ def test_a_motion_like_it_that_its_scene_does_not_determine_is_no_success():
     assert before.status == "converged"
     again = predict(pushed(5e-4), like=before)
     assert again.status == "stalled"
-    assert f"{AFRESH}On the grid of one like it the scene does not determine its motion" in again.message
+    assert f"{AFRESH}On the grid of the similar motion the scene does not determine its motion" in again.message
     assert again.accuracy.error_parts["start"] > UNDETERMINED
 
 

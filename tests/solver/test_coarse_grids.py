@@ -26,7 +26,7 @@ from tests.solver.scenes import paper_scene
 
 GRID = Quality(n_u=9, n_t=13, method="march")
 FREE = Quality(target_error=AUTO_ENOUGH)  # the cable is one metre long
-ASKED = "The 9 x 13 control points that were asked for err by an estimated"
+ASKED = "The requested 9 x 13 control points err by an estimated"
 
 
 def scene(quality: Quality, EI: float = 1e-4) -> Scene:
@@ -60,7 +60,7 @@ def test_the_finer_grid_is_the_answer_and_the_message_tells(own: Prediction, fre
     np.testing.assert_array_equal(found.surface.control_points, free.surface.control_points)
     assert f"{ASKED} {own.accuracy.error_estimate * 1e3:.2g} mm, which took" in found.message
     assert own.said in found.message
-    assert f"This is the answer on {size(free)[0]} x {size(free)[1]}, with an estimated error of" in found.message
+    assert f"This answer is on {size(free)[0]} x {size(free)[1]}, with an estimated error of" in found.message
     sizes = [(i.n_u, i.n_t) for i in found.iterations]
     assert sizes == [(i.n_u, i.n_t) for i in (*own.iterations, *free.iterations)]
 
@@ -69,7 +69,7 @@ def test_a_grid_that_errs_by_less_is_kept():
     found = predict(scene(GRID, EI=1e-3))
     assert size(found) == (9, 13)
     assert 1e-3 < found.accuracy.error_estimate < AUTO_ENOUGH
-    assert "asked for" not in found.message
+    assert "requested" not in found.message
 
 
 def test_what_was_left_out_is_not_laid_to_the_grid(own: Prediction):
@@ -112,7 +112,7 @@ def test_a_least_squares_that_errs_leaves_the_answer_to_a_march(free: Prediction
     assert kept.said in found.message
     again = predict(scene(asked), like=found)
     assert len(again.iterations) == 1
-    assert "The least squares that was asked for was left before: this is a march." in again.message
+    assert "The requested least squares did not suffice for a similar scene: this is a march." in again.message
 
 
 def test_a_motion_like_it_goes_on_on_the_finer_grid():
@@ -122,7 +122,7 @@ def test_a_motion_like_it_goes_on_on_the_finer_grid():
     assert again.scene is moved
     assert len(again.iterations) == 1
     assert size(again) == size(before) == size(predict(moved))
-    assert "were left before" in again.message
+    assert "control points did not suffice for a similar scene" in again.message
 
 
 def test_finer_grids_that_do_no_better_are_tried_once():
@@ -133,7 +133,7 @@ def test_finer_grids_that_do_no_better_are_tried_once():
     assert len(seen) == len(found.iterations) > len(own.iterations)
     np.testing.assert_array_equal(found.surface.control_points, own.surface.control_points)
     assert found.accuracy.error_estimate == own.accuracy.error_estimate > AUTO_ENOUGH * asked.cable.length
-    told = f"as it errs by an estimated {own.accuracy.error_estimate * 1e3:.2g} mm, and do not converge: "
+    told = f"as it errs by an estimated {own.accuracy.error_estimate * 1e3:.2g} mm, but do not converge: "
     assert found.said.startswith(own.said)
     assert told in found.said
     again = predict(asked, like=found)
@@ -182,5 +182,5 @@ def test_finer_grids_that_run_out_of_time_are_the_answer_where_they_are_far_near
     assert found.status == "time_limit"
     assert own.accuracy.error_estimate > 2.0 * found.accuracy.error_estimate > 2.0 * AUTO_ENOUGH
     assert size(found) == (seen[-1].n_u, seen[-1].n_t)
-    assert "The 9 x 13 control points that were asked for could not show the motion" in found.message
+    assert "The requested 9 x 13 control points could not show the motion" in found.message
     assert found.message.startswith("The time limit passed; the estimated error is")

@@ -12,7 +12,7 @@ from dlocore import Environment, Grasp, Move, Points, Prediction, Quality, Scene
 from dlocore.problem.checks import TOO_DEEP
 from tests.solver.scenes import WEIGHTLESS, cable, march
 
-FOLLOWS = "which no cable follows"
+FOLLOWS = "which no cable can follow"
 
 
 def late(way: tuple[float, float, float], environment: Environment, start: float = 0.3) -> Scene:

@@ -15,7 +15,7 @@ from dlocore.stability.determined import DOUBTFUL, UNSEEN
 from dlocore.stability.firmness import FIRMER, gives_way
 
 LENGTH = 1.0
-TOLD = "But contact that is twice as stiff takes the cable elsewhere by up to"
+TOLD = "But contact twice as stiff changes the motion by up to"
 
 
 def dropped(tilt: float, **quality: float) -> Scene:

@@ -127,7 +127,7 @@ def test_a_march_that_fails_on_a_given_grid_is_tried_in_more_steps():
     assert found.accuracy.steps >= 4 * 165
     assert "watched" not in found.message
     assert "Every time step found its equilibrium" in found.message
-    assert "On the grid as it is, with 165 steps: " in found.message  # no equilibrium, or torn: processors differ
+    assert "On the grid as given, with 165 steps: " in found.message  # no equilibrium, or torn: processors differ
 
 
 def test_a_time_spline_has_states_in_every_span():
@@ -145,7 +145,7 @@ def control_points(prediction: Prediction) -> tuple[int, int]:
 
 
 def asked_for(scene: Scene) -> str:
-    return f"The {scene.quality.n_u} x {scene.quality.n_t} control points that were asked for"
+    return f"The requested {scene.quality.n_u} x {scene.quality.n_t} control points"
 
 
 @pytest.mark.parametrize(
@@ -167,7 +167,7 @@ def test_finer_grids_are_the_answer_where_a_given_one_cant_show_the_motion(
     assert found.scene is scene
     assert f"{asked_for(scene)} could not show the motion, which took" in found.message
     assert why in found.message
-    assert f"This is the answer on {control_points(found)[0]} x {control_points(found)[1]}" in found.message
+    assert f"This answer is on {control_points(found)[0]} x {control_points(found)[1]}" in found.message
     estimated = found.accuracy.error_estimate
     assert estimated is not None  # it is how finer grids end, whether it was asked for or not
     assert estimated <= 0.01 * scene.cable.length
@@ -189,7 +189,7 @@ def test_a_given_grid_is_the_answer_where_finer_ones_do_no_better():
     assert found.status == given.status == "stalled"
     assert found.said.startswith(given.said)
     assert "Finer grids were tried for" in found.said
-    assert "which no cable follows. Its axial stiffness is 2 N: give it more, or less mass, weight" in found.said
+    assert "which no cable can follow. Its axial stiffness is 2 N: give it more, or less mass, weight" in found.said
     np.testing.assert_array_equal(found.surface.control_points, given.surface.control_points)
     assert control_points(found) == (9, 13)
     assert len(found.iterations) > len(given.iterations)
@@ -243,7 +243,7 @@ def test_a_motion_like_one_on_finer_grids_goes_on_on_them():
     assert again.scene is scene
     assert len(again.iterations) == 1
     assert control_points(again) == control_points(before)
-    assert f"{asked_for(scene)} were left before" in again.message
+    assert f"{asked_for(scene)} did not suffice for a similar scene" in again.message
     kept = predict(scene, like=before, keep_grid=True)
     assert kept.status == "max_iterations"
     assert control_points(kept) == (scene.quality.n_u, scene.quality.n_t)

@@ -312,7 +312,7 @@ def test_an_answer_tells_of_strains_that_few_cables_bear():
     assert "strain" not in firm.message
     assert "Note: the motion strains the cable by up to 8% along itself." in soft.message
     assert softer.status == "stalled"
-    assert "which no cable follows" in softer.message
+    assert "which no cable can follow" in softer.message
 
 
 def test_quality_auto_takes_the_march_and_a_given_grid_the_least_squares():

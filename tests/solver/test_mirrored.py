@@ -12,7 +12,7 @@ from dlocore import Cable, Environment, Grasp, Move, Points, Scene, Straight, Ta
 Floats = NDArray[np.float64]
 
 LYING = Environment(drag=0.2, table=Table())
-NOTE = "its own mirror image, and unstable so"
+NOTE = "its own mirror image, which is unstable"
 
 
 def arch() -> Floats:

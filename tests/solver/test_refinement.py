@@ -93,7 +93,7 @@ def test_who_gives_a_deadline_gets_more_work_for_a_target_that_ends_before_it(mo
     few = predict(scene)
     assert few.status == "max_iterations"
     finest = f"{few.accuracy.n_u} control points along the cable and {few.accuracy.steps} steps"
-    assert f"From {finest} on no finer grid is expected to reach the target in what may be spent" in few.message
+    assert f"No grid finer than {finest} is expected to reach the target within the work allowed" in few.message
     found = predict(scene, deadline=60.0)
     assert found.status == "converged"
     assert (found.accuracy.n_u, found.accuracy.steps) == (free.n_u, free.steps)
@@ -244,7 +244,7 @@ def test_a_fold_is_unfolded_with_all_the_work_that_a_target_is_worth():
 def test_a_surface_that_its_time_spline_stretches_is_told_of():
     scene = draw(28, 2367).make()
     free = replace(scene, quality=Quality(target_error=0.01 * scene.cable.length))
-    for asked, advice in ((scene, "take more control points"), (free, "ask for a smaller target_error")):
+    for asked, advice in ((scene, "use more control points"), (free, "ask for a smaller target_error")):
         found = predict(asked, keep_grid=True)
         assert found.status == "converged"
         assert found.level.motion.largest_strain < 0.05

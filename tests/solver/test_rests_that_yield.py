@@ -11,7 +11,7 @@ import pytest
 
 from dlocore import Cable, Environment, Grasp, Move, Points, Quality, Scene, Straight, equilibrium, predict
 
-TOLD = "nothing yields as the cable settles"
+TOLD = "yielding is left out as the cable settles"
 CLAMPED = Grasp(u=0.0, hold="clamp")
 
 
@@ -91,7 +91,7 @@ def elastic(**changes: Any) -> Cable:
     [
         (0.001, "converged", "Two grids agree"),
         (0.02, "converged", "the equilibrium strains the cable by up to 10% along itself, with the 2e+04 N of a solid"),
-        (0.2, "stalled", "strained along itself by 101%, which no cable follows. Bring the grasps no farther apart"),
+        (0.2, "stalled", "strained along itself by 101%, which no cable can follow. Bring the grasps no farther apart"),
     ],
 )
 def test_an_equilibrium_tells_that_grippers_stretch_the_cable(far: float, status: str, words: str) -> None:
@@ -107,7 +107,7 @@ def test_it_tells_that_its_own_weight_does() -> None:
     soft = Scene(cable=elastic(axial_stiffness=1.0), shape=DOWN, grasps=(Grasp(u=0.0),), horizon=1.0)
     torn = equilibrium(soft, n_u=17)
     assert torn.status == "stalled"
-    assert "which no cable follows. Its axial stiffness is 1 N: give it more, or less mass" in torn.message
+    assert "which no cable can follow. Its axial stiffness is 1 N: give it more, or less mass" in torn.message
     assert "by up to" not in torn.message
     firmer = equilibrium(replace(soft, cable=elastic(axial_stiffness=3.0)), n_u=17)
     assert firmer.status == "converged"

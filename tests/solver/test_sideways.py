@@ -228,7 +228,7 @@ def test_what_a_micrometre_moves_by_little_is_part_of_the_error_and_more_than_th
         scene = between(0.3, True, "tangent", replace(WEIGHTLESS, drag=0.7), closer)
         return replace(scene, quality=Quality(target_error=target))
 
-    told = "a cable bent by a millionth of the length, 1 um, goes elsewhere by up to 1.3 mm"
+    told = "bending the start by a millionth of the length, 1 um, changes the motion by up to 1.3 mm"
     found = predict(snaps(0.8, 2e-3))
     assert found.status == "converged", found.message
     assert f"But {told}." in found.message

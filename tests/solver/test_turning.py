@@ -45,7 +45,7 @@ def test_what_a_start_may_turn_about(posed, about):
 def test_the_message_tells_of_a_start_that_turned():
     found = predict(scene(HELIX, 0.4))
     assert found.status == "converged", found.message
-    assert "nothing holds the start from turning about the vertical through its grasp" in found.message
+    assert "nothing keeps the start from turning about the vertical through its grasp" in found.message
 
 
 def test_and_not_of_one_that_was_at_rest():
