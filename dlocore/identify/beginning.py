@@ -1,4 +1,4 @@
-"""What the first frames of a recording tell: where its markers are, how fast they move, and whether they rest."""
+"""The first frames of a recording: where its markers are, how fast they move, and whether they are at rest."""
 
 import warnings
 from typing import cast
@@ -11,13 +11,13 @@ from dlocore.recordings import Recording
 
 Floats = NDArray[np.float64]
 
-_REWEIGHTED = 12  # times at most that outliers of the start are weighed down
-_SETTLED = 1e-3  # change of a weight
-_STILL = 0.01  # [m/s]: slower than this, or than noise lets tell, nothing moves
+_REWEIGHTED = 12  # times, at most, that the weights of outliers are reduced
+_SETTLED = 1e-3  # largest change of a weight
+_STILL = 0.01  # [m/s]: a marker slower than this, or than its noise can show, is at rest
 
 
 def rests(recording: Recording, frames: int) -> bool:
-    """Tell whether no marker moves in the first frames, as far as their noise lets tell."""
+    """Tell whether no marker moves in the first frames, within its noise."""
     times, markers = cast(Floats, recording.times)[:frames], cast(Floats, recording.markers)[:frames]
     half = frames // 2
     between = float(times[half:].mean() - times[:half].mean())
@@ -34,9 +34,9 @@ def rests(recording: Recording, frames: int) -> bool:
 def start_markers(
     recording: Recording, frames: int, at: float, shake: np.random.Generator | None
 ) -> tuple[NDArray[np.int64], Floats, Floats]:
-    """Return the markers seen in the first frames, where they are at time `at` and how fast they move.
+    """Return the markers seen in the first frames, their positions at time `at` and their velocities.
 
-    From two or three frames a straight line, from more a parabola, with outliers weighed down.
+    Two or three frames are fitted by a straight line, more by a parabola, with reduced weight for outliers.
 
     Raises:
         SceneError: fewer than three markers are seen.
@@ -54,7 +54,7 @@ def start_markers(
     A = np.vander((times - at) / unit, order + 1, increasing=True)
 
     def fitted(w: Floats, x: Floats) -> Floats:
-        """Return the coefficients (m, order + 1, 3) of least squares with the weights w (m, frames)."""
+        """Return the coefficients (m, order + 1, 3) of a least squares fit with the weights w (m, frames)."""
         weighted = A.T * w[:, None, :]
         return np.asarray(np.linalg.solve(weighted @ A, weighted @ x))
 

@@ -1,4 +1,4 @@
-"""What a recording is replayed with, and the problem of one candidate made from that of another."""
+"""A candidate with which a recording is replayed, and how to make its problem from that of another candidate."""
 
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -12,24 +12,24 @@ from dlocore.scene.scene import Environment
 
 Floats = NDArray[np.float64]
 
-_RESISTS = frozenset({"bending_damping", "drag", "drag_quadratic"})  # what resists motion alone
+_RESISTS = frozenset({"bending_damping", "drag", "drag_quadratic"})  # parameters that only resist motion
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Candidate:
-    """What a recording is replayed with.
+    """Everything that a recording is replayed with.
 
     Attributes:
         cable: its length is that of the recording.
         environment: drag; gravity is that of the recording.
         rest_curvature: (k, 2) [1/m] of the stress-free shape at k places from end to end, in the frame of the
             sections; None: straight.
-        clamp_angles: (clamps, 2) [rad] by which the cable leaves each clamp beside the direction of its markers.
-        turn: [rad] of the last clamp against the first, about the cable.
-        marker_offsets: (m, 2) [m] of the markers beside the centreline, across it, in a frame that is carried from the
+        clamp_angles: (clamps, 2) [rad] between the cable at each clamp and the direction of the clamp's markers.
+        turn: [rad] of the last clamp relative to the first, about the cable.
+        marker_offsets: (m, 2) [m] of the markers from the centreline, across it, in a frame that is carried from the
             first clamp without twist; None: on it.
-        length_ratio: of the cable's length and its markers' coordinates to those of the recording.
-        twist: simulate twist; needed for rest_curvature, a torsional stiffness, and bends that stay.
+        length_ratio: ratio of the cable's length and its markers' coordinates to those of the recording.
+        twist: simulate twist; needed for rest_curvature, a torsional stiffness, and cables that yield.
     """
 
     cable: Cable
@@ -43,22 +43,22 @@ class Candidate:
 
     @property
     def yields(self) -> bool:
-        """Its cable has a strain at which bends, or twist or stretch, stay."""
+        """Whether its cable yields in bending, twist or stretch."""
         return self.cable.yields
 
 
 def resized(cable: Cable, length: float) -> Cable:
-    """Return a cable at another length [m], with its point masses at the same shares of it."""
+    """Return a cable with another length [m], with its point masses at the same fractions of it."""
     share = length / cable.length
     masses = tuple(replace(one, u=min(one.u * share, length)) for one in cable.point_masses)
     return replace(cable, length=length, point_masses=masses)
 
 
 def varied(problem: Problem, before: Candidate, after: Candidate) -> Problem | None:
-    """Return the problem of a candidate from the one posed for another.
+    """Return the problem of a candidate, made from the one posed for another.
 
-    It is None where they differ in more than what resists motion alone: then the start is another too, or what is
-    simulated.
+    It is None if they differ in more than parameters that only resist motion: the start, or what is simulated, then
+    differs too.
     """
     if not all(_alike(getattr(before, f.name), getattr(after, f.name)) for f in fields(Candidate)):
         return None
@@ -86,7 +86,7 @@ def varied(problem: Problem, before: Candidate, after: Candidate) -> Problem | N
 
 
 def _alike(a: Any, b: Any) -> bool:
-    """Tell whether two values are the same but for what resists motion."""
+    """Tell whether two values are the same apart from parameters that only resist motion."""
     if a is b:
         return True
     if isinstance(a, Cable | Environment):

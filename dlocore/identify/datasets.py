@@ -1,4 +1,4 @@
-"""Published data sets that a user has on disk, as recordings: motion capture of cables, hanging wires."""
+"""Published data sets that a user has on disk, read as recordings: motion capture of cables, and hanging wires."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +13,7 @@ from dlocore.recordings import Recording, read_facts
 
 Floats = NDArray[np.float64]
 
-FIT = 4  # windows of 5 s, of each cable, that parameters are fitted on; the others are predicted
+FIT = 4  # windows of 5 s, for each cable, on which parameters are fitted; the others are predicted
 PUBLISHED_BY = (
     "rod with a learned residual, best validation error in the training log of its authors (github.com/roahmlab/DEFORM)"
 )
@@ -22,7 +22,7 @@ PUBLISHED = {"DLO1": 0.0103, "DLO2": 0.0102, "DLO3": 0.0099, "DLO4": 0.0115}  # 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MovedCable:
-    """Windows of motion of one cable, those to fit on and those to predict."""
+    """Windows of motion of one cable: some to fit on and the others to predict."""
 
     name: str
     fit: tuple[Recording, ...]
@@ -39,22 +39,22 @@ class HangingWire:
 
 
 def dataset_files(paths: list[Path]) -> list[Path]:
-    """Return the files, and those of the folders, in the order in which `load_datasets` reads them."""
+    """Return the given files, and those in the given folders, in the order in which `load_datasets` reads them."""
     return [file for path in paths for file in (sorted(path.glob("*.npz")) if path.is_dir() else [path])]
 
 
 def load_datasets(paths: list[Path], fit: int = FIT) -> tuple[list[MovedCable], list[HangingWire]]:
-    """Return what the files, or the files in folders, hold.
+    """Return the contents of the given files, or of the files in the given folders.
 
-    Files of one cable, such as DLO1_train.npz and DLO1_eval.npz, go together: it is fitted on windows spread evenly
-    over the first of them, and all others are predicted.
+    Files of one cable, such as DLO1_train.npz and DLO1_eval.npz, belong together: the cable is fitted on windows spread
+    evenly over the first file, and all other windows are predicted.
 
     Args:
-        paths: `.npz` files with a `.json` beside each, or folders of them, of which other files are passed over.
+        paths: `.npz` files with a `.json` next to each, or folders of them; other files in a folder are ignored.
         fit: number of windows of each cable to fit on.
 
     Raises:
-        SceneError: a file is damaged, or a given one is not of a known set, or nothing is there.
+        SceneError: a file is damaged, a given file is not of a known set, or nothing is there.
         OSError: a file can't be read.
     """
     if type(fit) is not int or fit < 1:

@@ -1,4 +1,4 @@
-"""identify(recordings, ...): the parameters of a cable from windows of recordings, first of short ones."""
+"""identify(recordings, ...): the parameters of a cable from windows of recordings, starting with short ones."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -26,22 +26,22 @@ from dlocore.scene.scene import Environment, Quality
 Floats = NDArray[np.float64]
 
 WINDOW = 5.0  # [s]: longer recordings are replayed in windows of about this length, each from its own start
-_BEGINS = 0.5, 1.5  # [s] of the windows on which a search begins, of a cable of 1 m; it swings once in 2 s
-_MOST_SHORT = 8  # of them
-_COARSE = 13  # control points that they are replayed with at most
-_STIFFNESSES = 0.1, 0.3, 3.0, 10.0  # times the given one, that are tried first
+_BEGINS = 0.5, 1.5  # [s] of the windows on which a search begins, for a cable of 1 m; it swings once in 2 s
+_MOST_SHORT = 8  # of these windows, at most
+_COARSE = 13  # control points with which they are replayed, at most
+_STIFFNESSES = 0.1, 0.3, 3.0, 10.0  # times the given stiffness: what is tried first
 _BEGINNING = 4  # iterations on them
-_DENSITY = 0.04  # [kg/m] of a cable whose recordings tell none
+_DENSITY = 0.04  # [kg/m] of a cable whose recordings do not give it
 _UNTWISTED = (
-    "Replayed without twist, which damping between two clamps makes too stiff if it is strong: look at what comes of "
+    "Replayed without twist: between two clamps strong damping then makes the cable too stiff. Check the result with "
     "torsional_stiffness as one more parameter."
 )
 _UNTWISTED_FREE = (
-    "Replayed without twist: of a cable in space whose internal damping is strong, as of this one, EI may be found "
-    "far too large, and its interval leaves that out. Only a recording in which grippers hold it as clamps tells."
+    "Replayed without twist: for a cable in space with strong internal damping, such as this one, EI may come out "
+    "far too large, and its interval does not include that. Only a recording with clamps can show it."
 )
-_STRONG = 0.08  # [s] bending damping over EI, from which twist matters to a cable that may turn at its ends
-_FLAT = 0.02  # of the extent of markers across what they lie in: a motion in a plane twists nothing
+_STRONG = 0.08  # [s] bending damping over EI, from which on twist matters for a cable that may turn at its ends
+_FLAT = 0.02  # of the markers' extent, across the plane that they lie in: a motion in a plane twists nothing
 
 
 @interruptible
@@ -62,21 +62,21 @@ def identify(
 
     Args:
         recordings: of one cable.
-        cable: what is known of it, and first guesses; None: from the recordings' facts. Its length is that of the
-            first recording, where its point masses keep their shares of it; where it has none, those of the recordings
-            hang on it. Motion and shape depend on forces per mass
-            alone, so its linear density is taken as known.
+        cable: what is known of it, and first guesses; None: from the recordings' facts. Its length is that of the first
+            recording, in which its point masses keep their fractions of it. If it has no point masses, it gets those of
+            the recordings. Motion and shape depend on forces per mass alone, so its linear density is taken as known.
         environment: first guesses of the drag, and a table.
         names: parameters to identify (`parameters.SCALARS`, "rest_curvature", "clamp_angles", "marker_offsets").
-        start: a candidate to begin with instead of cable and environment.
+        start: a candidate to begin with, instead of cable and environment.
         resolution: how finely recordings are replayed.
-        window: [s] of the windows into which longer recordings are cut, and where held markers are lost for too long.
+        window: [s] of the windows into which longer recordings are cut. They are also cut where held markers are lost
+            for too long.
         iterations: at most.
         on_progress: called after every iteration.
-        cancelled: asked between replays.
+        cancelled: called between replays; if it returns True the search stops.
 
     Raises:
-        SceneError: the recordings, or what is asked of them, do not fit together.
+        SceneError: the recordings, or what is requested from them, do not fit together.
         Cancelled: `cancelled` returned True.
     """
     began = perf_counter()
@@ -84,14 +84,14 @@ def identify(
         raise SceneError("recordings", [], "at least one recording")
     check_together(recordings)
     resolution = resolution or Resolution()
-    Quality(n_u=resolution.n_u, n_t=resolution.n_u)  # refuses what is no number of control points
+    Quality(n_u=resolution.n_u, n_t=resolution.n_u)  # refuses an invalid number of control points
     windows = cut(recordings, window)
     clamps = max(sum(h.towards is not None for h in r.holds) for r in windows)
     free = sorted({int(i) for r in windows for i in r.free})
     known = cable_of(recordings) if cable is None else _known(cable, recordings)
     given = start or Candidate(cable=known, environment=environment or Environment())
     if not isinstance(given.cable.rest_shape, str) or given.cable.rest_shape != "straight":
-        allowed = '"straight"; bends without stress are sought as the parameter "rest_curvature"'
+        allowed = '"straight"; stress-free bends are identified as the parameter "rest_curvature"'
         raise SceneError("cable.rest_shape", given.cable.rest_shape, allowed)
     given = replace(
         given,
@@ -120,7 +120,7 @@ def identify(
 
 
 def _held_told(recordings: Sequence[Recording]) -> list[str]:
-    """Return in words how held neighbours were read: as one clamp, or as two point grasps."""
+    """Return messages on how held neighbours were read: as one clamp, or as two point grasps."""
     clamps, points = dict[str, None](), dict[str, None]()  # each once, in order
     for recording in recordings:
         held, u = recording.held, cast(Floats, recording.u)
@@ -153,13 +153,13 @@ def _twists(recordings: Sequence[Recording], cable: Cable) -> bool:
 
 
 def _check_clamps(recordings: Sequence[Recording], chosen: Sequence[Parameter], candidate: Candidate) -> None:
-    """Refuse what needs to know how the sections lie where a recording has no clamp, which alone shows that."""
+    """Refuse parameters that depend on the angle of the sections if a recording has no clamp, which alone shows it."""
     turning = ("torsional_stiffness", "turn", "yield_strain", "rest_curvature", "marker_offsets")
     sought = {p.name.partition("[")[0] for p in chosen}
     needing = [name for name in turning if name in sought] or (["a cable that yields"] if candidate.twist else [])
     for recording in recordings:
         if needing and not any(h.towards is not None for h in recording.holds):
-            reason = f"Without one nothing shows how the sections lie, which {needing[0]} needs"
+            reason = f"Without a clamp nothing shows how the sections are turned, which {needing[0]} needs"
             allowed = "recordings in which a gripper holds two neighbouring markers, as a clamp"
             raise SceneError("recordings", f"{recording.name!r} without a clamp", allowed, reason)
 
@@ -167,13 +167,13 @@ def _check_clamps(recordings: Sequence[Recording], chosen: Sequence[Parameter], 
 def _assumed(
     recordings: Sequence[Recording], given: Candidate, names: tuple[str, ...], cable: bool, drag: bool
 ) -> list[str]:
-    """Return in words what was kept at a value that was neither given nor sought.
+    """Return messages about values that were neither given nor identified, and so were assumed.
 
     Args:
         recordings: of the cable.
         given: what the search began with.
-        names: of what was sought.
-        cable, drag: the numbers of the cable, those of its drag, were not given.
+        names: of the identified parameters.
+        cable, drag: whether the numbers of the cable, or those of its drag, were not given.
     """
     moves = any(not r.static for r in recordings)
     assumed = {
@@ -191,10 +191,10 @@ def _assumed(
         kept.append(f"diameter {given.cable.diameter:g} m")
     said = []
     if kept:
-        said.append(f"Neither given nor sought, and kept at what is assumed: {', '.join(kept)}.")
+        said.append(f"Neither given nor identified, so kept at an assumed value: {', '.join(kept)}.")
     if cable and not any(r.linear_density is not None for r in recordings) and "linear_density" not in names:
         said.append(
-            f"The recordings tell no linear density: {given.cable.linear_density:g} kg/m is assumed, and stiffnesses, "
+            f"The recordings give no linear density: {given.cable.linear_density:g} kg/m is assumed. Stiffnesses, "
             "damping and drag are in proportion to it."
         )
     return said
@@ -207,9 +207,9 @@ def _begun(
     resolution: Resolution,
     cancelled: Callable[[], bool] | None,
 ) -> Candidate:
-    """Return a candidate improved on short windows, where a wrong guess has no time to grow into another motion.
+    """Return a candidate improved on short windows, in which a wrong guess has no time to grow into another motion.
 
-    Numbers of the cable alone are sought here: the others need none but a fair guess of these.
+    Only numbers of the cable are sought here: the other parameters need only a fair guess of these.
     """
     scalars = tuple(p for p in chosen if p.name in DEFAULT)
     coarse = replace(resolution, n_u=min(resolution.n_u, _COARSE))
@@ -222,15 +222,15 @@ def _begun(
                 picked = np.unique(np.linspace(0, len(short) - 1, _MOST_SHORT).round().astype(int))
                 search = Search([short[i] for i in picked], scalars, coarse, cancelled)
                 candidate = search.run(_stiff(search, candidate), _BEGINNING, None).candidate
-        except SceneError:  # so short ones may have too few samples, or begin where they tell of no start
+        except SceneError:  # short windows may have too few samples, or begin where no start can be found
             continue
     return candidate
 
 
 def _stiff(search: Search, candidate: Candidate) -> Candidate:
-    """Return the candidate with the one of several bending stiffnesses that meets the markers best.
+    """Return the candidate with that of several bending stiffnesses that fits the markers best.
 
-    Far from the true one a stiff cable's misfit hardly changes with it, so that no slope leads there.
+    Far from the true stiffness, the misfit of a stiff cable hardly changes with it, so no slope leads there.
     """
     scalar = next((p for p in search.chosen if p.name == "bending_stiffness"), None)
     if scalar is None:
@@ -242,7 +242,7 @@ def _stiff(search: Search, candidate: Candidate) -> Candidate:
         try:
             other = scalar.put(candidate, factor * scalar.get(candidate))
             misfit = search.misfit(np.concatenate(search.play(other).residuals), deviation)
-        except SceneError:  # no such cable, or none that begins so
+        except SceneError:  # no such cable, or none with such a start
             continue
         if misfit < least:
             best, least = other, misfit
@@ -250,7 +250,7 @@ def _stiff(search: Search, candidate: Candidate) -> Candidate:
 
 
 def _known(cable: Cable, recordings: Sequence[Recording]) -> Cable:
-    """Return a given cable, with the point masses that recordings tell where it has none."""
+    """Return a given cable, with the point masses from the recordings if it has none."""
     telling = next((r for r in recordings if r.point_masses), None)
     if telling is None or cable.point_masses:
         return cable
@@ -258,9 +258,9 @@ def _known(cable: Cable, recordings: Sequence[Recording]) -> Cable:
 
 
 def cable_of(recordings: Sequence[Recording]) -> Cable:
-    """Return a first guess of the cable from the facts of its recordings, else 5 mm thick and 40 g/m.
+    """Return a first guess of the cable from the facts of its recordings, by default 5 mm thick with 40 g/m.
 
-    The axial stiffness is that of a cable that nothing stretches.
+    The axial stiffness is so high that nothing stretches the cable.
     """
     telling = next((r for r in recordings if r.point_masses), recordings[0])
     density = next((r.linear_density for r in recordings if r.linear_density is not None), _DENSITY)

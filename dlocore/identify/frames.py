@@ -1,4 +1,4 @@
-"""Frames of clamps that are known by their direction alone, and the sections of a cable between two of them."""
+"""Frames of clamps of which only the direction is known, and the sections of a cable between two of them."""
 
 from dataclasses import replace
 from typing import cast
@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 
 def across(direction: Floats) -> Floats:
-    """Return a unit vector (3,) across a unit direction (3,)."""
+    """Return a unit vector (3,) perpendicular to a unit direction (3,)."""
     axis = np.zeros(3)
     axis[int(np.argmin(np.abs(direction)))] = 1.0
     out = axis - direction * (axis @ direction)
@@ -33,7 +33,7 @@ def tilted(direction: Floats, angles: Floats) -> Floats:
 
 
 def turned_from(reference: Floats, directions: Floats) -> Rotation:
-    """Return the smallest rotations that bring `reference` to the unit `directions` (k, 3)."""
+    """Return the smallest rotations that turn `reference` to the unit `directions` (k, 3)."""
     axis = np.cross(reference, directions)
     cosine = np.clip(directions @ reference, -0.999, 1.0)
     half = np.sqrt(0.5 * (1.0 + cosine))
@@ -42,9 +42,9 @@ def turned_from(reference: Floats, directions: Floats) -> Rotation:
 
 
 def carried(tangents: Floats, director: Floats) -> Floats:
-    """Return a director (..., 3) at the first of the unit tangents (n, ..., 3) carried along them without twist.
+    """Return a director (..., 3), given at the first of unit tangents (n, ..., 3), carried along them without twist.
 
-    It is made perpendicular to the first one. The result has the shape of the tangents.
+    It is first made perpendicular to the first tangent. The result has the shape of the tangents.
     """
     out = np.empty_like(tangents)
     first = director - tangents[0] * (tangents[0] * director).sum(axis=-1, keepdims=True)
@@ -60,7 +60,7 @@ def rest_points(rest_curvature: Floats, span: Span, direction: Floats) -> Floats
     Args:
         rest_curvature: (k, 2) [1/m] in the frame of the sections, from end to end of the span; straight beyond.
         span: the part of the cable that bends.
-        direction: (3,) in which it sets out, with the director that a clamp of this reference has.
+        direction: (3,) in which the points begin, with the director of a clamp that has this reference direction.
     """
     u = np.unique(np.concatenate([np.linspace(0.0, span.whole, 201), [span.begin, span.begin + span.length]]))
     middle = 0.5 * (u[1:] + u[:-1]) - span.begin
@@ -79,12 +79,12 @@ def rest_points(rest_curvature: Floats, span: Span, direction: Floats) -> Floats
 def with_sections(
     shape: ControlPoints, rest_curvature: Floats | None, turn: float, frames: list[tuple[Floats, Floats]]
 ) -> ControlPoints:
-    """Return the start with the sections turned as the clamps hold them, and bent by the rest curvature.
+    """Return the start with the sections turned as the clamps hold them, and with the stress-free bends.
 
     Args:
         shape: the centreline.
         rest_curvature: (k, 2) [1/m] in the frame of the sections, from end to end; None: straight.
-        turn: [rad] of the last clamp against the first.
+        turn: [rad] of the last clamp relative to the first.
         frames: director and tangent of each clamp.
     """
     knots, q = cast(Floats, shape.knots), cast(Floats, shape.control_points)[:, :3]

@@ -1,4 +1,4 @@
-"""What is identified: values with intervals, what they rest on, and how the search goes."""
+"""The result of an identification: values with intervals, the recordings they rest on, and progress reports."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -21,11 +21,11 @@ class Estimated:
 
     Attributes:
         name, unit: of the parameter.
-        value: [unit]; where it is not identifiable what it was assumed to be.
+        value: [unit]; if it is not identifiable, the assumed value.
         low, high: 95 % interval [unit].
-        identifiable: the data tell it.
-        statement: in words.
-        rests_on: share of what is known of it by recording.
+        identifiable: whether the data determine it.
+        statement: the result in words.
+        rests_on: by recording, its share in what is known of the parameter.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Estimated:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fit:
-    """How a recording's window is met.
+    """How well the window of a recording is fitted.
 
     Attributes:
         name: of the recording.
@@ -50,7 +50,7 @@ class Fit:
         times: of the compared frames in it (k,) [s].
         measured, predicted: (k, m, 3) [m].
         free: the markers that nothing holds.
-        stalled: the prediction stopped before the end.
+        stalled: whether the prediction stopped before the end.
     """
 
     name: str
@@ -66,27 +66,27 @@ class Fit:
 
     @property
     def distances(self) -> Floats:
-        """Distance of each free marker from its prediction (k, free) [m], NaN where it was lost."""
+        """Distance of each free marker from its prediction (k, free) [m]; NaN if the marker was lost."""
         away = self.measured[:, self.free] - self.predicted[:, self.free]
         return np.asarray(np.linalg.norm(away, axis=2))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Identification:
-    """What recordings tell of a cable.
+    """The result of an identification.
 
     Attributes:
         status: "converged" or "max_iterations".
-        message: in words, with what could not be identified.
+        message: the result in words, including what could not be identified.
         candidate: everything that was found, to replay with.
-        parameters: as asked for, with intervals.
-        correlations: between the identified ones, (n, n), in the order of `parameters`; NaN for others.
-        rest_shape: points (k, 3) [m] of the stress-free shape that was found, as it would lie were the first clamp held
-            as in the recordings in the mean; None: none was sought, straight.
-        fits: how each window is met.
+        parameters: as requested, with intervals.
+        correlations: between the identified parameters, (n, n), in the order of `parameters`; NaN for others.
+        rest_shape: points (k, 3) [m] of the stress-free shape that was found, as it would lie if the first clamp were
+            held as on average in the recordings; None: none was sought, straight.
+        fits: how well each window is fitted.
         deviation: robust standard deviation of a coordinate of the residuals [m].
         iterations: of Gauss-Newton.
-        seconds: time it took.
+        seconds: time taken.
     """
 
     status: Status
@@ -102,7 +102,7 @@ class Identification:
 
     @property
     def cable(self) -> Cable:
-        """The cable, to be used in scenes: with the length and the stress-free shape that were found."""
+        """The cable for use in scenes, with the length and the stress-free shape that were found."""
         found = self.candidate.cable
         cable = resized(found, found.length * self.candidate.length_ratio)
         return cable if self.rest_shape is None else replace(cable, rest_shape=self.rest_shape)

@@ -1,4 +1,4 @@
-"""How well identified parameters are known: intervals, correlations, and what the data do not tell."""
+"""How well the identified parameters are known: intervals, correlations, and what the data do not determine."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -22,20 +22,21 @@ from dlocore.words import counted, in_mm
 
 Floats = NDArray[np.float64]
 
-_BLOCK = 0.5  # [s] in which residuals hang together
-_SHAKES = 12  # replays with other noise of the held markers and the start
-_UNSEEN = 1.0  # half the interval of a logarithm, or in usual values, from which on a parameter is not identified
+_BLOCK = 0.5  # [s] within which residuals are taken as correlated
+_SHAKES = 12  # replays with different noise of the held markers and the start
+_UNSEEN = 1.0  # half the interval of a logarithm, or in usual values: from this on a parameter is not identified
 _UNEXPLAINED = 2.0  # times what noise explains: a model that misses markers by more lacks something
-_ELSEWHERE = 0.2  # of the length: what misses half of the markers by more is no motion of theirs
-_ASTRAY = 0.01  # of the length: what misses the markers by more, or is moved so far by noise, is none to trust
+_ELSEWHERE = 0.2  # of the length: a prediction that misses half of the markers by more is another motion
+_ASTRAY = 0.01  # of the length: a prediction that misses the markers, or is moved by noise, by more can't be trusted
 
 
 def assess(search: Search, state: State, seconds: float) -> Identification:
     """Return the identification of a finished search.
 
-    The variance of a value is the sum of three: of the residuals taken as independent, or as hanging together within
-    blocks of half a second where that is more; of the noise of what was taken as known, the held markers and the start,
-    replayed with other noise of the same size; and the square of what half the spans and half the step would change.
+    The variance of a value is the sum of three: that from the residuals, taken as independent, or as correlated within
+    blocks of half a second if that gives more; that from the noise of what was taken as known, the held markers and the
+    start, found by replays with different noise of the same size; and the square of the change due to half the span
+    length and half the step.
     """
     chosen = search.chosen
     x = search.coordinates(state.candidate)
@@ -129,10 +130,10 @@ def _blocks(search: Search, state: State, pull: Floats) -> list[Floats]:
 
 
 def _shaken(search: Search, state: State, scale: Floats) -> tuple[Floats, dict[str, Floats], int]:
-    """Return what noise of the held markers and the start does.
+    """Return the effect of noise of the held markers and the start.
 
-    That is the covariance of the gradient of the misfit; the robust deviation (3,) of the coordinates of the free
-    markers [m] by recording of a motion; and the number of replays that could not begin.
+    This is the covariance of the gradient of the misfit; the robust deviation (3,) of the coordinates of the free
+    markers [m], for each recording of a motion; and the number of replays that could not begin.
     """
     size = len(search.chosen)
     total = np.zeros((size, size))
@@ -167,7 +168,7 @@ def _by_axis(away: Floats) -> Floats:
 
 
 def _disturbed(search: Search, replay: Replay | Rest, deviation: float, noise: np.random.Generator) -> Replay | Rest:
-    """Return a replay with other noise of what is held; of shapes at rest with noise as large as their residuals."""
+    """Return a replay with different noise of what is held; for shapes at rest, noise as large as the residuals."""
     recording = replay.recording
     if not recording.static:
         return search.replay(recording, noise)
@@ -179,7 +180,7 @@ def _disturbed(search: Search, replay: Replay | Rest, deviation: float, noise: n
 def _refined(search: Search, state: State, scale: Floats) -> tuple[Floats, int]:
     """Return the gradient of the misfit that a net twice as fine and half the step give.
 
-    And the number of windows that could not be replayed so.
+    Return also the number of windows that could not be replayed with them.
     """
     resolution = search.resolution
     finer = replace(resolution, n_u=2 * resolution.n_u - DEGREE, step=0.5 * resolution.step)
@@ -203,13 +204,13 @@ def _refined(search: Search, state: State, scale: Floats) -> tuple[Floats, int]:
 
 
 def _left_out(unshaken: int, unrefined: int) -> list[str]:
-    """Return in words what intervals leave out, as so many replays with other noise, or on a finer net, can't begin."""
+    """Return messages about what intervals leave out because replays with other noise or a finer net can't begin."""
     parts = [
         f"{counted(lost, 'replay')} {how} can't begin"
         for lost, how in ((unshaken, "with other noise of the start"), (unrefined, "on a finer net"))
         if lost
     ]
-    return [f"{' and '.join(parts)}: intervals leave out what they would add."] if parts else []
+    return [f"{' and '.join(parts)}: the intervals do not include what they would add."] if parts else []
 
 
 def _estimated(
@@ -224,12 +225,12 @@ def _estimated(
     if unseen:
         statement = f"{p.name} can't be seen in these recordings: it changes nothing that was measured."
     elif wide:
-        statement = f"{p.name} can't be told from these recordings: anything from {low:.2g} to {high:.2g} fits."
+        statement = f"{p.name} can't be determined from these recordings: any value from {low:.2g} to {high:.2g} fits."
     elif not p.logarithmic and np.isfinite(p.least) and low <= p.least:
         statement = f"{p.name} is at most {high:.2g} {p.unit}, and may be zero."
     else:
         half = 0.5 * (high - low)
-        # one that may have either sign has no size to be measured by
+        # a parameter that may have either sign has no size to compare with
         known = f"{100 * half / value:.2g} %" if np.isfinite(p.least) else f"{half:.2g} {p.unit}"
         statement = f"{p.name} = {f'{value:.3g} {p.unit}'.rstrip()}, known to {known}."
     rests: dict[str, float] = {}
@@ -248,14 +249,15 @@ def _estimated(
 
 
 def _doubts(search: Search, state: State, by_noise: Mapping[str, Floats]) -> list[str]:
-    """Return in words why intervals may not hold, of the worst recording of a motion and the worst of shapes at rest.
+    """Return messages on why the intervals may not hold, for the worst recording of a motion and of shapes at rest.
 
-    Each is judged by the direction in which it is missed most: in a plane the one across it holds noise alone.
+    Each recording is judged by the direction with the largest misfit: in a planar motion, the direction across the
+    plane holds only noise.
 
     Args:
-        search, state: that has ended, and where.
-        by_noise: by which noise of the held markers and the start moves the prediction along each axis (3,) [m], by
-            recording of a motion; none where not known.
+        search, state: the finished search, and its final state.
+        by_noise: how far noise of the held markers and the start moves the prediction along each axis (3,) [m], for
+            each recording of a motion; empty if unknown.
     """
     length = max(cast(float, window.length) for window in search.windows)
     said = list[str]()
@@ -263,7 +265,7 @@ def _doubts(search: Search, state: State, by_noise: Mapping[str, Floats]) -> lis
     if wild:
         said += [
             f"Noise of the held markers and the start alone moves the prediction by {in_mm(max(wild.values()))}:",
-            "intervals don't hold for a motion so wild. Record a slower one, or replay shorter windows.",
+            "intervals don't hold for so sensitive a motion. Record a slower one, or replay shorter windows.",
         ]
     found: dict[bool, list[_Miss]] = {False: [], True: []}
     for static, name in dict.fromkeys((w.static, w.name) for w in search.windows):
@@ -271,7 +273,7 @@ def _doubts(search: Search, state: State, by_noise: Mapping[str, Floats]) -> lis
             continue
         own = [i for i, w in enumerate(search.windows) if (w.static, w.name) == (static, name)]
         away = np.concatenate([search.away(state, i) for i in own])
-        explained = np.full(3, np.inf)  # of shapes at rest nothing tells the noise
+        explained = np.full(3, np.inf)  # the noise of shapes at rest is not known
         if not static and name in by_noise:
             noise = np.max([noise_of_free(search.windows[i]) for i in own], axis=0)
             explained = np.hypot(by_noise[name], noise)
@@ -297,7 +299,7 @@ def _doubts(search: Search, state: State, by_noise: Mapping[str, Floats]) -> lis
         said += [
             f"The free markers{whose} {'at rest ' if static else ''}are missed by {in_mm(worst.distance * length, 3)} "
             f"in the median, {much}:",
-            f"{why}, or another cable meets them better. Intervals tell of noise alone.",
+            f"{why}, or another cable fits them better. Intervals account for noise only.",
         ]
         if worst.distance > _ELSEWHERE:
             said.append("That is another motion: are gravity, held and the order of the markers right?")
@@ -306,13 +308,13 @@ def _doubts(search: Search, state: State, by_noise: Mapping[str, Floats]) -> lis
 
 @dataclass(frozen=True)
 class _Miss:
-    """How far the free markers of a recording are missed.
+    """How far the prediction misses the free markers of a recording.
 
     Attributes:
         name: of the recording.
-        distance: median distance of the free markers, in lengths.
-        deviation: robust deviation in the worst direction, in lengths.
-        times: that of what noise explains in the worst direction.
+        distance: median distance of the free markers, in lengths of the cable.
+        deviation: robust deviation in the worst direction, in lengths of the cable.
+        times: its ratio to what noise explains, in the worst direction.
     """
 
     name: str
@@ -322,15 +324,15 @@ class _Miss:
 
 
 def _message(state: State, estimated: tuple[Estimated, ...], correlations: Floats) -> str:
-    """Return in words how the search ended, and what it does not tell."""
+    """Return a message on how the search ended, and on what it does not determine."""
     done = "Converged" if state.status == "converged" else "Stopped without converging"
-    why = ", as no step betters the fit: near values of the parameters make the prediction jump, or fail"
+    why = ", as no step improves the fit: nearby values of the parameters make the prediction jump, or fail"
     parts = [f"{done} in {counted(state.iterations, 'iteration')}{why if state.stuck else ''}."]
     parts += [e.statement for e in estimated if not e.identifiable]
     n = len(estimated)
     tied = [(i, j) for i in range(n) for j in range(i) if abs(correlations[i, j]) > 0.95]
     parts += [
-        f"{estimated[i].name} and {estimated[j].name} are hardly told apart (correlation {correlations[i, j]:.2f})."
+        f"{estimated[i].name} and {estimated[j].name} can hardly be told apart (correlation {correlations[i, j]:.2f})."
         for i, j in tied
     ]
     return " ".join(parts)

@@ -1,4 +1,4 @@
-"""Identification while a cable moves: a window of frames that moves on, with the last estimate as prior."""
+"""Identification while a cable moves, from a sliding window of frames, with the last estimate as prior."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -20,21 +20,21 @@ from dlocore.scene.scene import Environment
 
 Floats = NDArray[np.float64]
 
-_ASIDE = 1e-3  # step of a coordinate to a motion beside: far enough for one that is marched with a tolerance
-_FIRST = 1.0  # standard deviation of a logarithm, or of a share of a usual value, before anything was seen
-_FORGOTTEN = 0.02  # that is added to it in every update: cables warm up, wear, are changed
-_STEP = 0.3  # of a coordinate at most in one update
-_AT_ONCE = 2  # parameters at most that an update improves: each costs a motion beside the replayed one
-_BLOCK = 25  # frames whose residuals hang together: so many count as one
+_ASIDE = 1e-3  # step of a coordinate to a neighbouring motion: large enough for one that is marched with a tolerance
+_FIRST = 1.0  # standard deviation of a logarithm, or of a share of a usual value, before any frame
+_FORGOTTEN = 0.02  # added to it in every update: cables warm up, wear, are replaced
+_STEP = 0.3  # change of a coordinate in one update, at most
+_AT_ONCE = 2  # parameters that an update improves, at most: each costs a motion in addition to the replayed one
+_BLOCK = 25  # frames whose residuals are correlated: this many count as one
 
 
 @dataclass(frozen=True, kw_only=True)
 class Update:
-    """What an update found.
+    """The result of an update.
 
     Attributes:
         values: by parameter.
-        deviations: standard deviation of each on the scale on which it is sought.
+        deviations: standard deviation of each, on the scale on which it is sought.
         distance: median distance of the free markers from the prediction of the window [m].
         seconds: time that the update took.
     """
@@ -46,11 +46,11 @@ class Update:
 
 
 class Identifier:
-    """Takes frames as they arrive and keeps an estimate of the cable.
+    """An estimate of the cable that is updated as frames arrive.
 
-    Every update replays the frames of the last `window` seconds once and makes one Gauss-Newton step of two parameters
-    at most, by turns, with the last estimate and its covariance, widened a little, as prior. Not every frame needs an
-    update.
+    Every update replays the frames of the last `window` seconds once and makes one Gauss-Newton step in at most two
+    parameters, which take turns. The prior is the last estimate and its covariance, slightly widened. Not every frame
+    needs an update.
 
     Args:
         u: material coordinates of the markers (m,) [m].
@@ -98,10 +98,10 @@ class Identifier:
         return self._candidate.environment
 
     def add(self, time: float, markers: ArrayLike) -> None:
-        """Take a frame: time [s] and markers (m, 3) [m], NaN or masked where lost.
+        """Take a frame: time [s] and markers (m, 3) [m], NaN or masked if lost.
 
         Raises:
-            SceneError: the time is not after the last one, or the number of markers is another.
+            SceneError: the time is not after the last one, or the number of markers differs.
         """
         x = np.array(unmasked(markers), dtype=float)
         if x.shape != (len(self._u), 3):
@@ -114,10 +114,11 @@ class Identifier:
     def _derivatives(self, replay: Replay, played: Played, x: Floats) -> Floats:
         """Return the derivatives (frames, m, 3, parameters) of the prediction by the parameters whose turn it is.
 
-        They are two, or one where motions beside the played one can't be followed: to march one takes twice the time.
+        There are two, or one if neighbouring motions can't be followed from the replayed one: marching one takes twice
+        the time.
 
         Raises:
-            ValueError: a motion beside the played one leaves it, as it is unstable: it has no derivative.
+            ValueError: a neighbouring motion departs from the replayed one, which is unstable and so has no derivative.
         """
         count, followed = len(x), replay.differentiable(played)
         out = np.zeros((*played.predicted.shape, count))
@@ -131,10 +132,10 @@ class Identifier:
 
     @interruptible
     def update(self) -> Update | None:
-        """Improve the estimate by the latest frames; None while there are too few, or they tell nothing.
+        """Improve the estimate by the latest frames; return None while there are too few, or if they show nothing.
 
-        They don't where a held marker is lost for too long, where nothing can be replayed, or where it is so unstable
-        that it has no derivative.
+        They show nothing if a held marker is lost for too long, if nothing can be replayed, or if the motion is so
+        unstable that it has no derivative.
         """
         if len(self._times) < self._frames:
             return None
@@ -152,9 +153,9 @@ class Identifier:
         try:
             replay = Replay(recording, self._resolution)
             played = replay.play(self._candidate)
-        except SceneError:  # outliers where the window begins: no cable lies so
+        except SceneError:  # outliers where the window begins: no cable has such a shape
             return None
-        if played.stopped or played.motion.split > 0:  # beside a motion that took smaller steps others jump
+        if played.stopped or played.motion.split > 0:  # neighbours of a motion that took smaller steps jump
             return None
         free = recording.free
         x = np.array([p.coordinate(p.get(self._candidate)) for p in self._chosen])

@@ -1,4 +1,4 @@
-"""The parameters that can be identified: how each is put into a candidate, and on which scale it is sought."""
+"""The parameters that can be identified: how each enters a candidate, and on which scale it is sought."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -21,9 +21,9 @@ class Parameter:
     Attributes:
         name: as in results, e.g. "bending_stiffness" or "rest_curvature[2][0]".
         unit: SI.
-        logarithmic: varies by factors, else by `scale`.
-        scale: [unit] a usual value; the prior's standard deviation of those that may have either sign.
-        least: lower bound of those that vary evenly.
+        logarithmic: it varies by factors, otherwise by `scale`.
+        scale: [unit] a usual value; the prior's standard deviation for parameters that may have either sign.
+        least: lower bound for parameters that are not logarithmic.
         get, put: read it from a candidate; return a candidate with it.
     """
 
@@ -56,7 +56,7 @@ SCALARS = (
     "yield_strain",
 )
 DEFAULT = ("bending_stiffness", "drag", "drag_quadratic", "bending_damping")
-_FIRST = {"bending_damping": 1e-4, "drag": 0.05, "drag_quadratic": 0.02, "yield_strain": 0.02}  # where none is given
+_FIRST = {"bending_damping": 1e-4, "drag": 0.05, "drag_quadratic": 0.02, "yield_strain": 0.02}  # if none is given
 _INDEXED = re.compile(r"(rest_curvature|clamp_angles|marker_offsets)\[(\d+)\]\[([01])\]")
 _SEVERAL = {"rest_curvature": ("1/m", 2.0), "clamp_angles": ("rad", 0.2), "marker_offsets": ("m", 0.01)}
 _NEEDED = {"clamp_angles": "where a recording has a clamp", "marker_offsets": "where a recording has free markers"}
@@ -66,16 +66,16 @@ PLACES = 5  # along the cable at which its rest curvature is sought
 def parameters(
     names: tuple[str, ...], clamps: int, free: Sequence[int] = (), places: int = PLACES
 ) -> tuple[Parameter, ...]:
-    """Return the parameters of names; "rest_curvature", "clamp_angles" and "marker_offsets" stand for all of theirs.
+    """Return the parameters of the given names; "rest_curvature", "clamp_angles" and "marker_offsets" mean several.
 
     Args:
         names: of the parameters.
         clamps: their number.
         free: markers that nothing holds.
-        places: along the cable at which its rest curvature is sought.
+        places: number of places along the cable at which its rest curvature is sought.
 
     Raises:
-        SceneError: a name is unknown or given twice, or of a place, clamp or marker that is not there.
+        SceneError: a name is unknown, is given twice, or refers to a place, clamp or marker that does not exist.
     """
     there = {"rest_curvature": range(places), "clamp_angles": range(clamps), "marker_offsets": [int(i) for i in free]}
     found: list[Parameter] = []
@@ -103,7 +103,7 @@ def parameters(
 
 
 def prepared(candidate: Candidate, names: tuple[str, ...], clamps: int, markers: int = 0) -> Candidate:
-    """Return the candidate with everything in place that the parameters vary, of so many clamps and markers."""
+    """Return the candidate with everything that the parameters vary in place, for so many clamps and markers."""
     if any(n.startswith("rest_curvature") for n in names) and candidate.rest_curvature is None:
         candidate = replace(candidate, rest_curvature=np.zeros((PLACES, 2)), twist=True)
     if any(n.startswith("clamp_angles") for n in names) and candidate.clamp_angles is None:

@@ -1,4 +1,4 @@
-"""Replay of a recording: the scene of its grippers, predicted from its first frames with a candidate's parameters."""
+"""Replay a recording: a scene with its grippers, predicted from its first frames with a candidate's parameters."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -34,13 +34,13 @@ Floats = NDArray[np.float64]
 
 LIES_SO = "markers that tell how the cable lies, a first guess nearer to it, or more control points"
 _SLACK = 1.003  # of the cable between two grippers: held markers farther apart are brought nearer
-_REST_FRAMES = 8  # from which on a start can be seen to be at rest
+_REST_FRAMES = 8  # frames from which on it can be seen whether a start is at rest
 _CARRIED = 3  # tangents from a marker to the next, over which a frame is carried
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Resolution:
-    """How finely a recording is replayed: control points, time step [s], frames that its start is taken from."""
+    """How finely a recording is replayed: control points, time step [s], and frames that its start is taken from."""
 
     n_u: int = 13
     step: float = 0.005
@@ -52,7 +52,7 @@ class Played:
     """A replayed recording.
 
     Attributes:
-        candidate: that it was replayed with.
+        candidate: the one it was replayed with.
         predicted: positions of all markers at the compared frames (frames, m, 3) [m].
         problem, grid, motion: what was solved.
     """
@@ -65,7 +65,7 @@ class Played:
 
     @property
     def stopped(self) -> bool:
-        """The prediction ended before the recording."""
+        """Whether the prediction ended before the recording."""
         return bool(self.motion.stopped)
 
     @cached_property
@@ -85,14 +85,15 @@ class _Path:
 
 
 class Replay:
-    """Replays one recording of a motion with any candidate: what does not depend on it is prepared once.
+    """Replays one recording of a motion with any candidate; everything that does not depend on it is prepared once.
 
     Args:
         recording: of a motion.
         resolution: how finely.
         references: direction of each clamp about which its frame is chosen (clamps, 3); None: its mean in this
-            recording. Windows of one experiment need the same, so that angles mean the same in all of them.
-        shake: seeds noise of the held markers and of the start, as large as theirs: what the prediction owes to them.
+            recording. Windows of one experiment need the same references, so that angles mean the same in all of them.
+        shake: seeds noise of the held markers and of the start, as large as theirs, to see its effect on the
+            prediction.
     """
 
     def __init__(
@@ -161,7 +162,7 @@ class Replay:
         return paths
 
     def _way(self, i: int) -> tuple[Waypoints, Rotation | None]:
-        """Return the path of a gripper, and how it is turned at its first two instants."""
+        """Return the path of a gripper, and its rotations at its first two instants."""
         path = self.paths[i]
         if path.directions is None:
             return Waypoints(times=self.step_times, positions=path.positions, start="moving"), None
@@ -223,7 +224,7 @@ class Replay:
         """Return the equations of the recorded motion for a candidate, and its grid.
 
         Raises:
-            SceneError: no cable with these numbers can begin as the first frames tell.
+            SceneError: no cable with these numbers can begin as the first frames show.
         """
         try:
             problem = pose(self.scene(candidate))
@@ -239,7 +240,7 @@ class Replay:
 
         Args:
             candidate: to predict it with.
-            like: it with another candidate, whose equations serve as far as they are the same.
+            like: a replay with another candidate, whose equations are reused as far as they are the same.
         """
         problem, grid = self.posed(candidate) if like is None else self._posed_beside(like, candidate)
         motion = march(problem, grid, self.steps, Monitor(None, None, None))
@@ -249,7 +250,7 @@ class Replay:
         return Played(candidate, predicted, problem, grid, motion)
 
     def play_beside(self, played: Played, candidate: Candidate) -> Floats:
-        """Return the predicted positions (frames, m, 3) [m] with a candidate that differs a little.
+        """Return the predicted positions (frames, m, 3) [m] with a candidate that differs slightly.
 
         Raises:
             ValueError: the motion can't be followed from the played one.
@@ -259,7 +260,7 @@ class Replay:
         return self.positions(candidate, problem, grid, times, states)
 
     def _posed_beside(self, played: Played, candidate: Candidate) -> tuple[Problem, Grid]:
-        """Return the equations for a candidate beside the played one, with its grid where the start is the same."""
+        """Return the equations for a candidate near the played one, with the same grid if the start is the same."""
         problem = varied(played.problem, played.candidate, candidate)
         return self.posed(candidate) if problem is None else (problem, played.grid)
 
@@ -279,7 +280,7 @@ class Replay:
         return np.asarray(CubicSpline(times, x)(t))
 
     def _beside(self, offsets: Floats, grid: Grid, directors: Floats, q: Floats) -> Floats:
-        """Return how far the markers lie beside the centreline (k, m, 3) [m] of shapes q (k, n_u, 3)."""
+        """Return the offsets of the markers from the centreline (k, m, 3) [m] for shapes q (k, n_u, 3)."""
         length = float(grid.knots[-1])
         on = np.clip(self.span.u * (length / self.span.length), 0.0, length)
         ends = np.concatenate([[0.0], on])
@@ -296,7 +297,7 @@ class Replay:
         return np.asarray(turned_from(self.references[0], directions).apply(across(self.references[0])))
 
     def _beside_start(self, candidate: Candidate, seen: NDArray[np.int64], markers: Floats) -> Floats:
-        """Return how far the seen markers (k, 3) lie beside the centreline at the start, by their own polygon."""
+        """Return the offsets of the seen markers (k, 3) from the centreline at the start, by their own polygon."""
         if candidate.marker_offsets is None:
             return np.zeros((len(seen), 3))
         tangents = unit(np.gradient(markers, self.span.u[seen], axis=0))
@@ -305,18 +306,18 @@ class Replay:
         return np.asarray(offsets[:, :1] * first + offsets[:, 1:] * np.cross(tangents, first))
 
     def differentiable(self, played: Played) -> bool:
-        """Tell whether motions beside the played one can be followed."""
+        """Tell whether motions near the played one can be followed."""
         return not objection(played.problem, played.motion)
 
 
 def no_such_cable(error: SceneError) -> str:
-    """Return in words why a cable can't lie as its markers tell, without the fields of a shape that they made."""
+    """Return a message on why a cable can't lie as its markers show, without the fields of a shape made from them."""
     shaped = error.field.startswith("shape.")
     return f"No such cable can lie so: {'it would be folded or stretched' if shaped else str(error).rstrip('.')}"
 
 
 def common_references(recordings: Sequence[Recording]) -> Floats | None:
-    """Return the mean direction of each clamp over recordings of one experiment (clamps, 3), None where they differ."""
+    """Return the mean direction of each clamp over recordings of one experiment (clamps, 3); None if they differ."""
     if len({(r.holds, cast(Floats, r.markers).shape[1]) for r in recordings}) != 1:
         return None
     found = []

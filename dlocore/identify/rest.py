@@ -1,4 +1,4 @@
-"""Shapes at rest as recordings: every frame is an equilibrium under the cable's weight, held as its markers tell."""
+"""Shapes at rest as recordings: every frame is an equilibrium under the cable's weight, held as its markers show."""
 
 from dataclasses import dataclass, replace
 from typing import Literal, cast
@@ -65,7 +65,7 @@ class Rest:
         """Settle every shape with a candidate.
 
         Raises:
-            SceneError: no cable with these numbers can lie as the markers of a shape tell.
+            SceneError: no cable with these numbers can lie as the markers of a shape show.
         """
         shapes, stopped = [], False
         for frame in range(len(self.markers)):

@@ -18,19 +18,19 @@ from dlocore.recordings import Recording
 
 Floats = NDArray[np.float64]
 
-_FOLLOWED = 1e-5  # step of a coordinate in which a motion beside is followed
-_MARCHED = 2e-2  # where it is marched, whose tolerance would drown a smaller one
-_KNEE = 1.5  # robust deviations from which on a residual counts by its size, not its square
-_LEAST_DEVIATION = 2e-4  # [m] of the residuals, below which nothing is tracked
+_FOLLOWED = 1e-5  # step of a coordinate in which a neighbouring motion is followed
+_MARCHED = 2e-2  # the same if it is marched, where the tolerance would hide a smaller step
+_KNEE = 1.5  # robust deviations, above which a residual counts by its size instead of its square
+_LEAST_DEVIATION = 2e-4  # [m] of the residuals; no tracking is better than this
 _MOST_CHANGE = 1.0  # of a coordinate in one iteration
 _PRIOR_LOG = 3.0  # standard deviation of the logarithms: a factor of 20 either way is no surprise
-_HOPED = 1e-2  # relative decrease that a search may end without, when no step is better
+_HOPED = 1e-2  # expected relative decrease below which a search may end when no step is better
 _CONVERGED = 1e-3  # relative decrease of the cost
 
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Where the search stands: candidate, replays of it, residuals; stuck: no step did what the slope promised."""
+    """The state of the search: candidate, replays of it, residuals; stuck: no step gave what the slope promised."""
 
     candidate: Candidate
     played: list[Played | Settled]
@@ -57,14 +57,14 @@ class Search:
         self.measured = [measured(w, replay.markers) for w, replay in zip(windows, self.replays, strict=True)]
 
     def replay(self, window: Recording, shake: np.random.Generator | None = None) -> Replay | Rest:
-        """Return what replays a window, or its shapes at rest; with `shake` from other noise of what moves it."""
+        """Return what replays a window, or its shapes at rest; with `shake`, with different noise of what moves it."""
         with within(window.place):
             if window.static:
                 return Rest(window, self.resolution, self.references)
             return Replay(window, self.resolution, self.references, shake)
 
     def check(self) -> None:
-        """Raise Cancelled where the search was cancelled."""
+        """Raise Cancelled if the search was cancelled."""
         if self.cancelled is not None and self.cancelled():
             raise Cancelled("The identification was cancelled")
 
@@ -104,7 +104,7 @@ class Search:
                     found = tried
                     break
                 damping = max(10.0 * damping, 1e-2)
-            if found is None:  # no better one is near; where much was hoped for, that is no minimum
+            if found is None:  # there is no better one nearby; if a large decrease was expected, this is no minimum
                 stuck = hoped >= _HOPED * before
                 status = "max_iterations" if stuck else "converged"
                 break
@@ -153,7 +153,7 @@ class Search:
         return out
 
     def _followed(self, replay: Replay | Rest, played: Played | Settled, candidate: Candidate) -> Floats | None:
-        """Return the prediction, followed to rounding; None where it can't be."""
+        """Return the prediction, followed to rounding; None if it can't be followed."""
         if isinstance(replay, Rest) or isinstance(played, Settled) or not replay.differentiable(played):
             return None
         try:
@@ -174,7 +174,7 @@ class Search:
         if known is not None and isinstance(replay, Replay) and isinstance(played, Played):
             moved = x.copy()
             moved[j] += _FOLLOWED
-            if self.chosen[j].name.startswith("marker_offsets"):  # the start moves with it too, and forgets it soon
+            if self.chosen[j].name.startswith("marker_offsets"):  # the start moves with it too, and is soon forgotten
                 placed = (played.problem, played.grid, played.motion.times, played.motion.states)
                 change = replay.positions(self.candidate(candidate, moved), *placed) - played.predicted
                 return (change[:, free] / _FOLLOWED).ravel()
@@ -182,7 +182,7 @@ class Search:
                 change = replay.play_beside(played, self.candidate(candidate, moved)) - known
                 return (change[:, free] / _FOLLOWED).ravel()
             except ValueError:
-                pass  # it strayed: marched instead
+                pass  # it departed: marched instead
         for step in (_MARCHED, -_MARCHED):
             moved = x.copy()
             moved[j] += step
@@ -192,10 +192,10 @@ class Search:
                     change = replay.play(beside, played).predicted - played.predicted
                 else:
                     change = replay.play(beside).predicted - played.predicted
-            except SceneError:  # no such cable begins so
+            except SceneError:  # no such cable has this start
                 continue
             return (change[:, free] / step).ravel()
-        return np.zeros(played.predicted[:, free].size)  # the window tells nothing of it
+        return np.zeros(played.predicted[:, free].size)  # the window says nothing about it
 
     def coordinates(self, candidate: Candidate) -> Floats:
         """Return the parameters of a candidate on the scales on which they are sought."""
@@ -212,7 +212,7 @@ class Search:
         return np.maximum(x, least)
 
     def _free(self, x: Floats, H: Floats, g: Floats) -> NDArray[np.int64]:
-        """Return the parameters that change what was measured, or have a prior, and are not held at their bound."""
+        """Return the parameters that affect the measurements, or have a prior, and are not held at their bound."""
         held = [not p.logarithmic and x[j] <= p.least / p.scale and g[j] > 0 for j, p in enumerate(self.chosen)]
         return np.flatnonzero((np.diag(H) > 0.0) & ~np.array(held))
 
@@ -223,7 +223,7 @@ class Search:
         return H, J.T @ (w * r) + self._pull(x)
 
     def prior(self) -> Floats:
-        """Return the standard deviation of the prior of each coordinate; infinite where there is none."""
+        """Return the standard deviation of the prior of each coordinate; infinite if there is none."""
         return np.array([_PRIOR_LOG if p.logarithmic and p.name != "length_ratio" else 1.0 if not np.isfinite(p.least)
                          else p.scale if p.name == "length_ratio" else np.inf for p in self.chosen])  # fmt: skip
 
@@ -242,7 +242,7 @@ class Search:
         return float((np.sqrt(1.0 + (r / (_KNEE * deviation)) ** 2) - 1.0).sum()) * _KNEE**2
 
     def away(self, state: State, window: int) -> Floats:
-        """Return how far the predictions of the free markers of a window are from where they were seen (k, 3) [m]."""
+        """Return the distances of the predicted free markers of a window from where they were seen (k, 3) [m]."""
         seen = np.isfinite(self.replays[window].markers[:, self.windows[window].free, 0]).ravel()
         return state.residuals[window].reshape(-1, 3)[seen]
 
@@ -252,21 +252,21 @@ class Search:
         return float(np.median(np.linalg.norm(every, axis=1)))
 
     def deviation(self, state: State) -> float:
-        """Return the robust deviation of a coordinate of the residuals that were measured [m]."""
+        """Return the robust deviation of a coordinate of the measured residuals [m]."""
         return robust_deviation(np.concatenate(state.residuals)[np.concatenate(self.measured)])
 
 
 def measured(recording: Recording, markers: Floats) -> NDArray[np.bool_]:
-    """Tell which coordinates (k,) of the free ones of `markers` (frames, m, 3) [m] of a recording were measured.
+    """Tell which coordinates (k,) of the free `markers` (frames, m, 3) [m] of a recording were measured.
 
-    Not those of lost markers, and not those that never change, as z of 2D markers.
+    Not measured are those of lost markers and those that never change, such as z of 2D markers.
     """
     known = np.isfinite(markers) & varying(cast(Floats, recording.markers))
     return np.asarray(known[:, recording.free].ravel())
 
 
 def robust_deviation(r: Floats) -> float:
-    """Return the standard deviation of residuals (k,) [m] that outliers do not swell."""
+    """Return the standard deviation of residuals (k,) [m], not inflated by outliers."""
     return max(1.4826 * float(np.median(np.abs(r))) if len(r) else 0.0, _LEAST_DEVIATION)
 
 

@@ -18,14 +18,15 @@ Floats = NDArray[np.float64]
 class Span:
     """The part of a recorded cable that is simulated.
 
-    Between the two markers of a clamp the cable is as straight as the gripper that holds it, so it ends at the inner
-    one; not where free markers lie beyond a clamp.
+    Between the two markers of a clamp the cable is as straight as the gripper that holds it, so the span ends at the
+    inner one, unless free markers lie beyond a clamp.
 
     Attributes:
         length: [m].
-        u: of all markers (m,) [m], from where it begins: negative, or beyond its length, for those on a gripper.
+        u: coordinates of all markers (m,) [m] from its beginning: negative, or beyond its length, for those on a
+            gripper.
         begin: where it begins on the whole cable [m].
-        whole: length of that [m].
+        whole: length of the whole cable [m].
     """
 
     length: float
@@ -35,7 +36,7 @@ class Span:
 
     @staticmethod
     def of(recording: Recording) -> "Span":
-        """Return that of a recording."""
+        """Return the span of a recording."""
         u, free = cast(Floats, recording.u), recording.free
         begin, end = 0.0, cast(float, recording.length)
         for h in recording.holds:
@@ -48,13 +49,13 @@ class Span:
         return Span(end - begin, u - begin, begin, cast(float, recording.length))
 
     def scaled(self, ratio: float) -> "Span":
-        """Return it with all lengths `ratio` times as large."""
+        """Return the span with all lengths multiplied by `ratio`."""
         return Span(self.length * ratio, self.u * ratio, self.begin * ratio, self.whole * ratio)
 
     def of_cable(self, cable: Cable) -> Cable:
         """Return this part of a whole cable, with the point masses that lie on it; grippers hold the others.
 
-        These keep their shares of the cable's length, whatever that is in the recording.
+        Point masses keep their fractions of the cable's length, whatever that is in the recording.
         """
         slack = 1e-9 * self.length
         moved = [(one.u - self.begin, one) for one in resized(cable, self.whole).point_masses]
@@ -70,11 +71,11 @@ class Span:
         return replace(cable, length=self.whole, point_masses=tuple(masses))
 
     def inside(self, markers: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Tell which of some markers lie on it."""
+        """Tell which of the given markers lie on the span."""
         slack = 1e-9 * self.length
         return np.asarray((self.u[markers] >= -slack) & (self.u[markers] <= self.length + slack))
 
     def rows(self, knots: Floats) -> Floats:
-        """Return the rows (m, n) that give the markers' positions by the control points of a spline on it."""
+        """Return the rows (m, n) that give the markers' positions from the control points of a spline on the span."""
         on = np.clip(self.u, 0.0, self.length)
         return np.asarray(design_matrix(knots, on) + (self.u - on)[:, None] * design_matrix(knots, on, 1))

@@ -1,4 +1,4 @@
-"""The state a recorded motion begins with: shape and velocity of the spline from the markers of a few frames."""
+"""The initial state of a recorded motion: shape and velocity of the spline from the markers of a few frames."""
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -20,14 +20,15 @@ from dlocore.spline import design_matrix, greville
 Floats = NDArray[np.float64]
 
 _AXES = (0, 1, 2)
-# What follows is relative, so that a cable of another size and density starts alike. Of the relaxation:
+# The following numbers are relative, so that a cable of another size and density has a similar start. For the
+# relaxation:
 _AXIAL = 100.0, 1e3  # stiffness in weights of the cable, and in EI/L^2: it keeps the length within the markers' noise
 _SPRING = 100.0  # of a marker, in weights of a length; a metre of 50 g and 1e-3 N m^2 gives way by half over 0.1 m
-# and of the velocity:
-_EVEN = 1e-5  # of L^3: its smoothing, against markers a tenth of the length apart
-_KEPT_LENGTH = 10.0  # lengths: weight of the stretch rate beside a marker's velocity
+# and for the velocity:
+_EVEN = 1e-5  # of L^3: its smoothing, compared with markers a tenth of the length apart
+_KEPT_LENGTH = 10.0  # lengths: weight of the stretch rate compared with a marker's velocity
 _TOLERANCE = 1e-8  # of the length
-_ON_EARTH = 9.81  # [m/s^2], also where nothing weighs
+_ON_EARTH = 9.81  # [m/s^2], also if there is no gravity
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +36,8 @@ class HeldRows:
     """Held rows of the spline: C q = target, solved for the pivots.
 
     Attributes:
-        free: (n, free) what the control points follow of the free ones.
-        offset: (n, rows) what they follow of the targets.
+        free: (n, free) dependence of the control points on the free ones.
+        offset: (n, rows) their dependence on the targets.
     """
 
     free: Floats
@@ -44,7 +45,7 @@ class HeldRows:
 
     @staticmethod
     def of(knots: Floats, held: tuple[tuple[float, int], ...]) -> "HeldRows":
-        """Return those of (u [m], derivative 0 or 1)."""
+        """Return the rows of (u [m], derivative 0 or 1)."""
         n = len(knots) - 4
         if not held:
             return HeldRows(np.eye(n), np.zeros((n, 0)))
@@ -58,12 +59,12 @@ class HeldRows:
 class StartFit:
     """Fits the start of recordings of one cable on one grid.
 
-    The shape is where the cable would rest under its weight with springs to the markers: so a stiff cable bends no more
+    The shape is where the cable would rest under its weight with springs to the markers. So a stiff cable bends no more
     than it can between two noisy markers, and there may be more control points than markers. The velocity is smooth,
-    keeps the length, and comes as near to the markers' as it can.
+    keeps the length, and comes as near to that of the markers as possible.
 
     Args:
-        grid: whose knots and tables serve.
+        grid: whose knots and tables are used.
         held: (u [m], 0 for a position or 1 for a direction) of what is held.
     """
 
@@ -98,7 +99,7 @@ class StartFit:
         length, stiffness = float(knots[-1]), _SPRING * _ON_EARTH * density
         p[laws.STRETCH, 0] = max(_AXIAL[0] * _ON_EARTH * density * length, _AXIAL[1] * bending / length**2)
         p[laws.BEND, 0] = bending
-        # a motion in a plane, too, starts from a shape that is found in space
+        # even for a planar motion, the start shape is found in space
         history = self.grid.past()._replace(room=np.zeros(room_for(len(_AXES), len(tables.curvature.w))))
         B = design_matrix(knots, u)
         load = np.asarray(tables.weight)[:, None] * (density * gravity)
@@ -117,7 +118,7 @@ class StartFit:
         K, f, still = np.empty((3 * n, 12)), np.empty((n, 3)), np.zeros((n, 3))
         before, rounding = energy(q), 1e-15 * stiffness * length**2
         for _ in range(60):
-            scales = (1.0, 0.0, 0.0)  # the positive part: from a guess along noisy markers the full one need not be
+            scales = (1.0, 0.0, 0.0)  # the positive part: the full one may not be positive along noisy markers
             assemble(_AXES, q, still, tables, active, p, history, NO_RATES, scales, f, K)
             force = (Z.T @ (f - load + stiffness * B.T @ (B @ q - markers)).ravel()).astype(float)
             step = -np.linalg.solve(Z.T @ dense_of(K) @ Z + springs, force)
@@ -160,7 +161,7 @@ class StartFit:
 
 @lru_cache(maxsize=16)
 def start_fit(length: float, n_u: int, held: tuple[tuple[float, int], ...]) -> StartFit:
-    """Return the fit on the grid of `n_u` control points that a scene has whose grasps hold the cable so.
+    """Return the fit on the grid of `n_u` control points of a scene whose grasps hold the cable in this way.
 
     Args:
         length: of the cable [m].
@@ -169,14 +170,14 @@ def start_fit(length: float, n_u: int, held: tuple[tuple[float, int], ...]) -> S
     """
     directions = {u for u, order in held if order == 1}
     grasps = tuple(Grasp(u=u, hold="tangent" if u in directions else "point") for u, order in held if order == 0)
-    # knots and tables depend on where it is held alone, not on what it is made of
+    # knots and tables depend only on where it is held, not on its material
     cable = Cable(length=length, diameter=0.01 * length, linear_density=1.0, bending_stiffness=1.0)
     straight = Scene(cable=cable, shape=Straight(), grasps=grasps, horizon=1.0, effects={"twist": "off"})
     return StartFit(make_grid(pose(straight), n_u), held)
 
 
 def _along(at: Floats, u: Floats, markers: Floats) -> Floats:
-    """Return points (n, 3) [m] at coordinates on the polygon of markers, which goes on straight beyond its ends."""
+    """Return points (n, 3) [m] at coordinates on the polygon of markers, which continues straight beyond its ends."""
     out = np.column_stack([np.interp(at, u, markers[:, d]) for d in range(3)])
     for end, inner, beyond in ((0, 1, u[0] - at), (-1, -2, at - u[-1])):
         chord = markers[end] - markers[inner]

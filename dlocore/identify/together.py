@@ -12,17 +12,17 @@ from dlocore.recordings import Recording
 
 Floats = NDArray[np.float64]
 
-LONGEST = 50.0  # [m] of a cable: what is longer was tracked in millimetres
-_STRETCHED = 2.0  # times what its coordinates tell, that no cable is long
-_ALIKE = 0.02  # relative, to which lengths, diameters and densities of one cable agree
+LONGEST = 50.0  # [m] of a cable: a longer one was tracked in millimetres
+_STRETCHED = 2.0  # times the length that its coordinates give: no cable is longer
+_ALIKE = 0.02  # relative, within which lengths, diameters and densities of one cable agree
 
 
 def check_together(recordings: Sequence[Recording]) -> None:
-    """Refuse recordings that can't be of one cable, each seen once, in metres.
+    """Refuse recordings that can't be of one cable, each given once, in metres.
 
     Raises:
-        SceneError: one is in other units, given twice, or tells another length, diameter, density or other point
-            masses than another.
+        SceneError: one is in other units, is given twice, or differs from another in length, diameter, density or point
+            masses.
     """
     for recording in recordings:
         _check_metres(recording)

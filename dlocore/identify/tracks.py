@@ -1,4 +1,4 @@
-"""Smooth paths of held markers: without outliers, as smooth as their noise asks for."""
+"""Smooth paths of held markers: without outliers, as smooth as their noise suggests."""
 
 from typing import cast
 
@@ -13,10 +13,10 @@ from dlocore.shape.smoothing import smooth
 Floats = NDArray[np.float64]
 
 _JUMP = 6.0  # robust deviations beyond which a sample of a held marker is an outlier
-_FLOOR = 5e-4  # [m] below which no sample is one
-_PASSES = 20  # of looking for outliers
-_AWAY = 4.0  # robust deviations from the smooth path beyond which a sample is an outlier that was small enough to pass
-_MOST = 1.3  # times the noise that neighbouring samples tell
+_FLOOR = 5e-4  # [m] below which no sample is an outlier
+_PASSES = 20  # of the search for outliers
+_AWAY = 4.0  # robust deviations from the smooth path, beyond which a sample is an outlier, if a small one
+_MOST = 1.3  # times the noise that neighbouring samples indicate
 _CROWD = 7  # samples, of which most are no outliers
 _LEAST = 8  # samples
 _SPANS = 0.7  # of the path's spline for each sample at most
@@ -24,7 +24,7 @@ _KNOT = 0.02  # [s] between its knots at least
 
 
 def held_paths(recording: Recording, shake: np.random.Generator | None) -> dict[int, CubicSpline]:
-    """Return smooth paths of the held markers: without outliers, as smooth as their noise asks for."""
+    """Return smooth paths of the held markers: without outliers, as smooth as their noise suggests."""
     times = cast(Floats, recording.times)
     wanted = {h.marker for h in recording.holds} | {h.towards for h in recording.holds if h.towards is not None}
     out = {}
@@ -42,16 +42,16 @@ def held_paths(recording: Recording, shake: np.random.Generator | None) -> dict[
 
 
 def varying(x: Floats) -> NDArray[np.bool_]:
-    """Tell which coordinates of positions (..., 3) [m] ever change; NaN where a marker was lost."""
+    """Tell which coordinates of positions (..., 3) [m] ever change; NaN if a marker was lost."""
     flat = x.reshape(-1, x.shape[-1])
     return np.asarray(np.nanmax(flat, axis=0) > np.nanmin(flat, axis=0))
 
 
 def noise_of(x: Floats) -> float:
-    """Return the standard deviation of the noise of samples x (k, 3) [m] in a row, or more; infinite of three.
+    """Return the standard deviation of the noise of consecutive samples x (k, 3) [m], or more; infinite for three.
 
-    Third differences tell it, to which a path that is well sampled adds little. Coordinates that never change, as z of
-    2D markers, tell nothing.
+    It is found from third differences, to which a well sampled path adds little. Coordinates that never change, such as
+    z of 2D markers, are ignored.
     """
     if len(x) < 4:
         return np.inf
@@ -99,17 +99,17 @@ def _leaps(t: Floats, x: Floats) -> Floats:
 
 
 def _smoothed(t: Floats, x: Floats, times: Floats) -> CubicSpline:
-    """Return the spline through `times` of samples x (k, 3), whose smoothness has the largest likelihood.
+    """Return the spline through `times` of samples x (k, 3) whose smoothness has the largest likelihood.
 
-    Samples that are far from it are left out, and it is made again. Before the first and after the last that is left
-    it goes on straight.
+    Samples far from it are left out, and it is made again. It continues straight before the first sample and after the
+    last one that is kept.
 
     Raises:
         SceneError: too few samples are left.
     """
     keep = np.ones(len(t), dtype=bool)
     middle = x.mean(axis=0)
-    most = _MOST * noise_of(x)  # else the path could be all noise
+    most = _MOST * noise_of(x)  # otherwise the path could be all noise
     for _ in range(_PASSES):
         if keep.sum() < _LEAST:
             raise SceneError("markers", f"{keep.sum()} samples of a held marker", "at least 8 that are no outliers")
@@ -119,7 +119,7 @@ def _smoothed(t: Floats, x: Floats, times: Floats) -> CubicSpline:
         away = x - middle - path(np.clip(t, first, last) - first)
         limit = max(_AWAY * 1.4826 * float(np.median(np.abs(away[keep]))), _FLOOR)
         near = np.linalg.norm(away, axis=1) <= limit
-        near |= np.convolve(~near, np.ones(_CROWD), "same") > 0.5 * _CROWD  # so many at once are none: it is too smooth
+        near |= np.convolve(~near, np.ones(_CROWD), "same") > 0.5 * _CROWD  # so many at once: the path is too smooth
         if (near == keep).all():
             break
         keep = near

@@ -1,4 +1,4 @@
-"""Validation against measurements: parameters fitted on some windows of a set, and the others predicted."""
+"""Validation against measurements: parameters are fitted on some windows of a set, and the others are predicted."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -80,12 +80,12 @@ def validate_cable(
     model: Model = "scalars",
     start: Candidate | None = None,
 ) -> CableValidation:
-    """Fit a cable on its windows to fit on, and predict the others.
+    """Fit a cable on the windows for that, and predict the others.
 
     Args:
         cable: windows of one cable.
-        model: "scalars": EI, drag, bending damping, length; "bends": and how the cable leaves its clamps, where the
-            markers sit beside it, its rest curvature, and the twist that those need.
+        model: "scalars": EI, drag, bending damping, length; "bends": also how the cable leaves its clamps, the offsets
+            of the markers, its rest curvature, and the twist that these need.
         start: a candidate to begin with.
     """
     began = process_time()
@@ -127,7 +127,7 @@ def validate_wire(wire: HangingWire, names: Sequence[str]) -> WireValidation:
 
 
 def each_repeat(wire: HangingWire) -> Floats:
-    """Return the rms distance (k,) [m] of each repeat when stiffness and clamps are fitted on it alone."""
+    """Return the rms distance (k,) [m] of each repeat when stiffness and clamps are fitted on that repeat alone."""
     whole, out = wire.recording, []
     for shape in np.asarray(whole.markers):
         alone = replace(whole, times=[0.0], markers=shape[None])

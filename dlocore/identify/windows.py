@@ -1,4 +1,4 @@
-"""Windows of recordings that are replayed, each from its own start: where the markers tell how the cable is moved."""
+"""Windows of recordings that are replayed, each from its own start, where the markers show how the cable is moved."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,21 +13,21 @@ from dlocore.recordings import LEAST_FRAMES, LEAST_SEEN, Recording, apart_in_wor
 
 Floats = NDArray[np.float64]
 
-LONGEST_GAP = 0.15  # [s] over which the path of a gripper is bridged where its marker is lost
-_FEW = 4  # or so many frames, where these are far apart
-_SHORTEST = 0.5  # [s] of what lies between two gaps, to be replayed
-_LEAST_BEGUN = 3  # markers seen, with which a start can be found
-_NAMED = 3  # gaps that are told of one by one
+LONGEST_GAP = 0.15  # [s] over which the path of a gripper is bridged while its marker is lost
+_FEW = 4  # or this many frames, if they are far apart
+_SHORTEST = 0.5  # [s] between two gaps, for that part to be replayed
+_LEAST_BEGUN = 3  # markers seen, from which a start can be found
+_NAMED = 3  # gaps that the message names one by one
 
 
 @dataclass(frozen=True)
 class Gap:
-    """A time for which a held marker was lost so long that nothing tells how its gripper moved.
+    """A time during which a held marker was lost so long that nothing shows how its gripper moved.
 
     Attributes:
         marker: that was lost.
-        first, last: frames; none, and `first` the one after, where the frames themselves are missing.
-        begin, end: when it was last seen before, and first after [s], or where the recording begins or ends.
+        first, last: frames; none, with `first` the one after, if the frames themselves are missing.
+        begin, end: when it was last seen before and first seen after [s], or where the recording begins or ends.
     """
 
     marker: int
@@ -54,19 +54,19 @@ def gaps(recording: Recording) -> tuple[Gap, ...]:
 
 
 def gaps_told(recordings: Sequence[Recording]) -> list[str]:
-    """Return in words where held markers are lost for too long."""
+    """Return a message on where held markers are lost for too long."""
     found = [(recording.name, gap) for recording in recordings for gap in gaps(recording)]
     if not found:
         return []
     named = [
         f"held marker {gap.marker} of {name!r} from {gap.begin:.4g} to {gap.end:.4g} s" for name, gap in found[:_NAMED]
     ]
-    more = [f"{len(found) - _NAMED} times more"] if len(found) > _NAMED else []
-    return [f"Lost for so long that what lies before and after is replayed apart: {', '.join([*named, *more])}."]
+    more = [f"and {len(found) - _NAMED} more"] if len(found) > _NAMED else []
+    return [f"Lost for too long, so the parts before and after are replayed separately: {', '.join([*named, *more])}."]
 
 
 def cut(recordings: Sequence[Recording], window: float) -> list[Recording]:
-    """Return the recordings in windows of about `window` seconds, without where held markers are lost for too long.
+    """Return the recordings in windows of about `window` seconds, without gaps where held markers are lost too long.
 
     Raises:
         SceneError: a window has too few frames, or nothing is left of a recording.
@@ -82,7 +82,7 @@ def cut(recordings: Sequence[Recording], window: float) -> list[Recording]:
 
 
 def _pieces(recording: Recording) -> list[Recording]:
-    """Return what is left of a recording between its gaps, from the first frame on in which enough markers are seen."""
+    """Return the parts of a recording between its gaps, from the first frame on in which enough markers are seen."""
     if recording.static:
         return [recording]
     times, seen = cast(Floats, recording.times), np.isfinite(cast(Floats, recording.markers)[..., 0])

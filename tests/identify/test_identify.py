@@ -331,7 +331,7 @@ def test_a_search_that_no_step_betters_says_so(monkeypatch: pytest.MonkeyPatch) 
     start = Candidate(cable=replace(CABLE, bending_stiffness=1e-2), environment=DRAG)
     found = identify([simulated(3, 1.0, cable=CABLE, environment=DRAG)], names=("drag",), start=start)
     assert found.status == "max_iterations"
-    assert found.message.startswith("Stopped without converging in 1 iteration, as no step betters the fit")
+    assert found.message.startswith("Stopped without converging in 1 iteration, as no step improves the fit")
 
 
 def test_offsets_of_markers_need_the_same_markers_in_every_recording() -> None:
@@ -409,7 +409,7 @@ def test_a_search_whose_errors_can_not_all_be_assessed_is_kept_with_a_doubt(
     monkeypatch.setattr(Replay, "__init__", refuse)
     found = identify([still()], names=("drag",), start=Candidate(cable=CABLE, environment=DRAG))
     assert found.status == "converged"
-    assert f"{said}: intervals leave out what they would add." in found.message
+    assert f"{said}: the intervals do not include what they would add." in found.message
 
 
 def test_a_derivative_is_taken_to_the_side_on_which_the_cable_can_begin(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -433,7 +433,7 @@ def test_a_derivative_is_taken_to_the_side_on_which_the_cable_can_begin(monkeypa
 
 def test_what_is_kept_at_an_assumed_value_is_told_of() -> None:
     assert (
-        "Neither given nor sought, and kept at what is assumed: bending_stiffness 0.00125 N m^2, "
+        "Neither given nor identified, so kept at an assumed value: bending_stiffness 0.00125 N m^2, "
         "torsional_stiffness 0.00125 N m^2, bending_damping 0.0002 N m^2 s, drag_quadratic 0 N s^2/m^3, "
         "axial_stiffness 625 N, diameter 0.005 m." in identify([still()], names=("drag",)).message
     )
@@ -462,7 +462,7 @@ def test_what_is_sought_or_told_by_a_recording_is_not_told_of_as_assumed() -> No
 def test_what_is_given_is_not_told_of_as_assumed(given: dict[str, Any], kept: str) -> None:
     message = identify([still()], names=("drag",), **given).message
     assert message.endswith(kept)
-    assert ("Neither given nor sought" in message) is bool(kept)
+    assert ("Neither given nor identified" in message) is bool(kept)
 
 
 @pytest.mark.parametrize(("damping", "told"), [(3e-4, False), (1e-3, True)])

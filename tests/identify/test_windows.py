@@ -89,7 +89,7 @@ def test_gaps_are_told_of() -> None:
     several = hanging()
     for first in (70, 170, 270, 370, 450):
         several = lost(several, first, first + 19)
-    assert gaps_told([several])[0].endswith(" from 2.69 to 2.9 s, 2 times more.")
+    assert gaps_told([several])[0].endswith(" from 2.69 to 2.9 s, and 2 more.")
 
 
 def test_no_estimate_is_improved_by_a_gripper_that_was_not_seen() -> None:
