@@ -1,4 +1,4 @@
-"""Lower bands of symmetric matrices, as the kernels store them, where they are not compiled."""
+"""Lower bands of symmetric matrices, as the kernels store them, for code that is not compiled."""
 
 import numpy as np
 from numpy.typing import NDArray

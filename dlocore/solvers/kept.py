@@ -1,4 +1,4 @@
-"""The states of a march that are kept: all of them, or every so many where all would not fit."""
+"""The states of a march that are kept: all of them, or one of every few if they would not all fit."""
 
 from itertools import pairwise
 
@@ -10,18 +10,18 @@ from dlocore.kernels.predictor import ORDERS
 Floats = NDArray[np.float64]
 
 MOST_NUMBERS = 6.4e7  # of all states that are kept of a march: 0.5 GB
-_BEHIND = ORDERS + 1  # states behind the one that was reached, from which the next is predicted
+_BEHIND = ORDERS + 1  # states up to the one that was reached, from which the next is predicted
 
 
 def rows_of(every: int, counts: list[int]) -> NDArray[np.int64]:
-    """Return the steps that are kept, of every so many in each stretch of so many, and of its beginning and its end."""
+    """Return the steps that are kept: one in `every` in each stretch of `counts` steps, and its first and last."""
     ends = np.cumsum([0, *counts])
     inside = [np.arange(a, b, every) for a, b in pairwise(ends)]
     return np.concatenate([*inside, ends[-1:]])
 
 
 class Kept:
-    """The states of a march under way, and its log, of which every so many rows are kept.
+    """The states of a march under way, and its log, of which every few rows are kept.
 
     Args:
         start: (n_u, nc) control points [m] at step 0.
@@ -32,7 +32,7 @@ class Kept:
     Attributes:
         steps: (rows,) whose states are kept.
         states: (rows, n_u, nc) control points [m] at them.
-        log: (logged rows, points, columns) frames and memory at every so many of them, and at the last.
+        log: (logged rows, points, columns) frames and memory at every few of them, and at the last.
     """
 
     def __init__(self, start: Floats, counts: list[int], most_frames: float, columns: tuple[int, int]) -> None:
@@ -44,7 +44,7 @@ class Kept:
         self.states[0] = start
         self._every_log = max(1, int(-(-rows * len(start) // most_frames)))
         self.log = np.zeros((1 - -(rows - 1) // self._every_log if columns[1] else 0, *columns))
-        self._behind = self.states[:1]  # the last states, in a row of steps, up to the one reached
+        self._behind = self.states[:1]  # the last states in consecutive steps, up to the one reached
         self._noted = self.log[:1]  # the last row of the log
 
     @property
@@ -58,11 +58,11 @@ class Kept:
         return self._behind[-1]
 
     def window(self, at: int, until: int, first: int) -> tuple[int, Floats, Floats]:
-        """Return room for the states of the steps after `at`, the one reached, up to `until`, and for their log.
+        """Return room for the states, and for the log, of the steps after `at`, the one reached, up to `until`.
 
         Returns:
-            The step that its first row is of, not before `first`; states (k, n_u, nc) [m], those up to `at` written;
-            log (k, points, columns), or (0, 0, 0) where none is kept.
+            The step of its first row, not before `first`; states (k, n_u, nc) [m], with those up to `at` filled in; log
+            (k, points, columns), or (0, 0, 0) if none is kept.
         """
         base = max(at - _BEHIND, first)
         rows = slice(base, until + 1)
@@ -77,7 +77,7 @@ class Kept:
         return base, states, log
 
     def keep(self, base: int, states: Floats, log: Floats, before: int, at: int) -> None:
-        """Keep what is to be kept of the steps after `before` up to `at`, now the one reached, of a `window`."""
+        """Keep what is needed of the steps after `before` up to `at`, now the one reached, from a `window`."""
         self._behind = states[max(at - base - _BEHIND, 0) : at - base + 1]
         rows = np.arange(*np.searchsorted(self.steps, (before + 1, at + 1)))
         if self._every > 1:
@@ -95,7 +95,7 @@ class Kept:
         self.states[np.searchsorted(self.steps, at)] = self.now
 
     def stand_still(self, reached: int) -> int:
-        """Let the last state stay from a step on; return the last row that is not after it."""
+        """Hold the last state from a step on; return the last row that is not after it."""
         last = int(np.searchsorted(self.steps, reached, side="right")) - 1
         self.states[last + 1 :] = self.now
         self.log[last // self._every_log + 1 :] = self._noted

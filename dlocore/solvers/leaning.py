@@ -1,4 +1,4 @@
-"""What friction holds as a stretch of motion begins: its anchors lie where it holds the cable back from the first."""
+"""Friction at the beginning of a stretch of motion: anchors are placed where it holds the cable back from the start."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,16 +12,16 @@ from dlocore.problem.problem import Problem
 
 Floats = NDArray[np.float64]
 
-_RESTS = 0.05  # of the diameter above the table: nearer to it the cable rests on it
+_RESTS = 0.05  # of the diameter above the table: nearer to it, the cable rests on it
 
 
 def lean_on_anchors(
     problem: Problem, grid: Grid, v: Floats, a: Floats, mass: Floats, e: Elimination, G: Floats, history: History
 ) -> Floats:
-    """Put the anchors of a lying cable where friction holds it back from the acceleration `a` that it would else take.
+    """Place the anchors of a lying cable where friction holds it back from the acceleration `a` without friction.
 
-    With anchors right under it the cable would run into the stick, and swing past it. Returns the acceleration that is
-    left, and adds the friction to G, both (n_u, nc).
+    With anchors right under it the cable would move until it sticks, and swing past. The function returns the remaining
+    acceleration, and adds the friction to G, both (n_u, nc).
     """
     assert problem.friction is not None
     stick, _, limit = problem.friction.parameters()
@@ -30,7 +30,7 @@ def lean_on_anchors(
     pull = problem.scene.cable.linear_density * acceleration / limit
     pull = pull / np.maximum(np.linalg.norm(pull, axis=1, keepdims=True), 1.0)
     speed = np.linalg.norm(velocity, axis=1, keepdims=True)
-    moves = speed > SLIP_SPEED  # friction on what slides is in `a` and G already
+    moves = speed > SLIP_SPEED  # friction on what slides is already in `a` and G
     history.slide[:] = history.slide - stick * np.where(moves, velocity / np.maximum(speed, SLIP_SPEED), pull)
     pull = np.where(moves, 0.0, pull)
     force = np.zeros_like(a)
@@ -41,7 +41,7 @@ def lean_on_anchors(
 
 
 def lean_on_table(problem: Problem, grid: Grid, a: Floats, history: History) -> None:
-    """Put the anchors of what rests on a table in space where friction holds it back, as `lean_on_anchors` does."""
+    """Place the anchors of what rests on a table in space where friction holds it back, as `lean_on_anchors` does."""
     assert problem.friction is not None
     assert problem.table is not None
     fall = -float(problem.weight()[2]) / problem.scene.cable.linear_density

@@ -1,4 +1,4 @@
-"""The compiled march: implicit steps of the spatial spline, fitted by the time spline."""
+"""The compiled march: implicit time steps of the spatial spline, to which the time spline is fitted."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -38,24 +38,24 @@ from dlocore.solvers.stretch import Entry, enter, with_what_lasts
 
 Floats = NDArray[np.float64]
 
-# Spectral radius at infinite frequency. 0.9 is a little more accurate where the motion is smooth, but in stiff,
-# undamped motion energy grows; with 0.5 it hardly ever does, with 0 never (docs/model.md).
+# Spectral radius at infinite frequency. 0.9 is a little more accurate where the motion is smooth, but energy grows in
+# stiff, undamped motion; with 0.5 it hardly ever grows, with 0 never (docs/model.md).
 RHO = 0.5
 STRONGLY_DAMPED = 0.0
-TOLERANCE = 1e-8  # of the length, on the error that the Newton iterations of a step of COARSE leave
+TOLERANCE = 1e-8  # of the length: the error that Newton's iterations leave in a step of COARSE
 LEAST_TOLERANCE, MOST_TOLERANCE = 1e-11, 1e-7
-COARSE = 1 / 256  # of the period of a cable that swings: the tolerance goes with the square of the step
-_SHORT = 20.0  # times the shortest knot span are the mean, where forces begin to need more than positions do
-_STIFF = 3e6  # EA L^2/EI up to which tension is no noise: that of cables whose EA is not given is mostly below
+COARSE = 1 / 256  # of the period of a swing: the tolerance is proportional to the square of the step
+_SHORT = 20.0  # times the shortest knot span: from this mean span on, forces need more than positions do
+_STIFF = 3e6  # EA L^2/EI up to which tension is not noisy; cables whose EA is not given are mostly below it
 _NOISELESS = 1e-4  # of the tolerance, at least
-CHUNK = 256  # steps between looks at the clock, at most
+CHUNK = 256  # steps between checks of the clock, at most
 # of these steps, at most: times control points and their coordinates squared; some hundredths of a second
 _WORK = 2.5e5
-_NODE = 5.0  # times as much counts a node of contact: where many touch, a step may take many iterations
-MOST_FRAMES = 1_300_000  # control points times steps of which a motion with twist keeps the frames: 0.6 GB of them
+_NODE = 5.0  # a node of contact counts as this many: where many touch, a step may take many iterations
+MOST_FRAMES = 1_300_000  # control points times steps for which a motion with twist keeps frames: 0.6 GB of them
 _SPLITS = (4, 16, 64)  # parts of a step that found no equilibrium
-_STRUCK = (16,)  # the same where the cable strikes something, which leaves an error that goes with the step
-_MOST_STRUCK = 1 / 8  # of the steps: where it strikes in more, the others are taken whole
+_STRUCK = (16,)  # the same if the cable strikes something, which leaves an error proportional to the step
+_MOST_STRUCK = 1 / 8  # of the steps: if it strikes in more, the others are taken whole
 _LOOKS = 12  # states of a motion, at least, that are searched for folds
 
 
@@ -65,25 +65,25 @@ class March:
 
     Attributes:
         grid: space discretisation.
-        times: (k,) [s], of all steps, or of every so many of a march of very many, see `Kept`.
+        times: (k,) [s], of all steps, or of one of every few in a very long march, see `Kept`.
         states: (k, n_u, nc) control points at those times.
         steps: time steps that were to be taken.
-        asked: of how many it was asked for: events may need more.
+        asked: the requested number of steps: events may need more.
         velocity: (n_u, nc) [m/s] just after t = 0.
-        history: what the motion leaves behind at its end.
-        log: frames and memory at the times `logged` (rows, points, columns), see `kernels.assembly.note`; (0, 0, 0)
-            where nothing is kept.
-        reached: which of the times is the last before it ended.
-        stopped: why it ended there: "" (the end), "step" (no equilibrium), "time" (deadline), or as it was given
-            up: "strain" or "depth".
+        history: the history of the cable at the end of the motion.
+        log: frames and memory at the times `logged` (rows, points, columns), see `kernels.assembly.note`; (0, 0, 0) if
+            nothing is kept.
+        reached: index of the last time before it ended.
+        stopped: why it ended there: "" (the end), "step" (no equilibrium), "time" (deadline), or, if it was given up,
+            "strain" or "depth".
         rho: spectral radius it was marched with.
-        split: steps that found equilibrium only in smaller ones.
+        split: number of steps that found equilibrium only when divided.
         largest_strain: largest |axial strain| of the motion.
         slopes: least and largest |r'| at the curvature points of some of its states.
         update: largest error left by the Newton iterations of a step, as estimated [m].
         deepest: largest depth of the cable in an obstacle, the table or itself [m].
-        find_forces: finds `forces`, as they are first read.
-        growth: logarithm of what a disturbance grows by at most, about, where it was looked for.
+        find_forces: computes `forces` when they are first read.
+        growth: approximate logarithm of the largest growth of a disturbance, if it was examined.
     """
 
     grid: Grid
@@ -107,7 +107,7 @@ class March:
 
     @cached_property
     def forces(self) -> tuple[WindowForces, ...]:
-        """What holds the cable between each two events."""
+        """What holds the cable between each pair of events."""
         return self.find_forces()
 
     def __getstate__(self) -> dict[str, Any]:
@@ -120,7 +120,7 @@ class March:
 
     @property
     def logged(self) -> NDArray[np.int64]:
-        """Which of the times (rows,) the rows of the log are of; all where nothing is kept."""
+        """Indices of the times (rows,) of the rows of the log; all of them if nothing is kept."""
         at = np.arange(len(self.times))
         if len(self.log) == 0:
             return at
@@ -147,7 +147,7 @@ class March:
         return 3 if self.log.shape[2] > PAST else min(1, self.log.shape[2])
 
     def behind(self, times: Floats) -> History:
-        """Return what lies behind the motion at the times (k,) [s]: a `History` with arrays (1 or k, ...)."""
+        """Return the history of the motion at the times (k,) [s]: a `History` with arrays (1 or k, ...)."""
         start = self.grid.past()
         if len(self.log) == 0:
             return start._replace(memory=start.memory[None], past=start.past[None], axial=start.axial[None])
@@ -165,29 +165,29 @@ def march(
     problem: Problem, grid: Grid, steps: int, monitor: Monitor, *, rho: float = RHO, whole: bool = False,
     credible: float = math.inf, shallow: float = math.inf, knocks: Mapping[float, Floats] | None = None,
 ) -> March:  # fmt: skip
-    """March the motion of a problem on `grid` in about `steps` equal steps, more where events lie close.
+    """March the motion of a problem on `grid` in about `steps` equal steps, more if events are close together.
 
     Args:
         problem: what is solved.
         grid: its space discretisation, with the start on it.
         steps: time steps.
-        monitor: that of the solve.
+        monitor: of the solve.
         rho: spectral radius.
-        whole: whether a march that the deadline ends is of no use: there is an answer that it was to better.
+        whole: whether a march cut short by the deadline is of no use, because it was to improve an existing answer.
         credible, shallow: axial strain, and depth in an obstacle, the table or itself [m], beyond which it is given up.
-        knocks: by how much the control points (n_u, nc) [m] are displaced at some times [s] inside the motion, to see
-            what becomes of a disturbance; a stretch ends there.
+        knocks: displacements of the control points (n_u, nc) [m] at some times [s] inside the motion, to see how a
+            disturbance develops; a stretch ends there.
 
     Raises:
         Cancelled: the caller asked to stop.
-        TimeIsUp: the deadline passed, where it had to be `whole`.
+        TimeIsUp: the deadline passed, and it had to be `whole`.
     """
     knocks = knocks or {}
     marks = sorted({*marks_of(problem), *knocks})
     counts = step_counts(marks, steps)
     problem = firmer(problem, problem.horizon / steps)
     if problem.inertia is None or (problem.friction is not None and problem.friction.lying > 0.0):
-        rho = STRONGLY_DAMPED  # without waves, or where a rough table stops them, there is nothing to keep
+        rho = STRONGLY_DAMPED  # without waves, or if a rough table stops them, there is nothing to preserve
     walk = _Walk(problem, grid, monitor, marks, counts, rho, credible, shallow)
     first = 0
     for begin, end, count in zip(marks[:-1], marks[1:], counts, strict=True):
@@ -209,10 +209,10 @@ class _Stretch:
     Attributes:
         h: time step [s].
         first, last: its steps.
-        grasps: that hold in it.
+        grasps: those that hold in it.
         entry: how it begins.
         v, a, G: velocity [m/s], acceleration [m/s^2] and forces [N], see `march_steps`.
-        reactions: (its steps + 1, held) forces [N] that hold the held degrees of freedom.
+        reactions: (its steps + 1, held) forces [N] on the held degrees of freedom.
     """
 
     h: float
@@ -232,7 +232,7 @@ class _Walk:
     Args:
         problem: what is solved.
         grid: its space discretisation, with the start on it.
-        monitor: that of the solve.
+        monitor: of the solve.
         marks: times [s] between which the motion is smooth.
         counts: steps of each stretch between two of them.
         rho: spectral radius.
@@ -269,10 +269,10 @@ class _Walk:
         self._kept.knock(by, self._reached)
 
     def go(self, begin: float, end: float, first: int, last: int) -> None:
-        """Walk through the stretch from `begin` to `end` [s], steps `first` to `last`, or until it has to stop."""
+        """March through the stretch from `begin` to `end` [s], steps `first` to `last`, or until it has to stop."""
         stretch = self._enter(begin, end, first, last)
         anchors = self._history.stick.copy(), self._history.slide.copy()
-        at, smooth = first, first  # the step reached, and the first of the smooth steps that it is one of
+        at, smooth = first, first  # the step reached, and the first of the smooth steps that it belongs to
         jumps = stretch.entry.jumps  # whether these begin with a jump or a strike
         try:
             while at < last and not self.stopped:
@@ -296,7 +296,7 @@ class _Walk:
                 if self._in_smaller_steps(stretch, failed, jumps and at == smooth):
                     at = smooth = failed
                     jumps = bool(self._info[STRUCK])
-                elif not self._info[STRUCK]:  # as one it found equilibrium
+                elif not self._info[STRUCK]:  # if it found equilibrium as one step
                     self.stopped = "step"
                 if self._info[STRUCK]:
                     left = self._split < _MOST_STRUCK * len(self._times)
@@ -313,7 +313,7 @@ class _Walk:
         self._forces.append(WindowForces(stretch.entry.held, self._times[steps], reactions, kept.states[rows], anchors))
 
     def _astray(self) -> str:
-        """Return why it is given up at the step that was reached, "" where it is not."""
+        """Return why the march is given up at the step that was reached; "" if it is not."""
         if self._info[DEEPEST] > self._shallow:
             return "depth"
         if self._credible < math.inf and self._grid.largest_strain(self._kept.now[None]) > self._credible:
@@ -321,7 +321,7 @@ class _Walk:
         return ""
 
     def ended(self, asked: int) -> March:
-        """Return the march, `asked` for that many steps, whose last state stays where it stopped early."""
+        """Return the march, for which `asked` steps were requested; if it stopped early, its last state is held."""
         kept = self._kept
         reached, states = kept.stand_still(self._reached), kept.states
         grid, forces = self._grid, tuple(self._forces)
@@ -354,7 +354,7 @@ class _Walk:
         return entry.velocity(q, later, h, float(self._times[self._kept.steps[1]]))
 
     def _enter(self, begin: float, end: float, first: int, last: int) -> _Stretch:
-        """Close the grasps of a stretch; what friction holds leans on it from the beginning."""
+        """Close the grasps of a stretch, with friction holding from its beginning."""
         problem, grid, times = self._problem, self._grid, self._times
         h = (end - begin) / (last - first)
         grasps = closed_grasps(problem.scene, begin, end)
@@ -384,7 +384,7 @@ class _Walk:
     ) -> int:  # fmt: skip
         """Take steps as `march_steps` does, which counts them from the step `base`; return the one that failed, or -1.
 
-        `times` (rows of states,) [s] are those of the states.
+        `times` (rows of states,) [s] are the times of the states.
         """
         begins, ends = self._times[[stretch.first, stretch.last]]
         applied = applied_in_steps(self._problem, self._grid, times, begins, ends)
@@ -401,7 +401,7 @@ class _Walk:
         return base + failed if failed >= 0 else -1
 
     def _in_smaller_steps(self, stretch: _Stretch, failed: int, jumps: bool) -> bool:
-        """Take a step that was left in smaller ones, which damp what they can't resolve, if they find equilibrium."""
+        """Take a failed step in smaller ones, which damp what they can't resolve, if these find equilibrium."""
         times, now, at = self._times, self._kept.now, failed - 1
         under_way = (stretch.v, stretch.a, stretch.G, *self._history)
         kept = [x.copy() for x in under_way]
@@ -438,23 +438,23 @@ class _Walk:
 
 
 def chunk_of(problem: Problem, grid: Grid) -> int:
-    """Return how many steps on a grid are taken between looks at the clock."""
+    """Return how many steps on a grid are taken between checks of the clock."""
     spacings = problem.table_spacing(grid.n_u), problem.contact_spacing(), problem.strand_spacing()
     nodes = problem.scene.cable.length * sum(1.0 / spacing for spacing in spacings)
     return min(CHUNK, max(1, int(_WORK / (grid.n_u * problem.nc**2 + _NODE * nodes))))
 
 
 def every_of(states: int) -> int:
-    """Return of how many states of a motion one is searched for folds."""
+    """Return the stride at which states of a motion are searched for folds."""
     return max(1, states // _LOOKS)
 
 
 def tolerance_of(problem: Problem, grid: Grid, step: float) -> float:
     """Return the error that Newton's iterations may leave in a step [m].
 
-    Over a short step it is an acceleration, of which the tension of a cable that hardly stretches makes noise, and so
-    does a short span, or one that is far stiffer along itself than sideways. Forces with kinks are not solved for more
-    closely, as steps would fail at them.
+    Over a short step this error is an acceleration, which the tension of a nearly inextensible cable turns into noise.
+    The same holds for a short span, or one that is far stiffer along itself than sideways. Forces with kinks are not
+    solved more closely, because steps would fail at them.
     """
     cable = problem.scene.cable
     length = cable.length
@@ -473,7 +473,7 @@ def _frames(problem: Problem) -> float:
 
 
 def _columns(problem: Problem, grid: Grid) -> tuple[int, int]:
-    """Return the points and columns of frames and memory of a motion, (0, 0) where it keeps none."""
+    """Return the points and columns of frames and memory of a motion; (0, 0) if it keeps none."""
     kept = (problem.twist, problem.bending_memory, problem.twist_memory, problem.stretch_memory)
     if all(effect is None for effect in kept):
         return 0, 0

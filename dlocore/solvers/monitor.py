@@ -8,15 +8,15 @@ from dlocore.compiling.interrupts import let_in
 from dlocore.errors import Cancelled, number
 
 
-class TimeIsUp(Exception):  # noqa: N818 - no error: the solver answers with what it has
+class TimeIsUp(Exception):  # noqa: N818 - not an error: the solver answers with what it has
     """The deadline of a solve has passed; the solver answers with what it has.
 
-    Its arguments name the effects that a motion was found to call for, and that there was no time to march with.
+    Its arguments name the effects that a motion was found to call for and that there was no time to march with.
     """
 
 
 def time_allowed(deadline: float | None) -> float | None:
-    """Return `deadline` [s], or raise SceneError unless it is None or a number of at least 0."""
+    """Return `deadline` [s]; raise SceneError unless it is None or a number of at least 0."""
     return None if deadline is None else number("deadline", deadline, at_least=0.0, unit="s")
 
 
@@ -46,17 +46,17 @@ class Monitor:
         return float("inf") if self._end is None else self._end - time.perf_counter()
 
     def within(self, time: float) -> "Monitor":
-        """Return a monitor of a part of the solve, which has so much time from now on [s], and no more than all."""
+        """Return a monitor of a part of the solve, which has `time` [s] from now on, but no more than the whole."""
         return Monitor(deadline=min(time, self.remaining()), cancelled=self._cancelled)
 
     def end_within(self, time: float) -> None:
-        """Have the deadline no later than so long after the solve began [s]."""
+        """Set the deadline no later than `time` [s] after the solve began."""
         end = self.began + time
         if end < float("inf"):
             self._end = end if self._end is None else min(end, self._end)
 
     def check(self) -> None:
-        """Raise Cancelled where the caller asked to stop, TimeIsUp where the deadline has passed; let interrupts in."""
+        """Raise Cancelled if the caller asked to stop, TimeIsUp if the deadline has passed; let interrupts in."""
         let_in()
         if self._cancelled is not None and self._cancelled():
             raise Cancelled("the solve was cancelled")

@@ -1,7 +1,8 @@
 """The paper's scheme exactly as printed (eq. 20 to 25), for comparison.
 
-Plain least squares over all collocation points, started from the cable at rest, with the true stretch stiffness and
-the full Hessian, iterated until the update is below delta. It often does not converge (docs/model.md); then it says so.
+It is a plain least squares over all collocation points, started from the cable at rest, with the true stretch stiffness
+and the full Hessian, iterated until the update is below delta. It often does not converge (docs/model.md); the message
+then says so.
 """
 
 from collections.abc import Callable
@@ -30,10 +31,10 @@ BEYOND = 1e6  # times the length: iterates that went so far do not come back
 
 
 def refuse(problem: Problem, n_u: int, n_t: int) -> None:
-    """Refuse what the printed scheme can't solve on a grid of so many control points along the cable and in time.
+    """Refuse what the printed scheme can't solve on a grid of n_u control points along the cable and n_t in time.
 
     Raises:
-        SceneError: the motion has jumps inside, or the net is too large for a dense least squares.
+        SceneError: the motion has jumps in it, or the net is too large for a dense least squares.
     """
     if any(event.multiplicity > 1 for event in problem.events):
         allowed = '"march" or "spacetime" where grasps open, close or jump in mid-motion'
@@ -51,11 +52,10 @@ def solve_as_printed(
     monitor: Monitor,
     on_step: Callable[[Floats, float, float], None],
 ) -> Solved:
-    """Iterate the printed scheme.
-
-    The problem is one that `refuse` lets pass.
+    """Iterate the printed scheme, for a problem that `refuse` accepts.
 
     Args:
+        problem: what is solved.
         on_step: called with (control, update [m], residual [N]) after every iteration.
 
     Raises:

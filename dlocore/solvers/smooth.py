@@ -1,4 +1,4 @@
-"""The march of a smooth motion without twist, in one compiled call: the plainest motions, and the most frequent."""
+"""The march of a smooth motion without twist in one compiled call: the simplest and most frequent kind of motion."""
 
 from functools import partial
 
@@ -34,11 +34,11 @@ def march_smooth(
     Args:
         knots_t: (n_t + 4,) [s] of the time spline.
         rho: spectral radius.
-        looks: how many states are looked at, at least, for whether a disturbance may grow.
+        looks: how many states are examined, at least, for whether a disturbance may grow.
 
     Returns:
-        What `march` and `fit` return, and None where they have to do it: where there is more to the motion, it takes
-        so long that the clock is to be looked at in between, or a step found no equilibrium.
+        What `march` and `fit` return. None if they have to be used instead: if there is more to the motion, if it takes
+        so long that the clock has to be checked in between, or if a step found no equilibrium.
 
     Raises:
         Cancelled: the caller asked to stop.
@@ -94,7 +94,7 @@ def march_smooth(
 
 
 def _is_plain(problem: Problem) -> bool:
-    """Tell whether a motion has inertia, and neither twist, loads, contact nor anything that yields."""
+    """Tell whether a motion has inertia but neither twist, loads, contact nor anything that yields."""
     return (
         problem.twist is None
         and problem.inertia is not None

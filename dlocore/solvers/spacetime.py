@@ -1,7 +1,7 @@
 """The paper's least squares over all collocation points, in a weighted form that converges.
 
-The motion is split into windows where velocity or acceleration jumps; in each the control points of a clamped time
-spline are found by Gauss-Newton iteration from a march, until the update is below delta (paper eq. 25).
+The motion is split into windows where velocity or acceleration jumps. In each window, Gauss-Newton iteration from a
+march finds the control points of a clamped time spline, until the update is below delta (paper eq. 25).
 """
 
 from collections.abc import Callable
@@ -42,16 +42,16 @@ from dlocore.solvers.stretch import JUMPS
 Floats = NDArray[np.float64]
 
 MAX_ITERATIONS = 200
-_CHUNK = 1.5e7  # about the multiplications between two looks at the clock
+_CHUNK = 1.5e7  # multiplications between two checks of the clock, about
 _HISTORY = 4  # iterates that Anderson acceleration combines
-_FRESH = 2  # iterations that have their own normal matrix, at least; after them a matrix serves twice, at least
-_SHRINKS = 0.7  # of the update before: where an update is larger, the next iteration has its own, too
+_FRESH = 2  # iterations that have their own normal matrix, at least; after them a matrix serves at least twice
+_SHRINKS = 0.7  # of the previous update: if an update is larger, the next iteration gets its own matrix too
 _PATIENCE = 20  # iterations after which the least update has to be below ...
-_FALLS = 0.9  # ... this share of what it was; else it won't fall below delta, which most do in 15 and few in 40
-_DAMPING = 1e-6  # of the diagonal of normal equations that lost their positive factors to rounding
-_LARGEST_STEP = 0.25  # of the length, in one control point: beyond it a step is shortened
-_SHORT = 1e-6  # [s] after an event: for the velocity of what is held
-LARGEST_STRAIN = 0.003  # of a cable of the bounded axial stiffness under the largest tension of the march
+_FALLS = 0.9  # ... this share of what it was; else it won't fall below delta, as most do in 15 iterations, few in 40
+_DAMPING = 1e-6  # of the diagonal, for normal equations whose factors are no longer positive because of rounding
+_LARGEST_STEP = 0.25  # of the length, in one control point: a larger step is shortened
+_SHORT = 1e-6  # [s] after an event: to find the velocity of what is held
+LARGEST_STRAIN = 0.003  # of a cable with the bounded axial stiffness under the largest tension of the march
 RESOLVED = 15.0  # times mu L^2/h^2: the axial stiffness that a time spline of span h resolves
 
 
@@ -80,7 +80,7 @@ def windows_of(problem: Problem, knots_t: Floats) -> list[Window]:
 
 
 def join(parts: list[Floats], windows: list[Window]) -> Floats:
-    """Join the windows' control points (n, ...) to those of the whole time spline."""
+    """Join the windows' control points (n, ...) into those of the whole time spline."""
     joined = parts[0]
     for part, window in zip(parts[1:], windows[1:], strict=True):
         kept = joined if window.velocity_jumps else joined[:-1]
@@ -101,9 +101,9 @@ def bounded_axial_stiffness(problem: Problem, largest_tension: float, span: floa
 
 
 def behind_softer(problem: Problem, motion: March, times: Floats, axial_stiffness: float) -> History:
-    """Return what lies behind a march at the times (k,) [s] for a cable of another axial stiffness [N].
+    """Return the history of a march at the times (k,) [s] for a cable of another axial stiffness [N].
 
-    Strained as the march is, it bears the same tension (docs/model.md eq. 15b).
+    With the strain of the march, that cable bears the same tension (docs/model.md eq. 15b).
     """
     history, true = motion.behind(times), problem.stretch.axial_stiffness
     if axial_stiffness == true:
@@ -117,7 +117,7 @@ def behind_softer(problem: Problem, motion: March, times: Floats, axial_stiffnes
 
 
 class WindowSolver:
-    """The least squares of one window; it holds the equations, the iterate is passed in and out."""
+    """The least squares of one window; it holds the equations, and the iterate is passed in and out."""
 
     def __init__(
         self,
@@ -176,7 +176,7 @@ class WindowSolver:
     def objective(self, control: Floats, matrix: bool) -> tuple[float, Floats, Floats]:
         """Return the objective, eq. 16 [m^2], the normal matrix in blocks, and its right side at `control`.
 
-        Without `matrix` the normal matrix is left out, which is most of the work.
+        Without `matrix` the normal matrix, which is most of the work, is left out.
         """
         count, eq = len(control) - 2, self.equations
         A = np.zeros(
@@ -212,8 +212,8 @@ class WindowSolver:
         return change
 
     def forces(self, control: Floats) -> Callable[[], WindowForces]:
-        """Return what finds what holds the cable at `control`."""
-        lean = self.equations._replace(histories=None)  # the motion knows them, and is kept
+        """Return a function that finds what holds the cable at `control`."""
+        lean = self.equations._replace(histories=None)  # the motion has them, and is kept
         return partial(_window_forces, self.problem, self.motion, self.held, self.times, lean, control)
 
 
@@ -233,11 +233,11 @@ class Solved:
 
     Attributes:
         control: (n_t, n_u, nc) [m]; that of the march from the first window on that did not converge.
-        converged: the update fell below delta in every window.
-        update: the last update norm [m], the largest over the windows that were solved; the least of one that did not
-            converge.
-        find_forces: finds what holds the cable in each window that was solved, at its collocation points; None of the
-            printed scheme.
+        converged: whether the update fell below delta in every window.
+        update: the last update norm [m], the largest over the solved windows; for a window that did not converge, its
+            least update.
+        find_forces: finds what holds the cable in each solved window, at its collocation points; None for the printed
+            scheme.
     """
 
     control: Floats
@@ -252,11 +252,16 @@ OnStep = Callable[[Floats, float, float, float, float], None]
 def solve(problem: Problem, motion: March, knots_t: Floats, delta: float, monitor: Monitor, on_step: OnStep) -> Solved:
     """Solve the space-time least squares, started from a march on the same grid.
 
-    Gauss-Newton steps with the positive semidefinite part of the tangent, combined over the last iterates by Anderson
-    acceleration (Walker and Ni, 2011), until the norm of the update of all control points is below `delta`. The first
-    window in which that does not come to be is the last one that is tried.
+    Gauss-Newton steps with the positive semidefinite part of the tangent are combined over the last iterates by
+    Anderson acceleration (Walker and Ni, 2011), until the norm of the update of all control points is below `delta`.
+    The first window that does not reach this is the last one that is tried.
 
     Args:
+        problem: what is solved.
+        motion: the march.
+        knots_t: knots of the time spline [s].
+        delta: threshold on the update [m].
+        monitor: of the solve.
         on_step: called with (control, update, residual, damping, step length) after every iteration.
 
     Raises:
@@ -300,9 +305,10 @@ def solve(problem: Problem, motion: March, knots_t: Floats, delta: float, monito
 
 
 def _closed(problem: Problem, motion: March, window: Window, near: Held, v: Floats) -> Floats:
-    """Return what a velocity v (n_u, nc) [m/s] becomes as a window begins and its grasps close.
+    """Return the velocity that v (n_u, nc) [m/s] becomes when a window begins and its grasps close.
 
-    `near` is what is held then, _SHORT and 2 _SHORT later. Where the velocity jumps it is as the march goes on.
+    `near` is what is held then, and _SHORT and 2 _SHORT later. If the velocity jumps, the result is that with which the
+    march continues.
     """
     rate = (4 * near.offsets[1] - 3 * near.offsets[0] - near.offsets[2]) / (2 * _SHORT)
     mass = motion.grid.tables.inertia
@@ -327,17 +333,17 @@ def _window_fit(motion: March, window: Window) -> Floats:
 def _iterate(
     solver: WindowSolver, control: Floats, delta: float, monitor: Monitor, on_step: OnStep
 ) -> tuple[Floats, float]:
-    """Iterate one window; return its control points and the norm of the last update [m], the least if none is small.
+    """Iterate one window; return its control points and the norm of the last update [m], or the least if none is small.
 
-    It ends where the least update has fallen by less than a tenth in the last _PATIENCE iterations.
+    It ends if the least update has fallen by less than a tenth in the last _PATIENCE iterations.
 
-    As long as updates shrink, the normal matrix of an iterate before serves, and an iteration takes a fraction of the
-    time; it is the right side that has to be its own. A fresh matrix serves for the next iteration, too: what the last
-    steps teach mends as much as another one would.
+    As long as updates shrink, the normal matrix of an earlier iterate is reused, which takes a fraction of the time;
+    only the right side has to be new. A fresh matrix is also used for the next iteration: combining the last steps
+    gains as much as another matrix would.
     """
     limit = _LARGEST_STEP * solver.problem.scene.cable.length
     last = room(_HISTORY, control.size)
-    best: list[float] = []  # update so far, by iteration
+    best: list[float] = []  # the least update so far, by iteration
     factors: Floats | None = None
     damping, before = 0.0, np.inf
     for known in range(MAX_ITERATIONS):
@@ -365,9 +371,9 @@ def _iterate(
 
 
 def _linearised(solver: WindowSolver, control: Floats) -> tuple[float, Floats | None, Floats, float]:
-    """Return the objective, the factors of the normal matrix, its right side, and the damping that it took.
+    """Return the objective, the factors of the normal matrix, its right side, and the damping that was needed.
 
-    There are no factors where the matrix is not positive even with damping.
+    The factors are None if the matrix is not positive even with damping.
     """
     damping = 0.0
     while True:

@@ -1,4 +1,4 @@
-"""How a stretch of smooth motion begins: what is held in it, and the state that the grasps close on."""
+"""The beginning of a stretch of smooth motion: what is held in it, and the state when the grasps close."""
 
 from dataclasses import dataclass
 
@@ -15,8 +15,8 @@ from dlocore.scene.scene import Grasp
 
 Floats = NDArray[np.float64]
 
-JUMPS = 1e-6  # of the length, on what a jump of the velocity is in a step: less is rounding
-_STOPPED = 4.0  # times that drag takes to stop it: a velocity of the start that lasts for no step, as what jumps
+JUMPS = 1e-6  # of the length: a velocity jump that moves the cable less than this in a step is rounding
+_STOPPED = 4.0  # times the time that drag takes: a start velocity that is stopped within a step counts as a jump
 NEAR = 1e-3 * np.arange(3.0)  # of a step: for velocity and acceleration of the paths at the beginning
 
 
@@ -26,13 +26,13 @@ class Entry:
 
     Attributes:
         held: what is held in it.
-        offsets: (k, held) [m] its prescribed part at the times of the stretch.
+        offsets: (k, held) [m] prescribed part at the times of the stretch.
         closed: (n_u, nc) [m/s] velocity as the grasps close.
-        v: the same, zero where inertia is left out.
-        a: (n_u, nc) [m/s^2] consistent acceleration, and
+        v: the same, but zero if inertia is left out.
+        a: (n_u, nc) [m/s^2] consistent acceleration.
         G: (n_u, nc) [N] forces f + C v - load.
         sudden: whether the velocity jumps.
-        jumps: the same, but False where inertia is left out: with it the acceleration is that of the instant alone.
+        jumps: the same, but False if inertia is left out; if it is True, the acceleration is only that of the instant.
     """
 
     held: Held
@@ -45,9 +45,9 @@ class Entry:
     jumps: bool
 
     def velocity(self, q: Floats, later: Floats, h: float, after: float) -> Floats:
-        """Return the velocity (n_u, nc) [m/s] with which the motion goes on from q to a state `after` [s] later.
+        """Return the velocity (n_u, nc) [m/s] with which the motion continues from q to a state `after` [s] later.
 
-        Both are (n_u, nc) [m]; h is the time step [s] with which the stretch was entered.
+        Both states are (n_u, nc) [m]; h is the time step [s] with which the stretch was entered.
         """
         if not self.sudden:
             return self.closed
@@ -64,18 +64,18 @@ def enter(
     Args:
         problem: what is solved.
         grid: its space discretisation.
-        grasps: that hold in the stretch.
-        starts: where paths begin; those of grasps that close now are noted.
+        grasps: those that hold in the stretch.
+        starts: where paths begin; those of grasps that close now are added.
         times: (k,) [s] of the stretch.
         h: time step [s].
         last: the time step before it [s], 0 at the start of the motion.
         q, v: (n_u, nc) state and velocity before [m, m/s].
-        history: what lies behind; the strain of q is noted in it.
+        history: the history; the strain of q is written to it.
         load: (n_u, nc) applied forces at its beginning [N].
     """
     close_grasps(problem, grid, grasps, starts, q)
     held = hold(problem, grid, grasps, np.concatenate([times[0] + h * NEAR, times]), starts, q)
-    # the rate of a strain that hardly changes is lost in what steps leave of the velocities
+    # the rate of a strain that hardly changes is lost in the error that steps leave in the velocities
     rates = (1.0 / last, 0.0, -1.0 / last, 0.0) if last > 0.0 else NO_RATES
     inertial = problem.inertia is not None
     closed, a, G, jump = begin_stretch(
@@ -89,9 +89,9 @@ def enter(
 
 
 def least_jump(problem: Problem, h: float) -> float:
-    """Return from which size on a jump of the velocity at the start counts, as what it is in a step `h` [s] long [m].
+    """Return the size from which on a velocity jump at the start counts, as its displacement in a step of `h` [s] [m].
 
-    Where drag stops within the step what moves then, it is less than any: the motion begins with a jump.
+    If drag stops what moves then within the step, any velocity counts: the motion begins with a jump.
     """
     return -1.0 if h > _STOPPED * stopping_time(problem) else JUMPS * problem.scene.cable.length
 

@@ -13,18 +13,19 @@ Floats = NDArray[np.float64]
 
 _REFINEMENTS = 8  # of the time knots: each halves spans
 _MOST_OF_THE_TIME = 0.95
-MISSED_COUNTS = 3.0  # what the time spline misses of its march, times this, is the least that the error may be
+MISSED_COUNTS = 3.0  # times the misfit of the time spline to its march: the least value of the error estimate
 _EVENINGS = 12  # of the time knots
-_MOST_NUMBERS = 10**7  # of all states: with more of them, none are added between
+_MOST_NUMBERS = 10**7  # of all states: with more, no states are added in between
 _STATES = 2  # of the march in a span of the time spline, at least
-_QUIET = 1e-3  # of the largest miss: what a span misses at least, so that none grows without bounds
+_QUIET = 1e-3  # of the largest misfit: what a span is assumed to miss at least, so that none grows without bounds
 
 
 def refined(motion: March, knots_t: Floats, tolerance: float, strikes: bool) -> tuple[Floats, March]:
     """Return time knots, more where the time spline misses the motion by more than `tolerance` [m], and what to fit.
 
-    Where a cable `strikes` something its velocity jumps, and a spline without knots there goes on into the obstacle, or
-    swings past its states. There the states half-way through the steps are added to the motion, and knots beside them.
+    If the cable `strikes` something its velocity jumps, and a spline without knots there continues into the obstacle,
+    or swings past its states. States half-way through the steps are then added to the motion there, and knots beside
+    them.
     """
     for _ in range(_REFINEMENTS):
         control, off = fit(motion, knots_t)
@@ -44,23 +45,24 @@ def refined(motion: March, knots_t: Floats, tolerance: float, strikes: bool) -> 
 
 
 def missed(motion: March, knots_t: Floats, control: Floats) -> Floats:
-    """Return by how much the time spline of `control` (n_t, n_u, nc) misses each state (steps + 1,) [m]."""
+    """Return the distance of each state (steps + 1,) from the time spline of `control` (n_t, n_u, nc) [m]."""
     return _missed(knots_t, motion.times, motion.states, control)
 
 
 def largest(times: Floats, off: Floats, swing: float) -> float:
-    """Return what a spline misses its march by [m]; at moments such as a start that springs away, a third of that.
+    """Return the misfit of a spline to its march [m]; at moments such as a sudden start, a third of it counts.
 
-    Such moments are a share of each `swing` [s], however long the motion is; the third, times MISSED_COUNTS, is all.
+    Such moments are a share of each `swing` [s], however long the motion is; a third times MISSED_COUNTS is the full
+    misfit.
 
     Args:
         times: of the states (k,) [s], increasing.
-        off: by how much the spline misses each (k,) [m].
-        swing: about how long the cable needs to swing once [s].
+        off: the misfit at each (k,) [m].
+        swing: the approximate period of a swing of the cable [s].
     """
     at_all = float(off.max()) / MISSED_COUNTS
     last = math.ceil((times[-1] - times[0]) / swing) - 1
-    if last <= 0:  # one swing, as most motions: without what it takes to tell several
+    if last <= 0:  # one swing, like most motions: there is no need to tell several apart
         return max(float(np.sort(off)[int(_MOST_OF_THE_TIME * (len(off) - 1))]), at_all)
     window = np.minimum((times - times[0]) / swing, last).astype(int)
     begins = np.flatnonzero(np.diff(window, prepend=-1))
@@ -72,10 +74,10 @@ def largest(times: Floats, off: Floats, swing: float) -> float:
 def evened(motion: March, knots_t: Floats, events: Floats, swing: float) -> Floats:
     """Return as many time knots, closer where the motion is fast, so that the time spline misses it evenly.
 
-    The miss of a span goes with the fourth power of its length. Each round shares the spans out so that they would miss
-    as much as each other, and the best knots of all rounds are kept. Knots at the times of events (k,) [s] stay. A span
-    without states could go anywhere: where spans would be that short, the motion is too fast for so few steps. For
-    `swing` see `largest`.
+    The misfit of a span is proportional to the fourth power of its length. Each round redistributes the spans so that
+    they would all miss equally, and the best knots of all rounds are kept. Knots at the times of events (k,) [s] stay.
+    A span without states would not be determined: if spans would become that short, the motion is too fast for its
+    steps. For `swing` see `largest`.
     """
     best = found = knots_t
     least = np.inf
@@ -98,7 +100,7 @@ def evened(motion: March, knots_t: Floats, events: Floats, swing: float) -> Floa
 
 
 def _shared_out(knots_t: Floats, breaks: Floats, need: Floats, events: Floats) -> Floats:
-    """Return time knots whose spans have the same share of what is needed up to each of the breaks, but for events."""
+    """Return time knots whose spans, between events, have equal shares of the need, given up to each of the breaks."""
     inside = np.unique(events[(events > breaks[0]) & (events < breaks[-1])])
     marks = np.concatenate([breaks[:1], inside, breaks[-1:]])
     at = np.interp(marks, breaks, need)
@@ -117,7 +119,7 @@ def _missed(knots_t: Floats, times: Floats, states: Floats, control: Floats) -> 
 def _halved(motion: March, knots_t: Floats, control: Floats, tolerance: float) -> March:
     """Return the motion with states half-way through those steps where the spline leaves the chord of the states.
 
-    A motion in so many steps that its states fill memory stays as it is: its steps are short enough.
+    A motion in so many steps that its states fill the memory stays as it is: its steps are short enough.
     """
     times, states = motion.times, motion.states
     if states.size > _MOST_NUMBERS:
@@ -136,6 +138,6 @@ def _halved(motion: March, knots_t: Floats, control: Floats, tolerance: float) -
 
 
 def fit(motion: March, knots_t: Floats) -> tuple[Floats, Floats]:
-    """Return control points (n_t, n_u, nc) [m] of the time spline fitted to a marched motion, and what it `missed`."""
+    """Return control points (n_t, n_u, nc) [m] of the time spline fitted to a march, and its misfits, see `missed`."""
     control, off = fitted(knots_t, motion.times, motion.states, motion.velocity, min(3, motion.states.shape[2]))
     return control, off

@@ -1,4 +1,4 @@
-"""A grid on which the cable can't fold within a span: its stretch is watched at more points."""
+"""A grid on which the cable can't fold within a span, because its stretch is watched at more points."""
 
 import numpy as np
 
@@ -11,10 +11,10 @@ _SHARE = 0.3  # of the axial stiffness, at the points added: a fifth still leave
 def watched(grid: Grid) -> Grid:
     """Return a grid whose axial points see folds within a span too.
 
-    As many axial points as control points have strains leave it open how |r'| runs between them (docs/model.md,
-    selective reduced integration): a limp cable folds there at no cost of energy, on control points too few for its
-    bends. Three Gauss points more a span bear three tenths of the axial stiffness, the others the rest. That holds the
-    bending back, so it is for grids on which the cable folds without.
+    With only as many axial points as control points have strains, |r'| is not determined between them (docs/model.md,
+    selective reduced integration): a limp cable folds there without energy, if the control points are too few for its
+    bends. Here three more Gauss points per span bear three tenths of the axial stiffness, and the others the rest. This
+    hinders bending, so it is only for grids on which the cable folds otherwise.
     """
     tables, breaks = grid.tables, np.unique(grid.knots)
     half, (rule, weights) = 0.5 * np.diff(breaks)[:, None], GAUSS_3
