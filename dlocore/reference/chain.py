@@ -1,4 +1,4 @@
-"""The chain of a rod while the same grippers hold it: an edge without length stands where a direction is held."""
+"""The chain of a rod while the same grippers hold it; an edge without length stands where a direction is held."""
 
 from dataclasses import dataclass
 
@@ -13,12 +13,12 @@ from dlocore.scene.scene import Grasp
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-DIFFERENCE = 1e-5  # [s]: of the central differences that give the rates of paths
+DIFFERENCE = 1e-5  # [s]: of the central differences for the rates of paths
 
 
 @dataclass(frozen=True, eq=False)
 class Grip:
-    """A closed gripper: the grasp, and position, tangent and director (3,) in the rod's coordinates where it closed."""
+    """A closed gripper: its grasp, and position, tangent and director (3,) in the rod's coordinates when it closed."""
 
     grasp: Grasp
     node: int
@@ -29,11 +29,11 @@ class Grip:
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """A rod in the hands of some grippers.
+    """A rod held by some grippers.
 
     Attributes:
         rod: the rod.
-        grips: those that hold.
+        grips: the grippers that hold it.
         begin, end: from when to when [s].
         body: the constants of the equations.
         node_of: real node of each node of the chain (n,).
@@ -77,7 +77,7 @@ class Chain:
         return Guide(np.array(held, np.int64), position, velocity, virtual, tangent, director, rates, spin, load)
 
     def loads(self, t: Floats, end: float) -> Floats:
-        """Return what loads give to the nodes (s, n, 3) [N] at times t (s,) [s], as `dlocore.Load.at` does."""
+        """Return the forces of loads on the nodes (s, n, 3) [N] at times t (s,) [s], as `dlocore.Load.at` does."""
         load = np.zeros((len(t), len(self.node_of), 3))
         for given in self.rod.problem.scene.loads:
             load[:, int(np.argmax(self.node_of == self.rod.node(given.u)))] += given.at(t, end) @ self.rod.axes.T
@@ -107,7 +107,7 @@ class Chain:
         return np.asarray((turns[:, None] @ pair[None, :, :, None])[..., 0])
 
     def state(self, now: Snapshot) -> State:
-        """Return a state of the rod as one of this chain; what grippers prescribe is in place."""
+        """Return a state of the rod as a state of this chain, with what grippers prescribe in place."""
         n = len(self.node_of)
         q, v = np.zeros((n, 4)), np.zeros((n, 4))
         q[:, :3], v[:, :3] = now.x[self.node_of], now.v[self.node_of]
@@ -136,7 +136,7 @@ class Chain:
         return State(q, v, t, a, turn, memory, axial, now.anchor.copy())
 
     def _spun(self, now: Snapshot, e: int, t: Floats) -> Floats:
-        """Return the director of a section whose direction is held, from that of the edge beside it."""
+        """Return the director of a section whose direction is held, from that of the edge next to it."""
         node = self.node_of[e]
         if e + 1 < len(self.edge_of):
             real = self.edge_of[e + 1]
@@ -145,7 +145,7 @@ class Chain:
         return carried(now.t[real], t, now.a[real], float(now.kept.turn[node, 0]))
 
     def snapshot(self, state: State) -> Snapshot:
-        """Return a state of this chain as one of the rod."""
+        """Return a state of this chain as a state of the rod."""
         nodes = len(self.rod.u)
         first = np.searchsorted(self.node_of, np.arange(nodes))
         real = np.flatnonzero(self.edge_of >= 0)
@@ -188,7 +188,7 @@ def grip(rod: Rod, grasp: Grasp, now: Snapshot) -> Grip:
             director = carried(now.t[here], unit(tangent), now.a[here], twist)
         else:
             h = np.diff(rod.u)
-            left, right = h[node], h[node - 1]  # the nearer edge weighs more
+            left, right = h[node], h[node - 1]  # the nearer edge has more weight
             tangent = (left * now.t[node - 1] + right * now.t[node]) / (left + right)
             share = float(now.kept.turn[node].sum()) * h[node - 1] / (left + right)
             director = carried(now.t[node - 1], unit(tangent), now.a[node - 1], share)

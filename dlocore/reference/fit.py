@@ -1,4 +1,4 @@
-"""The bivariate spline through a simulated motion: least squares in u, then in t, on knots where it needs them."""
+"""The bivariate spline through a simulated motion: least squares in u, then in t, with knots where it needs them."""
 
 from dataclasses import dataclass
 
@@ -15,14 +15,14 @@ Floats = NDArray[np.float64]
 FIRST_SPANS = 12  # in time
 MOST_SPANS = 400
 LEAST_TIMES, MOST_TIMES = 257, 2000  # at which a motion is fitted
-WITHIN_STEPS = 3  # of them at most within each step
-FIRM = 1e4  # weight of what the spline keeps: what grasps hold, and the first and the last instant
+WITHIN_STEPS = 3  # of them, at most, within each step
+FIRM = 1e4  # weight of what the spline has to keep: what grasps hold, and the first and last instant
 MARGINS = 2  # samples that each span needs
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A surface, and by how much it misses the samples at most [m]."""
+    """A surface and its largest misfit to the samples [m]."""
 
     surface: SplineSurface
     missed: float
@@ -43,7 +43,7 @@ def fit(problem: Problem, u: Floats, times: Floats, q: Floats, tolerance: float)
 
 
 def _least(over: Floats, right: Floats) -> Floats:
-    """Return the least squares solution of over x = right, of least norm."""
+    """Return the least squares solution of over x = right with the least norm."""
     return np.asarray(np.linalg.lstsq(over, right, rcond=None)[0], dtype=np.float64)
 
 
@@ -53,7 +53,7 @@ def _held(problem: Problem, u: Floats) -> list[int]:
 
 
 def _along(problem: Problem, u: Floats, q: Floats, tolerance: float) -> Floats:
-    """Return knots in u: every 2^k-th node and those held, loaded or heavy, twice where a direction is held."""
+    """Return knots in u: every 2^k-th node and the held, loaded or heavy ones, twice where a direction is held."""
     length = u[-1]
     marks: dict[int, int] = {}
     for g, node in zip(problem.scene.grasps, _held(problem, u), strict=True):

@@ -1,4 +1,4 @@
-"""The motion of one rod, step by step: steps as long as their estimated error allows, windows between events."""
+"""The motion of one rod: time steps as long as their estimated error allows, in windows between events."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -39,29 +39,29 @@ SDIRK4 = Tableau(
     order=4,
 )
 BACKWARD_EULER = Tableau(np.ones((1, 1)), np.ones(1), np.zeros(1), 1)
-NEWTON = 1e-2  # of the tolerance of a step: what Newton's iteration leaves
-FIRST = 1e-3  # of a window: its first step
-LAST = 1e-3  # of a step: what it would leave of a window is done with it
+NEWTON = 1e-2  # of the tolerance of a step: the error that Newton's iteration leaves
+FIRST = 1e-3  # of a window: the length of its first step
+LAST = 1e-3  # of a step: a remainder of the window shorter than this is included in the step
 SAFETY, SHRINK, GROW = 0.85, 0.2, 4.0  # of the choice of the next step
-FAILURE = 0.25  # of a step that found no solution: the next
-NOTES = 2000  # of a motion at most, between its events
-SHORTEST = 1e-9  # of the horizon: a step
+FAILURE = 0.25  # of a step that found no solution: the length of the next
+NOTES = 2000  # of a motion, at most, between its events
+SHORTEST = 1e-9  # of the horizon: the shortest step
 DOWN = 1e-3  # [s]: the first step downhill; what friction holds in the end depends on longer ones
-SETTLED = 1e-11  # of the length: a step downhill that ends the search for an equilibrium
-FARTHEST = 0.05  # of the length, in a step downhill: farther the rod might pass through what is in its way
-BENT = 8  # times a motion is bent, to see what becomes of that
-DOWNHILL = 2000  # steps to an equilibrium
-FALLS = 0.01  # of the length: a rod that ends farther from where it was at rest once it is tipped did not rest there
+SETTLED = 1e-11  # of the length: a step downhill this short ends the search for an equilibrium
+FARTHEST = 0.05  # of the length, in a step downhill: farther, the rod might pass through an obstacle
+BENT = 8  # times that a motion is bent, to see how that disturbance develops
+DOWNHILL = 2000  # steps to an equilibrium, at most
+FALLS = 0.01  # of the length: a rod that ends farther away once it is tipped was not at a stable rest
 
 
 Stopped = Literal["", "step", "time"]
 
 
 class Watch(Protocol):
-    """What is asked between steps: it raises where the solve should end."""
+    """What is called between steps: it raises to end the solve."""
 
     def check(self) -> None:
-        """Raise where the solve should end."""
+        """Raise if the solve is to end."""
         ...
 
 
@@ -71,19 +71,19 @@ class Motion:
 
     Attributes:
         rod: the rod.
-        times: of the steps that were noted (k,) [s]; an event occurs twice, as a gripper may jump there.
+        times: of the recorded steps (k,) [s]; an event occurs twice, as a gripper may jump there.
         states: the rod at those times.
-        given_times: of the forces and moments (m,) [s]: the middle between each two noted steps, and both ends of what
-            lies between two events.
-        forces: of each grasp (grasps, m, 3) [N], the mean between two noted steps, which is what momentum is gained by;
+        given_times: of the forces and moments (m,) [s]: the middle between each pair of recorded steps, and both ends
+            of each window between two events.
+        forces: of each grasp (grasps, m, 3) [N], the mean between two recorded steps, which is what changes momentum;
             zero while it is open.
         moments: the same [N m].
         deepest: largest depth in a surface [m].
         left: largest update that Newton's iterations left [m].
-        stopped: why it ended early: "step" without a solution, "time" over; "" where it did not.
-        steps: how many it took.
-        rejected: how many were done again.
-        tipped: whether its start was tipped off an equilibrium that any disturbance leaves.
+        stopped: why it ended early: "step" without a solution, out of "time"; "" if it did not.
+        steps: number of steps taken.
+        rejected: number of steps that were repeated.
+        tipped: whether its start was tipped off an unstable equilibrium.
     """
 
     rod: Rod
@@ -101,7 +101,7 @@ class Motion:
 
 
 def events_of(problem: Problem) -> list[float]:
-    """Return the times [s] inside the horizon at which something given is not smooth, with its beginning and end."""
+    """Return the times [s] within the horizon at which something given is not smooth, and its beginning and end."""
     horizon = problem.horizon
     found = set()
     for g in problem.scene.grasps:
@@ -116,7 +116,7 @@ def events_of(problem: Problem) -> list[float]:
 
 
 class _Record:
-    """What a simulation notes as it goes."""
+    """What a simulation records as it proceeds."""
 
     def __init__(self, rod: Rod) -> None:
         self.rod = rod
@@ -128,12 +128,12 @@ class _Record:
         self.tipped = False
 
     def begin(self, link: Chain, state: State) -> None:
-        """Note the state in which a window begins."""
+        """Record the state in which a window begins."""
         self.times.append(link.begin)
         self.states.append(link.snapshot(state))
 
     def note(self, link: Chain, t: float, state: State, impulse: Floats, twist: Floats) -> None:
-        """Note the state at t [s], and what grippers gave to the cable since the note before, by its integrals.
+        """Record the state at t [s], and the integrals of what grippers exerted on the cable since the last record.
 
         These are of the forces that hold the nodes (n, 4) [N s] and of the moments (n - 1, 3) [N m s].
         """
@@ -154,7 +154,7 @@ class _Record:
         self.states.append(link.snapshot(state))
 
     def motion(self, stopped: Stopped) -> Motion:
-        """Return what was noted."""
+        """Return what was recorded."""
         nothing = np.zeros((len(self.rod.problem.scene.grasps), 3))
         times, forces, moments = zip(*self.given or [(self.times[0], nothing, nothing)], strict=True)
         return Motion(
@@ -174,13 +174,13 @@ class _Record:
 
 
 def simulate(rod: Rod, tolerance: float, watch: Watch, bend: Callable[[Floats], Floats] | None = None) -> Motion:
-    """Simulate a rod from its start to the horizon, each step to an estimated error of `tolerance` [m].
+    """Simulate a rod from its start to the horizon, each step with an estimated error of at most `tolerance` [m].
 
-    By `bend` (n, 3) [m] of their positions (n, 3) [m], nodes that no gripper holds are displaced as it begins and, as a
-    damped motion forgets its start, at each BENT-th of its time.
+    `bend` gives displacements (n, 3) [m] for positions (n, 3) [m]. Nodes that no gripper holds are displaced by it at
+    the beginning and, because a damped motion forgets its start, at each BENT-th of the time.
 
     Raises:
-        what `watch.check` raises, but for `TimeIsUp`.
+        what `watch.check` raises, except `TimeIsUp`.
     """
     problem = rod.problem
     grasps = problem.scene.grasps
@@ -213,7 +213,7 @@ def simulate(rod: Rod, tolerance: float, watch: Watch, bend: Callable[[Floats], 
 
 
 def _fallen(rod: Rod, rest: Snapshot, watch: Watch) -> Snapshot | None:
-    """Return where a rod at rest falls to, None where it stays: tipped by BOW of its length it comes back to there."""
+    """Return where a rod at rest falls when tipped by BOW of its length, or None if it comes back and so stays."""
     length = rod.problem.scene.cable.length
     way = BOW * length * to_a_side(rod.u / length)
     way[[rod.node(g.u) for g in rod.problem.scene.grasps if g.start == 0.0]] = 0.0
@@ -224,7 +224,7 @@ def _fallen(rod: Rod, rest: Snapshot, watch: Watch) -> Snapshot | None:
 
 
 def _window(link: Chain, state: State, tolerance: float, watch: Watch, record: _Record) -> State | None:
-    """Step through a window and return the state at its end, or None where a step finds no solution."""
+    """Step through a window and return the state at its end, or None if a step finds no solution."""
     t, end = link.begin, link.end
     h = FIRST * (end - t)
     period, told = link.rod.problem.horizon, np.zeros(3)
@@ -260,9 +260,8 @@ def _window(link: Chain, state: State, tolerance: float, watch: Watch, record: _
 def settled(rod: Rod, watch: Watch) -> tuple[Snapshot, float]:
     """Return the rod in equilibrium under the grasps' first poses, and the largest depth on its way there [m].
 
-    Backward Euler downhill, in ever longer steps, under loads as they are before a jump at t = 0.
-
-    The velocity is forgotten after each step, so that the rod goes where its energy falls; nothing yields on the way.
+    The method is backward Euler downhill, in ever longer steps, under loads as they are before a jump at t = 0. The
+    velocity is forgotten after each step, so that the rod goes where its energy falls; nothing yields on the way.
     """
     length = rod.problem.scene.cable.length
     law = rod.law.copy()

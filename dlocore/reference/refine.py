@@ -1,4 +1,4 @@
-"""Refinement: rods of ever more elements and ever shorter steps, until their motions agree."""
+"""Refinement: rods with more and more elements and shorter and shorter steps, until their motions agree."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,20 +21,20 @@ Floats = NDArray[np.float64]
 
 ELEMENTS = 20  # of the coarsest rod
 LEVELS = 6  # of refinement: up to 640 elements
-LEAST = 3  # rods, of which two changes tell how fast they converge
-FIRMER = 4.0  # times: friction holds within a quarter of the way with each refinement
+LEAST = 3  # rods: two changes, which show how fast they converge
+FIRMER = 4.0  # times: with each refinement friction gives way a quarter as far
 STEP = 1e-2  # of the target: the error of a step of the coarsest rod; a quarter of it with each refinement
-SECOND = 4.0  # change over next change, of the second order
-ORDERLY = (2.5, 8.0)  # change over next change, about 4: motions that converge with the second order
-SLOWEST = 1.5  # change over next change, below which nothing is said of the limit, as above those that are orderly
-SLOW = 2.0  # times the last change: the estimate where nothing is said of the limit
-CHANCE = 0.05  # of the change before: the estimate is no less where the last is far smaller, which may be chance
-FOURTH = 15.0  # what is left of a change by an extrapolation of the fourth order
-DEEP = 0.02  # of the diameter: a motion that goes deeper into a surface is done again with stiffer contact
-STIFFER = (2.0, 30.0)  # at least and at most by these ratios
+SECOND = 4.0  # change over next change, for second order
+ORDERLY = (2.5, 8.0)  # change over next change, about 4: motions that converge with second order
+SLOWEST = 1.5  # change over next change: below this, and above the orderly range, no limit is extrapolated
+SLOW = 2.0  # times the last change: the estimate if no limit is extrapolated
+CHANCE = 0.05  # of the change before: the least estimate, because a far smaller last change may be chance
+FOURTH = 15.0  # divisor of a change: what an extrapolation of fourth order leaves
+DEEP = 0.02  # of the diameter: a motion that goes deeper into a surface is repeated with stiffer contact
+STIFFER = (2.0, 30.0)  # the least and largest factor for that
 STIFFEST = 1e5  # times the stiffness that bears the weight
-HELD = 0.1  # of the length: so near to what holds it a rod is hardly bent
-TIMES = 129  # while a cable swings once, at which motions are compared, besides events
+HELD = 0.1  # of the length: so near to what holds it, a rod is hardly bent
+TIMES = 129  # per swing of a cable, at which motions are compared, in addition to events
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +44,8 @@ class Level:
     Attributes:
         motion: of the rod.
         taken: the same in the world.
-        change: largest distance to the rod before, at the nodes of that [m]; infinite at the first.
-        estimate: estimated error of the answer with this rod as the finest [m]; infinite where nothing tells.
+        change: largest distance to the rod before, at the nodes of that one [m]; infinite for the first.
+        estimate: estimated error of the answer if this rod is the finest [m]; infinite if unknown.
         orderly: whether the last changes fall as the square of the spacing, so that extrapolation helps.
     """
 
@@ -64,8 +64,8 @@ class Refined:
         problem: the posed scene, with the obstacles that the motion met.
         levels: the rods, by rising number of elements.
         ended: "agreed" within the target, "finest" rod, out of "time", or a "step" without solution.
-        astray: how far a rod that is hardly bent goes elsewhere [m], 0 where that does not matter or was not asked
-            (`goes_astray`), NaN where the time was up before that was known.
+        astray: how far a small bend of the rod changes the motion [m]; 0 if that does not matter or was not checked
+            (`goes_astray`), NaN if the time was up before it was known.
     """
 
     problem: Problem
@@ -84,7 +84,7 @@ class Refined:
         return self.levels[-2 if self.levels[-1].orderly else -1].taken.u
 
     def positions(self, t: Floats) -> Floats:
-        """Return the answer (m, n, 3) [m] at times t (m,) [s]: of the finest rod, extrapolated where that helps."""
+        """Return the answer (m, n, 3) [m] at times t (m,) [s]: that of the finest rod, extrapolated if that helps."""
         last = self.levels[-1]
         fine = last.taken.positions(t)
         if not last.orderly:
@@ -93,10 +93,10 @@ class Refined:
 
 
 def refine(problem: Problem, target: float, watch: Watch, on_level: Callable[[Problem, Level], None]) -> Refined:
-    """Simulate rods of ever more elements until the estimated error is at most `target` [m].
+    """Simulate rods with more and more elements until the estimated error is at most `target` [m].
 
     Raises:
-        what `watch.check` raises, but for its `TimeIsUp`.
+        what `watch.check` raises, except its `TimeIsUp`.
     """
     levels: list[Level] = []
     stiffening = 1.0
@@ -129,10 +129,10 @@ def refine(problem: Problem, target: float, watch: Watch, on_level: Callable[[Pr
 
 
 def goes_astray(refined: Refined, target: float, watch: Watch) -> float:
-    """Return how far a rod that is bent by DISTURBED of the length, now and then, goes elsewhere [m]: `Refined.astray`.
+    """Return how far a motion changes if its rod is at times bent by DISTURBED of the length [m]: `Refined.astray`.
 
-    Where rods agree the last but one is asked, and where it ends more than UNDETERMINED of the length elsewhere the
-    last one, too.
+    If rods agree, this is checked on the last but one. If that changes by more than UNDETERMINED of the length, it is
+    checked on the last one too.
     """
     moved, length = 0.0, refined.problem.scene.cable.length
     t = np.linspace(0.0, refined.problem.horizon, moments(refined.problem.scene, TIMES))
@@ -147,7 +147,7 @@ def goes_astray(refined: Refined, target: float, watch: Watch) -> float:
 
 
 def _moved(level: Level, tolerance: float, watch: Watch, t: Floats, way: float) -> float:
-    """Return how far bends, times `way`, move a rod at times t (m,) [s] [m]; 0 where no step tells.
+    """Return how far bends, times `way`, change the motion of a rod at times t (m,) [s] [m]; 0 if a step fails.
 
     Raises:
         TimeIsUp: the deadline passed.
@@ -160,9 +160,9 @@ def _moved(level: Level, tolerance: float, watch: Watch, t: Floats, way: float) 
 
 
 def bend_of(rod: Rod, x: Floats) -> Floats:
-    """Return displacements (n, 3) [m] across a rod at x (n, 3) [m], some half waves of up to DISTURBED of its length.
+    """Return displacements (n, 3) [m] across a rod at x (n, 3) [m]: some half waves of up to DISTURBED of its length.
 
-    They vanish at whatever holds it at some time.
+    They vanish at everything that holds it at some time.
     """
     scene, u = rod.problem.scene, rod.u[:, None]
     length = scene.cable.length
@@ -178,7 +178,7 @@ def bend_of(rod: Rod, x: Floats) -> Floats:
 
 
 def _tolerance(target: float, k: int) -> float:
-    """Return the error [m] of each step of the rod `k`."""
+    """Return the error [m] allowed in each step of the rod `k`."""
     return STEP * target * 0.25**k
 
 
@@ -202,7 +202,7 @@ def _compared(problem: Problem, levels: list[Level], motion: Motion) -> Level:
 
 
 def left(before: float, change: float) -> float:
-    """Return what the next refinements will change, about, after the last two changes [m]."""
+    """Return about how much the next refinements will change, from the last two changes [m]."""
     ratio = before / max(change, 1e-300)
     if SLOWEST < ratio <= ORDERLY[1]:
         return change / (min(ratio, SECOND) - 1.0)
@@ -214,7 +214,7 @@ def _farthest(a: Floats, b: Floats) -> float:
 
 
 def _met(problem: Problem, taken: Samples) -> dict[str, str]:
-    """Return a call for obstacles, if the motion comes to one that was thought out of reach."""
+    """Return a call for obstacles, if the motion comes to one that was considered out of reach."""
     obstacles = problem.scene.environment.obstacles
     left_out = [o for o in obstacles if all(o is not other for other in problem.obstacles)]
     if not left_out or problem.scene.effects.get("obstacles") == "off":

@@ -1,4 +1,4 @@
-"""The discrete rod of a posed scene: nodes on every grasp, load and point mass, its start, its laws, its surfaces."""
+"""The discrete rod of a posed scene: nodes at every grasp, load and point mass, its start, laws and surfaces."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -17,17 +17,17 @@ from dlocore.shape.shape import SplineCurve, rest_curve
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-SAME = 1e-9  # of the length: places nearer than this are one
-SINKS = 0.005  # of the diameter, under weight and the bending of a tenth of the length
-PASSAGE = 0.005  # of the diameter: the depth at which the stiffness of contact is whole
-STICK = 0.02  # of the diameter: by how much friction gives way before it holds
+SAME = 1e-9  # of the length: places nearer than this are the same
+SINKS = 0.005  # of the diameter: how far it sinks in under its weight and the bending of a tenth of the length
+PASSAGE = 0.005  # of the diameter: the depth at which contact has its full stiffness
+STICK = 0.02  # of the diameter: how far friction gives way before it holds
 STRAIGHTENING = 30  # steps of Newton's method towards edges of unit stretch
-POINTS = 8  # of contact in an edge where there are obstacles, so that they halve their distance as edges do; else 2
+POINTS = 8  # of contact per edge if there are obstacles, so that their distance halves as edges do; otherwise 2
 
 
 @dataclass(frozen=True, eq=False)
 class Memory:
-    """What a real node remembers to its left and its right: turn (nodes, 2) [rad], memory (nodes, 2, 3) [1/m]."""
+    """What a real node remembers on its left and right: turn (nodes, 2) [rad], memory (nodes, 2, 3) [1/m]."""
 
     turn: Floats
     memory: Floats
@@ -108,7 +108,7 @@ def nearest(nodes: Floats, u: float) -> int:
 
 
 def nodes_of(problem: Problem, elements: int, halvings: int) -> Floats:
-    """Return the nodes (n,) [m]: about `elements` edges, halved a number of times, with a node at each place."""
+    """Return the nodes (n,) [m]: about `elements` edges, halved a number of times, with a node at each given place."""
     length = problem.scene.cable.length
     marks = [0.0]
     for place in [*sorted(problem.scene.places), length]:
@@ -121,7 +121,7 @@ def nodes_of(problem: Problem, elements: int, halvings: int) -> Floats:
 
 
 def build(problem: Problem, u: Floats, stiffening: float = 1.0, firmness: float = 1.0) -> Rod:
-    """Return the rod of a posed scene on nodes u (n,) [m], with contact stiffer, and friction firmer, by ratios."""
+    """Return the rod of a posed scene on nodes u (n,) [m], with contact and friction made stiffer by ratios."""
     planar = problem.plane.dimensions == 2
     axes = np.vstack([problem.plane.axes, np.cross(problem.plane.axes[0], problem.plane.axes[1])])[:3]
     law = _laws(problem, stiffening, firmness)
@@ -209,7 +209,7 @@ def _points(problem: Problem, u: Floats) -> tuple[Integers, Floats, Floats, NDAr
                 along.append((p + 0.5) / parts)
                 length.append(float(size) / parts)
                 lies.append(False)
-        for node, alike in heavy:  # as much contact as the length of cable that is as heavy
+        for node, alike in heavy:  # as much contact as for the length of cable with the same mass
             edge.append(min(node, len(h) - 1))
             along.append(float(node == len(h)))
             length.append(float(alike))
@@ -228,7 +228,7 @@ def _surfaces(problem: Problem, axes: Floats, law: Floats) -> Floats:
         stiffness, width = law[places.STIFFNESS], law[places.PASSAGE]
         soft = 0.5 * stiffness * width
         depth = 0.0
-        if bears > 0.0:  # the depth at which contact bears the weight, so that a cable at the table's height rests
+        if bears > 0.0:  # the depth at which contact bears the weight, so that a cable at the table's height is at rest
             depth = np.sqrt(bears / soft) * width if bears < soft else bears / stiffness + 0.5 * width
         row = np.zeros(ROW)
         row[0], row[3] = PLANE, table.height - law[places.RADIUS] + depth
@@ -283,7 +283,7 @@ def _frame(axis: Floats) -> Floats:
 
 
 def carried(before: Floats, after: Floats, x: Floats, angle: float = 0.0) -> Floats:
-    """Return the director x (3,) carried from one tangent to another by the smallest rotation and spun by an angle."""
+    """Return the director x (3,) carried from one tangent to another by the smallest rotation, and spun by an angle."""
     y = x - (x @ after) / (1.0 + before @ after) * (before + after)
     y -= (y @ after) * after
     y /= np.linalg.norm(y)
@@ -296,7 +296,7 @@ def unit(x: Floats) -> Floats:
 
 
 def _along(tangents: Floats, between: Floats, first: Floats, angle: Floats) -> tuple[Floats, Floats]:
-    """Carry a director along a cable: from the tangent at a node to that of the edge behind it, to the next node.
+    """Carry a director along a cable: from the tangent at a node to that of the edge after it, and to the next node.
 
     Args:
         tangents: at the nodes (n, 3).
@@ -324,7 +324,7 @@ def _with_start(rod: Rod) -> Rod:
         if g.start == 0.0:
             fixed[rod.node(g.u)] = _flat(rod, rod.inside(start(g.u)))[0]
     strain = start.strain_at(0.5 * (u[1:] + u[:-1]))
-    if not start.bow:  # whose length is without stress
+    if not start.bow:  # whose length is stress-free
         x = _of_length(x, np.diff(u) * (1.0 + strain), fixed)
     tangents = unit(_flat(rod, start(u, 1) @ rod.axes.T))
     between = unit(np.diff(x, axis=0))
@@ -377,7 +377,7 @@ def _with_start(rod: Rod) -> Rod:
 
 
 def _flat(rod: Rod, x: Floats) -> Floats:
-    """Return vectors (..., 3) without their part across the plane of a planar motion."""
+    """Return vectors (..., 3) without their component across the plane of a planar motion."""
     out = np.array(x)
     if rod.planar:
         out[..., 2] = 0.0
@@ -419,7 +419,8 @@ def _bends(rod: Rod, curve: SplineCurve, between: Floats | None = None) -> Float
 def _of_length(x: Floats, h: Floats, fixed: dict[int, Floats]) -> Floats:
     """Return positions (n, 3) near x with edges of the lengths h (n - 1,) [m] and the `fixed` nodes in place.
 
-    Newton's method on the lengths with the smallest displacement; held nodes too far apart leave a little strain.
+    It is Newton's method on the lengths with the smallest displacement; held nodes that are too far apart leave some
+    strain.
     """
     x = x.copy()
     loose = np.ones(len(x))

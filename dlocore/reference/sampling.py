@@ -1,4 +1,4 @@
-"""A simulated motion at any time: positions between its steps, the angle of its sections, what they remember."""
+"""A simulated motion at any time: positions between its steps, section angles, and what the sections remember."""
 
 from dataclasses import dataclass
 
@@ -13,13 +13,13 @@ from dlocore.reference.rod import carried, unit
 
 Floats = NDArray[np.float64]
 
-KEPT = 33  # times at most at which memory and stretch of a motion are kept
+KEPT = 33  # times, at most, at which memory and stretch of a motion are kept
 
 
 def between(times: Floats, x: Floats, v: Floats, t: Floats) -> Floats:
     """Return x (k, ...) at times t (m,) [s] by cubic polynomials through x and v at the `times` (k,) of steps.
 
-    Where a time occurs twice, the velocity jumps. Beyond the last time x stays.
+    If a time occurs twice, the velocity jumps. After the last time x is constant.
     """
     if len(times) == 1:
         return np.repeat(x, len(t), axis=0)
@@ -91,7 +91,7 @@ def samples(motion: Motion) -> Samples:
 
 
 def stretch_of(motion: Motion) -> StretchMotion:
-    """Return how far the rod is stretched over a motion: its edges in their middles, and both ends as these go on."""
+    """Return the stretch of the rod over a motion: at the middles of its edges, and extrapolated to both ends."""
     u = motion.rod.u
     at = _kept(motion)
     edges = np.array([np.linalg.norm(np.diff(motion.states[k].x, axis=0), axis=1) / np.diff(u) - 1.0 for k in at])
@@ -104,13 +104,13 @@ def stretch_of(motion: Motion) -> StretchMotion:
 
 
 def _kept(motion: Motion) -> NDArray[np.int64]:
-    """Return the times of a motion that are kept of it, each once."""
+    """Return the times of a motion that are kept, each once."""
     at = np.unique(np.linspace(0, len(motion.times) - 1, KEPT).round().astype(int))
     return at[np.concatenate([[True], np.diff(motion.times[at]) > 0.0])]
 
 
 def material_of(motion: Motion, taken: Samples) -> MaterialMotion | None:
-    """Return what the sections remember over a motion; None where they are elastic and straight whatever the start."""
+    """Return what the sections remember over a motion; None if they are elastic, and straight whatever the start."""
     rod = motion.rod
     soft = rod.law[places.SOFTENED]
     yields = rod.law[places.MEMORY_RATE] > 0.0

@@ -31,7 +31,7 @@ from dlocore.words import in_mm
 
 Floats = NDArray[np.float64]
 
-TARGET = 1e-3  # of the length, where no target error is asked for
+TARGET = 1e-3  # of the length, if no target error is requested
 FITTED = 0.05  # of the target: by how much the spline may miss the rods, which are to agree to the rest
 UNSEEN = "The time ran out before it was known whether the scene determines its motion."
 
@@ -147,7 +147,7 @@ def _surface(problem: Problem, refined: Refined, tolerance: float) -> Fit:
     # several within each step, unless that is too many: the spans of the spline are no shorter than a few of them
     last_step, parts = len(steps) - 1, min(WITHIN_STEPS, MOST_TIMES / len(steps))
     times = np.interp(np.append(np.arange(0.0, last_step, 1.0 / parts), last_step), np.arange(len(steps)), steps)
-    # between long steps too, and to the horizon, where it stands still if it could not go on
+    # between long steps too, and up to the horizon; it stands still if it could not continue
     times = np.union1d(times, np.linspace(0.0, problem.horizon, LEAST_TIMES))
     q = np.empty((len(times), len(refined.u), 4))
     q[..., :3] = refined.positions(times)
@@ -247,7 +247,7 @@ def _status(refined: Refined, fitted: Fit, target: float) -> tuple[Status, str]:
 
 
 def _effects(refined: Refined, surface: SplineSurface) -> tuple[EffectReport, ...]:
-    """Return what was simulated: all that the scene has and does not switch off."""
+    """Return what was simulated: everything that the scene has and does not switch off."""
     problem, motion = refined.problem, refined.levels[-1].motion
     space = problem.plane.dimensions == 3
     yields = problem.scene.cable.yields and problem.scene.effects.get("plasticity") != "off"

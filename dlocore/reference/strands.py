@@ -1,4 +1,4 @@
-"""Whether strands of a motion meet: contact of the cable with itself, which the reference does not simulate."""
+"""Whether strands of a motion meet: contact of the cable with itself is not simulated by the reference."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,9 +9,9 @@ from dlocore.reference.refine import Refined
 
 Floats = NDArray[np.float64]
 
-APART = 4.0  # diameters along the cable from which on two parts of it are two strands
+APART = 4.0  # diameters along the cable, from which on two parts of it count as two strands
 MEET = 1.0  # diameters between them
-FINE = 0.25  # diameters between the points that are looked at
+FINE = 0.25  # diameters between the points that are checked
 MOST_POINTS = 4000
 TIMES = 65
 

@@ -84,7 +84,7 @@ def test_shapes_at_rest_have_no_gaps() -> None:
 def test_gaps_are_told_of() -> None:
     gap = lost(hanging(160), 60, 99)
     (said,) = gaps_told([gap])
-    assert said.endswith("is replayed apart: held marker 0 of 'still' from 0.59 to 1 s.")
+    assert said.endswith("are replayed separately: held marker 0 of 'still' from 0.59 to 1 s.")
     assert said in identify([gap], names=("drag",), resolution=Resolution(n_u=9), iterations=1).message
     several = hanging()
     for first in (70, 170, 270, 370, 450):
