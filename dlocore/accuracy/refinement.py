@@ -291,7 +291,7 @@ class _Climb:
         if coarse.posed is not self.problem or march_status(self.problem, coarse)[0] != "converged":
             return
         moved = distance(coarse, level, self.problem)
-        record_level(self.problem, replace(coarse, change=moved, note="tells what steps err by"), self.monitor)
+        record_level(self.problem, replace(coarse, change=moved, note="shows the error of the steps"), self.monitor)
         self.changes.last["time"] = weighed(replace(level, change=moved), coarse, None, True)
         self.estimate = self.changes.estimate(level)
 

@@ -32,7 +32,7 @@ from dlocore.statics.statics import start_grid
 
 Floats = NDArray[np.float64]
 
-LIES_SO = "markers that tell how the cable lies, a first guess nearer to it, or more control points"
+LIES_SO = "markers that show how the cable lies, a first guess closer to it, or more control points"
 _SLACK = 1.003  # of the cable between two grippers: held markers farther apart are brought nearer
 _REST_FRAMES = 8  # frames from which on it can be seen whether a start is at rest
 _CARRIED = 3  # tangents from a marker to the next, over which a frame is carried
@@ -106,7 +106,7 @@ class Replay:
         if recording.static:
             raise SceneError("static", True, "a recording of a motion", "Shapes at rest have no motion to replay")
         if not recording.holds:
-            raise SceneError("held", recording.held, "at least one held marker", "Nothing tells how the cable is moved")
+            raise SceneError("held", recording.held, "at least one held marker", "Nothing shows how the cable is moved")
         self.recording, self.resolution = recording, resolution
         times = cast(Floats, recording.times)
         self.span = Span.of(recording)
@@ -313,7 +313,7 @@ class Replay:
 def no_such_cable(error: SceneError) -> str:
     """Return a message on why a cable can't lie as its markers show, without the fields of a shape made from them."""
     shaped = error.field.startswith("shape.")
-    return f"No such cable can lie so: {'it would be folded or stretched' if shaped else str(error).rstrip('.')}"
+    return f"Such a cable can't lie so: {'it would be folded or stretched' if shaped else str(error).rstrip('.')}"
 
 
 def common_references(recordings: Sequence[Recording]) -> Floats | None:

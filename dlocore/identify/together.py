@@ -29,17 +29,17 @@ def check_together(recordings: Sequence[Recording]) -> None:
     for first, second in combinations(recordings, 2):
         if _same(first.times, second.times) and _same(first.markers, second.markers):
             given = f"times and markers of {first.name!r} again"
-            twice = "What counts twice makes intervals too narrow"
+            twice = "Data that count twice make the intervals too narrow"
             raise SceneError(second.place, given, "each recording once", twice)
         for name, unit in (("length", "m"), ("diameter", "m"), ("linear_density", "kg/m")):
             one, other = getattr(first, name), getattr(second, name)
             if one is not None and other is not None and abs(other - one) > _ALIKE * one:
                 allowed = f"{one:.4g} {unit} as of {first.name!r}, to {_ALIKE:.0%}"
-                raise SceneError(f"{second.place}.{name}", f"{other:.4g} {unit}", allowed, "All are of one cable")
+                raise SceneError(f"{second.place}.{name}", f"{other:.4g} {unit}", allowed, "All must be of one cable")
         if first.point_masses and second.point_masses and not _hang_alike(first, second):
             allowed = f"those of {first.name!r}, to {_ALIKE:.0%}"
             given = "; ".join(f"{one.mass:.4g} kg at {one.u:.4g} m" for one in second.point_masses)
-            raise SceneError(f"{second.place}.point_masses", given, allowed, "All are of one cable")
+            raise SceneError(f"{second.place}.point_masses", given, allowed, "All must be of one cable")
 
 
 def _hang_alike(first: Recording, second: Recording) -> bool:
@@ -60,7 +60,7 @@ def _check_metres(recording: Recording) -> None:
     steps = np.linalg.norm(np.diff(cast(Floats, recording.markers), axis=1), axis=2)
     tracked = float(np.nanmedian(np.nansum(steps, axis=1)))
     if tracked > _STRETCHED * (u[-1] - u[0]):
-        allowed = f"about {u[-1] - u[0]:.4g} m, as `u` tells"
+        allowed = f"about {u[-1] - u[0]:.4g} m, as `u` says"
         given = f"{tracked:.4g} m from the first to the last"
         raise SceneError(f"{recording.place}.markers", given, allowed, MILLIMETRES)
 

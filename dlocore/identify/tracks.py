@@ -112,7 +112,7 @@ def _smoothed(t: Floats, x: Floats, times: Floats) -> CubicSpline:
     most = _MOST * noise_of(x)  # otherwise the path could be all noise
     for _ in range(_PASSES):
         if keep.sum() < _LEAST:
-            raise SceneError("markers", f"{keep.sum()} samples of a held marker", "at least 8 that are no outliers")
+            raise SceneError("markers", f"{keep.sum()} samples of a held marker", "at least 8 that are not outliers")
         first, last = t[keep][0], t[keep][-1]
         spans = max(round(min(_SPANS * keep.sum(), (last - first) / _KNOT)), _LEAST)
         path = smooth(t[keep] - first, x[keep] - middle, np.ones(keep.sum()), last - first, spans, most)

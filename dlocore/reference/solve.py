@@ -95,7 +95,7 @@ def refuse(problem: Problem) -> None:
         )
     damped = cable.bending_damping > 0.0 and effects.get("damping") != "off"
     if problem.plane.dimensions == 3 and effects.get("twist") == "off" and damped:
-        reason = "The sections of the reference always twist in space, and damping acts on bends as they see them"
+        reason = "In space the sections of the reference always twist, and damping acts on bends in their frame"
         raise SceneError("effects.twist", "off", '"on" or "auto" with method "reference"', reason)
 
 
@@ -243,7 +243,7 @@ def _status(refined: Refined, fitted: Fit, target: float) -> tuple[Status, str]:
         return "time_limit", f"The time limit passed; {moved}. Allow more time or a larger target_error."
     if refined.ended == "step":
         return "stalled", f"A step found no solution; {moved}. Make the motion slower or smoother."
-    return "max_iterations", f"No finer rod; {moved}, target {in_mm(target)}. Allow a larger target_error."
+    return "max_iterations", f"No finer rod was tried; {moved}, target {in_mm(target)}. Allow a larger target_error."
 
 
 def _effects(refined: Refined, surface: SplineSurface) -> tuple[EffectReport, ...]:

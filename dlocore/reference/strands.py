@@ -30,7 +30,7 @@ def refuse_meeting(refined: Refined) -> None:
     for t in np.linspace(0.0, problem.horizon, TIMES):
         nodes = refined.positions(np.array([t]))[0]
         if _meet(u, np.column_stack([np.interp(u, refined.u, nodes[:, d]) for d in range(3)]), cable.diameter):
-            reason = f"At {t:.3g} s strands of the cable meet, and the reference does not know of contact between them"
+            reason = f"At {t:.3g} s strands of the cable meet, and the reference does not simulate contact between them"
             given = problem.scene.effects.get("self_contact", "auto")
             raise SceneError("effects.self_contact", given, '"off", or another method', reason)
 

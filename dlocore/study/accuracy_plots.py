@@ -1,4 +1,4 @@
-"""Draw what a study measured of accuracy: error against time, and the convergence of the iterations."""
+"""Plots of the accuracy that a study measured: error against time, and the convergence of the iterations."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -16,7 +16,7 @@ _GRIDS = ("#56B4E9", "#0072B2", "#009E73", "#E69F00", "#D55E00", "#CC79A7", "#00
 
 
 def work_precision(study: Study) -> Figure:
-    """Draw error against time, in the plane and in space: a curve a method and set of effects, the front, a slope."""
+    """Draw error against time, in the plane and in space: a curve per method and set of effects, the front, a slope."""
     kinds = sorted({run.dimensions for run in study.runs})
     figure, panels = new_figure(6.2 * len(kinds), 5.0, 1, len(kinds))
     for axes, dimensions in zip(panels, kinds, strict=True):
@@ -34,9 +34,9 @@ def work_precision(study: Study) -> Figure:
 
 
 class Point(NamedTuple):
-    """A method, with a set of effects, on a grid.
+    """A method with a set of effects on a grid.
 
-    Geometric means of time [ms] and error [mm] over the scenes, and the largest error [mm].
+    It has the geometric means of time [ms] and error [mm] over the scenes, and the largest error [mm].
     """
 
     time: float
@@ -47,7 +47,7 @@ class Point(NamedTuple):
 
 
 def _work_precision_panel(axes: Axes, runs: Sequence[Run]) -> list[Point]:
-    """Draw every run faintly and the geometric mean over the scenes strongly; return the means of what was solved."""
+    """Draw every run faintly and the geometric mean over the scenes strongly; return the means of the solved runs."""
     points: list[Point] = []
     sets = list(dict.fromkeys(run.effects for run in runs))
     for method, effects in dict.fromkeys((run.method, run.effects) for run in runs):
@@ -67,7 +67,7 @@ def _work_precision_panel(axes: Axes, runs: Sequence[Run]) -> list[Point]:
         for grid in sorted({(run.n_u, run.n_t) for run in good}):
             group = [run for run in good if (run.n_u, run.n_t) == grid]
             if len({run.scene for run in group}) < len({run.scene for run in mine}):
-                continue  # a mean over other scenes than its neighbours'
+                continue  # a mean over other scenes than its neighbours
             time, error = (
                 float(np.exp(np.mean(np.log([1e3 * getattr(run, name) for run in group]))))
                 for name in ("wall_time", "error")
@@ -84,7 +84,7 @@ def _work_precision_panel(axes: Axes, runs: Sequence[Run]) -> list[Point]:
 
 
 def _front(axes: Axes, points: list[Point]) -> None:
-    """Mark the Pareto front with the grids on it, and draw the slope that halving every spacing would give."""
+    """Mark the Pareto front with its grids, and draw the slope that halving all spacings would give."""
     if not points:
         return
     times, errors = np.array([p.time for p in points]), np.array([p.error for p in points])
@@ -100,7 +100,7 @@ def _front(axes: Axes, points: list[Point]) -> None:
 
 
 def _finding(points: list[Point]) -> str:
-    """Return the fastest way to a millimetre in every scene, or else how near the best comes."""
+    """Return the fastest way to an error of a millimetre in every scene, or how near the best one comes."""
     if not points:
         return "nothing converged"
     good = [p for p in points if p.largest <= 1.0]

@@ -1,4 +1,4 @@
-"""Measure a machine: errors and times of both methods over grids, and what coordinates, effects and estimates add."""
+"""Calibrate a machine: errors and times of both methods over grids, and the cost of coordinates, effects, estimates."""
 
 import time
 from collections.abc import Callable
@@ -37,7 +37,7 @@ _PATIENCE = 0.4  # [s] for the repeats of one solve
 
 @dataclass(frozen=True, kw_only=True)
 class _Run:
-    """One solve, repeated: of what, on which grid, and what came of it."""
+    """One repeated solve: the scene, the grid, and the result."""
 
     dimensions: int
     method: Method
@@ -59,7 +59,7 @@ class _Run:
 
 @dataclass
 class _Course:
-    """How far the measurement is; `next` tells of the next part, and stops where that is asked for."""
+    """The progress of the measurement; `next` announces the next part, and stops if that is requested."""
 
     total: int
     repeats: int
@@ -101,8 +101,8 @@ def measure(
 
     Args:
         repeats: timed calls of each solve, at most.
-        on_progress: called before each part with how many are done, how many there are, and what comes.
-        cancelled: asked before each part; where it returns True the measurement stops.
+        on_progress: called before each part with how many are done, how many there are, and which is next.
+        cancelled: called before each part; if it returns True the measurement stops.
 
     Raises:
         Cancelled: `cancelled` returned True.
@@ -160,7 +160,7 @@ def _points(runs: list[_Run]) -> list[Measured]:
 
 
 def _effects(course: _Course, scenes: dict[str, Scene]) -> dict[str, float]:
-    """Return how many times as long the marches of the same motion take with each effect."""
+    """Return, by effect, the factor by which it lengthens the marches of the same motion."""
 
     def times(name: str, scene: Scene) -> list[float]:
         return [course.run(name, scene, "march", grid).times.median for grid in _EFFECT_GRIDS]
@@ -170,7 +170,7 @@ def _effects(course: _Course, scenes: dict[str, Scene]) -> dict[str, float]:
 
 
 def _estimates(course: _Course) -> dict[str, float]:
-    """Return by method how many times as long a solve takes with an error estimate."""
+    """Return, by method, the factor by which an error estimate lengthens a solve."""
     found = {}
     for method in GRIDS:
         bare, estimated = (
@@ -185,12 +185,12 @@ def _estimates(course: _Course) -> dict[str, float]:
 
 
 def _ratio(times: list[float], others: list[float]) -> float:
-    """Return the geometric mean of the ratios of two rows of times."""
+    """Return the geometric mean of the ratios of two lists of times."""
     return float(np.exp(np.mean(np.log(times) - np.log(others))))
 
 
 def _deviation(cost: Cost, samples: list[Sample]) -> dict[str, float]:
-    """Return by method the median factor between modelled and measured times, whichever is larger."""
+    """Return, by method, the median factor between modelled and measured times, taken to be at least 1."""
     factors: dict[str, list[float]] = {"march": [], "spacetime": []}
     for s in samples:
         method = "spacetime" if s.iterations else "march"

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from dlocore.study.record import Run, Study
 from dlocore.words import counted
 
-SLOWER = 1.15  # times: what two measurements on one machine differ by without any change
+SLOWER = 1.15  # times: two measurements on one machine may differ by this without any change
 SPREADS = 4.0  # times the spreads of both: about 2.7 standard deviations of a normal distribution
-LEAST_REPEATS = 3  # of both: the spread of fewer tells nothing of the noise
-LESS_ACCURATE = 1.1  # times: the compiler may order additions anew, and Newton's iterations stop elsewhere
+LEAST_REPEATS = 3  # of both: with fewer, the spread says nothing about the noise
+LESS_ACCURATE = 1.1  # times: the compiler may reorder additions, and Newton's iterations may stop elsewhere
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,11 +16,11 @@ class Change:
     """One quantity of one run that changed.
 
     Attributes:
-        run: which, in words.
+        run: the run, in words.
         quantity: "time" [s], "error" [m] or "status".
         before: its value in the earlier study.
         now: its value.
-        worse: whether for the worse.
+        worse: whether it became worse.
     """
 
     run: str
@@ -35,12 +35,12 @@ class Comparison:
     """What changed between two studies.
 
     Attributes:
-        changes: beyond noise, the worse ones first.
-        compared: runs that both have.
+        changes: those beyond noise, the worse ones first.
+        compared: number of runs that both have.
         missing: runs that only the earlier one has, in words.
         same_machine: whether times could be compared.
-        barely_timed: runs whose times were not compared, as one of the studies has less than three of them.
-        same_judge: whether errors could be.
+        barely_timed: runs whose times were not compared because one of the studies has fewer than three of them.
+        same_judge: whether errors could be compared.
     """
 
     changes: tuple[Change, ...]
@@ -52,16 +52,16 @@ class Comparison:
 
     @property
     def worse(self) -> tuple[Change, ...]:
-        """What changed for the worse."""
+        """The changes for the worse."""
         return tuple(change for change in self.changes if change.worse)
 
 
 def compare(now: Study, before: Study) -> Comparison:
     """Compare the runs that two studies have in common.
 
-    A time has changed where it differs by more than 15 % and by more than four times the spreads of both. An error has
-    changed where it differs by more than 10 % and by more than the errors of both truths. Times of different machines
-    or of less than three repeats, and errors against different truths, are not compared.
+    A time has changed if it differs by more than 15 % and by more than four times the spreads of both. An error has
+    changed if it differs by more than 10 % and by more than the errors of both truths. Times of different machines or
+    of fewer than three repeats, and errors against different truths, are not compared.
     """
     earlier = {run.key: run for run in before.runs}
     pairs = [(run, earlier[run.key]) for run in now.runs if run.key in earlier]
@@ -122,12 +122,12 @@ def words(comparison: Comparison) -> str:
     lines = [f"{comparison.compared} runs compared; {len(comparison.worse)} changes for the worse"]
     lines += [f"not measured now: {run}" for run in comparison.missing]
     if not comparison.same_machine:
-        lines.append("another machine: times are not compared")
+        lines.append("different machines: times are not compared")
     elif comparison.barely_timed:
         of = counted(comparison.barely_timed, "run")
-        lines.append(f"times of {of} are not compared: less than {LEAST_REPEATS} repeats in one of the studies")
+        lines.append(f"times of {of} are not compared: fewer than {LEAST_REPEATS} repeats in one of the studies")
     if not comparison.same_judge:
-        lines.append("another judge: errors are not compared")
+        lines.append("different judges: errors are not compared")
     for change in comparison.changes:
         mark = "worse " if change.worse else "better"
         lines.append(f"{mark} {_shown(change):34} {change.run}")

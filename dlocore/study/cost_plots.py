@@ -1,4 +1,4 @@
-"""Draw what a study measured of cost: time by phase and by effect, and against the size of a problem."""
+"""Plots of the cost that a study measured: time by phase and by effect, and against the size of a problem."""
 
 from collections.abc import Sequence
 
@@ -55,7 +55,7 @@ def phases(study: Study) -> Figure:
 
 
 def _shares(runs: Sequence[Run]) -> dict[str, float]:
-    """Return the share of each phase in the time of some runs, each run counting the same."""
+    """Return the share of each phase in the time of some runs, with equal weight for each run."""
     found: dict[str, float] = {}
     for run in runs:
         total = sum(run.phases.values())
@@ -65,7 +65,7 @@ def _shares(runs: Sequence[Run]) -> dict[str, float]:
 
 
 def effect_costs(study: Study) -> Figure:
-    """Draw how many times as long a march takes with each effect as without it."""
+    """Draw the time of a march with each effect relative to that without it."""
     rows = sorted(study.effects, key=lambda cost: cost.present / cost.absent)
     figure, (axes,) = new_figure(7.4, 1.3 + 0.34 * len(rows))
     ratios = [cost.present / cost.absent for cost in rows]
@@ -117,7 +117,7 @@ def scaling(study: Study) -> Figure:
 def _scaling_curve(axes: Axes, rows: Sequence[Scaled], method: str) -> tuple[str, float]:
     values, times = np.array([row.value for row in rows]), np.array([1e3 * row.wall_time for row in rows])
     spread = np.array([min(1e3 * row.spread, 0.9 * t) for row, t in zip(rows, times, strict=True)])
-    upper = slice(len(rows) // 3, None)  # below, what does not grow with the size tells on the exponent
+    upper = slice(len(rows) // 3, None)  # below, the part that does not grow with the size distorts the exponent
     p, c = exponent(values[upper], times[upper])
     axes.errorbar(values, times, yerr=spread, fmt=MARKS[method], markersize=5, color=COLOURS[method], label=method)
     axes.plot(values[upper], c * values[upper] ** p, "-", color=COLOURS[method], linewidth=1.2, alpha=0.8)

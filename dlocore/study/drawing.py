@@ -1,4 +1,4 @@
-"""Draw a study into pictures. Needs matplotlib."""
+"""Draw the plots of a study. Needs matplotlib."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -12,16 +12,16 @@ from dlocore.study.cost_plots import effect_costs, phases, scaling
 from dlocore.study.record import Study
 
 _DPI = 110
-_PER_INCH = 17  # letters of the caption
-_LINE = 0.12  # [in] of its lines
+_PER_INCH = 17  # characters of the caption
+_LINE = 0.12  # [in] height of its lines
 
 
 def draw_all(study: Study, folder: Path) -> list[Path]:
-    """Draw every plot that a study has the measurements for, and return the files.
+    """Draw every plot for which a study has the measurements, and return the files.
 
     Args:
         study: what was measured.
-        folder: where the pictures go; made where it does not exist.
+        folder: where the pictures go; created if it does not exist.
     """
     folder.mkdir(parents=True, exist_ok=True)
     plots: dict[str, tuple[Callable[[Study], Figure], bool]] = {
@@ -45,7 +45,7 @@ def draw_all(study: Study, folder: Path) -> list[Path]:
 
 
 def _caption(figure: Figure, study: Study) -> None:
-    """Write below a figure what was measured where, in as many lines as its width asks for."""
+    """Write below a figure what was measured and where, in as many lines as its width requires."""
     machine = ", ".join([study.machine["processor"], f"Python {study.machine.get('Python', '?')}"])
     day = study.measured_at.replace("T", " ").replace("Z", " UTC")
     text = f"dlo study; {machine}; {day}; program {study.source}; one thread, time on a core of its own"

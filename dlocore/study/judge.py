@@ -1,4 +1,4 @@
-"""Truth to measure errors against: a march refined until it stands still, or the independent reference."""
+"""The truth against which errors are measured: a march refined until it no longer changes, or the reference."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 SAMPLES = (101, 33)  # along the cable and in time, at which surfaces are compared
 GRIDS = ((33, 65), (49, 97), (65, 129), (97, 193), (129, 257), (129, 385), (129, 513))  # (n_u, n_t)
-TOLERANCE = 2e-4  # of the length: the error of the reference that judges, where nothing else is asked
+TOLERANCE = 2e-4  # of the length: the error of the reference used as truth, if nothing else is requested
 STILL = 2e-5  # of the length: a refinement that moves the motion by less is the last
 
 
@@ -26,9 +26,9 @@ class Truth:
 
     Attributes:
         positions: (n_t, n_u, 3) [m], evenly spaced in time and along the cable.
-        moved: by how much the last refinement moved it, or its own estimated error [m].
+        moved: how far the last refinement moved it, or its own estimated error [m].
         n_u, n_t: the finest grid.
-        status: that of the finest solve.
+        status: of the finest solve.
     """
 
     positions: Floats
@@ -53,10 +53,10 @@ def finest_march(
     """March on finer and finer grids until a refinement moves the motion by less than `still` of the length.
 
     Args:
-        scene: whose motion; its quality is not regarded.
-        still: where to stop, as a part of the cable's length.
-        patience: no finer grid once the marches have taken so long [s].
-        cancelled: asked within the solves; where it returns True they stop.
+        scene: the scene; its quality is ignored.
+        still: where to stop, as a fraction of the cable's length.
+        patience: no finer grid once the marches have taken this long [s].
+        cancelled: called within the solves; if it returns True they stop.
 
     Raises:
         SceneError: the scene can't be solved.
@@ -83,8 +83,8 @@ def step_by_step(scene: Scene, *, cancelled: Callable[[], bool] | None = None) -
     """Simulate a scene step by step, refined until the reference's own estimated error is below TOLERANCE.
 
     Args:
-        scene: whose motion; its quality is not regarded.
-        cancelled: asked within the solve; where it returns True it stops.
+        scene: the scene; its quality is ignored.
+        cancelled: called within the solve; if it returns True it stops.
 
     Raises:
         SceneError: the scene can't be solved, or has an effect that the reference does not cover.
@@ -95,7 +95,7 @@ def step_by_step(scene: Scene, *, cancelled: Callable[[], bool] | None = None) -
 
 
 def as_truth(prediction: Prediction) -> Truth:
-    """Return a prediction as the truth, which is as sure as its own estimated error."""
+    """Return a prediction as the truth, with its own estimated error as the error of the truth."""
     accuracy = prediction.accuracy
     return Truth(
         positions=positions_of(prediction),
@@ -107,5 +107,5 @@ def as_truth(prediction: Prediction) -> Truth:
 
 
 def largest_error(prediction: Prediction, truth: Truth) -> float:
-    """Return the largest distance of a prediction to the truth, over the cable and the time [m]."""
+    """Return the largest distance of a prediction from the truth, over the cable and time [m]."""
     return float(np.linalg.norm(positions_of(prediction) - truth.positions, axis=-1).max())

@@ -1,4 +1,4 @@
-"""What a study is to measure."""
+"""What a study measures."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -19,7 +19,7 @@ _NO_CHANGE: Mapping[str, Switch] = {}
 
 
 class Case(NamedTuple):
-    """One run to be measured: names of scene and set of effects, and the scene with its quality."""
+    """One run to be measured: the names of scene and set of effects, and the scene with its quality."""
 
     name: str
     effects: str
@@ -31,15 +31,15 @@ class Plan:
     """Scenes over grids, thresholds, methods and sets of effects.
 
     Args:
-        scenes: by name; their own quality is not regarded. None: the paper's four grasps and a hanging cable.
+        scenes: by name; their own quality is ignored. None: the paper's four grasps and a hanging cable.
         grids: (n_u, n_t) of each.
         methods: "march", "spacetime", "paper".
         deltas: thresholds on the update [m]; a march has none, and is measured once.
         effects: switches by effect, by the name of the set; they replace those of the scenes.
         repeats: timed calls of each solve, 1 to 100.
-        estimate: whether the solves estimate their error, too.
-        judge: what errors are distances to: "march", the project's own march refined until it stands still, or
-            "reference", the independent step-by-step simulation, which takes from a second to minutes a scene.
+        estimate: whether the solves also estimate their error.
+        judge: the truth for errors: "march", the project's own march refined until it no longer changes, or
+            "reference", the independent step-by-step simulation, which takes from a second to minutes per scene.
         parts: which of "runs", "scaling" and "effects" are measured.
 
     Raises:

@@ -1,4 +1,4 @@
-"""What a study measured, as frozen data and as JSON."""
+"""The results of a study, as frozen data and as JSON."""
 
 import json
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ from typing import Any, Literal, TypeVar
 from dlocore.errors import DloError
 
 FORMAT = 1
-_BESIDE = ("format", "id", "state", "created")  # what a document has besides the fields of `Study`
+_BESIDE = ("format", "id", "state", "created")  # what a document has in addition to the fields of `Study`
 Part = Literal["runs", "scaling", "effects"]
 PARTS: tuple[Part, ...] = ("runs", "scaling", "effects")
 
@@ -26,7 +26,7 @@ class Step:
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """One scene by one method on one grid, repeated.
+    """One scene solved by one method on one grid, repeatedly.
 
     Attributes:
         scene: its name.
@@ -38,13 +38,13 @@ class Run:
         steps: time steps of the march.
         status: of the prediction.
         wall_time: of one solve on a core of its own, the median of the repeats [s].
-        spread: half the width that holds half of the repeats [s].
+        spread: half the width of the range that contains half of the repeats [s].
         repeats: timed calls.
         error: largest distance to the truth over cable and time [m].
         rms: root mean square distance [m].
-        truth_error: about the error of the truth itself [m]; None where nothing tells.
+        truth_error: approximate error of the truth itself [m]; None if unknown.
         estimate: the error that the prediction states [m].
-        iterations: how the solve went.
+        iterations: the course of the solve.
         phases: time by phase [s].
         active: the effects that were simulated.
     """
@@ -71,20 +71,20 @@ class Run:
 
     @property
     def key(self) -> tuple[str, str, str, int, int, float]:
-        """What tells it from the other runs of a study."""
+        """What distinguishes it from the other runs of a study."""
         return self.scene, self.effects, self.method, self.n_u, self.n_t, self.delta
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scaled:
-    """The time of a solve at one value of what its cost is measured against.
+    """The time of a solve at one value of the quantity against which its cost is measured.
 
     Attributes:
         variable: "n_u", "n_t", "horizon" or "grasps".
-        value: of it; the horizon in s.
+        value: its value; the horizon in s.
         method: how it was solved.
-        wall_time: the median of the repeats; of an iteration alone where the method iterates [s].
-        spread: half the width that holds half of the repeats [s].
+        wall_time: the median of the repeats; of a single iteration if the method iterates [s].
+        spread: half the width of the range that contains half of the repeats [s].
     """
 
     variable: str
@@ -105,16 +105,16 @@ class EffectCost:
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """What a study measured.
+    """The results of a study.
 
     Attributes:
         machine: processor, cores, system, versions.
-        source: a mark of the program text that was measured.
+        source: an identifier of the program text that was measured.
         measured_at: when, ISO 8601 in UTC.
         duration: how long it took [s].
-        judge: what the errors are distances to.
+        judge: the truth that errors refer to.
         runs: scenes over grids, thresholds, methods and sets of effects.
-        refused: what could not be measured, and why: runs that the solver does not take, times that noise drowned.
+        refused: what could not be measured, and why: runs that the solver refuses, and times lost in noise.
         scaling: cost against the size of a problem.
         effects: cost by effect.
     """
@@ -131,7 +131,7 @@ class Study:
 
 
 class StudyError(DloError, ValueError):
-    """A file that holds no study."""
+    """A file is not a study."""
 
 
 def to_document(study: Study) -> dict[str, Any]:
@@ -140,13 +140,13 @@ def to_document(study: Study) -> dict[str, Any]:
 
 
 def from_document(document: Any) -> Study:
-    """Return the study that `to_document` gave.
+    """Return the study from a document of `to_document`.
 
     Raises:
-        StudyError: it is no study, or one of another form.
+        StudyError: it is not a study, or has another format.
     """
     if not isinstance(document, dict) or "format" not in document:
-        raise StudyError("This is no study, as `dlo study -o` writes it.")
+        raise StudyError("This is not a study as written by `dlo study -o`.")
     try:
         if document["format"] != FORMAT:
             raise StudyError(f"format: got {document['format']!r}. Allowed: {FORMAT}.")
@@ -160,9 +160,9 @@ def from_document(document: Any) -> Study:
     except StudyError:
         raise
     except KeyError as error:
-        raise StudyError(f"This is no study: {error} is missing.") from None
+        raise StudyError(f"This is not a study: {error} is missing.") from None
     except (TypeError, ValueError, AttributeError) as error:
-        raise StudyError(f"This is no study: {error}.") from None
+        raise StudyError(f"This is not a study: {error}.") from None
 
 
 def _run(values: dict[str, Any]) -> Run:
@@ -187,7 +187,7 @@ _Row = TypeVar("_Row", Step, Run, Scaled, EffectCost, Study)
 
 
 def _plain(kind: type[_Row], values: Mapping[str, Any]) -> _Row:
-    """Return a row of a study, whose texts and numbers are some."""
+    """Return a row of a study; its fields must have their types."""
     row = kind(**values)
     for part in fields(kind):
         if part.type not in _KINDS:
@@ -208,9 +208,9 @@ def load(path: Path) -> Study:
 
     Raises:
         OSError: the file can't be read.
-        StudyError: it holds no study.
+        StudyError: it is not a study.
     """
     try:
         return from_document(json.loads(path.read_text()))
     except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise StudyError(f"This is no JSON: {error}.") from None
+        raise StudyError(f"This is not JSON: {error}.") from None

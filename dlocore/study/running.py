@@ -22,7 +22,7 @@ from dlocore.words import in_ms
 
 OnProgress = Callable[[int, int, str], None]
 _PATIENCE = 2.0  # [s] for the repeats of one solve
-_TRUTH_PATIENCE = 10.0  # [s] for the marches that make a truth, before the last
+_TRUTH_PATIENCE = 10.0  # [s] for the marches that make a truth, before the last one
 
 
 def run_study(
@@ -32,15 +32,15 @@ def run_study(
     cancelled: Callable[[], bool] = lambda: False,
     deadline: float | None = None,
 ) -> Study:
-    """Measure what a plan asks for.
+    """Measure what a plan requests.
 
-    A run that the solver does not take, such as a grid without room for a scene's grasps, is noted and passed over.
+    A run that the solver refuses, such as a grid without room for a scene's grasps, is recorded as refused and skipped.
 
     Args:
         plan: what is measured.
-        on_progress: called before each part with how many are done, how many there are, and what comes.
-        cancelled: asked within the solves; where it returns True the study stops.
-        deadline: time allowed to one solve [s]; one that reaches it is measured as far as it got.
+        on_progress: called before each part with how many are done, how many there are, and which is next.
+        cancelled: called within the solves; if it returns True the study stops.
+        deadline: time allowed for one solve [s]; one that reaches it is measured as far as it got.
 
     Raises:
         Cancelled: `cancelled` returned True.
@@ -67,7 +67,7 @@ def run_study(
 
 
 class _Measuring:
-    """The course of one study: how far it is, and what was refused."""
+    """The progress of one study, and what was refused."""
 
     def __init__(
         self, plan: Plan, on_progress: OnProgress, cancelled: Callable[[], bool], deadline: float | None
@@ -84,7 +84,7 @@ class _Measuring:
         self.refused: list[str] = []
 
     def next(self, what: str) -> None:
-        """Tell what comes, and stop where that is asked for."""
+        """Announce the next part, and stop if that is requested."""
         if self._cancelled():
             raise Cancelled("The study was cancelled.")
         self._on_progress(self._done, self.total, what)
@@ -138,7 +138,7 @@ class _Measuring:
             count, before = 1, 0.0
             if method == "march":
                 marches[key] = times.median
-            else:  # how many iterations a solve takes is no matter of its size
+            else:  # the number of iterations that a solve takes does not depend on its size
                 count, before = len(prediction.iterations), marches[key]
             if times.median <= before:
                 began = f"{in_ms(times.median)}, not above the {in_ms(before)} of the march that it begins with"

@@ -27,7 +27,7 @@ class Size(NamedTuple):
 
 
 def _swung(horizon: float) -> Scene:
-    """Return a cable on a table that a gripper at 0.25 m swings to and fro, once in 2 s."""
+    """Return a cable on a table that a gripper at 0.25 m swings back and forth, once in 2 s."""
     times = np.arange(0.0, horizon + 0.25, 0.5)
     swing = 0.1 * np.sin(np.pi * times)
     positions = np.column_stack([0.25 + 0 * times, swing, 0 * times])
@@ -38,7 +38,7 @@ def _swung(horizon: float) -> Scene:
 
 def _held(count: int) -> Scene:
     """Return a bent cable on a table that `count` grippers, evenly spaced, move sideways together."""
-    angle = np.linspace(0.0, 1.0, 41)  # [rad]: bent, each part between two grippers is slack
+    angle = np.linspace(0.0, 1.0, 41)  # [rad]: bent, so that each part between two grippers is slack
     arc = np.column_stack([np.sin(angle), 1.0 - np.cos(angle)])
     path = Move(displacement=(0.0, 0.3, 0.0), duration=1.6)
     grasps = tuple(Grasp(u=float(u), path=path) for u in np.linspace(0.0, 1.0, count))

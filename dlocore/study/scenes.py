@@ -1,4 +1,4 @@
-"""The scenes that a machine is calibrated on."""
+"""The scenes on which a machine is calibrated."""
 
 from dataclasses import replace
 from typing import Any
@@ -30,7 +30,7 @@ def paper_case(grasp: float, **table: float) -> Scene:
 
 
 def hanging(hold: Hold = "point") -> Scene:
-    """Return a cable that hangs between two grippers, of which one moves it out of its plane."""
+    """Return a cable that hangs between two grippers, one of which moves it out of its plane."""
     angle = np.linspace(-1.2, 1.2, 41)
     radius = 1.0 / 2.4
     arc = radius * np.column_stack([np.sin(angle) - np.sin(angle[0]), 0 * angle, np.cos(angle[0]) - np.cos(angle)])
@@ -50,7 +50,7 @@ def accuracy_scenes() -> dict[str, Scene]:
 
 
 def effect_scenes() -> dict[str, Scene]:
-    """Return for each effect that costs time by itself a scene like the paper's at 0.25 m that has it, by effect."""
+    """Return, for each effect that costs time by itself, a scene with it, otherwise like the paper's at 0.25 m."""
     plain = paper_case(0.25)
     peg = Cylinder(center=(0.8, 0.12, 0.0), radius=0.02, height=0.1)
     return {

@@ -10,14 +10,14 @@ from dlocore.shape.fit import forget_fits
 
 Answer = TypeVar("Answer")
 
-# A solve runs in one thread: the processor time of this thread is the time that it takes on a core of its own, whatever
-# else the machine does. Where the clock of a thread is coarse, the time that passes has to do.
+# A solve runs in one thread: the processor time of this thread is its time on a core of its own, whatever else the
+# machine does. If the clock of a thread is coarse, the elapsed time has to do.
 _FINE = 1e-6  # [s]
 clock = time.thread_time if time.get_clock_info("thread_time").resolution <= _FINE else time.perf_counter
 
 
 class Times(NamedTuple):
-    """Times of repeated calls [s]: their median, the half width that holds half of them, and how many they are."""
+    """Times of repeated calls [s]: their median, half the width of the range of half of them, and their number."""
 
     median: float
     spread: float
@@ -27,12 +27,12 @@ class Times(NamedTuple):
 def timed(call: Callable[[], Answer], repeats: int, patience: float = np.inf) -> tuple[Answer, Times]:
     """Return the last answer of `call` and its times; the first of several calls, which loads code, is not counted.
 
-    A call finds nothing of those before it: fits of points are forgotten in between.
+    No call benefits from earlier ones: cached fits of points are cleared in between.
 
     Args:
         call: what is measured.
         repeats: how often, at least 1.
-        patience: no further repeats after so much time in all [s].
+        patience: no further repeats after this total time [s].
     """
     taken: list[float] = []
     while len(taken) <= repeats and (len(taken) < 2 or sum(taken) < patience):

@@ -28,7 +28,7 @@ def test_a_recording_that_is_given_twice_is_refused() -> None:
 )
 def test_facts_that_contradict_each_other_are_refused(field: str, one: float, other: float) -> None:
     first, second = recording("first", **{field: one}), recording("second", 0.1, **{field: other})
-    with pytest.raises(SceneError, match="All are of one cable") as error:
+    with pytest.raises(SceneError, match="All must be of one cable") as error:
         check_together([first, second])
     assert error.value.field == f"recordings['second'].{field}"
     check_together([first, replace(second, **{field: 1.01 * one})])  # as medians of noisy distances differ

@@ -124,7 +124,7 @@ def test_what_steps_err_by_is_learned_from_half_as_many_where_twice_as_many_are_
     monkeypatch.setattr(budget, "_DEAR", 0.0)  # as if the time were nearly up
     found = predict(scene, deadline=60.0)
     assert found.status == "converged"
-    assert sum("tells what steps err by" in step.note for step in found.iterations) == 1
+    assert sum("shows the error of the steps" in step.note for step in found.iterations) == 1
     truth = predict(replace(scene, quality=march(129, 480)), keep_grid=True)
     estimate = found.accuracy.error_estimate
     assert estimate is not None

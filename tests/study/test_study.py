@@ -99,7 +99,7 @@ NO_STUDIES = ["", "[]", "{}", '{"format": 7}', '{"format": 1, "runs": 3}', '{"fo
 @pytest.mark.parametrize("text", NO_STUDIES, ids=lambda text: text[:30])
 def test_what_is_no_study_is_refused_in_words(text: str, tmp_path: Path) -> None:
     (tmp_path / "no.json").write_text(text)
-    with pytest.raises(record.StudyError, match=r"no study|no JSON|Allowed") as refused:
+    with pytest.raises(record.StudyError, match=r"not a study|not JSON|Allowed") as refused:
         record.load(tmp_path / "no.json")
     assert "indices" not in str(refused.value)
 
@@ -125,7 +125,7 @@ def test_a_run_of_a_study_with_a_wrong_value_is_refused_by_its_name(measured: St
 
 
 def test_a_study_without_a_machine_is_refused(measured: Study) -> None:
-    with pytest.raises(record.StudyError, match="no study"):
+    with pytest.raises(record.StudyError, match="not a study"):
         record.from_document({**record.to_document(measured), "machine": None})
 
 
@@ -182,7 +182,7 @@ def test_times_of_another_machine_are_not_compared(measured: Study) -> None:
     comparison = compare(elsewhere, measured)
     assert not comparison.same_machine
     assert comparison.changes == ()
-    assert "another machine" in words(comparison)
+    assert "different machines" in words(comparison)
 
 
 def test_a_grid_without_room_is_noted_and_the_rest_is_measured() -> None:
